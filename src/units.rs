@@ -25,6 +25,10 @@ pub const MILLI_G: f64 = 1e-3 * STANDARD_GRAVITY;
 pub const MILLIGAL: f64 = 1e-5;
 /// One micro-g per root hertz (velocity random walk) in (m/s)/√s.
 pub const MICRO_G_PER_SQRT_HZ: f64 = MICRO_G;
+/// One hour in seconds.
+pub const HOUR: f64 = 3600.0;
+/// One minute in seconds.
+pub const MINUTE: f64 = 60.0;
 /// One millisecond in seconds.
 pub const MILLISECOND: f64 = 1e-3;
 /// One international nautical mile in metres (exact by definition).

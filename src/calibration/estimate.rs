@@ -1,9 +1,10 @@
 //! Both triads with the covariance of their parameters.
 
 use crate::calibration::budget::curvature::curvature;
-use crate::calibration::{ParameterMatrix, ParameterVector, parameter, to_vector};
+use crate::calibration::{PARAMETERS, ParameterMatrix, ParameterVector, parameter, to_vector};
 use crate::imu::{InstallationForm, PerSensor, Sensor, Triad};
 use crate::run::Run;
+use nalgebra::{DMatrix, DMatrixView};
 
 /// Both triads with the covariance of their parameters.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,6 +36,24 @@ impl Estimate {
     /// 1σ of each parameter; zero for those that were not estimated.
     pub fn sigma(&self) -> ParameterVector {
         self.covariance.diagonal().map(|v| v.max(0.0).sqrt())
+    }
+
+    /// Covariance of its parameters and of what is estimated beside them, given that of these and between them.
+    pub fn covariance_with<'a>(
+        &self,
+        cross: impl Into<DMatrixView<'a, f64>>,
+        own: &DMatrix<f64>,
+    ) -> DMatrix<f64> {
+        let (cross, n) = (cross.into(), own.nrows());
+        let mut all = DMatrix::zeros(PARAMETERS + n, PARAMETERS + n);
+        let corner = (PARAMETERS, PARAMETERS);
+        all.view_mut((0, 0), corner).copy_from(&self.covariance);
+        all.view_mut(corner, (n, n)).copy_from(own);
+        all.view_mut((0, PARAMETERS), (PARAMETERS, n))
+            .copy_from(&cross);
+        let mut below = all.view_mut((PARAMETERS, 0), (n, PARAMETERS));
+        below.copy_from(&cross.transpose());
+        all
     }
 
     /// The installation form, one for both triads.

@@ -72,6 +72,7 @@ use problem::Stretch;
 pub use reduction::{Epoch, Own};
 use reduction::{Reduction, Script};
 pub use result::at_rest::{AtRest, AxisAtRest, Second};
+pub use result::at_temperature::TemperatureError;
 pub use result::comparison::{Comparison, Named, Side, compare};
 pub use result::correction::{Calibrated, Correction, CorrectionError};
 pub use result::frame::{Canonical, in_body_frame};
@@ -83,12 +84,11 @@ pub use result::thermal_record::{
     ValueRecord,
 };
 pub use result::{Calibration, Method, triads_of};
-pub use several::at_temperature::TemperatureError;
 pub use several::day_to_day::{DayToDay, Difference};
-pub use several::separate_estimate::SeparateEstimate;
 pub use several::thermal::{Coefficient, Thermal};
 pub use several::{Repeatability, TemperatureOptions, Together};
 pub use solution::{Assessment, Solution};
+pub use solved::SeparateEstimate;
 use solved::Solved;
 pub use start::closed_form::{ClosedForm, Reference, six_position, six_position_of};
 pub use start::coarse::{CoarseStart, coarse_start};

@@ -1,9 +1,37 @@
 //! What iterations found, and with what they were made.
 
 use crate::calibration::{
-    AttitudePrior, CalibrationError, Finding, FoundCause, Gate, Iterated, NoiseReport, Pass,
-    Problem, Progress, SeparateEstimate, iterate,
+    AttitudePrior, CalibrationError, Estimate, Finding, FoundCause, Gate, Iterated, Linearisation,
+    NoiseReport, Pass, Problem, Progress, iterate,
 };
+use crate::imu::{PerSensor, ThermalState};
+
+/// What a recording alone says.
+#[derive(Debug, Clone)]
+pub struct SeparateEstimate {
+    /// Its name.
+    pub name: String,
+    /// Mean temperature of each axis, °C, and its rate, K/s, over its dwells; none where it is not known.
+    pub temperature: Option<PerSensor<[f64; 3]>>,
+    /// The span of its temperatures, K.
+    pub span: f64,
+    /// Calibration at that temperature, with the noise that is stated or, where it may be learnt and has to be, with
+    /// that of its own; none where it gave none.
+    pub estimate: Option<Estimate>,
+    /// Where its temperature stands for all of it: the functions of temperature then.
+    pub(in crate::calibration) state: Option<ThermalState>,
+    /// The estimate with the initial attitudes, or the coarse start.
+    pub(in crate::calibration) at: Linearisation,
+    pub(in crate::calibration) priors: Vec<AttitudePrior>,
+}
+
+impl SeparateEstimate {
+    /// Mean temperature of all axes over its dwells, °C.
+    pub fn mean_temperature(&self) -> Option<f64> {
+        let PerSensor { gyro, accel } = self.temperature?;
+        Some(gyro.iter().chain(&accel).sum::<f64>() / 6.0)
+    }
+}
 
 /// A problem whose iterations have ended.
 #[derive(Clone)]
@@ -63,6 +91,19 @@ impl<'a> Solved<'a> {
                 .ok()
                 .filter(|again| again.iterated.converged || !self.iterated.converged)),
         }
+    }
+
+    /// By iterations from a point of linearisation.
+    pub fn of(
+        problem: &Problem<'a>,
+        priors: Vec<AttitudePrior>,
+        from: Linearisation,
+        gate: Gate,
+        progress: Progress,
+    ) -> Result<Self, CalibrationError> {
+        let mut passes = Vec::new();
+        let iterated = iterate(problem, &priors, from, gate, &mut passes, progress)?;
+        Ok(Self::new(problem, priors, iterated, passes))
     }
 
     /// Iterates another problem from here.

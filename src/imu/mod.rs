@@ -91,4 +91,12 @@ impl<T> PerSensor<T> {
             accel: f(Sensor::Accel),
         }
     }
+
+    /// The value of each sensor, or the first error.
+    pub fn try_from_fn<E>(mut f: impl FnMut(Sensor) -> Result<T, E>) -> Result<Self, E> {
+        Ok(Self {
+            gyro: f(Sensor::Gyro)?,
+            accel: f(Sensor::Accel)?,
+        })
+    }
 }

@@ -84,6 +84,11 @@ impl PerSensor<ThermalRange> {
             [0, 1, 2].map(|axis| self.get(sensor).values(t[axis], rate[axis]))
         })
     }
+
+    /// Both triads' functions where all axes have one temperature in °C that changes by so many K/s.
+    pub fn everywhere(&self, temperature: f64, rate: f64) -> ThermalState {
+        PerSensor::from_fn(|sensor| [self.get(sensor).values(temperature, rate); 3])
+    }
 }
 
 /// P₀ to the highest order (Bonnet's recursion).

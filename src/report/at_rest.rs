@@ -1,13 +1,8 @@
 //! The report of outputs at rest against temperature.
 
-use serde_json::{Value, json};
-
-use super::document::{Document, Table};
-use super::group::Group;
-use super::number::{plus_minus, three_digits};
-use super::plot::{Axis, Mark, Panel, Plot, Series};
 use crate::calibration::{AtRest, AxisAtRest, Calibration, parameter};
 use crate::imu::{AXES, PARAMETERS as PER_TRIAD, RATE};
+use crate::report::prelude::*;
 use crate::run::Run;
 
 /// Points of a curve, and seconds that are drawn at most.

@@ -1,11 +1,6 @@
 //! The report of a study of campaigns.
 
-use serde_json::{Map, Value, json};
-
-use super::document::{Document, Table};
-use super::group::Group;
-use super::number::{three_digits, value};
-use crate::imu::RATE;
+use crate::report::prelude::*;
 use crate::study::CampaignAccuracy;
 
 /// Everything that is said of a study.
@@ -39,33 +34,22 @@ pub fn document(accuracy: &CampaignAccuracy) -> Document {
     document
 }
 
-fn name(function: Option<usize>) -> String {
-    match function {
-        None => "at the reference".to_owned(),
-        Some(RATE) => "by rate".to_owned(),
-        Some(0) => "linear".to_owned(),
-        Some(1) => "square".to_owned(),
-        Some(2) => "cubic".to_owned(),
-        Some(function) => format!("order {}", function + 1),
-    }
-}
-
 fn figures(accuracy: &CampaignAccuracy) -> Table {
     let row = |group: Group, function: Option<usize>| {
-        let of = accuracy.figures(group, function)?;
-        let unit = group.unit_value();
+        let (of, campaigns) = accuracy.figures(group, function)?;
+        let (ratio, unit) = (of.ratio?, group.unit_value());
         Some(vec![
-            format!("{}, {}", group.short(), name(function)),
+            format!("{}, {}", group.short(), function_name(function)),
             group.unit().to_owned(),
-            of.campaigns.to_string(),
-            three_digits(of.error / unit),
+            campaigns.to_string(),
+            three_digits(of.filter / unit),
             three_digits(of.claimed / unit),
             three_digits(of.bound / unit),
             format!(
                 "{} ({} to {})",
-                value(of.ratio.value, 0.01),
-                value(of.ratio.interval.0, 0.01),
-                value(of.ratio.interval.1, 0.01)
+                value(ratio.value, 0.01),
+                value(ratio.interval.0, 0.01),
+                value(ratio.interval.1, 0.01)
             ),
         ])
     };
@@ -77,15 +61,7 @@ fn figures(accuracy: &CampaignAccuracy) -> Table {
     });
     Table::new(
         "RMS errors against σ and bound",
-        [
-            "",
-            "unit",
-            "campaigns",
-            "RMS error",
-            "RMS σ",
-            "RMS bound",
-            "error/bound (99 %)",
-        ],
+        columns("| unit | campaigns | RMS error | RMS σ | RMS bound | error/bound (99 %)"),
     )
     .sections(sections)
     .note("Bound: Cramér–Rao, linearised at the truth with the orders that were chosen.")
@@ -104,17 +80,19 @@ fn data(accuracy: &CampaignAccuracy) -> Value {
     for group in Group::all() {
         let mut of_group = Map::new();
         for function in accuracy.functions() {
-            if let Some(of) = accuracy.figures(group, function) {
+            if let Some((of, campaigns)) = accuracy.figures(group, function)
+                && let Some(ratio) = of.ratio
+            {
                 let unit = group.unit_value();
                 let figures = json!({
-                    "campaigns": of.campaigns,
-                    "rms_error": of.error / unit,
+                    "campaigns": campaigns,
+                    "rms_error": of.filter / unit,
                     "rms_sigma": of.claimed / unit,
                     "rms_bound": of.bound / unit,
-                    "ratio": of.ratio.value,
-                    "ratio_interval": [of.ratio.interval.0, of.ratio.interval.1],
+                    "ratio": ratio.value,
+                    "ratio_interval": [ratio.interval.0, ratio.interval.1],
                 });
-                of_group.insert(name(function), figures);
+                of_group.insert(function_name(function), figures);
             }
         }
         let (right, all) = accuracy.right_orders(group);

@@ -2,10 +2,11 @@
 
 mod results;
 
-use super::document::{Document, Facts, List, Table, cells};
-use super::number::{count, or_dash, sigma, value};
+use results::{name, results};
+
+use super::document::Block;
+use super::pdf;
 use super::pdf::{Attached, Frame, PdfError};
-use super::{document::Block, pdf};
 use crate::calibration::Group;
 use crate::calibration::result::{EQUATION, GravityRecord};
 use crate::certificate::{
@@ -13,8 +14,8 @@ use crate::certificate::{
     temperature_words,
 };
 use crate::imu::ParameterKind;
+use crate::report::prelude::*;
 use crate::run::Aiding;
-use results::{name, results};
 
 /// A certificate's files: PDF, XML and the calibration, which are in the PDF, too.
 ///
@@ -294,16 +295,7 @@ fn limits(conformity: &Conformity) -> Table {
             probability(of.risk),
         ]
     });
-    let columns = [
-        "parameter",
-        "value",
-        "U (k = 2)",
-        "limits",
-        "unit",
-        "decision",
-        "wrong with",
-    ];
-    Table::new("Conformity with the specification", columns)
+    Table::new("Conformity with the specification", columns("parameter | value | U (k = 2) | limits | unit | decision | wrong with"))
         .section(rows)
         .note(
             "In the general installation form. Wrong with: probability that the parameter is outside a limit that it \
@@ -328,16 +320,7 @@ fn found(as_found: &AsFound) -> Table {
             or_dash(in_u, |x| value(x, 0.1)),
         ]
     });
-    let columns = [
-        "parameter",
-        "as found",
-        "as left",
-        "change",
-        "U (k = 2)",
-        "unit",
-        "change/U",
-    ];
-    Table::new("As found and as left", columns).section(rows).note(format!(
+    Table::new("As found and as left", columns("parameter | as found | as left | change | U (k = 2) | unit | change/U")).section(rows).note(format!(
         "As found: the parameters of {}, with which the item was received; as left: those of this calibration. A \
          change beyond its U shows that the item has drifted since. Body frame of both: {}.",
         as_found.earlier,

@@ -1,9 +1,7 @@
 //! A noise figure in every convention.
 
-use serde_json::{Value, json};
-
-use super::document::{Document, Facts};
 use crate::noise::conventions::{Conversion, Line};
+use crate::report::prelude::*;
 
 /// How the figure was taken, and a line for each convention.
 pub fn document(conversion: &Conversion) -> Document {

@@ -1,8 +1,7 @@
 //! What both methods are worth at the same table time, and the closed form with all the time it takes.
 
-use super::document::{Block, Document, Table};
-use super::number::three_digits;
 use super::quantity::Quantity;
+use crate::report::prelude::*;
 use crate::study::navigation::Outlook;
 
 /// One way of navigating by several calibrations.
@@ -28,7 +27,7 @@ pub fn add(document: &mut Document, methods: &[String], missions: &[Flown]) {
         for end in &flown.ends {
             let error = end.error.as_ref().map(|error| horizontal.error(error));
             row.push(error.map_or("–".to_owned(), three_digits));
-            row.push(three_digits(horizontal.of_sigma(&end.sigma)));
+            row.push(three_digits(horizontal.of(&end.sigma)));
         }
         row
     };

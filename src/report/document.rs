@@ -118,6 +118,11 @@ impl Document {
         self.add(Medium::Page, block.into());
     }
 
+    /// The same for several.
+    pub fn pages(&mut self, blocks: impl IntoIterator<Item = impl Into<Block>>) {
+        blocks.into_iter().for_each(|block| self.page(block));
+    }
+
     /// Adds what stands in a terminal in the place of a plot or of a longer table.
     pub fn terminal(&mut self, block: impl Into<Block>) {
         self.add(Medium::Terminal, block.into());
@@ -239,6 +244,11 @@ into_block!(Facts, Table, Plot, List);
 
 /// In the place of a number that there is not.
 pub(super) const NONE: &str = "–";
+
+/// The headings of a table's columns, of a line with bars between them.
+pub(super) fn columns(line: &str) -> impl Iterator<Item = &str> {
+    line.split('|').map(str::trim)
+}
 
 /// A row of a table.
 macro_rules! cells {

@@ -1,21 +1,14 @@
 //! How the six groups are spoken of: names, and the unit of each.
 
-use crate::calibration::ParameterVector;
-use crate::calibration::parameter_name;
-use crate::imu::{InstallationForm, ParameterKind, Sensor};
-use crate::units;
+use crate::calibration::{ParameterVector, parameter_name};
+use crate::imu::{InstallationForm, ParameterKind, RATE};
 
 pub(super) use crate::calibration::Group;
 
 impl Group {
     /// Such as `gyro scale factor K`.
     pub fn title(self) -> String {
-        let kind = match self.kind() {
-            ParameterKind::Scale => "scale factor K",
-            ParameterKind::Installation => "installation E",
-            ParameterKind::Bias => "bias D",
-        };
-        format!("{} {kind}", self.sensor().name())
+        format!("{} {}", self.sensor().name(), self.entry().title)
     }
 
     /// Its title with the unit.
@@ -25,43 +18,23 @@ impl Group {
 
     /// Such as `gyro K`.
     pub fn short(self) -> String {
-        let letter = match self.kind() {
-            ParameterKind::Scale => 'K',
-            ParameterKind::Installation => 'E',
-            ParameterKind::Bias => 'D',
-        };
+        let letter = self.entry().title.rsplit(' ').next().unwrap_or_default();
         format!("{} {letter}", self.sensor().name())
     }
 
     /// Its key in documents, such as `gyro.scale_ppm`.
     pub fn key(self) -> String {
-        let quantity = match (self.kind(), self.sensor()) {
-            (ParameterKind::Scale, _) => "scale_ppm",
-            (ParameterKind::Installation, _) => "installation_arcsec",
-            (ParameterKind::Bias, Sensor::Gyro) => "bias_deg_per_h",
-            (ParameterKind::Bias, Sensor::Accel) => "bias_ug",
-        };
-        format!("{}.{quantity}", self.sensor().name())
+        format!("{}.{}", self.sensor().name(), self.entry().key)
     }
 
     /// Symbol of the unit.
     pub fn unit(self) -> &'static str {
-        match (self.kind(), self.sensor()) {
-            (ParameterKind::Scale, _) => "ppm",
-            (ParameterKind::Installation, _) => "″",
-            (ParameterKind::Bias, Sensor::Gyro) => "°/h",
-            (ParameterKind::Bias, Sensor::Accel) => "µg",
-        }
+        self.entry().unit
     }
 
     /// The unit in the model's normalised SI values.
     pub fn unit_value(self) -> f64 {
-        match (self.kind(), self.sensor()) {
-            (ParameterKind::Scale, _) => units::PPM,
-            (ParameterKind::Installation, _) => units::ARCSEC,
-            (ParameterKind::Bias, Sensor::Gyro) => units::DEG_PER_H,
-            (ParameterKind::Bias, Sensor::Accel) => units::MICRO_G,
-        }
+        self.entry().value
     }
 
     /// What a reader is shown for a parameter's value: scale factors as departure from nominal.
@@ -94,6 +67,18 @@ pub(super) fn axis_name(form: InstallationForm, index: usize) -> String {
     parameter_name(form, index)
         .and_then(|name| name.rsplit('.').next().map(str::to_owned))
         .unwrap_or_default()
+}
+
+/// Which function of temperature a coefficient is of; none: a parameter at the reference.
+pub(super) fn function_name(function: Option<usize>) -> String {
+    match function {
+        None => "at the reference".to_owned(),
+        Some(RATE) => "by rate".to_owned(),
+        Some(0) => "linear".to_owned(),
+        Some(1) => "square".to_owned(),
+        Some(2) => "cubic".to_owned(),
+        Some(function) => format!("order {}", function + 1),
+    }
 }
 
 /// A short name for a figure's margin, such as `gyro E xy`.

@@ -12,6 +12,10 @@ const STYLE: &str = include_str!("style.css");
 /// document of each plot in order.
 pub fn page(document: &Document, drawn: &[String]) -> String {
     let mut drawn = drawn.iter();
+    let blocks = document.blocks.iter();
+    let shown = blocks.filter(|(medium, _)| *medium != Medium::Terminal);
+    let shown: Vec<&Block> = shown.map(|(_, block)| block).collect();
+    let parts = shown.chunk_by(|_, next| !matches!(next, Block::Fold(_)));
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -29,7 +33,7 @@ pub fn page(document: &Document, drawn: &[String]) -> String {
                 @if !document.conclusions.items.is_empty() {
                     section { (list(&document.conclusions)) }
                 }
-                @for part in parts(document) { (of_part(&part, &mut drawn)) }
+                @for part in parts { (of_part(part, &mut drawn)) }
                 footer { "turncal " (env!("CARGO_PKG_VERSION")) }
             }
         }
@@ -38,36 +42,12 @@ pub fn page(document: &Document, drawn: &[String]) -> String {
 }
 
 /// Blocks below a fold's heading; those before the first fold have none.
-struct Part<'a> {
-    heading: Option<&'a str>,
-    blocks: Vec<&'a Block>,
-}
-
-fn parts(document: &Document) -> Vec<Part<'_>> {
-    let mut parts = vec![Part {
-        heading: None,
-        blocks: Vec::new(),
-    }];
-    let shown = document.blocks.iter();
-    for (_, block) in shown.filter(|(medium, _)| *medium != Medium::Terminal) {
-        match (block, parts.last_mut()) {
-            (Block::Fold(heading), _) => parts.push(Part {
-                heading: Some(heading),
-                blocks: Vec::new(),
-            }),
-            (block, Some(part)) => part.blocks.push(block),
-            (_, None) => {}
-        }
-    }
-    parts.retain(|part| !part.blocks.is_empty());
-    parts
-}
-
-fn of_part<'a>(part: &Part, drawn: &mut impl Iterator<Item = &'a String>) -> Markup {
-    let blocks = html! { @for block in &part.blocks { (of_block(block, drawn)) } };
-    match part.heading {
-        Some(heading) => html! { details { summary { (heading) } (blocks) } },
-        None => blocks,
+fn of_part<'a>(part: &[&Block], drawn: &mut impl Iterator<Item = &'a String>) -> Markup {
+    let blocks = html! { @for block in part { (of_block(block, drawn)) } };
+    match part {
+        [Block::Fold(_)] => html! {},
+        [Block::Fold(heading), ..] => html! { details { summary { (heading) } (blocks) } },
+        _ => blocks,
     }
 }
 

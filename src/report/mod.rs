@@ -43,17 +43,17 @@ pub mod check;
 pub mod comparison;
 pub mod conversion;
 pub mod demo;
-mod effects;
 pub mod experiment;
 mod group;
 pub mod lot;
 pub mod navigation;
 mod outlook;
+mod prelude;
 mod quantity;
-#[cfg(test)]
-mod synthetic;
 pub mod table1;
 mod terms;
+#[cfg(test)]
+mod tests;
 
 pub use document::Document;
 pub use files::{ReportError, files, write};

@@ -6,19 +6,12 @@ mod tests;
 
 use std::fmt::Write;
 
-use serde_json::{Map, Value, json};
-
-use super::document::{Document, Facts, NONE, Table, cells};
-use super::number::{or_dash, three_digits, value};
-use super::plot::{Axis, Panel, Plot, Series};
 use super::quantity::Quantity;
 use crate::attitude::to_pitch_roll_heading;
-use crate::imu::BodyFrame;
-use crate::imu::Sensor;
+use crate::imu::{BodyFrame, Sensor};
+use crate::report::prelude::*;
 use crate::study::navigation::{Epoch, INTERVAL, Mission, Motion, Warming};
-use crate::units::{DEGREE, NAUTICAL_MILE};
 
-const HOUR: f64 = 3600.0;
 /// Hours over which the paper gives the drift of position.
 const PAPER_HOURS: f64 = 40.0;
 
@@ -56,9 +49,7 @@ impl Navigation<'_> {
         document.warnings.items = self.warnings();
         document.both(self.facts());
         document.both(self.table());
-        for plot in self.figures() {
-            document.page(plot);
-        }
+        document.pages(self.figures());
         document.files = vec![("navigation.csv".to_owned(), self.csv())];
         document.data = self.data();
         document
@@ -140,17 +131,8 @@ impl Navigation<'_> {
     }
 
     fn table(&self) -> Table {
-        let columns = [
-            "",
-            "unit",
-            "largest",
-            "after h",
-            "at the end",
-            "σ",
-            "error/σ",
-        ];
         let rows = Quantity::ALL.map(|quantity| self.row(quantity));
-        let table = Table::new("Errors", columns)
+        let table = Table::new("Errors", columns("| unit | largest | after h | at the end | σ | error/σ"))
             .sections(rows.chunks(3).map(<[_]>::to_vec))
             .note(
                 "Computed minus true. σ: of the error at the end, predicted from the calibration's covariance; \
@@ -173,9 +155,9 @@ impl Navigation<'_> {
         let largest = moments.max_by(|a, b| magnitude(a).total_cmp(&magnitude(b)));
         let last = self.moments.last();
         let sigma = last.and_then(|m| quantity.sigma(m)).filter(|s| *s > 0.0);
-        let ratio = last.zip(sigma).filter(|_| quantity.is_component());
+        let ratio = last.zip(sigma).filter(|_| quantity.is_component);
         cells![
-            quantity.name(),
+            quantity.name,
             quantity.unit(),
             or_dash(largest.map(error), three_digits),
             or_dash(largest.map(|m| m.time / HOUR), |t| value(t, 1.0)),
@@ -218,7 +200,7 @@ impl Navigation<'_> {
     /// A row a minute: time, errors, predicted σ where there is one.
     fn csv(&self) -> String {
         let with_sigma = self.moments.iter().all(|m| m.covariance.is_some());
-        let keys = Quantity::ALL.map(Quantity::key);
+        let keys = Quantity::ALL.map(|quantity| quantity.key);
         let mut text = format!("t_h,{}", keys.join(","));
         if with_sigma {
             text.extend(keys.iter().map(|key| format!(",sigma_{key}")));
@@ -279,7 +261,7 @@ impl Navigation<'_> {
 /// One number for each quantity under its key.
 fn by_key(of: impl Fn(Quantity) -> f64) -> Map<String, Value> {
     let all = Quantity::ALL.into_iter();
-    all.map(|quantity| (quantity.key().to_owned(), of(quantity).into()))
+    all.map(|quantity| (quantity.key.to_owned(), of(quantity).into()))
         .collect()
 }
 

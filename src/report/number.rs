@@ -1,7 +1,8 @@
 //! Numbers as a reader wants them: digits up to the second that σ leaves meaning to.
 
+use crate::units::MINUTE;
+
 const MINUS: char = '−';
-const MINUTE: f64 = 60.0;
 
 /// Decimals that show two digits of `sigma`.
 fn decimals(sigma: f64) -> usize {

@@ -1,10 +1,8 @@
 //! What the calibrations of one run are worth: their navigation errors side by side, or where the truth is not
 //! known their predicted σ alone.
 
-use super::document::{Block, Document, Table};
-use super::number::{self, three_digits};
-use super::plot::{Axis, Panel, Plot, Point, Series};
 use super::quantity::Quantity;
+use crate::report::prelude::*;
 use crate::study::navigation::{NavigationStudyError, Outlook};
 
 const HEADING: &str = "Navigation with this calibration";
@@ -66,13 +64,13 @@ fn clock(navigated: &[Navigated]) -> (&'static str, f64) {
 /// Duration in words.
 fn long(navigated: &[Navigated]) -> String {
     let (unit, size) = clock(navigated);
-    format!("{} {unit}", number::value(duration(navigated) / size, 10.0))
+    format!("{} {unit}", value(duration(navigated) / size, 10.0))
 }
 
 /// Error and its σ in the usual unit.
 fn both(quantity: Quantity, moment: &Outlook) -> (Option<f64>, f64) {
     let error = moment.error.as_ref().map(|error| quantity.error(error));
-    (error, quantity.of_sigma(&moment.sigma))
+    (error, quantity.of(&moment.sigma))
 }
 
 /// The position at the end in one line.
@@ -160,12 +158,12 @@ fn row(navigated: &[Navigated], quantity: Quantity, of: Of) -> Vec<String> {
     let (unit, scale) = quantity.readable_unit(largest);
     let (name, unit, scale) = match of {
         Of::End => (
-            format!("{} at the end", quantity.name()),
+            format!("{} at the end", quantity.name),
             unit.to_owned(),
             scale,
         ),
         Of::Largest => (
-            format!("{}, largest", quantity.name()),
+            format!("{}, largest", quantity.name),
             unit.to_owned(),
             scale,
         ),
@@ -175,7 +173,7 @@ fn row(navigated: &[Navigated], quantity: Quantity, of: Of) -> Vec<String> {
         }
         Of::Drift => ("drift".to_owned(), format!("{unit}/{unit_of_time}"), scale),
     };
-    let shown = |x: Option<f64>| number::or_dash(x, |x| three_digits(x * scale));
+    let shown = |x: Option<f64>| or_dash(x, |x| three_digits(x * scale));
     let mut row = vec![name, unit];
     for (error, sigma) in numbers {
         row.extend(is_known(navigated).then(|| shown(error)));
@@ -206,7 +204,7 @@ pub(super) fn figure(navigated: &[Navigated]) -> Option<Plot> {
     if navigated.len() > 1 {
         caption += " Solid: EKF; dashed: closed form.";
     }
-    let panels = [Quantity::EAST, Quantity::NORTH].map(|quantity| panel(quantity, navigated));
+    let panels = [6, 7].map(|place| panel(Quantity::ALL[place], navigated));
     Some(Plot::new("navigation.svg", heading, (1, 250), panels).caption(caption))
 }
 

@@ -2,155 +2,98 @@
 
 use nalgebra::SVector;
 
-use super::plot::{Axis, Panel, Point, Series, Shape};
-
 use crate::navigation::NavigationError;
 use crate::navigation::error_model::STATES;
+use crate::report::prelude::*;
 use crate::study::navigation::Epoch;
-use crate::units::{ARCSEC, DEGREE, NAUTICAL_MILE};
 
-const KILOMETRE: f64 = 1000.0;
-const CENTIMETRE: f64 = 0.01;
 /// Lines this many times apart share an axis that is logarithmic.
 const APART: f64 = 20.0;
 
+/// Units of one kind with their size in SI, the usual one first.
+type Units = &'static [(&'static str, f64)];
+const ANGLES: Units = &[("°", DEGREE), ("″", ARCSEC)];
+const SPEEDS: Units = &[("m/s", 1.0), ("cm/s", 0.01), ("mm/s", 0.001)];
+const LENGTHS: Units = &[("nmile", NAUTICAL_MILE), ("m", 1.0)];
+
 /// A component of the error, or the horizontal length of two.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Quantity {
-    kind: Kind,
-    /// Place in [`NavigationError::to_vector`]; none for the horizontal length.
-    component: Option<usize>,
+    /// Such as `pitch`.
+    pub(super) name: &'static str,
+    /// Its name in documents, with its unit.
+    pub(super) key: &'static str,
+    /// Place in [`NavigationError::to_vector`]; of a horizontal length that of its first component.
+    place: usize,
+    /// Whether it has a sign, and a normal distribution where parameters have one.
+    pub(super) is_component: bool,
+    units: Units,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Attitude,
-    Velocity,
-    Position,
+const fn component(place: usize, name: &'static str, key: &'static str, units: Units) -> Quantity {
+    Quantity {
+        name,
+        key,
+        place,
+        is_component: true,
+        units,
+    }
 }
 
-impl Kind {
-    /// Place of the first component in [`NavigationError::to_vector`].
-    fn first(self) -> usize {
-        match self {
-            Self::Attitude => 0,
-            Self::Velocity => 3,
-            Self::Position => 6,
-        }
+const fn horizontal(place: usize, name: &'static str, key: &'static str, units: Units) -> Quantity {
+    Quantity {
+        is_component: false,
+        ..component(place, name, key, units)
     }
 }
 
 impl Quantity {
     /// Attitude, velocity, position, three each.
     pub(super) const ALL: [Self; 9] = [
-        Self::new(Kind::Attitude, Some(0)),
-        Self::new(Kind::Attitude, Some(1)),
-        Self::new(Kind::Attitude, Some(2)),
-        Self::new(Kind::Velocity, Some(3)),
-        Self::new(Kind::Velocity, Some(4)),
-        Self::new(Kind::Velocity, None),
-        Self::new(Kind::Position, Some(6)),
-        Self::new(Kind::Position, Some(7)),
-        Self::new(Kind::Position, None),
+        component(0, "pitch", "pitch_deg", ANGLES),
+        component(1, "roll", "roll_deg", ANGLES),
+        component(2, "heading", "heading_deg", ANGLES),
+        component(3, "velocity east", "velocity_east_m_s", SPEEDS),
+        component(4, "velocity north", "velocity_north_m_s", SPEEDS),
+        horizontal(3, "velocity, horizontal", "velocity_m_s", SPEEDS),
+        component(6, "position east", "position_east_nmile", LENGTHS),
+        component(7, "position north", "position_north_nmile", LENGTHS),
+        horizontal(6, "position, horizontal", "position_nmile", LENGTHS),
     ];
-
-    /// Position east.
-    pub(super) const EAST: Self = Self::ALL[6];
-    /// Position north.
-    pub(super) const NORTH: Self = Self::ALL[7];
-
-    const fn new(kind: Kind, component: Option<usize>) -> Self {
-        Self { kind, component }
-    }
-
-    /// Whether it has a sign, and a normal distribution where parameters have one.
-    pub(super) fn is_component(self) -> bool {
-        self.component.is_some()
-    }
-
-    /// Such as `pitch`.
-    pub(super) fn name(self) -> &'static str {
-        self.words().0
-    }
-
-    /// Its name in documents, with its unit.
-    pub(super) fn key(self) -> &'static str {
-        self.words().1
-    }
-
-    fn words(self) -> (&'static str, &'static str) {
-        match (self.kind, self.component) {
-            (Kind::Attitude, Some(0)) => ("pitch", "pitch_deg"),
-            (Kind::Attitude, Some(1)) => ("roll", "roll_deg"),
-            (Kind::Attitude, _) => ("heading", "heading_deg"),
-            (Kind::Velocity, Some(3)) => ("velocity east", "velocity_east_m_s"),
-            (Kind::Velocity, Some(_)) => ("velocity north", "velocity_north_m_s"),
-            (Kind::Velocity, None) => ("velocity, horizontal", "velocity_m_s"),
-            (Kind::Position, Some(6)) => ("position east", "position_east_nmile"),
-            (Kind::Position, Some(_)) => ("position north", "position_north_nmile"),
-            (Kind::Position, None) => ("position, horizontal", "position_nmile"),
-        }
-    }
 
     /// Symbol of its unit in documents and tables.
     pub(super) fn unit(self) -> &'static str {
-        match self.kind {
-            Kind::Attitude => "°",
-            Kind::Velocity => "m/s",
-            Kind::Position => "nmile",
-        }
+        self.units[0].0
     }
 
     fn unit_value(self) -> f64 {
-        match self.kind {
-            Kind::Attitude => DEGREE,
-            Kind::Velocity => 1.0,
-            Kind::Position => NAUTICAL_MILE,
-        }
+        self.units[0].1
     }
 
     /// A unit in which values up to this one, in the usual unit, have few zeros; and how many of it
     /// make the usual unit.
     pub(super) fn readable_unit(self, largest: f64) -> (&'static str, f64) {
-        let units: &[(&str, f64)] = match self.kind {
-            Kind::Attitude => &[("°", DEGREE), ("″", ARCSEC)],
-            Kind::Velocity => &[
-                ("m/s", 1.0),
-                ("cm/s", CENTIMETRE),
-                ("mm/s", 1.0 / KILOMETRE),
-            ],
-            Kind::Position => &[("nmile", NAUTICAL_MILE), ("m", 1.0)],
-        };
         let size = largest * self.unit_value();
-        let (unit, value) = units
-            .iter()
-            .find(|(_, value)| size >= 0.5 * value)
-            .or(units.last())
-            .copied()
-            .unwrap_or((self.unit(), self.unit_value()));
+        let fits = self.units.iter().find(|(_, value)| size >= 0.5 * value);
+        let (unit, value) = fits.copied().unwrap_or(self.units[self.units.len() - 1]);
         (unit, self.unit_value() / value)
     }
 
     /// The error in the usual unit.
     pub(super) fn error(self, error: &NavigationError) -> f64 {
-        let si = match (self.component, self.kind) {
-            (Some(component), _) => error.to_vector()[component],
-            (None, Kind::Velocity) => error.horizontal_velocity(),
-            (None, _) => error.horizontal_position(),
-        };
-        si / self.unit_value()
+        self.of(&error.to_vector())
     }
 
     /// Predicted 1σ in the usual unit; of a horizontal length the root of its mean square.
     pub(super) fn sigma(self, moment: &Epoch) -> Option<f64> {
-        Some(self.of_sigma(&moment.sigma()?))
+        Some(self.of(&moment.sigma()?))
     }
 
-    /// The same from the σ of all errors, in the order of [`NavigationError::to_vector`].
-    pub(super) fn of_sigma(self, sigma: &SVector<f64, STATES>) -> f64 {
-        let si = match self.component {
-            Some(component) => sigma[component],
-            None => sigma[self.kind.first()].hypot(sigma[self.kind.first() + 1]),
+    /// The same of all errors or their σ, in the order of [`NavigationError::to_vector`].
+    pub(super) fn of(self, all: &SVector<f64, STATES>) -> f64 {
+        let si = match self.is_component {
+            true => all[self.place],
+            false => all[self.place].hypot(all[self.place + 1]),
         };
         si / self.unit_value()
     }
@@ -192,12 +135,12 @@ impl Quantity {
         let sigma = |sign: f64| -> Vec<Point> {
             sigma.iter().map(|&(t, s)| (t, sign * s * scale)).collect()
         };
-        let lowest = if self.is_component() { -1.0 } else { 0.0 };
+        let lowest = if self.is_component { -1.0 } else { 0.0 };
         let names = [(1.0, "+σ"), (-1.0, "−σ")].into_iter();
         let names = names
             .filter(|(sign, _)| *sign >= lowest)
             .filter_map(|(sign, name)| Some(Series::name(sigma(sign).last()?.1, name)));
-        let title = format!("{}, {unit}{kind}", self.name());
+        let title = format!("{}, {unit}{kind}", self.name);
         Panel::new(title, time, y)
             .with(Series::band(sigma(lowest), sigma(1.0)))
             .with(Series::zero())

@@ -3,7 +3,6 @@
 //!
 //! Everything is compared in the general form and in the body frame of the table.
 
-mod auxiliary;
 mod baseline;
 mod figures;
 mod navigation;
@@ -23,17 +22,14 @@ use crate::models::ModelError;
 use crate::simulation::{Runs, Scenario};
 use crate::turntable::TableError;
 
-use figures::{Squares, rms};
+pub(in crate::study) use figures::Squares;
+use figures::rms;
 use navigation::Way;
 
-pub use auxiliary::ErrorTermAccuracy;
 pub use baseline::Baseline;
 pub use figures::Figures;
 pub use navigation::{Containment, Journey, NavigationAccuracy, Position, Region};
 pub use trial::{Filtered, Trial};
-
-/// Each mission, followed once, or why it cannot be navigated.
-type Ways = Vec<(Journey, Result<Way, NavigationStudyError>)>;
 
 /// What is studied.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -90,8 +86,8 @@ pub struct Accuracy {
     pub not_navigated: Vec<(Journey, NavigationStudyError)>,
     /// NEES/n over all runs; `None` if no run gave an estimate.
     pub anees: Option<Anees>,
-    /// Figures of each block of constants beside the parameters that was estimated.
-    pub error_terms: Vec<ErrorTermAccuracy>,
+    /// Figures of each error term that was estimated, RMS over its parameters, in rad or SI.
+    pub error_terms: Vec<(ErrorTerm, Figures)>,
     /// What each error term did to the filter in the first run: see [`crate::calibration::test_error_terms`].
     pub effects: Vec<ErrorTermTest>,
     /// NIS of zero velocity over all runs.
@@ -137,11 +133,8 @@ impl AccuracyStudy {
     /// [`StudyError`] if runs cannot be made. A run that the filter fails on is no error: it is
     /// counted.
     pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Accuracy, StudyError> {
-        let baseline = Baseline::new(&self.scenario)?;
         let all: Vec<u64> = (0..self.runs).collect();
-        let (ways, trials) =
-            rayon::join(|| self.ways(), || self.trials_with(&baseline, &all, done));
-        self.assemble(baseline, ways?, trials?)
+        self.result(self.trials(&all, done)?)
     }
 
     /// Makes some of the runs, given by their numbers; `done` is told of each.
@@ -149,7 +142,14 @@ impl AccuracyStudy {
     /// # Errors
     /// As [`Self::run`].
     pub fn trials(&self, runs: &[u64], done: &(dyn Fn() + Sync)) -> Result<Vec<Trial>, StudyError> {
-        self.trials_with(&Baseline::new(&self.scenario)?, runs, done)
+        let baseline = Baseline::new(&self.scenario)?;
+        let simulated = [Runs::new(&self.scenario)?, Runs::new(&baseline.scenario)?];
+        let all = runs.par_iter().with_max_len(1).map(|&run| {
+            let trial = self.trial(&baseline, &simulated, run);
+            done();
+            trial
+        });
+        all.collect()
     }
 
     /// What all runs say, in the order of their numbers.
@@ -157,54 +157,24 @@ impl AccuracyStudy {
     /// # Errors
     /// As [`Self::run`].
     pub fn result(&self, trials: Vec<Trial>) -> Result<Accuracy, StudyError> {
-        self.assemble(Baseline::new(&self.scenario)?, self.ways()?, trials)
-    }
-
-    fn trials_with(
-        &self,
-        baseline: &Baseline,
-        runs: &[u64],
-        done: &(dyn Fn() + Sync),
-    ) -> Result<Vec<Trial>, StudyError> {
-        let simulated = [Runs::new(&self.scenario)?, Runs::new(&baseline.scenario)?];
-        let all = runs.par_iter().with_max_len(1).map(|&run| {
-            let trial = self.trial(baseline, &simulated, run);
-            done();
-            trial
-        });
-        all.collect()
-    }
-
-    fn ways(&self) -> Result<Ways, StudyError> {
-        let all = Journey::ALL.into_par_iter();
-        let ways = all.map(|journey| Ok((journey, Way::of(journey, &self.scenario)?)));
-        ways.collect()
-    }
-
-    fn assemble(
-        &self,
-        baseline: Baseline,
-        ways: Ways,
-        trials: Vec<Trial>,
-    ) -> Result<Accuracy, StudyError> {
+        let baseline = Baseline::new(&self.scenario)?;
         let table_time = self.scenario.duration()?;
         let (mut navigation, mut not_navigated) = (Vec::new(), Vec::new());
-        for (journey, way) in ways {
-            match way {
+        for journey in Journey::ALL {
+            match Way::of(journey, &self.scenario)? {
                 Ok(way) => navigation.push(way.worth(&trials)),
                 Err(error) => not_navigated.push((journey, error)),
             }
         }
+        let effects = trials.first().map(|trial| trial.effects.clone());
         Ok(Accuracy {
             groups: Group::all()
                 .filter_map(|group| GroupAccuracy::new(group, &trials, &baseline, table_time))
                 .collect(),
             navigation,
             not_navigated,
-            error_terms: auxiliary::figures(&trials),
-            effects: trials
-                .first()
-                .map_or_else(Vec::new, |trial| trial.effects.clone()),
+            error_terms: figures::of_error_terms(&trials),
+            effects: effects.unwrap_or_default(),
             anees: anees(&trials),
             velocity: pooled(&trials, |filtered| &filtered.velocity),
             table: pooled(&trials, |filtered| &filtered.table),
@@ -217,6 +187,11 @@ impl AccuracyStudy {
 }
 
 impl Accuracy {
+    /// What the filter gave in each run in which it gave anything.
+    pub fn filtered(&self) -> impl Iterator<Item = &Filtered> {
+        filtered(&self.trials)
+    }
+
     /// Runs that failed, with the reason.
     pub fn failures(&self) -> impl Iterator<Item = (u64, &str)> {
         self.trials
@@ -226,14 +201,9 @@ impl Accuracy {
 
     /// Number of runs whose data reject the filter's installation form, and of those tested.
     pub fn rejections(&self) -> (usize, usize) {
-        let tests = || {
-            let filtered = self.trials.iter().filter_map(|t| t.filtered.as_ref());
-            filtered.filter_map(|f| f.form_test)
-        };
-        (
-            tests().filter(|test| test.rejects()).count(),
-            tests().count(),
-        )
+        let tests = || self.filtered().filter_map(|filtered| filtered.form_test);
+        let rejected = tests().filter(|test| test.rejects());
+        (rejected.count(), tests().count())
     }
 }
 
@@ -291,11 +261,12 @@ impl GroupAccuracy {
     }
 }
 
+fn filtered(trials: &[Trial]) -> impl Iterator<Item = &Filtered> {
+    trials.iter().filter_map(|trial| trial.filtered.as_ref())
+}
+
 fn anees(trials: &[Trial]) -> Option<Anees> {
-    let all = || {
-        let filtered = trials.iter().filter_map(|trial| trial.filtered.as_ref());
-        filtered.filter_map(|filtered| filtered.nees)
-    };
+    let all = || filtered(trials).filter_map(|filtered| filtered.nees);
     let count: usize = all().map(|nees| nees.count).sum();
     let first = all().next()?;
     Some(Anees {
@@ -309,8 +280,10 @@ fn anees(trials: &[Trial]) -> Option<Anees> {
 
 /// One NIS of all runs.
 fn pooled(trials: &[Trial], of: impl Fn(&Filtered) -> &Nis) -> Nis {
-    let filtered = trials.iter().filter_map(|trial| trial.filtered.as_ref());
-    let all: Vec<&Nis> = filtered.map(of).filter(|nis| nis.count > 0).collect();
+    let all: Vec<&Nis> = filtered(trials)
+        .map(of)
+        .filter(|nis| nis.count > 0)
+        .collect();
     let count = all.iter().map(|nis| nis.count).sum::<usize>();
     let mean = |value: &dyn Fn(&Nis) -> f64| {
         let sum: f64 = all.iter().map(|nis| value(nis) * nis.count as f64).sum();

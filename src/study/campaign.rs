@@ -4,11 +4,10 @@
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::accuracy::StudyError;
-use super::ratio::Ratio;
+use super::accuracy::{Figures, Squares, StudyError};
 use crate::calibration::{
-    CalibrationError, Group, NoisePolicy, Options, Outcome, PARAMETERS, Problem, UNWATCHED,
-    estimate, mean_square_interval, thermal_bound, to_vector,
+    CalibrationError, Coefficient, Group, NoisePolicy, Options, Outcome, PARAMETERS, Problem,
+    UNWATCHED, estimate, mean_square_interval, nees, thermal_bound, to_vector,
 };
 use crate::imu::{InstallationForm, ParameterKind, PerSensor, ThermalCoefficients, Triad};
 use crate::run::Run;
@@ -180,67 +179,42 @@ fn compare(
     simulated: &[Simulated],
     bound: &DVector<f64>,
 ) -> Option<CampaignTrial> {
-    let estimated: Vec<usize> = outcome.estimate.estimated().collect();
-    let empty = DMatrix::zeros(PARAMETERS, 0);
-    let thermal = outcome.thermal.as_ref();
-    let coefficients = thermal
-        .map(|t| t.coefficients.as_slice())
-        .unwrap_or_default();
-    let cross = thermal.map_or(&empty, |t| &t.cross);
-    let (m, n) = (estimated.len(), coefficients.len());
-    let off = to_vector(&truth(outcome, simulated)) - outcome.estimate.vector();
+    let (estimate, thermal) = (&outcome.estimate, outcome.thermal.as_ref());
+    let none = (DMatrix::zeros(PARAMETERS, 0), DMatrix::zeros(0, 0));
+    let (cross, own) = thermal.map_or((&none.0, &none.1), |t| (&t.cross, &t.covariance));
+    let covariance = estimate.covariance_with(cross, own);
+    let coefficients = thermal.map_or(&[][..], |t| &t.coefficients);
+    let off = to_vector(&truth(outcome, simulated)) - estimate.vector();
     let true_coefficients = truth_coefficients(outcome, simulated);
-    let error = DVector::from_fn(m + n, |k, _| match k.checked_sub(m) {
-        None => off[estimated[k]],
-        Some(k) => {
-            let c = coefficients[k];
-            let value = thermal.map_or(0.0, |t| t.values[k]);
-            true_coefficients.get(c.sensor)[(c.parameter, c.function)] - value
-        }
-    });
-    let covariance = DMatrix::from_fn(m + n, m + n, |i, j| {
-        match (i.checked_sub(m), j.checked_sub(m)) {
-            (None, None) => outcome.estimate.covariance[(estimated[i], estimated[j])],
-            (None, Some(k)) => cross[(estimated[i], k)],
-            (Some(k), None) => cross[(estimated[j], k)],
-            (Some(k), Some(l)) => thermal.map_or(0.0, |t| t.covariance[(k, l)]),
-        }
-    });
-    let nees = squared_error(&error, &covariance)?;
-    let errors = (0..m + n).map(|k| {
-        let (index, function) = match k.checked_sub(m) {
-            None => (estimated[k], None),
-            Some(k) => (coefficients[k].index(), Some(coefficients[k].function)),
-        };
-        let bound = match k.checked_sub(m) {
-            None => bound.get(index),
-            Some(k) => bound.get(PARAMETERS + k),
-        };
+    let of_coefficient = |(k, c): (usize, &Coefficient)| {
+        let value = thermal.map_or(0.0, |t| t.values[k]);
+        true_coefficients.get(c.sensor)[(c.parameter, c.function)] - value
+    };
+    let of_coefficients = coefficients.iter().enumerate().map(of_coefficient);
+    let error = off.iter().copied().chain(of_coefficients);
+    let error = DVector::from_vec(error.collect());
+    let places: Vec<usize> = estimate
+        .estimated()
+        .chain(PARAMETERS..error.len())
+        .collect();
+    let nees = nees(&error, &covariance, &places)?;
+    let errors = places.iter().map(|&k| {
+        let coefficient = k.checked_sub(PARAMETERS).map(|c| coefficients[c]);
         ErrorOf {
-            group: Group::of(index),
-            function,
+            group: Group::of(coefficient.map_or(k, |c| c.index())),
+            function: coefficient.map(|c| c.function),
             squares: [
                 error[k].powi(2),
                 covariance[(k, k)],
-                bound.copied().unwrap_or(f64::NAN),
+                bound.get(k).copied().unwrap_or(f64::NAN),
             ],
         }
     });
     Some(CampaignTrial {
-        nees: (nees, m + n),
+        nees: (nees.mean * nees.count as f64, nees.count),
         errors: errors.collect(),
         orders: orders(outcome, simulated),
     })
-}
-
-/// Squared error by its covariance; none if that is not positive definite.
-fn squared_error(error: &DVector<f64>, covariance: &DMatrix<f64>) -> Option<f64> {
-    let sigma = covariance.diagonal().map(f64::sqrt);
-    let correlation = DMatrix::from_fn(sigma.len(), sigma.len(), |i, j| {
-        covariance[(i, j)] / (sigma[i] * sigma[j])
-    });
-    let whitened = error.component_div(&sigma);
-    Some(whitened.dot(&correlation.cholesky()?.solve(&whitened)))
 }
 
 /// The order of each group that was chosen, and the true one.
@@ -282,27 +256,24 @@ impl CampaignAccuracy {
         (count > 0).then(|| (sum / count as f64, mean_square_interval(count, 0.01)))
     }
 
-    /// RMS error, RMS σ claimed, RMS bound and the ratio of error to bound, of the parameters of a group at the
-    /// reference or of their coefficients of one function.
-    pub fn figures(&self, group: Group, function: Option<usize>) -> Option<CampaignFigures> {
+    /// Figures of the parameters of a group at the reference, or of their coefficients of one function, normalised; and how
+    /// many campaigns have them.
+    pub fn figures(&self, group: Group, function: Option<usize>) -> Option<(Figures, usize)> {
         let of = |trial: &CampaignTrial| {
             let of_group = |e: &&ErrorOf| e.group == group && e.function == function;
             let errors: Vec<&ErrorOf> = trial.errors.iter().filter(of_group).collect();
             let mean =
                 |k: usize| errors.iter().map(|e| e.squares[k]).sum::<f64>() / errors.len() as f64;
-            (!errors.is_empty()).then(|| [mean(0), mean(1), mean(2)])
+            (!errors.is_empty()).then(|| Squares {
+                filter: Some(mean(0)),
+                claimed: Some(mean(1)),
+                bound: mean(2),
+                ..Squares::default()
+            })
         };
-        let all: Vec<[f64; 3]> = self.trials.iter().filter_map(of).collect();
-        let column = |k: usize| all.iter().map(|s| s[k]).collect::<Vec<f64>>();
-        let rms = |k: usize| (column(k).iter().sum::<f64>() / all.len() as f64).sqrt();
-        let ratio = Ratio::of(&column(0), &column(2))?;
-        Some(CampaignFigures {
-            campaigns: all.len(),
-            error: rms(0),
-            claimed: rms(1),
-            bound: rms(2),
-            ratio,
-        })
+        let all: Vec<Squares> = self.trials.iter().filter_map(of).collect();
+        let count = all.len();
+        (count > 0).then(|| (Figures::new(all.into_iter()), count))
     }
 
     /// In how many campaigns the order of a group was chosen as it is, and of how many.
@@ -314,21 +285,6 @@ impl CampaignAccuracy {
         };
         (self.trials.iter().filter(right).count(), self.trials.len())
     }
-}
-
-/// Figures of one kind of error over all campaigns, normalised.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CampaignFigures {
-    /// Campaigns that have it.
-    pub campaigns: usize,
-    /// RMS error.
-    pub error: f64,
-    /// RMS of the σ that is claimed.
-    pub claimed: f64,
-    /// RMS of the Cramér–Rao bound.
-    pub bound: f64,
-    /// Error over bound.
-    pub ratio: Ratio,
 }
 
 impl CampaignAccuracy {

@@ -5,7 +5,6 @@
 //! δθ do on the way, X₀ what they did to the alignment at the start. Both are linear, so each mission
 //! is followed once and serves every calibration.
 
-mod alignment;
 mod budget;
 mod method;
 mod noise;
@@ -17,7 +16,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::Ratio;
-use super::navigation::{Exposure, Mission, Motion, NavigationStudyError};
+use super::navigation::{Mission, Motion, NavigationStudyError};
 use super::ratio::{bootstrap, median, quantile};
 use crate::calibration::{PARAMETERS, ParameterVector, parameter};
 use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
@@ -178,11 +177,8 @@ impl ExperimentStudy {
     /// [`ExperimentError`] if runs or missions cannot be made. A calibration that fails is no error:
     /// it is counted.
     pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Experiment, ExperimentError> {
-        let scenarios = method::Scenarios::new(&self.scenario)?;
         let all: Vec<u64> = (0..self.samples).collect();
-        let (ways, trials) =
-            rayon::join(|| self.ways(), || self.trials_with(&scenarios, &all, done));
-        self.assemble(&scenarios, &ways?, trials?)
+        self.result(self.trials(&all, done)?)
     }
 
     /// Makes some of the instruments, given by their numbers; `done` is told of each.
@@ -194,24 +190,7 @@ impl ExperimentStudy {
         runs: &[u64],
         done: &(dyn Fn() + Sync),
     ) -> Result<Vec<Trial>, ExperimentError> {
-        self.trials_with(&method::Scenarios::new(&self.scenario)?, runs, done)
-    }
-
-    /// What all instruments say, in the order of their numbers.
-    ///
-    /// # Errors
-    /// As [`Self::run`].
-    pub fn result(&self, trials: Vec<Trial>) -> Result<Experiment, ExperimentError> {
         let scenarios = method::Scenarios::new(&self.scenario)?;
-        self.assemble(&scenarios, &self.ways()?, trials)
-    }
-
-    fn trials_with(
-        &self,
-        scenarios: &method::Scenarios,
-        runs: &[u64],
-        done: &(dyn Fn() + Sync),
-    ) -> Result<Vec<Trial>, ExperimentError> {
         let all = runs.par_iter().with_max_len(1).map(|&run| {
             let trial = scenarios.trial(self.seed, run)?;
             done();
@@ -220,21 +199,17 @@ impl ExperimentStudy {
         all.collect()
     }
 
-    fn ways(&self) -> Result<Vec<Way>, ExperimentError> {
-        let all = Situation::ALL.into_par_iter();
-        all.map(|situation| self.way(situation)).collect()
-    }
-
-    fn assemble(
-        &self,
-        scenarios: &method::Scenarios,
-        ways: &[Way],
-        trials: Vec<Trial>,
-    ) -> Result<Experiment, ExperimentError> {
+    /// What all instruments say, in the order of their numbers.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub fn result(&self, trials: Vec<Trial>) -> Result<Experiment, ExperimentError> {
+        let navigated = Situation::ALL.into_par_iter();
+        let navigated = navigated.map(|situation| Ok(self.way(situation)?.navigated(&trials)));
         Ok(Experiment {
-            navigations: ways.iter().map(|way| way.navigated(&trials)).collect(),
+            navigations: navigated.collect::<Result<_, ExperimentError>>()?,
             study: self.clone(),
-            table_times: scenarios.table_times()?,
+            table_times: method::Scenarios::new(&self.scenario)?.table_times()?,
             trials,
         })
     }
@@ -259,7 +234,7 @@ impl ExperimentStudy {
         let mut start = Sensitivity::zeros();
         let mut aligned = None;
         if let (Situation::SelfAligned, Motion::Standing(at)) = (situation, &mission.motion) {
-            let by_sensed = alignment::by_itself(at);
+            let by_sensed = noise::by_itself(at);
             if let Ok(sensed) = SensedErrors::new(&instrument) {
                 start = by_sensed * sensed.at(&at.steady());
             }
@@ -270,7 +245,10 @@ impl ExperimentStudy {
         Ok(Way {
             situation,
             noise: noise::spread(&noise),
-            minutes: exposures.iter().map(Minute::of).collect(),
+            minutes: exposures
+                .iter()
+                .map(|at| (at.time, at.position()))
+                .collect(),
         })
     }
 }
@@ -285,21 +263,8 @@ fn ideal() -> PerSensor<Triad> {
 struct Way {
     situation: Situation,
     noise: Spread,
-    minutes: Vec<Minute>,
-}
-
-struct Minute {
-    time: f64,
-    position: ByParameter,
-}
-
-impl Minute {
-    fn of(exposure: &Exposure) -> Self {
-        Self {
-            time: exposure.time,
-            position: exposure.position(),
-        }
-    }
+    /// Time and what each parameter's error does to the position.
+    minutes: Vec<(f64, ByParameter)>,
 }
 
 impl Way {
@@ -318,11 +283,15 @@ impl Way {
         let calibrated: Vec<&Calibrated> = trials.iter().filter_map(|t| t.of(place)).collect();
         let all = || calibrated.iter().map(|c| &c.error);
         let errors: Vec<f64> = all().map(|error| self.at_end(error)).collect();
-        let lengths_at =
-            |minute: &Minute| -> Vec<f64> { all().map(|e| (minute.position * e).norm()).collect() };
         let every: Vec<usize> = (0..errors.len()).collect();
+        let median_at = |by: &ByParameter| {
+            median(
+                &Vec::from_iter(all().map(|error| (by * error).norm())),
+                &every,
+            )
+        };
         let largest = |error: &ParameterVector| {
-            let lengths = self.minutes.iter().map(|m| (m.position * error).norm());
+            let lengths = self.minutes.iter().map(|(_, by)| (by * error).norm());
             lengths.fold(0.0, f64::max)
         };
         let interval = bootstrap(errors.len(), |chosen| median(&errors, chosen));
@@ -338,7 +307,7 @@ impl Way {
                 .minutes
                 .iter()
                 .step_by(EVERY)
-                .map(|minute| (minute.time, median(&lengths_at(minute), &every)))
+                .map(|(t, by)| (*t, median_at(by)))
                 .collect(),
             gain: self.gain(place, method, trials),
             budget: Budget::new(self.end(), &calibrated),
@@ -366,7 +335,7 @@ impl Way {
 
     fn end(&self) -> ByParameter {
         let last = self.minutes.last();
-        last.map_or_else(ByParameter::zeros, |last| last.position)
+        last.map_or_else(ByParameter::zeros, |last| last.1)
     }
 }
 

@@ -1,7 +1,6 @@
 //! What a calibration is worth: the navigation error that what is wrong with it causes, by the
 //! nonlinear equations of navigation, and the σ of that error that its covariance predicts, by the linear model.
 
-mod course;
 mod outlook;
 mod warming;
 
@@ -9,17 +8,17 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use thiserror::Error;
 
 use crate::attitude::from_pitch_roll_heading;
-use crate::calibration::{Comparison, ComparisonError, Named, compare};
-use crate::calibration::{PARAMETERS, ParameterMatrix, parameter};
+use crate::calibration::{
+    Comparison, ComparisonError, Named, PARAMETERS, ParameterMatrix, compare, parameter,
+};
 use crate::earth::Site;
-use crate::imu::BodyFrame;
-use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+use crate::imu::{BodyFrame, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::navigation::error_model::{POSITION, STATES};
 use crate::navigation::{
     ErrorMatrix, ErrorVector, Forcing, InputError, Instant, Linearisation, NavigationError,
-    NearPole, NonlinearError, SensedErrors, Sensitivity, Solution, Trajectory, within_reach,
+    NearPole, NonlinearError, SensedErrors, Sensitivity, Solution, Stride, Strides, Trajectory,
+    within_reach,
 };
-use course::Course;
 
 pub use outlook::Outlook;
 pub use warming::{Warming, WarmingError, WarmingPair};
@@ -163,10 +162,7 @@ impl Pair {
                 constant: correction * (truth.bias - calibration.bias),
             })
         };
-        Ok(PerSensor {
-            gyro: of(Sensor::Gyro)?,
-            accel: of(Sensor::Accel)?,
-        })
+        PerSensor::try_from_fn(of)
     }
 }
 
@@ -286,32 +282,46 @@ impl Mission {
         mut sensitivity: Sensitivity,
         truth: &PerSensor<Triad>,
     ) -> Result<Vec<Exposure>, NavigationStudyError> {
-        let mut course = Course::new(&self.motion);
         let sensed = sensed_errors(truth)?;
-        let linear = |at: &Instant| Linearisation::about(at, &sensed);
-        let mut start = linear(course.here());
-        // At rest one exact step does for all intervals.
-        let at_rest = match &self.motion {
-            Motion::Standing(truth) => Some(truth.steady()),
-            Motion::Moving(_) => None,
+        let Motion::Standing(truth) = &self.motion else {
+            let linear = |at: &Instant| Linearisation::about(at, &sensed);
+            return self.exposure_by(sensitivity, |_| Ok(linear));
         };
-        let at_rest = at_rest.map(|at| (at, at.linear_model().over(self.interval)));
+        // At rest one exact step does for all intervals.
+        let at = truth.steady();
+        let transition = at.linear_model().over(self.interval);
+        let added = transition.input * sensed.at(&at);
+        let mut exposures = vec![exposure(0.0, &sensitivity, truth)?];
+        for interval in 1..=self.intervals {
+            sensitivity = transition.errors * sensitivity + added;
+            exposures.push(exposure(
+                f64::from(interval) * self.interval,
+                &sensitivity,
+                truth,
+            )?);
+        }
+        Ok(exposures)
+    }
 
+    /// The same with a linear model that is new in each interval, told by number.
+    fn exposure_by<L: Fn(&Instant) -> Linearisation>(
+        &self,
+        mut sensitivity: Sensitivity,
+        linear: impl Fn(u32) -> Result<L, NavigationStudyError>,
+    ) -> Result<Vec<Exposure>, NavigationStudyError> {
+        let mut course = Course::new(&self.motion);
         let mut exposures = vec![exposure(0.0, &sensitivity, &course.here().truth)?];
         for interval in 1..=self.intervals {
+            let linear = linear(interval)?;
             let time = f64::from(interval) * self.interval;
-            if let Some((at, transition)) = &at_rest {
-                let sensed = sensed.at(at);
-                sensitivity = transition.errors * sensitivity + transition.input * sensed;
-            } else {
-                course.go(time, 0.0, |stride| {
-                    let [middle, end] = [&stride.middle, &stride.end].map(linear);
-                    let linearised = [&start, &middle, &end];
-                    sensitivity = Linearisation::follow(&sensitivity, stride.duration, linearised);
-                    start = end;
-                    Ok::<_, NavigationStudyError>(())
-                })?;
-            }
+            let mut start = linear(course.here());
+            course.go(time, 0.0, |stride| {
+                let [middle, end] = [&stride.middle, &stride.end].map(&linear);
+                let linearised = [&start, &middle, &end];
+                sensitivity = Linearisation::follow(&sensitivity, stride.duration, linearised);
+                start = end;
+                Ok::<_, NavigationStudyError>(())
+            })?;
             exposures.push(exposure(time, &sensitivity, &course.here().truth)?);
         }
         Ok(exposures)
@@ -354,6 +364,54 @@ fn exposure(
         time,
         by_parameter: by_state * sensitivity,
     })
+}
+
+/// A body's true motion step by step, whether it stands or moves.
+enum Course<'a> {
+    Standing { here: Instant, time: f64 },
+    Moving(Box<Strides<'a>>),
+}
+
+impl<'a> Course<'a> {
+    fn new(motion: &'a Motion) -> Self {
+        match motion {
+            Motion::Standing(truth) => Self::Standing {
+                here: truth.steady(),
+                time: 0.0,
+            },
+            Motion::Moving(trajectory) => Self::Moving(Box::new(trajectory.strides())),
+        }
+    }
+
+    /// The true state now and what is sensed in it.
+    fn here(&self) -> &Instant {
+        match self {
+            Self::Standing { here, .. } => here,
+            Self::Moving(strides) => strides.here(),
+        }
+    }
+
+    /// Goes on until a time in s since the start, as [`Strides::go`] does.
+    fn go<E>(
+        &mut self,
+        until: f64,
+        beside: f64,
+        mut each: impl FnMut(&Stride) -> Result<(), E>,
+    ) -> Result<(), E> {
+        match self {
+            Self::Standing { here, time } => {
+                let steps = Stride::count(until - *time, here.rate.norm() + beside);
+                let stride = Stride {
+                    duration: (until - *time) / f64::from(steps),
+                    middle: *here,
+                    end: *here,
+                };
+                *time = until;
+                (0..steps).try_for_each(|_| each(&stride))
+            }
+            Self::Moving(strides) => strides.go(until, beside, each),
+        }
+    }
 }
 
 #[cfg(test)]

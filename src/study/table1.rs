@@ -13,26 +13,23 @@
 //! as scale factors of rows of unit norm, is not left out.
 
 pub mod paper;
-mod quantity;
-mod reading;
 mod response;
 mod verdict;
 
 use nalgebra::Vector3;
+use paper::Published;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use response::{Response, standing};
 
 use crate::earth::ROTATION_RATE;
 use crate::imu::{InstallationForm, PerSensor, Sensor, Triad};
 use crate::models::{InstallationModel, Instrument, ModelError, Place};
 use crate::navigation::{Instant, LARGEST_LATITUDE};
 use crate::units::DEGREE;
-use paper::Published;
-use response::{Response, standing};
 
-pub use quantity::{ByQuantity, Quantity};
-pub use reading::{Installation, Kind, Reading};
+pub use paper::{ByQuantity, Installation, Kind, Quantity, Reading};
 pub use response::Moments;
 pub use verdict::{AGREEMENT, Verdict};
 

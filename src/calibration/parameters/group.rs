@@ -1,15 +1,28 @@
 //! The six groups in which an engineer reads a calibration.
 
-use super::parameter_name;
-use super::{PARAMETERS, sensor_and_parameter};
-use crate::calibration::estimate::Estimate;
+use super::{PARAMETERS, parameter_name, sensor_and_parameter};
+use crate::calibration::Estimate;
 use crate::imu::{InstallationForm, ParameterKind, Sensor, Triad};
+use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
 
 /// Parameters of one triad and kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Group {
     sensor: Sensor,
     kind: ParameterKind,
+}
+
+/// How the figures of a group are written.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GroupEntry {
+    /// Its kind with the letter of the model.
+    pub title: &'static str,
+    /// Key in files, with the unit.
+    pub key: &'static str,
+    /// Symbol of the unit.
+    pub unit: &'static str,
+    /// The unit in the model's normalised SI values.
+    pub value: f64,
 }
 
 impl Group {
@@ -37,6 +50,24 @@ impl Group {
     /// The kind of its parameters.
     pub fn kind(self) -> ParameterKind {
         self.kind
+    }
+
+    /// How its figures are written.
+    pub fn entry(self) -> GroupEntry {
+        let (title, key, unit, value) = match (self.kind, self.sensor) {
+            (ParameterKind::Scale, _) => ("scale factor K", "scale_ppm", "ppm", PPM),
+            (ParameterKind::Installation, _) => {
+                ("installation E", "installation_arcsec", "″", ARCSEC)
+            }
+            (ParameterKind::Bias, Sensor::Gyro) => ("bias D", "bias_deg_per_h", "°/h", DEG_PER_H),
+            (ParameterKind::Bias, Sensor::Accel) => ("bias D", "bias_ug", "µg", MICRO_G),
+        };
+        GroupEntry {
+            title,
+            key,
+            unit,
+            value,
+        }
     }
 
     /// Indices of its parameters in this form.

@@ -78,3 +78,20 @@ pub const OBSERVED_BELOW: f64 = 0.5;
 pub fn in_general_form(triads: &PerSensor<Triad>) -> PerSensor<Triad> {
     PerSensor::from_fn(|sensor| triads.get(sensor).in_form(InstallationForm::General))
 }
+
+/// Derivatives of a smooth function by central differences; at unit scale they leave 1e-10 of relative error.
+pub fn derivatives<const M: usize, const N: usize>(
+    at: &SVector<f64, N>,
+    of: impl Fn(&SVector<f64, N>) -> SVector<f64, M>,
+) -> SMatrix<f64, M, N> {
+    const STEP: f64 = 1e-5;
+    let column = |k: usize| {
+        let moved = |by: f64| {
+            of(&SVector::from_fn(|i, _| {
+                at[i] + if i == k { by } else { 0.0 }
+            }))
+        };
+        (moved(STEP) - moved(-STEP)) / (2.0 * STEP)
+    };
+    SMatrix::from_columns(&std::array::from_fn::<_, N, _>(column))
+}

@@ -7,11 +7,11 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::observability::{not_observed, temperature_not_seen};
-use crate::calibration::estimate::Estimate;
-use crate::calibration::parameters::{PARAMETERS, parameter, parameter_name, sensor_and_parameter};
-use crate::calibration::several::thermal::{Coefficient, Thermal};
+use crate::calibration::{
+    Coefficient, Estimate, Finding, PARAMETERS, Thermal, parameter, parameter_name,
+    sensor_and_parameter,
+};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{
     InstallationForm, PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, RATE, Sensor,

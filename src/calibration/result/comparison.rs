@@ -4,11 +4,9 @@
 use super::frame::{Canonical, free_parameters, own_nominal};
 use super::nees::{Nees, nees};
 use super::scatter::{Scatter, scatter};
-use crate::calibration::error::ComparisonError;
-use crate::calibration::parameters::{ParameterMatrix, ParameterVector, sensor_and_parameter};
 use crate::calibration::result::Calibration;
-use crate::imu::BodyFrame;
-use crate::imu::{Nominal, ParameterKind, PerSensor, Sensor, Triad};
+use crate::calibration::{ComparisonError, ParameterMatrix, ParameterVector, sensor_and_parameter};
+use crate::imu::{BodyFrame, Nominal, ParameterKind, PerSensor, Sensor, Triad};
 
 /// A record with the name that tables and messages give it.
 #[derive(Debug, Clone, Copy)]
@@ -39,6 +37,12 @@ pub struct Comparison {
 }
 
 impl Comparison {
+    /// The reference, then every other.
+    pub fn calibrations(&self) -> impl Iterator<Item = &Canonical> {
+        let sides = self.sides.iter().map(|side| &side.calibration);
+        std::iter::once(&self.reference).chain(sides)
+    }
+
     /// The reference's scale factor in the file's quantity; none for other parameters.
     pub fn scale_factor(&self, parameter: usize) -> Option<f64> {
         let (sensor, of_triad) = sensor_and_parameter(parameter);

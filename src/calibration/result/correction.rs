@@ -120,10 +120,7 @@ impl Correction {
             terms[known] = term.value;
         }
         Ok(Self {
-            matrix: PerSensor {
-                gyro: inverse(Sensor::Gyro)?,
-                accel: inverse(Sensor::Accel)?,
-            },
+            matrix: PerSensor::try_from_fn(inverse)?,
             bias: PerSensor::from_fn(|sensor| Vector3::from(record.triad(sensor).bias)),
             sensitivity,
             terms,

@@ -4,6 +4,7 @@
 //! + bias`, with `u` in rad/s or m/s² along right-front-up.
 
 pub(super) mod at_rest;
+pub(super) mod at_temperature;
 pub(super) mod comparison;
 pub(super) mod correction;
 pub(crate) mod frame;
@@ -21,10 +22,8 @@ use serde::{Deserialize, Deserializer, Serialize};
 
 use super::budget::BudgetRecord;
 use super::noise::NoiseReport;
-use crate::calibration::checks::dwell_scatter::DwellScatter;
-use crate::calibration::checks::finding::Finding;
-use crate::calibration::checks::quality::Quality;
 use crate::calibration::result::thermal_record::{RecordingRecord, ThermalRecord};
+use crate::calibration::{DwellScatter, Finding, Quality};
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
 

@@ -1,10 +1,10 @@
 //! An error measured by its covariance, correlations included.
 
 use faer::{Mat, Side};
-use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView};
 use serde::{Deserialize, Serialize};
 
-use crate::calibration::checks::innovation::mean_square_interval;
+use crate::calibration::mean_square_interval;
 
 /// A correlation matrix has no information in directions whose eigenvalue is below this: they are
 /// zero except for rounding, as where three angles stand for six.
@@ -22,11 +22,12 @@ pub struct Nees {
 }
 
 /// NEES of a difference over those of some parameters that have a σ; none if none has.
-pub fn nees<const N: usize>(
-    difference: &SVector<f64, N>,
-    covariance: &SMatrix<f64, N, N>,
+pub fn nees<'a>(
+    difference: impl Into<DVectorView<'a, f64>>,
+    covariance: impl Into<DMatrixView<'a, f64>>,
     parameters: &[usize],
 ) -> Option<Nees> {
+    let (difference, covariance) = (difference.into(), covariance.into());
     let with_sigma = parameters.iter().copied();
     let with_sigma: Vec<usize> = with_sigma.filter(|&i| covariance[(i, i)] > 0.0).collect();
     let squares = Directions::new(covariance, &with_sigma)?.squares(difference);
@@ -51,7 +52,8 @@ pub struct Directions {
 impl Directions {
     /// Of the covariance of some parameters, each of which has a σ; none if there are none, or if the
     /// matrix cannot be a covariance.
-    pub fn new<const N: usize>(covariance: &SMatrix<f64, N, N>, indices: &[usize]) -> Option<Self> {
+    pub fn new<'a>(covariance: impl Into<DMatrixView<'a, f64>>, indices: &[usize]) -> Option<Self> {
+        let covariance = covariance.into();
         let n = indices.len();
         let sigma = DVector::from_fn(n, |i, _| covariance[(indices[i], indices[i])].sqrt());
         let correlation = Mat::from_fn(n, n, |i, j| {
@@ -73,7 +75,7 @@ impl Directions {
     }
 
     /// Squares of a vector's components along the directions, each in units of its σ.
-    fn squares<const N: usize>(&self, v: &SVector<f64, N>) -> Vec<f64> {
+    fn squares(&self, v: DVectorView<f64>) -> Vec<f64> {
         let z = DVector::from_fn(self.sigma.len(), |i, _| v[self.indices[i]] / self.sigma[i]);
         let along = self.eigenvectors.tr_mul(&z);
         let squares = along.iter().zip(&self.eigenvalues);

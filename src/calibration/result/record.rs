@@ -11,22 +11,14 @@ use super::{
     FORMAT, FORMAT_WITH_TEMPERATURE, GravityRecord, Method, NisRecord, NoiseRecord, TermRecord,
     TestVector, TriadRecord, rows,
 };
-use crate::calibration::budget::Budget;
-use crate::calibration::checks::error_term_test::ErrorTermTest;
-use crate::calibration::checks::finding::Finding;
-use crate::calibration::checks::innovation::Nis;
-use crate::calibration::checks::quality::Quality;
-use crate::calibration::estimate::Estimate;
-use crate::calibration::outcome::Outcome;
-use crate::calibration::parameters::auxiliary::{Auxiliary, auxiliary_name};
-use crate::calibration::parameters::{
-    PARAMETERS, ParameterMatrix, factor, parameter, parameter_name,
+use crate::calibration::parameters::factor;
+use crate::calibration::{
+    Auxiliary, Budget, ClosedForm, ErrorTermTest, Estimate, Finding, Nis, Outcome, PARAMETERS,
+    ParameterMatrix, ParameterVector, Problem, Quality, auxiliary_name, from_vector,
+    parameter_name,
 };
-use crate::calibration::problem::Problem;
-use crate::calibration::start::closed_form::ClosedForm;
 use crate::imu::{
     BodyFrame, InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad,
-    TriadVector,
 };
 use crate::run::Run;
 
@@ -218,24 +210,15 @@ impl Estimate {
         let names = |of: &[usize]| of.iter().filter_map(|&i| parameter_name(form, i)).collect();
         let entry = |i, j| self.covariance[(i, j)] * factor(nominal, i) * factor(nominal, j);
         let row = |&i: &usize| estimated.iter().map(|&j| entry(i, j)).collect();
-        let sigma_of = |sensor| {
-            let sigma = sigma.fixed_rows::<PER_TRIAD>(parameter(sensor, 0));
-            TriadRecord::of_sigma(form, &sigma.into_owned(), nominal.get(sensor))
-        };
-        let correction = |sensor| {
-            let sensitivity = nominal.get(sensor).sensitivity(self.triads.get(sensor));
-            Some(rows(&sensitivity.try_inverse()?))
-        };
-        let correction = correction(Sensor::Gyro).zip(correction(Sensor::Accel));
         let vectors = TEST_INPUTS.map(|input| self.test_vector(nominal, input));
         Calibration {
             body_frame,
-            sigma: Some(PerSensor::from_fn(sigma_of)),
+            sigma: Some(TriadRecord::of_both_sigma(form, &sigma, nominal)),
             parameters: names(&estimated),
             covariance: estimated.iter().map(row).collect(),
             fixed: names(&fixed),
             equation: Some(EQUATION.to_owned()),
-            correction: correction.map(|(gyro, accel)| PerSensor { gyro, accel }),
+            correction: correction_of(&self.triads, nominal),
             test_vectors: vectors.into(),
             meta: run.recording.meta.clone(),
             ..truth_record(&self.triads, run)
@@ -267,10 +250,35 @@ pub fn truth_record(truth: &PerSensor<Triad>, run: &Run) -> Calibration {
     }
 }
 
+/// The matrices of `u = correction (N − bias)`, by nominal scales; none where one has no inverse.
+pub fn correction_of(
+    triads: &PerSensor<Triad>,
+    nominal: &PerSensor<Nominal>,
+) -> Option<PerSensor<[[f64; 3]; 3]>> {
+    let of = |sensor| {
+        let sensitivity = nominal.get(sensor).sensitivity(triads.get(sensor));
+        Some(rows(&sensitivity.try_inverse()?))
+    };
+    Some(PerSensor {
+        gyro: of(Sensor::Gyro)?,
+        accel: of(Sensor::Accel)?,
+    })
+}
+
 impl TriadRecord {
+    /// σ of the parameters of both triads where they stand in their records, by nominal scales.
+    pub fn of_both_sigma(
+        form: InstallationForm,
+        sigma: &ParameterVector,
+        nominal: &PerSensor<Nominal>,
+    ) -> PerSensor<Self> {
+        let triads = from_vector(form, sigma);
+        PerSensor::from_fn(|sensor| Self::of_sigma(triads.get(sensor), nominal.get(sensor)))
+    }
+
     /// σ of a triad's parameters where they stand in its record, by nominal scales.
-    pub fn of_sigma(form: InstallationForm, sigma: &TriadVector, nominal: &Nominal) -> Self {
-        let triad = Triad::from_vector(form, sigma);
+    fn of_sigma(triad: &Triad, nominal: &Nominal) -> Self {
+        let form = triad.form;
         let mut installation = [[0.0; 3]; 3];
         for (angle, &(row, column)) in form.angle_names().iter().enumerate() {
             installation[row][column] = triad.angles[angle];

@@ -5,7 +5,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::frame::Canonical;
 use super::nees::Directions;
-use crate::calibration::parameters::ParameterVector;
+use crate::calibration::ParameterVector;
 
 /// Mean and scatter of three calibrations or more, taken as of one instrument that has not changed
 /// and of different data.

@@ -4,16 +4,14 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::calibration::estimate::Estimate;
-use crate::calibration::outcome::Outcome;
-use crate::calibration::parameters::{
-    PARAMETERS, ParameterVector, factor, parameter_index, parameter_name, sensor_and_parameter,
+use crate::calibration::parameters::factor;
+use crate::calibration::{
+    Coefficient, Estimate, Outcome, Own, PARAMETERS, ParameterVector, Thermal, parameter_index,
+    parameter_name, sensor_and_parameter,
 };
-use crate::calibration::reduction::Own;
-use crate::calibration::several::thermal::Thermal;
 use crate::imu::{
     AXES, HIGHEST_ORDER, InstallationForm, Nominal, PerSensor, RATE, Sensor, ThermalCoefficients,
-    ThermalRange, ThermalValues, powers,
+    ThermalRange, ThermalValues, Triad, powers,
 };
 use crate::run::Run;
 
@@ -102,14 +100,20 @@ impl CoefficientRecord {
         })
     }
 
-    /// Index of its parameter in a form, and of its function of temperature; `None` where there is none.
-    pub fn place(&self, form: InstallationForm) -> Option<(usize, usize)> {
+    /// What it is of in a form; `None` where there is no such parameter or function.
+    pub(super) fn coefficient(&self, form: InstallationForm) -> Option<Coefficient> {
         let function = match self.order {
             None => RATE,
             Some(order @ 1..=RATE) => order - 1,
             Some(_) => return None,
         };
-        Some((parameter_index(form, &self.parameter)?, function))
+        let (sensor, parameter) = sensor_and_parameter(parameter_index(form, &self.parameter)?);
+        Some(Coefficient {
+            sensor,
+            parameter,
+            function,
+            axis: Triad::axis(form, parameter)?,
+        })
     }
 }
 

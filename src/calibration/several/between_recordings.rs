@@ -3,14 +3,12 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::day_to_day::DayToDay;
-use super::separate_estimate::SeparateEstimate;
-use crate::calibration::checks::finding::Finding;
-use crate::calibration::checks::recordings::{RecordingDifference, recordings_differ};
-use crate::calibration::estimate::Estimate;
-use crate::calibration::model::Model;
-use crate::calibration::parameters::group::Group;
-use crate::calibration::parameters::{from_vector, sensor_and_parameter};
-use crate::imu::{RATE, ThermalModel, ThermalState, Triad};
+use crate::calibration::checks::recordings::recordings_differ;
+use crate::calibration::{
+    Estimate, Finding, Group, Model, RecordingDifference, SeparateEstimate, from_vector,
+    sensor_and_parameter,
+};
+use crate::imu::{RATE, ThermalState, Triad};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
 /// Fewer recordings do not tell a difference from a change with temperature.
@@ -38,39 +36,24 @@ pub fn learnt(model: &Model, alone: &[SeparateEstimate]) -> Option<(DayToDay, Fi
     let limit = chi_square_limit(1.0, FALSE_ALARM / evidence.groups.len() as f64);
     let found = evidence.found(limit)?;
     let mut day_to_day = model.day_to_day;
-    let differences = found
-        .into_iter()
-        .map(
-            |GroupDifference {
-                 group,
-                 variance,
-                 ratio,
-             }| {
-                let (key, unit) = DayToDay::key(group);
-                let mut stated = 0.0;
-                for index in group.parameters(model.form) {
-                    let sigma = &mut day_to_day.parameters[index];
-                    stated = *sigma / unit;
-                    *sigma = sigma.hypot(variance.sqrt());
-                }
-                RecordingDifference {
-                    key,
-                    stated,
-                    found: stated.hypot(variance.sqrt() / unit),
-                    ratio,
-                    limit,
-                }
-            },
-        )
-        .collect::<Vec<_>>();
+    let mut differences = Vec::new();
+    for (group, variance, ratio) in found {
+        let (key, unit) = DayToDay::key(group);
+        let mut stated = 0.0;
+        for index in group.parameters(model.form) {
+            let sigma = &mut day_to_day.parameters[index];
+            stated = *sigma / unit;
+            *sigma = sigma.hypot(variance.sqrt());
+        }
+        differences.push(RecordingDifference {
+            key,
+            stated,
+            found: stated.hypot(variance.sqrt() / unit),
+            ratio,
+            limit,
+        });
+    }
     Some((day_to_day, recordings_differ(&differences)))
-}
-
-/// A group whose parameters differ by this variance beyond what is stated.
-struct GroupDifference {
-    group: Group,
-    variance: f64,
-    ratio: f64,
 }
 
 /// What one recording says beyond its prior, along the directions of which it says more than that.
@@ -93,12 +76,6 @@ struct RecordingsEvidence {
     stated: DMatrix<f64>,
     /// Of what all have in common: the inverse of the prior variance.
     prior: DVector<f64>,
-}
-
-/// −2 ln of the likelihood, but for a constant, and its derivative by the variance of each group.
-struct Likelihood {
-    deviance: f64,
-    slopes: Vec<f64>,
 }
 
 impl RecordingEvidence {
@@ -148,8 +125,8 @@ fn common(
             continue;
         };
         for function in 0..functions {
-            let sigma = |thermal: &ThermalModel| thermal.sigma.get(sensor)[(of_triad, function)];
-            let coefficient = model.thermal.as_deref().map_or(0.0, sigma);
+            let thermal = model.thermal.as_deref();
+            let coefficient = thermal.map_or(0.0, |t| t.sigma.get(sensor)[(of_triad, function)]);
             let by = state.get(sensor)[axis][function];
             common[(i, (1 + function) * n + i)] = by * coefficient / model.prior_sigma[index];
         }
@@ -161,9 +138,8 @@ impl RecordingsEvidence {
     /// `None` where too few recordings say anything.
     fn new(model: &Model, alone: &[SeparateEstimate]) -> Option<Self> {
         let groups: Vec<Group> = Group::all().collect();
-        let indices: Vec<usize> = groups
-            .iter()
-            .flat_map(|group| group.parameters(model.form))
+        let indices = groups.iter().flat_map(|group| group.parameters(model.form));
+        let indices: Vec<usize> = indices
             .filter(|&index| model.prior_sigma[index] > 0.0)
             .collect();
         let n = indices.len();
@@ -184,18 +160,17 @@ impl RecordingsEvidence {
             widest.zip_apply(&off, |widest, off| *widest = widest.max(off.abs()));
             recordings.extend(RecordingEvidence::new((&off, covariance), &common));
         }
-        let own = model.day_to_day;
-        let own = own.covariance(&from_vector(model.form, &model.prior_mean));
+        let own = model
+            .day_to_day
+            .covariance(&from_vector(model.form, &model.prior_mean));
+        let parameter = |&index: &usize| {
+            let place = groups.iter().position(|&of| of == Group::of(index));
+            (place.unwrap_or_default(), model.prior_sigma[index].powi(2))
+        };
+        let parameters = indices.iter().map(parameter).collect();
         (recordings.len() >= FEWEST).then(|| Self {
             recordings,
-            parameters: indices
-                .iter()
-                .map(|&index| {
-                    let group = Group::of(index);
-                    let place = groups.iter().position(|&of| of == group);
-                    (place.unwrap_or_default(), model.prior_sigma[index].powi(2))
-                })
-                .collect(),
+            parameters,
             groups,
             stated: DMatrix::from_fn(n, n, |i, j| {
                 own[(indices[i], indices[j])] / (prior(i) * prior(j))
@@ -208,8 +183,9 @@ impl RecordingsEvidence {
         })
     }
 
-    /// Where the variance of each group beyond what is stated is this. `None` where rounding has the last word.
-    fn likelihood(&self, variances: &[f64]) -> Option<Likelihood> {
+    /// −2 ln of the likelihood, except for a constant, and its derivative by the variance of each group beyond what is
+    /// stated. `None` where rounding has the last word.
+    fn likelihood(&self, variances: &[f64]) -> Option<(f64, Vec<f64>)> {
         let mut own = self.stated.clone();
         for (i, &(group, prior)) in self.parameters.iter().enumerate() {
             own[(i, i)] += variances[group] / prior;
@@ -244,7 +220,7 @@ impl RecordingsEvidence {
                 slopes[group] += (expected - unexplained[i].powi(2)) / prior;
             }
         }
-        Some(Likelihood { deviance, slopes })
+        Some((deviance, slopes))
     }
 
     /// The variance of a group at which the likelihood is largest, the others' held; zero where any lowers it.
@@ -252,7 +228,7 @@ impl RecordingsEvidence {
         let mut trial = variances.to_vec();
         let mut falls = |variance: f64| {
             trial[group] = variance;
-            Some(self.likelihood(&trial)?.slopes[group] < 0.0)
+            Some(self.likelihood(&trial)?.1[group] < 0.0)
         };
         if !falls(0.0)? {
             return Some(0.0);
@@ -273,10 +249,10 @@ impl RecordingsEvidence {
         Some(10f64.powf(0.5 * (low + high)))
     }
 
-    /// The groups whose variance the data call for beyond this likelihood ratio; `None` where there are none.
-    fn found(&self, limit: f64) -> Option<Vec<GroupDifference>> {
+    /// The groups whose variance the data call for beyond this likelihood ratio, with both; `None` where there are none.
+    fn found(&self, limit: f64) -> Option<Vec<(Group, f64, f64)>> {
         let mut variances = vec![0.0; self.groups.len()];
-        let deviance = |variances: &[f64]| self.likelihood(variances).map(|of| of.deviance);
+        let deviance = |variances: &[f64]| self.likelihood(variances).map(|of| of.0);
         // What −2 ln of the likelihood loses by a group, the others' variances held.
         let ratio = |group: usize, variances: &[f64]| {
             let mut without = variances.to_vec();
@@ -312,17 +288,12 @@ impl RecordingsEvidence {
             }
         }
         let found = (0..variances.len()).filter(|&group| variances[group] > 0.0);
-        let found: Vec<GroupDifference> = found
-            .filter_map(|group| {
-                Some(GroupDifference {
-                    group: self.groups[group],
-                    variance: variances[group],
-                    ratio: ratio(group, &variances)?,
-                })
-            })
-            // One that came in first may be explained by those after it.
-            .filter(|found| found.ratio > limit)
-            .collect();
+        let found = found.filter_map(|group| {
+            let ratio = ratio(group, &variances)?;
+            Some((self.groups[group], variances[group], ratio))
+        });
+        // One that came in first may be explained by those after it.
+        let found: Vec<_> = found.filter(|&(.., ratio)| ratio > limit).collect();
         (!found.is_empty()).then_some(found)
     }
 }
@@ -392,8 +363,8 @@ mod tests {
     fn the_slope_of_the_likelihood_is_its_derivative() {
         let evidence = drawn(2.0, 1);
         let at = |variance: f64| evidence.likelihood(&[variance]).unwrap();
-        let numeric = (at(2.0 + 1e-4).deviance - at(2.0 - 1e-4).deviance) / 2e-4;
-        assert!((at(2.0).slopes[0] / numeric - 1.0).abs() < 1e-6);
+        let numeric = (at(2.0 + 1e-4).0 - at(2.0 - 1e-4).0) / 2e-4;
+        assert!((at(2.0).1[0] / numeric - 1.0).abs() < 1e-6);
     }
 
     #[test]
@@ -406,7 +377,7 @@ mod tests {
             let found = drawn(2.0, seed)
                 .found(chi_square_limit(1.0, FALSE_ALARM))
                 .unwrap();
-            sum += found[0].variance / f64::from(runs as u32);
+            sum += found[0].1 / f64::from(runs as u32);
         }
         let expected = 5.0 * (2.0f64 / 55.0).sqrt() / f64::from(runs as u32).sqrt();
         assert!((sum - 4.0).abs() < 4.0 * expected, "{sum} ± {expected}");

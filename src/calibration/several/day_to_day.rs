@@ -3,12 +3,11 @@
 use nalgebra::{SMatrix, Vector3};
 
 use crate::attitude::exp;
-use crate::calibration::parameters::group::Group;
-use crate::calibration::parameters::{
-    PARAMETERS, ParameterMatrix, ParameterVector, from_vector, to_vector,
+use crate::calibration::parameters::derivatives;
+use crate::calibration::{
+    Group, PARAMETERS, ParameterMatrix, ParameterVector, from_vector, to_vector,
 };
-use crate::imu::{ParameterKind, PerSensor, Sensor, Triad};
-use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
+use crate::imu::{PerSensor, Triad};
 
 /// What an instrument that is turned on its mounting face makes of parameters: derivatives of those of the recording.
 #[derive(Debug, Clone)]
@@ -50,8 +49,6 @@ pub enum OwnState {
 
 /// Rounds in which a mounting of a degree is found to a thousandth of a second of arc.
 const ROUNDS: usize = 3;
-/// Step of derivatives: small to their third order, large to rounding.
-const STEP: f64 = 1e-4;
 
 impl DayToDay {
     /// Whether anything differs.
@@ -61,13 +58,11 @@ impl DayToDay {
 
     /// The key of a group in a campaign's `[day_to_day]`, and its unit in SI.
     pub fn key(group: Group) -> (String, f64) {
-        let (kind, unit) = match (group.kind(), group.sensor()) {
-            (ParameterKind::Scale, _) => ("scale_ppm", PPM),
-            (ParameterKind::Installation, _) => ("installation_arcsec", ARCSEC),
-            (ParameterKind::Bias, Sensor::Gyro) => ("bias_deg_per_h", DEG_PER_H),
-            (ParameterKind::Bias, Sensor::Accel) => ("bias_ug", MICRO_G),
-        };
-        (format!("{}_{kind}", group.sensor().name()), unit)
+        let entry = group.entry();
+        (
+            format!("{}_{}", group.sensor().name(), entry.key),
+            entry.value,
+        )
     }
 
     /// All that a recording has of its own, with its 1σ.
@@ -118,31 +113,17 @@ impl Difference {
 
     /// How the parameters of the recording change with those of all and with its mounting.
     pub(in crate::calibration) fn response(&self, common: &PerSensor<Triad>) -> Turned {
-        let form = common.gyro.form;
         let before = to_vector(common) + self.parameters;
         let after = |mounting: &Vector3<f64>, parameters: &ParameterVector| {
             let turned = Self {
                 mounting: *mounting,
                 ..*self
             };
-            to_vector(&turned.turned(&from_vector(form, parameters)))
+            to_vector(&turned.turned(&from_vector(common.gyro.form, parameters)))
         };
-        let difference = |up: ParameterVector, down: ParameterVector| (up - down) / (2.0 * STEP);
-        let columns = |k: usize| {
-            let step = ParameterVector::from_fn(|i, _| if i == k { STEP } else { 0.0 });
-            let at = |step| after(&self.mounting, &(before + step));
-            difference(at(step), at(-step))
-        };
-        let turns = [0, 1, 2].map(|axis| {
-            let step = Vector3::from_fn(|i, _| if i == axis { STEP } else { 0.0 });
-            let at = |step| after(&(self.mounting + step), &before);
-            difference(at(step), at(-step))
-        });
         Turned {
-            by_parameters: ParameterMatrix::from_columns(&std::array::from_fn::<_, PARAMETERS, _>(
-                columns,
-            )),
-            by_mounting: SMatrix::from_columns(&turns),
+            by_parameters: derivatives(&before, |parameters| after(&self.mounting, parameters)),
+            by_mounting: derivatives(&self.mounting, |mounting| after(mounting, &before)),
         }
     }
 

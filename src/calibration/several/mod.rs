@@ -5,7 +5,6 @@
 //! from which the Gauss–Newton iterations of all data begin; with all orders that the temperatures support,
 //! then with those that a likelihood ratio calls for.
 
-pub mod at_temperature;
 pub mod day_to_day;
 pub mod separate;
 pub mod thermal;
@@ -13,27 +12,24 @@ pub mod thermal;
 mod between_recordings;
 mod order;
 mod repeat;
-pub mod separate_estimate;
 mod temperatures;
 
 use std::sync::Arc;
 
 use super::error::CalibrationError;
-use super::gauss_newton::{Progress, iterate};
+use super::gauss_newton::Progress;
 use super::linearisation::{AttitudePrior, Linearisation};
 use super::noise::NoisePolicy;
 use super::options::Options;
-use super::parameters::parameter;
+use super::parameters::{PARAMETERS, from_vector, sensor_and_parameter, to_vector};
 use super::pass::Gate;
 use super::problem::{Problem, Stretch};
 use super::solved::Solved;
-use crate::calibration::several::day_to_day::{DayToDay, Difference};
-use crate::calibration::several::separate_estimate::SeparateEstimate;
-use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+use crate::calibration::{DayToDay, Difference, SeparateEstimate};
+use crate::imu::{PerSensor, ThermalCoefficients, Triad};
 use crate::run::{Aiding, Run};
 pub use repeat::Repeatability;
 pub use temperatures::TemperatureOptions;
-use temperatures::Temperatures;
 
 /// What recordings of one instrument have in common, and what not.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,8 +72,7 @@ impl<'a> Problem<'a> {
             model.day_to_day.mounting = 0.0;
         }
         if let Some(options) = together.temperature {
-            let temperatures = Temperatures::of(&problem)?;
-            model.thermal = temperatures.model(&problem, options).map(Arc::new);
+            model.thermal = temperatures::model(&problem, options)?.map(Arc::new);
         }
         Ok(problem.with_model(model))
     }
@@ -131,56 +126,54 @@ pub fn solve<'a>(
     }
     let priors: Vec<AttitudePrior> = alone.iter().flat_map(|a| a.priors.clone()).collect();
     let at = start(&problem, &alone);
-    let mut passes = Vec::new();
-    let gate = Gate::Innovations;
-    let mut iterated = iterate(&problem, &priors, at, gate, &mut passes, progress)?;
-    if let Some(thermal) = iterated.held.thermal(&problem.model) {
-        let selected = order::select(&problem, &iterated, &thermal);
-        findings.extend(selected.finding(problem.model.form));
+    let mut solved = Solved::of(&problem, priors, at, Gate::Innovations, progress)?;
+    if let Some(thermal) = solved.iterated.held.thermal(&problem.model) {
+        let selected = order::select(&problem, &solved.iterated, &thermal);
+        findings.extend(selected.finding);
         if selected.model != thermal.model {
             let mut model = problem.model.clone();
             model.thermal = Some(Arc::new(selected.model));
-            problem = problem.with_model(model);
-            let from = selected.at;
-            iterated = iterate(&problem, &priors, from, gate, &mut passes, progress)?;
+            solved.iterated.estimate = selected.at;
+            solved = solved.again(problem.with_model(model), progress)?;
         }
     }
     Ok(Solved {
         alone,
         findings,
-        ..Solved::new(&problem, priors, iterated, passes)
+        ..solved
     })
 }
 
 /// Where the iterations begin: of each parameter the polynomial through what each recording alone says.
 fn start(problem: &Problem, alone: &[SeparateEstimate]) -> Linearisation {
     let model = &problem.model;
-    let initial = alone.iter().flat_map(|a| a.initial_attitudes.clone());
+    let initial = alone.iter().flat_map(|a| a.at.initial_attitudes.clone());
+    let mut common = model.prior_mean;
+    let mut thermal = PerSensor::<ThermalCoefficients>::default();
+    for index in 0..PARAMETERS {
+        let (sensor, of_triad) = sensor_and_parameter(index);
+        let Some(axis) =
+            Triad::axis(model.form, of_triad).filter(|_| model.prior_sigma[index] > 0.0)
+        else {
+            continue;
+        };
+        let fit = separate::through(model, alone, (sensor, of_triad, axis));
+        common[index] += fit[0];
+        let of_functions = fit.rows(1, fit.len() - 1).transpose();
+        thermal
+            .get_mut(sensor)
+            .row_mut(of_triad)
+            .copy_from(&of_functions);
+    }
     let mut at = Linearisation::new(
-        super::parameters::from_vector(model.form, &model.prior_mean),
+        from_vector(model.form, &common),
         nalgebra::SVector::zeros(),
         initial.collect(),
     );
-    let mut common = model.prior_mean;
-    for sensor in Sensor::ALL {
-        for of_triad in 0..PER_TRIAD {
-            let index = parameter(sensor, of_triad);
-            let (sigma, axis) = (model.prior_sigma[index], Triad::axis(model.form, of_triad));
-            let (Some(axis), true) = (axis, sigma > 0.0) else {
-                continue;
-            };
-            let fit = separate::through(model, alone, (sensor, of_triad, axis));
-            common[index] = model.prior_mean[index] + fit[0];
-            let coefficients = at.thermal.get_mut(sensor);
-            for function in 0..fit.len() - 1 {
-                coefficients[(of_triad, function)] = fit[function + 1];
-            }
-        }
-    }
-    at.triads = super::parameters::from_vector(model.form, &common);
+    at.thermal = thermal;
     if model.day_to_day.mounting > 0.0 {
         let mountings = alone.iter().map(|alone| Difference {
-            mounting: Difference::mounting_between(&at.triads, &alone.start),
+            mounting: Difference::mounting_between(&at.triads, &to_vector(&alone.at.triads)),
             ..Difference::default()
         });
         at.own = mountings.collect();

@@ -1,14 +1,11 @@
 //! Which orders of the polynomials the data call for.
 
 use super::thermal::{Coefficient, Thermal};
-use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::observability::temperature_not_seen;
 use crate::calibration::constants::Prior;
 use crate::calibration::gauss_newton::Iterated;
-use crate::calibration::linearisation::Linearisation;
-use crate::calibration::parameters::{OBSERVED_BELOW, parameter_name};
-use crate::calibration::problem::Problem;
-use crate::imu::{InstallationForm, ParameterKind, RATE, Sensor, ThermalModel, Triad};
+use crate::calibration::{Finding, Group, Linearisation, OBSERVED_BELOW, Problem, parameter_name};
+use crate::imu::{InstallationForm, RATE, ThermalModel};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
 /// What of a model the data call for.
@@ -16,16 +13,8 @@ pub struct Selected {
     pub model: ThermalModel,
     /// The estimates under it.
     pub at: Linearisation,
-    /// Coefficients of first order that the recordings did not show.
-    unseen: Vec<Coefficient>,
-}
-
-/// The highest order that is kept of one kind of parameters of a triad.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Order {
-    accel: bool,
-    kind: usize,
-    function: usize,
+    /// What the recordings did not show.
+    pub finding: Option<Finding>,
 }
 
 /// Takes the highest order of a kind of parameters off while the data do not call for it: where it is zero, the
@@ -41,21 +30,28 @@ pub fn select(problem: &Problem, iterated: &Iterated, thermal: &Thermal) -> Sele
         }
         reduction.posterior(&prior)
     };
+    let form = problem.model.form;
     let mut model = thermal.model.clone();
     let mut now = with(&model);
     loop {
-        let of_order = |order: Order| {
-            let of = Coefficient::all(problem.model.form, Some(&model)).into_iter();
-            of.filter(move |coefficient| Order::of(coefficient) == order)
+        let of_order = |(group, function): (Group, usize)| {
+            let of = Coefficient::all(form, Some(&model)).into_iter();
+            of.filter(move |c| Group::of(c.index()) == group && c.function == function)
         };
-        let without = |order: Order| {
-            let mut without = model.clone();
-            of_order(order).for_each(|coefficient| *coefficient.of_mut(&mut without.sigma) = 0.0);
-            without
-        };
-        let candidates = highest(problem.model.form, &model).into_iter();
+        let candidates = Group::all().flat_map(|group| {
+            let orders = (0..RATE).rev();
+            let there = |function: &usize| of_order((group, *function)).next().is_some();
+            let highest = orders
+                .filter(&there)
+                .take(1)
+                .chain([RATE].into_iter().filter(&there));
+            highest
+                .map(|function| (group, function))
+                .collect::<Vec<_>>()
+        });
         let least = candidates.map(|order| {
-            let without = without(order);
+            let mut without = model.clone();
+            of_order(order).for_each(|c| *c.of_mut(&mut without.sigma) = 0.0);
             let posterior = with(&without);
             let limit = chi_square_limit(of_order(order).count() as f64, FALSE_ALARM);
             ((posterior.cost - now.cost) / limit, without, posterior)
@@ -68,60 +64,20 @@ pub fn select(problem: &Problem, iterated: &Iterated, thermal: &Thermal) -> Sele
     Selected {
         model,
         at: reduction.estimate(&held.at, &now),
-        unseen: unseen(thermal),
+        finding: unseen(form, thermal),
     }
 }
 
-/// Coefficients of first order of which little more is known than before.
-fn unseen(thermal: &Thermal) -> Vec<Coefficient> {
+/// Parameters of whose first order little more is known than before, if there are any.
+fn unseen(form: InstallationForm, thermal: &Thermal) -> Option<Finding> {
     let all = thermal.coefficients.iter().enumerate();
-    all.filter(|(k, c)| {
-        let prior = thermal.model.sigma.get(c.sensor)[(c.parameter, c.function)];
-        c.function == 0 && thermal.covariance[(*k, *k)].sqrt() > OBSERVED_BELOW * prior
-    })
-    .map(|(_, c)| *c)
-    .collect()
-}
-
-impl Selected {
-    /// What the recordings do not show, if there is anything.
-    pub fn finding(&self, form: InstallationForm) -> Option<Finding> {
-        let names = self.unseen.iter();
-        let names = names.filter_map(|c| parameter_name(form, c.index()));
-        let parameters: Vec<String> = names.collect();
-        temperature_not_seen(parameters)
-    }
-}
-
-/// The highest order of each kind of parameters, and its rate.
-fn highest(form: InstallationForm, model: &ThermalModel) -> Vec<Order> {
-    let mut orders: Vec<Order> = Coefficient::all(form, Some(model))
-        .iter()
-        .map(Order::of)
-        .collect();
-    orders.sort();
-    orders.dedup();
-    let top = |order: &Order| {
-        order.function == RATE
-            || !orders.iter().any(|other| {
-                (other.accel, other.kind) == (order.accel, order.kind)
-                    && other.function > order.function
-                    && other.function < RATE
-            })
-    };
-    orders.iter().copied().filter(top).collect()
-}
-
-impl Order {
-    fn of(coefficient: &Coefficient) -> Self {
-        let kind = Triad::kind(coefficient.parameter);
-        Self {
-            accel: coefficient.sensor == Sensor::Accel,
-            kind: ParameterKind::ALL
-                .iter()
-                .position(|&k| k == kind)
-                .unwrap_or(0),
-            function: coefficient.function,
-        }
-    }
+    let unseen = all.filter(|(k, c)| {
+        let limit = OBSERVED_BELOW * c.of(&thermal.model.sigma);
+        c.function == 0 && thermal.covariance[(*k, *k)].sqrt() > limit
+    });
+    temperature_not_seen(
+        unseen
+            .filter_map(|(_, c)| parameter_name(form, c.index()))
+            .collect(),
+    )
 }

@@ -3,10 +3,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::day_to_day::Difference;
-use super::separate_estimate::SeparateEstimate;
-use crate::calibration::checks::innovation::Observation;
-use crate::calibration::outcome::Outcome;
-use crate::calibration::parameters::{PARAMETERS, ParameterVector, to_vector};
+use crate::calibration::{
+    Innovation, Observation, Outcome, PARAMETERS, ParameterVector, SeparateEstimate, to_vector,
+};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
 /// How a parameter repeats from one recording to the next.
@@ -82,27 +81,19 @@ impl Outcome {
 
     /// How each parameter repeats, where at least three recordings say it alone.
     pub fn repeatability(&self) -> Vec<Repeatability> {
-        let all: Vec<(ParameterVector, ParameterVector)> = self
-            .alone
-            .iter()
-            .enumerate()
-            .filter_map(|(k, alone)| {
-                Some((self.departure(k, alone)?, alone.estimate.as_ref()?.sigma()))
-            })
-            .collect();
+        let all = self.alone.iter().enumerate().filter_map(|(k, alone)| {
+            Some((self.departure(k, alone)?, alone.estimate.as_ref()?.sigma()))
+        });
+        let all: Vec<(ParameterVector, ParameterVector)> = all.collect();
         let of = |parameter: usize| {
             let own = self.model.day_to_day.parameters[parameter];
-            let known: Vec<(f64, f64)> = all
+            let known = all
                 .iter()
-                .filter(|(_, sigma)| sigma[parameter] > 0.0)
-                .map(|(off, sigma)| (off[parameter], sigma[parameter]))
-                .collect();
+                .map(|(off, sigma)| (off[parameter], sigma[parameter]));
+            let known: Vec<(f64, f64)> = known.filter(|(_, sigma)| *sigma > 0.0).collect();
             let taken = 1 + self.thermal.as_ref().map_or(0, |t| t.order(parameter).0);
-            let freedom = known
-                .len()
-                .checked_sub(taken)
-                .filter(|&f| f > 0 && known.len() > 2)?;
-            let freedom = freedom as f64;
+            let freedom = known.len().checked_sub(taken);
+            let freedom = freedom.filter(|&f| f > 0 && known.len() > 2)? as f64;
             let variance = |sigma: f64| sigma * sigma + own * own;
             let squares: f64 = known.iter().map(|(off, _)| off * off).sum();
             let chi_square: f64 = known.iter().map(|(off, s)| off * off / variance(*s)).sum();
@@ -123,25 +114,17 @@ impl Outcome {
     /// Of each dwell that had any, told by number, the sums of its whitened innovations of velocity over the root of
     /// their number.
     pub fn by_dwell(&self) -> Vec<(usize, [f64; 3])> {
-        let mut all: Vec<(usize, [f64; 3], f64)> = Vec::new();
         let seen = self.innovations.iter();
-        for innovation in seen.filter(|i| i.accepted && i.observation == Observation::Velocity) {
-            if all
-                .last()
-                .is_none_or(|(dwell, ..)| *dwell != innovation.dwell)
-            {
-                all.push((innovation.dwell, [0.0; 3], 0.0));
-            }
-            if let Some((_, sums, count)) = all.last_mut() {
-                for (sum, whitened) in sums.iter_mut().zip(&innovation.whitened) {
-                    *sum += whitened;
-                }
-                *count += 1.0;
-            }
-        }
-        let root = |(dwell, sums, count): (usize, [f64; 3], f64)| {
-            (dwell, sums.map(|sum| sum / count.sqrt()))
+        let seen = seen.filter(|i| i.accepted && i.observation == Observation::Velocity);
+        let seen: Vec<&Innovation> = seen.collect();
+        let of_dwell = |of: &[&Innovation]| {
+            let sum = |axis: usize| of.iter().map(|i| i.whitened[axis]).sum::<f64>();
+            (
+                of[0].dwell,
+                [0, 1, 2].map(|axis| sum(axis) / (of.len() as f64).sqrt()),
+            )
         };
-        all.into_iter().map(root).collect()
+        let dwells = seen.chunk_by(|a, b| a.dwell == b.dwell);
+        dwells.map(of_dwell).collect()
     }
 }

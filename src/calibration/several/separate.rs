@@ -4,19 +4,15 @@ use nalgebra::{DMatrix, DVector, SVector};
 use rayon::prelude::*;
 
 use super::day_to_day::{DayToDay, Difference};
-use super::separate_estimate::SeparateEstimate;
-use crate::calibration::error::CalibrationError;
-use crate::calibration::estimate::Estimate;
-use crate::calibration::gauss_newton::{Iterated, UNWATCHED, iterate};
-use crate::calibration::linearisation::{AttitudePrior, Linearisation};
-use crate::calibration::model::Model;
+use crate::calibration::gauss_newton::Iterated;
 use crate::calibration::noise::learn;
-use crate::calibration::parameters::{from_vector, parameter, to_vector};
 use crate::calibration::pass::Gate;
-use crate::calibration::problem::Problem;
 use crate::calibration::solved::Solved;
 use crate::calibration::start::attempt::from_coarse_start;
-use crate::calibration::start::coarse::coarse_start;
+use crate::calibration::{
+    AttitudePrior, CalibrationError, Estimate, Linearisation, Model, Problem, SeparateEstimate,
+    UNWATCHED, coarse_start, from_vector, parameter, to_vector,
+};
 use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalModel, ThermalRange};
 use crate::run::Dwell;
 
@@ -69,24 +65,19 @@ fn noise_of_all(problem: &Problem, alone: &[SeparateEstimate]) -> Option<Model> 
         .filter(|alone| alone.estimate.is_some())
         .collect();
     let priors: Vec<AttitudePrior> = known.iter().flat_map(|a| a.priors.clone()).collect();
-    let attitudes = known.iter().flat_map(|a| a.initial_attitudes.clone());
-    let model = &problem.model;
+    let attitudes = known.iter().flat_map(|a| a.at.initial_attitudes.clone());
+    let mean = problem.model.prior_mean;
     let mut at = Linearisation::new(
-        from_vector(model.form, &model.prior_mean),
+        from_vector(problem.model.form, &mean),
         SVector::zeros(),
         attitudes.collect(),
     );
-    at.own = known
-        .iter()
-        .map(|alone| Difference {
-            parameters: alone.start - model.prior_mean,
-            ..Difference::default()
-        })
-        .collect();
-    let passes = &mut Vec::new();
-    let gate = Gate::Innovations;
-    let iterated = iterate(&problem, &priors, at, gate, passes, UNWATCHED).ok()?;
-    let stated = Solved::new(&problem, priors, iterated, Vec::new());
+    let differences = known.iter().map(|alone| Difference {
+        parameters: to_vector(&alone.at.triads) - mean,
+        ..Difference::default()
+    });
+    at.own = differences.collect();
+    let stated = Solved::of(&problem, priors, at, Gate::Innovations, UNWATCHED).ok()?;
     let learnt = learn(&problem, stated, UNWATCHED).ok()?;
     let of_all = || plain(&problem, &learnt.problem.model).model;
     learnt.noise.learnt.then(of_all)
@@ -100,59 +91,45 @@ fn of(
     let run = plain.run();
     let temperature = run.recording.imu.temperature.as_ref();
     let span = temperature.map_or(0.0, |temperature| {
-        Sensor::ALL
-            .map(|sensor| {
-                let [low, high] = temperature.range(sensor);
-                high - low
-            })
-            .into_iter()
-            .fold(0.0, f64::max)
+        let spans = Sensor::ALL.map(|sensor| temperature.range(sensor));
+        spans
+            .iter()
+            .fold(0.0, |most: f64, [low, high]| most.max(high - low))
     });
     let middle = middle_temperature(plain);
     let state = thermal.zip(middle.as_ref());
     let state = state.map(|(thermal, at)| thermal.range.state(at, &PerSensor::default()));
-    let alone = |start, priors, initial_attitudes, estimate| SeparateEstimate {
+    // What changes within a recording has no calibration without its change.
+    let whole = thermal.map_or(f64::INFINITY, |thermal| {
+        let span = |range: &ThermalRange| range.highest - range.lowest;
+        span(&thermal.range.gyro).max(span(&thermal.range.accel))
+    });
+    let stands = span < PART_OF_RANGE * whole;
+    let solved = stands
+        .then(|| from_coarse_start(plain, UNWATCHED).ok())
+        .flatten();
+    let solved = solved.map(|solved| learn(plain, solved.clone(), UNWATCHED).unwrap_or(solved));
+    let contradicted = solved.as_ref().is_some_and(|solved| solved.noise.learnt);
+    let estimate = solved
+        .as_ref()
+        .and_then(|solved| estimate(&solved.iterated));
+    let (at, priors) = match solved {
+        Some(solved) => (solved.iterated.estimate, solved.priors),
+        None => {
+            let start = coarse_start(plain)?;
+            (start.at, start.attitudes)
+        }
+    };
+    let alone = SeparateEstimate {
         name: run.recording.name.clone(),
         temperature: middle,
         span,
         estimate,
         state,
-        start,
+        at,
         priors,
-        initial_attitudes,
     };
-    // What changes within a recording has no calibration without its change.
-    let range = thermal.map(|thermal| thermal.range);
-    let whole = range.map_or(f64::INFINITY, |range| {
-        let span = |range: &ThermalRange| range.highest - range.lowest;
-        span(&range.gyro).max(span(&range.accel))
-    });
-    let stands = span < PART_OF_RANGE * whole;
-    let solved = stands.then(|| from_coarse_start(plain, UNWATCHED));
-    Ok(match solved {
-        Some(Ok(solved)) => {
-            let solved = learn(plain, solved.clone(), UNWATCHED).unwrap_or(solved);
-            let (contradicted, iterated) = (solved.noise.learnt, solved.iterated);
-            let at = &iterated.estimate;
-            let alone = alone(
-                to_vector(&at.triads),
-                solved.priors,
-                at.initial_attitudes.clone(),
-                estimate(iterated),
-            );
-            (alone, contradicted)
-        }
-        _ => {
-            let start = coarse_start(plain)?;
-            let alone = alone(
-                to_vector(&start.at.triads),
-                start.attitudes,
-                start.at.initial_attitudes,
-                None,
-            );
-            (alone, false)
-        }
-    })
+    Ok((alone, contradicted))
 }
 
 /// Mean temperature of each axis in the middles of a recording's dwells, °C; none where it is not known.
@@ -172,21 +149,14 @@ fn middle_temperature(recording: &Problem) -> Option<PerSensor<[f64; 3]>> {
 
 /// What a recording alone says with other noise.
 fn with_noise(alone: &SeparateEstimate, recording: &Problem) -> Option<Estimate> {
-    let at = Linearisation::new(
-        alone.estimate.as_ref()?.triads,
-        SVector::zeros(),
-        alone.initial_attitudes.clone(),
-    );
-    let (gate, passes) = (Gate::Innovations, &mut Vec::new());
-    let iterated = iterate(recording, &alone.priors, at, gate, passes, UNWATCHED).ok()?;
-    estimate(iterated)
+    alone.estimate.as_ref()?;
+    let (priors, at) = (alone.priors.clone(), alone.at.clone());
+    let solved = Solved::of(recording, priors, at, Gate::Innovations, UNWATCHED).ok()?;
+    estimate(&solved.iterated)
 }
 
-fn estimate(iterated: Iterated) -> Option<Estimate> {
-    iterated.converged.then_some(Estimate {
-        triads: iterated.estimate.triads,
-        covariance: iterated.held.posterior.parameter_covariance,
-    })
+fn estimate(iterated: &Iterated) -> Option<Estimate> {
+    iterated.converged.then(|| iterated.both_triads())
 }
 
 /// Of a parameter, the part common to all recordings beyond its prior mean, and the coefficient of each function of
@@ -199,50 +169,38 @@ pub fn through(
     let index = parameter(sensor, of_triad);
     let prior = model.prior_sigma[index];
     let n = 1 + THERMAL_FUNCTIONS;
-    let sigma = |k: usize| match k.checked_sub(1) {
-        None => prior,
-        Some(function) => model.thermal.as_ref().map_or(0.0, |thermal| {
-            thermal.sigma.get(sensor)[(of_triad, function)]
-        }),
-    };
+    let mut sigma = DVector::zeros(n);
+    sigma[0] = prior;
+    if let Some(thermal) = &model.thermal {
+        let coefficients = thermal.sigma.get(sensor).row(of_triad).transpose();
+        sigma
+            .rows_mut(1, THERMAL_FUNCTIONS)
+            .copy_from(&coefficients);
+    }
     let prior_mean = from_vector(model.form, &model.prior_mean);
-    let own = model.day_to_day;
-    let own = own.covariance(&prior_mean);
-    let own = own.diagonal();
-    let mut normal = DMatrix::from_fn(n, n, |i, j| f64::from(u8::from(i == j)));
-    let mut right = DVector::zeros(n);
+    let own = model.day_to_day.covariance(&prior_mean)[(index, index)];
+    let (mut normal, mut right) = (DMatrix::identity(n, n), DVector::zeros(n));
     for alone in alone {
         let known = alone.estimate.as_ref();
         let variance = known.map_or(0.0, |estimate| estimate.covariance[(index, index)]);
-        let own = own[index];
         // Without a σ the coarse start is as good as a tenth of what was known before.
         let variance = match variance > 0.0 {
             true => variance * BEYOND_NOISE.powi(2) + own,
             false => (0.1 * prior).powi(2) + own,
         };
-        let functions = alone.state.as_ref();
-        let row = DVector::from_fn(n, |k, _| {
-            let by = match k.checked_sub(1) {
-                None => 1.0,
-                Some(function) => functions.map_or(0.0, |s| s.get(sensor)[axis][function]),
-            };
-            by * sigma(k)
-        });
-        let off = alone.start[index] - model.prior_mean[index];
+        let mut row = sigma.clone();
+        for function in 0..THERMAL_FUNCTIONS {
+            let state = alone.state.as_ref();
+            row[1 + function] *= state.map_or(0.0, |s| s.get(sensor)[axis][function]);
+        }
+        let off = to_vector(&alone.at.triads)[index] - model.prior_mean[index];
         normal.ger(1.0 / variance, &row, &row, 1.0);
         right.axpy(off / variance, &row, 1.0);
     }
-    let mut solution = solved(normal, &right);
-    for k in 0..n {
-        solution[k] *= sigma(k);
-    }
-    solution
-}
-
-/// A solution of normal equations that are positive definite by their prior; zero if not.
-fn solved(normal: DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
-    let n = right.len();
-    normal
-        .cholesky()
-        .map_or_else(|| DVector::zeros(n), |factor| factor.solve(right))
+    // Positive definite by the prior.
+    let solution = normal.cholesky().map(|factor| factor.solve(&right));
+    solution.map_or_else(
+        || DVector::zeros(n),
+        |solution| solution.component_mul(&sigma),
+    )
 }

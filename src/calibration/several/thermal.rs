@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::calibration::parameters::{PARAMETERS, ParameterMatrix, ParameterVector, parameter};
+use crate::calibration::{PARAMETERS, ParameterMatrix, ParameterVector, parameter};
 use crate::imu::{
     InstallationForm, PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalCoefficients, ThermalModel,
     ThermalState, Triad,

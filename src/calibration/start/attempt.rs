@@ -1,13 +1,11 @@
 //! A calibration from the coarse start.
 
 use super::coarse::{CoarseStart, coarse_start};
-use crate::calibration::error::CalibrationError;
-use crate::calibration::gauss_newton::{Iterated, Progress, iterate};
-use crate::calibration::noise::NoisePolicy;
+use crate::calibration::gauss_newton::Iterated;
 use crate::calibration::pass::{Gate, pass};
-use crate::calibration::problem::Problem;
 use crate::calibration::reduction::Script;
 use crate::calibration::solved::Solved;
+use crate::calibration::{CalibrationError, NoisePolicy, Problem, Progress};
 
 /// From the coarse start, with the noise that is stated or, where it may be learnt, with what a hand adds to it as the
 /// start shows.
@@ -23,44 +21,25 @@ pub fn from_coarse_start<'a>(
     let problem = with_hand.as_ref().unwrap_or(problem);
     // What a hand leaves is not all that is unknown: noise that is estimated decides on outliers.
     let gate = by_hand.map_or(Gate::Innovations, |_| Gate::Open);
-    let mut solved = match solved(problem, &start, gate, progress) {
+    let (at, priors) = (start.at.clone(), start.attitudes.clone());
+    let mut solved = match Solved::of(problem, priors, at, gate, progress) {
         Err(CalibrationError::Stopped) => return Err(CalibrationError::Stopped),
         Ok(solved) if solved.iterated.converged => solved,
         // Noise that is stated far too small leads a step out of all that is linear; the start shows how large it is.
-        _ if may_be_learnt => at_start(problem, &start)?,
+        _ if may_be_learnt => at_start(problem, start)?,
         astray => astray?,
     };
     solved.noise = noise.unwrap_or(solved.noise);
     Ok(solved)
 }
 
-fn solved<'a>(
-    problem: &Problem<'a>,
-    start: &CoarseStart,
-    gate: Gate,
-    progress: Progress,
-) -> Result<Solved<'a>, CalibrationError> {
-    let (mut passes, at) = (Vec::new(), start.at.clone());
-    let priors = start.attitudes.clone();
-    let iterated = iterate(problem, &priors, at, gate, &mut passes, progress)?;
-    Ok(Solved::new(problem, priors, iterated, passes))
-}
-
 /// One pass at the start, which stays the estimate.
-fn at_start<'a>(
-    problem: &Problem<'a>,
-    start: &CoarseStart,
-) -> Result<Solved<'a>, CalibrationError> {
+fn at_start<'a>(problem: &Problem<'a>, start: CoarseStart) -> Result<Solved<'a>, CalibrationError> {
     let script = Script::new(problem, &start.attitudes, &start.at)?;
     let iterated = Iterated {
         held: pass(problem, &script, Gate::Open)?,
-        estimate: start.at.clone(),
+        estimate: start.at,
         converged: false,
     };
-    Ok(Solved::new(
-        problem,
-        start.attitudes.clone(),
-        iterated,
-        Vec::new(),
-    ))
+    Ok(Solved::new(problem, start.attitudes, iterated, Vec::new()))
 }

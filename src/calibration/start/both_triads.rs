@@ -4,14 +4,12 @@ use nalgebra::SMatrix;
 
 use super::judged::Judged;
 use super::positions::{BASE, Fit, Observed};
-use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::prior_distance::{far_from_prior, widened};
 use crate::calibration::checks::residuals::Residuals;
-use crate::calibration::error::CalibrationError;
-use crate::calibration::estimate::{Estimate, largest_growth};
-use crate::calibration::model::Model;
-use crate::calibration::parameters::{ParameterMatrix, from_vector, parameter};
-use crate::calibration::problem::Problem;
+use crate::calibration::estimate::largest_growth;
+use crate::calibration::{
+    CalibrationError, Estimate, Finding, Model, ParameterMatrix, Problem, from_vector, parameter,
+};
 use crate::imu::{PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
 
@@ -31,18 +29,13 @@ pub fn both_triads(
     if !findings.is_empty() {
         prior = widened(&prior, &of_positions).unwrap_or(prior);
     }
-    let stated = PerSensor {
-        gyro: Stated::new(&observed.gyro, &prior)?,
-        accel: Stated::new(&observed.accel, &prior)?,
-    };
-    let bases = Sensor::ALL
-        .into_iter()
-        .filter_map(|sensor| stated.get(sensor).base);
-    let base = bases.reduce(f64::max);
-    let fits = PerSensor {
-        gyro: stated.gyro.calibrated(&prior, base, &mut findings)?,
-        accel: stated.accel.calibrated(&prior, base, &mut findings)?,
-    };
+    let stated = PerSensor::try_from_fn(|sensor| Stated::new(observed.get(sensor), &prior))?;
+    let bases = [stated.gyro.base, stated.accel.base];
+    let base = bases.into_iter().flatten().reduce(f64::max);
+    let fits = PerSensor::try_from_fn(|sensor| {
+        let stated = stated.get(sensor);
+        stated.calibrated(&prior, base, &mut findings)
+    })?;
     let mut covariance = ParameterMatrix::zeros();
     let of_all = [&fits.gyro, &fits.accel].map(|fit| fit.by_errors.ncols());
     let shared = of_all[0].min(of_all[1]);
@@ -74,8 +67,10 @@ fn set(
 struct Stated<'a> {
     observed: &'a Observed,
     fit: Fit,
-    judged: Option<Judged>,
-    /// 1σ of the table's base, rad, if that explains why residuals ring.
+    drift: Option<Finding>,
+    /// Where residuals ring.
+    rings: Option<Judged>,
+    /// 1σ of the table's base, rad, if that explains why they do.
     base: Option<f64>,
 }
 
@@ -88,37 +83,32 @@ impl<'a> Stated<'a> {
             (ParameterKind::Bias, [3, 7, 11]),
         ];
         let judged = Judged::new(&observed.about(&fit.triad), &[observed.sensor], places);
-        let rings = judged
-            .as_ref()
-            .filter(|judged| judged.residuals.growth().is_some());
+        let drift = judged.as_ref().and_then(Judged::drift);
+        let rings = judged.filter(|judged| judged.residuals.growth().is_some());
+        let residuals = rings.as_ref().map(|judged| &judged.residuals);
         Ok(Self {
-            base: rings.and_then(|judged| base_off(&judged.residuals, observed, &fit.triad)),
+            base: residuals.and_then(|residuals| base_off(residuals, observed, &fit.triad)),
             observed,
             fit,
-            judged,
+            drift,
+            rings,
         })
     }
 
     /// On a base whose level and north are as stated, or known to this σ only, rad; wider where residuals ring.
     fn calibrated(
-        self,
+        &self,
         prior: &Model,
         base: Option<f64>,
         findings: &mut Vec<Finding>,
     ) -> Result<Fit, CalibrationError> {
         let observed = self.observed;
         let on_base = base.map(|sigma| observed.on_base(sigma));
-        findings.extend(self.judged.as_ref().and_then(Judged::drift));
-        let rings = self
-            .judged
-            .as_ref()
-            .filter(|judged| judged.residuals.growth().is_some());
-        let Some(judged) = rings else {
-            return on_base.map_or(Ok(self.fit), |on_base| on_base.fitted(prior));
+        findings.extend(self.drift.clone());
+        let Some(judged) = &self.rings else {
+            return on_base.map_or_else(|| Ok(self.fit.clone()), |on_base| on_base.fitted(prior));
         };
-        let Judged {
-            residuals, worst, ..
-        } = judged;
+        let (residuals, worst) = (&judged.residuals, &judged.worst);
         // Where one position explains it, the others are as good as stated. Nor are they where the base explains it: they
         // may agree with each other on what this one alone tells.
         let all: Vec<usize> = (0..observed.known.len()).collect();
@@ -204,9 +194,8 @@ fn without_prior(observed: &PerSensor<Observed>, model: &Model) -> Estimate {
         let observed = observed.get(sensor);
         // An axis that may sense nothing has no direction, and σ of what is not linear are for small errors.
         let senses = |fit: &Fit| {
-            let known =
-                |k: usize| fit.triad.scale[k].abs() > SENSES * fit.covariance[(k, k)].sqrt();
-            (0..3).all(known)
+            let sigma = |k: usize| fit.covariance[(k, k)].sqrt();
+            (0..3).all(|k| fit.triad.scale[k].abs() > SENSES * sigma(k))
         };
         let rings = |fit: &Fit| {
             let residuals = observed.residuals(&fit.triad);

@@ -3,23 +3,21 @@
 //! place without a table.
 
 use super::both_triads::both_triads;
-use super::coarse;
-use super::labels::{self, Section, Used};
+use super::coarse::{Turned, calibrated, calibrated_as_held, dwells, judged};
+use super::gravity::AtRest;
+use super::labels::{Section, Used};
 use super::positions::{Observed, Position};
-use super::table;
-use crate::calibration::checks;
-use crate::calibration::checks::finding::Finding;
+use super::{labels, table};
 use crate::calibration::checks::observability::not_observed;
 use crate::calibration::checks::prior_distance::far_by_data;
 use crate::calibration::checks::rest_scatter::scatter_at_rest;
 use crate::calibration::checks::rounding::{by_rounding, rounded};
 use crate::calibration::checks::unexplained::unexplained_residuals;
-use crate::calibration::error::CalibrationError;
-use crate::calibration::estimate::Estimate;
-use crate::calibration::model::Model;
-use crate::calibration::noise::NoiseReport;
-use crate::calibration::parameters::{OBSERVED_BELOW, parameter, parameter_name};
-use crate::calibration::problem::Problem;
+use crate::calibration::linearisation::singular;
+use crate::calibration::{
+    CalibrationError, Estimate, Finding, Model, NoiseReport, OBSERVED_BELOW, Problem, checks,
+    from_vector, parameter, parameter_name,
+};
 use crate::earth::Site;
 use crate::imu::{BodyFrame, PerSensor, Sensor};
 use crate::run::motion::rests;
@@ -143,17 +141,14 @@ pub fn six_position_of(
 ) -> Result<ClosedForm, CalibrationError> {
     let run = problem.run();
     let mut used = vec![false; dwells.len()];
-    let mut of_six = |sensor| -> Result<Observed, CalibrationError> {
+    let of_six = |sensor| -> Result<Observed, CalibrationError> {
         let all = table::positions(problem, dwells, sensor).ok_or(CalibrationError::NoTable)?;
         let six = six_of(&all);
         six.iter().for_each(|&k| used[k] = true);
         let known = six.iter().map(|&k| all.known[k].clone()).collect();
         Ok(Observed { known, ..all })
     };
-    let observed = PerSensor {
-        gyro: of_six(Sensor::Gyro)?,
-        accel: of_six(Sensor::Accel)?,
-    };
+    let observed = PerSensor::try_from_fn(of_six)?;
     if observed.gyro.known.is_empty() {
         return Err(CalibrationError::NoDwells);
     }
@@ -180,16 +175,12 @@ fn six_of(observed: &Observed) -> Vec<usize> {
         let axis = input.iamax();
         (input[axis].abs() > ALONG_AXIS * input.norm()).then_some((axis, input[axis] > 0.0))
     };
-    let all: Vec<usize> = (0..observed.known.len()).collect();
-    let six: Vec<usize> = all
-        .iter()
-        .copied()
-        .filter(|&k| along(k).is_some())
-        .collect();
+    let all = 0..observed.known.len();
+    let six: Vec<usize> = all.clone().filter(|&k| along(k).is_some()).collect();
     let has = |axis, up| six.iter().any(|&k| along(k) == Some((axis, up)));
     match (0..3).all(|axis| has(axis, true) && has(axis, false)) {
         true => six,
-        false => all,
+        false => all.collect(),
     }
 }
 
@@ -230,32 +221,49 @@ fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
 
 /// From every dwell and every move by gravity alone, with the prior where they are too few.
 fn by_gravity(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
-    let found = coarse::by_gravity(problem)?;
-    let (model, estimate) = (&problem.model, found.estimate);
-    let noise = found
-        .by_hand
-        .as_ref()
-        .map(|by_hand| by_hand.report(problem));
-    let learnt = found.by_hand.zip(noise.as_ref());
+    let rests = dwells(problem)?;
+    let (turned, by_hand) = calibrated_as_held(problem, &rests)?;
+    let form = problem.model.form;
+    let singular = || singular(&from_vector(form, &problem.model.prior_mean));
+    let judged = judged(&turned).ok_or_else(singular)?;
+    let growth = judged.residuals.growth();
+    // Weights count against those of the prior: σ of all data grow where those of the prior shrink.
+    let turned = match growth {
+        None => turned,
+        Some(growth) => {
+            let by_hand = by_hand.as_ref().map(|by_hand| by_hand.model(problem));
+            let mut model = by_hand.unwrap_or_else(|| problem.model.clone());
+            model.prior_sigma /= growth;
+            calibrated(&problem.with_model(model), &rests)?
+        }
+    };
+    let variance = growth.unwrap_or(1.0).powi(2);
+    let Turned { at, equations, .. } = turned;
+    let gain = equations.gain().ok_or_else(singular)?;
+    let estimate = Estimate {
+        triads: at.triads,
+        covariance: equations.whole(&equations.covariance(&gain)) * variance,
+    };
+    // Of how far the data bring the estimate from a prior that is right.
+    let distance = equations.whole(&equations.covariance_of_distance(&gain)) * variance;
+    let noise = by_hand.as_ref().map(|by_hand| by_hand.report(problem));
+    let learnt = by_hand.zip(noise.as_ref());
     let learnt = learnt.and_then(|(by_hand, report)| by_hand.finding(problem, report));
-    let far = far_by_data(model, &estimate, &found.distance);
-    let hidden = hidden(model, &estimate, Reference::Gravity);
-    let findings = far.into_iter().chain(hidden).chain(learnt);
-    let stretches = problem.stretches();
-    let at_rest = stretches.iter().flat_map(|stretch| {
-        stretch
-            .dwells
-            .iter()
-            .map(|dwell| dwell.duration(&stretch.run.recording.imu))
-    });
-    let dwells = problem.dwells().count();
+    let far = far_by_data(&problem.model, &estimate, &distance).into_iter();
+    let findings = far.chain(hidden(&problem.model, &estimate, Reference::Gravity));
+    let large = growth.map(|growth| judged.large("both triads", growth, None));
+    let count = rests.iter().map(Vec::len).sum();
     Ok(ClosedForm {
-        findings: findings.chain(found.ringing).collect(),
+        findings: findings
+            .chain(learnt)
+            .chain(large)
+            .chain(judged.drift())
+            .collect(),
         estimate,
         reference: Reference::Gravity,
-        positions: PerSensor::from_fn(|_| dwells),
-        turns: dwells - stretches.len(),
-        standing_time: at_rest.sum(),
+        positions: PerSensor::from_fn(|_| count),
+        turns: count - rests.len(),
+        standing_time: rests.iter().flatten().map(AtRest::duration).sum(),
         noise,
     })
 }

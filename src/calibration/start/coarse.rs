@@ -8,13 +8,11 @@ use super::gravity::{AtRest, Chain, add_magnitude, events, up};
 use super::judged::Judged;
 use super::table;
 use crate::attitude::level;
-use crate::calibration::checks::finding::Finding;
-use crate::calibration::error::CalibrationError;
-use crate::calibration::estimate::Estimate;
-use crate::calibration::linearisation::{AttitudePrior, Linearisation, singular};
-use crate::calibration::noise::{ByHand, NoisePolicy};
-use crate::calibration::parameters::{ParameterMatrix, ParameterVector, from_vector, to_vector};
-use crate::calibration::problem::Problem;
+use crate::calibration::noise::ByHand;
+use crate::calibration::{
+    AttitudePrior, CalibrationError, Linearisation, NoisePolicy, ParameterVector, Problem,
+    from_vector, to_vector,
+};
 use crate::earth::Site;
 use crate::imu::{ParameterKind, Sensor, TermVector};
 
@@ -64,12 +62,10 @@ pub fn coarse_start(problem: &Problem) -> Result<CoarseStart, CalibrationError> 
             by_hand: None,
         });
     }
-    let (
-        Turned {
-            at, heading_sigma, ..
-        },
-        by_hand,
-    ) = calibrated_as_held(problem, &dwells)?;
+    let (turned, by_hand) = calibrated_as_held(problem, &dwells)?;
+    let Turned {
+        at, heading_sigma, ..
+    } = turned;
     let sites = problem.stretches().iter().map(|s| &s.run.site);
     let attitudes = at.initial_attitudes.iter().zip(&heading_sigma).zip(sites);
     let of_alignment = |((attitude, &sigma), site): ((&Matrix3<f64>, &f64), &Site)| {
@@ -98,7 +94,7 @@ fn attitudes_of_table(problem: &Problem) -> Option<Vec<AttitudePrior>> {
 }
 
 /// The dwells of each stretch; an error where there is none.
-fn dwells(problem: &Problem) -> Result<Vec<Vec<AtRest>>, CalibrationError> {
+pub fn dwells(problem: &Problem) -> Result<Vec<Vec<AtRest>>, CalibrationError> {
     let dwells = AtRest::all(problem);
     match dwells.iter().flatten().count() {
         0 => Err(CalibrationError::NoDwells),
@@ -106,54 +102,8 @@ fn dwells(problem: &Problem) -> Result<Vec<Vec<AtRest>>, CalibrationError> {
     }
 }
 
-/// Both triads by gravity alone, as a result of its own.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ByGravity {
-    pub estimate: Estimate,
-    /// Of how far the data bring the estimate from a prior that is right.
-    pub distance: ParameterMatrix,
-    /// What a hand adds to the noise that is stated, where the data show that.
-    pub by_hand: Option<ByHand>,
-    /// Residuals beyond chance, by which the covariance was widened, and a drift that they follow.
-    pub ringing: Vec<Finding>,
-}
-
-/// The coarse start without a table, with its covariance.
-pub fn by_gravity(problem: &Problem) -> Result<ByGravity, CalibrationError> {
-    let dwells = dwells(problem)?;
-    let (turned, by_hand) = calibrated_as_held(problem, &dwells)?;
-    let prior = from_vector(problem.model.form, &problem.model.prior_mean);
-    let singular = || singular(&prior);
-    let judged = judged(&turned).ok_or_else(singular)?;
-    let growth = judged.residuals.growth();
-    // Weights count against those of the prior: σ of all data grow where those of the prior shrink.
-    let turned = match growth {
-        None => turned,
-        Some(growth) => {
-            let mut model = match &by_hand {
-                Some(by_hand) => by_hand.model(problem),
-                None => problem.model.clone(),
-            };
-            model.prior_sigma /= growth;
-            calibrated(&problem.with_model(model), &dwells)?
-        }
-    };
-    let variance = growth.unwrap_or(1.0).powi(2);
-    let Turned { at, equations, .. } = turned;
-    let gain = equations.gain().ok_or_else(singular)?;
-    let large = growth.map(|growth| judged.large("both triads", growth, None));
-    Ok(ByGravity {
-        estimate: Estimate {
-            triads: at.triads,
-            covariance: equations.whole(&equations.covariance(&gain)) * variance,
-        },
-        distance: equations.whole(&equations.covariance_of_distance(&gain)) * variance,
-        by_hand,
-        ringing: large.into_iter().chain(judged.drift()).collect(),
-    })
-}
-
-fn judged(turned: &Turned) -> Option<Judged> {
+/// What its residuals show.
+pub fn judged(turned: &Turned) -> Option<Judged> {
     let places = [
         (ParameterKind::Scale, [0, 1, 2]),
         (ParameterKind::Bias, [9, 10, 11]),
@@ -162,17 +112,17 @@ fn judged(turned: &Turned) -> Option<Judged> {
 }
 
 /// Both triads and attitudes as gravity and the rates at rest show them.
-struct Turned {
+pub struct Turned {
     /// The triads, and the attitude at the first sample of each stretch.
-    at: Linearisation,
+    pub at: Linearisation,
     /// 1σ of each heading, rad.
     heading_sigma: Vec<f64>,
     /// What they are found from, made at them.
-    equations: Equations,
+    pub equations: Equations,
 }
 
 /// Both triads and attitudes by gravity and Earth rate, first the accelerometers alone by its magnitude.
-fn calibrated(problem: &Problem, dwells: &[Vec<AtRest>]) -> Result<Turned, CalibrationError> {
+pub fn calibrated(problem: &Problem, dwells: &[Vec<AtRest>]) -> Result<Turned, CalibrationError> {
     let model = &problem.model;
     let prior = from_vector(model.form, &model.prior_mean);
     let triads = gauss_newton(prior, &ParameterVector::repeat(SMALL), |triads| {
@@ -183,11 +133,8 @@ fn calibrated(problem: &Problem, dwells: &[Vec<AtRest>]) -> Result<Turned, Calib
     let first = dwells
         .iter()
         .map(|dwells| Ok(level(&up(&triads, &dwells[0])?)));
-    let mut at = Linearisation::new(
-        triads,
-        TermVector::zeros(),
-        first.collect::<Result<_, _>>()?,
-    );
+    let first = first.collect::<Result<_, CalibrationError>>()?;
+    let mut at = Linearisation::new(triads, TermVector::zeros(), first);
     at.triads.gyro.bias = gyro_bias_at_rest(dwells);
     for round in 0..ROUNDS {
         let sensors = match round < ROUNDS_OF_GYROS {
@@ -219,26 +166,22 @@ fn turned(
     let chains = starts
         .map(|((first, stretch), dwells)| Chain::new(model, stretch, dwells, &at.triads, first));
     let chains = chains.collect::<Result<Vec<_>, _>>()?;
-    let compass = gyrocompass(model, stretches, dwells, &chains, &at.triads)?;
-    let headings = &compass.headings;
-    let attitudes = chains
-        .iter()
-        .zip(headings)
-        .map(|(chain, heading)| heading.turn * chain.attitudes[0]);
+    let (headings, bias) = gyrocompass(model, stretches, dwells, &chains, &at.triads)?;
+    let attitudes = chains.iter().zip(&headings);
+    let attitudes = attitudes.map(|(chain, heading)| heading.turn * chain.attitudes[0]);
     at.initial_attitudes = attitudes.collect();
-    at.triads.gyro.bias += at.triads.gyro.sensitivity() * compass.bias;
+    at.triads.gyro.bias += at.triads.gyro.sensitivity() * bias;
     let mut equations = Equations::of_triads(model, &at.triads, sensors);
     if sensors.contains(&Sensor::Accel) {
         add_magnitude(&mut equations, problem, dwells, &at.triads)?;
     }
-    for (((stretch, dwells), chain), heading) in
-        stretches.iter().zip(dwells).zip(&chains).zip(headings)
-    {
-        chain.add(&mut equations, dwells, stretch, heading);
+    for (k, (chain, heading)) in chains.iter().zip(&headings).enumerate() {
+        let of_stretch = (&stretches[k], &dwells[k][..]);
+        chain.add(&mut equations, of_stretch, heading);
         add_rates(
             &mut equations,
             model,
-            (stretch, dwells),
+            of_stretch,
             chain,
             &at.triads,
             heading,
@@ -253,7 +196,7 @@ fn turned(
 }
 
 /// The same with what a hand adds to the noise that is stated, where the data show that and residuals cannot.
-fn calibrated_as_held(
+pub fn calibrated_as_held(
     problem: &Problem,
     dwells: &[Vec<AtRest>],
 ) -> Result<(Turned, Option<ByHand>), CalibrationError> {

@@ -3,23 +3,14 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::equations::{Equations, Rows, of};
-use super::gravity::{AtRest, Chain, ROUNDING, input_errors, of_noise};
-use super::heading::Heading;
+use super::gravity::{AtRest, Chain, Heading, ROUNDING, input_errors, of_noise};
 use crate::attitude::exp;
-use crate::calibration::error::CalibrationError;
 use crate::calibration::linearisation::singular;
-use crate::calibration::model::Model;
-use crate::calibration::noise::{BY_HAND, Source};
+use crate::calibration::noise::BY_HAND;
 use crate::calibration::problem::Stretch;
+use crate::calibration::{CalibrationError, Model, Source};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{PerSensor, Sensor, Triad};
-
-/// The headings of all stretches, and the error of the rates.
-pub struct Gyrocompass {
-    pub headings: Vec<Heading>,
-    /// Along body axes, rad/s.
-    pub bias: Vector3<f64>,
-}
 
 /// Bias of the gyros within Earth rate: their mean output at rest. From a prior that is off by so much that a move turns
 /// into another, no step leads back.
@@ -30,14 +21,15 @@ pub fn gyro_bias_at_rest(dwells: &[Vec<AtRest>]) -> Vector3<f64> {
 }
 
 /// Fits Earth rate, whose part along Up is known, and a constant along body axes: at rest
-/// `C ω = ω_ie + C b`. Attitudes that differ tell one from the other. An error where a rate is no number.
+/// `C ω = ω_ie + C b`. Attitudes that differ tell one from the other. Gives the headings of all stretches and b, rad/s.
+/// An error where a rate is no number.
 pub fn gyrocompass(
     model: &Model,
     stretches: &[Stretch],
     dwells: &[Vec<AtRest>],
     chains: &[Chain],
     triads: &PerSensor<Triad>,
-) -> Result<Gyrocompass, CalibrationError> {
+) -> Result<(Vec<Heading>, Vector3<f64>), CalibrationError> {
     let triad = &triads.gyro;
     let correction = triad.correction().ok_or_else(|| singular(triads))?;
     // Unknown: b, and for each stretch Earth rate along its two level axes. Before any rate is observed
@@ -83,10 +75,8 @@ pub fn gyrocompass(
             sigma: level / of_stretch.run.site.earth_rate_n().y.abs(),
         }
     };
-    Ok(Gyrocompass {
-        headings: stretches.iter().enumerate().map(heading).collect(),
-        bias: found.fixed_rows::<3>(0).into_owned(),
-    })
+    let headings = stretches.iter().enumerate().map(heading).collect();
+    Ok((headings, found.fixed_rows::<3>(0).into_owned()))
 }
 
 /// Adds the rates in the dwells of a stretch, whose chain of attitudes is turned to its heading.

@@ -5,12 +5,10 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3, Vector4};
 
-use crate::calibration::error::CalibrationError;
-use crate::calibration::model::Model;
 use crate::calibration::noise::{BY_HAND, Parts};
-use crate::calibration::parameters::{
-    PARAMETERS, ParameterMatrix, ParameterVector, from_vector, parameter, sensor_and_parameter,
-    to_vector,
+use crate::calibration::{
+    CalibrationError, Model, PARAMETERS, ParameterMatrix, ParameterVector, from_vector, parameter,
+    sensor_and_parameter, to_vector,
 };
 use crate::imu::{Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 

@@ -2,16 +2,14 @@
 
 use std::ops::Range;
 
-use nalgebra::{Matrix3, SMatrix, Vector1, Vector2, Vector3};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector1, Vector2, Vector3};
 
 use super::equations::{Common, Equations, Event, OfTriad, Rows, of, of_parameters};
-use super::heading::Heading;
 use crate::attitude::{exp, skew, tilt};
-use crate::calibration::error::CalibrationError;
 use crate::calibration::linearisation::singular;
-use crate::calibration::model::Model;
-use crate::calibration::noise::{BY_HAND, Source};
-use crate::calibration::problem::{Problem, Stretch};
+use crate::calibration::noise::BY_HAND;
+use crate::calibration::problem::Stretch;
+use crate::calibration::{CalibrationError, Model, Problem, Source};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::navigation::{Navigator, ProcessNoise, State};
@@ -168,6 +166,34 @@ pub fn add_magnitude(
     Ok(())
 }
 
+/// The heading common to all attitudes of a stretch.
+#[derive(Debug, Clone, Copy)]
+pub struct Heading {
+    /// Number of the stretch.
+    pub stretch: usize,
+    /// Turn about Up that brings the attitudes to East-North-Up, rad.
+    pub turn: Matrix3<f64>,
+    /// 1σ of its angle, rad; above one nothing is known of it.
+    pub sigma: f64,
+}
+
+impl Heading {
+    /// Its σ as it is used, rad.
+    pub fn known(&self) -> f64 {
+        self.sigma.clamp(1e-3, 1.0)
+    }
+
+    /// How some rows follow its error, by their change with an angle of one.
+    pub fn error<const N: usize>(
+        &self,
+        by_angle: &SVector<f64, N>,
+    ) -> (Common, SMatrix<f64, N, 3>) {
+        let mut error = SMatrix::<f64, N, 3>::zeros();
+        error.set_column(2, &(by_angle * self.known()));
+        (Common::Unit(self.stretch), error)
+    }
+}
+
 /// Attitudes of the dwells of a stretch, each carried to the next by the gyros and levelled there.
 pub struct Chain {
     pub attitudes: Vec<Matrix3<f64>>,
@@ -224,8 +250,7 @@ impl Chain {
     pub fn add(
         &self,
         equations: &mut Equations,
-        dwells: &[AtRest],
-        stretch: &Stretch,
+        (stretch, dwells): (&Stretch, &[AtRest]),
         heading: &Heading,
     ) {
         let earth_rate = stretch.run.site.earth_rate_n();

@@ -2,9 +2,8 @@
 
 use super::equations::Equations;
 use crate::calibration::checks::drift::{Changing, drift};
-use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::residuals::{Residuals, Worst};
-use crate::calibration::parameters::parameter;
+use crate::calibration::{Finding, parameter};
 use crate::imu::{ParameterKind, Sensor};
 
 /// Residuals without what any values of the unknowns explain, and the events that fit the others least.

@@ -9,7 +9,6 @@ pub mod coarse;
 mod earth_rate;
 pub mod equations;
 mod gravity;
-mod heading;
 mod judged;
 mod labels;
 pub mod mounting;

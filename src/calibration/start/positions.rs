@@ -1,14 +1,13 @@
 //! One triad from its mean outputs under known inputs, by generalised least squares.
 
-use nalgebra::{DMatrix, Matrix3, SMatrix, Vector3};
+use nalgebra::{DMatrix, Matrix3, Matrix4x3, SMatrix, Vector3};
 
 use super::equations::{
     Common, Equations, Event, Gain, OfTriad, Rows, gauss_newton, of, of_parameters, of_sensitivity,
 };
 use crate::calibration::checks::residuals::Residuals;
-use crate::calibration::error::CalibrationError;
-use crate::calibration::model::Model;
-use crate::calibration::parameters::{ParameterVector, from_vector, parameter};
+use crate::calibration::parameters::derivatives;
+use crate::calibration::{CalibrationError, Model, ParameterVector, from_vector, parameter};
 use crate::imu::{
     InstallationForm, Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector,
 };
@@ -56,6 +55,7 @@ pub struct Observed {
 }
 
 /// One triad as its positions show it.
+#[derive(Clone)]
 pub struct Fit {
     pub triad: Triad,
     pub covariance: SMatrix<f64, PER_TRIAD, PER_TRIAD>,
@@ -93,7 +93,7 @@ impl Observed {
     fn add(
         &self,
         mut equations: Equations,
-        (a, bias): (&Matrix3<f64>, &Vector3<f64>),
+        (a, bias): (Matrix3<f64>, Vector3<f64>),
         partials: impl Fn(&Vector3<f64>) -> OfTriad<3>,
     ) -> Equations {
         let least = (NOISELESS * self.size()).powi(2);
@@ -140,26 +140,26 @@ impl Observed {
     }
 
     /// Equations of `A` and `D`, of which nothing is known beforehand.
-    pub fn of_sensitivity(&self, a: &Matrix3<f64>, bias: &Vector3<f64>) -> Equations {
+    fn of_sensitivity(&self, at: (Matrix3<f64>, Vector3<f64>)) -> Equations {
         let mut sigma = ParameterVector::zeros();
         let mut of_triad = sigma.fixed_rows_mut::<PER_TRIAD>(parameter(self.sensor, 0));
         of_triad.fill(f64::INFINITY);
         let equations = Equations::new(&ParameterVector::zeros(), &sigma);
         let partials = |input: &Vector3<f64>| of_sensitivity(input.push(1.0));
-        self.add(equations, (a, bias), partials)
+        self.add(equations, at, partials)
     }
 
     /// Equations of the parameters of a triad and their prior.
     fn of_parameters(&self, model: &Model, triads: &PerSensor<Triad>) -> Equations {
         let triad = triads.get(self.sensor);
         let equations = Equations::of_triads(model, triads, &[self.sensor]);
-        let at = (&triad.sensitivity(), &triad.bias);
+        let at = (triad.sensitivity(), triad.bias);
         self.add(equations, at, |input| of_parameters(triad, input))
     }
 
     /// Equations of `A` and `D` about a triad.
     pub fn about(&self, triad: &Triad) -> Equations {
-        self.of_sensitivity(&triad.sensitivity(), &triad.bias)
+        self.of_sensitivity((triad.sensitivity(), triad.bias))
     }
 
     /// What positions leave of any triad, their inputs' errors taken through this one.
@@ -199,8 +199,8 @@ impl Observed {
     /// One triad from positions alone: least squares for `A = K C` and `D` row by row, then the form's split. `None`
     /// if fewer than four positions, or positions that leave a row undetermined.
     pub fn determined(&self, form: InstallationForm) -> Option<Fit> {
-        let (mut a, mut bias) = (Matrix3::identity(), Vector3::zeros());
-        let mut equations = self.of_sensitivity(&a, &bias);
+        let mut rows = TriadVector::from_column_slice(Matrix4x3::identity().as_slice());
+        let mut equations = self.of_sensitivity(sensitivity_and_bias(&rows));
         if self.known.len() < 4 || self.size() <= 0.0 || in_a_plane(&equations) {
             return None;
         }
@@ -208,15 +208,19 @@ impl Observed {
         let mut gain = None;
         for _ in 0..2 {
             let by_rows = equations.gain()?;
-            let step = equations.found(&by_rows);
-            a += Matrix3::from_fn(|i, j| step[4 * i + j]);
-            bias += Vector3::from_fn(|i, _| step[4 * i + 3]);
-            equations = self.of_sensitivity(&a, &bias);
+            rows += TriadVector::from_column_slice(equations.found(&by_rows).as_slice());
+            equations = self.of_sensitivity(sensitivity_and_bias(&rows));
             gain = Some(by_rows);
         }
-        let triad = Triad::from_sensitivity(form, &a, bias);
+        let split = |rows: &TriadVector| {
+            let (a, bias) = sensitivity_and_bias(rows);
+            Triad::from_sensitivity(form, &a, bias)
+        };
+        let triad = split(&rows);
         triad.correction()?;
-        Some(self.fit(triad, &equations, &gain?, &split(form, &a, &bias)))
+        let by_rows = derivatives(&rows, |rows| split(rows).to_vector());
+        let by_rows = DMatrix::from_fn(PER_TRIAD, PER_TRIAD, |i, j| by_rows[(i, j)]);
+        Some(self.fit(triad, &equations, &gain?, &by_rows))
     }
 
     /// A triad whose parameters follow the unknowns of equations so, and these the residuals by a gain.
@@ -236,6 +240,15 @@ impl Observed {
             by_errors: by_unknowns * equations.by_units(gain, count),
         }
     }
+}
+
+/// `A` and `D` of their entries row by row.
+fn sensitivity_and_bias(rows: &TriadVector) -> (Matrix3<f64>, Vector3<f64>) {
+    let rows = Matrix4x3::from_column_slice(rows.as_slice()).transpose();
+    (
+        rows.fixed_columns::<3>(0).into_owned(),
+        rows.column(3).into_owned(),
+    )
 }
 
 /// Whether positions leave a row undetermined: in a plane they leave an eigenvalue of nothing but rounding
@@ -271,27 +284,6 @@ pub fn six_position_triad(
     };
     let fit = observed.determined(form)?;
     Some((fit.triad, fit.covariance))
-}
-
-/// How the parameters follow `A` and `D`, row by row, through the form's split.
-fn split(form: InstallationForm, a: &Matrix3<f64>, bias: &Vector3<f64>) -> DMatrix<f64> {
-    /// The split is smooth at unit scale; central differences leave 1e-10 of relative error.
-    const STEP: f64 = 1e-5;
-    let mut jacobian = DMatrix::zeros(PER_TRIAD, PER_TRIAD);
-    for unknown in 0..PER_TRIAD {
-        let (axis, column) = (unknown / 4, unknown % 4);
-        let shifted = |by: f64| -> TriadVector {
-            let (mut a, mut bias) = (*a, *bias);
-            match column {
-                3 => bias[axis] += by,
-                _ => a[(axis, column)] += by,
-            }
-            Triad::from_sensitivity(form, &a, bias).to_vector()
-        };
-        let slope = (shifted(STEP) - shifted(-STEP)) / (2.0 * STEP);
-        jacobian.set_column(unknown, &slope);
-    }
-    jacobian
 }
 
 #[cfg(test)]

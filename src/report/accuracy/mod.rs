@@ -1,19 +1,20 @@
 //! The report of a study of accuracy.
 
-mod compared;
-mod data;
-mod facts;
 mod figures;
-mod normalised;
 mod tables;
 #[cfg(test)]
 mod tests;
 mod verdict;
 
-use super::document::Document;
-use super::effects;
-use super::number::count;
-use crate::study::Accuracy;
+use super::terms;
+use crate::calibration::result::BlockRecord;
+use crate::calibration::{ErrorTerm, Nis};
+use crate::report::accuracy::tables::white_within;
+use crate::report::prelude::*;
+use crate::report::terms::title;
+use crate::study::accuracy::{Containment, Journey, Region};
+use crate::study::navigation::{FORTY_HOURS, INTERVAL};
+use crate::study::{Accuracy, Figures};
 
 /// Everything that is said of the study.
 pub fn document(accuracy: &Accuracy) -> Document {
@@ -25,17 +26,263 @@ pub fn document(accuracy: &Accuracy) -> Document {
     document.conclusions.heading = "What holds".to_owned();
     document.warnings.heading = "To be noted".to_owned();
     verdict::say(&mut document, accuracy);
-    document.both(facts::facts(accuracy));
+    document.both(facts(accuracy));
     document.both(tables::bound(accuracy));
     document.both(tables::gain(accuracy));
     document.both(tables::consistency(accuracy));
     document.both(tables::auxiliary(accuracy));
-    document.both(effects::costs(&accuracy.effects));
-    document.both(effects::explained(&accuracy.effects));
+    document.both(terms::costs(&accuracy.effects));
+    document.both(terms::explained(&accuracy.effects));
     document.both(tables::containment(accuracy));
-    for plot in figures::figures(accuracy) {
-        document.page(plot);
-    }
-    document.data = data::data(accuracy);
+    document.pages(figures::figures(accuracy));
+    document.data = data(accuracy);
     document
+}
+
+/// Reasons of failure that are shown.
+const REASONS: usize = 3;
+
+pub(super) fn facts(accuracy: &Accuracy) -> Facts {
+    let (study, scenario) = (&accuracy.study, &accuracy.study.scenario);
+    let (form, truth) = (study.form.name(), scenario.installation.form.name());
+    let what = format!(
+        "{}: instrument {}, table {}, path {}, latitude {}°",
+        scenario.name,
+        scenario.instrument.name,
+        scenario.table_name,
+        scenario.path_name,
+        three_digits(scenario.site.latitude / DEGREE)
+    );
+    let aiding = match accuracy.table.count {
+        0 => "zero velocity",
+        _ => "zero velocity and table attitude",
+    };
+    let mut facts = Facts::new("The study", [("scenario", what)]);
+    facts.push(
+        "runs",
+        format!("{}, seed {}", count(accuracy.trials.len()), study.seed),
+    );
+    let forms = format!("filter {form}, truth {truth}; compared in the general form");
+    facts.push("installation", forms);
+    facts.push("aiding", aiding);
+    facts.push("error terms", terms(accuracy));
+    facts.push("table time", table_time(accuracy));
+    facts.push("failures", failures(accuracy));
+    if let Some((median, most)) = passes(accuracy) {
+        let median = value(median, if median.fract() == 0.0 { 10.0 } else { 1.0 });
+        facts.push("passes", format!("median {median}, most {most}"));
+    }
+    let rejected = match rejected(accuracy) {
+        (0, _) => "none".to_owned(),
+        (of, runs) => format!("{} in {} of the runs", count(of), count(runs)),
+    };
+    facts.push("rejected observations", rejected);
+    if let (rejections, tested @ 1..) = accuracy.rejections() {
+        let (rejections, tested) = (count(rejections), count(tested));
+        facts.push(
+            "form",
+            format!("the data reject {form} in {rejections} of {tested} runs"),
+        );
+    }
+    facts
+}
+
+/// Which error terms the filter had, and which it should have had.
+fn terms(accuracy: &Accuracy) -> String {
+    let (scenario, unmodelled) = (&accuracy.study.scenario, &accuracy.study.unmodelled);
+    let there = ErrorTerm::ALL.into_iter().filter(|&b| scenario.has(b));
+    let (left_out, on): (Vec<_>, Vec<_>) = there.partition(|block| unmodelled.contains(block));
+    let named = |blocks: &[ErrorTerm]| {
+        let titles: Vec<&str> = blocks.iter().map(|&block| title(block)).collect();
+        titles.join(", ")
+    };
+    let on = if on.is_empty() {
+        "none".to_owned()
+    } else {
+        named(&on)
+    };
+    match &left_out[..] {
+        [] => format!("beside K, E and D: {on}"),
+        left_out => {
+            format!(
+                "beside K, E and D: {on}; simulated but not modelled: {}",
+                named(left_out)
+            )
+        }
+    }
+}
+
+/// Median and largest number of passes; none if no run gave an estimate.
+pub(super) fn passes(accuracy: &Accuracy) -> Option<(f64, usize)> {
+    let mut passes: Vec<usize> = accuracy
+        .filtered()
+        .map(|filtered| filtered.passes)
+        .collect();
+    passes.sort_unstable();
+    let most = *passes.last()?;
+    let [low, high] = [(passes.len() - 1) / 2, passes.len() / 2].map(|k| passes[k] as f64);
+    Some((0.5 * (low + high), most))
+}
+
+/// Number of observations that the gate rejected, and in how many runs.
+pub(super) fn rejected(accuracy: &Accuracy) -> (usize, usize) {
+    let rejected = accuracy.filtered().map(|filtered| filtered.rejected);
+    rejected.fold((0, 0), |(all, runs), of| {
+        (all + of, runs + usize::from(of > 0))
+    })
+}
+
+fn table_time(accuracy: &Accuracy) -> String {
+    let baseline = &accuracy.baseline;
+    let cut = match baseline.equal_time() {
+        Some(time) => format!(", also cut to {}", minutes(time)),
+        None => "; its positions cannot be had in the time of the EKF".to_owned(),
+    };
+    let (filter, closed) = (minutes(accuracy.table_time), minutes(baseline.table_time));
+    let path = &baseline.scenario.path_name;
+    format!("EKF {filter}; closed form {closed} on path {path}{cut}")
+}
+
+fn failures(accuracy: &Accuracy) -> String {
+    let failed = accuracy.failures().count();
+    let reasons = accuracy.failures().take(REASONS);
+    let reasons = reasons.map(|(run, reason)| format!("run {run}: {reason}"));
+    let more = if failed > REASONS { "; …" } else { "" };
+    match failed {
+        0 => "none".to_owned(),
+        _ => format!(
+            "{} ({}{more})",
+            count(failed),
+            reasons.collect::<Vec<_>>().join("; ")
+        ),
+    }
+}
+
+pub(super) fn data(accuracy: &Accuracy) -> Value {
+    let study = &accuracy.study;
+    let (form, truth) = (study.form, study.scenario.installation.form);
+    let (rejections, tested) = accuracy.rejections();
+    let failures = accuracy
+        .failures()
+        .map(|(run, reason)| json!({ "run": run, "reason": reason }));
+    let mut data = json!({
+        "scenario": study.scenario.name,
+        "path": study.scenario.path_name,
+        "seed": study.seed,
+        "installation_form": form,
+        "truth_installation_form": truth,
+        "form_holds_truth": form.holds(truth),
+        "runs": accuracy.trials.len(),
+        "failures": accuracy.failures().count(),
+        "failure_reasons": failures.collect::<Value>(),
+        "anees": accuracy.anees.map(|anees| anees.mean),
+        "anees_interval": accuracy.anees.map(|anees| anees.interval_95),
+        "anees_interval_998": accuracy.anees.map(|anees| anees.interval_998),
+        "anees_directions": accuracy.anees.map(|anees| anees.directions),
+        "nis": { "velocity": nis(&accuracy.velocity), "table": nis(&accuracy.table) },
+        "passes": passes(accuracy).map(|(median, most)| json!({ "median": median, "largest": most })),
+        "rejected_observations": rejected(accuracy).0,
+        "form_rejections":
+            (tested > 0).then(|| json!({ "rejected": rejections, "tested": tested })),
+    });
+    for of in &accuracy.groups {
+        data[of.group.key()] = figures(accuracy, &of.figures, of.group.unit_value());
+    }
+    let terms = accuracy.error_terms.iter().map(|(term, of)| {
+        let data = json!({
+            "ekf_rms": of.filter,
+            "claimed_rms": of.claimed,
+            "bound_rms": of.bound,
+            "ratio": of.ratio.map(|r| r.value),
+            "ratio_interval": of.ratio.map(|r| r.interval),
+        });
+        (term.name().to_owned(), data)
+    });
+    data["blocks"] = Value::Object(terms.collect::<Map<_, _>>());
+    let effects: Vec<BlockRecord> = accuracy.effects.iter().map(BlockRecord::from).collect();
+    data["block_effects"] = json!(effects);
+    data["navigation"] = navigation(accuracy);
+    data
+}
+
+fn nis(nis: &Nis) -> Option<Value> {
+    let white = white_within(nis);
+    (nis.count > 0).then(|| {
+        json!({
+            "mean": nis.mean,
+            "interval_998": nis.interval,
+            "lag_one": nis.lag_one,
+            "lag_one_interval": [-white, white],
+            "scalars": nis.count,
+        })
+    })
+}
+
+/// One for each mission, or why it cannot be navigated from the scenario's site.
+fn navigation(accuracy: &Accuracy) -> Value {
+    let mission = |journey, reason: Option<String>, position: Option<Value>, containment: Value| {
+        json!({
+            "mission": match journey {
+                Journey::Standing => "standing",
+                Journey::Flight => "flight",
+            },
+            "hours": f64::from(FORTY_HOURS) * INTERVAL / 3600.0,
+            "latitude_deg": accuracy.study.scenario.site.latitude / DEGREE,
+            "not_navigated": reason,
+            "position_nmile": position,
+            "containment": containment,
+        })
+    };
+    let navigated = accuracy.navigation.iter().map(|of| {
+        let position = figures(accuracy, &of.figures, NAUTICAL_MILE);
+        let containment = of.containment.iter().map(containment).collect();
+        mission(of.journey, None, Some(position), containment)
+    });
+    let others = accuracy.not_navigated.iter();
+    let others = others.map(|(journey, reason)| {
+        mission(
+            *journey,
+            Some(reason.to_string()),
+            None,
+            Value::Array(Vec::new()),
+        )
+    });
+    navigated.chain(others).collect()
+}
+
+/// How many runs have their position error within a region that their predicted covariance marks out.
+fn containment(of: &Containment) -> Value {
+    let (region, sigmas) = match of.region {
+        Region::East => ("east", 1.0),
+        Region::North => ("north", 1.0),
+        Region::Ellipse(sigmas) => ("ellipse", sigmas),
+    };
+    json!({
+        "region": region,
+        "sigmas": sigmas,
+        "probability": of.region.probability(),
+        "runs": of.runs,
+        "within": of.within,
+        "within_interval": of.interval,
+        "as_claimed": of.as_claimed(),
+    })
+}
+
+fn figures(accuracy: &Accuracy, of: &Figures, unit: f64) -> Value {
+    json!({
+        "ekf_rms": of.filter / unit,
+        "claimed_rms": of.claimed / unit,
+        "bound_rms": of.bound / unit,
+        "ratio": of.ratio.map(|r| r.value),
+        "ratio_interval": of.ratio.map(|r| r.interval),
+        "six_position_rms": of.closed_form.map(|rms| rms / unit),
+        "gain": of.gain.map(|r| r.value),
+        "gain_interval": of.gain.map(|r| r.interval),
+        "six_position_rms_equal_time": of.closed_form_in_equal_time.map(|rms| rms / unit),
+        "gain_equal_time": of.gain_in_equal_time.map(|r| r.value),
+        "gain_equal_time_interval": of.gain_in_equal_time.map(|r| r.interval),
+        "ekf_table_time_s": accuracy.table_time,
+        "six_position_table_time_s": accuracy.baseline.table_time,
+        "six_position_equal_table_time_s": accuracy.baseline.equal_time(),
+    })
 }

@@ -1,22 +1,13 @@
 //! The tables, alike for terminal and page.
 
-use super::super::document::{NONE, Table, cells};
-use super::super::number::{count, interval, minutes, or_dash, three_digits, value, with_interval};
-use super::super::terms::{title, unit};
-use super::compared::{Compared, compared, journey_name, region_name, white_within};
-use crate::calibration::Nis;
-use crate::study::accuracy::{Containment, ErrorTermAccuracy};
-use crate::study::{Accuracy, Ratio};
+use crate::calibration::{ErrorTerm, Nis};
+use crate::imu::Sensor;
+use crate::report::prelude::*;
+use crate::report::terms::{title, unit};
+use crate::study::accuracy::{Containment, Journey, Region};
+use crate::study::{Accuracy, Figures, Ratio};
 
-const AGAINST_BOUND: [&str; 7] = [
-    "",
-    "unit",
-    "RMS error",
-    "RMS σ",
-    "RMS bound",
-    "error/bound",
-    "99 % interval",
-];
+const AGAINST_BOUND: &str = "| unit | RMS error | RMS σ | RMS bound | error/bound | 99 % interval";
 
 /// What ought to be one, with the digits that the width of its interval leaves meaning to.
 pub(super) fn mean(mean: f64, (low, high): (f64, f64)) -> String {
@@ -55,18 +46,16 @@ fn sections(
 }
 
 /// RMS error, σ and bound in a unit, and the ratio of the first to the last.
-fn against_bound(rms: [f64; 3], unit: f64, ratio: Option<&Ratio>) -> Vec<String> {
-    let rms = rms.map(|rms| three_digits(rms / unit));
-    rms.into_iter().chain(ratio_cells(ratio)).collect()
+fn against_bound(of: &Figures, unit: f64) -> Vec<String> {
+    let rms = [of.filter, of.claimed, of.bound].map(|rms| three_digits(rms / unit));
+    rms.into_iter()
+        .chain(ratio_cells(of.ratio.as_ref()))
+        .collect()
 }
 
 pub(super) fn bound(accuracy: &Accuracy) -> Table {
-    let cells = |of: &Compared| {
-        let figures = of.figures;
-        let rms = [figures.filter, figures.claimed, figures.bound];
-        against_bound(rms, of.unit_value, figures.ratio.as_ref())
-    };
-    Table::new("EKF against the Cramér–Rao bound", AGAINST_BOUND)
+    let cells = |of: &Compared| against_bound(of.figures, of.unit_value);
+    Table::new("EKF against the Cramér–Rao bound", columns(AGAINST_BOUND))
         .sections(sections(accuracy, cells))
         .note("RMS over all runs and the parameters of a group; σ: what the filter claims.")
         .note("Position: horizontal, after 40 h from perfect alignment; flight: the trajectory of that name.")
@@ -75,13 +64,11 @@ pub(super) fn bound(accuracy: &Accuracy) -> Table {
 
 /// Auxiliary parameters, term by term.
 pub(super) fn auxiliary(accuracy: &Accuracy) -> Table {
-    let row = |of: &ErrorTermAccuracy| {
-        let (unit, in_si) = unit(of.term);
-        let rms = [of.filter, of.claimed, of.bound];
-        let cells = against_bound(rms, in_si, of.ratio.as_ref());
-        [cells![title(of.term), unit], cells].concat()
+    let row = |(term, of): &(ErrorTerm, Figures)| {
+        let (unit, in_si) = unit(*term);
+        [cells![title(*term), unit], against_bound(of, in_si)].concat()
     };
-    Table::new("Error terms beside K, E and D", AGAINST_BOUND)
+    Table::new("Error terms beside K, E and D", columns(AGAINST_BOUND))
         .section(accuracy.error_terms.iter().map(row))
         .note("RMS over all runs and the parameters of a term.")
 }
@@ -117,17 +104,10 @@ pub(super) fn gain(accuracy: &Accuracy) -> Table {
 }
 
 pub(super) fn consistency(accuracy: &Accuracy) -> Table {
-    let columns = [
-        "",
-        "mean",
-        "95 % interval",
-        "99.8 % interval",
-        "numbers",
-        "lag-one correlation",
-        "99 % if white",
-    ];
-    let filtered = accuracy.trials.iter().filter_map(|t| t.filtered.as_ref());
-    let directions = filtered.filter_map(|f| Some(f.nees?.count)).sum();
+    let directions = accuracy
+        .filtered()
+        .filter_map(|f| Some(f.nees?.count))
+        .sum();
     let nees = accuracy.anees.map(|of| {
         cells![
             format!("NEES/{}", of.directions),
@@ -144,7 +124,9 @@ pub(super) fn consistency(accuracy: &Accuracy) -> Table {
         ("NIS table attitude", &accuracy.table),
     ];
     let nis = nis.into_iter().filter(|(_, nis)| nis.count > 0);
-    Table::new("Consistency", columns)
+    Table::new("Consistency", columns(
+"| mean | 95 % interval | 99.8 % interval | numbers | lag-one correlation | 99 % if white",
+))
         .section(nees.into_iter().chain(nis.map(|(name, nis)| nis_row(name, nis))))
         .note("NEES/n: squared errors over the claimed covariance; NIS: squared innovations over theirs.")
         .note("Both are one if σ are true; the intervals are χ².")
@@ -165,14 +147,6 @@ fn nis_row(name: &str, nis: &Nis) -> Vec<String> {
 
 /// Whether position errors lie within their predicted σ.
 pub(super) fn containment(accuracy: &Accuracy) -> Table {
-    let columns = [
-        "",
-        "runs",
-        "within",
-        "claimed",
-        "99 % interval",
-        "as claimed",
-    ];
     let sections = accuracy.navigation.iter().map(|of| {
         of.containment.iter().map(|held: &Containment| {
             let share = |hits: usize| percent(hits as f64 / held.runs as f64);
@@ -187,8 +161,64 @@ pub(super) fn containment(accuracy: &Accuracy) -> Table {
             ]
         })
     });
-    Table::new("Position error after 40 h within its predicted σ", columns)
+    Table::new("Position error after 40 h within its predicted σ", columns("| runs | within | claimed | 99 % interval | as claimed"))
         .sections(sections)
         .note("σ and ellipses: predicted from the covariance that the filter claims, by the linear error model.")
         .note("Interval: binomial, of the share of the runs if the covariance is true.")
+}
+
+/// 99 % of a normal distribution lie within this many σ.
+const SIGMAS_99: f64 = 2.576;
+
+/// Something whose error is compared, with how it is shown.
+pub(super) struct Compared<'a> {
+    pub(super) title: String,
+    /// The triad; none of a position.
+    pub(super) sensor: Option<Sensor>,
+    /// Symbol of the unit.
+    pub(super) unit: &'static str,
+    /// The unit in SI.
+    pub(super) unit_value: f64,
+    pub(super) figures: &'a Figures,
+}
+
+/// The parameters group by group, then the position after each mission.
+pub(super) fn compared(accuracy: &Accuracy) -> Vec<Compared<'_>> {
+    let groups = accuracy.groups.iter().map(|of| Compared {
+        title: of.group.title(),
+        sensor: Some(of.group.sensor()),
+        unit: of.group.unit(),
+        unit_value: of.group.unit_value(),
+        figures: &of.figures,
+    });
+    let positions = accuracy.navigation.iter().map(|of| Compared {
+        title: format!("position, {}", journey_name(of.journey)),
+        sensor: None,
+        unit: "nmile",
+        unit_value: NAUTICAL_MILE,
+        figures: &of.figures,
+    });
+    groups.chain(positions).collect()
+}
+
+/// A mission in a word.
+pub(super) fn journey_name(journey: Journey) -> &'static str {
+    match journey {
+        Journey::Standing => "stationary",
+        Journey::Flight => "flight",
+    }
+}
+
+/// A region in words.
+pub(super) fn region_name(region: Region) -> String {
+    match region {
+        Region::East => "east within 1σ".to_owned(),
+        Region::North => "north within 1σ".to_owned(),
+        Region::Ellipse(sigmas) => format!("inside the {sigmas}σ ellipse"),
+    }
+}
+
+/// What the lag-one correlation of white innovations stays within in 99 of 100 studies.
+pub(super) fn white_within(nis: &Nis) -> f64 {
+    SIGMAS_99 / (nis.count as f64).sqrt()
 }

@@ -2,14 +2,11 @@
 
 use std::cmp::Ordering;
 
-use super::super::document::Document;
-use super::super::number::{count, interval, minutes, value, with_interval};
-use super::compared::{compared, journey_name, region_name, white_within};
-use super::tables::{self, percent};
-
-use crate::calibration::ErrorTermTest;
-use crate::calibration::Nis;
+use super::tables;
+use super::tables::{compared, journey_name, percent, region_name, white_within};
+use crate::calibration::{ErrorTermTest, Nis};
 use crate::imu::Output;
+use crate::report::prelude::*;
 use crate::study::accuracy::Containment;
 use crate::study::{Accuracy, Figures, NavigationAccuracy, Ratio};
 

@@ -1,10 +1,9 @@
 //! Allan deviation against cluster time, a panel for each axis.
 
-use super::super::number::three_digits;
-use super::super::plot::{Axis, Color, Mark, Panel, Plot, Point, Series};
 use super::quantity::{deviation_unit, quantity};
 use crate::imu::{AXES, Sensor};
 use crate::noise::{AxisNoise, Found, NoiseAnalysis, Process};
+use crate::report::prelude::*;
 
 /// A process is drawn where it makes at least this part of the variance.
 const SEEN: f64 = 0.02;

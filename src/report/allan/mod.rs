@@ -3,14 +3,12 @@
 mod data;
 mod figure;
 mod quantity;
-mod run_toml;
 mod tables;
 mod words;
 
-use super::document::{Block, Document, List};
-use super::number::{count, three_digits};
 use crate::imu::Sensor;
 use crate::noise::NoiseAnalysis;
+use crate::report::prelude::*;
 
 /// Of the deviations a terminal shows every so-manieth.
 const EVERY: usize = 2;
@@ -37,7 +35,7 @@ pub fn document(run: &str, analysis: &NoiseAnalysis) -> Document {
     document.terminal(tables::deviations(analysis, EVERY));
     document.page(tables::deviations(analysis, 1));
     document.both(List::new("Not found", words::advice(analysis)));
-    let toml = run_toml::noise_table(analysis);
+    let toml = data::noise_table(analysis);
     document.both(Block::Code("For run.toml".to_owned(), toml));
     document.page(Block::Text("Method".to_owned(), words::METHOD.to_owned()));
     document.data = data::data(run, analysis);

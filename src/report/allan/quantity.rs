@@ -2,9 +2,10 @@
 
 use crate::imu::Sensor;
 use crate::noise::Process;
-use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, MICRO_G, MICRO_G_PER_SQRT_HZ, MILLISECOND};
+use crate::units::{
+    ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, HOUR, MICRO_G, MICRO_G_PER_SQRT_HZ, MILLISECOND,
+};
 
-const HOUR: f64 = 3600.0;
 const SQRT_HOUR: f64 = 60.0;
 
 /// How the strength of a process is shown.

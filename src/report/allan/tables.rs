@@ -1,11 +1,10 @@
 //! The coefficients and the deviations as tables.
 
-use super::super::document::{NONE, Table, cells};
-use super::super::number::{count, or_dash, plus_minus, sigma, three_digits};
 use super::quantity::{deviation_unit, quantity};
 use super::words;
 use crate::imu::{AXES, Sensor};
 use crate::noise::{AxisNoise, Found, NoiseAnalysis, Process, TriadNoise, of_kind};
+use crate::report::prelude::*;
 
 /// What was found in a triad: a row for each process, a column for each axis and one for their mean.
 pub(super) fn coefficients(analysis: &NoiseAnalysis, sensor: Sensor) -> Table {

@@ -1,9 +1,9 @@
 //! What has to be said of an analysis.
 
-use super::super::number::{count, sigma, three_digits};
 use super::quantity::quantity;
 use crate::imu::{AXES, Sensor};
 use crate::noise::{Hidden, Identified, NoiseAnalysis, Process, TriadNoise, of_kind};
+use crate::report::prelude::*;
 
 /// Random walks of the axes of a triad that differ by more than this factor are not alike.
 const UNLIKE: f64 = 1.5;

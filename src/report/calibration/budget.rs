@@ -1,15 +1,11 @@
 //! Where the uncertainty comes from: tables and stacked bars.
 
-use super::super::document::{NONE, Table, cells};
-use super::super::group::{Group, axis_name};
-use super::super::number::{self, sigma, three_digits, value};
-use super::super::plot::{Axis, Color, Panel, Plot, Series, Shape};
 use super::super::terms::title;
 use super::report::Report;
 use crate::calibration::{Budget, BudgetPart, ErrorTermTest, Estimate, ParameterVector};
 use crate::earth::ROTATION_RATE;
 use crate::imu::Sensor;
-use crate::units::{DEG_PER_H, DEGREE};
+use crate::report::prelude::*;
 
 /// So many sources have a colour of their own; the others share one.
 const SHOWN: usize = 5;
@@ -27,7 +23,7 @@ pub(super) fn table(budget: &Budget, estimate: &Estimate) -> Table {
     let row = |name: &str, u: ParameterVector, freedom: &str| {
         let cells = Group::all().map(|group| {
             let spread = group.spread(&u, &group.estimated(estimate));
-            number::or_dash(spread.map(|of| of.1), three_digits)
+            or_dash(spread.map(|of| of.1), three_digits)
         });
         let mut row = vec![name.to_owned()];
         row.extend(cells);
@@ -46,7 +42,7 @@ pub(super) fn table(budget: &Budget, estimate: &Estimate) -> Table {
         of.map(|i| budget.coverage_factor(i)).reduce(f64::max)
     });
     let mut coverage = vec!["coverage factor k, 95.45 %".to_owned()];
-    coverage.extend(factors.map(|k| number::or_dash(k, |k| value(k, 0.1))));
+    coverage.extend(factors.map(|k| or_dash(k, |k| value(k, 0.1))));
     coverage.push(String::new());
     Table::new("Uncertainty budget", columns.chain(["ν".to_owned()]))
         .section(rows)
@@ -187,7 +183,7 @@ pub(super) fn left_off(report: &Report, estimate: &Estimate) -> Table {
     let columns = Group::all().map(|group| format!("{}, {}", group.short(), group.unit()));
     let cell = |group: Group, of: &ParameterVector| {
         let spread = group.spread(of, &group.estimated(estimate));
-        number::or_dash(spread.map(|of| of.1), sigma)
+        or_dash(spread.map(|of| of.1), sigma)
     };
     let row = |test: &ErrorTermTest| {
         let left_off = test.left_off?;

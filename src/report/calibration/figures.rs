@@ -1,11 +1,15 @@
 //! The figures.
 
-use super::super::group::{Group, axis_name, short_name};
-use super::super::number::{count, value};
-use super::super::plot::{Axis, Color, Mark, Matrix, Panel, Plot, Series};
-use super::report::Report;
-use super::{methods, path};
-use crate::calibration::{Epoch, Estimate, Innovation, Nis, Observation, Outcome};
+use nalgebra::Matrix3;
+
+use crate::attitude::matrix;
+use crate::calibration::{
+    Epoch, Estimate, Innovation, Nis, Observation, Outcome, ParameterVector, sensor_and_parameter,
+};
+use crate::imu::AXES;
+use crate::recording::{ImuSamples, TableLog};
+use crate::report::calibration::report::Report;
+use crate::report::prelude::*;
 
 /// Where the axis of estimates ends, in final σ: with the prior on it the end could not be read.
 const EXTENT: f64 = 300.0;
@@ -21,8 +25,8 @@ impl Report<'_> {
     pub(super) fn figures(&self) -> Vec<Plot> {
         let mut plots = Vec::new();
         plots.extend(match (self.truth_vector(), self.methods().as_slice()) {
-            (Some(truth), methods @ [_, ..]) => Some(methods::errors(methods, &truth)),
-            (None, &[(_, closed), (_, filter)]) => Some(methods::differences(closed, filter)),
+            (Some(truth), methods @ [_, ..]) => Some(errors(methods, &truth)),
+            (None, &[(_, closed), (_, filter)]) => Some(differences(closed, filter)),
             _ => None,
         });
         // Recordings have each their own time.
@@ -33,7 +37,7 @@ impl Report<'_> {
             plots.extend(self.innovations(outcome));
         }
         if self.outcome.as_ref().is_none_or(one) {
-            plots.push(path::figure(self));
+            plots.push(path(self));
         }
         plots.extend(self.estimate().and_then(correlation));
         plots
@@ -251,4 +255,249 @@ fn correlation(estimate: &Estimate) -> Option<Plot> {
              by this path as a sum or difference rather than each alone."
         ))
     })
+}
+
+/// Magnitude of each parameter's error by each method, with the σ that it claims.
+fn errors(methods: &[(&str, &Estimate)], truth: &ParameterVector) -> Plot {
+    let form = methods[0].1.form();
+    let panel = |group: Group| {
+        let mut indices = group.parameters(form);
+        indices.retain(|&i| methods.iter().any(|(_, m)| m.covariance[(i, i)] > 0.0));
+        if indices.is_empty() {
+            return Panel::blank(format!("{}: all fixed", group.title()));
+        }
+        let series = methods
+            .iter()
+            .enumerate()
+            .flat_map(|(n, (name, estimate))| {
+                let (error, sigma) = (estimate.vector() - truth, estimate.sigma());
+                let offset = 0.26 * (n as f64 - 0.5 * (methods.len() as f64 - 1.0));
+                let places = || {
+                    indices
+                        .iter()
+                        .enumerate()
+                        .map(|(k, &i)| (k as f64 + offset, i))
+                };
+                let unit = group.unit_value();
+                let (mark, color) = method_mark(name);
+                let whiskers = places().filter(|&(_, i)| sigma[i] > 0.0);
+                let whiskers = whiskers.map(|(x, i)| (x, 0.0, sigma[i] / unit)).collect();
+                let marks = places().map(|(x, i)| (x, error[i].abs() / unit));
+                [
+                    Series::new(Shape::Intervals(whiskers))
+                        .color(color)
+                        .width(1.0),
+                    Series::marks(mark, marks)
+                        .color(color)
+                        .width(2.0)
+                        .key(*name),
+                ]
+            });
+        let x = Axis::places(indices.iter().map(|&i| axis_name(form, i)));
+        Panel::new(group.titled(), x, Axis::log("")).with_all(series)
+    };
+    let mut caption = "Magnitude of each parameter's true error, logarithmic. The whisker reaches up to the 1σ \
+                       that the method claims: about two marks in three should lie below the top of their \
+                       whisker."
+        .to_owned();
+    if methods.len() == 2 {
+        caption += " Open rings: closed form; filled dots: EKF.";
+    }
+    let heading = "Errors against the truth";
+    Plot::new("comparison.svg", heading, (3, 300), Group::all().map(panel)).caption(caption)
+}
+
+/// Mark and colour of a method, the same in every figure.
+fn method_mark(name: &str) -> (Mark, Color) {
+    match name {
+        "EKF" => (Mark::Dot, Color::Nth(0)),
+        _ => (Mark::Ring, Color::Nth(1)),
+    }
+}
+
+/// The difference between both methods in its σ.
+fn differences(closed: &Estimate, filter: &Estimate) -> Plot {
+    let form = filter.form();
+    let difference = closed.vector() - filter.vector();
+    let variance = closed.covariance.diagonal() + filter.covariance.diagonal();
+    let points: Vec<(usize, f64)> = filter
+        .estimated()
+        .filter(|&i| variance[i] > 0.0)
+        .map(|i| (i, difference[i] / variance[i].sqrt()))
+        .collect();
+    let extent = 1.2 * points.iter().map(|point| point.1.abs()).fold(4.0, f64::max);
+    let y = match extent > 24.0 {
+        true => Axis::symlog(1.0),
+        false => Axis::linear(""),
+    };
+    let sensor = |index: usize| sensor_and_parameter(index).0;
+    let panels = points
+        .chunk_by(|a, b| sensor(a.0) == sensor(b.0))
+        .map(|triad| {
+            let x = Axis::places(triad.iter().map(|&(i, _)| short_name(form, i)));
+            let stems = triad
+                .iter()
+                .enumerate()
+                .map(|(k, &(_, y))| (k as f64, 0.0, y))
+                .collect();
+            let marks = triad.iter().enumerate().map(|(k, &(_, y))| (k as f64, y));
+            Panel::new(
+                "closed form minus EKF, σ",
+                x,
+                y.clone().between(-extent, extent),
+            )
+            .with(Series::zero())
+            .with_all([-3.0, 3.0].map(|y| {
+                Series::level(y)
+                    .dashed()
+                    .label(if y < 0.0 { "−3σ" } else { "+3σ" })
+            }))
+            .with(Series::new(Shape::Intervals(stems)).width(1.0))
+            .with(Series::marks(Mark::Dot, marks).width(2.5))
+        });
+    Plot::new("comparison.svg", "Closed form against EKF", (1, 220), panels).caption(
+        "Closed form minus EKF in units of the σ of their difference, as if they had no data in common. Dashed: \
+         ±3.",
+    )
+}
+
+/// Nearer to the plumb line than this an axis has no azimuth worth drawing.
+const STEEP: f64 = 80.0 * DEGREE;
+/// An azimuth may run so far past ±180° before it goes on at the other end, °.
+const PAST: f64 = 190.0;
+
+/// Elevation and azimuth of the body axes from the table, and body rates from the gyros.
+fn path(report: &Report) -> Plot {
+    let (start, end) = report.time_span();
+    let numbers = || {
+        let dwells = report.dwells.iter().enumerate();
+        dwells.map(|(n, dwell)| (0.5 * (dwell.start + dwell.end), (n + 1).to_string()))
+    };
+    let panel = |title: &str, y: Axis, line: &dyn Fn(usize) -> Vec<Point>| {
+        let lines = [0, 1, 2].map(|axis| Series::line(line(axis)).axis(axis).label(AXES[axis]));
+        Panel::new(title, Axis::linear("time, s").between(start, end), y)
+            .shaded(report.dwells)
+            .tagged(1, numbers())
+            .with_all(lines)
+    };
+    let table = report.table().filter(|table| !table.time.is_empty());
+    let mut panels = Vec::new();
+    let mut caption = String::new();
+    if let Some(table) = table {
+        let y = Axis::linear("").between(-95.0, 130.0).step(45.0);
+        panels.push(panel("elevation of the body axes, °", y, &|axis| {
+            elevation(table, axis)
+        }));
+        let y = Axis::linear("").between(-200.0, 260.0).step(90.0);
+        panels.push(panel("azimuth of the body axes, °", y, &|axis| {
+            azimuth(table, axis)
+        }));
+        caption += "Elevation of each body axis above the horizon and its azimuth clockwise from North, as the \
+                    turntable reads them. Unlike heading, pitch and roll these are never singular; an axis has \
+                    no azimuth while it is within 10° of the plumb line. ";
+    }
+    caption += "Rates are the raw gyro outputs about the body axes. Grey: dwells, numbered where there is room.";
+    let y = Axis::linear("").including([0.0]).room(0.05, 0.16);
+    panels.push(panel("rate about the body axes, °/s", y, &|axis| {
+        rate(&report.run.recording.imu, axis)
+    }));
+    Plot::new("path.svg", "Path", (1, 240), panels).caption(caption)
+}
+
+/// Elevation of a body axis above the horizon in degrees.
+fn elevation(table: &TableLog, axis: usize) -> Vec<Point> {
+    let line = table.time.iter().zip(&table.attitude);
+    line.map(|(&t, attitude)| (t, axis_elevation(&matrix(attitude), axis) / DEGREE))
+        .collect()
+}
+
+/// Azimuth of a body axis clockwise from North in degrees, interrupted where it jumps and where it is steep.
+fn azimuth(table: &TableLog, axis: usize) -> Vec<Point> {
+    let gap = (f64::NAN, f64::NAN);
+    let (mut last, mut line) = (f64::NAN, Vec::new());
+    for (&t, attitude) in table.time.iter().zip(&table.attitude) {
+        let c = matrix(attitude);
+        if axis_elevation(&c, axis).abs() > STEEP {
+            last = f64::NAN;
+            line.push(gap);
+            continue;
+        }
+        let angle = c[(0, axis)].atan2(c[(1, axis)]) / DEGREE;
+        let near = [angle, angle - 360.0, angle + 360.0];
+        let near = near.into_iter().filter(|a| a.abs() <= PAST);
+        let next = near.min_by(|a, b| (a - last).abs().total_cmp(&(b - last).abs()));
+        let next = next.filter(|_| last.is_finite()).unwrap_or(angle);
+        if (next - last).abs() > 180.0 {
+            line.push(gap);
+        }
+        line.push((t, next));
+        last = next;
+    }
+    line
+}
+
+fn axis_elevation(c: &Matrix3<f64>, axis: usize) -> f64 {
+    c[(2, axis)].clamp(-1.0, 1.0).asin()
+}
+
+/// Mean rate of each sample about a body axis in degrees a second.
+fn rate(imu: &ImuSamples, axis: usize) -> Vec<Point> {
+    let samples = imu.gyro.iter().enumerate();
+    let rate = |(k, angle): (usize, nalgebra::Vector3<f64>)| {
+        (
+            imu.time(k) + 0.5 * imu.period,
+            angle[axis] / imu.period / DEGREE,
+        )
+    };
+    thinned(samples.map(rate))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::attitude::{from_pitch_roll_heading, quaternion};
+
+    fn table(headings: impl Iterator<Item = f64>) -> TableLog {
+        let attitude: Vec<_> = headings
+            .map(|heading| quaternion(&from_pitch_roll_heading(0.0, 0.0, heading * DEGREE)))
+            .collect();
+        TableLog {
+            time: (0..attitude.len()).map(|k| k as f64).collect(),
+            attitude,
+            axes: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_full_turn_in_heading_is_drawn_without_a_jump() {
+        let line = azimuth(&table((0..=36).map(|k| f64::from(k) * 10.0 + 5.0)), 1);
+        let pieces: Vec<&[Point]> = line.split(|point| point.0.is_nan()).collect();
+        assert_eq!(pieces.len(), 2);
+        for piece in &pieces {
+            assert!(piece.is_sorted_by(|a, b| b.1 - a.1 < 11.0 && b.1 > a.1));
+        }
+        let vertical = azimuth(&table((0..=36).map(f64::from)), 2);
+        assert!(
+            vertical.iter().all(|point| point.0.is_nan()),
+            "a vertical axis has no azimuth"
+        );
+    }
+
+    #[test]
+    fn an_azimuth_that_trembles_about_south_stays_on_one_side() {
+        let line = azimuth(&table((0..40).map(|k| 180.0 + f64::from(k % 2) - 0.5)), 1);
+        assert!(
+            line.windows(2)
+                .all(|pair| (pair[1].1 - pair[0].1).abs() < 2.0),
+            "{line:?}"
+        );
+    }
+
+    #[test]
+    fn the_front_axis_points_east_at_a_heading_of_ninety_degrees() {
+        let table = table(std::iter::once(90.0));
+        assert!((azimuth(&table, 1)[0].1 - 90.0).abs() < 1e-9);
+        assert!(elevation(&table, 1)[0].1.abs() < 1e-9);
+        assert!((elevation(&table, 2)[0].1 - 90.0).abs() < 1e-9);
+    }
 }

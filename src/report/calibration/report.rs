@@ -5,8 +5,9 @@ use std::ops::Range;
 
 use super::super::outlook::Navigated;
 use crate::calibration::result::TermRecord;
-use crate::calibration::{Budget, ErrorTermTest, Finding, ParameterVector, Quality};
-use crate::calibration::{Estimate, Outcome, to_vector};
+use crate::calibration::{
+    Budget, ErrorTermTest, Estimate, Finding, Outcome, ParameterVector, Quality, to_vector,
+};
 use crate::imu::{BodyFrame, PerSensor, Triad};
 use crate::recording::TableLog;
 use crate::run::{Aiding, Run};

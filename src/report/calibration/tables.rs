@@ -1,15 +1,12 @@
 //! The tables, alike for terminal and page.
 
-use super::super::document::{NONE, Table, cells};
-use super::super::group::Group;
-use super::super::number::{self, count, plus_minus, sigma, three_digits, value};
-use super::super::terms::{self, improvement};
+use super::super::terms;
+use super::super::terms::improvement;
 use super::report::Report;
-use crate::calibration::{Estimate, Nis, Outcome, parameter_name};
-use crate::calibration::{Measures, Quality, Spread};
+use crate::calibration::{Estimate, Measures, Nis, Outcome, Quality, Spread, parameter_name};
 use crate::imu::ParameterKind;
 use crate::recording::TableLog;
-use crate::units::{ARCSEC, DEGREE, MICRO_G, MILLI_G};
+use crate::report::prelude::*;
 
 /// How many of the directions that were observed are shown.
 const WEAKEST: usize = 3;
@@ -41,10 +38,7 @@ impl Report<'_> {
             row.extend(truth.iter().flat_map(|truth| {
                 let error = (values[i] - truth[i]) / unit;
                 let in_sigma = (!fixed).then(|| error / s);
-                [
-                    value(error, s),
-                    number::or_dash(in_sigma, |z| value(z, 0.1)),
-                ]
+                [value(error, s), or_dash(in_sigma, |z| value(z, 0.1))]
             }));
             Some(row)
         };
@@ -93,11 +87,11 @@ impl Report<'_> {
             for (_, estimate) in &methods {
                 let indices = group.estimated(estimate);
                 let claimed = group.spread(&estimate.sigma(), &indices);
-                row.push(number::or_dash(claimed.map(|x| x.1), sigma));
+                row.push(or_dash(claimed.map(|x| x.1), sigma));
                 if let Some(truth) = &truth {
                     let error = group.spread(&(estimate.vector() - truth), &indices);
-                    row.push(number::or_dash(error.map(|x| x.1), three_digits));
-                    row.push(number::or_dash(error.map(|x| x.0), three_digits));
+                    row.push(or_dash(error.map(|x| x.1), three_digits));
+                    row.push(or_dash(error.map(|x| x.0), three_digits));
                 }
             }
             if let Some([(_, closed), (_, filter)]) = both {
@@ -105,7 +99,7 @@ impl Report<'_> {
                 let ratio = rms(closed)
                     .zip(rms(filter))
                     .map(|(closed, filter)| closed / filter);
-                row.push(number::or_dash(ratio, three_digits));
+                row.push(or_dash(ratio, three_digits));
                 let difference = closed.vector() - filter.vector();
                 let spread = group.spread(&difference, &group.parameters(closed.form()));
                 let spread = spread.filter(|_| truth.is_none());
@@ -147,21 +141,17 @@ pub(super) fn passes(outcome: &Outcome) -> Table {
         cells![
             (n + 1).to_string(),
             three_digits(pass.largest_step),
-            number::whole(pass.cost),
+            whole(pass.cost),
             count(pass.observations),
             three_digits(pass.cost / pass.observations as f64),
             count(pass.rejected),
         ]
     });
-    let columns = [
-        "pass",
-        "largest step, σ",
-        "cost",
-        "scalars",
-        "cost / scalars",
-        "rejected",
-    ];
-    Table::new("Passes", columns).section(rows)
+    Table::new(
+        "Passes",
+        columns("pass | largest step, σ | cost | scalars | cost / scalars | rejected"),
+    )
+    .section(rows)
 }
 
 fn observed(outcome: &Outcome) -> impl Iterator<Item = (&'static str, Nis)> {
@@ -196,14 +186,7 @@ pub(super) fn consistency(outcome: &Outcome) -> Table {
             count(nis.count),
         ]
     });
-    let columns = [
-        "observation",
-        "NIS per scalar",
-        "95 % interval",
-        "lag-one correlation",
-        "scalars",
-    ];
-    Table::new("Consistency", columns).section(rows).note(
+    Table::new("Consistency", columns("observation | NIS per scalar | 95 % interval | lag-one correlation | scalars")).section(rows).note(
         "A NIS within its interval and a correlation near zero say that the innovations are as large and as \
          white as the filter claims.",
     )

@@ -1,19 +1,14 @@
 //! What changes with temperature, and what differs between recordings.
 
-use super::super::document::{Document, NONE, Table};
-use super::super::group::{Group, axis_name};
-use super::super::number::{plus_minus, three_digits, value};
-use super::super::plot::{Axis, Mark, Panel, Plot, Series, Shape};
 use crate::calibration::{
     Estimate, Outcome, ParameterMatrix, ParameterVector, SeparateEstimate, Thermal, parameter_name,
     sensor_and_parameter,
 };
-use crate::imu::{PerSensor, RATE, Sensor, ThermalState};
+use crate::imu::{RATE, Sensor};
+use crate::report::prelude::*;
 
 /// Points of a curve.
 const POINTS: usize = 81;
-/// Seconds in a minute: rates are shown per minute.
-const MINUTE: f64 = 60.0;
 
 /// Adds tables and figures, where anything changes or differs.
 pub(super) fn add(document: &mut Document, outcome: &Outcome) {
@@ -21,13 +16,8 @@ pub(super) fn add(document: &mut Document, outcome: &Outcome) {
         document.both(orders(outcome, thermal));
         document.both(hysteresis(outcome, thermal));
         document.page(curves(outcome, thermal));
-        if outcome
-            .alone
-            .iter()
-            .filter(|a| a.estimate.is_some())
-            .count()
-            > 1
-        {
+        let known = outcome.alone.iter().filter(|a| a.estimate.is_some());
+        if known.count() > 1 {
             document.page(departures(outcome, thermal));
         }
         document.page(residuals(outcome));
@@ -36,22 +26,14 @@ pub(super) fn add(document: &mut Document, outcome: &Outcome) {
     document.both(differences(outcome));
 }
 
-/// All axes at a temperature that does not change.
-fn at(thermal: &Thermal, temperature: f64) -> ThermalState {
-    let everywhere = PerSensor::from_fn(|_| [temperature; 3]);
-    thermal
-        .model
-        .range
-        .state(&everywhere, &PerSensor::default())
-}
-
 /// Change of all parameters from those at the reference, and σ of what they are then.
 fn there(
     outcome: &Outcome,
     thermal: &Thermal,
     temperature: f64,
 ) -> (ParameterVector, ParameterMatrix) {
-    thermal.at(&at(thermal, temperature), &outcome.estimate.covariance)
+    let state = thermal.model.range.everywhere(temperature, 0.0);
+    thermal.at(&state, &outcome.estimate.covariance)
 }
 
 /// Order and coefficients of each parameter.
@@ -60,14 +42,13 @@ fn orders(outcome: &Outcome, thermal: &Thermal) -> Table {
     let highest = thermal.coefficients.iter().filter(|c| c.function != RATE);
     let highest = highest.map(|c| c.function + 1).max().unwrap_or(0);
     let mut columns = vec!["parameter".to_owned(), "unit".to_owned()];
-    columns.extend((1..=highest).map(|order| match order {
-        1 => "linear".to_owned(),
-        2 => "square".to_owned(),
-        3 => "cubic".to_owned(),
-        _ => format!("order {order}"),
-    }));
     let any_rate = thermal.coefficients.iter().any(|c| c.function == RATE);
-    columns.extend(any_rate.then(|| "by rate".to_owned()));
+    let functions = (0..highest).chain(any_rate.then_some(RATE));
+    columns.extend(
+        functions
+            .clone()
+            .map(|function| function_name(Some(function))),
+    );
     let row = |group: Group, index: usize| {
         let mut row = vec![parameter_name(form, index)?, group.unit().to_owned()];
         let cell = |function: usize| {
@@ -79,8 +60,7 @@ fn orders(outcome: &Outcome, thermal: &Thermal) -> Table {
                 plus_minus(thermal.values[k] / unit, sigma / unit)
             })
         };
-        row.extend((0..highest).map(cell));
-        row.extend(any_rate.then(|| cell(RATE)));
+        row.extend(functions.clone().map(cell));
         row[2..].iter().any(|cell| cell != NONE).then_some(row)
     };
     let range = |sensor: Sensor| {
@@ -133,7 +113,7 @@ fn hysteresis(outcome: &Outcome, thermal: &Thermal) -> Table {
         });
     Table::new(
         "Hysteresis: heating less cooling at the same temperature",
-        ["parameter", "value ± 1σ", "unit", "at ± K/min"],
+        columns("parameter | value ± 1σ | unit | at ± K/min"),
     )
     .section(rows)
 }
@@ -318,7 +298,7 @@ fn recordings(outcome: &Outcome) -> Table {
     };
     Table::new(
         "Recordings",
-        ["recording", "°C", "calibrates alone", "χ²/n from all", "999 of 1000 below"],
+        columns("recording | °C | calibrates alone | χ²/n from all | 999 of 1000 below"),
     )
     .section(outcome.alone.iter().enumerate().map(row))
     .note(
@@ -345,7 +325,7 @@ fn differences(outcome: &Outcome) -> Table {
     });
     Table::new(
         "Repeatability between recordings",
-        ["parameter", "spread ± 1σ", "by σ alone", "unit", "χ²/n", "999 of 1000 below"],
+        columns("parameter | spread ± 1σ | by σ alone | unit | χ²/n | 999 of 1000 below"),
     )
     .section(rows)
     .note(

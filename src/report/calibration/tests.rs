@@ -4,14 +4,13 @@ use std::fs;
 use std::path::Path;
 
 use super::super::group::Group;
-use super::super::synthetic::synthetic;
+use super::super::tests::synthetic;
 use super::super::{html, svg, terminal, write};
 use super::*;
 use crate::calibration::{
-    ErrorTerm, ErrorTermTest, PARAMETERS, ParameterMatrix, ParameterVector, Role, UnmodelledEffect,
-    parameter,
+    ErrorTerm, ErrorTermTest, Nis, Observation, PARAMETERS, ParameterMatrix, ParameterVector, Role,
+    UnmodelledEffect, from_vector, parameter, parameter_name, to_vector,
 };
-use crate::calibration::{Nis, Observation, from_vector, parameter_name, to_vector};
 use crate::imu::{GaussMarkov, InstallationForm, Sensor, Term};
 use crate::navigation::NearPole;
 use crate::study::navigation::NavigationStudyError;

@@ -1,10 +1,9 @@
 //! The table of results.
 
-use super::super::document::{NONE, Table, cells};
-use super::super::number::{plain, sigma, value};
 use crate::calibration::Group;
 use crate::certificate::{Certificate, Measured, Quantity, to_twelve_digits};
 use crate::imu::{Sensor, Term};
+use crate::report::prelude::*;
 
 /// A parameter's name with the model's letter.
 pub(super) fn name(measured: &str) -> String {
@@ -50,7 +49,7 @@ pub(super) fn results(certificate: &Certificate) -> Table {
         true => ", their uncertainty budget in calibration.json",
         false => "",
     };
-    let table = Table::new("Results", ["parameter", "value", "U", "unit", "k", "ν"])
+    let table = Table::new("Results", columns("parameter | value | U | unit | k | ν"))
         .sections(groups)
         .sections(terms)
         .note(format!(

@@ -2,16 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use serde_json::{Map, Value, json};
-
 use super::tables::column_of;
 use super::words;
 use crate::imu::{AXES, Sensor};
 use crate::recording::{Fault, LabelledMotion};
+use crate::report::prelude::*;
 use crate::run::Run;
 use crate::run::motion::{LabelCheck, Rest, Turn, Verdict};
 use crate::survey::{Expected, Path, Survey};
-use crate::units::DEGREE;
 
 pub(super) fn data(run: &Run, survey: &Survey) -> Value {
     let imu = &run.recording.imu;

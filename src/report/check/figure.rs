@@ -1,12 +1,11 @@
 //! The record: what the gyros and accelerometers say against time, with dwells, turns and faults.
 
-use super::super::plot::{Axis, Color, Mark, Panel, Plot, Series};
 use super::words;
 use crate::imu::{AXES, Sensor};
+use crate::report::prelude::*;
 use crate::run::Run;
 use crate::run::motion::{Rest, Turn};
 use crate::survey::Survey;
-use crate::units::DEGREE;
 
 pub(super) fn figure(run: &Run, survey: &Survey) -> Plot {
     let mut caption = "Gyro rates and specific force along body axes by nominal scales, as they stand in the file. \

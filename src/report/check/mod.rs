@@ -5,8 +5,7 @@ mod figure;
 mod tables;
 mod words;
 
-use super::document::Document;
-use super::number::{count, three_digits, value};
+use crate::report::prelude::*;
 use crate::run::Run;
 use crate::survey::Survey;
 
@@ -26,7 +25,7 @@ pub fn document(run: &Run, survey: &Survey) -> Document {
     document.warnings.heading = "What to look at".to_owned();
     document.warnings.items = words::findings(run, survey);
     document.page(figure::figure(run, survey));
-    document.both(tables::columns(run));
+    document.both(tables::log_columns(run));
     document.both(tables::faults(run));
     document.both(tables::dwells(run, survey));
     document.both(tables::labels(survey));

@@ -1,31 +1,18 @@
 //! The log, dwells and turns, labels and methods as tables.
 
-use super::super::document::{NONE, Table, cells};
-use super::super::number::{count, or_dash, sigma, three_digits, value, whole};
 use super::words::{degrees, direction, of_label, signed, way_up};
 use crate::calibration::Group;
 use crate::imu::{AXES, Sensor};
 use crate::recording::{Fault, LabelledMotion, Slower};
+use crate::report::prelude::*;
 use crate::run::Run;
 use crate::run::motion::{LabelCheck, Rest, Turn, Verdict};
 use crate::survey::Survey;
-use crate::units::{DEG_PER_H, DEGREE, MICRO_G, MILLI_G};
 
 /// Faults beyond so many are not listed one by one.
 const LISTED: usize = 20;
 
-pub(super) fn columns(run: &Run) -> Table {
-    let headings = [
-        "column",
-        "body axis",
-        "smallest",
-        "times",
-        "largest",
-        "times",
-        "unit",
-        "step",
-        "as a rate",
-    ];
+pub(super) fn log_columns(run: &Run) -> Table {
     let rows = run.recording.imu.log.iter().flat_map(|log| {
         Sensor::ALL.into_iter().flat_map(|sensor| {
             let columns = log.columns.get(sensor).iter().zip(AXES);
@@ -51,9 +38,14 @@ pub(super) fn columns(run: &Run) -> Table {
             })
         })
     });
-    Table::new("Columns", headings)
-        .section(rows)
-        .note("Body axes are right, front, up. Step: of the grid on which all values lie.")
+    Table::new(
+        "Columns",
+        columns(
+            "column | body axis | smallest | times | largest | times | unit | step | as a rate",
+        ),
+    )
+    .section(rows)
+    .note("Body axes are right, front, up. Step: of the grid on which all values lie.")
 }
 
 /// A whole number as it is, others to four digits.
@@ -96,7 +88,7 @@ pub(super) fn faults(run: &Run) -> Table {
     let beside = || imu.faults.iter().filter(is_beside);
     let table = Table::new(
         "Faults",
-        ["what", "column", "line", "at, s", "samples", "bridged"],
+        columns("what | column | line | at, s | samples | bridged"),
     )
     .section(slower.iter().map(of_part))
     .section(beside().take(LISTED).map(row));
@@ -199,7 +191,7 @@ pub(super) fn labels(survey: &Survey) -> Table {
     };
     Table::new(
         "Labelled sections",
-        ["label", "from, s", "to, s", "found", "agrees"],
+        columns("label | from, s | to, s | found | agrees"),
     )
     .section(survey.labels.iter().map(row))
 }

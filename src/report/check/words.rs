@@ -1,12 +1,11 @@
 //! What has to be said of a run before it is calibrated.
 
-use super::super::number::{count, three_digits, value};
 use crate::calibration::Contradiction;
 use crate::imu::{AXES, Sensor};
+use crate::report::prelude::*;
 use crate::run::motion::{LabelCheck, Turn};
 use crate::run::{LONG_ENOUGH, Run};
 use crate::survey::{APART, Survey};
-use crate::units::DEGREE;
 
 /// Specific force at rest further from gravity than this part of it has a wrong unit or scale.
 const WRONG_FORCE: f64 = 0.15;
@@ -18,8 +17,6 @@ const WRONG_PART: f64 = 0.1;
 const WORTH: f64 = 60.0 * DEGREE;
 /// Parameters of the accelerometers without a table: as many directions of up are needed.
 const DIRECTIONS: usize = 9;
-/// Seconds in a minute: rates of temperature are shown per minute.
-const MINUTE: f64 = 60.0;
 /// An instrument whose temperature spans less, K, has soaked.
 const SOAKED: f64 = 1.0;
 const MICROSECOND: f64 = 1e-6;

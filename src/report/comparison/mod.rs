@@ -1,17 +1,13 @@
 //! The report of calibrations side by side.
 
-mod data;
-mod figure;
-
-use super::document::{Document, NONE, Table, cells};
-use super::group::{Group, short_name};
-use super::number::{count, or_dash, plus_minus, sigma, three_digits, value};
-use super::terms::unit;
-use crate::calibration::ParameterVector;
 use crate::calibration::result::TermRecord;
-use crate::calibration::{AUXILIARY, AuxiliaryKind, auxiliary_name};
-use crate::calibration::{Canonical, ChiSquare, Comparison, Nees, Side};
+use crate::calibration::{
+    AUXILIARY, AuxiliaryKind, Canonical, ChiSquare, Comparison, Nees, ParameterVector, Side,
+    auxiliary_name, parameter_name,
+};
 use crate::imu::{InstallationForm, Sensor};
+use crate::report::prelude::*;
+use crate::report::terms::unit;
 
 /// Beyond this many σ a difference is flagged.
 const FLAGGED: f64 = 3.0;
@@ -28,21 +24,21 @@ pub fn document(comparison: &Comparison) -> Document {
         comparison.body_frame.words(),
         comparison.reference.name
     )];
-    document.warnings.items = std::iter::once(&comparison.reference)
-        .chain(comparison.sides.iter().map(|side| &side.calibration))
+    document.warnings.items = comparison
+        .calibrations()
         .filter(|calibration| !calibration.converged)
         .map(|calibration| format!("{} did not converge: its σ mean nothing.", calibration.name))
         .collect();
-    document.page(figure::figure(comparison));
+    document.page(figure(comparison));
     document.both(parameters(comparison));
     document.both(groups(comparison));
     document.both(auxiliary(comparison));
     document.both(scatter(comparison));
-    document.data = data::data(comparison);
+    document.data = data(comparison);
     document
 }
 
-fn name(index: usize) -> String {
+fn short(index: usize) -> String {
     short_name(InstallationForm::General, index)
 }
 
@@ -74,7 +70,7 @@ fn parameters(comparison: &Comparison) -> Table {
     let row = |index: usize| {
         let group = Group::of(index);
         let mut row = cells![
-            name(index),
+            short(index),
             reference_value(comparison, index),
             group.unit()
         ];
@@ -113,8 +109,8 @@ fn parameters(comparison: &Comparison) -> Table {
 
 /// The smallest σ that any calibration claims for some parameters: what is finer means nothing.
 fn finest(comparison: &Comparison, indices: &[usize]) -> Option<f64> {
-    std::iter::once(&comparison.reference)
-        .chain(comparison.sides.iter().map(|side| &side.calibration))
+    comparison
+        .calibrations()
         .filter_map(|calibration| calibration.sigma())
         .flat_map(|sigma| indices.iter().map(move |&index| sigma[index]))
         .filter(|sigma| *sigma > 0.0)
@@ -224,16 +220,10 @@ fn auxiliary(comparison: &Comparison) -> Table {
 
 /// From three calibrations on.
 fn scatter(comparison: &Comparison) -> Table {
-    let columns = [
-        "",
-        "unit",
-        "mean minus reference",
-        "scatter",
-        "χ²/n",
-        "n",
-        "p",
-    ];
-    let table = Table::new("Scatter", columns);
+    let table = Table::new(
+        "Scatter",
+        columns("| unit | mean minus reference | scatter | χ²/n | n | p"),
+    );
     let Some(scatter) = &comparison.scatter else {
         return table;
     };
@@ -247,7 +237,7 @@ fn scatter(comparison: &Comparison) -> Table {
             let finest = finest(comparison, &[p.index]);
             let mean = with_sigma(p.mean, p.mean_sigma, None, unit);
             let deviation = with_sigma(p.deviation, None, finest, unit);
-            let mut row = cells![name(p.index), group.unit(), mean, deviation];
+            let mut row = cells![short(p.index), group.unit(), mean, deviation];
             row.extend(chi_square(p.chi_square));
             row
         });
@@ -279,4 +269,175 @@ fn chi_square(chi_square: Option<ChiSquare>) -> [String; 3] {
             p,
         ]
     })
+}
+
+pub(super) fn data(comparison: &Comparison) -> Value {
+    let (sides, reference) = (&comparison.sides, &comparison.reference);
+    let groups = Group::all().map(|group| {
+        let spreads = sides.iter().map(|side| spread(comparison, group, side));
+        (group.key(), spreads.collect::<Value>())
+    });
+    let mut data = json!({
+        "body_frame": comparison.body_frame,
+        "installation_form": InstallationForm::General,
+        "reference": reference.name,
+        "reference_is_truth": comparison.against_truth,
+        "calibrations": sides.iter().map(|side| json!({
+            "name": side.calibration.name,
+            "converged": side.calibration.converged,
+            "nees_per_n": side.nees.map(|nees| nees.mean),
+            "n": side.nees.map(|nees| nees.count),
+            "nees_interval": side.nees.map(|nees| nees.interval),
+        })).collect::<Value>(),
+        "groups": groups.collect::<Map<_, _>>(),
+        "parameters": comparison.parameters.iter().map(|&k| parameter(comparison, k)).collect::<Value>(),
+    });
+    if let Some(scatter) = &comparison.scatter {
+        let parameters = scatter.parameters.iter().map(|of| {
+            let group = Group::of(of.index);
+            let unit = group.unit_value();
+            let mut data = json!({
+                "name": name(of.index),
+                "group": group.key(),
+                "count": of.count,
+                "mean_less_reference": of.mean / unit,
+                "mean_sigma": of.mean_sigma.map(|sigma| sigma / unit),
+                "standard_deviation": of.deviation / unit,
+            });
+            if let (Some(chi), Value::Object(data)) = (of.chi_square, &mut data) {
+                data.extend(chi2(chi));
+            }
+            data
+        });
+        let parameters: Value = parameters.collect();
+        data["scatter"] = json!({ "parameters": parameters, "all": scatter.joint.map(chi2) });
+    }
+    data
+}
+
+fn name(index: usize) -> String {
+    parameter_name(InstallationForm::General, index).unwrap_or_default()
+}
+
+/// Of a group's differences.
+fn spread(comparison: &Comparison, group: Group, side: &Side) -> Value {
+    let indices = group.among(&comparison.parameters);
+    let of = |v: &ParameterVector| group.spread(v, &indices);
+    let difference = of(&side.difference);
+    json!({
+        "name": side.calibration.name,
+        "largest": difference.map(|d| d.0),
+        "rms": difference.map(|d| d.1),
+        "rms_sigma": side.calibration.sigma().and_then(|s| of(&s)).map(|s| s.1),
+    })
+}
+
+/// The reference's value is in the file's quantity for scale factors, in the group's unit for others.
+fn parameter(comparison: &Comparison, index: usize) -> Value {
+    let group = Group::of(index);
+    let unit = group.unit_value();
+    let at = |v: Option<ParameterVector>| v.map(|v| v[index] / unit);
+    let value = comparison.reference.vector()[index] / unit;
+    json!({
+        "name": name(index),
+        "group": group.key(),
+        "reference_value": comparison.scale_factor(index).unwrap_or(value),
+        "reference_sigma": at(comparison.reference.sigma()),
+        "calibrations": comparison.sides.iter().map(|side| json!({
+            "name": side.calibration.name,
+            "difference": side.difference[index] / unit,
+            "sigma": at(side.calibration.sigma()),
+            "difference_sigma": at(side.difference_sigma),
+            "z": side.z(index),
+        })).collect::<Value>(),
+    })
+}
+
+fn chi2(of: ChiSquare) -> Map<String, Value> {
+    Map::from_iter([
+        ("chi2".to_owned(), of.value.into()),
+        ("degrees_of_freedom".to_owned(), of.freedom.into()),
+        ("p".to_owned(), of.p.into()),
+    ])
+}
+
+/// Calibrations that reach this many times further than others make an axis logarithmic.
+const APART: f64 = 20.0;
+
+pub(super) fn figure(comparison: &Comparison) -> Plot {
+    let panels = Group::all().map(|group| panel(comparison, group));
+    Plot::new("differences.svg", "Differences to the reference", (3, 320), panels).caption(format!(
+        "Each calibration minus the reference, {}; bars: the 1σ that it claims. About two bars in three should \
+         reach a true value. Where one calibration is far coarser than another, the axis is logarithmic away \
+         from zero.",
+        comparison.reference.name
+    ))
+}
+
+fn panel(comparison: &Comparison, group: Group) -> Panel {
+    let (indices, unit) = (group.among(&comparison.parameters), group.unit_value());
+    let sides: Vec<(&str, Vec<(f64, f64)>)> = comparison
+        .sides
+        .iter()
+        .map(|side| {
+            let sigma = side.calibration.sigma().unwrap_or_default();
+            let points = indices
+                .iter()
+                .map(|&i| (side.difference[i] / unit, sigma[i] / unit));
+            (side.calibration.name.as_str(), points.collect())
+        })
+        .collect();
+    let (y, kind) = axis(sides.iter().map(|(_, points)| reach(points)).collect());
+    let spacing = 0.6 / sides.len().max(1) as f64;
+    let series = sides.iter().enumerate().flat_map(|(n, (name, points))| {
+        let x =
+            |place: usize| place as f64 + spacing * (n as f64 - 0.5 * (sides.len() as f64 - 1.0));
+        let bars = points
+            .iter()
+            .enumerate()
+            .filter(|(_, (_, sigma))| *sigma > 0.0);
+        let bars = bars
+            .map(|(k, (d, sigma))| (x(k), d - sigma, d + sigma))
+            .collect();
+        let marks = points.iter().enumerate().map(|(k, point)| (x(k), point.0));
+        let mark = [Mark::Dot, Mark::Ring, Mark::Cross][n % 3];
+        [
+            Series::new(Shape::Intervals(bars)).nth(n).width(1.25),
+            Series::marks(mark, marks).nth(n).width(1.75).label(*name),
+        ]
+    });
+    let names = indices
+        .iter()
+        .map(|&i| axis_name(InstallationForm::General, i));
+    Panel::new(
+        format!("{}, {}{kind}", group.title(), group.unit()),
+        Axis::places(names),
+        y,
+    )
+    .with(Series::zero())
+    .with_all(series)
+}
+
+/// How far points reach from zero with their σ.
+fn reach(points: &[(f64, f64)]) -> f64 {
+    let reaches = points
+        .iter()
+        .map(|(difference, sigma)| difference.abs() + sigma);
+    reaches.fold(0.0, f64::max)
+}
+
+/// The axis of calibrations that reach as far as this, and what its title says of it.
+fn axis(reaches: Vec<f64>) -> (Axis, &'static str) {
+    let most = reaches.iter().copied().fold(0.0, f64::max);
+    let least = reaches
+        .into_iter()
+        .filter(|r| *r > 0.0)
+        .fold(most, f64::min);
+    match most > APART * least {
+        true => (
+            Axis::symlog(0.3 * least).between(-1.5 * most, 1.5 * most),
+            ", logarithmic",
+        ),
+        false => (Axis::linear("").between(-1.15 * most, 1.15 * most), ""),
+    }
 }

@@ -1,11 +1,9 @@
 //! Position errors at the end, against time, and by group of parameters.
 
-use super::super::number::{sigma, three_digits};
-use super::super::plot::{Anchor, Axis, Color, Dash, Mark, Panel, Plot, Point, Series, Shape};
-use super::names::{HOUR, estimator_name, hours, in_general, method_name, miles, situation_name};
-use super::tables::nmile;
+use super::tables::{estimator_name, hours, in_general, method_name, miles, nmile, situation_name};
 use crate::calibration::Group;
 use crate::imu::InstallationForm;
+use crate::report::prelude::*;
 use crate::study::Experiment;
 use crate::study::experiment::{Estimator, Navigated, Situation, Worth};
 

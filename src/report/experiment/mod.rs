@@ -1,17 +1,18 @@
 //! The report of the turntable experiment.
 
-mod data;
 mod figures;
-mod names;
 mod tables;
-mod verdict;
 
-use super::document::{Document, Facts};
-use super::number::{count, minutes, three_digits};
+use crate::imu::Sensor;
+use crate::report::experiment::tables::{
+    PAPER, estimator_name, hours, in_general, method_kind, method_name, miles, navigated, nmile,
+    situation_name, timed,
+};
+use crate::report::prelude::*;
 use crate::study::Experiment;
-use crate::study::experiment::{ALIGNMENT_TIME, Estimator};
-use crate::units::DEGREE;
-use names::{hours, method_kind, timed};
+use crate::study::experiment::{
+    ALIGNMENT_TIME, Budget, Estimator, Method, Situation, Spread, Worth,
+};
 
 /// Everything that is said of the experiment.
 pub fn document(experiment: &Experiment) -> Document {
@@ -20,15 +21,13 @@ pub fn document(experiment: &Experiment) -> Document {
     let mut document = Document::new(title);
     document.conclusions.heading = "What holds".to_owned();
     document.warnings.heading = "To be noted".to_owned();
-    verdict::say(&mut document, experiment);
+    say(&mut document, experiment);
     document.both(facts(experiment));
-    for table in tables::tables(experiment) {
-        document.both(table);
-    }
-    for plot in figures::figures(experiment) {
-        document.page(plot);
-    }
-    document.data = data::data(experiment);
+    tables::tables(experiment)
+        .into_iter()
+        .for_each(|table| document.both(table));
+    document.pages(figures::figures(experiment));
+    document.data = data(experiment);
     document
 }
 
@@ -80,6 +79,210 @@ fn facts(experiment: &Experiment) -> Facts {
         ),
     ];
     Facts::new("The experiment", rows)
+}
+
+pub(super) fn data(experiment: &Experiment) -> Value {
+    let study = &experiment.study;
+    let mission = |situation| {
+        let navigated = navigated(experiment, situation)?;
+        let methods = navigated.methods.iter().enumerate();
+        let methods = methods.map(|(place, worth)| method(experiment, place, worth));
+        Some(json!({
+            "methods": methods.collect::<Value>(),
+            "noise_alone_nmile": spread(&navigated.noise),
+        }))
+    };
+    let paper = PAPER.iter().map(|&(sensor, form, position)| {
+        json!({ "errors": sensor.name(), "installation_form": form, "position_nmile": position })
+    });
+    json!({
+        "scenario": study.scenario.name,
+        "trajectory": study.trajectory_name,
+        "samples": experiment.trials.len(),
+        "seed": study.seed,
+        "hours": hours(experiment),
+        "latitude_deg": study.scenario.site.latitude / DEGREE,
+        "truth_installation_form": study.scenario.installation.form,
+        "alignment_time_s": ALIGNMENT_TIME,
+        "standing_self_aligned": mission(Situation::SelfAligned),
+        "standing_aligned": mission(Situation::Aligned),
+        "moving": mission(Situation::Moving),
+        "paper": paper.collect::<Value>(),
+    })
+}
+
+fn spread(metres: &Spread) -> Value {
+    json!({
+        "median": miles(metres.median),
+        "mean": miles(metres.mean),
+        "rms": miles(metres.rms),
+        "below_68_percent": miles(metres.below_68),
+        "below_95_percent": miles(metres.below_95),
+    })
+}
+
+/// Intervals are of 99 %, by bootstrap over instruments.
+fn method(experiment: &Experiment, place: usize, worth: &Worth) -> Value {
+    let calibrations = || {
+        experiment
+            .trials
+            .iter()
+            .filter_map(|t| t.calibrations.get(place))
+    };
+    let (low, high) = worth.median_interval;
+    let budget = worth.budget.parts.iter().map(|part| {
+        let data = json!({ "alone_rms_nmile": miles(part.alone), "share": part.share });
+        (part.group.key(), data)
+    });
+    let against_time = worth.against_time.iter();
+    let against_time = against_time
+        .map(|&(time, metres)| json!({ "t_h": time / HOUR, "position_nmile": miles(metres) }));
+    json!({
+        "method": match worth.method.estimator {
+            Estimator::ClosedForm => "six-position",
+            Estimator::Filter => "ekf",
+            Estimator::LongFilter => "ekf-equal-time",
+        },
+        "installation_form": worth.method.form,
+        "table_time_s": experiment.table_times.get(place),
+        "failures": calibrations().filter(|c| c.is_err()).count(),
+        "not_converged": calibrations().flatten().filter(|c| !c.converged).count(),
+        "form_rejections": calibrations().flatten().filter(|c| c.rejects_form).count(),
+        "position_nmile": spread(&worth.at_end),
+        "median_interval": [miles(low), miles(high)],
+        "largest_position_nmile": spread(&worth.largest),
+        "gyro_errors_alone_nmile": spread(worth.by_one.get(Sensor::Gyro)),
+        "accel_errors_alone_nmile": spread(worth.by_one.get(Sensor::Accel)),
+        "closed_form_over_ekf": worth.gain.map(|gain| gain.value),
+        "closed_form_over_ekf_interval": worth.gain.map(|gain| gain.interval),
+        "claimed_rms_nmile": miles(worth.budget.claimed),
+        "budget": budget.collect::<Map<_, _>>(),
+        "median_against_time": against_time.collect::<Value>(),
+        "positions_nmile": worth.errors.iter().map(|&metres| miles(metres)).collect::<Value>(),
+    })
+}
+
+/// What is compared with the closed form: in equal time stationary, in a sixth of it moving.
+const COMPARED: [(Situation, Estimator); 4] = [
+    (Situation::SelfAligned, Estimator::LongFilter),
+    (Situation::SelfAligned, Estimator::Filter),
+    (Situation::Moving, Estimator::LongFilter),
+    (Situation::Moving, Estimator::Filter),
+];
+
+/// Says what is better, what makes most of the error, and which calibrations failed.
+pub(super) fn say(document: &mut Document, experiment: &Experiment) {
+    for text in failures(experiment) {
+        document.say(false, text);
+    }
+    for (situation, estimator) in COMPARED {
+        if let Some((better, text)) = compared(experiment, situation, estimator) {
+            document.say(better, text);
+        }
+    }
+    let limits = [Situation::SelfAligned, Situation::Moving].into_iter();
+    for text in limits.filter_map(|situation| limit(experiment, situation)) {
+        document.say(true, text);
+    }
+}
+
+fn compared(
+    experiment: &Experiment,
+    situation: Situation,
+    estimator: Estimator,
+) -> Option<(bool, String)> {
+    let navigated = navigated(experiment, situation)?;
+    let closed = in_general(navigated, Estimator::ClosedForm)?;
+    let filter = in_general(navigated, estimator)?;
+    let gain = filter.gain.as_ref()?;
+    let [by, interval] = with_interval(gain.value, gain.interval);
+    let (low, high) = gain.interval;
+    let judged = match () {
+        () if low > 1.0 => "the EKF is better",
+        () if high < 1.0 => "the closed form is better",
+        () => "no significant difference with so many instruments",
+    };
+    let text = format!(
+        "{}, {} h: median {} nmile after {}, {} after {}, ratio {by} ({interval}): {judged}.",
+        capital(situation_name(situation)),
+        three_digits(hours(experiment)),
+        nmile(filter.at_end.median),
+        estimator_name(experiment, estimator),
+        nmile(closed.at_end.median),
+        estimator_name(experiment, Estimator::ClosedForm),
+    );
+    Some((low > 1.0, text))
+}
+
+/// What makes most of what is left.
+fn limit(experiment: &Experiment, situation: Situation) -> Option<String> {
+    let navigated = navigated(experiment, situation)?;
+    let most = |budget: &Budget| {
+        let part = budget
+            .parts
+            .iter()
+            .max_by(|a, b| a.share.total_cmp(&b.share))?;
+        Some(format!(
+            "{} ({} %)",
+            part.group.title(),
+            value(100.0 * part.share, 10.0)
+        ))
+    };
+    let of = Estimator::ALL.into_iter().map(|estimator| {
+        let worth = in_general(navigated, estimator)?;
+        Some(format!(
+            "{}: {}",
+            estimator_name(experiment, estimator),
+            most(&worth.budget)?
+        ))
+    });
+    Some(format!(
+        "{}, most of the variance is made by: {}. Noise alone would leave a median of {} nmile.",
+        capital(situation_name(situation)),
+        of.collect::<Option<Vec<_>>>()?.join("; "),
+        nmile(navigated.noise.median)
+    ))
+}
+
+/// Calibrations that failed, did not converge, or whose data reject the form.
+fn failures(experiment: &Experiment) -> Vec<String> {
+    let trials = &experiment.trials;
+    let mut sentences = Vec::new();
+    for (place, method) in Method::all().enumerate() {
+        let all = || trials.iter().filter_map(|t| t.calibrations.get(place));
+        let failed = all().filter(|c| c.is_err()).count();
+        let diverged = all().flatten().filter(|c| !c.converged).count();
+        let rejected = all().flatten().filter(|c| c.rejects_form).count();
+        let (name, of) = (method_name(experiment, method), count(trials.len()));
+        if failed > 0 {
+            let reason = all()
+                .find_map(|c| c.as_ref().err())
+                .map_or("", String::as_str);
+            let failed = count(failed);
+            sentences.push(format!(
+                "{name}: {failed} of {of} calibrations failed, the first because: {reason}"
+            ));
+        }
+        if rejected > 0 {
+            let rejected = count(rejected);
+            sentences.push(format!(
+                "{name}: the data reject the form for {rejected} of {of} instruments."
+            ));
+        }
+        if diverged > 0 {
+            let diverged = count(diverged);
+            sentences.push(format!(
+                "{name}: {diverged} of {of} calibrations did not converge; they are counted as they are."
+            ));
+        }
+    }
+    sentences
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().into_iter().flat_map(char::to_uppercase);
+    first.chain(letters).collect()
 }
 
 #[cfg(test)]

@@ -1,14 +1,11 @@
 //! The tables, alike for terminal and page.
 
-use super::super::document::{NONE, Table, cells};
-use super::super::number::{or_dash, three_digits, value, with_interval};
-use super::names::{
-    PAPER_HOURS, estimator_name, hours, in_general, method_name, miles, navigated, situation_name,
-};
 use crate::calibration::Group;
 use crate::imu::{InstallationForm, Sensor};
+use crate::report::prelude::*;
 use crate::study::Experiment;
 use crate::study::experiment::{Estimator, Method, Navigated, Situation, Worth};
+use crate::study::navigation::INTERVAL;
 
 /// The paper's position errors by one triad's errors after 40 h, nmile (Zhao, Jiang, Li 2016, §3.3, Figure 10).
 pub(super) const PAPER: [(Sensor, InstallationForm, f64); 4] = [
@@ -41,18 +38,11 @@ pub(super) fn nmile(metres: f64) -> String {
 }
 
 fn errors(experiment: &Experiment, navigated: &Navigated) -> Table {
-    let columns = [
-        "nmile",
-        "median",
-        "99 % interval",
-        "mean",
-        "68 % below",
-        "95 % below",
-        "largest, median",
-        "largest, 95 % below",
-        "closed form : EKF",
-        "99 % interval",
-    ];
+    let headings: Vec<&str> = columns(
+        "nmile | median | 99 % interval | mean | 68 % below | 95 % below | largest, median | \
+         largest, 95 % below | closed form : EKF | 99 % interval",
+    )
+    .collect();
     let row = |worth: &Worth| {
         let (at_end, largest) = (&worth.at_end, &worth.largest);
         let (low, high) = worth.median_interval;
@@ -73,10 +63,10 @@ fn errors(experiment: &Experiment, navigated: &Navigated) -> Table {
     let noise = &navigated.noise;
     let mut last = cells!["noise alone", nmile(noise.median), NONE];
     last.extend([noise.mean, noise.below_68, noise.below_95].map(nmile));
-    last.resize(columns.len(), NONE.to_owned());
+    last.resize(headings.len(), NONE.to_owned());
     let by_estimator = navigated.methods.chunks(InstallationForm::ALL.len());
     let situation = situation_name(navigated.situation);
-    Table::new(format!("Position error at the end, {situation}"), columns)
+    Table::new(format!("Position error at the end, {situation}"), headings)
         .sections(by_estimator.map(|of_estimator| of_estimator.iter().map(row)))
         .section([last])
         .note(
@@ -165,4 +155,64 @@ fn budget(experiment: &Experiment, navigated: &Navigated) -> Table {
              make by itself. Share: of the variance, what two groups make together going half to each; below zero \
              where a group makes up for another.",
         )
+}
+
+/// Hours of the paper's experiment.
+pub(super) const PAPER_HOURS: f64 = 40.0;
+
+pub(super) fn hours(experiment: &Experiment) -> f64 {
+    f64::from(experiment.study.intervals) * INTERVAL / HOUR
+}
+
+/// Every method with its table time, s.
+pub(super) fn timed(experiment: &Experiment) -> impl Iterator<Item = (Method, f64)> {
+    Method::all().zip(experiment.table_times.iter().copied())
+}
+
+/// Such as `EKF 10 min, six-angle`.
+pub(super) fn method_name(experiment: &Experiment, method: Method) -> String {
+    let estimator = estimator_name(experiment, method.estimator);
+    format!("{estimator}, {}", method.form.name())
+}
+
+pub(super) fn method_kind(estimator: Estimator) -> &'static str {
+    match estimator {
+        Estimator::ClosedForm => "closed form",
+        Estimator::Filter | Estimator::LongFilter => "EKF",
+    }
+}
+
+/// Such as `EKF 10 min`, to the minute: the facts hold the rest.
+pub(super) fn estimator_name(experiment: &Experiment, estimator: Estimator) -> String {
+    let time = timed(experiment).find(|(method, _)| method.estimator == estimator);
+    let minutes = time.map_or(f64::NAN, |(_, time)| time / 60.0);
+    format!("{} {minutes:.0} min", method_kind(estimator))
+}
+
+pub(super) fn situation_name(situation: Situation) -> &'static str {
+    match situation {
+        Situation::SelfAligned => "stationary, self-aligned",
+        Situation::Aligned => "stationary, alignment given",
+        Situation::Moving => "moving, alignment given",
+    }
+}
+
+pub(super) fn miles(metres: f64) -> f64 {
+    metres / NAUTICAL_MILE
+}
+
+/// What a method is worth in the general form.
+pub(super) fn in_general(navigated: &Navigated, estimator: Estimator) -> Option<&Worth> {
+    let general = Method {
+        estimator,
+        form: InstallationForm::General,
+    };
+    navigated.methods.iter().find(|w| w.method == general)
+}
+
+pub(super) fn navigated(experiment: &Experiment, situation: Situation) -> Option<&Navigated> {
+    experiment
+        .navigations
+        .iter()
+        .find(|n| n.situation == situation)
 }

@@ -1,22 +1,12 @@
 //! Figures of a lot: every unit's values with their σ, the mean, the limits.
 
-use super::super::group::{Group, axis_name};
-use super::super::plot::{Axis, Mark, Panel, Plot, Series, Shape};
-use super::shown::{shown, symbol};
-use crate::imu::{AXES, InstallationForm, Sensor};
+use super::shown::{shown, together};
 use crate::lot::{Lot, Quantity, Sample};
+use crate::report::prelude::*;
 
 pub(super) fn parameters(lot: &Lot) -> Plot {
-    let panels = Group::all().map(|group| {
-        let all = lot.statistics.iter().map(|of| of.quantity);
-        let of_group = |q: &Quantity| matches!(q, Quantity::Parameter(i) if Group::of(*i) == group);
-        let quantities: Vec<Quantity> = all.filter(of_group).collect();
-        let names = quantities.iter().map(|q| match q {
-            Quantity::Parameter(index) => axis_name(InstallationForm::General, *index),
-            Quantity::Noise(..) => String::new(),
-        });
-        let names: Vec<String> = names.collect();
-        let title = format!("{}, {}", group.title(), group.unit());
+    let panels = together(lot).into_iter().take(Group::all().count());
+    let panels = panels.map(|(title, names, quantities)| {
         let limits = limits(lot, &quantities);
         let mut panel = panel(lot, &title, &quantities, &names);
         panel.y = panel.y.including(limits.iter().copied());
@@ -29,23 +19,10 @@ pub(super) fn parameters(lot: &Lot) -> Plot {
 }
 
 pub(super) fn noise(lot: &Lot) -> Plot {
-    let panels = Sensor::ALL.map(|sensor| {
-        let quantities: Vec<Quantity> = lot
-            .statistics
-            .iter()
-            .map(|of| of.quantity)
-            .filter(|q| matches!(q, Quantity::Noise(of, _) if *of == sensor))
-            .collect();
-        let unit = quantities.first().map_or("", |q| symbol(*q));
-        let names: Vec<String> = AXES.iter().map(char::to_string).collect();
-        let mut panel = panel(
-            lot,
-            &format!("{} noise at rest, {unit}", sensor.name()),
-            &quantities,
-            &names,
-        );
-        panel.y = Axis::log("").room(0.1, 0.1);
-        panel
+    let panels = together(lot).into_iter().skip(Group::all().count());
+    let panels = panels.map(|(title, names, quantities)| Panel {
+        y: Axis::log("").room(0.1, 0.1),
+        ..panel(lot, &title, &quantities, &names)
     });
     Plot::new("noise.svg", "Noise at rest", (2, 330), panels).caption(
         "White-noise density of each axis in the dwells, with its 1σ; logarithmic. Crosses are apart from the lot.",

@@ -2,7 +2,6 @@
 
 mod data;
 mod figures;
-mod rows;
 mod shown;
 mod tables;
 #[cfg(test)]
@@ -10,12 +9,11 @@ mod tests;
 
 use std::collections::BTreeMap;
 
-use super::document::{Document, Facts};
-use super::number::{count, three_digits};
+use shown::{change, title};
+
 use crate::imu::AXES;
 use crate::lot::{FALSE_ALARM, FALSE_TREND, Lot, Row, Verdict};
-use crate::units::PPM;
-use shown::{change, title};
+use crate::report::prelude::*;
 
 /// Everything that is said of a lot.
 pub fn document(lot: &Lot) -> Document {
@@ -37,12 +35,10 @@ pub fn document(lot: &Lot) -> Document {
     document.both(tables::parameters(lot));
     document.page(figures::noise(lot));
     document.both(tables::noise(lot));
-    for table in tables::values(lot) {
-        document.page(table);
-    }
+    document.pages(tables::values(lot));
     document.page(tables::undecided(lot));
     document.data = data::data(lot);
-    document.files = vec![("lot.csv".to_owned(), rows::csv(lot))];
+    document.files = vec![("lot.csv".to_owned(), data::csv(lot))];
     document
 }
 

@@ -1,10 +1,8 @@
 //! How quantities of a lot are spoken of.
 
-use super::super::group::{Group, short_name};
-use super::super::number::{plus_minus, sigma, three_digits, value};
 use crate::imu::{AXES, InstallationForm, Sensor};
-use crate::lot::{Against, Quantity, Sample, Spread, Trend};
-use crate::units::{DEG_PER_SQRT_H, MICRO_G_PER_SQRT_HZ};
+use crate::lot::{Against, Check, Lot, Quantity, Row, Sample, Spread, Trend, Verdict};
+use crate::report::prelude::*;
 
 /// Such as `gyro K x` or `gyro noise x`.
 pub(super) fn title(quantity: Quantity) -> String {
@@ -14,41 +12,35 @@ pub(super) fn title(quantity: Quantity) -> String {
     }
 }
 
+/// Its unit: symbol, name in files, size in SI.
+fn unit(quantity: Quantity) -> (&'static str, &'static str, f64) {
+    match quantity {
+        Quantity::Parameter(index) => {
+            let of = Group::of(index).entry();
+            let (_, name) = of.key.split_once('_').unwrap_or_default();
+            (of.unit, name, of.value)
+        }
+        Quantity::Noise(Sensor::Gyro, _) => ("°/√h", "deg_per_sqrt_h", DEG_PER_SQRT_H),
+        Quantity::Noise(Sensor::Accel, _) => ("µg/√Hz", "ug_per_sqrt_hz", MICRO_G_PER_SQRT_HZ),
+    }
+}
+
 /// Symbol of its unit.
 pub(super) fn symbol(quantity: Quantity) -> &'static str {
-    match quantity {
-        Quantity::Parameter(index) => Group::of(index).unit(),
-        Quantity::Noise(Sensor::Gyro, _) => "°/√h",
-        Quantity::Noise(Sensor::Accel, _) => "µg/√Hz",
-    }
+    unit(quantity).0
 }
 
 /// Its unit as a name in files.
 pub(super) fn unit_key(quantity: Quantity) -> &'static str {
-    match quantity {
-        Quantity::Parameter(index) => match Group::of(index).unit() {
-            "ppm" => "ppm",
-            "″" => "arcsec",
-            "°/h" => "deg_per_h",
-            _ => "ug",
-        },
-        Quantity::Noise(Sensor::Gyro, _) => "deg_per_sqrt_h",
-        Quantity::Noise(Sensor::Accel, _) => "ug_per_sqrt_hz",
-    }
+    unit(quantity).1
 }
 
 /// Value and σ in that unit.
 pub(super) fn shown(quantity: Quantity, of: Sample) -> (f64, f64) {
+    let (.., unit) = unit(quantity);
     match quantity {
-        Quantity::Parameter(index) => {
-            let group = Group::of(index);
-            (group.shown(of.value), of.sigma / group.unit_value())
-        }
-        Quantity::Noise(sensor, _) => {
-            let unit = match sensor {
-                Sensor::Gyro => DEG_PER_SQRT_H,
-                Sensor::Accel => MICRO_G_PER_SQRT_HZ,
-            };
+        Quantity::Parameter(index) => (Group::of(index).shown(of.value), of.sigma / unit),
+        Quantity::Noise(..) => {
             let density = of.value.exp() / unit;
             (density, density * of.sigma)
         }
@@ -113,4 +105,35 @@ pub(super) fn spread(quantity: Quantity, of: &Spread) -> String {
         // The scatter is less than the units' σ alone make.
         _ => "0".to_owned(),
     }
+}
+
+/// Quantities that are shown together: the heading, the name of each, and which they are. First the groups of
+/// parameters, then the noise of each triad.
+pub(super) fn together(lot: &Lot) -> Vec<(String, Vec<String>, Vec<Quantity>)> {
+    let those = |is: &dyn Fn(Quantity) -> bool| -> Vec<Quantity> {
+        let all = lot.statistics.iter().map(|of| of.quantity);
+        all.filter(|&quantity| is(quantity)).collect()
+    };
+    let groups = Group::all().map(|group| {
+        let quantities =
+            those(&|q| matches!(q, Quantity::Parameter(index) if Group::of(index) == group));
+        let names = quantities.iter().map(|quantity| {
+            let title = title(*quantity);
+            title.rsplit(' ').next().unwrap_or_default().to_owned()
+        });
+        (group.titled(), names.collect(), quantities)
+    });
+    let noises = Sensor::ALL.map(|sensor| {
+        let quantities = those(&|q| matches!(q, Quantity::Noise(of, _) if of == sensor));
+        let unit = quantities.first().map_or("", |q| symbol(*q));
+        let heading = format!("{} noise at rest, {unit}", sensor.name());
+        (heading, AXES.map(String::from).to_vec(), quantities)
+    });
+    groups.chain(noises).collect()
+}
+
+/// The verdict of the limit of a quantity.
+pub(super) fn verdict(row: &Row, quantity: Quantity) -> Option<Verdict> {
+    let is_of = |check: &&Check| Quantity::Parameter(check.limit.parameter) == quantity;
+    row.checks.iter().find(is_of).map(|check| check.verdict)
 }

@@ -1,11 +1,12 @@
 //! Tables of a lot.
 
-use super::super::document::{NONE, Table, cells};
-use super::super::group::{Group, axis_name};
-use super::super::number::{count, or_dash, sigma, three_digits, value};
-use super::shown::{chance, shown, shown_spread, spread, spread_symbol, symbol, title, with_sigma};
-use crate::imu::{InstallationForm, Sensor};
+use super::shown;
+use super::shown::{
+    chance, shown, shown_spread, spread, spread_symbol, symbol, title, together, with_sigma,
+};
+use crate::imu::Sensor;
 use crate::lot::{Calibrated, Check, FALSE_ALARM, Lot, Quantity, Row, Sample, Statistics, Verdict};
+use crate::report::prelude::*;
 
 /// One row a unit.
 pub(super) fn units(lot: &Lot) -> Table {
@@ -158,35 +159,8 @@ fn ratio(of: f64) -> String {
 
 /// Every parameter of every unit, a table for each group, and one of noise for each triad.
 pub(super) fn values(lot: &Lot) -> Vec<Table> {
-    let groups = Group::all().map(|group| {
-        let quantities: Vec<Quantity> = lot
-            .statistics
-            .iter()
-            .map(|of| of.quantity)
-            .filter(|q| matches!(q, Quantity::Parameter(index) if Group::of(*index) == group))
-            .collect();
-        let axes = quantities.iter().map(|q| match q {
-            Quantity::Parameter(index) => axis_name(InstallationForm::General, *index),
-            Quantity::Noise(..) => String::new(),
-        });
-        (group.titled(), axes.collect::<Vec<_>>(), quantities)
-    });
-    let noises = Sensor::ALL.map(|sensor| {
-        let all = lot.statistics.iter().map(|of| of.quantity);
-        let quantities: Vec<Quantity> = all
-            .filter(|q| matches!(q, Quantity::Noise(of, _) if *of == sensor))
-            .collect();
-        let unit = quantities.first().map_or("", |q| symbol(*q));
-        let axes = ["x", "y", "z"].map(str::to_owned).to_vec();
-        (
-            format!("{} noise at rest, {unit}", sensor.name()),
-            axes,
-            quantities,
-        )
-    });
-    let tables = groups
-        .chain(noises)
-        .filter(|(_, _, quantities)| !quantities.is_empty());
+    let tables = together(lot).into_iter();
+    let tables = tables.filter(|(.., quantities)| !quantities.is_empty());
     let table = |(heading, axes, quantities): (String, Vec<String>, Vec<Quantity>)| {
         let row = |(place, row): (usize, &Row)| {
             let mut cells = vec![row.unit.name.clone()];
@@ -195,10 +169,7 @@ pub(super) fn values(lot: &Lot) -> Vec<Table> {
                     return NONE.to_owned();
                 };
                 let apart = lot.outliers_of(place).any(|of| of.quantity == quantity);
-                let fails = row.checks.iter().any(|check| {
-                    Quantity::Parameter(check.limit.parameter) == quantity
-                        && check.verdict == Verdict::Fail
-                });
+                let fails = shown::verdict(row, quantity) == Some(Verdict::Fail);
                 let mark = if apart || fails { "! " } else { "" };
                 format!("{mark}{}", with_sigma(shown(quantity, sample)))
             }));
@@ -235,7 +206,7 @@ pub(super) fn undecided(lot: &Lot) -> Table {
     });
     Table::new(
         "Limits that are not kept, or not certainly",
-        ["unit", "", "unit", "from nominal", "limit", "P(within)", "verdict"],
+        columns("unit | | unit | from nominal | limit | P(within) | verdict"),
     )
     .section(rows)
     .note("A unit passes a limit if its probability of being within is at least the stated confidence, and fails if that of being outside is.")

@@ -1,8 +1,7 @@
 //! Where the parts of a document stand on pages.
 
-use super::super::document::{Block, Document, Facts, List, Medium, Table};
-use super::font::Fonts;
-use super::{Frame, PdfError};
+use crate::report::document::{Block, Document, Facts, List, Medium, Table};
+use crate::report::pdf::font::Fonts;
 
 /// A4, pt.
 pub(super) const WIDTH: f32 = 595.28;
@@ -29,9 +28,7 @@ pub(super) enum Drawn {
     Text {
         at: (f32, f32),
         text: String,
-        size: f32,
-        bold: bool,
-        grey: u8,
+        style: Style,
     },
     Rule {
         from: (f32, f32),
@@ -41,11 +38,11 @@ pub(super) enum Drawn {
 }
 
 /// How letters are.
-#[derive(Clone, Copy)]
-struct Style {
-    size: f32,
-    bold: bool,
-    grey: u8,
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Style {
+    pub size: f32,
+    pub bold: bool,
+    pub grey: u8,
 }
 
 const PLAIN: Style = Style {
@@ -84,56 +81,56 @@ impl<'a> Layout<'a> {
 
     /// All of a document's pages.
     pub fn pages(mut self, document: &Document) -> Result<Vec<Vec<Drawn>>, PdfError> {
-        self.title(&document.title)?;
+        self.title(&document.title);
         for text in &document.lead {
-            self.paragraph(text, PLAIN)?;
+            self.paragraph(text, PLAIN);
         }
         for (medium, block) in &document.blocks {
             if *medium != Medium::Terminal {
-                self.block(block)?;
+                self.block(block);
             }
         }
         if !document.warnings.items.is_empty() {
-            self.list(&document.warnings)?;
+            self.list(&document.warnings);
         }
         self.y += 10.0;
         self.need(2.0 * BODY);
         let end = self.frame.end.clone();
         let at = 0.5 * (WIDTH - self.width(&end, REMARK));
-        self.text(at, &end, REMARK)?;
-        self.frames()?;
+        self.text(at, &end, REMARK);
+        self.frames();
+        self.check()?;
         Ok(self.pages)
     }
 
-    fn title(&mut self, title: &str) -> Result<(), PdfError> {
+    fn title(&mut self, title: &str) {
         let style = Style {
             size: TITLE,
             bold: true,
             grey: INK,
         };
         self.y += TITLE;
-        self.text(MARGIN, title, style)?;
+        self.text(MARGIN, title, style);
         self.y += 0.6 * TITLE;
-        Ok(())
     }
 
-    fn block(&mut self, block: &Block) -> Result<(), PdfError> {
+    fn block(&mut self, block: &Block) {
         match block {
             Block::Facts(of) => self.facts(of),
             Block::Table(of) => self.table(of),
             Block::List(of) => self.list(of),
             Block::Text(heading, text) | Block::Code(heading, text) => {
-                self.heading(heading, 3.0 * BODY)?;
-                self.paragraph(text, PLAIN)
+                self.heading(heading, 3.0 * BODY);
+                self.paragraph(text, PLAIN);
             }
-            Block::Plot(_) | Block::Fold(_) => Ok(()),
+            Block::Plot(_) | Block::Fold(_) => {}
         }
     }
 
     /// A heading, with room for so much of what follows.
-    fn heading(&mut self, heading: &str, follows: f32) -> Result<(), PdfError> {
+    fn heading(&mut self, heading: &str, follows: f32) {
         if heading.is_empty() {
-            return Ok(());
+            return;
         }
         self.y += 9.0;
         self.need(HEADING * LEADING + follows);
@@ -142,54 +139,51 @@ impl<'a> Layout<'a> {
             ..STRONG
         };
         self.y += HEADING;
-        self.text(MARGIN, heading, style)?;
+        self.text(MARGIN, heading, style);
         self.y += 4.0;
-        Ok(())
     }
 
-    fn facts(&mut self, facts: &Facts) -> Result<(), PdfError> {
-        self.heading(&facts.heading, 2.0 * BODY * LEADING)?;
+    fn facts(&mut self, facts: &Facts) {
+        self.heading(&facts.heading, 2.0 * BODY * LEADING);
         for (name, value) in &facts.rows {
             let room = WIDTH - 2.0 * MARGIN - NAMES;
-            let lines = self.broken(value, PLAIN, room);
-            self.need(BODY * LEADING);
-            for (n, line) in lines.iter().enumerate() {
-                self.need(BODY * LEADING);
-                self.y += BODY;
-                if n == 0 {
-                    let name_style = Style {
-                        grey: NOTE,
-                        ..PLAIN
-                    };
-                    self.text(MARGIN, name, name_style)?;
-                }
-                self.text(MARGIN + NAMES, line, PLAIN)?;
-                self.y += BODY * (LEADING - 1.0);
+            let style = Style {
+                grey: NOTE,
+                ..PLAIN
+            };
+            for (n, line) in self.broken(value, PLAIN, room).iter().enumerate() {
+                let name = if n == 0 { name } else { "" };
+                self.line(&[(MARGIN, name, style), (MARGIN + NAMES, line, PLAIN)]);
             }
         }
-        Ok(())
     }
 
-    fn list(&mut self, list: &List) -> Result<(), PdfError> {
-        self.heading(&list.heading, 2.0 * BODY * LEADING)?;
+    fn list(&mut self, list: &List) {
+        self.heading(&list.heading, 2.0 * BODY * LEADING);
         for item in &list.items {
-            self.paragraph(&format!("• {item}"), PLAIN)?;
+            self.paragraph(&format!("• {item}"), PLAIN);
         }
-        Ok(())
     }
 
-    fn paragraph(&mut self, text: &str, style: Style) -> Result<(), PdfError> {
+    fn paragraph(&mut self, text: &str, style: Style) {
         for line in self.broken(text, style, WIDTH - 2.0 * MARGIN) {
-            self.need(style.size * LEADING);
-            self.y += style.size;
-            self.text(MARGIN, &line, style)?;
-            self.y += style.size * (LEADING - 1.0);
+            self.line(&[(MARGIN, &line, style)]);
         }
         self.y += 2.0;
-        Ok(())
     }
 
-    fn table(&mut self, table: &Table) -> Result<(), PdfError> {
+    /// Texts beside each other in a line of the last one's size.
+    fn line(&mut self, texts: &[(f32, &str, Style)]) {
+        let size = texts.last().map_or(BODY, |(.., style)| style.size);
+        self.need(size * LEADING);
+        self.y += size;
+        for (x, text, style) in texts {
+            self.text(*x, text, *style);
+        }
+        self.y += size * (LEADING - 1.0);
+    }
+
+    fn table(&mut self, table: &Table) {
         let rows = || table.sections.iter().flatten();
         let size = |text: &str, style: Style| self.width(text, style);
         let widths: Vec<f32> = (0..table.columns.len())
@@ -221,7 +215,7 @@ impl<'a> Layout<'a> {
         let first = leading * (table.sections.first().map_or(1, Vec::len).min(4) as f32 + 1.5);
         // A table that fits on a page stands on one.
         let together = whole + HEADING * LEADING < BOTTOM - TOP;
-        self.heading(&table.heading, if together { whole } else { first })?;
+        self.heading(&table.heading, if together { whole } else { first });
         let mut header = true;
         for section in &table.sections {
             for row in section {
@@ -230,39 +224,30 @@ impl<'a> Layout<'a> {
                     header = true;
                 }
                 if std::mem::take(&mut header) {
-                    self.row(&table.columns, &widths, &rights, shrink, style(true))?;
+                    self.row(&table.columns, &widths, &rights, shrink, style(true));
                     self.rule(right, 0.7);
                 }
-                self.row(row, &widths, &rights, shrink, style(false))?;
+                self.row(row, &widths, &rights, shrink, style(false));
             }
             self.rule(right, 0.3);
         }
         self.y += 2.0;
         for note in &table.notes {
-            self.paragraph(note, REMARK)?;
+            self.paragraph(note, REMARK);
         }
-        Ok(())
     }
 
     /// Cells of a row: the first to the left, the others to the right.
-    fn row(
-        &mut self,
-        cells: &[String],
-        widths: &[f32],
-        rights: &[f32],
-        shrink: f32,
-        style: Style,
-    ) -> Result<(), PdfError> {
+    fn row(&mut self, cells: &[String], widths: &[f32], rights: &[f32], shrink: f32, style: Style) {
         self.y += style.size;
         for (k, (cell, right)) in cells.iter().zip(rights).enumerate() {
             let x = match k {
                 0 => right - widths[0] * shrink,
                 _ => right - self.width(cell, style),
             };
-            self.text(x, cell, style)?;
+            self.text(x, cell, style);
         }
         self.y += style.size * (LEADING - 1.0);
-        Ok(())
     }
 
     fn rule(&mut self, to: f32, width: f32) {
@@ -276,7 +261,7 @@ impl<'a> Layout<'a> {
     }
 
     /// What stands on every page, once their number is known.
-    fn frames(&mut self) -> Result<(), PdfError> {
+    fn frames(&mut self) {
         let total = self.pages.len();
         let style = Style {
             size: SMALL,
@@ -295,16 +280,12 @@ impl<'a> Layout<'a> {
                 (MARGIN, HEIGHT - 36.0, foot.clone()),
                 (end(&number), HEIGHT - 36.0, number),
             ];
-            for (x, y, text) in texts {
-                self.check(&text, style)?;
-                self.pages[page].push(Drawn::Text {
-                    at: (x, y),
-                    text,
-                    size: style.size,
-                    bold: style.bold,
-                    grey: style.grey,
-                });
-            }
+            let texts = texts.map(|(x, y, text)| Drawn::Text {
+                at: (x, y),
+                text,
+                style,
+            });
+            self.pages[page].extend(texts);
             for y in [50.0, HEIGHT - 46.0] {
                 self.pages[page].push(Drawn::Rule {
                     from: (MARGIN, y),
@@ -313,32 +294,31 @@ impl<'a> Layout<'a> {
                 });
             }
         }
+    }
+
+    /// An error where a font lacks a character of what is drawn.
+    fn check(&self) -> Result<(), PdfError> {
+        for drawn in self.pages.iter().flatten() {
+            if let Drawn::Text { text, style, .. } = drawn
+                && let Some(character) = self.fonts.get(style.bold).lacks(text).next()
+            {
+                return Err(PdfError::NoGlyph {
+                    character,
+                    text: text.clone(),
+                });
+            }
+        }
         Ok(())
     }
 
-    fn check(&self, text: &str, style: Style) -> Result<(), PdfError> {
-        match self.fonts.get(style.bold).lacks(text).next() {
-            Some(character) => Err(PdfError::NoGlyph {
-                character,
-                text: text.to_owned(),
-            }),
-            None => Ok(()),
-        }
-    }
-
-    fn text(&mut self, x: f32, text: &str, style: Style) -> Result<(), PdfError> {
-        self.check(text, style)?;
+    fn text(&mut self, x: f32, text: &str, style: Style) {
         if !text.is_empty() {
-            let at = (x, self.y);
             self.draw(Drawn::Text {
-                at,
+                at: (x, self.y),
                 text: text.to_owned(),
-                size: style.size,
-                bold: style.bold,
-                grey: style.grey,
+                style,
             });
         }
-        Ok(())
     }
 
     fn draw(&mut self, drawn: Drawn) {
@@ -400,4 +380,43 @@ impl<'a> Layout<'a> {
         }
         lines
     }
+}
+
+/// A document that could not be made a PDF.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum PdfError {
+    /// A character has no glyph.
+    #[error(
+        "found the character {character:?} in {text:?}, expected Latin, Greek or Cyrillic: the fonts of the \
+         certificate have no other. Write it in those."
+    )]
+    NoGlyph {
+        /// The character.
+        character: char,
+        /// Where it stands.
+        text: String,
+    },
+    /// The file would not be what the standard asks for.
+    #[error("the certificate cannot be written as PDF/A-3: {reason}")]
+    Standard {
+        /// What is in the way.
+        reason: String,
+    },
+}
+
+/// What stands on every page, and what the file says of itself.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Frame {
+    /// Upper left.
+    pub left: String,
+    /// Upper right.
+    pub right: String,
+    /// At the foot, before the page's number.
+    pub foot: String,
+    /// Below the last line.
+    pub end: String,
+    /// Author in the metadata.
+    pub author: String,
+    /// Year, month and day of the metadata.
+    pub day: (u16, u8, u8),
 }

@@ -1,11 +1,9 @@
 //! A document as a PDF/A-3 file: facts, tables and texts on A4 pages, with files attached.
 
 mod font;
-mod frame;
 mod layout;
 
-use krilla::Document as Pdf;
-use krilla::SerializeSettings;
+use font::Fonts;
 use krilla::color::rgb;
 use krilla::configure::{Archival, ConfigurationBuilder};
 use krilla::embed::{AssociationKind, EmbeddedFile, MimeType};
@@ -14,11 +12,11 @@ use krilla::metadata::{DateTime, Metadata};
 use krilla::page::PageSettings;
 use krilla::paint::{Fill, Stroke};
 use krilla::surface::Surface;
+use krilla::{Document as Pdf, SerializeSettings};
+use layout::{Drawn, HEIGHT, Layout, WIDTH};
 
 use super::document::Document;
-use font::Fonts;
-pub use frame::{Frame, PdfError};
-use layout::{Drawn, HEIGHT, Layout, WIDTH};
+pub use layout::{Frame, PdfError};
 
 /// A file in a PDF.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -104,19 +102,17 @@ fn draw(surface: &mut Surface, fonts: &Fonts, drawn: &Drawn) {
         Drawn::Text {
             at: (x, y),
             text,
-            size,
-            bold,
-            grey,
+            style,
         } => {
-            let typeface = fonts.get(*bold);
-            let color = rgb::Color::new(*grey, *grey, *grey);
+            let typeface = fonts.get(style.bold);
+            let color = rgb::Color::new(style.grey, style.grey, style.grey);
             surface.set_stroke(None);
             surface.set_fill(Some(Fill {
                 paint: color.into(),
                 ..Fill::default()
             }));
             let (at, glyphs) = (Point::from_xy(*x, *y), typeface.glyphs(text));
-            surface.draw_glyphs(at, &glyphs, typeface.font.clone(), text, *size, false);
+            surface.draw_glyphs(at, &glyphs, typeface.font.clone(), text, style.size, false);
         }
         Drawn::Rule {
             from: (x, y),

@@ -1,15 +1,13 @@
 //! A plot as a value: panels with axes and series, or a matrix. It knows nothing of where it is drawn.
 
 mod axis;
-mod point;
 mod series;
-mod thinned;
 
 use std::ops::Range;
 
 pub use axis::{Axis, Kind, Scale};
+pub(super) use series::thinned;
 pub use series::{Anchor, Color, Dash, Mark, Pen, Point, Series, Shape};
-pub(super) use thinned::thinned;
 
 /// A figure with its file, heading and caption.
 #[derive(Debug, Clone, PartialEq)]

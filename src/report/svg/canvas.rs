@@ -3,13 +3,15 @@
 //! Plotters rounds every coordinate to a whole pixel, so a figure is drawn [`FINE`] times larger and shown at
 //! its size. Sizes here are in shown pixels.
 
+use std::cell::RefCell;
+
 use plotters::coord::Shift;
-use plotters::element::DashedPathElement;
+use plotters::element::{DashedPathElement, Drawable, PointCollection};
 use plotters::prelude::*;
 use plotters::style::Color as _;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::super::plot::{Color, Dash, Pen, Point};
+use crate::report::plot::{Color, Dash, Panel, Pen, Point, Scale};
 
 /// Width of every figure.
 pub(super) const WIDTH: u32 = 1200;
@@ -89,21 +91,31 @@ fn place((x, y): Point) -> (i32, i32) {
 }
 
 /// What a figure is drawn on.
-pub(super) struct Canvas<'a>(DrawingArea<SVGBackend<'a>, Shift>);
+pub(super) struct Canvas<'a> {
+    area: DrawingArea<SVGBackend<'a>, Shift>,
+    /// The first error, which is that of the figure.
+    failed: RefCell<Option<DrawError>>,
+}
 
 /// An SVG document of this size.
 pub(super) fn draw(
     (width, height): (u32, u32),
-    content: impl FnOnce(&Canvas) -> Result<(), DrawError>,
+    content: impl FnOnce(&Canvas),
 ) -> Result<String, DrawError> {
     let (fine_width, fine_height) = (width * FINE as u32, height * FINE as u32);
     let mut text = String::new();
     {
         let backend = SVGBackend::with_string(&mut text, (fine_width, fine_height));
-        let canvas = Canvas(backend.into_drawing_area());
-        canvas.0.fill(&WHITE)?;
-        content(&canvas)?;
-        canvas.0.present()?;
+        let canvas = Canvas {
+            area: backend.into_drawing_area(),
+            failed: RefCell::default(),
+        };
+        canvas.area.fill(&WHITE)?;
+        content(&canvas);
+        canvas.area.present()?;
+        if let Some(error) = canvas.failed.take() {
+            return Err(error);
+        }
     }
     Ok(text.replacen(
         &format!(r#"width="{fine_width}" height="{fine_height}" viewBox"#),
@@ -113,8 +125,18 @@ pub(super) fn draw(
 }
 
 impl Canvas<'_> {
+    fn put<E>(&self, element: E)
+    where
+        for<'e> &'e E: PointCollection<'e, (i32, i32)>,
+        E: for<'b> Drawable<SVGBackend<'b>>,
+    {
+        if let Err(error) = self.area.draw(&element) {
+            self.failed.borrow_mut().get_or_insert(error);
+        }
+    }
+
     /// Joins points.
-    pub(super) fn line(&self, points: &[Point], pen: Pen) -> Result<(), DrawError> {
+    pub(super) fn line(&self, points: &[Point], pen: Pen) {
         let style = rgb(pen.color).stroke_width(px(pen.width) as u32);
         let (dash, gap) = match pen.dash {
             Dash::Solid => return self.stroke(points, rgb(pen.color), pen.width),
@@ -123,43 +145,32 @@ impl Canvas<'_> {
         };
         let points: Vec<_> = points.iter().copied().map(place).collect();
         let dashes = DashedPathElement::new(points, px(dash), px(gap), style);
-        self.0.draw(&dashes)
+        self.put(dashes);
     }
 
     /// The same without dashes in any colour.
-    pub(super) fn stroke(
-        &self,
-        points: &[Point],
-        color: RGBColor,
-        width: f64,
-    ) -> Result<(), DrawError> {
+    pub(super) fn stroke(&self, points: &[Point], color: RGBColor, width: f64) {
         let points: Vec<_> = points.iter().copied().map(place).collect();
         let style = color.stroke_width(px(width) as u32);
-        self.0.draw(&PathElement::new(points, style))
+        self.put(PathElement::new(points, style));
     }
 
     /// Fills an outline.
-    pub(super) fn area(&self, outline: &[Point], color: RGBColor) -> Result<(), DrawError> {
+    pub(super) fn area(&self, outline: &[Point], color: RGBColor) {
         let outline: Vec<_> = outline.iter().copied().map(place).collect();
-        self.0.draw(&Polygon::new(outline, color.filled()))
+        self.put(Polygon::new(outline, color.filled()));
     }
 
     /// Fills a rectangle.
-    pub(super) fn rectangle(&self, corners: [Point; 2], color: RGBColor) -> Result<(), DrawError> {
+    pub(super) fn rectangle(&self, corners: [Point; 2], color: RGBColor) {
         let rectangle = Rectangle::new(corners.map(place), color.filled());
-        self.0.draw(&rectangle)
+        self.put(rectangle);
     }
 
     /// A circle, filled or open with a line of this width.
-    pub(super) fn circle(
-        &self,
-        at: Point,
-        radius: f64,
-        color: RGBColor,
-        line: Option<f64>,
-    ) -> Result<(), DrawError> {
+    pub(super) fn circle(&self, at: Point, radius: f64, color: RGBColor, line: Option<f64>) {
         let style = line.map_or(color.filled(), |width| color.stroke_width(px(width) as u32));
-        self.0.draw(&Circle::new(place(at), px(radius), style))
+        self.put(Circle::new(place(at), px(radius), style));
     }
 
     /// Writes text; `scale` 1 is the usual size.
@@ -170,19 +181,52 @@ impl Canvas<'_> {
         (h, v): (HPos, VPos),
         color: RGBColor,
         scale: f64,
-    ) -> Result<(), DrawError> {
+    ) {
         let style = font(scale).color(&color).pos(Pos::new(h, v));
-        self.0.draw(&Text::new(text.to_owned(), place(at), style))
+        self.put(Text::new(text.to_owned(), place(at), style));
     }
 
     /// Writes text upwards.
-    pub(super) fn upright(&self, text: &str, at: Point, scale: f64) -> Result<(), DrawError> {
+    pub(super) fn upright(&self, text: &str, at: Point, scale: f64) {
         let style = font(scale).transform(FontTransform::Rotate270);
         let style = style.color(&INK).pos(Pos::new(HPos::Left, VPos::Center));
-        self.0.draw(&Text::new(text.to_owned(), place(at), style))
+        self.put(Text::new(text.to_owned(), place(at), style));
     }
 }
 
 fn font(scale: f64) -> FontDesc<'static> {
     ("sans-serif", LETTER * FONT_RATIO * FINE * scale).into_font()
+}
+
+/// A panel laid out: where its axes are.
+pub(super) struct Frame<'p> {
+    /// The panel.
+    pub(super) panel: &'p Panel,
+    /// Horizontal scale.
+    pub(super) x: Scale,
+    /// Vertical scale.
+    pub(super) y: Scale,
+    /// Left and right end of the axes.
+    pub(super) across: (f64, f64),
+    /// Upper and lower end.
+    pub(super) down: (f64, f64),
+    /// Right end of the panel.
+    pub(super) end: f64,
+}
+
+impl Frame<'_> {
+    /// Where a point is drawn.
+    pub(super) fn at(&self, (x, y): Point) -> Point {
+        (self.at_x(x), self.at_y(y))
+    }
+
+    /// Where an abscissa is drawn.
+    pub(super) fn at_x(&self, x: f64) -> f64 {
+        self.across.0 + self.x.part(x) * (self.across.1 - self.across.0)
+    }
+
+    /// Where a height is drawn.
+    pub(super) fn at_y(&self, y: f64) -> f64 {
+        self.down.1 - self.y.part(y) * (self.down.1 - self.down.0)
+    }
 }

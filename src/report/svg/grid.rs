@@ -4,9 +4,8 @@ use plotters::style::text_anchor::{HPos, VPos};
 
 use super::super::plot::{Grid, Panel, Scale};
 use super::canvas::{
-    Canvas, DrawError, GRID, INK, LETTER, QUIET, SHADE, SMALL, WIDTH, rgb, shortened, width,
+    Canvas, Frame, GRID, INK, LETTER, QUIET, SHADE, SMALL, WIDTH, rgb, shortened, width,
 };
-use super::frame::Frame;
 use super::series;
 
 /// Above the axes, for the title.
@@ -26,7 +25,7 @@ pub(super) fn height(grid: &Grid) -> u32 {
     grid.height * rows(grid) as u32
 }
 
-pub(super) fn draw(on: &Canvas, grid: &Grid) -> Result<(), DrawError> {
+pub(super) fn draw(on: &Canvas, grid: &Grid) {
     let panel_width = f64::from(WIDTH) / grid.columns as f64;
     for column in 0..grid.columns {
         let panels = grid.panels.iter().skip(column).step_by(grid.columns);
@@ -56,12 +55,11 @@ pub(super) fn draw(on: &Canvas, grid: &Grid) -> Result<(), DrawError> {
                 end: origin + panel_width,
             };
             match panel.blank {
-                true => title(on, &frame)?,
-                false => of_panel(on, &frame, &names)?,
+                true => title(on, &frame),
+                false => of_panel(on, &frame, &names),
             }
         }
     }
-    Ok(())
 }
 
 fn widest(ticks: &[(f64, String)]) -> f64 {
@@ -97,40 +95,40 @@ fn names(x: &Scale, room: f64) -> Vec<Vec<String>> {
     x.ticks.iter().map(|(_, label)| lines(label)).collect()
 }
 
-fn title(on: &Canvas, frame: &Frame) -> Result<(), DrawError> {
+fn title(on: &Canvas, frame: &Frame) {
     let at = (frame.across.0, frame.down.0 - TOP + 6.0);
     on.text(&frame.panel.title, at, (HPos::Left, VPos::Top), INK, 1.0)
 }
 
-fn of_panel(on: &Canvas, frame: &Frame, names: &[Vec<String>]) -> Result<(), DrawError> {
+fn of_panel(on: &Canvas, frame: &Frame, names: &[Vec<String>]) {
     let (panel, (left, right), (top, bottom)) = (frame.panel, frame.across, frame.down);
     for range in &panel.shading {
         let (start, end) = (range.start.max(frame.x.low), range.end.min(frame.x.high));
         if end > start {
             let corners = [(frame.at_x(start), top), (frame.at_x(end), bottom)];
-            on.rectangle(corners, SHADE)?;
+            on.rectangle(corners, SHADE);
         }
     }
-    ticks(on, frame, names)?;
-    on.stroke(&[(left, top), (left, bottom), (right, bottom)], QUIET, 0.75)?;
-    title(on, frame)?;
-    keys(on, frame, top - TOP + 6.0)?;
+    ticks(on, frame, names);
+    on.stroke(&[(left, top), (left, bottom), (right, bottom)], QUIET, 0.75);
+    title(on, frame);
+    keys(on, frame, top - TOP + 6.0);
     for series in &panel.series {
-        series::draw(on, frame, series)?;
+        series::draw(on, frame, series);
     }
-    tags(on, frame)?;
+    tags(on, frame);
     let (x, side) = match panel.notes_left {
         true => (left + 6.0, HPos::Left),
         false => (right - 6.0, HPos::Right),
     };
     for (line, note) in panel.notes.iter().enumerate() {
         let at = (x, top + 6.0 + LINE * line as f64);
-        on.text(note, at, (side, VPos::Top), INK, SMALL)?;
+        on.text(note, at, (side, VPos::Top), INK, SMALL);
     }
     labels(on, frame)
 }
 
-fn ticks(on: &Canvas, frame: &Frame, names: &[Vec<String>]) -> Result<(), DrawError> {
+fn ticks(on: &Canvas, frame: &Frame, names: &[Vec<String>]) {
     let ((left, right), (top, bottom)) = (frame.across, frame.down);
     let mut taken: Vec<f64> = Vec::new();
     for (value, label) in &frame.y.ticks {
@@ -139,15 +137,15 @@ fn ticks(on: &Canvas, frame: &Frame, names: &[Vec<String>]) -> Result<(), DrawEr
             continue;
         }
         taken.push(y);
-        on.stroke(&[(left, y), (right, y)], GRID, 0.75)?;
-        on.stroke(&[(left - 3.0, y), (left, y)], QUIET, 0.75)?;
+        on.stroke(&[(left, y), (right, y)], GRID, 0.75);
+        on.stroke(&[(left - 3.0, y), (left, y)], QUIET, 0.75);
         on.text(
             label,
             (left - 6.0, y),
             (HPos::Right, VPos::Center),
             INK,
             SMALL,
-        )?;
+        );
     }
     let mut taken: Vec<(f64, f64)> = Vec::new();
     for ((value, _), lines) in frame.x.ticks.iter().zip(names) {
@@ -158,42 +156,41 @@ fn ticks(on: &Canvas, frame: &Frame, names: &[Vec<String>]) -> Result<(), DrawEr
                 .map(|line| width(line, SMALL))
                 .fold(0.0, f64::max);
         let near = |&(other, of): &(f64, f64)| (other - x).abs() < half + of + 6.0;
-        on.stroke(&[(x, top), (x, bottom)], GRID, 0.75)?;
-        on.stroke(&[(x, bottom), (x, bottom + 3.0)], QUIET, 0.75)?;
+        on.stroke(&[(x, top), (x, bottom)], GRID, 0.75);
+        on.stroke(&[(x, bottom), (x, bottom + 3.0)], QUIET, 0.75);
         if frame.panel.x.places.is_empty() && taken.iter().any(near) {
             continue;
         }
         taken.push((x, half));
         for (n, line) in lines.iter().enumerate() {
             let at = (x, bottom + 6.0 + LINE * n as f64);
-            on.text(line, at, (HPos::Center, VPos::Top), INK, SMALL)?;
+            on.text(line, at, (HPos::Center, VPos::Top), INK, SMALL);
         }
     }
     let lines = names.iter().map(Vec::len).max().unwrap_or(1).max(1) as f64;
     let at = (0.5 * (left + right), bottom + 6.0 + LINE * lines);
     let title = &frame.panel.x.title;
     if title.is_empty() {
-        return Ok(());
+        return;
     }
     on.text(title, at, (HPos::Center, VPos::Top), INK, SMALL)
 }
 
 /// Names with a sample of their colour, from the right end of the title's line.
-fn keys(on: &Canvas, frame: &Frame, y: f64) -> Result<(), DrawError> {
+fn keys(on: &Canvas, frame: &Frame, y: f64) {
     let mut x = frame.across.1;
     for series in frame.panel.series.iter().rev() {
         let Some(key) = &series.key else { continue };
         x -= width(key, SMALL);
-        on.text(key, (x, y), (HPos::Left, VPos::Top), INK, SMALL)?;
+        on.text(key, (x, y), (HPos::Left, VPos::Top), INK, SMALL);
         let sample = [(x - 16.0, y + 3.0), (x - 5.0, y + 14.0)];
-        on.rectangle(sample, rgb(series.pen.color))?;
+        on.rectangle(sample, rgb(series.pen.color));
         x -= 28.0;
     }
-    Ok(())
 }
 
 /// Tags in the first of some lines that has room; those for which there is none are left out.
-fn tags(on: &Canvas, frame: &Frame) -> Result<(), DrawError> {
+fn tags(on: &Canvas, frame: &Frame) {
     let (left, right) = frame.across;
     let mut taken = vec![f64::NEG_INFINITY; frame.panel.tag_lines];
     for (x, text) in &frame.panel.tags {
@@ -207,13 +204,12 @@ fn tags(on: &Canvas, frame: &Frame) -> Result<(), DrawError> {
         };
         taken[line] = at + half + 6.0;
         let place = (at, frame.down.0 + 3.0 + 15.0 * line as f64);
-        on.text(text, place, (HPos::Center, VPos::Top), QUIET, TAG)?;
+        on.text(text, place, (HPos::Center, VPos::Top), QUIET, TAG);
     }
-    Ok(())
 }
 
 /// Names at the ends of lines, pushed apart where they would overlap, each with a leader to its line.
-fn labels(on: &Canvas, frame: &Frame) -> Result<(), DrawError> {
+fn labels(on: &Canvas, frame: &Frame) {
     let labelled = frame.panel.series.iter();
     let labelled = labelled.filter_map(|s| Some((s.label.as_ref()?, rgb(s.pen.color))));
     let mut labels: Vec<_> = labelled
@@ -223,13 +219,12 @@ fn labels(on: &Canvas, frame: &Frame) -> Result<(), DrawError> {
     let heights: Vec<f64> = labels.iter().map(|label| label.0.1).collect();
     let right = frame.across.1;
     for (((x, y), text, color), shown_at) in labels.into_iter().zip(spread(&heights, frame.down)) {
-        on.stroke(&[(x, y), (right, y)], color, 0.4)?;
-        on.stroke(&[(right + 1.0, y), (right + 9.0, shown_at)], color, 0.75)?;
+        on.stroke(&[(x, y), (right, y)], color, 0.4);
+        on.stroke(&[(right + 1.0, y), (right + 9.0, shown_at)], color, 0.75);
         let text = shortened(text, frame.end - right - 12.0);
         let at = (right + 11.0, shown_at);
-        on.text(&text, at, (HPos::Left, VPos::Center), color, SMALL)?;
+        on.text(&text, at, (HPos::Left, VPos::Center), color, SMALL);
     }
-    Ok(())
 }
 
 /// Ascending heights moved until they are a line apart, within the frame while there is room.

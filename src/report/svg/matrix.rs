@@ -4,7 +4,7 @@ use plotters::style::RGBColor;
 use plotters::style::text_anchor::{HPos, VPos};
 
 use super::super::plot::{Matrix, Point};
-use super::canvas::{Canvas, DrawError, INK, QUIET, width};
+use super::canvas::{Canvas, INK, QUIET, width};
 
 const SIDE: f64 = 880.0;
 const DIAGONAL: RGBColor = RGBColor(225, 225, 222);
@@ -23,33 +23,33 @@ pub(super) fn height(matrix: &Matrix) -> u32 {
     (margin(matrix) + SIDE + 20.0) as u32
 }
 
-pub(super) fn draw(on: &Canvas, matrix: &Matrix) -> Result<(), DrawError> {
+pub(super) fn draw(on: &Canvas, matrix: &Matrix) {
     let (margin, count) = (margin(matrix), matrix.names.len());
     let cell = SIDE / count.max(1) as f64;
     let at = |n: usize| margin + cell * n as f64;
     for (row, name) in matrix.names.iter().enumerate() {
         let middle = at(row) + 0.5 * cell;
         let to_the_left = (HPos::Right, VPos::Center);
-        on.text(name, (margin - 8.0, middle), to_the_left, INK, LETTERS)?;
-        on.upright(name, (middle, margin - 8.0), LETTERS)?;
+        on.text(name, (margin - 8.0, middle), to_the_left, INK, LETTERS);
+        on.upright(name, (middle, margin - 8.0), LETTERS);
         for (column, &r) in matrix.values[row].iter().enumerate() {
             let corner = (at(column), at(row));
             let fill = if row == column { DIAGONAL } else { tint(r) };
-            on.rectangle([corner, (corner.0 + cell, corner.1 + cell)], fill)?;
+            on.rectangle([corner, (corner.0 + cell, corner.1 + cell)], fill);
             if row > column {
-                square(on, corner, cell, r)?;
+                square(on, corner, cell, r);
             } else if row < column && r.abs() >= matrix.written {
                 let text = format!("{:.0}", 100.0 * r).replace('-', "−");
                 let place = (corner.0 + 0.5 * cell, corner.1 + 0.5 * cell);
-                on.text(&text, place, (HPos::Center, VPos::Center), INK, LETTERS)?;
+                on.text(&text, place, (HPos::Center, VPos::Center), INK, LETTERS);
             }
         }
     }
     for n in 0..=count {
         let between = n == 0 || n == count || matrix.groups.contains(&n);
         let (color, width) = if between { (QUIET, 1.25) } else { (FAINT, 0.5) };
-        on.stroke(&[(at(0), at(n)), (at(count), at(n))], color, width)?;
-        on.stroke(&[(at(n), at(0)), (at(n), at(count))], color, width)?;
+        on.stroke(&[(at(0), at(n)), (at(count), at(n))], color, width);
+        on.stroke(&[(at(n), at(0)), (at(n), at(count))], color, width);
     }
     scale(on, (at(count) + 50.0, margin + 30.0))
 }
@@ -66,10 +66,10 @@ fn tint(r: f64) -> RGBColor {
 }
 
 /// Its side grows with the magnitude; filled if positive, open if negative.
-fn square(on: &Canvas, corner: Point, cell: f64, r: f64) -> Result<(), DrawError> {
+fn square(on: &Canvas, corner: Point, cell: f64, r: f64) {
     let half = 0.5 * (cell - 4.0) * r.abs().clamp(0.0, 1.0);
     if half < 0.75 {
-        return Ok(());
+        return;
     }
     let (x, y) = (corner.0 + 0.5 * cell, corner.1 + 0.5 * cell);
     let (left, right, top, bottom) = (x - half, x + half, y - half, y + half);
@@ -81,16 +81,15 @@ fn square(on: &Canvas, corner: Point, cell: f64, r: f64) -> Result<(), DrawError
     on.stroke(&around, NEGATIVE, 1.5)
 }
 
-fn scale(on: &Canvas, (x, y): Point) -> Result<(), DrawError> {
+fn scale(on: &Canvas, (x, y): Point) {
     let cell = 34.0;
     for n in 0..=8 {
         let r = 1.0 - 0.25 * f64::from(n);
         let corner = (x, y + cell * f64::from(n));
-        on.rectangle([corner, (x + cell, corner.1 + cell)], tint(r))?;
-        square(on, corner, cell, r)?;
+        on.rectangle([corner, (x + cell, corner.1 + cell)], tint(r));
+        square(on, corner, cell, r);
         let text = format!("{r:+.2}").replace('-', "−").replace("+0.00", "0");
         let place = (x + cell + 8.0, corner.1 + 0.5 * cell);
-        on.text(&text, place, (HPos::Left, VPos::Center), INK, LETTERS)?;
+        on.text(&text, place, (HPos::Left, VPos::Center), INK, LETTERS);
     }
-    Ok(())
 }

@@ -2,7 +2,6 @@
 //! overlap, ticks that leave each other room.
 
 mod canvas;
-mod frame;
 mod grid;
 mod matrix;
 mod series;

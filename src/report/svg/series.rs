@@ -3,15 +3,14 @@
 use plotters::style::text_anchor::{HPos, VPos};
 
 use super::super::plot::{Anchor, Mark, Pen, Point, Series, Shape};
-use super::canvas::{BAND, Canvas, DrawError, SMALL, rgb};
-use super::frame::Frame;
+use super::canvas::{BAND, Canvas, Frame, SMALL, rgb};
 
 /// Half the width of a cap, in pixels.
 const CAP: f64 = 4.0;
 /// Points of a line for each pixel of its panel; more would not show.
 const POINTS: f64 = 1.5;
 
-pub(super) fn draw(on: &Canvas, frame: &Frame, series: &Series) -> Result<(), DrawError> {
+pub(super) fn draw(on: &Canvas, frame: &Frame, series: &Series) {
     let (pen, color) = (series.pen, rgb(series.pen.color));
     let ((left, right), (top, bottom)) = (frame.across, frame.down);
     match &series.shape {
@@ -19,14 +18,12 @@ pub(super) fn draw(on: &Canvas, frame: &Frame, series: &Series) -> Result<(), Dr
         Shape::Band(lower, upper) => band(on, frame, lower, upper),
         Shape::Marks(mark, points) => {
             let points = placed(frame, &visible(frame, points));
-            points
-                .into_iter()
-                .try_for_each(|at| marked(on, at, *mark, pen))
+            points.into_iter().for_each(|at| marked(on, at, *mark, pen))
         }
         Shape::Intervals(of) => of
             .iter()
             .filter(|(_, low, high)| low.is_finite() && high.is_finite())
-            .try_for_each(|&of| interval(on, frame, of, pen)),
+            .for_each(|&of| interval(on, frame, of, pen)),
         Shape::Bars {
             tops,
             half,
@@ -35,18 +32,18 @@ pub(super) fn draw(on: &Canvas, frame: &Frame, series: &Series) -> Result<(), Dr
         } => tops
             .iter()
             .filter(|top| top.1.is_finite())
-            .try_for_each(|&(x, top)| {
+            .for_each(|&(x, top)| {
                 let foot = base.unwrap_or(frame.y.low);
                 let corners = corners(frame, x, *half, (foot, top));
                 if *filled {
-                    on.area(&corners, BAND)?;
+                    on.area(&corners, BAND);
                 }
                 on.stroke(&corners, color, pen.width)
             }),
         Shape::Blocks(half, of) => of
             .iter()
             .filter(|(_, low, high)| low.is_finite() && high > low)
-            .try_for_each(|&(x, low, high)| on.area(&corners(frame, x, *half, (low, high)), color)),
+            .for_each(|&(x, low, high)| on.area(&corners(frame, x, *half, (low, high)), color)),
         Shape::Level(y) => {
             let y = frame.at_y(*y);
             on.line(&[(left, y), (right, y)], pen)
@@ -72,29 +69,24 @@ pub(super) fn draw(on: &Canvas, frame: &Frame, series: &Series) -> Result<(), Dr
     }
 }
 
-fn band(on: &Canvas, frame: &Frame, lower: &[Point], upper: &[Point]) -> Result<(), DrawError> {
+fn band(on: &Canvas, frame: &Frame, lower: &[Point], upper: &[Point]) {
     let limit = (POINTS * (frame.across.1 - frame.across.0)) as usize;
     let lower = thinned(&visible(frame, lower), limit);
     let mut outline = thinned(&visible(frame, upper), limit);
     outline.extend(lower.into_iter().rev());
     match outline.len() {
-        0..=2 => Ok(()),
+        0..=2 => {}
         _ => on.area(&placed(frame, &outline), BAND),
     }
 }
 
 /// An upright line from low to high with a cap at each end.
-fn interval(
-    on: &Canvas,
-    frame: &Frame,
-    (x, low, high): (f64, f64, f64),
-    pen: Pen,
-) -> Result<(), DrawError> {
+fn interval(on: &Canvas, frame: &Frame, (x, low, high): (f64, f64, f64), pen: Pen) {
     let color = rgb(pen.color);
     let ends = [frame.at((x, low)), frame.at((x, high))];
-    on.stroke(&ends, color, pen.width)?;
+    on.stroke(&ends, color, pen.width);
     ends.into_iter()
-        .try_for_each(|(x, y)| on.stroke(&[(x - CAP, y), (x + CAP, y)], color, pen.width))
+        .for_each(|(x, y)| on.stroke(&[(x - CAP, y), (x + CAP, y)], color, pen.width))
 }
 
 /// Corners of a bar about `x`: up on its left, across, and down on its right.
@@ -109,7 +101,7 @@ fn corners(frame: &Frame, x: f64, half: f64, (foot, top): (f64, f64)) -> [Point;
 }
 
 /// Points joined between those that are no numbers; a point alone is a dot.
-fn line(on: &Canvas, frame: &Frame, points: &[Point], pen: Pen) -> Result<(), DrawError> {
+fn line(on: &Canvas, frame: &Frame, points: &[Point], pen: Pen) {
     let limit = POINTS * (frame.across.1 - frame.across.0);
     let is_point = |p: &Point| p.0.is_finite() && p.1.is_finite();
     for piece in points.split(|p| !is_point(p)) {
@@ -118,11 +110,10 @@ fn line(on: &Canvas, frame: &Frame, points: &[Point], pen: Pen) -> Result<(), Dr
         let piece = placed(frame, &thinned(&piece, share as usize));
         match piece[..] {
             [] => {}
-            [alone] => marked(on, alone, Mark::Dot, Pen { width: 0.5, ..pen })?,
-            _ => on.line(&piece, pen)?,
+            [alone] => marked(on, alone, Mark::Dot, Pen { width: 0.5, ..pen }),
+            _ => on.line(&piece, pen),
         }
     }
-    Ok(())
 }
 
 /// What lies on the horizontal axis and is a number.
@@ -138,14 +129,14 @@ fn placed(frame: &Frame, points: &[Point]) -> Vec<Point> {
     points.iter().map(|&point| frame.at(point)).collect()
 }
 
-fn marked(on: &Canvas, at: Point, mark: Mark, pen: Pen) -> Result<(), DrawError> {
+fn marked(on: &Canvas, at: Point, mark: Mark, pen: Pen) {
     let color = rgb(pen.color);
     let (x, y) = at;
     match mark {
         Mark::Dot => on.circle(at, pen.width + 1.0, color, None),
         Mark::Ring => on.circle(at, 4.5, color, Some(pen.width)),
         Mark::Cross => {
-            on.stroke(&[(x - 4.0, y - 4.0), (x + 4.0, y + 4.0)], color, pen.width)?;
+            on.stroke(&[(x - 4.0, y - 4.0), (x + 4.0, y + 4.0)], color, pen.width);
             on.stroke(&[(x - 4.0, y + 4.0), (x + 4.0, y - 4.0)], color, pen.width)
         }
     }

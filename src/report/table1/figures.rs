@@ -1,13 +1,11 @@
 //! The paper's Figures 2 to 9: every sample's course, their mean and standard deviation.
 
-use super::super::number::count;
-use super::super::plot::{Axis, Color, Panel, Plot, Point, Series};
 use super::verdict::title;
 use crate::imu::{InstallationForm, Sensor};
+use crate::report::prelude::*;
 use crate::study::Table1;
 use crate::study::table1::{Column, Quantity};
 
-const HOUR: f64 = 3600.0;
 /// A course that stays within this part of its axis is a straight line.
 const FLAT: f64 = 1e-4;
 

@@ -3,14 +3,9 @@
 mod figures;
 mod verdict;
 
-use serde_json::{Map, Value, json};
-
-use super::document::{Block, Document, Facts, List, Table, cells};
-use super::number::{count, three_digits, value};
+use crate::report::prelude::*;
 use crate::study::Table1;
-use crate::study::table1::paper;
-use crate::study::table1::{AGREEMENT, ByQuantity, Column, Moments, Quantity, Row};
-use crate::units::DEGREE;
+use crate::study::table1::{AGREEMENT, ByQuantity, Column, Moments, Quantity, Row, paper};
 
 /// Smaller figures, in the units shown, are shown as zero.
 const ZERO: f64 = 5e-10;
@@ -27,9 +22,7 @@ pub fn document(table: &Table1) -> Document {
         document.both(of_column(table, column));
     }
     document.both(List::new("How to read the tables", notes(table)));
-    for plot in figures::figures(table) {
-        document.page(plot);
-    }
+    document.pages(figures::figures(table));
     document.data = data(table);
     document
 }

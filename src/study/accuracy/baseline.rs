@@ -2,11 +2,12 @@
 //! instrument and the same noise.
 
 use super::StudyError;
-use crate::calibration::ParameterVector;
-use crate::calibration::{Options, Problem};
-use crate::calibration::{in_body_frame, in_general_form, six_position_of, to_vector};
+use crate::calibration::{
+    Options, ParameterVector, Problem, in_body_frame, in_general_form, six_position_of, to_vector,
+};
 use crate::imu::InstallationForm;
-use crate::models::{self, ModelError, Place};
+use crate::models;
+use crate::models::{ModelError, Place};
 use crate::run::Dwell;
 use crate::simulation::{Scenario, Simulated};
 use crate::turntable::Table;

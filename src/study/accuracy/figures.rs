@@ -1,5 +1,7 @@
 //! Root mean squares of an error over the runs, by every method, and their ratios.
 
+use super::trial::{Filtered, Trial};
+use crate::calibration::{AUXILIARY, AuxiliaryKind, AuxiliaryVector, ErrorTerm};
 use crate::study::Ratio;
 
 /// Figures of one kind of error over all runs, in SI.
@@ -24,16 +26,17 @@ pub struct Figures {
 }
 
 /// Mean squares of one run; none where a method gave nothing.
-pub(super) struct Squares {
-    pub(super) filter: Option<f64>,
-    pub(super) claimed: Option<f64>,
-    pub(super) bound: f64,
-    pub(super) closed_form: Option<f64>,
-    pub(super) closed_form_in_equal_time: Option<f64>,
+#[derive(Default)]
+pub struct Squares {
+    pub filter: Option<f64>,
+    pub claimed: Option<f64>,
+    pub bound: f64,
+    pub closed_form: Option<f64>,
+    pub closed_form_in_equal_time: Option<f64>,
 }
 
 impl Figures {
-    pub(super) fn new(runs: impl Iterator<Item = Squares>) -> Self {
+    pub(in crate::study) fn new(runs: impl Iterator<Item = Squares>) -> Self {
         let runs: Vec<Squares> = runs.collect();
         let of = |one: &dyn Fn(&Squares) -> Option<f64>| -> Vec<f64> {
             runs.iter().filter_map(one).collect()
@@ -61,6 +64,32 @@ impl Figures {
             gain_in_equal_time: ratio(&equal, &filter),
         }
     }
+}
+
+/// Of each term that has a bound in any run and that the filter estimated.
+pub(super) fn of_error_terms(trials: &[Trial]) -> Vec<(ErrorTerm, Figures)> {
+    let has_sigma = |&k: &usize| trials.iter().any(|trial| trial.auxiliary_bound[k] > 0.0);
+    let of_term = |term: ErrorTerm| {
+        let is_of = |&k: &usize| AuxiliaryKind::of(k).is_some_and(|of| of.error_term() == term);
+        let indices: Vec<usize> = (0..AUXILIARY).filter(is_of).filter(has_sigma).collect();
+        let square = |of: &AuxiliaryVector| {
+            let sum: f64 = indices.iter().map(|&k| of[k].powi(2)).sum();
+            sum / indices.len() as f64
+        };
+        let runs = trials.iter().filter_map(|trial| {
+            let estimated = |f: &&Filtered| square(&f.auxiliary_sigma) > 0.0;
+            let filtered = trial.filtered.as_ref().filter(estimated)?;
+            Some(Squares {
+                filter: Some(square(&filtered.auxiliary_error)),
+                claimed: Some(square(&filtered.auxiliary_sigma)),
+                bound: square(&trial.auxiliary_bound),
+                ..Squares::default()
+            })
+        });
+        let runs: Vec<Squares> = runs.collect();
+        (!runs.is_empty()).then(|| (term, Figures::new(runs.into_iter())))
+    };
+    ErrorTerm::ALL.into_iter().filter_map(of_term).collect()
 }
 
 /// Root of the mean; NaN of none.

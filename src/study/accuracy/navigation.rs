@@ -9,7 +9,8 @@ use super::figures::Squares;
 use super::{Baseline, Figures, Trial};
 use crate::calibration::{PARAMETERS, ParameterMatrix, ParameterVector};
 use crate::imu::{InstallationForm, PerSensor};
-use crate::models::{self, ModelError, Place};
+use crate::models;
+use crate::models::{ModelError, Place};
 use crate::simulation::Scenario;
 use crate::study::navigation::{FORTY_HOURS, INTERVAL, Mission, Motion, NavigationStudyError};
 

@@ -1,19 +1,15 @@
 //! One run of the study.
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
 use super::{AccuracyStudy, Baseline, StudyError};
-use crate::calibration::{AUXILIARY, AuxiliaryVector, UNWATCHED, auxiliary_vector};
-use crate::calibration::{Epoch, Nis, from_vector, to_vector};
 use crate::calibration::{
-    ErrorTermTest, Estimate, FormTest, Nees, Outcome, bound, estimate, in_general_form, nees,
-    test_error_terms,
+    AUXILIARY, AuxiliaryVector, Epoch, ErrorTermTest, Estimate, FormTest, Nees, Nis, Options,
+    Outcome, PARAMETERS, ParameterMatrix, ParameterVector, Problem, UNWATCHED, auxiliary_vector,
+    bound, estimate, from_vector, in_general_form, nees, test_error_terms, to_vector,
 };
-use crate::calibration::{Options, Problem};
-use crate::calibration::{PARAMETERS, ParameterMatrix, ParameterVector};
-use crate::imu::BodyFrame;
-use crate::imu::{InstallationForm, PerSensor, Triad};
+use crate::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
 use crate::run::Aiding;
 use crate::simulation::Runs;
 
@@ -188,29 +184,12 @@ fn whole_nees(
     error: &ParameterVector,
     auxiliary_error: &AuxiliaryVector,
 ) -> Option<Nees> {
-    const ALL: usize = PARAMETERS + AUXILIARY;
     let auxiliary = &outcome.auxiliary;
-    let cross = outcome.estimate.to_general_form() * &auxiliary.cross;
-    let mut covariance = SMatrix::<f64, ALL, ALL>::zeros();
-    covariance
-        .fixed_view_mut::<PARAMETERS, PARAMETERS>(0, 0)
-        .copy_from(&estimate.covariance);
-    covariance
-        .fixed_view_mut::<AUXILIARY, AUXILIARY>(PARAMETERS, PARAMETERS)
-        .copy_from(&auxiliary.covariance);
-    covariance
-        .fixed_view_mut::<PARAMETERS, AUXILIARY>(0, PARAMETERS)
-        .copy_from(&cross);
-    covariance
-        .fixed_view_mut::<AUXILIARY, PARAMETERS>(PARAMETERS, 0)
-        .copy_from(&cross.transpose());
-    let mut difference = SVector::<f64, ALL>::zeros();
-    difference.fixed_rows_mut::<PARAMETERS>(0).copy_from(error);
-    difference
-        .fixed_rows_mut::<AUXILIARY>(PARAMETERS)
-        .copy_from(auxiliary_error);
-    let all: Vec<usize> = (0..ALL).collect();
-    nees(&difference, &covariance, &all)
+    let cross = outcome.estimate.to_general_form(BodyFrame::Table) * &auxiliary.cross;
+    let covariance = estimate.covariance_with(&cross, &auxiliary.covariance);
+    let error = error.iter().chain(auxiliary_error).copied();
+    let error = DVector::from_iterator(PARAMETERS + AUXILIARY, error);
+    nees(&error, &covariance, &Vec::from_iter(0..error.len()))
 }
 
 /// What a history says at each of the moments, in the general form. It holds no correlations, which

@@ -1,8 +1,7 @@
 //! Which group of parameters makes how much of the position error.
 
 use super::{ByParameter, Calibrated};
-use crate::calibration::Group;
-use crate::calibration::{PARAMETERS, ParameterMatrix};
+use crate::calibration::{Group, PARAMETERS, ParameterMatrix};
 
 /// What the claimed covariance, averaged over all instruments, says of the position error at the end.
 ///

@@ -3,10 +3,10 @@
 use serde::{Deserialize, Serialize};
 
 use super::{ExperimentError, HOUR_PATH, POSITIONS};
-use crate::calibration::to_vector;
-use crate::calibration::{Estimate, UNWATCHED, estimate, in_general_form, six_position};
-use crate::calibration::{NoisePolicy, Options, Problem};
-use crate::calibration::{ParameterMatrix, ParameterVector};
+use crate::calibration::{
+    Estimate, NoisePolicy, Options, ParameterMatrix, ParameterVector, Problem, UNWATCHED, estimate,
+    in_general_form, six_position, to_vector,
+};
 use crate::imu::InstallationForm;
 use crate::models::ModelError;
 use crate::simulation::{Scenario, Simulated};

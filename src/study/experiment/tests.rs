@@ -3,8 +3,7 @@ use nalgebra::Vector2;
 
 use super::budget::Budget;
 use super::*;
-use crate::calibration::ParameterMatrix;
-use crate::calibration::{Group, Options, Problem, in_general_form, six_position};
+use crate::calibration::{Group, Options, ParameterMatrix, Problem, in_general_form, six_position};
 use crate::imu::{GaussMarkov, Noise};
 use crate::models::{Place, trajectory};
 use crate::study::navigation::Pair;
@@ -65,7 +64,7 @@ fn exposure_against_navigation(cases: &[(InstallationForm, u32, f64)]) {
             let start = match (&mission.motion, situation) {
                 (Motion::Standing(at), Situation::SelfAligned) => {
                     let sensed = SensedErrors::new(&pair.truth).unwrap().at(&at.steady());
-                    alignment::by_itself(at) * sensed * error
+                    noise::by_itself(at) * sensed * error
                 }
                 _ => Default::default(),
             };
@@ -75,7 +74,7 @@ fn exposure_against_navigation(cases: &[(InstallationForm, u32, f64)]) {
             let last = actual.len() - 1;
             let largest = (0..=last).map(|k| position(k).norm()).fold(0.0, f64::max);
             for k in (0..=last).step_by(60) {
-                let linear: Vector2<f64> = way.minutes[k].position * error;
+                let linear: Vector2<f64> = way.minutes[k].1 * error;
                 let apart = (linear - position(k)).norm() / largest;
                 assert!(apart < within, "{situation:?}, {form:?}, {k} min: {apart}");
             }

@@ -7,8 +7,7 @@ use statrs::distribution::{Binomial, DiscreteCDF};
 
 use super::*;
 use crate::attitude::from_pitch_roll_heading;
-use crate::calibration::{ParameterVector, sensor_and_parameter};
-use crate::calibration::{from_vector, to_vector};
+use crate::calibration::{ParameterVector, from_vector, sensor_and_parameter, to_vector};
 use crate::imu::{InstallationForm, ParameterKind};
 use crate::models::{Place, trajectory};
 use crate::navigation::{Height, Increments, Strapdown, Stride};

@@ -1,19 +1,16 @@
 //! Navigation while the instrument warms up: errors of parameters that change with temperature.
 
-use nalgebra::{DMatrix, SMatrix, Vector3};
+use nalgebra::{DMatrix, Vector3};
 use thiserror::Error;
 
-use super::{INTERVAL, Mission, NavigationStudyError, Pair, exposure};
+use super::{Epoch, Exposure, Mission, NavigationStudyError, Pair, sensed_errors};
 use crate::calibration::result::Calibration;
-use crate::calibration::{PARAMETERS, parameter_name, sensor_and_parameter, triads_of};
-use crate::imu::{
-    InstallationForm, Nominal, PerSensor, ThermalCoefficients, ThermalRange, ThermalState, Triad,
+use crate::calibration::{
+    Estimate, TEMPERATURE_TOLERANCE, Thermal, from_vector, sensor_and_parameter, triads_of,
 };
+use crate::imu::{InstallationForm, Nominal, PerSensor, ThermalState, Triad};
 use crate::navigation::error_model::STATES;
-use crate::navigation::{Instant, Linearisation, Sensitivity};
-
-use super::course::Course;
-use super::{Epoch, sensed_errors};
+use crate::navigation::{ErrorMatrix, ErrorVector, Instant, Linearisation, Sensitivity};
 
 /// How an instrument warms up: `to + (from − to) exp(−t/τ)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,10 +37,6 @@ impl Warming {
 pub struct WarmingPair {
     truth: Changing,
     calibration: Changing,
-    /// Covariance of the calibration's parameters, then of its coefficients; none if no σ is claimed.
-    covariance: Option<DMatrix<f64>>,
-    /// Index among the parameters of both triads and function of each coefficient.
-    coefficients: Vec<(usize, usize)>,
 }
 
 /// Why calibrations cannot be navigated with while they warm up.
@@ -64,75 +57,57 @@ pub enum WarmingError {
         "the temperature leaves the range in which the polynomials of calibration or truth hold; navigate within it"
     )]
     Outside,
-    /// A coefficient of what is no parameter.
-    #[error("temperature.coefficients names what is no parameter; correct the file")]
+    /// A covariance or a coefficient of what is no parameter.
+    #[error(
+        "the covariance or temperature.coefficients names what is no parameter; correct the file"
+    )]
     Unknown,
 }
 
-/// Triads that change with temperature, normalised.
+/// An estimate that may change with temperature, normalised.
 #[derive(Debug, Clone)]
 struct Changing {
-    triads: PerSensor<Triad>,
-    thermal: Option<(PerSensor<ThermalRange>, PerSensor<ThermalCoefficients>)>,
+    estimate: Estimate,
+    thermal: Option<Thermal>,
 }
 
 impl Changing {
-    fn of(
-        record: &Calibration,
-        nominal: &PerSensor<Nominal>,
-    ) -> Result<(Self, Vec<(usize, usize)>), WarmingError> {
+    fn of(record: &Calibration, nominal: &PerSensor<Nominal>) -> Result<Self, WarmingError> {
         let general = InstallationForm::General;
         if record.installation_form.is_some_and(|form| form != general) {
             return Err(WarmingError::Form);
         }
-        let triads = triads_of(record, nominal, general);
-        let Some(of) = &record.temperature else {
-            let plain = Self {
-                triads,
-                thermal: None,
-            };
-            return Ok((plain, Vec::new()));
-        };
-        let mut all = PerSensor::<ThermalCoefficients>::default();
-        let mut places = Vec::new();
-        for coefficient in &of.coefficients {
-            let (index, function) = coefficient.place(general).ok_or(WarmingError::Unknown)?;
-            let (sensor, of_triad) = sensor_and_parameter(index);
-            let factor = nominal.get(sensor).factor(of_triad);
-            all.get_mut(sensor)[(of_triad, function)] = coefficient.value / factor;
-            places.push((index, function));
-        }
-        let range = of.range;
-        let changing = Self {
-            triads,
-            thermal: Some((range, all)),
-        };
-        Ok((changing, places))
+        let covariance = record.covariance_by(nominal);
+        let thermal = record.thermal(nominal);
+        Ok(Self {
+            estimate: Estimate {
+                triads: triads_of(record, nominal, general),
+                covariance: covariance.ok_or(WarmingError::Unknown)?,
+            },
+            thermal: thermal.map_err(|_| WarmingError::Unknown)?,
+        })
     }
 
-    fn state(&self, (temperature, rate): (f64, f64)) -> Option<ThermalState> {
-        let (range, _) = self.thermal.as_ref()?;
-        Some(PerSensor::from_fn(|sensor| {
-            [range.get(sensor).values(temperature, rate); 3]
-        }))
+    fn state(&self, (temperature, rate): (f64, f64)) -> ThermalState {
+        let thermal = self.thermal.as_ref();
+        let state = thermal.map(|thermal| thermal.model.range.everywhere(temperature, rate));
+        state.unwrap_or_default()
     }
 
     fn at(&self, now: (f64, f64)) -> PerSensor<Triad> {
-        let (Some(state), Some((_, coefficients))) = (self.state(now), &self.thermal) else {
-            return self.triads;
-        };
-        PerSensor::from_fn(|sensor| {
-            let triad = self.triads.get(sensor);
-            triad.warmed(coefficients.get(sensor), state.get(sensor))
+        let Estimate { triads, covariance } = &self.estimate;
+        self.thermal.as_ref().map_or(*triads, |thermal| {
+            let (change, _) = thermal.at(&self.state(now), covariance);
+            from_vector(self.estimate.form(), &(self.estimate.vector() + change))
         })
     }
 
     fn holds(&self, temperature: f64) -> bool {
-        self.thermal.as_ref().is_none_or(|(range, _)| {
-            let all = [range.gyro, range.accel];
-            let tolerance = crate::calibration::TEMPERATURE_TOLERANCE;
-            all.iter()
-                .all(|range| range.contains(temperature, tolerance))
+        self.thermal.as_ref().is_none_or(|thermal| {
+            let PerSensor { gyro, accel } = thermal.model.range;
+            [gyro, accel]
+                .iter()
+                .all(|range| range.contains(temperature, TEMPERATURE_TOLERANCE))
         })
     }
 }
@@ -153,14 +128,9 @@ impl WarmingPair {
             gyro: Nominal(Vector3::from(truth.gyro.scale)),
             accel: Nominal(Vector3::from(truth.accel.scale)),
         };
-        let (truth, _) = Changing::of(truth, &nominal)?;
-        let (changing, coefficients) = Changing::of(calibration, &nominal)?;
-        let covariance = joint_covariance(calibration, &nominal, &coefficients);
         Ok(Self {
-            truth,
-            calibration: changing,
-            covariance,
-            coefficients,
+            truth: Changing::of(truth, &nominal)?,
+            calibration: Changing::of(calibration, &nominal)?,
         })
     }
 
@@ -171,58 +141,6 @@ impl WarmingPair {
             covariance: None,
         }
     }
-}
-
-/// Covariance of parameters and coefficients, normalised; none if no σ is claimed.
-fn joint_covariance(
-    record: &Calibration,
-    nominal: &PerSensor<Nominal>,
-    coefficients: &[(usize, usize)],
-) -> Option<DMatrix<f64>> {
-    if record.covariance.is_empty() {
-        return None;
-    }
-    let general = InstallationForm::General;
-    let n = coefficients.len();
-    let factor = |index: usize| {
-        let (sensor, of_triad) = sensor_and_parameter(index);
-        nominal.get(sensor).factor(of_triad)
-    };
-    let named = |name: &String| {
-        (0..PARAMETERS).find(|&i| parameter_name(general, i).as_ref() == Some(name))
-    };
-    let places: Vec<Option<usize>> = record.parameters.iter().map(named).collect();
-    let mut all = DMatrix::zeros(PARAMETERS + n, PARAMETERS + n);
-    let known = places.iter().enumerate();
-    for (row, i) in known
-        .clone()
-        .filter_map(|(row, place)| Some((row, (*place)?)))
-    {
-        for (column, j) in known
-            .clone()
-            .filter_map(|(column, place)| Some((column, (*place)?)))
-        {
-            let value = *record.covariance.get(row)?.get(column)?;
-            all[(i, j)] = value / (factor(i) * factor(j));
-        }
-    }
-    if let Some(thermal) = &record.temperature {
-        for (k, &(of, _)) in coefficients.iter().enumerate() {
-            for (l, &(other, _)) in coefficients.iter().enumerate() {
-                let value = thermal.covariance.get(k).and_then(|row| row.get(l));
-                let value = value.copied().unwrap_or(0.0) / (factor(of) * factor(other));
-                all[(PARAMETERS + k, PARAMETERS + l)] = value;
-            }
-            for (row, place) in places.iter().enumerate() {
-                let Some(i) = *place else { continue };
-                let value = thermal.cross.get(row).and_then(|row| row.get(k));
-                let value = value.copied().unwrap_or(0.0) / (factor(i) * factor(of));
-                all[(i, PARAMETERS + k)] = value;
-                all[(PARAMETERS + k, i)] = value;
-            }
-        }
-    }
-    Some(all)
 }
 
 impl Mission {
@@ -236,87 +154,72 @@ impl Mission {
         pair: &WarmingPair,
         warming: &Warming,
     ) -> Result<Vec<Epoch>, NavigationStudyError> {
-        let middle = |interval: u32| warming.at((f64::from(interval) - 0.5) * INTERVAL);
+        let middle = |interval: u32| warming.at((f64::from(interval) - 0.5) * self.interval);
         for interval in 1..=self.intervals {
             let (temperature, _) = middle(interval);
             if !(pair.truth.holds(temperature) && pair.calibration.holds(temperature)) {
                 return Err(WarmingError::Outside.into());
             }
         }
-        let mut epochs = self.errors_by(&nalgebra::SVector::zeros(), |interval| {
+        let mut epochs = self.errors_by(&ErrorVector::zeros(), |interval| {
             pair.at(middle(interval)).sensed()
         })?;
-        if let Some(covariance) = &pair.covariance {
-            let exposures = self.exposure_warming(pair, middle)?;
-            for (epoch, by) in epochs.iter_mut().zip(exposures) {
-                let predicted = &by * covariance * by.transpose();
-                epoch.covariance = Some(SMatrix::from_fn(|i, j| predicted[(i, j)]));
+        let Changing { estimate, thermal } = &pair.calibration;
+        if estimate.estimated().next().is_none() {
+            return Ok(epochs);
+        }
+        let own = self.exposure_warming(pair, &middle, None)?;
+        for (epoch, by) in epochs.iter_mut().zip(&own) {
+            epoch.covariance = Some(by.covariance(&estimate.covariance));
+        }
+        if let Some(thermal) = thermal {
+            let coefficients = thermal.coefficients.iter();
+            let mut functions: Vec<usize> = coefficients.map(|c| c.function).collect();
+            functions.sort_unstable();
+            functions.dedup();
+            let by_function = functions
+                .iter()
+                .map(|&f| self.exposure_warming(pair, &middle, Some(f)));
+            let by_function: Vec<_> = by_function.collect::<Result<_, _>>()?;
+            for (k, (epoch, own)) in epochs.iter_mut().zip(&own).enumerate() {
+                let mut by = DMatrix::zeros(STATES, thermal.coefficients.len());
+                for (mut column, of) in by.column_iter_mut().zip(&thermal.coefficients) {
+                    let place = functions.partition_point(|&function| function < of.function);
+                    column.copy_from(&by_function[place][k].by_parameter.column(of.index()));
+                }
+                let crossed = own.by_parameter * &thermal.cross * by.transpose();
+                let added =
+                    &crossed + crossed.transpose() + &by * &thermal.covariance * by.transpose();
+                let added = ErrorMatrix::from_fn(|i, j| added[(i, j)]);
+                epoch.covariance = epoch.covariance.map(|covariance| covariance + added);
             }
         }
         Ok(epochs)
     }
 
-    /// What errors of parameters, then of coefficients, do to navigation.
+    /// What errors of the parameters do to navigation, or those of their coefficients of a function.
     fn exposure_warming(
         &self,
         pair: &WarmingPair,
-        middle: impl Fn(u32) -> (f64, f64),
-    ) -> Result<Vec<DMatrix<f64>>, NavigationStudyError> {
-        let mut course = Course::new(&self.motion);
-        let mut functions: Vec<usize> = pair.coefficients.iter().map(|c| c.1).collect();
-        functions.sort_unstable();
-        functions.dedup();
-        let mut constant: Sensitivity = Sensitivity::zeros();
-        let mut changing = vec![constant; functions.len()];
-        let gather =
-            |constant: &Sensitivity, changing: &[Sensitivity], course: &Course, time: f64| {
-                let n = pair.coefficients.len();
-                let own = exposure(time, constant, &course.here().truth)?.by_parameter;
-                let by_function = changing.iter().map(|sensitivity| {
-                    Ok(exposure(time, sensitivity, &course.here().truth)?.by_parameter)
-                });
-                let by_function: Vec<_> =
-                    by_function.collect::<Result<_, NavigationStudyError>>()?;
-                let mut all = DMatrix::zeros(STATES, PARAMETERS + n);
-                for row in 0..STATES {
-                    for column in 0..PARAMETERS {
-                        all[(row, column)] = own[(row, column)];
-                    }
-                    for (k, (index, function)) in pair.coefficients.iter().enumerate() {
-                        let place = functions.iter().position(|f| f == function);
-                        let of = place.and_then(|place| by_function.get(place));
-                        all[(row, PARAMETERS + k)] = of.map_or(0.0, |of| of[(row, *index)]);
-                    }
-                }
-                Ok::<_, NavigationStudyError>(all)
-            };
-        let mut exposures = vec![gather(&constant, &changing, &course, 0.0)?];
-        for interval in 1..=self.intervals {
+        middle: &impl Fn(u32) -> (f64, f64),
+        function: Option<usize>,
+    ) -> Result<Vec<Exposure>, NavigationStudyError> {
+        self.exposure_by(Sensitivity::zeros(), |interval| {
             let now = middle(interval);
-            let sensed = sensed_errors(&pair.truth.at(now))?;
-            let state = pair.calibration.state(now).unwrap_or_default();
-            let time = f64::from(interval) * INTERVAL;
-            let linear = |at: &Instant| Linearisation::about(at, &sensed);
-            let mut start = linear(course.here());
-            course.go(time, 0.0, |stride| {
-                let [middle, end] = [&stride.middle, &stride.end].map(linear);
-                let all = [&start, &middle, &end];
-                constant = Linearisation::follow(&constant, stride.duration, all);
-                for (sensitivity, &function) in changing.iter_mut().zip(&functions) {
-                    let [a, b, c] = all.map(|linear| of_function(linear, &state, function));
-                    *sensitivity =
-                        Linearisation::follow(sensitivity, stride.duration, [&a, &b, &c]);
+            let (sensed, state) = (
+                sensed_errors(&pair.truth.at(now))?,
+                pair.calibration.state(now),
+            );
+            Ok(move |at: &Instant| {
+                let linear = Linearisation::about(at, &sensed);
+                match function {
+                    None => linear,
+                    // All axes are alike.
+                    Some(function) => linear.weighted(|parameter| {
+                        state.get(sensor_and_parameter(parameter).0)[0][function]
+                    }),
                 }
-                start = end;
-                Ok::<_, NavigationStudyError>(())
-            })?;
-            exposures.push(gather(&constant, &changing, &course, time)?);
-        }
-        Ok(exposures)
+            })
+        })
     }
-}
-
-/// What the errors of coefficients of a function do, in this state of all axes alike.
-fn of_function(linear: &Linearisation, state: &ThermalState, function: usize) -> Linearisation {
-    linear.weighted(|parameter| state.get(sensor_and_parameter(parameter).0)[0][function])
 }

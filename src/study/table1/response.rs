@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-use super::quantity::ByQuantity;
+use super::paper::ByQuantity;
 use crate::imu::{PerSensor, Sensor};
 use crate::navigation::error_model::{INPUTS, STATES};
 use crate::navigation::{NavigationError, Sensitivity, Solution};

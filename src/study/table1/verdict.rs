@@ -1,8 +1,6 @@
 //! Whether the paper's figures are reproduced.
 
-use super::paper::{Published, SAMPLES};
-use super::quantity::ByQuantity;
-use super::reading::{Kind, Reading};
+use super::paper::{ByQuantity, Kind, Published, Reading, SAMPLES};
 use super::response::Moments;
 
 /// Two means agree if they differ by no more than this many standard errors of their difference: 99 %

@@ -1,5 +1,6 @@
-use super::*;
 use approx::assert_relative_eq;
+
+use super::*;
 
 fn triad(form: InstallationForm) -> Triad {
     let mut v = TriadVector::zeros();

@@ -11,8 +11,10 @@ use rand_distr::{Distribution, StandardNormal};
 use super::calibration::{ClosedForm, Navigated, Report};
 use crate::calibration::result::TermRecord;
 use crate::calibration::*;
-use crate::calibration::{AttitudePrior, Direction, Linearisation, Observability, Part};
-use crate::calibration::{ParameterMatrix, ParameterVector, sensor_and_parameter};
+use crate::calibration::{
+    AttitudePrior, Direction, Linearisation, Observability, ParameterMatrix, ParameterVector, Part,
+    sensor_and_parameter,
+};
 use crate::imu::*;
 use crate::run::Run;
 use crate::simulation::{Scenario, Simulated};

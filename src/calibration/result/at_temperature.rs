@@ -1,0 +1,190 @@
+//! A calibration read back as an estimate, and one that changes with temperature at one.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+use thiserror::Error;
+
+use super::record::correction_of;
+use super::thermal_record::{CoefficientRecord, TOLERANCE};
+use super::{Calibration, FORMAT, TriadRecord, triads_of};
+use crate::calibration::parameters::factor;
+use crate::calibration::{
+    Coefficient, PARAMETERS, ParameterMatrix, ParameterVector, Thermal, from_vector,
+    parameter_index, parameter_name, to_vector,
+};
+use crate::imu::{Nominal, PerSensor, Sensor, ThermalModel, ThermalState};
+
+/// Of triads that stay in the file's quantity.
+const ONE: PerSensor<Nominal> = PerSensor {
+    gyro: Nominal(Vector3::new(1.0, 1.0, 1.0)),
+    accel: Nominal(Vector3::new(1.0, 1.0, 1.0)),
+};
+
+/// Why there is no calibration at a temperature.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum TemperatureError {
+    /// It lies outside.
+    #[error(
+        "{found} °C, expected {lowest} to {highest} °C: outside that the polynomials of the {} are not known; \
+         calibrate at temperatures that reach there", .sensor.name()
+    )]
+    Outside {
+        /// Which triad.
+        sensor: Sensor,
+        /// The temperature.
+        found: f64,
+        /// Lowest of the range.
+        lowest: f64,
+        /// Highest of the range.
+        highest: f64,
+    },
+    /// A coefficient of what is no parameter, or of an order that does not exist.
+    #[error(
+        "`{0}` in temperature.coefficients is no parameter with a polynomial of order 1 to 5; correct the file"
+    )]
+    Unknown(String),
+}
+
+impl Calibration {
+    /// The same at one temperature of all axes, °C, that does not change: a calibration without temperature, with
+    /// the covariance that it has there. One that does not change with temperature is itself.
+    ///
+    /// # Errors
+    /// If that lies outside its range, or coefficients are of no parameter.
+    pub fn at_temperature(&self, temperature: f64) -> Result<Self, TemperatureError> {
+        let Some(thermal) = &self.temperature else {
+            return Ok(self.clone());
+        };
+        for sensor in Sensor::ALL {
+            let range = thermal.range.get(sensor);
+            if !range.contains(temperature, TOLERANCE) {
+                return Err(TemperatureError::Outside {
+                    sensor,
+                    found: temperature,
+                    lowest: range.lowest,
+                    highest: range.highest,
+                });
+            }
+        }
+        self.in_state(&thermal.range.everywhere(temperature, 0.0))
+    }
+
+    /// The same where the functions of temperature have these values.
+    ///
+    /// # Errors
+    /// If coefficients are of no parameter.
+    pub fn in_state(&self, state: &ThermalState) -> Result<Self, TemperatureError> {
+        let Some(thermal) = self.thermal(&ONE)? else {
+            return Ok(self.clone());
+        };
+        let form = self.installation_form.unwrap_or_default();
+        let places = self.parameters.iter();
+        let places: Vec<usize> = places
+            .filter_map(|name| parameter_index(form, name))
+            .collect();
+        let covariance = self.covariance_by(&ONE).unwrap_or_default();
+        let (change, covariance) = thermal.at(state, &covariance);
+        let moved = to_vector(&triads_of(self, &ONE, form)) + change;
+        let triads = from_vector(form, &moved);
+        let [gyro, accel] =
+            Sensor::ALL.map(|sensor| TriadRecord::new(triads.get(sensor), ONE.get(sensor)));
+        let sigma = covariance.diagonal().map(|v| v.max(0.0).sqrt());
+        let row = |&i: &usize| places.iter().map(|&j| covariance[(i, j)]).collect();
+        Ok(Self {
+            correction: self.correction.and(correction_of(&triads, &ONE)),
+            test_vectors: Vec::new(),
+            format: FORMAT.to_owned(),
+            temperature: None,
+            covariance: match self.covariance.is_empty() {
+                true => Vec::new(),
+                false => places.iter().map(row).collect(),
+            },
+            sigma: self
+                .sigma
+                .map(|_| TriadRecord::of_both_sigma(form, &sigma, &ONE)),
+            gyro,
+            accel,
+            ..self.clone()
+        })
+    }
+
+    /// Covariance of its parameters, normalised by nominal scales: by its σ alone where it gives no correlations, zero
+    /// where it claims nothing. `None` where it is not of the parameters that it names.
+    pub(crate) fn covariance_by(&self, nominal: &PerSensor<Nominal>) -> Option<ParameterMatrix> {
+        let form = self.installation_form.unwrap_or_default();
+        let factor = |index| factor(nominal, index);
+        if self.covariance.is_empty() && self.parameters.is_empty() {
+            let sigma = ParameterVector::from_fn(|index, _| {
+                let name = parameter_name(form, index);
+                let sigma = name.and_then(|name| self.sigma_of(&name).copied());
+                sigma.unwrap_or(0.0) / factor(index)
+            });
+            return Some(ParameterMatrix::from_diagonal(
+                &sigma.map(|sigma| sigma * sigma),
+            ));
+        }
+        let names = self.parameters.iter();
+        let places: Vec<usize> = names
+            .map(|name| parameter_index(form, name))
+            .collect::<Option<_>>()?;
+        let is_whole = |row: &Vec<f64>| row.len() == places.len();
+        if !self.covariance.iter().all(is_whole) || self.covariance.len() != places.len() {
+            return None;
+        }
+        let mut covariance = ParameterMatrix::zeros();
+        for (&i, row) in places.iter().zip(&self.covariance) {
+            for (&j, value) in places.iter().zip(row) {
+                covariance[(i, j)] = value / (factor(i) * factor(j));
+            }
+        }
+        Some(covariance)
+    }
+
+    /// How its parameters change with temperature, normalised by nominal scales; none where they do not.
+    ///
+    /// # Errors
+    /// If coefficients are of no parameter.
+    pub(crate) fn thermal(
+        &self,
+        nominal: &PerSensor<Nominal>,
+    ) -> Result<Option<Thermal>, TemperatureError> {
+        let Some(of) = &self.temperature else {
+            return Ok(None);
+        };
+        let form = self.installation_form.unwrap_or_default();
+        let coefficient = |record: &CoefficientRecord| {
+            let found = record.coefficient(form);
+            found.ok_or_else(|| TemperatureError::Unknown(record.parameter.clone()))
+        };
+        let coefficients = of.coefficients.iter().map(coefficient);
+        let coefficients: Vec<Coefficient> = coefficients.collect::<Result<_, _>>()?;
+        let n = coefficients.len();
+        let by = |k: usize| factor(nominal, coefficients[k].index());
+        let entry = |rows: &[Vec<f64>], i: usize, j: usize| {
+            rows.get(i)
+                .and_then(|row| row.get(j))
+                .copied()
+                .unwrap_or(0.0)
+        };
+        let mut cross = DMatrix::zeros(PARAMETERS, n);
+        for (row, name) in self.parameters.iter().enumerate() {
+            if let Some(index) = parameter_index(form, name) {
+                for k in 0..n {
+                    cross[(index, k)] = entry(&of.cross, row, k) / (factor(nominal, index) * by(k));
+                }
+            }
+        }
+        Ok(Some(Thermal {
+            // What was known before is not in a record.
+            model: ThermalModel {
+                range: of.range,
+                sigma: PerSensor::default(),
+            },
+            values: DVector::from_fn(n, |k, _| of.coefficients[k].value / by(k)),
+            covariance: DMatrix::from_fn(n, n, |i, j| {
+                entry(&of.covariance, i, j) / (by(i) * by(j))
+            }),
+            coefficients,
+            cross,
+        }))
+    }
+}
