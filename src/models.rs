@@ -9,20 +9,19 @@ mod instrument;
 mod machine;
 mod thermal;
 mod trajectory;
-mod values;
 
 use std::path::{Path, PathBuf};
 
 use serde::de::DeserializeOwned;
 
-use crate::shown::excerpt;
+use crate::formats::Document;
+use crate::formats::FileError;
 
 pub use catalogue::Embedded;
 pub use instrument::{InstallationModel, Instrument, Spread, Variation};
 pub use machine::{path, turntable};
 pub use thermal::ThermalVariation;
 pub use trajectory::trajectory;
-pub(crate) use values::{Finite, NonNegative, OneOrThree, Positive};
 
 /// A folder of models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -179,15 +178,8 @@ pub enum ModelError {
         source: std::io::Error,
     },
     /// A file that is not what it should be.
-    #[error("{file}{place}: {message}")]
-    Malformed {
-        /// The file.
-        file: String,
-        /// Line and column, where they are known.
-        place: String,
-        /// What the parser says, and the line if it is short enough.
-        message: String,
-    },
+    #[error(transparent)]
+    Malformed(#[from] FileError),
     /// Values that do not fit together.
     #[error("{file}: {message}")]
     Inconsistent {
@@ -234,24 +226,14 @@ impl Text {
     }
 
     pub(crate) fn parse<T: DeserializeOwned>(&self) -> Result<T, ModelError> {
-        toml::from_str(&self.text).map_err(|error| self.malformed(&error))
+        let document = self.document();
+        Ok(document.fill(document.parse()?)?)
     }
 
-    /// The parser's message without its picture of the line, which may be as long as the file.
-    fn malformed(&self, error: &toml::de::Error) -> ModelError {
-        let before = error.span().and_then(|span| self.text.get(..span.start));
-        let begun = before.map_or(0, |before| before.rfind('\n').map_or(0, |end| end + 1));
-        let place = before.map(|before| {
-            let line = 1 + before.matches('\n').count();
-            let column = 1 + before[begun..].chars().count();
-            format!(", line {line}, column {column}")
-        });
-        let line = self.text[begun..].lines().next().unwrap_or_default();
-        let line = before.map(|_| format!(", in `{}`", excerpt(line.trim())));
-        ModelError::Malformed {
-            file: self.file.clone(),
-            place: place.unwrap_or_default(),
-            message: excerpt(error.message()) + &line.unwrap_or_default(),
+    pub(crate) fn document(&self) -> Document<'_> {
+        Document {
+            file: Path::new(&self.file),
+            text: &self.text,
         }
     }
 
@@ -377,7 +359,7 @@ mod tests {
             (
                 Room::Installation,
                 "form = \"general\"\nangles_deg = { sigma = -1.0 }",
-                ["line 2", "found -1, expected a number above zero"],
+                ["line 2", "sigma = -1.0, expected a number above zero"],
             ),
             (
                 Room::Installation,
@@ -387,12 +369,12 @@ mod tests {
             (
                 Room::Installation,
                 "form = \"general\"\nangle_deg = { sigma = 1.0 }",
-                ["line 2", "expected `form` or `angles_deg`"],
+                ["line 2", "expected one of `form`, `angles_deg`"],
             ),
             (
                 Room::Imu,
                 "[gyro]\npulse_arcsec = \"fine\"",
-                ["line 2", "expected f64"],
+                ["line 2", "expected a finite number"],
             ),
             (
                 Room::Turntable,
@@ -400,7 +382,11 @@ mod tests {
                 ["line 3", "not all zero"],
             ),
             (Room::Turntable, "axis = []", ["without axes", "[[axis]]"]),
-            (Room::Path, "first_dwell_s = nan", ["line 1", "found NaN"]),
+            (
+                Room::Path,
+                "first_dwell_s = nan",
+                ["line 1", "first_dwell_s = nan"],
+            ),
             (Room::Path, "first_dwell_s = 1", ["[axes]", "[body]"]),
             (
                 Room::Scenario,

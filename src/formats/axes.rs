@@ -8,9 +8,10 @@ use nalgebra::Vector3;
 use crate::imu::AxisOrder;
 
 /// What x, y, z of a file are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) enum BodyAxes {
     /// Right, front, up.
+    #[default]
     Rfu,
     /// Front, right, down.
     Frd,

@@ -1,11 +1,13 @@
 //! `campaign.toml`: recordings of one instrument that are calibrated together.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::error::FileError;
-use super::fields::{Document, Field, Fields};
+use super::schema::{Celsius, Document, NonNegative};
 use super::small_file;
 use crate::calibration::{DayToDay, Group, TemperatureOptions, Together};
 use crate::imu::{HIGHEST_ORDER, InstallationForm, ParameterKind};
@@ -15,9 +17,6 @@ use crate::units::ARCSEC;
 
 /// The version of the format.
 const FORMAT: &str = "turncal-campaign/1";
-/// Temperatures that an instrument may have, °C.
-const LARGEST_TEMPERATURE: f64 = 100.0;
-
 /// Recordings of one instrument with what they have in common.
 #[derive(Debug, Clone)]
 pub struct Campaign {
@@ -29,10 +28,40 @@ pub struct Campaign {
     pub together: Together,
 }
 
-/// A recording as the file names it.
-struct Named {
-    path: PathBuf,
-    temperature: Option<f64>,
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CampaignFile {
+    /// Groups of parameters that each recording has for itself.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    own: Vec<String>,
+    temperature: Option<TemperatureFile>,
+    recording: Vec<RecordingFile>,
+    /// 1σ from one recording to the next.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    day_to_day: BTreeMap<String, NonNegative>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RecordingFile {
+    run: PathBuf,
+    temperature_degc: Option<Celsius>,
+}
+
+/// Whether parameters follow temperature, and how.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[serde(
+    untagged,
+    deny_unknown_fields,
+    expecting = "true, false, or a table with `highest_order` (1 to 5), `rate` and `reference_degc`"
+)]
+enum TemperatureFile {
+    Follows(bool),
+    With {
+        highest_order: Option<u8>,
+        rate: Option<bool>,
+        reference_degc: Option<Celsius>,
+    },
 }
 
 impl Campaign {
@@ -48,11 +77,9 @@ impl Campaign {
         let Ok(table) = document.parse() else {
             return false;
         };
-        let format = Fields::of(document, &table).get("format");
-        format.is_some_and(|field| {
-            let format = field.text();
-            format.is_ok_and(|format| format.starts_with("turncal-campaign/"))
-        })
+        let format = table.get_ref().get("format");
+        let format = format.and_then(|format| format.get_ref().as_str());
+        format.is_some_and(|format| format.starts_with("turncal-campaign/"))
     }
 
     /// Reads a campaign and its recordings, whose paths are relative to it.
@@ -68,17 +95,19 @@ impl Campaign {
             file: path,
             text: &text,
         };
-        let table = document.parse()?;
-        let known = ["format", "recording", "own", "day_to_day", "temperature"];
-        let top = Fields::top(document, &table, &known)?;
-        top.need("format", "the format of this file")?
-            .choice(&[(FORMAT, ())])?;
+        let mut file: CampaignFile = document.fill(document.of_format(FORMAT)?)?;
+        if file.recording.is_empty() {
+            return Err(document.missing("recording", ""));
+        }
         let directory = path.parent().unwrap_or(Path::new(""));
-        let mut named = recordings(&top, directory)?;
-        named.sort_by(|a, b| a.path.cmp(&b.path));
-        if let Some(pair) = named.windows(2).find(|pair| pair[0].path == pair[1].path) {
+        let named = &mut file.recording;
+        named
+            .iter_mut()
+            .for_each(|one| one.run = directory.join(&one.run));
+        named.sort_by(|a, b| a.run.cmp(&b.run));
+        if let Some(pair) = named.windows(2).find(|pair| pair[0].run == pair[1].run) {
             let advice = "Name every recording once.";
-            let found = format_args!("{} twice", pair[0].path.display());
+            let found = format_args!("{} twice", pair[0].run.display());
             let place = super::error::Place::File;
             return Err(FileError::new(
                 path,
@@ -88,25 +117,26 @@ impl Campaign {
                 advice,
             ));
         }
-        let temperature = temperature(&top)?;
+        let temperature = file
+            .temperature
+            .map(|of| temperature(document, of))
+            .transpose()?;
         let runs = named.par_iter().map(|named| {
-            let mut run = Run::read(&named.path)?;
+            let mut run = Run::read(&named.run)?;
             let of_meta = run.recording.meta.get("temperature_degc");
-            let stated = named
-                .temperature
-                .or_else(|| of_meta.and_then(|text| text.parse().ok()))
-                .filter(|t: &f64| t.abs() <= LARGEST_TEMPERATURE);
+            let of_meta = || Celsius::try_from(of_meta?.parse::<f64>().ok()?).ok();
+            let stated = named.temperature_degc.or_else(of_meta).map(|of| of.0);
             let of_run = &mut run.recording.imu.temperature;
             *of_run = of_run.take().or(stated.map(Temperature::constant));
             Ok(run)
         });
         let mut runs: Vec<Run> = runs.collect::<Result<_, FileError>>()?;
         doubt_stuck(&mut runs);
-        let day_to_day = day_to_day(&top, &runs)?;
+        let mut day_to_day = day_to_day(document, &file.day_to_day)?;
+        own_parameters(document, &file.own, &runs, &mut day_to_day)?;
         let temperature = match temperature {
-            Stated::Follows(options) => Some(options),
-            Stated::Constant => None,
-            Stated::NotSaid => {
+            Some(stated) => stated,
+            None => {
                 let known = |run: &Run| run.recording.imu.temperature.is_some();
                 runs.iter().all(known).then(TemperatureOptions::default)
             }
@@ -123,53 +153,34 @@ impl Campaign {
 }
 
 /// The `campaign.toml` of recordings with these paths, relative to it, that differ from day to day by this 1σ.
-pub fn campaign_text(paths: &[String], day_to_day: &DayToDay) -> String {
-    let mut text = format!("format = \"{FORMAT}\"\n");
-    for path in paths {
-        text += &format!(
-            "\n[[recording]]\nrun = {}\n",
-            toml::Value::from(path.as_str())
-        );
-    }
+pub fn campaign_text(paths: &[String], day_to_day: &DayToDay) -> Result<String, toml::ser::Error> {
     let lines = Group::all().filter_map(|group| {
         let (key, unit) = DayToDay::key(group);
-        let first = group
-            .parameters(InstallationForm::General)
-            .first()
-            .copied()?;
+        let first = *group.parameters(InstallationForm::General).first()?;
         Some((key, day_to_day.parameters[first] / unit))
     });
     let mounting = (MOUNTING.to_owned(), day_to_day.mounting / ARCSEC);
     let lines = lines.chain([mounting]).filter(|&(_, sigma)| sigma > 0.0);
-    let lines: Vec<String> = lines
-        .map(|(key, sigma)| format!("{key} = {}\n", three_digits(sigma)))
-        .collect();
-    if !lines.is_empty() {
-        text += "\n# 1σ from one recording to the next\n[day_to_day]\n";
-        text.extend(lines);
-    }
-    text
-}
-
-/// A number of three digits as TOML has it.
-fn three_digits(value: f64) -> String {
-    let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
-    format!("{rounded:?}")
-}
-
-fn recordings(top: &Fields, directory: &Path) -> Result<Vec<Named>, FileError> {
-    let known = ["run", "temperature_degc"];
-    let meaning = "a [[recording]] for each run, with run = \"its run.toml\"";
-    let tables = top.need_tables("recording", &known, meaning)?;
-    let recording = |fields: &Fields| {
-        let temperature = fields.get("temperature_degc");
-        let within = |field: Field| field.within(-LARGEST_TEMPERATURE, LARGEST_TEMPERATURE);
-        Ok(Named {
-            path: directory.join(fields.need("run", "the path of a run.toml")?.text()?),
-            temperature: temperature.map(within).transpose()?,
-        })
+    let recording = |path: &String| RecordingFile {
+        run: path.into(),
+        temperature_degc: None,
     };
-    tables.iter().map(recording).collect()
+    let file = CampaignFile {
+        own: Vec::new(),
+        temperature: None,
+        recording: paths.iter().map(recording).collect(),
+        day_to_day: lines
+            .map(|(key, sigma)| (key, three_digits(sigma)))
+            .collect(),
+    };
+    let text = toml::to_string(&file)?;
+    let comment = "\n# 1σ from one recording to the next\n[day_to_day]";
+    let text = text.replace("\n[day_to_day]", comment);
+    Ok(format!("format = \"{FORMAT}\"\n\n{text}"))
+}
+
+fn three_digits(value: f64) -> NonNegative {
+    NonNegative(format!("{value:.2e}").parse().unwrap_or(value))
 }
 
 /// Notes temperatures that never change where those of other recordings do.
@@ -204,39 +215,32 @@ fn doubt_stuck(runs: &mut [Run]) {
     }
 }
 
-/// What a campaign says of temperature.
-enum Stated {
-    Follows(TemperatureOptions),
-    Constant,
-    NotSaid,
-}
-
-fn temperature(top: &Fields) -> Result<Stated, FileError> {
-    let Some(field) = top.get("temperature") else {
-        return Ok(Stated::NotSaid);
-    };
-    if !field.is_table() {
-        return Ok(match field.flag()? {
-            true => Stated::Follows(TemperatureOptions::default()),
-            false => Stated::Constant,
-        });
+/// How parameters follow temperature; none if they do not.
+fn temperature(
+    document: Document,
+    stated: TemperatureFile,
+) -> Result<Option<TemperatureOptions>, FileError> {
+    let usual = TemperatureOptions::default();
+    match stated {
+        TemperatureFile::Follows(follows) => Ok(follows.then_some(usual)),
+        TemperatureFile::With {
+            highest_order: Some(order),
+            ..
+        } if !(1..=HIGHEST_ORDER).contains(&usize::from(order)) => {
+            let expected = format_args!("a whole number from 1 to {HIGHEST_ORDER}");
+            let path = "temperature.highest_order";
+            Err(document.wrong(path, expected, "Correct this value."))
+        }
+        TemperatureFile::With {
+            highest_order,
+            rate,
+            reference_degc,
+        } => Ok(Some(TemperatureOptions {
+            highest_order: highest_order.map_or(usual.highest_order, usize::from),
+            rate: rate.unwrap_or(usual.rate),
+            reference: reference_degc.map(|of| of.0).or(usual.reference),
+        })),
     }
-    let known = ["highest_order", "rate", "reference_degc"];
-    let Some(fields) = top.table("temperature", &known)? else {
-        return Ok(Stated::NotSaid);
-    };
-    let mut options = TemperatureOptions::default();
-    if let Some(field) = fields.get("highest_order") {
-        let highest = field.within(1.0, HIGHEST_ORDER as f64)?;
-        options.highest_order = highest.round() as usize;
-    }
-    if let Some(field) = fields.get("rate") {
-        options.rate = field.flag()?;
-    }
-    if let Some(field) = fields.get("reference_degc") {
-        options.reference = Some(field.within(-LARGEST_TEMPERATURE, LARGEST_TEMPERATURE)?);
-    }
-    Ok(Stated::Follows(options))
 }
 
 /// The key of the mounting in `[day_to_day]`.
@@ -252,47 +256,49 @@ fn own_name(group: Group) -> String {
     format!("{}.{kind}", group.sensor().name())
 }
 
-/// 1σ by which recordings differ.
-fn day_to_day(top: &Fields, runs: &[Run]) -> Result<DayToDay, FileError> {
-    let form = InstallationForm::General;
-    let mut of_recordings = DayToDay::default();
-    let sigma = &mut of_recordings.parameters;
+/// 1σ by which recordings differ, from a table `[day_to_day]`.
+pub(crate) fn day_to_day(
+    document: Document,
+    stated: &BTreeMap<String, NonNegative>,
+) -> Result<DayToDay, FileError> {
     let keys: Vec<(String, f64)> = Group::all().map(DayToDay::key).collect();
     let known = keys.iter().map(|(key, _)| key.as_str());
     let known: Vec<&str> = known.chain([MOUNTING]).collect();
-    if let Some(fields) = top.table("day_to_day", &known)? {
-        if let Some(field) = fields.get(MOUNTING) {
-            of_recordings.mounting = field.not_negative()? * ARCSEC;
-        }
-        for (group, (key, unit)) in Group::all().zip(&keys) {
-            if let Some(field) = fields.get(key) {
-                let stated = field.not_negative()? * unit;
-                group
-                    .parameters(form)
-                    .into_iter()
-                    .for_each(|i| sigma[i] = stated);
-            }
+    document.only("day_to_day", stated.keys(), &known)?;
+    let mut differ = DayToDay::default();
+    for (group, (key, unit)) in Group::all().zip(&keys) {
+        for i in group.parameters(InstallationForm::General) {
+            differ.parameters[i] = stated.get(key).map_or(0.0, |sigma| sigma.0 * unit);
         }
     }
-    let Some(field) = top.get("own") else {
-        return Ok(of_recordings);
-    };
-    for name in field.texts()? {
+    differ.mounting = stated.get(MOUNTING).map_or(0.0, |sigma| sigma.0 * ARCSEC);
+    Ok(differ)
+}
+
+/// What differs as much as instruments do has nothing in common.
+fn own_parameters(
+    document: Document,
+    own: &[String],
+    runs: &[Run],
+    day_to_day: &mut DayToDay,
+) -> Result<(), FileError> {
+    let form = InstallationForm::General;
+    for name in own {
         let Some(group) = Group::all().find(|&group| own_name(group) == *name) else {
             let known: Vec<String> = Group::all().map(own_name).collect();
-            return Err(field.error(
+            return Err(document.wrong(
+                "own",
                 format_args!("names among {}", known.join(", ")),
                 "Name groups of parameters that each recording has for itself.",
             ));
         };
-        // What differs as much as instruments do has nothing in common.
         for i in group.parameters(form) {
             let (sensor, of_triad) = crate::calibration::sensor_and_parameter(i);
             let prior = runs
                 .first()
                 .map(|run| run.instrument.prior.get(sensor).sigma(form));
-            sigma[i] = prior.map_or(0.0, |prior| prior[of_triad]);
+            day_to_day.parameters[i] = prior.map_or(0.0, |prior| prior[of_triad]);
         }
     }
-    Ok(of_recordings)
+    Ok(())
 }

@@ -4,14 +4,13 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::axes::BodyAxes;
 use super::clock::{Breaks, Clock};
-use super::error::FileError;
-use super::fields::{Field, Fields};
-use super::imu_log::{ImuLog, TimeStamp};
-use super::quantity::{OUTPUTS, units};
-use super::source::{Source, accel_from};
-use super::temperature::TemperatureColumns;
+use super::error::{FileError, list, suggestion};
+use super::imu_log::ImuLog;
+use super::quantity::units;
+use super::schema::{Document, ImuFile, OneOrThree, PriorFile, RunFile, TermFile};
+use super::source::{Source, accel_from, clock};
+use super::temperature::{TemperatureColumns, TemperatureUnit};
 use crate::imu::NoiseKeys;
 use crate::imu::{
     GaussMarkov, Instrument, MotionNoise, Noise, Nominal, Output, PerSensor, Prior, Sensor, Term,
@@ -34,31 +33,7 @@ const WIDEST_SCALE: f64 = 10.0;
 /// 1σ of a bias beyond the range of any instrument, rad/s or m/s².
 const WIDEST_BIAS: f64 = 1e6;
 /// Beyond any error of an angle, ″.
-pub(super) const HALF_TURN: f64 = 648_000.0;
-
-/// Keys of `[imu]`.
-const KEYS: [&str; 20] = [
-    "file",
-    "stream",
-    "salvage",
-    "accel_from",
-    "output",
-    "gyro_unit",
-    "accel_unit",
-    "gyro_full_scale",
-    "accel_full_scale",
-    "time_unit",
-    "sample_period_s",
-    "time_stamp",
-    "continuous",
-    "instance",
-    "temperature_unit",
-    "body_axes",
-    "columns",
-    "noise",
-    "prior",
-    "terms",
-];
+const HALF_TURN: f64 = 648_000.0;
 
 /// What `[imu]` and the tables below it say.
 pub(super) struct InstrumentFields<'a> {
@@ -69,66 +44,61 @@ pub(super) struct InstrumentFields<'a> {
 }
 
 impl<'a> InstrumentFields<'a> {
-    /// Reads the fields; remarks on those without effect go to `notes`.
-    pub fn of_fields(
-        top: &Fields<'a>,
+    /// Remarks on what is assumed or without effect go to `notes`.
+    pub fn of_file(
+        document: Document,
+        run: &'a RunFile,
         directory: &Path,
         notes: &mut Vec<String>,
     ) -> Result<Self, FileError> {
-        let fields = top.need_table("imu", &KEYS, "the instrument and its record")?;
-        let (output, axes) = output_and_axes(&fields)?;
-        let columns = fields.need_table(
-            "columns",
-            &["time", "gyro", "accel", "temperature"],
-            "the names of the columns",
+        let imu = &run.imu;
+        let known = knowledge(document, imu, notes)?;
+        let mut of_gyro = clock(
+            document,
+            "imu",
+            imu.columns.time.as_ref(),
+            (imu.time_unit, imu.sample_period_s),
         )?;
-        let temperature = TemperatureColumns::of_fields(&fields, &columns)?;
-
-        let instance = instance(&fields)?;
-        let mut clock = Clock::of_fields(&fields, &columns)?;
-        let source = Source::of_fields(&fields, directory, None)?;
-        let accel_from = accel_from(&fields, directory, &source, clock)?;
-        check_instance(&fields, accel_from.is_some(), instance)?;
-        clock.breaks = allowed_breaks(top, accel_from.is_some());
-        let without_period = clock.column.is_none() && clock.period.is_none();
-        if without_period {
-            check_without_period(top, &columns, output)?;
-            clock.period = Some(USUAL_PERIOD);
+        let source = Source::of_fields(directory, &imu.file, &imu.stream, imu.salvage);
+        let accel_from = accel_from(document, imu, directory, &source, of_gyro)?;
+        if let (Some(of), Some(_)) = (&imu.instance, &accel_from) {
+            let meaning = format!(
+                "one instrument without `{}`, as accel_from needs",
+                of.column
+            );
+            return Err(document.missing("imu.stream", &meaning));
         }
-        let full_scale = |name| fields.get(name).map(|field| field.positive()).transpose();
-
-        let mut known = knowledge(&fields, output, axes, notes)?;
-        let three = |name| -> Result<[&'a str; 3], FileError> {
-            columns
-                .need(name, "the names of three columns")?
-                .three_texts()
+        of_gyro.breaks = match run.turntable.is_some() || run.segments.is_some() {
+            _ if accel_from.is_some() => Breaks::None,
+            true => Breaks::Pauses,
+            false => Breaks::Settings,
         };
+        let without_period = with_usual_period(document, run, &mut of_gyro)?;
+        let columns = &imu.columns;
+        let names = |names: &'a [String; 3]| names.each_ref().map(String::as_str);
         let log = ImuLog {
             source,
-            clock,
+            clock: of_gyro,
             accel_from,
-            instance,
+            instance: (imu.instance.as_ref()).map(|of| (of.column.as_str(), of.number.0)),
             triads: PerSensor {
-                gyro: three("gyro")?,
-                accel: three("accel")?,
+                gyro: names(&columns.gyro),
+                accel: names(&columns.accel),
             },
-            temperature,
-            output,
-            axes,
-            stamp: fields
-                .need("time_stamp", "which moment of a sample its time names")?
-                .choice(&TimeStamp::WORDS)?,
-            continuous: match fields.get("continuous") {
-                Some(field) => field.flag()?,
-                None => true,
-            },
+            temperature: columns.temperature.as_ref().map(|column| {
+                let unit = imu.temperature_unit.unwrap_or(TemperatureUnit::WORDS[0].1);
+                TemperatureColumns::of_fields(column, unit)
+            }),
+            output: imu.output,
+            axes: imu.body_axes.unwrap_or_default(),
+            stamp: imu.time_stamp,
+            continuous: imu.continuous.unwrap_or(true),
             nominal: known.nominal,
             full_scale: PerSensor {
-                gyro: full_scale("gyro_full_scale")?,
-                accel: full_scale("accel_full_scale")?,
+                gyro: imu.gyro_full_scale.map(|of| of.0),
+                accel: imu.accel_full_scale.map(|of| of.0),
             },
         };
-        known.term_sigma = term_sigma(&fields)?;
         Ok(Self {
             log,
             known,
@@ -137,301 +107,259 @@ impl<'a> InstrumentFields<'a> {
     }
 }
 
-/// Units, nominal scales, priors and noise of both triads, with every error term off.
+/// The usual period where none is stated; how long a row lasts can only be found of rates that stand alone.
+fn with_usual_period(
+    document: Document,
+    run: &RunFile,
+    clock: &mut Clock,
+) -> Result<bool, FileError> {
+    if clock.column.is_some() || clock.period.is_some() {
+        return Ok(false);
+    }
+    if run.imu.output != Output::Rate || run.turntable.is_some() {
+        let meaning = "the name of a column; rows of pulses or increments, or rows beside a [turntable], need it, \
+                       or else sample_period_s";
+        return Err(document.missing("imu.columns.time", meaning));
+    }
+    clock.period = Some(USUAL_PERIOD);
+    Ok(true)
+}
+
+/// Units, nominal scales, priors, noise and error terms.
 fn knowledge(
-    imu: &Fields,
-    output: Output,
-    axes: BodyAxes,
+    document: Document,
+    imu: &ImuFile,
     notes: &mut Vec<String>,
 ) -> Result<Instrument, FileError> {
-    let priors = imu.table("prior", &["gyro", "accel"])?;
-    let priors = priors.as_ref();
-    let gyro = triad(imu, priors, Sensor::Gyro, (output, axes), notes)?;
-    let accel = triad(imu, priors, Sensor::Accel, (output, axes), notes)?;
-    let (noise, motion_noise) = noise(imu, notes)?;
-    let noise_is_stated = |sensor| {
-        let noise = imu
-            .get("noise")
-            .map(|noise| noise.has(NoiseKeys::of(sensor).random_walk.0));
-        noise.unwrap_or(false)
+    let unit = PerSensor {
+        gyro: imu.gyro_unit.clone(),
+        accel: imu.accel_unit.clone(),
     };
+    let gyro = nominal(document, imu, Sensor::Gyro, &unit.gyro)?;
+    let accel = nominal(document, imu, Sensor::Accel, &unit.accel)?;
+    let axes = imu.body_axes.unwrap_or_default();
+    let names = Sensor::ALL.map(|sensor| NoiseKeys::of(sensor).names());
+    document.only("imu.noise", imu.noise.keys(), names.as_flattened())?;
+    let (gyro_noise, gyro_in_moves) = noise(document, imu, Sensor::Gyro, notes)?;
+    let (accel_noise, accel_in_moves) = noise(document, imu, Sensor::Accel, notes)?;
     Ok(Instrument {
-        nominal: PerSensor {
-            gyro: gyro.nominal,
-            accel: accel.nominal,
-        },
-        unit: PerSensor {
-            gyro: gyro.unit,
-            accel: accel.unit,
-        },
         prior: PerSensor {
-            gyro: gyro.prior,
-            accel: accel.prior,
+            gyro: prior(document, imu, Sensor::Gyro, gyro, notes)?,
+            accel: prior(document, imu, Sensor::Accel, accel, notes)?,
         },
-        noise,
-        noise_is_stated: PerSensor::from_fn(noise_is_stated),
-        motion_noise,
-        term_sigma: TermVector::zeros(),
+        nominal: PerSensor {
+            gyro: Nominal(axes.each(gyro)),
+            accel: Nominal(axes.each(accel)),
+        },
+        unit,
+        noise: PerSensor {
+            gyro: gyro_noise,
+            accel: accel_noise,
+        },
+        noise_is_stated: PerSensor::from_fn(|sensor| {
+            imu.noise.contains_key(NoiseKeys::of(sensor).random_walk.0)
+        }),
+        motion_noise: PerSensor {
+            gyro: gyro_in_moves,
+            accel: accel_in_moves,
+        },
+        term_sigma: term_sigma(document, "imu.terms", &imu.terms)?,
     })
 }
 
-/// The column that tells instruments apart, and what it says of the one that is meant.
-fn instance<'a>(imu: &Fields<'a>) -> Result<Option<(&'a str, f64)>, FileError> {
-    let Some(of) = imu.table("instance", &["column", "number"])? else {
-        return Ok(None);
-    };
-    Ok(Some((
-        of.need("column", "the column that tells instruments apart")?
-            .text()?,
-        of.need("number", "what it says of the one that is meant")?
-            .number()?,
-    )))
-}
-
-/// Rows of several instruments cannot be one of two streams.
-fn check_instance(
-    imu: &Fields,
-    has_accel_from: bool,
-    instance: Option<(&str, f64)>,
-) -> Result<(), FileError> {
-    match instance {
-        Some((column, _)) if has_accel_from => Err(imu.missing(
-            "stream",
-            &format!("one instrument without `{column}`, as accel_from needs"),
-        )),
-        _ => Ok(()),
-    }
-}
-
-/// What a row holds, and along which axes.
-fn output_and_axes(imu: &Fields) -> Result<(Output, BodyAxes), FileError> {
-    let output = imu
-        .need("output", "what a row holds: pulse, increment or rate")?
-        .choice(&OUTPUTS)?;
-    let axes = match imu.get("body_axes") {
-        Some(field) => field.choice(&BodyAxes::WORDS)?,
-        None => BodyAxes::Rfu,
-    };
-    Ok((output, axes))
-}
-
-/// What times may do, by the other records that are put beside the instrument's.
-fn allowed_breaks(top: &Fields, has_accel_from: bool) -> Breaks {
-    let told = ["turntable", "segments"];
-    match told.iter().any(|name| top.get(name).is_some()) {
-        _ if has_accel_from => Breaks::None,
-        true => Breaks::Pauses,
-        false => Breaks::Settings,
-    }
-}
-
-/// How long a row lasts can only be found of rates that stand alone.
-fn check_without_period(top: &Fields, columns: &Fields, output: Output) -> Result<(), FileError> {
-    match output == Output::Rate && top.get("turntable").is_none() {
-        true => Ok(()),
-        false => Err(columns.missing(
-            "time",
-            "the name of a column; rows of pulses or increments, or rows beside a [turntable], need it, or else \
-             sample_period_s",
-        )),
-    }
-}
-
-/// 1σ of the parameters of the terms that `[imu.terms]` switches on.
-fn term_sigma(imu: &Fields) -> Result<TermVector, FileError> {
+/// 1σ of the parameters of the terms that a table of them switches on, in SI; zero for the others.
+pub(crate) fn term_sigma(
+    document: Document,
+    table: &str,
+    terms: &std::collections::BTreeMap<String, TermFile>,
+) -> Result<TermVector, FileError> {
+    document.only(table, terms.keys(), &Term::NAMES)?;
     let mut sigma = TermVector::zeros();
-    let Some(terms) = imu.table("terms", &Term::NAMES)? else {
-        return Ok(sigma);
-    };
     for term in Term::ALL {
-        let meaning = "1σ of each of its parameters";
-        if let Some(fields) = terms.table(term.name(), &["sigma"])? {
-            let unit = term.entry().unit.1;
-            let most = (term.entry().largest / unit).round();
-            let given = fields.need("sigma", meaning)?.positive_to(most)?;
-            for parameter in term.parameters() {
-                sigma[parameter] = given * unit;
-            }
+        let Some(TermFile { sigma: stated }) = terms.get(term.name()) else {
+            continue;
+        };
+        let unit = term.entry().unit.1;
+        let most = (term.entry().largest / unit).round();
+        if stated.0 > most {
+            let path = format!("{table}.{}.sigma", term.name());
+            let expected = format_args!("a number above zero, at most {most}");
+            return Err(document.wrong(&path, expected, "Correct this value."));
+        }
+        for parameter in term.parameters() {
+            sigma[parameter] = stated.0 * unit;
         }
     }
     Ok(sigma)
 }
 
-/// Noise of both triads at rest and in moves; zero where it is not stated.
+/// Noise of a triad at rest and in moves; zero where it is not stated.
 fn noise(
-    imu: &Fields,
-    notes: &mut Vec<String>,
-) -> Result<(PerSensor<Noise>, PerSensor<MotionNoise>), FileError> {
-    let keys = Sensor::ALL.map(NoiseKeys::of);
-    let known = keys.map(NoiseKeys::names);
-    let Some(fields) = imu.table("noise", known.as_flattened())? else {
-        return Ok((PerSensor::default(), PerSensor::default()));
-    };
-    let mut triad = |keys: NoiseKeys| {
-        let ((walk, walk_unit), (sigma, sigma_unit)) = (keys.random_walk, keys.gauss_markov);
-        let former = fields
-            .get(keys.former)
-            .filter(|_| fields.get(sigma).is_none());
-        if former.is_some() {
-            notes.push(format!(
-                "imu.noise.{} is read as the 1σ of a Gauss–Markov bias, not as the floor of the Allan \
-                 deviation that data sheets call instability; write {sigma}.",
-                keys.former
-            ));
-        }
-        let time = keys.correlation_time;
-        let gauss_markov = match (fields.get(sigma).or(former), fields.get(time)) {
-            (None, None) => None,
-            (Some(sigma), Some(time)) => Some(GaussMarkov {
-                sigma: sigma.positive()? * sigma_unit,
-                correlation_time: time.positive()?,
-            }),
-            (Some(_), None) => return Err(fields.missing(time, "its correlation time")),
-            (None, Some(_)) => {
-                return Err(fields.missing(sigma, "the 1σ of the Gauss–Markov bias"));
-            }
-        };
-        let or_zero = |name: &str| match fields.get(name) {
-            Some(field) => field.not_negative(),
-            None => Ok(0.0),
-        };
-        let (by_duration, unit) = keys.by_duration;
-        Ok((
-            Noise {
-                random_walk: or_zero(walk)? * walk_unit,
-                gauss_markov,
-            },
-            MotionNoise {
-                by_motion: or_zero(keys.by_motion)?,
-                by_duration: or_zero(by_duration)? * unit,
-            },
-        ))
-    };
-    let [of_gyro, of_accel] = keys;
-    let (gyro, gyro_in_moves) = triad(of_gyro)?;
-    let (accel, accel_in_moves) = triad(of_accel)?;
-    let in_moves = PerSensor {
-        gyro: gyro_in_moves,
-        accel: accel_in_moves,
-    };
-    Ok((PerSensor { gyro, accel }, in_moves))
-}
-
-/// Unit, nominal scale and prior of a triad, along right-front-up.
-struct TriadKnowledge {
-    unit: String,
-    nominal: Nominal,
-    prior: Prior,
-}
-
-fn triad(
-    imu: &Fields,
-    priors: Option<&Fields>,
+    document: Document,
+    imu: &ImuFile,
     sensor: Sensor,
-    (output, axes): (Output, BodyAxes),
     notes: &mut Vec<String>,
-) -> Result<TriadKnowledge, FileError> {
-    let unit = imu.need(&format!("{}_unit", sensor.name()), "the unit of a row")?;
-    let unit_scale = unit.choice(units(sensor, output))?;
-    let names = [
-        "scale",
-        "scale_sigma_ppm",
-        "installation_sigma_arcsec",
-        "bias",
-        "bias_sigma",
-    ];
-    let fields = priors.map(|priors| priors.table(sensor.name(), &names));
-    let fields = fields.transpose()?.flatten();
-    let get = |name| fields.as_ref().and_then(|fields| fields.get(name));
-    let nominal = match (get("scale"), unit_scale) {
-        (Some(field), unit_scale) => {
-            let scale = field.triple()?;
-            check_scale(&field, scale, unit_scale)?;
-            scale
+) -> Result<(Noise, MotionNoise), FileError> {
+    let keys = NoiseKeys::of(sensor);
+    let get = |name: &str| imu.noise.get(name).map(|value| value.0);
+    let (sigma, sigma_unit) = keys.gauss_markov;
+    let former = get(keys.former).filter(|_| get(sigma).is_none());
+    if former.is_some() {
+        notes.push(format!(
+            "imu.noise.{} is read as the 1σ of a Gauss–Markov bias, not as the floor of the Allan \
+             deviation that data sheets call instability; write {sigma}.",
+            keys.former
+        ));
+    }
+    let key = former.map_or(sigma, |_| keys.former);
+    let time = keys.correlation_time;
+    let gauss_markov = match (get(key), get(time)) {
+        (None, None) => None,
+        (Some(sigma), Some(correlation_time)) => {
+            for (name, value) in [(key, sigma), (time, correlation_time)] {
+                if value <= 0.0 {
+                    let path = format!("imu.noise.{name}");
+                    let expected = "a number above zero";
+                    return Err(document.wrong(&path, expected, "Correct this value."));
+                }
+            }
+            Some(GaussMarkov {
+                sigma: sigma * sigma_unit,
+                correlation_time,
+            })
         }
-        (None, Some(unit_scale)) => Vector3::repeat(unit_scale),
-        (None, None) => {
-            let meaning =
-                "counts per second for one rad/s or m/s², for a count has no size of its own";
-            let name = format!("prior.{}.scale", sensor.name());
-            return Err(match &fields {
-                Some(fields) => fields.missing("scale", meaning),
-                None => imu.missing(&name, meaning),
-            });
+        (Some(_), None) => {
+            let path = format!("imu.noise.{time}");
+            return Err(document.missing(&path, "its correlation time"));
         }
+        (None, Some(_)) => {
+            let path = format!("imu.noise.{sigma}");
+            return Err(document.missing(&path, "the 1σ of the Gauss–Markov bias"));
+        }
+    };
+    let or_zero = |(name, unit): (&str, f64)| get(name).unwrap_or(0.0) * unit;
+    Ok((
+        Noise {
+            random_walk: or_zero(keys.random_walk),
+            gauss_markov,
+        },
+        MotionNoise {
+            by_motion: or_zero((keys.by_motion, 1.0)),
+            by_duration: or_zero(keys.by_duration),
+        },
+    ))
+}
+
+fn prior_of(imu: &ImuFile, sensor: Sensor) -> &PriorFile {
+    match sensor {
+        Sensor::Gyro => &imu.prior.gyro,
+        Sensor::Accel => &imu.prior.accel,
+    }
+}
+
+/// The file's quantity per second for one rad/s or m/s², along the file's axes.
+fn nominal(
+    document: Document,
+    imu: &ImuFile,
+    sensor: Sensor,
+    unit: &str,
+) -> Result<Vector3<f64>, FileError> {
+    let known = units(sensor, imu.output);
+    let names = || known.iter().map(|&(name, _)| name);
+    let Some(&(_, of_unit)) = known.iter().find(|(name, _)| *name == unit) else {
+        return Err(document.wrong(
+            &format!("imu.{}_unit", sensor.name()),
+            format_args!("one of {}", list(names())),
+            suggestion(unit, names(), "Choose one of them."),
+        ));
+    };
+    let path = format!("imu.prior.{}.scale", sensor.name());
+    match (prior_of(imu, sensor).scale.map(OneOrThree::vector), of_unit) {
+        (None, Some(of_unit)) => Ok(Vector3::repeat(of_unit)),
+        (None, None) => Err(document.missing(
+            &path,
+            "counts per second for one rad/s or m/s², for a count has no size of its own",
+        )),
+        (Some(scale), _) if scale.iter().any(|&s| s == 0.0) => {
+            Err(document.wrong(&path, "no zeros", "Give the data sheet's scale factor."))
+        }
+        (Some(scale), Some(of_unit))
+            if !scale
+                .iter()
+                .all(|s| (0.5..=2.0).contains(&(s.abs() / of_unit))) =>
+        {
+            Err(document.wrong(
+                &path,
+                format_args!("about {of_unit}, which this unit says for one rad/s or m/s²"),
+                "Correct the scale or the unit, or leave the scale out.",
+            ))
+        }
+        (Some(scale), _) => Ok(scale),
+    }
+}
+
+/// The prior of a triad of this nominal scale, along right-front-up; what is not stated is wide.
+fn prior(
+    document: Document,
+    imu: &ImuFile,
+    sensor: Sensor,
+    nominal: Vector3<f64>,
+    notes: &mut Vec<String>,
+) -> Result<Prior, FileError> {
+    let (file, axes) = (prior_of(imu, sensor), imu.body_axes.unwrap_or_default());
+    let bias = file.bias.map_or_else(Vector3::zeros, OneOrThree::vector);
+    let usual_bias = nominal.abs() * *USUAL_BIAS.get(sensor);
+    let bias_words = match sensor {
+        Sensor::Gyro => "bias ± 2 °/s",
+        Sensor::Accel => "bias ± 1 m/s²",
     };
     let mut assumed = Vec::new();
-    let mut sigma =
-        |name, most: f64, (usual, unit): (Vector3<f64>, f64), words: &str| match get(name) {
-            Some(field) => field.positive_triple_to(most),
-            None => {
-                assumed.push(words.to_owned());
-                Ok(usual / unit)
-            }
+    let mut sigma = |key: &str, stated: Option<OneOrThree>, most: f64, usual, words| {
+        let Some(stated) = stated.map(OneOrThree::vector) else {
+            assumed.push(words);
+            return Ok(usual);
         };
-    let bias = match get("bias") {
-        Some(field) => field.triple()?,
-        None => Vector3::zeros(),
+        match stated.iter().all(|&s| s > 0.0 && s <= most) {
+            true => Ok(stated),
+            false => Err(document.wrong(
+                &format!("imu.prior.{}.{key}", sensor.name()),
+                format_args!("numbers above zero, at most {most}"),
+                "Correct this value.",
+            )),
+        }
     };
-    let usual_bias = *USUAL_BIAS.get(sensor);
     let scale_sigma = sigma(
         "scale_sigma_ppm",
+        file.scale_sigma_ppm,
         WIDEST_SCALE / PPM,
-        (Vector3::repeat(USUAL_SCALE), PPM),
+        Vector3::repeat(USUAL_SCALE / PPM),
         "scale factor ± 5 %",
     )?;
     let installation_sigma = sigma(
         "installation_sigma_arcsec",
+        file.installation_sigma_arcsec,
         HALF_TURN,
-        (Vector3::repeat(USUAL_INSTALLATION), ARCSEC),
+        Vector3::repeat(USUAL_INSTALLATION / ARCSEC),
         "misalignment ± 2°",
     )?;
     let bias_sigma = sigma(
         "bias_sigma",
+        file.bias_sigma,
         WIDEST_BIAS * nominal.amax(),
-        (nominal.abs() * usual_bias, 1.0),
-        match sensor {
-            Sensor::Gyro => "bias ± 2 °/s",
-            Sensor::Accel => "bias ± 1 m/s²",
-        },
+        usual_bias,
+        bias_words,
     )?;
     if !assumed.is_empty() {
-        let name = sensor.name();
         notes.push(format!(
-            "run.toml does not state everything in [imu.prior.{name}]. turncal assumed (1σ): {}.",
+            "run.toml does not state everything in [imu.prior.{}]. turncal assumed (1σ): {}.",
+            sensor.name(),
             assumed.join(", ")
         ));
     }
-    Ok(TriadKnowledge {
-        unit: unit.text()?.to_owned(),
-        nominal: Nominal(axes.each(nominal)),
-        prior: Prior {
-            scale_sigma: axes.each(scale_sigma) * PPM,
-            installation_sigma: axes.each(installation_sigma) * ARCSEC,
-            bias: axes.vector(bias.component_div(&nominal)),
-            bias_sigma: axes.each(bias_sigma.component_div(&nominal.abs())),
-        },
+    Ok(Prior {
+        scale_sigma: axes.each(scale_sigma) * PPM,
+        installation_sigma: axes.each(installation_sigma) * ARCSEC,
+        bias: axes.vector(bias.component_div(&nominal)),
+        bias_sigma: axes.each(bias_sigma.component_div(&nominal.abs())),
     })
-}
-
-/// A scale factor is never zero, and where the unit gives it, never far from that.
-fn check_scale(
-    field: &Field,
-    scale: Vector3<f64>,
-    unit_scale: Option<f64>,
-) -> Result<(), FileError> {
-    if scale.iter().any(|&s| s == 0.0) {
-        return Err(field.error("no zeros", "Give the data sheet's scale factor."));
-    }
-    if let Some(unit_scale) = unit_scale
-        && scale
-            .iter()
-            .any(|s| !(0.5..=2.0).contains(&(s.abs() / unit_scale)))
-    {
-        return Err(field.error(
-            format_args!("about {unit_scale}, which this unit says for one rad/s or m/s²"),
-            "Correct the scale or the unit, or leave the scale out.",
-        ));
-    }
-    Ok(())
 }

@@ -2,26 +2,20 @@
 
 use std::path::Path;
 
+use serde::Deserialize;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
 use super::error::{FileError, Place as At, list};
-use super::fields::{Document, Field, Fields};
+use super::schema::{Document, Finite, NonNegative};
 use super::small_file;
 use crate::certificate::{Condition, Contact, Day, DecisionRule, Equipment, Laboratory, Place};
 
 /// The version of the format.
 const FORMAT: &str = "turncal-laboratory/1";
 
-const CONTACT: [&str; 7] = [
-    "name",
-    "street",
-    "post_code",
-    "city",
-    "country",
-    "email",
-    "phone",
-];
-
 /// Table, field and meaning of what ISO/IEC 17025 asks for in every certificate.
-const REQUIRED: [(&str, &str, &str); 21] = [
+const REQUIRED: [(&str, &str, &str); 22] = [
     ("laboratory", "name", "the laboratory"),
     ("laboratory", "street", "its address"),
     ("laboratory", "city", "its address"),
@@ -45,6 +39,11 @@ const REQUIRED: [(&str, &str, &str); 21] = [
     ("item", "state", "the state in which it was received"),
     ("method", "procedure", "the laboratory's procedure"),
     (
+        "conditions",
+        "temperature_degc",
+        "the air's temperature and its uncertainty",
+    ),
+    (
         "traceability",
         "statement",
         "how results are traceable to the SI",
@@ -52,6 +51,86 @@ const REQUIRED: [(&str, &str, &str); 21] = [
     ("authorised", "name", "who authorises the certificate"),
     ("authorised", "function", "and as what"),
 ];
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LaboratoryFile {
+    laboratory: Contact,
+    customer: Contact,
+    certificate: CertificateFile,
+    item: ItemFile,
+    method: MethodFile,
+    conditions: ConditionsFile,
+    traceability: TraceabilityFile,
+    authorised: AuthorisedFile,
+    decision: Option<DecisionFile>,
+    remarks: Option<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CertificateFile {
+    number: String,
+    issued: Day,
+    received: Option<Day>,
+    begin: Day,
+    end: Day,
+    place: Place,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ItemFile {
+    name: String,
+    manufacturer: Option<String>,
+    /// As the run states it where this file does not.
+    model: Option<String>,
+    serial: Option<String>,
+    state: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MethodFile {
+    procedure: String,
+    deviations: Option<String>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ConditionsFile {
+    temperature_degc: ConditionFile,
+    humidity_percent: Option<ConditionFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ConditionFile {
+    value: Finite,
+    uncertainty: NonNegative,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TraceabilityFile {
+    statement: String,
+    /// Name, serial number and certificate of each.
+    #[serde(default)]
+    equipment: Vec<[String; 3]>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct AuthorisedFile {
+    name: String,
+    function: String,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct DecisionFile {
+    rule: Option<DecisionRule>,
+}
 
 impl Laboratory {
     /// Reads and checks a lab.toml. `meta` holds what the run said of the item, by which `[item]` is completed.
@@ -67,272 +146,134 @@ impl Laboratory {
             file: path,
             text: &text,
         };
-        let table = document.parse()?;
-        let tables = [
-            "format",
-            "laboratory",
-            "customer",
-            "certificate",
-            "item",
-            "method",
-            "conditions",
-            "traceability",
-            "authorised",
-            "decision",
-            "remarks",
-        ];
-        let top = Fields::top(document, &table, &tables)?;
-        top.need("format", "the format of this file")?
-            .choice(&[(FORMAT, ())])?;
-        let read = Tables {
-            laboratory: top.table("laboratory", &CONTACT)?,
-            customer: top.table("customer", &CONTACT)?,
-            certificate: top.table(
-                "certificate",
-                &["number", "issued", "received", "begin", "end", "place"],
-            )?,
-            item: top.table(
-                "item",
-                &["name", "manufacturer", "model", "serial", "state"],
-            )?,
-            method: top.table("method", &["procedure", "deviations"])?,
-            conditions: top.table("conditions", &["temperature_degc", "humidity_percent"])?,
-            traceability: top.table("traceability", &["statement", "equipment"])?,
-            authorised: top.table("authorised", &["name", "function"])?,
-            decision: top.table("decision", &["rule"])?,
-            meta: &meta,
-        };
-        read.check(path)?;
-        let remarks = top
-            .get("remarks")
-            .map(|field| text_of(&field))
-            .transpose()?;
-        read.laboratory(remarks)
-    }
-}
-
-struct Tables<'a, M> {
-    laboratory: Option<Fields<'a>>,
-    customer: Option<Fields<'a>>,
-    certificate: Option<Fields<'a>>,
-    item: Option<Fields<'a>>,
-    method: Option<Fields<'a>>,
-    conditions: Option<Fields<'a>>,
-    traceability: Option<Fields<'a>>,
-    authorised: Option<Fields<'a>>,
-    decision: Option<Fields<'a>>,
-    meta: &'a M,
-}
-
-impl<'a, M: Fn(&str) -> Option<String>> Tables<'a, M> {
-    fn table(&self, name: &str) -> Option<&Fields<'a>> {
-        let of = match name {
-            "laboratory" => &self.laboratory,
-            "customer" => &self.customer,
-            "certificate" => &self.certificate,
-            "item" => &self.item,
-            "method" => &self.method,
-            "conditions" => &self.conditions,
-            "traceability" => &self.traceability,
-            _ => &self.authorised,
-        };
-        of.as_ref()
-    }
-
-    fn field(&self, table: &str, name: &str) -> Option<Field<'a>> {
-        self.table(table)?.get(name)
-    }
-
-    /// What the run itself says of the item.
-    fn of_run(&self, table: &str, name: &str) -> Option<String> {
-        match (table, name) {
-            ("item", "model") => (self.meta)("instrument"),
-            ("item", "serial") => (self.meta)("serial"),
-            _ => None,
+        let of_item = [("model", meta("instrument")), ("serial", meta("serial"))];
+        let mut table = document.of_format(FORMAT)?;
+        check_complete(path, table.get_ref(), &of_item)?;
+        let values = table.get_mut().iter_mut();
+        for (name, value) in values.filter(|(name, _)| name.get_ref() != "conditions") {
+            document.as_written(value);
+            say_something(document, name.get_ref(), value)?;
         }
-    }
-
-    fn check(&self, path: &Path) -> Result<(), FileError> {
-        let temperature = (
-            "conditions",
-            "temperature_degc",
-            "the air's temperature and its uncertainty",
-        );
-        let required = REQUIRED.into_iter().chain([temperature]);
-        let missing: Vec<String> = required
-            .filter(|(table, name, _)| {
-                self.field(table, name).is_none() && self.of_run(table, name).is_none()
-            })
-            .map(|(table, name, meaning)| format!("{table}.{name} ({meaning})"))
-            .collect();
-        if missing.is_empty() {
-            return Ok(());
-        }
-        let fields = match missing.len() {
-            1 => "1 required field".to_owned(),
-            count => format!("{count} required fields"),
-        };
-        let missing = list(missing.iter().map(String::as_str));
-        Err(FileError::new(
-            path,
-            At::File,
-            format_args!("{fields} missing"),
-            format_args!("what ISO/IEC 17025, 7.8.2 and 7.8.4, ask for: {missing}"),
-            "Add what is missing.",
-        ))
-    }
-
-    fn needed(&self, table: &str, name: &str) -> Result<String, FileError> {
-        match self.field(table, name) {
-            Some(field) => text_of(&field),
-            None => Ok(self.of_run(table, name).unwrap_or_default()),
-        }
-    }
-
-    fn optional(&self, table: &str, name: &str) -> Result<Option<String>, FileError> {
-        self.field(table, name)
-            .map(|field| text_of(&field))
-            .transpose()
-    }
-
-    fn contact(&self, table: &str) -> Result<Contact, FileError> {
-        let country = self.needed(table, "country")?;
-        let two = country.len() == 2 && country.bytes().all(|b| b.is_ascii_uppercase());
-        if let Some(field) = self.field(table, "country").filter(|_| !two) {
-            let expected = "two capital letters of ISO 3166-1, such as \"DE\"";
-            return Err(field.error(expected, "Correct this value."));
-        }
-        Ok(Contact {
-            name: self.needed(table, "name")?,
-            street: self.needed(table, "street")?,
-            post_code: self.optional(table, "post_code")?,
-            city: self.needed(table, "city")?,
-            country,
-            email: self.optional(table, "email")?,
-            phone: self.optional(table, "phone")?,
-        })
-    }
-
-    fn day(&self, name: &str) -> Result<Option<Day>, FileError> {
-        let Some(field) = self.field("certificate", name) else {
-            return Ok(None);
-        };
-        let day = Day::parse(&field.as_written()?);
-        let expected = "a day such as 2026-03-31";
-        Ok(Some(day.ok_or_else(|| {
-            field.error(expected, "Correct this value.")
-        })?))
-    }
-
-    fn needed_day(&self, name: &str) -> Result<Day, FileError> {
-        let missing = || {
-            let at = self.certificate.as_ref();
-            at.map(|at| at.missing(name, "a day"))
-        };
-        match self.day(name)? {
-            Some(day) => Ok(day),
-            // `check` has seen it.
-            None => Err(missing().unwrap_or_else(|| {
-                FileError::new(Path::new(""), At::File, "no day", "a day", "Add it.")
-            })),
-        }
-    }
-
-    fn condition(&self, name: &str) -> Result<Option<Condition>, FileError> {
-        let Some(conditions) = &self.conditions else {
-            return Ok(None);
-        };
-        let Some(fields) = conditions.table(name, &["value", "uncertainty"])? else {
-            return Ok(None);
-        };
-        Ok(Some(Condition {
-            value: fields.need("value", "what was measured")?.number()?,
-            uncertainty: fields
-                .need("uncertainty", "expanded uncertainty, k = 2")?
-                .not_negative()?,
-        }))
-    }
-
-    fn equipment(&self) -> Result<Vec<Equipment>, FileError> {
-        let Some(field) = self.field("traceability", "equipment") else {
-            return Ok(Vec::new());
-        };
-        let expected = "lists of three texts: name, serial number, certificate";
-        let wrong = || field.error(expected, "Correct this value.");
-        let rows = field.rows_of_texts().ok_or_else(wrong)?;
-        rows.into_iter()
-            .map(|row| match <[&str; 3]>::try_from(row) {
-                Ok([name, serial, certificate]) => Ok(Equipment {
-                    name: name.to_owned(),
-                    serial: serial.to_owned(),
-                    certificate: certificate.to_owned(),
-                }),
-                Err(_) => Err(wrong()),
-            })
-            .collect()
-    }
-
-    fn laboratory(&self, remarks: Option<String>) -> Result<Laboratory, FileError> {
-        let places = [
-            ("laboratory", Place::Laboratory),
-            ("customer", Place::Customer),
-            ("laboratory-branch", Place::LaboratoryBranch),
-            ("other", Place::Other),
-        ];
-        let place = self.field("certificate", "place");
-        let place = place.map(|field| field.choice(&places)).transpose()?;
-        let performed = (self.needed_day("begin")?, self.needed_day("end")?);
-        let issued = self.needed_day("issued")?;
-        if let Some(field) = self.field("certificate", "end")
-            && (performed.1 < performed.0 || issued < performed.1)
-        {
+        let file: LaboratoryFile = document.fill(table)?;
+        let [(_, model), (_, serial)] = of_item;
+        let days = &file.certificate;
+        if days.end < days.begin || days.issued < days.end {
             let expected = "begin, end and issued in this order";
-            return Err(field.error(expected, "Correct these days."));
+            return Err(document.wrong("certificate.end", expected, "Correct these days."));
         }
-        let rules = [
-            ("guard-band", DecisionRule::GuardBand),
-            ("simple-acceptance", DecisionRule::SimpleAcceptance),
-        ];
-        let rule = self.decision.as_ref().and_then(|of| of.get("rule"));
-        Ok(Laboratory {
-            contact: self.contact("laboratory")?,
-            customer: self.contact("customer")?,
-            number: self.needed("certificate", "number")?,
-            issued,
-            received: self.day("received")?,
-            performed,
-            place: place.unwrap_or(Place::Laboratory),
-            item: self.needed("item", "name")?,
-            manufacturer: self.optional("item", "manufacturer")?,
-            model: self.needed("item", "model")?,
-            serial: self.needed("item", "serial")?,
-            state: self.needed("item", "state")?,
-            procedure: self.needed("method", "procedure")?,
-            deviations: self.optional("method", "deviations")?,
-            temperature: self.condition("temperature_degc")?.unwrap_or(Condition {
-                value: f64::NAN,
-                uncertainty: f64::NAN,
-            }),
-            humidity: self.condition("humidity_percent")?,
-            traceability: self.needed("traceability", "statement")?,
-            equipment: self.equipment()?,
-            authorised: (
-                self.needed("authorised", "name")?,
-                self.needed("authorised", "function")?,
-            ),
-            rule: rule.map(|field| field.choice(&rules)).transpose()?,
-            remarks,
-        })
+        for (of, contact) in [
+            ("laboratory", &file.laboratory),
+            ("customer", &file.customer),
+        ] {
+            let country = &contact.country;
+            if country.len() != 2 || !country.bytes().all(|b| b.is_ascii_uppercase()) {
+                let expected = "two capital letters of ISO 3166-1, such as \"DE\"";
+                let path = format!("{of}.country");
+                return Err(document.wrong(&path, expected, "Correct this value."));
+            }
+        }
+        Ok(file.laboratory(model, serial))
     }
 }
 
-/// A text that says something: white space is put in order, as a page and XML want it.
-fn text_of(field: &Field) -> Result<String, FileError> {
-    let text = field.as_written()?;
-    let words: Vec<&str> = text.split_whitespace().collect();
-    match words.is_empty() {
-        true => Err(field.error("a text that is not empty", "Complete this value.")),
-        false => Ok(words.join(" ")),
+/// Names every required field that is missing.
+fn check_complete(
+    path: &Path,
+    table: &DeTable,
+    of_item: &[(&str, Option<String>)],
+) -> Result<(), FileError> {
+    let is_there = |of: &str, name: &str| {
+        let of_run = of_item
+            .iter()
+            .any(|(item, of_run)| *item == name && of_run.is_some());
+        let fields = table.get(of).and_then(|fields| fields.get_ref().as_table());
+        fields.is_some_and(|fields| fields.contains_key(name)) || (of == "item" && of_run)
+    };
+    let missing: Vec<String> = REQUIRED
+        .into_iter()
+        .filter(|(of, name, _)| !is_there(of, name))
+        .map(|(of, name, meaning)| format!("{of}.{name} ({meaning})"))
+        .collect();
+    let fields = match missing.len() {
+        0 => return Ok(()),
+        1 => "1 required field".to_owned(),
+        count => format!("{count} required fields"),
+    };
+    let missing = list(missing.iter().map(String::as_str));
+    Err(FileError::new(
+        path,
+        At::File,
+        format_args!("{fields} missing"),
+        format_args!("what ISO/IEC 17025, 7.8.2 and 7.8.4, ask for: {missing}"),
+        "Add what is missing.",
+    ))
+}
+
+/// Texts are not empty, and white space in them is put in order, as a page and XML want it.
+fn say_something(
+    document: Document,
+    path: &str,
+    value: &mut Spanned<DeValue>,
+) -> Result<(), FileError> {
+    match value.get_mut() {
+        DeValue::Table(fields) => {
+            let mut fields = fields.iter_mut();
+            fields.try_for_each(|(name, value)| {
+                say_something(document, &format!("{path}.{}", name.get_ref()), value)
+            })
+        }
+        DeValue::String(text) => {
+            let words: Vec<&str> = text.split_whitespace().collect();
+            if words.is_empty() {
+                let expected = "a text that is not empty";
+                return Err(document.wrong(path, expected, "Complete this value."));
+            }
+            *text = words.join(" ").into();
+            Ok(())
+        }
+        _ => Ok(()),
+    }
+}
+
+impl LaboratoryFile {
+    fn laboratory(self, model: Option<String>, serial: Option<String>) -> Laboratory {
+        let condition = |of: ConditionFile| Condition {
+            value: of.value.0,
+            uncertainty: of.uncertainty.0,
+        };
+        let equipment = |[name, serial, certificate]: [String; 3]| Equipment {
+            name,
+            serial,
+            certificate,
+        };
+        Laboratory {
+            contact: self.laboratory,
+            customer: self.customer,
+            number: self.certificate.number,
+            issued: self.certificate.issued,
+            received: self.certificate.received,
+            performed: (self.certificate.begin, self.certificate.end),
+            place: self.certificate.place,
+            item: self.item.name,
+            manufacturer: self.item.manufacturer,
+            model: self.item.model.or(model).unwrap_or_default(),
+            serial: self.item.serial.or(serial).unwrap_or_default(),
+            state: self.item.state,
+            procedure: self.method.procedure,
+            deviations: self.method.deviations,
+            temperature: condition(self.conditions.temperature_degc),
+            humidity: self.conditions.humidity_percent.map(condition),
+            traceability: self.traceability.statement,
+            equipment: self
+                .traceability
+                .equipment
+                .into_iter()
+                .map(equipment)
+                .collect(),
+            authorised: (self.authorised.name, self.authorised.function),
+            rule: self.decision.and_then(|of| of.rule),
+            remarks: self.remarks,
+        }
     }
 }
 
@@ -361,7 +302,6 @@ mod tests {
         for (table, name, _) in REQUIRED {
             assert!(empty.contains(&format!("{table}.{name}")), "{table}.{name}");
         }
-        assert!(empty.contains("conditions.temperature_degc"));
         let without = LAB.replace("number = ", "# number = ");
         let message = read(&without).unwrap_err().to_string();
         assert!(message.contains("certificate.number") && !message.contains("customer"));

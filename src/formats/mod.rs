@@ -14,7 +14,6 @@ mod door;
 pub mod draft;
 pub(crate) mod error;
 pub mod export;
-mod fields;
 mod imu_log;
 mod instrument;
 mod job;
@@ -28,6 +27,7 @@ mod plausible;
 mod quantity;
 mod read;
 mod rows;
+mod schema;
 mod segments;
 mod sheet;
 mod small_file;
@@ -49,6 +49,9 @@ pub use job::{JOB_FILE, Job, JobKind, Part};
 pub use lot_directory::{LotDirectory, read_part_unit, unit_key};
 pub use parts::{Parts, part_is_there, write_part};
 pub(crate) use quantity::unit_scale;
+pub(crate) use schema::{
+    Document, Finite, Latitude, NonNegative, OneOrThree, Positive, TermFile, day_to_day, term_sigma,
+};
 pub(crate) use sheet::Sheet;
 pub(crate) use whole::write_whole_with;
 pub use whole::{WholeDirectory, abandon_unfinished, write_whole};

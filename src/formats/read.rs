@@ -3,45 +3,23 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use serde::Deserialize;
+use toml::Spanned;
+use toml::de::DeTable;
+
 use super::draft::motion::Motion;
 use super::error::{FileError, Place};
-use super::fields::{Document, Fields};
 use super::instrument::InstrumentFields;
+use super::schema::{Document, FORMAT, META, Positive, RunFile, StandstillFile};
 use super::segments;
 use super::small_file;
 use super::table_log::TableLogFile;
 use crate::earth::Site;
-use crate::imu::{NoiseKeys, Output, PerSensor, Sensor};
+use crate::imu::{Instrument, NoiseKeys, Output, PerSensor, Sensor};
 use crate::noise;
 use crate::recording::{ImuSamples, Recording, faults, nanoseconds};
 use crate::run::{Run, SET_BY_HAND, Standstill};
 use crate::units::{ARCSEC, DEGREE, MILLIGAL, PPM};
-
-/// The version of the format of `run.toml`.
-pub(super) const FORMAT: &str = "turncal-run/1";
-
-/// Fields of `[meta]`.
-pub(super) const META: [&str; 8] = [
-    "instrument",
-    "serial",
-    "operator",
-    "date",
-    "temperature_degc",
-    "laboratory",
-    "table",
-    "notes",
-];
-
-/// The fields of `run.toml` itself.
-const TABLES: [&str; 7] = [
-    "format",
-    "site",
-    "meta",
-    "imu",
-    "standstill",
-    "turntable",
-    "segments",
-];
 
 impl Run {
     /// Reads `run.toml` and the files that it names, relative to itself.
@@ -60,19 +38,17 @@ impl Run {
         source: Option<&Path>,
     ) -> Result<Self, FileError> {
         let document = Document { file: path, text };
-        let table = document.parse()?;
-        let top = Fields::top(document, &table, &TABLES)?;
-        top.need("format", "the format of this file")?
-            .choice(&[(FORMAT, ())])?;
+        let file = run_file(document)?;
         let directory = path.parent().unwrap_or(Path::new(""));
         let mut notes = Vec::new();
-
-        let site = site(&top, &mut notes)?;
-        let meta = meta(&top)?;
-        let instrument = InstrumentFields::of_fields(&top, directory, &mut notes)?;
-        let standstill = standstill(&top)?;
-        let table_log = TableLogFile::of_fields(&top, directory, &mut notes)?;
-        let (segments_file, segment_sigma) = labels(&top, directory)?.unzip();
+        let site = site(document, &file, &mut notes)?;
+        let instrument = InstrumentFields::of_file(document, &file, directory, &mut notes)?;
+        let table_log = file
+            .turntable
+            .as_ref()
+            .map(|fields| TableLogFile::of_fields(document, fields, directory, &mut notes));
+        let table_log = table_log.transpose()?;
+        let segments_file = file.segments.as_ref().map(|of| directory.join(&of.file));
 
         // The small files' fields are checked before the large files are read.
         let mut files: Vec<PathBuf> = source.map(Path::to_owned).into_iter().collect();
@@ -80,34 +56,19 @@ impl Run {
         files.extend(other_file(&instrument));
         files.extend(table_log.as_ref().map(|log| log.source.file.clone()));
         files.extend(segments_file.clone());
-        let mut imu = instrument.log.read(&mut notes)?;
-        if instrument.without_period {
-            imu = with_found_period(imu, &instrument, &mut notes)?;
-        }
-        notes.extend(faults::notes(&imu));
-        notes.extend(clock_note(&imu, &instrument));
-        let mut known = instrument.known;
-        let without_noise = |sensor: &Sensor| !known.noise_is_stated.get(*sensor);
-        for sensor in Sensor::ALL.into_iter().filter(without_noise) {
-            let random_walk = noise::white_noise(&imu, sensor);
-            known.noise.get_mut(sensor).random_walk = random_walk;
-            notes.push(noise_note(sensor, random_walk));
-        }
-        let accuracy = table_log.as_ref().map(|log| log.accuracy);
-        let table = table_log
-            .map(|log| log.read(&imu, &mut notes))
-            .transpose()?;
-        let segments = match segments_file {
-            Some(file) => {
-                let log = &instrument.log;
-                segments::read(&file, &imu, log.stamp.lag(), log.axes, &mut notes)?
-            }
-            None => Vec::new(),
-        };
-        let run = Self {
+        let imu = samples(&instrument, &mut notes)?;
+        let known = with_noise(&instrument, &imu, &mut notes);
+        let table = (table_log.as_ref()).map(|log| log.read(&imu, &mut notes));
+        let table = table.transpose()?;
+        let log = &instrument.log;
+        let segments = segments_file
+            .map(|file| segments::read(&file, &imu, log.stamp.lag(), log.axes, &mut notes));
+        let segments = segments.transpose()?.unwrap_or_default();
+        let position_sigma = file.segments.and_then(|of| of.position_sigma_deg);
+        let mut run = Self {
             recording: Recording {
                 name: name(path),
-                meta,
+                meta: file.meta,
                 imu,
                 table,
                 segments,
@@ -116,12 +77,13 @@ impl Run {
             },
             instrument: known,
             site,
-            table: accuracy.unwrap_or_default(),
-            standstill,
-            segment_sigma: segment_sigma.unwrap_or(SET_BY_HAND),
+            table: table_log.map_or_else(Default::default, |log| log.accuracy),
+            standstill: standstill(&file.standstill),
+            segment_sigma: position_sigma.map_or(SET_BY_HAND, |sigma| sigma.0 * DEGREE),
         };
         let doubts = run.doubts();
-        Ok(run.with_notes(doubts))
+        run.recording.notes.extend(doubts);
+        Ok(run)
     }
 
     /// `[meta]` of a `run.toml` alone, for a run whose logs cannot be read.
@@ -134,14 +96,67 @@ impl Run {
             file: path,
             text: &text,
         };
-        let table = document.parse()?;
-        meta(&Fields::of(document, &table))
+        #[derive(Deserialize)]
+        struct Meta {
+            #[serde(default)]
+            meta: BTreeMap<String, String>,
+        }
+        let Meta { meta } = fill(document, document.parse()?)?;
+        Ok(meta)
     }
+}
 
-    fn with_notes(mut self, notes: Vec<String>) -> Self {
-        self.recording.notes.extend(notes);
-        self
+/// The fields of a `run.toml`.
+fn run_file(document: Document) -> Result<RunFile, FileError> {
+    fill(document, document.of_format(FORMAT)?)
+}
+
+/// The same with numbers and dates of `[meta]` as they are written.
+fn fill<'a, T: Deserialize<'a>>(
+    document: Document<'a>,
+    mut table: Spanned<DeTable<'a>>,
+) -> Result<T, FileError> {
+    if let Some(meta) = table.get_mut().get_mut("meta") {
+        document.as_written(meta);
+        let names = meta
+            .get_ref()
+            .as_table()
+            .into_iter()
+            .flat_map(DeTable::keys);
+        document.only("meta", names.map(|name| name.get_ref().as_ref()), &META)?;
     }
+    document.fill(table)
+}
+
+/// The samples of the record, and what they show against what is stated.
+fn samples(
+    instrument: &InstrumentFields,
+    notes: &mut Vec<String>,
+) -> Result<ImuSamples, FileError> {
+    let mut imu = instrument.log.read(notes)?;
+    if instrument.without_period {
+        imu = with_found_period(imu, instrument, notes)?;
+    }
+    notes.extend(faults::notes(&imu));
+    notes.extend(clock_note(&imu, instrument));
+    Ok(imu)
+}
+
+/// What is known of the instrument, white noise that is not stated being what the record shows.
+fn with_noise(
+    instrument: &InstrumentFields,
+    imu: &ImuSamples,
+    notes: &mut Vec<String>,
+) -> Instrument {
+    let mut known = instrument.known.clone();
+    for sensor in Sensor::ALL {
+        if !known.noise_is_stated.get(sensor) {
+            let random_walk = noise::white_noise(imu, sensor);
+            known.noise.get_mut(sensor).random_walk = random_walk;
+            notes.push(noise_note(sensor, random_walk));
+        }
+    }
+    known
 }
 
 /// The file of the accelerometers, if it is another than that of the gyros.
@@ -247,55 +262,38 @@ const USUAL_HEIGHT: f64 = 500.0;
 /// How much gravity falls with height, (m/s²)/m.
 const FREE_AIR: f64 = 0.3086 * MILLIGAL;
 
-fn site(top: &Fields, notes: &mut Vec<String>) -> Result<Site, FileError> {
-    let known = [
-        "latitude_deg",
-        "longitude_deg",
-        "height_m",
-        "gravity_m_s2",
-        "gravity_sigma_mgal",
-    ];
-    let fields = top.table("site", &known)?;
-    let get = |name| fields.as_ref().and_then(|fields| fields.get(name));
-    let degrees = |name, low, high| -> Result<Option<f64>, FileError> {
-        let field = get(name).map(|field| field.within(low, high));
-        Ok(field.transpose()?.map(|degrees| degrees * DEGREE))
-    };
-    let latitude = degrees("latitude_deg", -90.0, 90.0)?;
-    if latitude.is_none() && top.get("turntable").is_some() {
+fn site(document: Document, run: &RunFile, notes: &mut Vec<String>) -> Result<Site, FileError> {
+    let file = &run.site;
+    if file.latitude_deg.is_none() && run.turntable.is_some() {
         let meaning = "a latitude, north positive: beside a [turntable] Earth rate must be known";
-        return Err(match &fields {
-            Some(fields) => fields.missing("latitude_deg", meaning),
-            None => top.missing("site.latitude_deg", meaning),
-        });
+        return Err(document.missing("site.latitude_deg", meaning));
     }
-    let longitude = degrees("longitude_deg", -180.0, 360.0)?.unwrap_or(0.0);
-    // From the shore of the Dead Sea to above any laboratory.
-    let height = get("height_m").map(|field| field.within(-500.0, 9000.0));
-    let height = height.transpose()?;
-    let mut site = match latitude {
-        Some(latitude) => Site::with_normal_gravity(latitude, longitude, height.unwrap_or(0.0)),
+    let longitude = file.longitude_deg.map_or(0.0, |degrees| degrees.0 * DEGREE);
+    let height = file.height_m.map(|height| height.0);
+    let mut site = match file.latitude_deg {
+        Some(degrees) => {
+            Site::with_normal_gravity(degrees.0 * DEGREE, longitude, height.unwrap_or(0.0))
+        }
         None => Site::unknown(),
     };
     if height.is_none() {
         site.gravity_sigma = site.gravity_sigma.hypot(FREE_AIR * USUAL_HEIGHT);
     }
-    let gravity = get("gravity_m_s2");
-    if let Some(field) = &gravity {
-        let gravity = field.within(9.7, 9.9)?;
-        site = site.with_gravity(gravity, stated_gravity_sigma(&field.as_written()?));
+    if let Some(gravity) = &file.gravity_m_s2 {
+        let sigma = stated_gravity_sigma(document.written(gravity.span()));
+        site = site.with_gravity(gravity.get_ref().0, sigma);
     }
-    if let Some(field) = get("gravity_sigma_mgal") {
-        site.gravity_sigma = field.within(0.0, 1e5)? * MILLIGAL;
+    if let Some(sigma) = file.gravity_sigma_mgal {
+        site.gravity_sigma = sigma.0 * MILLIGAL;
     }
-    if latitude.is_none() {
+    if !site.is_known {
         notes.push(
             "run.toml does not state latitude_deg in [site]. turncal estimates Earth rate as an unknown vector, which \
              widens the σ of the gyro biases."
                 .to_owned(),
         );
     }
-    if gravity.is_none() && (latitude.is_none() || height.is_none()) {
+    if file.gravity_m_s2.is_none() && (!site.is_known || height.is_none()) {
         notes.push(format!(
             "run.toml does not state the place in [site]. turncal assumed a gravity of {:.4} ± {:.4} m/s², which widens \
              the σ of the accelerometer scale factors by as much. State latitude_deg and height_m, or gravity_m_s2.",
@@ -314,52 +312,15 @@ fn stated_gravity_sigma(written: &str) -> f64 {
     MILLIGAL.max(last / 12f64.sqrt())
 }
 
-fn meta(top: &Fields) -> Result<BTreeMap<String, String>, FileError> {
-    match top.table("meta", &META)? {
-        Some(fields) => fields
-            .all()
-            .map(|(name, field)| Ok((name.to_owned(), field.as_written()?)))
-            .collect(),
-        None => Ok(BTreeMap::new()),
+fn standstill(file: &StandstillFile) -> Standstill {
+    let usual = Standstill::default();
+    let or = |stated: Option<Positive>, usual| stated.map_or(usual, |stated| stated.0);
+    Standstill {
+        sigma: PerSensor {
+            gyro: (file.attitude_sigma_arcsec.map(|sigma| sigma.0 * ARCSEC)).or(usual.sigma.gyro),
+            accel: (file.velocity_sigma_m_s.map(|sigma| sigma.0)).or(usual.sigma.accel),
+        },
+        turning: (file.turning_deg_per_sqrt_s).map_or(usual.turning, |of| of.0 * DEGREE),
+        position_sigma: or(file.position_sigma_m, usual.position_sigma),
     }
-}
-
-/// The file of labelled sections and how well they are set.
-fn labels(top: &Fields, directory: &Path) -> Result<Option<(PathBuf, f64)>, FileError> {
-    let Some(fields) = top.table("segments", &["file", "position_sigma_deg"])? else {
-        return Ok(None);
-    };
-    let file = directory.join(fields.need("file", "a file name")?.text()?);
-    let sigma = match fields.get("position_sigma_deg") {
-        Some(field) => field.positive()? * DEGREE,
-        None => SET_BY_HAND,
-    };
-    Ok(Some((file, sigma)))
-}
-
-fn standstill(top: &Fields) -> Result<Standstill, FileError> {
-    let mut standstill = Standstill::default();
-    if let Some(fields) = top.table(
-        "standstill",
-        &[
-            "velocity_sigma_m_s",
-            "attitude_sigma_arcsec",
-            "turning_deg_per_sqrt_s",
-            "position_sigma_m",
-        ],
-    )? {
-        if let Some(field) = fields.get("velocity_sigma_m_s") {
-            standstill.sigma.accel = Some(field.positive()?);
-        }
-        if let Some(field) = fields.get("attitude_sigma_arcsec") {
-            standstill.sigma.gyro = Some(field.positive()? * ARCSEC);
-        }
-        if let Some(field) = fields.get("turning_deg_per_sqrt_s") {
-            standstill.turning = field.not_negative()? * DEGREE;
-        }
-        if let Some(field) = fields.get("position_sigma_m") {
-            standstill.position_sigma = field.positive()?;
-        }
-    }
-    Ok(standstill)
 }

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use super::clock::Clock;
+use super::clock::{Breaks, Clock, TimeUnit};
 use super::csv_file::CsvFile;
 use super::error::{FileError, Place};
-use super::fields::Fields;
 use super::rows::LogRows;
+use super::schema::{Document, ImuFile, Positive, TimeColumn};
 use super::streams::{self, StreamRows};
 
 /// Where rows come from.
@@ -49,59 +49,81 @@ impl Source<'_> {
 }
 
 impl<'a> Source<'a> {
-    /// Reads `file`, `stream` and `salvage` of a table; what it does not say is as in the other.
+    /// What a table says of its file.
     pub fn of_fields(
-        fields: &Fields<'a>,
         directory: &Path,
-        other: Option<&Source<'a>>,
-    ) -> Result<Self, FileError> {
-        let file = match (fields.get("file"), other) {
-            (None, Some(other)) => other.file.clone(),
-            _ => directory.join(fields.need("file", "a file name")?.text()?),
-        };
-        let stream = fields.get("stream").map(|field| field.text()).transpose()?;
-        let salvage = fields
-            .get("salvage")
-            .map(|field| field.flag())
-            .transpose()?;
-        Ok(Self {
-            file,
-            stream: stream.or(other.and_then(|other| other.stream)),
-            salvage: salvage
-                .or(other.map(|other| other.salvage))
-                .unwrap_or(false),
-        })
+        file: &str,
+        stream: &'a Option<String>,
+        salvage: Option<bool>,
+    ) -> Self {
+        Self {
+            file: directory.join(file),
+            stream: stream.as_deref(),
+            salvage: salvage.unwrap_or(false),
+        }
     }
+}
+
+/// The clock that a table says of its rows.
+pub(super) fn clock<'a>(
+    document: Document,
+    table: &str,
+    column: Option<&'a TimeColumn>,
+    (unit, period): (Option<TimeUnit>, Option<Positive>),
+) -> Result<Clock<'a>, FileError> {
+    if unit == Some(TimeUnit::Count) && period.is_none() {
+        return Err(document.missing(&format!("{table}.sample_period_s"), "what a count lasts"));
+    }
+    let seconds = TimeUnit::PerSecond(1.0);
+    let (column, nanoseconds) = match column {
+        None => (None, None),
+        Some(TimeColumn::One(column)) => (Some(column.as_str()), None),
+        Some(TimeColumn::SecondsAndNanoseconds([seconds, rest])) => {
+            (Some(seconds.as_str()), Some(rest.as_str()))
+        }
+    };
+    if nanoseconds.is_some() && unit.is_some_and(|unit| unit != seconds) {
+        let path = format!("{table}.time_unit");
+        return Err(document.wrong(&path, "`s`", "Choose it, or leave it out."));
+    }
+    Ok(Clock {
+        column,
+        nanoseconds,
+        unit: unit.unwrap_or(seconds),
+        period: period.map(|period| period.0),
+        breaks: Breaks::None,
+    })
 }
 
 /// Where the accelerometers are, if not in the rows of the gyros, and their clock.
 pub(super) fn accel_from<'a>(
-    imu: &Fields<'a>,
+    document: Document,
+    imu: &'a ImuFile,
     directory: &Path,
     gyro: &Source<'a>,
-    clock: Clock<'a>,
+    of_gyro: Clock<'a>,
 ) -> Result<Option<(Source<'a>, Clock<'a>)>, FileError> {
-    let known = [
-        "file",
-        "stream",
-        "salvage",
-        "time",
-        "time_unit",
-        "sample_period_s",
-    ];
-    let Some(fields) = imu.table("accel_from", &known)? else {
+    let Some(fields) = &imu.accel_from else {
         return Ok(None);
     };
-    let source = Source::of_fields(&fields, directory, Some(gyro))?;
-    let mut of_accel = Clock::of_fields(&fields, &fields)?;
-    if of_accel.column.is_none() {
-        (of_accel.column, of_accel.nanoseconds) = (clock.column, clock.nanoseconds);
+    let source = Source {
+        file: (fields.file.as_ref()).map_or_else(|| gyro.file.clone(), |file| directory.join(file)),
+        stream: fields.stream.as_deref().or(gyro.stream),
+        salvage: fields.salvage.unwrap_or(gyro.salvage),
+    };
+    let stated = (fields.time_unit, fields.sample_period_s);
+    let mut clock = clock(document, "imu.accel_from", fields.time.as_ref(), stated)?;
+    if clock.column.is_none() {
+        (clock.column, clock.nanoseconds) = (of_gyro.column, of_gyro.nanoseconds);
     }
-    if fields.get("time_unit").is_none() {
-        of_accel.unit = clock.unit;
+    if fields.time_unit.is_none() {
+        clock.unit = of_gyro.unit;
     }
-    if of_accel.column.is_none() {
-        return Err(fields.missing("time", "the column of its time, for two streams need both"));
+    match clock.column {
+        Some(_) => Ok(Some((source, clock))),
+        None => Err(document.missing(
+            "imu.accel_from.time",
+            "the column of its time, for two streams need both",
+        )),
     }
-    Ok(Some((source, of_accel)))
 }

@@ -1,9 +1,12 @@
 //! `specification.toml`: within which limits units of a type must be.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
+use serde::Deserialize;
+
 use super::error::FileError;
-use super::fields::{Document, Field, Fields};
+use super::schema::{Document, Finite, Positive};
 use super::small_file;
 use crate::calibration::{Group, parameter_name};
 use crate::imu::{InstallationForm, ParameterKind, Sensor};
@@ -14,6 +17,27 @@ use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
 const FORMAT: &str = "turncal-specification/1";
 /// Unless the file says otherwise.
 const CONFIDENCE: f64 = 0.95;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SpecificationFile {
+    confidence: Option<f64>,
+    #[serde(default)]
+    gyro: BTreeMap<String, LimitsFile>,
+    #[serde(default)]
+    accel: BTreeMap<String, LimitsFile>,
+}
+
+#[derive(Deserialize)]
+#[serde(
+    untagged,
+    expecting = "a number above zero, or a table with `within` and `nominal`"
+)]
+enum LimitsFile {
+    OfAll(Positive),
+    /// `within`, `nominal` and single axes.
+    Each(BTreeMap<String, Finite>),
+}
 
 impl Specification {
     /// Reads and checks a specification.
@@ -26,33 +50,26 @@ impl Specification {
             file: path,
             text: &text,
         };
-        let table = document.parse()?;
-        let top = Fields::top(document, &table, &["format", "confidence", "gyro", "accel"])?;
-        top.need("format", "the format of this file")?
-            .choice(&[(FORMAT, ())])?;
-        let confidence = match top.get("confidence") {
-            Some(field) => field.within(0.5, 1.0 - 1e-9)?,
-            None => CONFIDENCE,
-        };
+        let file: SpecificationFile = document.fill(document.of_format(FORMAT)?)?;
+        let confidence = file.confidence.unwrap_or(CONFIDENCE);
+        if !(0.5..1.0).contains(&confidence) {
+            let expected = "a number from 0.5 to below 1";
+            return Err(document.wrong("confidence", expected, "Correct this value."));
+        }
         let mut limits = Vec::new();
-        for sensor in Sensor::ALL {
-            let keys = Group::all()
-                .filter(|g| g.sensor() == sensor)
-                .map(|g| unit(g).0);
-            let keys: Vec<&str> = keys.collect();
-            let Some(fields) = top.table(sensor.name(), &keys)? else {
-                continue;
-            };
-            for group in Group::all().filter(|group| group.sensor() == sensor) {
-                let (key, unit) = unit(group);
-                if let Some(field) = fields.get(key) {
-                    limits.extend(limits_of(group, unit, &fields, key, &field)?);
+        for (sensor, stated) in [(Sensor::Gyro, &file.gyro), (Sensor::Accel, &file.accel)] {
+            let groups = || Group::all().filter(|group| group.sensor() == sensor);
+            let keys: Vec<&str> = groups().map(|group| unit(group).0).collect();
+            document.only(sensor.name(), stated.keys(), &keys)?;
+            for group in groups() {
+                if let Some(of_group) = stated.get(unit(group).0) {
+                    limits.extend(limits_of(document, group, of_group)?);
                 }
             }
         }
         if limits.is_empty() {
             let meaning = "a table of limits, such as [gyro] with scale_ppm = 500";
-            return Err(top.missing("gyro", meaning));
+            return Err(document.missing("gyro", meaning));
         }
         Ok(Self { confidence, limits })
     }
@@ -68,23 +85,21 @@ fn unit(group: Group) -> (&'static str, f64) {
     }
 }
 
-/// A number for all axes, or a table with `within`, `nominal` and single axes.
+/// The limits of the parameters of a group.
 fn limits_of(
+    document: Document,
     group: Group,
-    unit: f64,
-    fields: &Fields,
-    key: &str,
-    field: &Field,
+    stated: &LimitsFile,
 ) -> Result<Vec<Limit>, FileError> {
     let form = InstallationForm::General;
-    let parameters: Vec<(usize, String)> = group
-        .parameters(form)
-        .into_iter()
-        .filter_map(|index| {
-            let name = parameter_name(form, index)?;
-            Some((index, name.rsplit('.').next()?.to_owned()))
-        })
-        .collect();
+    let (key, unit) = unit(group);
+    let path = format!("{}.{key}", group.sensor().name());
+    let axis = |index| {
+        let name = parameter_name(form, index)?;
+        Some((index, name.rsplit('.').next()?.to_owned()))
+    };
+    let parameters: Vec<(usize, String)> =
+        (group.parameters(form).into_iter().filter_map(axis)).collect();
     let base = match group.kind() {
         ParameterKind::Scale => 1.0,
         ParameterKind::Installation | ParameterKind::Bias => 0.0,
@@ -94,36 +109,37 @@ fn limits_of(
         nominal: base + nominal * unit,
         within: within * unit,
     };
-    if !field.is_table() {
-        let within = field.positive()?;
-        let all = parameters
-            .iter()
-            .map(|&(index, _)| limit(index, 0.0, within));
-        return Ok(all.collect());
-    }
-    let known: Vec<&str> = ["within", "nominal"]
-        .into_iter()
-        .chain(parameters.iter().map(|(_, axis)| axis.as_str()))
-        .collect();
-    let Some(table) = fields.table(key, &known)? else {
-        return Ok(Vec::new());
-    };
-    let within = table.get("within").map(|f| f.positive()).transpose()?;
-    let nominal = table.get("nominal").map(|f| f.number()).transpose()?;
-    let mut limits = Vec::new();
-    for (index, axis) in &parameters {
-        let own = table.get(axis).map(|f| f.positive()).transpose()?;
-        if let Some(within) = own.or(within) {
-            limits.push(limit(*index, nominal.unwrap_or(0.0), within));
+    let table = match stated {
+        LimitsFile::OfAll(within) => {
+            let all = parameters.iter();
+            return Ok(all.map(|&(index, _)| limit(index, 0.0, within.0)).collect());
         }
+        LimitsFile::Each(table) => table,
+    };
+    let axes = parameters.iter().map(|(_, axis)| axis.as_str());
+    let known: Vec<&str> = ["within", "nominal"].into_iter().chain(axes).collect();
+    document.only(&path, table.keys(), &known)?;
+    let negative = |(name, value): &(&String, &Finite)| *name != "nominal" && value.0 <= 0.0;
+    if let Some((name, _)) = table.iter().find(negative) {
+        let path = format!("{path}.{name}");
+        return Err(document.wrong(&path, "a number above zero", "Correct this value."));
     }
-    if limits.is_empty() {
-        return Err(table.missing(
-            "within",
+    let get = |name: &str| table.get(name).map(|value| value.0);
+    let nominal = get("nominal").unwrap_or(0.0);
+    let limits: Vec<Limit> = parameters
+        .iter()
+        .filter_map(|(index, axis)| {
+            let within = get(axis).or_else(|| get("within"))?;
+            Some(limit(*index, nominal, within))
+        })
+        .collect();
+    match limits.is_empty() {
+        true => Err(document.missing(
+            &format!("{path}.within"),
             "the largest distance from nominal that is allowed, or one axis by its name",
-        ));
+        )),
+        false => Ok(limits),
     }
-    Ok(limits)
 }
 
 #[cfg(test)]

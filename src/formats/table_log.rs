@@ -6,10 +6,9 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 use super::clock::{Clock, Stamp, Stamps};
 use super::error::FileError;
-use super::fields::Fields;
-use super::instrument::HALF_TURN;
 use super::rows::LogRows;
-use super::source::Source;
+use super::schema::{Angle, Document, TableColumns, TurntableFile};
+use super::source::{Source, clock};
 use crate::attitude;
 use crate::recording::{ImuSamples, TableLog};
 use crate::turntable::{AxisAngles, AxisError, TableAccuracy, TableGeometry, axis_angles};
@@ -18,22 +17,12 @@ use crate::units::{ARCSEC, DEGREE};
 /// Four components printed to four decimals meet it. What is off by more is no quaternion.
 const NORM_TOLERANCE: f64 = 1e-4;
 
-/// No clocks of one run are further apart, ms.
-const MINUTE_MS: f64 = 60_000.0;
-
 /// What axes are called by which a table turns when all its angles are zero.
 pub(super) const LETTERS: [(&str, Vector3<f64>); 3] = [
     ("x", Vector3::new(1.0, 0.0, 0.0)),
     ("y", Vector3::new(0.0, 1.0, 0.0)),
     ("z", Vector3::new(0.0, 0.0, 1.0)),
 ];
-/// Keys of the 1σ of errors of the axes, in the order of [`AxisError::ALL`].
-pub(super) const AXIS_KEYS: [&str; AxisError::ALL.len()] = [
-    "nonorthogonality_sigma_arcsec",
-    "wobble_sigma_arcsec",
-    "encoder_sigma_arcsec",
-];
-
 /// How a row gives `C_b_n`, and where the table's axes stand; `C` is a column's name or its index.
 pub(super) struct AttitudeColumns<C> {
     /// `[w, x, y, z]`, body right-front-up to East-North-Up.
@@ -44,55 +33,62 @@ pub(super) struct AttitudeColumns<C> {
 }
 
 impl<'a> AttitudeColumns<&'a str> {
-    fn of_fields(table: &Fields<'a>, columns: &Fields<'a>) -> Result<Self, FileError> {
-        let axes = table.get("axes").or_else(|| columns.get("axes"));
-        let quaternion = columns.get("quaternion").map(|quaternion| {
-            let names = quaternion.texts()?.try_into();
-            names.map_err(|_| {
-                quaternion.error("four columns, in the order w, x, y, z", "Name all four.")
-            })
-        });
-        let quaternion = quaternion.transpose()?;
-        let angles = match (columns.get("angles"), axes) {
-            (Some(angles), Some(axes)) => {
-                let names = angles.texts()?;
-                let letters = axes.texts()?;
-                if names.is_empty() || names.len() != letters.len() {
-                    return Err(angles.error(
-                        format_args!(
-                            "an angle for each of {} axes, outermost first",
-                            letters.len()
-                        ),
-                        "Complete `angles` or `axes`.",
-                    ));
-                }
-                let pairs = names.into_iter().zip(letters).map(|(name, letter)| {
-                    let axis = LETTERS.iter().find(|(known, _)| *known == letter);
-                    let (_, axis) = axis.ok_or_else(|| {
-                        axes.error(
-                            "`x`, `y` or `z` for each axis",
-                            "Name the axis about which the table turns when all angles are zero.",
-                        )
-                    })?;
-                    Ok((name, *axis))
-                });
-                pairs.collect::<Result<_, FileError>>()?
+    fn of_fields(document: Document, table: &'a TurntableFile) -> Result<Self, FileError> {
+        let TableColumns {
+            quaternion, angles, ..
+        } = &table.columns;
+        let axes = table.axes.as_ref().or(table.columns.axes.as_ref());
+        let path = |name: &str| match (name, &table.axes) {
+            ("axes", Some(_)) => "turntable.axes".to_owned(),
+            _ => format!("turntable.columns.{name}"),
+        };
+        let angles = match (angles, axes) {
+            (Some(names), Some(letters)) if names.is_empty() || names.len() != letters.len() => {
+                return Err(document.wrong(
+                    &path("angles"),
+                    format_args!(
+                        "an angle for each of {} axes, outermost first",
+                        letters.len()
+                    ),
+                    "Complete `angles` or `axes`.",
+                ));
             }
-            (Some(_), None) => return Err(table.missing("axes", "the axes of the angles")),
-            (None, Some(axes)) => {
-                return Err(axes.error(
+            (Some(names), Some(letters)) => {
+                let pairs = names.iter().zip(letters).map(|(name, letter)| {
+                    let axis = LETTERS.iter().find(|(known, _)| known == letter);
+                    axis.map(|(_, axis)| (name.as_str(), *axis))
+                });
+                pairs.collect::<Option<_>>().ok_or_else(|| {
+                    document.wrong(
+                        &path("axes"),
+                        "`x`, `y` or `z` for each axis",
+                        "Name the axis about which the table turns when all angles are zero.",
+                    )
+                })?
+            }
+            (Some(_), None) => {
+                return Err(document.missing("turntable.axes", "the axes of the angles"));
+            }
+            (None, Some(_)) => {
+                return Err(document.wrong(
+                    &path("axes"),
                     "it beside the columns of `angles`",
                     "Name the columns of the angles, or remove the axes.",
                 ));
             }
             (None, None) if quaternion.is_none() => {
-                return Err(
-                    columns.missing("quaternion", "the columns of a quaternion or of `angles`")
-                );
+                return Err(document.missing(
+                    &path("quaternion"),
+                    "the columns of a quaternion or of `angles`",
+                ));
             }
             (None, None) => Vec::new(),
         };
-        Ok(Self { quaternion, angles })
+        let quaternion = quaternion.as_ref();
+        Ok(Self {
+            quaternion: quaternion.map(|names| names.each_ref().map(String::as_str)),
+            angles,
+        })
     }
 
     fn find(&self, csv: &mut LogRows) -> Result<AttitudeColumns<usize>, FileError> {
@@ -148,30 +144,26 @@ impl AttitudeColumns<usize> {
 }
 
 /// What `[turntable]` states of the errors of a table with this number of angles.
-fn geometry(fields: &Fields, angles: usize) -> Result<TableGeometry, FileError> {
-    let optional = |name| -> Result<f64, FileError> {
-        let field = fields.get(name);
-        let field = field
-            .map(|field| field.positive_to(HALF_TURN))
-            .transpose()?;
-        Ok(field.unwrap_or(0.0) * ARCSEC)
-    };
+fn geometry(
+    document: Document,
+    fields: &TurntableFile,
+    angles: usize,
+) -> Result<TableGeometry, FileError> {
+    let sigma = |stated: Option<Angle>| stated.map_or(0.0, |sigma| sigma.0 * ARCSEC);
     let mut axes = TableGeometry::default().axes;
-    for (kind, key) in AxisError::ALL.into_iter().zip(AXIS_KEYS) {
-        match fields.get(key) {
-            Some(field) if angles == 0 => {
-                return Err(field.error(
-                        "it with `angles` only, for a quaternion does not tell the axes apart",
-                        "Remove it, or give the angles of the table's axes, alone or beside the quaternion.",
-                    ));
-            }
-            Some(_) => axes += kind.of_table(angles, optional(key)?),
-            None => (),
+    for (kind, (key, stated)) in AxisError::ALL.into_iter().zip(fields.axis_errors()) {
+        if stated.is_some() && angles == 0 {
+            return Err(document.wrong(
+                &format!("turntable.{key}"),
+                "it with `angles` only, for a quaternion does not tell the axes apart",
+                "Remove it, or give the angles of the table's axes, alone or beside the quaternion.",
+            ));
         }
+        axes += kind.of_table(angles, sigma(stated));
     }
-    let level = optional("level_sigma_arcsec")?;
+    let level = sigma(fields.level_sigma_arcsec);
     Ok(TableGeometry {
-        base: Vector3::new(level, level, optional("north_sigma_arcsec")?),
+        base: Vector3::new(level, level, sigma(fields.north_sigma_arcsec)),
         axes,
     })
 }
@@ -185,60 +177,28 @@ pub(super) struct TableLogFile<'a> {
 }
 
 impl<'a> TableLogFile<'a> {
-    /// Reads the fields of `[turntable]`, if it is there; remarks on those without effect go to
-    /// `notes`.
+    /// Of the fields of `[turntable]`; remarks on those without effect go to `notes`.
     pub fn of_fields(
-        top: &Fields<'a>,
+        document: Document,
+        fields: &'a TurntableFile,
         directory: &Path,
         notes: &mut Vec<String>,
-    ) -> Result<Option<Self>, FileError> {
-        let known = [
-            "file",
-            "stream",
-            "salvage",
-            "columns",
-            "time_unit",
-            "sample_period_s",
-            "axes",
-            "position_sigma_arcsec",
-            "reading_sigma_arcsec",
-            "level_sigma_arcsec",
-            "north_sigma_arcsec",
-            AXIS_KEYS[0],
-            AXIS_KEYS[1],
-            AXIS_KEYS[2],
-            "time_sigma_ms",
-        ];
-        let Some(fields) = top.table("turntable", &known)? else {
-            return Ok(None);
-        };
-        let columns = fields.need_table(
-            "columns",
-            &["time", "quaternion", "angles", "axes"],
-            "the names of the columns",
-        )?;
-        columns.need("time", "the name of a column")?;
-        let clock = Clock::of_fields(&fields, &columns)?;
-        let attitude = AttitudeColumns::of_fields(&fields, &columns)?;
-        if let Some(field) = fields.get("time_sigma_ms") {
-            field.positive_to(MINUTE_MS)?;
+    ) -> Result<Self, FileError> {
+        let stated = (fields.time_unit, fields.sample_period_s);
+        let attitude = AttitudeColumns::of_fields(document, fields)?;
+        if fields.time_sigma_ms.is_some() {
             notes.push("turntable.time_sigma_ms is read but has no effect yet.".to_owned());
         }
-        let geometry = geometry(&fields, attitude.angles.len())?;
-        let sigma = |name| -> Result<f64, FileError> {
-            let field = fields.need(name, "a 1σ in seconds of arc")?;
-            Ok(field.positive_to(HALF_TURN)? * ARCSEC)
-        };
-        Ok(Some(Self {
-            source: Source::of_fields(&fields, directory, None)?,
-            clock,
-            attitude,
+        Ok(Self {
+            source: Source::of_fields(directory, &fields.file, &fields.stream, fields.salvage),
+            clock: clock(document, "turntable", Some(&fields.columns.time), stated)?,
             accuracy: TableAccuracy {
-                position_sigma: sigma("position_sigma_arcsec")?,
-                reading_sigma: sigma("reading_sigma_arcsec")?,
-                geometry,
+                position_sigma: fields.position_sigma_arcsec.0 * ARCSEC,
+                reading_sigma: fields.reading_sigma_arcsec.0 * ARCSEC,
+                geometry: geometry(document, fields, attitude.angles.len())?,
             },
-        }))
+            attitude,
+        })
     }
 
     /// Reads the log of a run with these samples; what the file leaves open goes to `notes`.

@@ -1,9 +1,9 @@
 //! Temperature columns of a log.
 
 use super::error::FileError;
-use super::fields::{Field, Fields};
 use super::rows::LogRows;
-use crate::imu::{PerSensor, Sensor};
+use super::schema::{TemperatureColumn, ThreeColumns};
+use crate::imu::PerSensor;
 use crate::recording::{TEMPERATURE_SPACING, Temperature, TemperatureFacts};
 
 /// Beyond this, °C, no instrument is calibrated: the column is in another unit, or no temperature.
@@ -59,47 +59,35 @@ pub(super) struct TemperatureColumns<'a> {
 }
 
 impl<'a> TemperatureColumns<'a> {
-    /// Reads `temperature` of the columns — a name, or a table with a name or three for each triad — and
-    /// `temperature_unit` of the instrument.
-    pub fn of_fields(imu: &Fields<'a>, columns: &Fields<'a>) -> Result<Option<Self>, FileError> {
-        let unit = match imu.get("temperature_unit") {
-            Some(field) => field.choice(&TemperatureUnit::WORDS)?,
-            None => TemperatureUnit::WORDS[0].1,
-        };
-        let Some(field) = columns.get("temperature") else {
-            return Ok(None);
-        };
+    /// A column of both triads, or one or three of each.
+    pub fn of_fields(column: &'a TemperatureColumn, unit: TemperatureUnit) -> Self {
         let mut all = Self {
             names: Vec::new(),
             of: PerSensor::default(),
             unit,
         };
-        if !field.is_table() {
-            all.names.push(field.text()?);
-            return Ok(Some(all));
+        match column {
+            TemperatureColumn::One(name) => all.names.push(name),
+            TemperatureColumn::Triads { gyro, accel } => {
+                all.of.gyro = all.places(gyro);
+                all.of.accel = all.places(accel);
+            }
         }
-        let Some(triads) = columns.table("temperature", &["gyro", "accel"])? else {
-            return Ok(None);
-        };
-        for sensor in Sensor::ALL {
-            let field = triads.need(sensor.name(), "the name of a column, or three")?;
-            *all.of.get_mut(sensor) = all.places(&field)?;
-        }
-        Ok(Some(all))
+        all
     }
 
-    fn places(&mut self, field: &Field<'a>) -> Result<[usize; 3], FileError> {
-        let names = match field.texts() {
-            Ok(_) => field.three_texts()?,
-            Err(_) => [field.text()?; 3],
+    fn places(&mut self, columns: &'a ThreeColumns) -> [usize; 3] {
+        let names = match columns {
+            ThreeColumns::One(name) => [name; 3],
+            ThreeColumns::Three(names) => names.each_ref(),
         };
-        Ok(names.map(|name| {
-            let known = self.names.iter().position(|&known| known == name);
+        names.map(|name| {
+            let known = self.names.iter().position(|known| known == name);
             known.unwrap_or_else(|| {
                 self.names.push(name);
                 self.names.len() - 1
             })
-        }))
+        })
     }
 
     /// The columns, each once.

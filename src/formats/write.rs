@@ -1,24 +1,29 @@
 //! A [`Run`] as a run directory.
 
-use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use flate2::{Compression, GzBuilder};
 use nalgebra::Vector3;
+use toml::Spanned;
 
 use super::error::{FileError, Place, list, suggestion};
-use super::quantity::{OUTPUTS, units};
-use super::read::{FORMAT, META};
-use super::table_log::{AXIS_KEYS, LETTERS};
+use super::imu_log::TimeStamp;
+use super::quantity::units;
+use super::schema::{
+    Angle, FORMAT, Gravity, Height, ImuColumns, ImuFile, Latitude, Longitude, META, NonNegative,
+    Positive, PriorFile, PriorsFile, RunFile, SegmentsFile, SiteFile, StandstillFile, TableColumns,
+    TemperatureColumn, TermFile, TimeColumn, TurntableFile,
+};
+use super::table_log::LETTERS;
 use crate::calibration::Calibration;
-use crate::imu::{MotionNoise, NoiseKeys};
-use crate::imu::{Output, Sensor, Term};
+use crate::earth::Site;
+use crate::imu::{Instrument, NoiseKeys, Output, Sensor, Term};
 use crate::recording::{ImuSamples, Segment, TableLog, nanoseconds};
 use crate::run::Run;
 use crate::turntable::AxisError;
-use crate::units::{ARCSEC, DEG_PER_SQRT_H, DEGREE, MICRO_G_PER_SQRT_HZ, MILLIGAL, PPM};
+use crate::units::{ARCSEC, DEGREE, MILLIGAL, PPM};
 
 /// Columns of the angles of a table's axes, outermost first.
 const ANGLES: [&str; 3] = ["outer", "middle", "inner"];
@@ -35,7 +40,8 @@ pub fn write_run(
     output: Output,
     truth: Option<&Calibration>,
 ) -> Result<(), FileError> {
-    check_words(&directory.join("run.toml"), run, output)?;
+    let configuration = directory.join("run.toml");
+    check_words(&configuration, run, output)?;
     let write = |name: &str, content: &dyn Fn(&mut dyn Write) -> io::Result<()>| {
         let path = directory.join(name);
         let written = File::create(&path).and_then(|file| write_rows(&path, file, content));
@@ -48,7 +54,16 @@ pub fn write_run(
             )
         })
     };
-    let toml = configuration_text(run, output);
+    let toml = configuration_text(run, output).map_err(|error| {
+        let advice = "Nothing was written.";
+        FileError::new(
+            &configuration,
+            Place::File,
+            error,
+            "values that TOML can hold",
+            advice,
+        )
+    })?;
     write("run.toml", &|file| file.write_all(toml.as_bytes()))?;
     write("imu.csv.gz", &|file| imu_rows(file, run, output))?;
     if let Some(table) = &run.recording.table {
@@ -213,243 +228,200 @@ fn short(value: f64) -> f64 {
     format!("{value:.14e}").parse().unwrap_or(value)
 }
 
-fn triple(v: Vector3<f64>) -> String {
-    let [x, y, z] = [v.x, v.y, v.z].map(short);
-    format!("[{x:?}, {y:?}, {z:?}]")
+/// A value in a file's unit; none of what is not above zero.
+fn above_zero(value: f64, unit: f64) -> Option<f64> {
+    Some(short(value / unit)).filter(|&value| value > 0.0)
 }
 
-fn configuration_text(run: &Run, output: Output) -> String {
-    let mut sections = vec![
-        site_text(run),
-        meta_text(&run.recording.meta),
-        imu_text(run, output),
-    ];
-    sections.extend(
-        Sensor::ALL
-            .into_iter()
-            .filter_map(|sensor| gauss_markov_text(run, sensor)),
-    );
-    sections.extend(Sensor::ALL.map(|sensor| motion_noise_text(run, sensor)));
-    sections.push(
-        "\n# known before calibration: N = scale * installation * u + bias, N the file's quantity \
-         per second\n"
-            .to_owned(),
-    );
-    sections.extend(Sensor::ALL.map(|sensor| prior_text(run, sensor)));
-    sections.extend(terms_text(run));
-    sections.push(standstill_text(run));
-    if run.recording.table.is_some() {
-        sections.push(turntable_text(run));
+/// Comments above tables and fields of `run.toml`.
+const COMMENTS: [(&str, &str); 8] = [
+    ("[site]", "the place of the turntable"),
+    ("[meta]", "carried into calibration and report"),
+    (
+        "[imu]",
+        "the instrument's samples, along body right-front-up",
+    ),
+    (
+        "[imu.prior.gyro]",
+        "known before calibration: N = scale * installation * u + bias, N the file's quantity per second",
+    ),
+    ("[imu.terms", "error terms, 1σ around zero"),
+    (
+        "[standstill]",
+        "how still the IMU is while the table is at rest",
+    ),
+    (
+        "[turntable]",
+        "attitude of the table's mounting face, body right-front-up to East-North-Up; position errors are constant while \
+         the table stands and new at every position, reading errors are white",
+    ),
+    ("[segments]", "labelled sections of the record, in s"),
+];
+
+fn configuration_text(run: &Run, output: Output) -> Result<String, toml::ser::Error> {
+    let fields = toml::to_string(&run_file(run, output))?;
+    let mut text = format!("format = \"{FORMAT}\"\n\n");
+    for line in fields.lines() {
+        let comment = COMMENTS.iter().find(|(table, _)| line.starts_with(table));
+        if let Some((_, comment)) = comment.filter(|(_, comment)| !text.contains(comment)) {
+            text += &format!("# {comment}\n");
+        }
+        text += &format!("{line}\n");
     }
-    if !run.recording.segments.is_empty() {
-        sections.push(format!(
-            r#"
-# labelled sections of the record, in s
-[segments]
-file = "segments.csv"
-position_sigma_deg = {:?}
-"#,
-            short(run.segment_sigma / DEGREE)
-        ));
-    }
-    sections.concat()
+    Ok(text)
 }
 
-/// The format of the file and `[site]`.
-fn site_text(run: &Run) -> String {
-    let site = &run.site;
-    let place = match site.is_known {
-        true => format!(
-            "latitude_deg = {:?}\nlongitude_deg = {:?}\nheight_m = {:?}\n",
-            short(site.latitude / DEGREE),
-            short(site.longitude / DEGREE),
-            site.height,
-        ),
-        false => String::new(),
-    };
-    format!(
-        r#"format = "{FORMAT}"
-
-# the place of the turntable
-[site]
-{place}gravity_m_s2 = {gravity:?}
-gravity_sigma_mgal = {gravity_sigma:?}
-"#,
-        gravity = site.gravity,
-        gravity_sigma = short(site.gravity_sigma / MILLIGAL),
-    )
-}
-
-/// `[imu]`, and the random walks of `[imu.noise]`.
-fn imu_text(run: &Run, output: Output) -> String {
-    let (output, _) = OUTPUTS
-        .into_iter()
-        .find(|&(_, known)| known == output)
-        .unwrap_or(OUTPUTS[0]);
-    let (imu, noise) = (&run.recording.imu, &run.instrument.noise);
-    format!(
-        r#"
-# the instrument's samples, along body right-front-up
-[imu]
-file = "imu.csv.gz"
-output = "{output}"
-gyro_unit = {gyro_unit}
-accel_unit = {accel_unit}
-sample_period_s = {period:?}
-time_stamp = "start"
-continuous = {continuous}
-columns = {{ time = "t", gyro = ["gx", "gy", "gz"], accel = ["ax", "ay", "az"]{temperature} }}
-
-[imu.noise]
-angle_random_walk_deg_per_sqrt_h = {angle_walk:?}
-velocity_random_walk_ug_per_sqrt_hz = {velocity_walk:?}
-"#,
-        gyro_unit = quoted(&run.instrument.unit.gyro),
-        accel_unit = quoted(&run.instrument.unit.accel),
-        period = imu.period,
-        continuous = imu.continuous,
-        temperature = match imu.temperature {
-            Some(_) => ", temperature = \"temperature\"",
-            None => "",
+fn run_file(run: &Run, output: Output) -> RunFile {
+    let segments = &run.recording.segments;
+    let standstill = &run.standstill;
+    RunFile {
+        site: site_file(&run.site),
+        meta: run.recording.meta.clone(),
+        imu: imu_file(run, output),
+        standstill: StandstillFile {
+            velocity_sigma_m_s: standstill.sigma.accel.map(Positive),
+            attitude_sigma_arcsec: (standstill.sigma.gyro).map(|of| Positive(short(of / ARCSEC))),
+            turning_deg_per_sqrt_s: above_zero(standstill.turning, DEGREE).map(NonNegative),
+            position_sigma_m: Some(Positive(standstill.position_sigma)),
         },
-        angle_walk = short(noise.gyro.random_walk / DEG_PER_SQRT_H),
-        velocity_walk = short(noise.accel.random_walk / MICRO_G_PER_SQRT_HZ),
-    )
-}
-
-fn gauss_markov_text(run: &Run, sensor: Sensor) -> Option<String> {
-    let keys = NoiseKeys::of(sensor);
-    let (sigma, unit) = keys.gauss_markov;
-    let bias = run.instrument.noise.get(sensor).gauss_markov?;
-    Some(format!(
-        "{sigma} = {:?}\n{} = {:?}\n",
-        short(bias.sigma / unit),
-        keys.correlation_time,
-        bias.correlation_time
-    ))
-}
-
-fn motion_noise_text(run: &Run, sensor: Sensor) -> String {
-    let keys = NoiseKeys::of(sensor);
-    let MotionNoise {
-        by_motion,
-        by_duration,
-    } = *run.instrument.motion_noise.get(sensor);
-    let (name, unit) = keys.by_duration;
-    [(keys.by_motion, by_motion), (name, by_duration / unit)]
-        .into_iter()
-        .filter(|&(_, value)| value > 0.0)
-        .map(|(name, value)| format!("{name} = {:?}\n", short(value)))
-        .collect()
-}
-
-fn standstill_text(run: &Run) -> String {
-    let mut text = format!(
-        "# how still the IMU is while the table is at rest\n[standstill]\nposition_sigma_m = {:?}\n",
-        run.standstill.position_sigma
-    );
-    if let Some(sigma) = run.standstill.sigma.gyro {
-        let sigma = short(sigma / ARCSEC);
-        text += &format!("attitude_sigma_arcsec = {sigma:?}\n");
+        turntable: run.recording.table.as_ref().map(|_| turntable_file(run)),
+        segments: (!segments.is_empty()).then(|| SegmentsFile {
+            file: "segments.csv".to_owned(),
+            position_sigma_deg: Some(Positive(short(run.segment_sigma / DEGREE))),
+        }),
     }
-    if let Some(sigma) = run.standstill.sigma.accel {
-        text += &format!("velocity_sigma_m_s = {sigma:?}\n");
-    }
-    if run.standstill.turning > 0.0 {
-        let turning = short(run.standstill.turning / DEGREE);
-        text += &format!("turning_deg_per_sqrt_s = {turning:?}\n");
-    }
-    text
 }
 
-fn turntable_text(run: &Run) -> String {
-    let letters = axis_letters(run);
-    let mut text = format!(
-        r#"
-# attitude of the table's mounting face, body right-front-up to East-North-Up
-[turntable]
-file = "table.csv.gz"
-columns = {{ time = "t", quaternion = ["qw", "qx", "qy", "qz"]{angles} }}
-position_sigma_arcsec = {position:?}    # constant while the table stands, new at every position
-reading_sigma_arcsec = {reading:?}    # white, each reading
-"#,
-        angles = letters.as_ref().map_or_else(String::new, |letters| format!(
-            ", angles = {:?}, axes = {letters:?}",
-            &ANGLES[..letters.len()]
-        )),
-        position = short(run.table.position_sigma / ARCSEC),
-        reading = short(run.table.reading_sigma / ARCSEC),
-    );
-    let geometry = &run.table.geometry;
-    let of_base = [
-        ("level_sigma_arcsec", geometry.base.x),
-        ("north_sigma_arcsec", geometry.base.z),
-    ];
-    let of_axes = AXIS_KEYS.into_iter().zip(AxisError::ALL);
-    let of_axes = of_axes.filter(|_| letters.is_some());
-    let of_axes = of_axes.map(|(key, kind)| (key, geometry.axes.rows_range(kind.range()).max()));
-    let stated = of_base.into_iter().chain(of_axes);
-    for (key, sigma) in stated.filter(|&(_, sigma)| sigma > 0.0) {
-        text += &format!("{key} = {:?}\n", short(sigma / ARCSEC));
+fn site_file(site: &Site) -> SiteFile {
+    let known = |value: f64| Some(value).filter(|_| site.is_known);
+    SiteFile {
+        latitude_deg: known(short(site.latitude / DEGREE)).map(Latitude),
+        longitude_deg: known(short(site.longitude / DEGREE)).map(Longitude),
+        height_m: known(site.height).map(Height),
+        gravity_m_s2: Some(Spanned::new(0..0, Gravity(site.gravity))),
+        gravity_sigma_mgal: Some(NonNegative(short(site.gravity_sigma / MILLIGAL))),
     }
-    text
 }
 
-fn prior_text(run: &Run, sensor: Sensor) -> String {
-    let (prior, nominal) = (
-        run.instrument.prior.get(sensor),
-        run.instrument.nominal.get(sensor).0,
-    );
-    format!(
-        r#"[imu.prior.{name}]
-scale = [{x:?}, {y:?}, {z:?}]
-scale_sigma_ppm = {scale_sigma}
-installation_sigma_arcsec = {installation_sigma}
-bias = {bias}
-bias_sigma = {bias_sigma}
-
-"#,
-        name = sensor.name(),
-        // All digits, so that pulses stay whole.
-        x = nominal.x,
-        y = nominal.y,
-        z = nominal.z,
-        scale_sigma = triple(prior.scale_sigma / PPM),
-        installation_sigma = triple(prior.installation_sigma / ARCSEC),
-        bias = triple(prior.bias.component_mul(&nominal)),
-        bias_sigma = triple(prior.bias_sigma.component_mul(&nominal.abs())),
-    )
-}
-
-/// `[imu.terms]`, if any is on.
-fn terms_text(run: &Run) -> Option<String> {
-    let on = Term::ALL.into_iter().filter_map(|term| {
-        let sigma = run.instrument.term_sigma[term.parameters().start];
-        let (unit, in_si) = term.entry().unit;
-        let line = || {
-            format!(
-                "{} = {{ sigma = {:?} }} # {unit}\n",
-                term.name(),
-                short(sigma / in_si)
-            )
-        };
-        (sigma > 0.0).then(line)
+fn imu_file(run: &Run, output: Output) -> ImuFile {
+    let (imu, instrument) = (&run.recording.imu, &run.instrument);
+    let name = str::to_owned;
+    let of = |sensor| noise_fields(instrument, sensor);
+    let terms = Term::ALL.into_iter().filter_map(|term| {
+        let sigma = instrument.term_sigma[term.parameters().start];
+        let sigma = Positive(above_zero(sigma, term.entry().unit.1)?);
+        Some((name(term.name()), TermFile { sigma }))
     });
-    let lines: String = on.collect();
-    (!lines.is_empty()).then(|| format!("# error terms, 1σ around zero\n[imu.terms]\n{lines}\n"))
-}
-
-fn meta_text(meta: &BTreeMap<String, String>) -> String {
-    if meta.is_empty() {
-        return String::new();
+    ImuFile {
+        file: name("imu.csv.gz"),
+        stream: None,
+        salvage: None,
+        accel_from: None,
+        output,
+        gyro_unit: instrument.unit.gyro.clone(),
+        accel_unit: instrument.unit.accel.clone(),
+        gyro_full_scale: None,
+        accel_full_scale: None,
+        time_unit: None,
+        sample_period_s: Some(Positive(imu.period)),
+        time_stamp: TimeStamp::Start,
+        continuous: Some(imu.continuous),
+        instance: None,
+        temperature_unit: None,
+        body_axes: None,
+        columns: ImuColumns {
+            time: Some(TimeColumn::One(name("t"))),
+            gyro: ["gx", "gy", "gz"].map(name),
+            accel: ["ax", "ay", "az"].map(name),
+            temperature: (imu.temperature.as_ref())
+                .map(|_| TemperatureColumn::One(name("temperature"))),
+        },
+        noise: Sensor::ALL.into_iter().flat_map(of).collect(),
+        prior: PriorsFile {
+            gyro: prior_file(instrument, Sensor::Gyro),
+            accel: prior_file(instrument, Sensor::Accel),
+        },
+        terms: terms.collect(),
     }
-    let fields: String = meta
-        .iter()
-        .map(|(name, value)| format!("{name} = {}\n", quoted(value)))
-        .collect();
-    format!("\n# carried into calibration and report\n[meta]\n{fields}")
 }
 
-fn quoted(text: &str) -> String {
-    toml::Value::String(text.to_owned()).to_string()
+/// The random walk of a triad, and what else is stated of its noise.
+fn noise_fields(
+    instrument: &Instrument,
+    sensor: Sensor,
+) -> impl Iterator<Item = (String, NonNegative)> {
+    let keys = NoiseKeys::of(sensor);
+    let (noise, moves) = (
+        instrument.noise.get(sensor),
+        instrument.motion_noise.get(sensor),
+    );
+    let varying = noise.gauss_markov;
+    let (walk, (sigma, sigma_unit)) = (keys.random_walk, keys.gauss_markov);
+    let (by_duration, unit) = keys.by_duration;
+    let fields = [
+        (walk.0, Some(short(noise.random_walk / walk.1))),
+        (sigma, varying.map(|of| short(of.sigma / sigma_unit))),
+        (keys.correlation_time, varying.map(|of| of.correlation_time)),
+        (keys.by_motion, above_zero(moves.by_motion, 1.0)),
+        (by_duration, above_zero(moves.by_duration, unit)),
+    ];
+    let stated = fields.into_iter();
+    stated.filter_map(|(name, value)| Some((name.to_owned(), NonNegative(value?))))
+}
+
+fn prior_file(instrument: &Instrument, sensor: Sensor) -> PriorFile {
+    let (prior, nominal) = (
+        instrument.prior.get(sensor),
+        instrument.nominal.get(sensor).0,
+    );
+    let three = |v: Vector3<f64>| Some(v.map(short).into());
+    PriorFile {
+        // All digits, so that pulses stay whole.
+        scale: Some(nominal.into()),
+        scale_sigma_ppm: three(prior.scale_sigma / PPM),
+        installation_sigma_arcsec: three(prior.installation_sigma / ARCSEC),
+        bias: three(prior.bias.component_mul(&nominal)),
+        bias_sigma: three(prior.bias_sigma.component_mul(&nominal.abs())),
+    }
+}
+
+fn turntable_file(run: &Run) -> TurntableFile {
+    let letters = axis_letters(run);
+    let (table, geometry) = (&run.table, &run.table.geometry);
+    let owned = |names: &[&str]| {
+        names
+            .iter()
+            .map(|&name| name.to_owned())
+            .collect::<Vec<_>>()
+    };
+    let stated = |sigma: f64| above_zero(sigma, ARCSEC).map(Angle);
+    let of_axes = AxisError::ALL.map(|kind| {
+        let sigma = stated(geometry.axes.rows_range(kind.range()).max());
+        sigma.filter(|_| letters.is_some())
+    });
+    let [nonorthogonality, wobble, encoder] = of_axes;
+    TurntableFile {
+        file: "table.csv.gz".to_owned(),
+        stream: None,
+        salvage: None,
+        time_unit: None,
+        sample_period_s: None,
+        columns: TableColumns {
+            time: TimeColumn::One("t".to_owned()),
+            quaternion: Some(["qw", "qx", "qy", "qz"].map(str::to_owned)),
+            angles: letters
+                .as_ref()
+                .map(|letters| owned(&ANGLES[..letters.len()])),
+            axes: letters.as_deref().map(owned),
+        },
+        axes: None,
+        position_sigma_arcsec: Angle(short(table.position_sigma / ARCSEC)),
+        reading_sigma_arcsec: Angle(short(table.reading_sigma / ARCSEC)),
+        level_sigma_arcsec: stated(geometry.base.x),
+        north_sigma_arcsec: stated(geometry.base.z),
+        nonorthogonality_sigma_arcsec: nonorthogonality,
+        wobble_sigma_arcsec: wobble,
+        encoder_sigma_arcsec: encoder,
+        time_sigma_ms: None,
+    }
 }
