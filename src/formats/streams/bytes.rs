@@ -43,6 +43,12 @@ impl Input {
         })
     }
 
+    /// The file itself, at any place.
+    #[cfg_attr(not(feature = "npy"), allow(dead_code))]
+    pub fn into_source(self) -> Box<dyn Source> {
+        self.source
+    }
+
     /// Bytes read or passed over so far.
     pub fn offset(&self) -> u64 {
         self.offset

@@ -139,9 +139,12 @@ pub fn npz(deflated: bool) -> Vec<u8> {
             }
             false => content.clone(),
         };
+        let mut sum = flate2::Crc::new();
+        sum.update(content);
         let head = [
             &[20, 0, 0, 0, if deflated { 8 } else { 0 }, 0][..],
-            &[0; 8],
+            &[0; 4],
+            &sum.sum().to_le_bytes(),
             &(packed.len() as u32).to_le_bytes(),
             &(content.len() as u32).to_le_bytes(),
             &(name.len() as u16).to_le_bytes(),
