@@ -3,16 +3,36 @@
 use std::ffi::OsStr;
 use std::fs::File;
 use std::io::{self, Read};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use toml::de::DeTable;
 
 use super::small_file;
 
-/// Tables of a run.toml that name a file beside it.
-const WITH_FILE: [&str; 3] = ["imu", "turntable", "segments"];
+/// What a run.toml or a campaign.toml names beside it; neither need be right.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct Inputs {
+    imu: Named,
+    turntable: Named,
+    segments: Named,
+    recording: Vec<Named>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct Named {
+    file: Option<String>,
+    run: Option<String>,
+}
+
+impl Inputs {
+    fn read(path: &Path) -> Self {
+        let text = small_file::text(path).unwrap_or_default();
+        toml::from_str(&text).unwrap_or_default()
+    }
+}
 
 /// SHA-256 of a value as JSON, in hexadecimal digits.
 pub fn digest_of(value: &impl Serialize) -> String {
@@ -47,69 +67,48 @@ fn digest_of_file(path: &Path) -> io::Result<String> {
 ///
 /// Of a campaign its file, then those of each recording, in the order of their paths.
 pub fn input_digests(run: &Path) -> Vec<(String, String)> {
-    let recordings = recordings(run);
-    if !recordings.is_empty() {
-        let directory = run.parent().unwrap_or(Path::new(""));
-        let digest = digest_of_file(run).unwrap_or_else(|error| error.kind().to_string());
-        let mut all = vec![("campaign.toml".to_owned(), digest)];
-        for recording in recordings {
-            let of_recording = digests_of_run(&directory.join(&recording));
-            let folder = Path::new(&recording).parent().unwrap_or(Path::new(""));
-            let named = of_recording
-                .into_iter()
-                .map(|(name, digest)| (folder.join(name).display().to_string(), digest));
-            all.extend(named);
-        }
-        return all;
+    let recordings = Inputs::read(run).recording.into_iter();
+    let mut recordings: Vec<String> = recordings.filter_map(|named| named.run).collect();
+    if recordings.is_empty() {
+        return digests_of_run(run);
     }
-    digests_of_run(run)
-}
-
-fn digests_of_run(run: &Path) -> Vec<(String, String)> {
-    let digest = |name: String, path: PathBuf| {
-        let digest = digest_of_file(&path).unwrap_or_else(|error| error.kind().to_string());
-        (name, digest)
-    };
-    let name = match run.extension() == Some(OsStr::new("toml")) {
-        true => "run.toml".into(),
-        false => run.file_name().unwrap_or_default().to_string_lossy(),
-    };
-    let mut all = vec![digest(name.into_owned(), run.to_owned())];
-    let text = small_file::text(run).unwrap_or_default();
-    let Ok(table) = DeTable::parse(&text) else {
-        return all;
-    };
+    recordings.sort();
     let directory = run.parent().unwrap_or(Path::new(""));
-    for name in WITH_FILE {
-        let file = table.get_ref().get(name).and_then(|value| {
-            let table = value.get_ref().as_table()?;
-            table.get("file")?.get_ref().as_str()
-        });
-        if let Some(file) = file {
-            all.push(digest(file.to_owned(), directory.join(file)));
-        }
+    let mut all = vec![("campaign.toml".to_owned(), digest_or_error(run))];
+    for recording in recordings {
+        let folder = Path::new(&recording).parent().unwrap_or(Path::new(""));
+        let of_recording = digests_of_run(&directory.join(&recording)).into_iter();
+        all.extend(
+            of_recording.map(|(name, digest)| (folder.join(name).display().to_string(), digest)),
+        );
     }
     all
 }
 
-/// The recordings that a campaign names, sorted; none of a run.
-fn recordings(campaign: &Path) -> Vec<String> {
-    let text = small_file::text(campaign).unwrap_or_default();
-    let Ok(table) = DeTable::parse(&text) else {
-        return Vec::new();
+/// The digest of a file, or what the system says where it cannot be read.
+fn digest_or_error(path: &Path) -> String {
+    digest_of_file(path).unwrap_or_else(|error| error.kind().to_string())
+}
+
+fn digests_of_run(run: &Path) -> Vec<(String, String)> {
+    let name = match run.extension() == Some(OsStr::new("toml")) {
+        true => "run.toml".into(),
+        false => run.file_name().unwrap_or_default().to_string_lossy(),
     };
-    let all = table.get_ref().get("recording");
-    let all = all.and_then(|value| value.get_ref().as_array());
-    let run = |value: &toml::Spanned<toml::de::DeValue>| {
-        let table = value.get_ref().as_table()?;
-        Some(table.get("run")?.get_ref().as_str()?.to_owned())
-    };
-    let mut named: Vec<String> = all
-        .into_iter()
-        .flat_map(|all| all.iter().filter_map(run))
-        .collect();
-    named.sort();
-    named
+    let mut all = vec![(name.into_owned(), digest_or_error(run))];
+    let directory = run.parent().unwrap_or(Path::new(""));
+    let Inputs {
+        imu,
+        turntable,
+        segments,
+        ..
+    } = Inputs::read(run);
+    let files = [imu, turntable, segments].into_iter();
+    all.extend(files.filter_map(|named| named.file).map(|file| {
+        let digest = digest_or_error(&directory.join(&file));
+        (file, digest)
+    }));
+    all
 }
 
 #[cfg(test)]

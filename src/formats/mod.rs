@@ -23,7 +23,6 @@ mod laboratory;
 mod lot_directory;
 mod names;
 mod parts;
-mod plausible;
 mod quantity;
 mod read;
 mod rows;

@@ -1,10 +1,45 @@
 //! A topic of a log: messages of one type, each with the time at which it was logged.
 
+use std::collections::BTreeMap;
+
 use super::bytes::Broken;
 use super::ros::{self, Encoding};
 use super::{Column, Stream};
 #[cfg(feature = "mcap")]
 use super::{json, protobuf};
+
+/// The topics of a log, by the numbers that its messages have.
+#[derive(Default)]
+pub(super) struct Topics {
+    pub streams: Vec<Stream>,
+    pub readers: Vec<Reader>,
+    of_number: BTreeMap<u32, usize>,
+}
+
+impl Topics {
+    /// Adds a number of a topic, which may be known by another: a recorder begins anew, or several programs publish.
+    pub fn add(&mut self, number: u32, topic: &str, reader: impl FnOnce() -> Reader) {
+        if self.of_number.contains_key(&number) {
+            return;
+        }
+        let known = self.streams.iter().position(|stream| stream.name == topic);
+        let stream = known.unwrap_or_else(|| {
+            let reader = reader();
+            self.streams.push(reader.stream(topic));
+            self.readers.push(reader);
+            self.streams.len() - 1
+        });
+        self.of_number.insert(number, stream);
+    }
+
+    /// The stream of a message.
+    pub fn stream(&self, number: u32, offset: u64) -> Result<usize, Broken> {
+        self.of_number.get(&number).copied().ok_or_else(|| {
+            let found = format_args!("a message of channel {number}");
+            Broken::new(offset, found, "a channel that was described before it")
+        })
+    }
+}
 
 /// The column of the time of logging, in s.
 const LOG_TIME: &str = "log_time";
