@@ -12,10 +12,10 @@ mod trajectory;
 
 use std::path::{Path, PathBuf};
 
+use include_dir::{Dir, include_dir};
 use serde::de::DeserializeOwned;
 
-use crate::formats::Document;
-use crate::formats::FileError;
+use crate::formats::{Document, FileError, Place as At};
 
 pub use catalogue::Embedded;
 pub use instrument::{InstallationModel, Instrument, Spread, Variation};
@@ -67,87 +67,15 @@ impl Room {
         }
     }
 
-    fn embedded(self) -> &'static [(&'static str, &'static str)] {
-        match self {
-            Self::Imu => IMU,
-            Self::Installation => INSTALLATION,
-            Self::Turntable => TURNTABLE,
-            Self::Path => PATH,
-            Self::Scenario => SCENARIO,
-            Self::Campaign => CAMPAIGN,
-            Self::Trajectory => TRAJECTORY,
-        }
+    /// Name and text of each model of the folder, in the order of their names.
+    fn embedded(self) -> impl Iterator<Item = (&'static str, &'static str)> {
+        let folder = MODELS.get_dir(self.name());
+        let files = folder.into_iter().flat_map(Dir::files);
+        files.filter_map(|file| Some((file.path().file_stem()?.to_str()?, file.contents_utf8()?)))
     }
 }
 
-macro_rules! embed {
-    ($list:ident, $room:literal, $($name:literal),+ $(,)?) => {
-        const $list: &[(&str, &str)] = &[
-            $(($name, include_str!(concat!("../models/", $room, "/", $name, ".toml")))),+
-        ];
-    };
-}
-
-embed!(
-    IMU,
-    "imu",
-    "industrial-mems",
-    "industrial-mems-warming",
-    "navigation-fog",
-    "navigation-fog-warming",
-    "paper",
-    "paper-unsteady",
-    "ring-laser",
-    "tactical-fog",
-);
-embed!(
-    INSTALLATION,
-    "installation",
-    "general",
-    "six-angle",
-    "three-angle",
-);
-embed!(
-    TURNTABLE,
-    "turntable",
-    "three-axis",
-    "three-axis-with-errors",
-    "two-axis",
-);
-embed!(
-    PATH,
-    "path",
-    "nineteen-position",
-    "single-axis",
-    "six-position",
-    "three-axis",
-    "three-axis-hour",
-    "three-axis-two-hours",
-    "two-axis",
-);
-embed!(
-    SCENARIO,
-    "scenario",
-    "demo",
-    "demo-six-position",
-    "experiment",
-    "mems",
-    "nineteen-position",
-    "real-table",
-    "single-axis",
-    "two-axis",
-    "warming",
-    "warming-mems",
-);
-embed!(
-    CAMPAIGN,
-    "campaign",
-    "days",
-    "five-soaks",
-    "mountings",
-    "ramp"
-);
-embed!(TRAJECTORY, "trajectory", "flight", "vehicle");
+static MODELS: Dir = include_dir!("$CARGO_MANIFEST_DIR/models");
 
 /// Why a model cannot be had.
 #[derive(Debug, thiserror::Error)]
@@ -169,30 +97,14 @@ pub enum ModelError {
         /// All embedded names.
         known: String,
     },
-    /// A file that cannot be read.
-    #[error("{file}: cannot be read: {source}")]
-    Unreadable {
-        /// The file.
-        file: String,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// A file that is not what it should be.
+    /// A file that cannot be read, or is not what it should be.
     #[error(transparent)]
-    Malformed(#[from] FileError),
-    /// Values that do not fit together.
-    #[error("{file}: {message}")]
-    Inconsistent {
-        /// The file.
-        file: String,
-        /// What is wrong and what to do.
-        message: String,
-    },
+    File(#[from] FileError),
 }
 
 /// The embedded names of a folder, in order.
 pub fn names(room: Room) -> impl Iterator<Item = &'static str> {
-    room.embedded().iter().map(|&(name, _)| name)
+    room.embedded().map(|(name, _)| name)
 }
 
 /// Where a model is named, which decides what its name can mean.
@@ -237,12 +149,20 @@ impl Text {
         }
     }
 
+    /// Values that do not fit together: what is wrong and what to do.
     pub(crate) fn inconsistent(&self, message: impl Into<String>) -> ModelError {
-        ModelError::Inconsistent {
-            file: self.file.clone(),
-            message: message.into(),
-        }
+        inconsistent(&self.file, message)
     }
+}
+
+/// The same of a file by its name.
+pub(crate) fn inconsistent(file: &str, message: impl Into<String>) -> ModelError {
+    let error = FileError {
+        file: file.into(),
+        place: At::File,
+        message: message.into(),
+    };
+    error.into()
 }
 
 /// Finds a model: the file at `name_or_path` if there is one, else the embedded model of that name.
@@ -257,23 +177,18 @@ pub fn text(room: Room, name_or_path: &str, named_in: &Place) -> Result<Text, Mo
     };
     if let Some(path) = path.filter(|path| path.is_file()) {
         let file = path.display().to_string();
-        return match std::fs::read_to_string(&path) {
-            Ok(text) => Ok(Text {
-                text,
-                file,
-                place: Place::File(path),
-            }),
-            Err(source) => Err(ModelError::Unreadable { file, source }),
-        };
-    }
-    if let Some((name, text)) = room
-        .embedded()
-        .iter()
-        .find(|(name, _)| *name == name_or_path)
-    {
+        let text = std::fs::read_to_string(&path);
+        let text = text.map_err(|error| inconsistent(&file, format!("cannot be read: {error}")))?;
         return Ok(Text {
-            text: (*text).into(),
-            file: (*name).into(),
+            text,
+            file,
+            place: Place::File(path),
+        });
+    }
+    if let Some((name, text)) = room.embedded().find(|(name, _)| *name == name_or_path) {
+        return Ok(Text {
+            text: text.into(),
+            file: name.into(),
             place: Place::Embedded,
         });
     }

@@ -107,30 +107,24 @@ impl Parts {
 
     /// Every run in one part.
     fn check_all_there(&self) -> Result<(), FileError> {
-        let count = usize::try_from(self.job.runs).unwrap_or(usize::MAX);
-        let mut holder: Vec<Option<&Path>> = vec![None; count];
-        for (directory, part) in &self.parts {
-            for run in part.held() {
-                let slot = usize::try_from(run).ok().and_then(|k| holder.get_mut(k));
-                let Some(slot) = slot else {
-                    continue;
-                };
-                if let Some(other) = slot.replace(directory) {
-                    return Err(FileError::new(
-                        directory,
-                        Place::File,
-                        format_args!("run {} that is in {}, too", self.name(run), other.display()),
-                        "every run in one part",
-                        "Leave one of the two out.",
-                    ));
-                }
-            }
+        let mut held = self.held();
+        held.sort();
+        if let Some([(run, other), (_, directory)]) = held.array_windows().find(|[a, b]| a.0 == b.0)
+        {
+            return Err(FileError::new(
+                directory,
+                Place::File,
+                format_args!(
+                    "run {} that is in {}, too",
+                    self.name(*run),
+                    other.display()
+                ),
+                "every run in one part",
+                "Leave one of the two out.",
+            ));
         }
-        let missing: Vec<u64> = (0..self.job.runs)
-            .zip(&holder)
-            .filter(|(_, holder)| holder.is_none())
-            .map(|(run, _)| run)
-            .collect();
+        let is_there = |run: &u64| held.binary_search_by_key(run, |(run, _)| *run).is_ok();
+        let missing: Vec<u64> = (0..self.job.runs).filter(|run| !is_there(run)).collect();
         let Some(first) = self.parts.first().filter(|_| !missing.is_empty()) else {
             return Ok(());
         };
@@ -149,6 +143,16 @@ impl Parts {
             format_args!("all {} runs; the parts given are {given}", self.job.runs),
             "Add the missing parts.",
         ))
+    }
+
+    /// All runs, each with the directory of its part.
+    fn held(&self) -> Vec<(u64, &Path)> {
+        let all = self.parts.iter();
+        all.flat_map(|(directory, part)| {
+            let held = part.held().into_iter();
+            held.map(move |run| (run, directory.as_path()))
+        })
+        .collect()
     }
 
     /// A run as messages call it: by its number, of a lot by its unit.
@@ -190,11 +194,7 @@ impl Parts {
 
     /// Name and part of every unit of a lot, in its order.
     pub fn units<'a>(&'a self) -> Vec<(&'a str, &'a Path)> {
-        let of_part = |(directory, part): &'a (PathBuf, Part)| {
-            let held = part.held().into_iter();
-            held.map(move |run| (run, directory.as_path()))
-        };
-        let mut all: Vec<(u64, &Path)> = self.parts.iter().flat_map(of_part).collect();
+        let mut all = self.held();
         all.sort();
         let unit = |(run, directory)| {
             let name = self.job.names.get(usize::try_from(run).ok()?)?;

@@ -8,10 +8,9 @@ use serde::Deserialize;
 use super::error::FileError;
 use super::schema::{Document, Finite, Positive};
 use super::small_file;
-use crate::calibration::{Group, parameter_name};
+use crate::calibration::{DayToDay, Group, parameter_name};
 use crate::imu::{InstallationForm, ParameterKind, Sensor};
 use crate::lot::{Limit, Specification};
-use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
 
 /// The version of the format.
 const FORMAT: &str = "turncal-specification/1";
@@ -59,10 +58,11 @@ impl Specification {
         let mut limits = Vec::new();
         for (sensor, stated) in [(Sensor::Gyro, &file.gyro), (Sensor::Accel, &file.accel)] {
             let groups = || Group::all().filter(|group| group.sensor() == sensor);
-            let keys: Vec<&str> = groups().map(|group| unit(group).0).collect();
-            document.only(sensor.name(), stated.keys(), &keys)?;
+            let keys: Vec<String> = groups().map(|group| key(group).0).collect();
+            let known: Vec<&str> = keys.iter().map(String::as_str).collect();
+            document.only(sensor.name(), stated.keys(), &known)?;
             for group in groups() {
-                if let Some(of_group) = stated.get(unit(group).0) {
+                if let Some(of_group) = stated.get(&key(group).0) {
                     limits.extend(limits_of(document, group, of_group)?);
                 }
             }
@@ -76,13 +76,9 @@ impl Specification {
 }
 
 /// The key of a group in its sensor's table, and its unit in SI.
-fn unit(group: Group) -> (&'static str, f64) {
-    match (group.kind(), group.sensor()) {
-        (ParameterKind::Scale, _) => ("scale_ppm", PPM),
-        (ParameterKind::Installation, _) => ("installation_arcsec", ARCSEC),
-        (ParameterKind::Bias, Sensor::Gyro) => ("bias_deg_per_h", DEG_PER_H),
-        (ParameterKind::Bias, Sensor::Accel) => ("bias_ug", MICRO_G),
-    }
+fn key(group: Group) -> (String, f64) {
+    let (key, unit) = DayToDay::key(group);
+    (key[group.sensor().name().len() + 1..].to_owned(), unit)
 }
 
 /// The limits of the parameters of a group.
@@ -92,7 +88,7 @@ fn limits_of(
     stated: &LimitsFile,
 ) -> Result<Vec<Limit>, FileError> {
     let form = InstallationForm::General;
-    let (key, unit) = unit(group);
+    let (key, unit) = key(group);
     let path = format!("{}.{key}", group.sensor().name());
     let axis = |index| {
         let name = parameter_name(form, index)?;
@@ -145,6 +141,7 @@ fn limits_of(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::units::{ARCSEC, DEG_PER_H};
 
     fn read(text: &str) -> Result<Specification, FileError> {
         let directory = tempfile::tempdir().unwrap();

@@ -23,28 +23,14 @@ pub(super) struct TemperatureUnit {
 impl TemperatureUnit {
     /// The words for it in `run.toml`.
     pub const WORDS: [(&'static str, Self); 3] = [
-        (
-            "degC",
-            Self {
-                kelvin: 1.0,
-                zero: 0.0,
-            },
-        ),
-        (
-            "K",
-            Self {
-                kelvin: 1.0,
-                zero: 273.15,
-            },
-        ),
-        (
-            "degF",
-            Self {
-                kelvin: 5.0 / 9.0,
-                zero: 32.0,
-            },
-        ),
+        ("degC", Self::new(1.0, 0.0)),
+        ("K", Self::new(1.0, 273.15)),
+        ("degF", Self::new(5.0 / 9.0, 32.0)),
     ];
+
+    const fn new(kelvin: f64, zero: f64) -> Self {
+        Self { kelvin, zero }
+    }
 
     fn celsius(self, value: f64) -> f64 {
         (value - self.zero) * self.kelvin

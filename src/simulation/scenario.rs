@@ -124,10 +124,8 @@ impl Scenario {
     /// If it does not exist, is malformed, or does not fit the table.
     pub fn with_path(mut self, name_or_path: &str) -> Result<Self, ModelError> {
         (self.path, self.path_name) = models::path(name_or_path, &Place::CommandLine, &self.site)?;
-        self.check().map_err(|message| ModelError::Inconsistent {
-            file: name_or_path.into(),
-            message,
-        })?;
+        let checked = self.check();
+        checked.map_err(|message| models::inconsistent(name_or_path, message))?;
         Ok(self)
     }
 
