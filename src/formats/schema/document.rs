@@ -8,7 +8,7 @@ use serde::Deserialize;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer};
 
-use super::super::error::{FileError, Place, list, suggestion};
+use crate::formats::error::{FileError, Place, list, suggestion};
 
 /// What fields hold that must be there.
 const MEANINGS: [(&str, &str); 19] = [

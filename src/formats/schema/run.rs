@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
-use super::super::axes::BodyAxes;
-use super::super::clock::TimeUnit;
-use super::super::imu_log::TimeStamp;
-use super::super::temperature::TemperatureUnit;
+use super::axes::BodyAxes;
 use super::values::{
     Angle, Finite, Gravity, Height, Latitude, Longitude, NonNegative, OneOrThree, Positive,
 };
+use crate::formats::clock::TimeUnit;
+use crate::formats::imu_log::TimeStamp;
+use crate::formats::inputs::temperature::TemperatureUnit;
 use crate::imu::Output;
 
 /// The version of the format.

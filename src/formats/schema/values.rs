@@ -5,11 +5,11 @@ use serde::de::{Deserializer, Error};
 use serde::ser::Serializer;
 use serde::{Deserialize, Serialize};
 
-use super::super::axes::BodyAxes;
-use super::super::clock::TimeUnit;
-use super::super::error::list;
-use super::super::imu_log::TimeStamp;
-use super::super::temperature::TemperatureUnit;
+use super::axes::BodyAxes;
+use crate::formats::clock::TimeUnit;
+use crate::formats::error::list;
+use crate::formats::imu_log::TimeStamp;
+use crate::formats::inputs::temperature::TemperatureUnit;
 
 /// Squares and quotients of such numbers are still numbers.
 fn has_size(value: f64) -> bool {

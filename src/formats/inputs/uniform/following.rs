@@ -10,7 +10,7 @@ const BUCKET: usize = 4096;
 
 /// Follows stamps as they come, and says at the end what clock they shared.
 #[derive(Debug)]
-pub(in crate::formats) struct Following {
+pub struct Following {
     file: PathBuf,
     given: Option<f64>,
     counter: Counter,

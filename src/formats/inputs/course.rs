@@ -8,7 +8,7 @@ const SAME: f64 = 1e-6;
 
 /// Samples without a gap, whose integrals are counted in values times samples.
 #[derive(Default)]
-pub(super) struct Course {
+pub struct Course {
     /// Where they begin, in samples.
     pub begin: f64,
     pub sums: [Vec<f64>; 3],

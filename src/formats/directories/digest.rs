@@ -8,7 +8,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::small_file;
+use crate::formats::small_file;
 
 /// What a run.toml or a campaign.toml names beside it; neither need be right.
 #[derive(Default, Deserialize)]

@@ -1,8 +1,8 @@
 //! Temperature columns of a log.
 
-use super::error::FileError;
-use super::rows::LogRows;
-use super::schema::{TemperatureColumn, ThreeColumns};
+use crate::formats::error::FileError;
+use crate::formats::rows::LogRows;
+use crate::formats::schema::{TemperatureColumn, ThreeColumns};
 use crate::imu::PerSensor;
 use crate::recording::{TEMPERATURE_SPACING, Temperature, TemperatureFacts};
 
@@ -13,7 +13,7 @@ const MOST_SPANS: f64 = 366.0 * 86_400.0;
 
 /// What a column's numbers are.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct TemperatureUnit {
+pub struct TemperatureUnit {
     /// K for one of them.
     kelvin: f64,
     /// 0 °C in them.
@@ -38,7 +38,7 @@ impl TemperatureUnit {
 }
 
 /// What `run.toml` says of them.
-pub(super) struct TemperatureColumns<'a> {
+pub struct TemperatureColumns<'a> {
     names: Vec<&'a str>,
     of: PerSensor<[usize; 3]>,
     unit: TemperatureUnit,
@@ -103,7 +103,7 @@ impl<'a> TemperatureColumns<'a> {
 }
 
 /// Temperatures as a file is read.
-pub(super) struct Temperatures {
+pub struct Temperatures {
     channels: Vec<Channel>,
     of: PerSensor<[usize; 3]>,
     unit: TemperatureUnit,
@@ -127,7 +127,7 @@ struct Channel {
 }
 
 /// What was read of them.
-pub(super) struct Read {
+pub struct Read {
     pub temperature: Option<Temperature>,
     pub facts: Option<TemperatureFacts>,
     /// What is wrong with them, a sentence each.

@@ -2,16 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use super::clock::{Breaks, Clock, TimeUnit};
-use super::csv_file::CsvFile;
-use super::error::{FileError, Place};
-use super::rows::LogRows;
-use super::schema::{Document, ImuFile, Positive, TimeColumn};
-use super::streams::{self, StreamRows};
+use crate::formats::clock::{Breaks, Clock, TimeUnit};
+use crate::formats::csv_file::CsvFile;
+use crate::formats::error::{FileError, Place};
+use crate::formats::rows::LogRows;
+use crate::formats::schema::{Document, ImuFile, Positive, TimeColumn};
+use crate::formats::streams::{self, StreamRows};
 
 /// Where rows come from.
 #[derive(Debug, Clone)]
-pub(super) struct Source<'a> {
+pub struct Source<'a> {
     pub file: PathBuf,
     /// Of a file of several streams the one that is meant.
     pub stream: Option<&'a str>,
@@ -65,7 +65,7 @@ impl<'a> Source<'a> {
 }
 
 /// The clock that a table says of its rows.
-pub(super) fn clock<'a>(
+pub fn clock<'a>(
     document: Document,
     table: &str,
     column: Option<&'a TimeColumn>,
@@ -96,7 +96,7 @@ pub(super) fn clock<'a>(
 }
 
 /// Where the accelerometers are, if not in the rows of the gyros, and their clock.
-pub(super) fn accel_from<'a>(
+pub fn accel_from<'a>(
     document: Document,
     imu: &'a ImuFile,
     directory: &Path,

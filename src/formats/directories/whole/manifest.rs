@@ -7,13 +7,13 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 /// The list's name in its directory.
-pub(in crate::formats) const FILE: &str = ".turncal";
+pub const FILE: &str = ".turncal";
 
 const FIRST_LINE: &str = "turncal-output/1: turncal wrote what is listed here, and --force replaces \
                           this directory only while it holds nothing else";
 
 /// The list of all that is in a directory.
-pub(super) fn of_all(directory: &Path) -> io::Result<String> {
+pub fn of_all(directory: &Path) -> io::Result<String> {
     let mut names = Vec::new();
     search(directory, Path::new(""), &mut |entry| {
         names.push(name(entry));
@@ -24,7 +24,7 @@ pub(super) fn of_all(directory: &Path) -> io::Result<String> {
 
 /// The list of a directory that grows, of these entries. What is in an entry that ends in `/` has a list of its
 /// own.
-pub(super) fn of_names<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+pub fn of_names<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     let lines = std::iter::once(FIRST_LINE).chain(names);
     lines.flat_map(|line| [line, "\n"]).collect()
 }
@@ -42,7 +42,7 @@ fn listed(directory: &Path) -> Option<BTreeSet<String>> {
 }
 
 /// Files that the list of a directory names, in it and not further below.
-pub(super) fn listed_files(directory: &Path) -> Vec<PathBuf> {
+pub fn listed_files(directory: &Path) -> Vec<PathBuf> {
     let names = listed(directory).unwrap_or_default().into_iter();
     let here = names.filter(|name| !name.contains('/') && name != FILE);
     let files = here.map(|name| directory.join(name));
@@ -50,7 +50,7 @@ pub(super) fn listed_files(directory: &Path) -> Vec<PathBuf> {
 }
 
 /// The first entry of a directory that its list does not name, relative to it.
-pub(super) fn foreign(directory: &Path) -> io::Result<Option<PathBuf>> {
+pub fn foreign(directory: &Path) -> io::Result<Option<PathBuf>> {
     let of_all = listed(directory).unwrap_or_default();
     let grows: Vec<&str> = of_all.iter().filter_map(|n| n.strip_suffix('/')).collect();
     let mut of_one: BTreeMap<PathBuf, Option<BTreeSet<String>>> = BTreeMap::new();

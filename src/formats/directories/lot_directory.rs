@@ -8,11 +8,11 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::digest::{digest_of, input_digests};
-use super::error::{FileError, Place};
 use super::job::{JOB_FILE, Part};
-use super::small_file;
 use super::whole::{WholeDirectory, clear_abandoned, list_anew, write_whole};
 use crate::calibration::result::Calibration;
+use crate::formats::error::{FileError, Place};
+use crate::formats::small_file;
 use crate::imu::PerSensor;
 use crate::lot::{Calibrated, Unit};
 use crate::noise::RestNoise;

@@ -12,8 +12,8 @@ use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use super::error::{FileError, Place};
-pub(in crate::formats) use manifest::FILE as LIST;
+use crate::formats::error::{FileError, Place};
+pub use manifest::FILE as LIST;
 use stage::Stage;
 pub use stage::abandon_unfinished;
 
@@ -110,7 +110,7 @@ impl WholeDirectory {
     }
 
     /// The same for a directory that grows: see [`list_anew`].
-    pub(super) fn commit_growing(self, names: &[&str]) -> Result<(), FileError> {
+    pub fn commit_growing(self, names: &[&str]) -> Result<(), FileError> {
         let list = manifest::of_names(names.iter().copied());
         self.commit_with(&list)
     }
@@ -129,7 +129,7 @@ impl WholeDirectory {
 
 /// Writes the list of a directory that grows, in which nothing but these names is turncal's; what is in a name
 /// that ends in `/` has a list of its own. Files that the list before named and this one does not go.
-pub(super) fn list_anew(directory: &Path, names: &[&str]) -> Result<(), FileError> {
+pub fn list_anew(directory: &Path, names: &[&str]) -> Result<(), FileError> {
     for old in manifest::listed_files(directory) {
         let still = |name: &&str| old.file_name() == Some(name.as_ref());
         if !names.iter().any(still) {
@@ -142,7 +142,7 @@ pub(super) fn list_anew(directory: &Path, names: &[&str]) -> Result<(), FileErro
 }
 
 /// Removes what a killed process left unfinished in a directory.
-pub(super) fn clear_abandoned(directory: &Path) {
+pub fn clear_abandoned(directory: &Path) {
     stage::remove_abandoned(directory);
 }
 
@@ -172,7 +172,7 @@ pub fn write_whole(path: &Path, bytes: &[u8], force: bool) -> Result<(), FileErr
 }
 
 /// The same for what is too long to be held: `write` gets the file that will appear.
-pub(crate) fn write_whole_with(
+pub fn write_whole_with(
     path: &Path,
     force: bool,
     write: impl FnOnce(File) -> io::Result<()>,

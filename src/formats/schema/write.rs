@@ -8,17 +8,17 @@ use flate2::{Compression, GzBuilder};
 use nalgebra::Vector3;
 use toml::Spanned;
 
-use super::error::{FileError, Place, list, suggestion};
-use super::imu_log::TimeStamp;
-use super::quantity::units;
-use super::schema::{
+use super::{
     Angle, FORMAT, Gravity, Height, ImuColumns, ImuFile, Latitude, Longitude, META, NonNegative,
     Positive, PriorFile, PriorsFile, RunFile, SegmentsFile, SiteFile, StandstillFile, TableColumns,
     TemperatureColumn, TermFile, TimeColumn, TurntableFile,
 };
-use super::table_log::LETTERS;
 use crate::calibration::Calibration;
 use crate::earth::Site;
+use crate::formats::error::{FileError, Place, list, suggestion};
+use crate::formats::imu_log::TimeStamp;
+use crate::formats::inputs::table_log::LETTERS;
+use crate::formats::quantity::units;
 use crate::imu::{Instrument, NoiseKeys, Output, Sensor, Term};
 use crate::recording::{ImuSamples, Segment, TableLog, nanoseconds};
 use crate::run::Run;
@@ -111,7 +111,7 @@ fn check_words(configuration: &Path, run: &Run, output: Output) -> Result<(), Fi
 }
 
 /// Writes rows into a file, compressed if the name ends in `.gz`.
-pub(crate) fn write_rows(
+pub fn write_rows(
     name: &Path,
     file: File,
     rows: &dyn Fn(&mut dyn Write) -> io::Result<()>,

@@ -52,7 +52,7 @@ fn remove(stage: &Path, parents: &[PathBuf]) -> bool {
 }
 
 /// A place that something new is going to take.
-pub(super) struct Stage {
+pub struct Stage {
     /// Holds the new thing and, while they change places, the old one. Goes away on drop.
     beside: PathBuf,
     /// None where the file system has no locks.
@@ -61,7 +61,7 @@ pub(super) struct Stage {
 }
 
 impl Stage {
-    pub(super) fn new(target: &Path) -> Result<Self, FileError> {
+    pub fn new(target: &Path) -> Result<Self, FileError> {
         if target.file_name().is_none() {
             return Err(FileError::new(
                 target,
@@ -113,16 +113,16 @@ impl Stage {
         }
     }
 
-    pub(super) fn new_path(&self) -> PathBuf {
+    pub fn new_path(&self) -> PathBuf {
         self.beside.join(NEW)
     }
 
-    pub(super) fn target(&self) -> &Path {
+    pub fn target(&self) -> &Path {
         &self.target
     }
 
     /// Puts the new thing in its place; what is there is replaced only with `force`.
-    pub(super) fn commit(self, force: bool) -> Result<(), FileError> {
+    pub fn commit(self, force: bool) -> Result<(), FileError> {
         let mut unfinished = unfinished();
         let old = self.beside.join(OLD);
         let exists = fs::symlink_metadata(&self.target).is_ok();
@@ -195,7 +195,7 @@ fn begin(parent: &Path) -> io::Result<(PathBuf, Option<File>)> {
 }
 
 /// Removes the stages in a directory whose processes live no more.
-pub(super) fn remove_abandoned(parent: &Path) {
+pub fn remove_abandoned(parent: &Path) {
     let Ok(entries) = fs::read_dir(parent) else {
         return;
     };

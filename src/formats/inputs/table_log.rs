@@ -4,12 +4,12 @@ use std::path::Path;
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
-use super::clock::{Clock, Stamp, Stamps};
-use super::error::FileError;
-use super::rows::LogRows;
-use super::schema::{Angle, Document, TableColumns, TurntableFile};
 use super::source::{Source, clock};
 use crate::attitude;
+use crate::formats::clock::{Clock, Stamp, Stamps};
+use crate::formats::error::FileError;
+use crate::formats::rows::LogRows;
+use crate::formats::schema::{Angle, Document, TableColumns, TurntableFile};
 use crate::recording::{ImuSamples, TableLog};
 use crate::turntable::{AxisAngles, AxisError, TableAccuracy, TableGeometry, axis_angles};
 use crate::units::{ARCSEC, DEGREE};
@@ -18,13 +18,13 @@ use crate::units::{ARCSEC, DEGREE};
 const NORM_TOLERANCE: f64 = 1e-4;
 
 /// What axes are called by which a table turns when all its angles are zero.
-pub(super) const LETTERS: [(&str, Vector3<f64>); 3] = [
+pub const LETTERS: [(&str, Vector3<f64>); 3] = [
     ("x", Vector3::new(1.0, 0.0, 0.0)),
     ("y", Vector3::new(0.0, 1.0, 0.0)),
     ("z", Vector3::new(0.0, 0.0, 1.0)),
 ];
 /// How a row gives `C_b_n`, and where the table's axes stand; `C` is a column's name or its index.
-pub(super) struct AttitudeColumns<C> {
+pub struct AttitudeColumns<C> {
     /// `[w, x, y, z]`, body right-front-up to East-North-Up.
     quaternion: Option<[C; 4]>,
     /// Angles in degrees about the axes of the table, outermost first. Without a quaternion the attitude is
@@ -169,7 +169,7 @@ fn geometry(
 }
 
 /// What `run.toml` says of the file.
-pub(super) struct TableLogFile<'a> {
+pub struct TableLogFile<'a> {
     pub source: Source<'a>,
     pub clock: Clock<'a>,
     pub attitude: AttitudeColumns<&'a str>,

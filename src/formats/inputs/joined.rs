@@ -7,18 +7,18 @@
 
 use std::path::{Path, PathBuf};
 
-use super::clock::{Breaks, Clock, Stamp, Stamps, TimeUnit};
 use super::course::Course;
-use super::error::{FileError, Place};
 use super::source::Source;
 use super::uniform::Uniform;
+use crate::formats::clock::{Breaks, Clock, Stamp, Stamps, TimeUnit};
+use crate::formats::error::{FileError, Place};
 use crate::imu::{Output, PerSensor};
 
 /// The column of time, in s.
-pub(super) const TIME: &str = "time";
+pub const TIME: &str = "time";
 
 /// One of the streams, as `run.toml` describes it.
-pub(super) struct Part<'a> {
+pub struct Part<'a> {
     pub source: &'a Source<'a>,
     pub clock: Clock<'a>,
     pub columns: [&'a str; 3],
@@ -27,7 +27,7 @@ pub(super) struct Part<'a> {
 }
 
 /// Both streams at one row of the gyros' clock.
-pub(super) struct Joined {
+pub struct Joined {
     file: PathBuf,
     header: Vec<String>,
     units: Vec<String>,
@@ -40,7 +40,7 @@ pub(super) struct Joined {
 }
 
 /// The columns of both triads by names that tell them apart.
-pub(super) fn distinct(triads: &PerSensor<[&str; 3]>) -> PerSensor<[String; 3]> {
+pub fn distinct(triads: &PerSensor<[&str; 3]>) -> PerSensor<[String; 3]> {
     let bare = |name: &str| name.strip_prefix('-').unwrap_or(name).to_owned();
     let clash = |name: &str| triads.gyro.iter().any(|other| bare(other) == bare(name));
     PerSensor {
@@ -309,7 +309,7 @@ impl Track {
 }
 
 /// The clock of the rows of both.
-pub(super) fn clock(period: Option<f64>) -> Clock<'static> {
+pub fn clock(period: Option<f64>) -> Clock<'static> {
     Clock {
         column: Some(TIME),
         nanoseconds: None,

@@ -8,10 +8,10 @@ use std::path::Path;
 
 use nalgebra::DMatrix;
 
-use super::error::{FileError, Place, suggestion};
-use super::small_file;
-use super::whole::write_whole;
 use crate::calibration::result::{Calibration, FORMAT, FORMAT_WITH_TEMPERATURE, TriadRecord};
+use crate::formats::directories::write_whole;
+use crate::formats::error::{FileError, Place, suggestion};
+use crate::formats::small_file;
 use crate::imu::{AXES, PARAMETERS, PerSensor, Sensor, Term, ThermalRange, Triad};
 use crate::shown::excerpt;
 use crate::units::{DEGREE, STANDARD_GRAVITY};

@@ -4,13 +4,13 @@ use std::collections::VecDeque;
 
 /// So many rows behind a late one tell that it was: no burst is longer, and over so few a period that is not known
 /// well is known well enough.
-pub(in crate::formats) const REACH: usize = 128;
+pub const REACH: usize = 128;
 
 /// Times of rows, those that came late at the time that rows behind them leave.
 ///
 /// A row was sampled before those behind it, a period for each. A stamp that says otherwise by more than a period,
 /// which jitter and rounding do not, is the logger's: it was busy, or passed on a burst.
-pub(super) fn punctual(stamps: &[(f64, u64)], period: f64) -> Vec<f64> {
+pub fn punctual(stamps: &[(f64, u64)], period: f64) -> Vec<f64> {
     let mut times: Vec<f64> = stamps.iter().map(|&(time, _)| time).collect();
     // Against a clock without gaps; rows behind, each earlier than all between it and this one.
     let against = |row: usize| stamps[row].0 - stamps[0].0 - row as f64 * period;

@@ -4,15 +4,15 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::axes::BodyAxes;
-use super::csv_file::CsvFile;
-use super::error::FileError;
+use crate::formats::csv_file::CsvFile;
+use crate::formats::error::FileError;
+use crate::formats::schema::axes::BodyAxes;
 use crate::recording::{ImuSamples, LabelledMotion, Segment};
 use crate::units::DEGREE;
 
 /// Reads the sections of a run with these samples, which are stamped so many samples after they begin; what
 /// the file leaves open goes to `notes`.
-pub(super) fn read(
+pub fn read(
     file: &Path,
     imu: &ImuSamples,
     lag: f64,

@@ -16,7 +16,7 @@ struct Knot {
 
 /// Stamps as they come, against a clock that they are referred to.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Knots {
+pub struct Knots {
     rows: Vec<(usize, f64)>,
     knots: Vec<Knot>,
     count: usize,
@@ -85,7 +85,7 @@ impl Knots {
 
 /// The samples of a clock that wanders on the axis of time of a uniform one, both counted in samples.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::formats) struct Wander {
+pub struct Wander {
     /// Number, and how much later it is than its number says; between them straight lines.
     knots: Vec<(f64, f64)>,
 }

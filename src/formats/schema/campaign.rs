@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::error::FileError;
-use super::schema::{Celsius, Document, NonNegative};
-use super::small_file;
+use super::{Celsius, Document, NonNegative};
 use crate::calibration::{DayToDay, Group, TemperatureOptions, Together};
+use crate::formats::error::FileError;
+use crate::formats::small_file;
 use crate::imu::{HIGHEST_ORDER, InstallationForm, ParameterKind};
 use crate::recording::Temperature;
 use crate::run::Run;
@@ -108,7 +108,7 @@ impl Campaign {
         if let Some(pair) = named.windows(2).find(|pair| pair[0].run == pair[1].run) {
             let advice = "Name every recording once.";
             let found = format_args!("{} twice", pair[0].run.display());
-            let place = super::error::Place::File;
+            let place = crate::formats::error::Place::File;
             return Err(FileError::new(
                 path,
                 place,
@@ -257,7 +257,7 @@ fn own_name(group: Group) -> String {
 }
 
 /// 1σ by which recordings differ, from a table `[day_to_day]`.
-pub(crate) fn day_to_day(
+pub fn day_to_day(
     document: Document,
     stated: &BTreeMap<String, NonNegative>,
 ) -> Result<DayToDay, FileError> {

@@ -9,7 +9,7 @@ use crate::imu::AxisOrder;
 
 /// What x, y, z of a file are.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) enum BodyAxes {
+pub enum BodyAxes {
     /// Right, front, up.
     #[default]
     Rfu,

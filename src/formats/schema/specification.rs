@@ -5,10 +5,10 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use super::error::FileError;
-use super::schema::{Document, Finite, Positive};
-use super::small_file;
+use super::{Document, Finite, Positive};
 use crate::calibration::{DayToDay, Group, parameter_name};
+use crate::formats::error::FileError;
+use crate::formats::small_file;
 use crate::imu::{InstallationForm, ParameterKind, Sensor};
 use crate::lot::{Limit, Specification};
 

@@ -4,13 +4,13 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::clock::{Breaks, Clock};
-use super::error::{FileError, list, suggestion};
-use super::imu_log::ImuLog;
-use super::quantity::units;
-use super::schema::{Document, ImuFile, OneOrThree, PriorFile, RunFile, TermFile};
-use super::source::{Source, accel_from, clock};
-use super::temperature::{TemperatureColumns, TemperatureUnit};
+use super::{Document, ImuFile, OneOrThree, PriorFile, RunFile, TermFile};
+use crate::formats::clock::{Breaks, Clock};
+use crate::formats::error::{FileError, list, suggestion};
+use crate::formats::imu_log::ImuLog;
+use crate::formats::inputs::source::{Source, accel_from, clock};
+use crate::formats::inputs::temperature::{TemperatureColumns, TemperatureUnit};
+use crate::formats::quantity::units;
 use crate::imu::NoiseKeys;
 use crate::imu::{
     GaussMarkov, Instrument, MotionNoise, Noise, Nominal, Output, PerSensor, Prior, Sensor, Term,
@@ -19,15 +19,15 @@ use crate::imu::{
 use crate::units::{ARCSEC, DEGREE, PPM};
 
 /// 1σ of the scale factors, misalignments and biases of a sensor of which nothing is stated: usual of consumer MEMS.
-pub(super) const USUAL_SCALE: f64 = 50_000.0 * PPM;
-pub(super) const USUAL_INSTALLATION: f64 = 2.0 * DEGREE;
+pub const USUAL_SCALE: f64 = 50_000.0 * PPM;
+pub const USUAL_INSTALLATION: f64 = 2.0 * DEGREE;
 /// rad/s and m/s².
-pub(super) const USUAL_BIAS: PerSensor<f64> = PerSensor {
+pub const USUAL_BIAS: PerSensor<f64> = PerSensor {
     gyro: 2.0 * DEGREE,
     accel: 1.0,
 };
 /// The period of rows of which none is known, until their motion shows it, s.
-pub(super) const USUAL_PERIOD: f64 = 0.01;
+pub const USUAL_PERIOD: f64 = 0.01;
 /// 1σ of a scale factor of which nothing is known, of the scale factor.
 const WIDEST_SCALE: f64 = 10.0;
 /// 1σ of a bias beyond the range of any instrument, rad/s or m/s².
@@ -36,7 +36,7 @@ const WIDEST_BIAS: f64 = 1e6;
 const HALF_TURN: f64 = 648_000.0;
 
 /// What `[imu]` and the tables below it say.
-pub(super) struct InstrumentFields<'a> {
+pub struct InstrumentFields<'a> {
     pub log: ImuLog<'a>,
     pub known: Instrument,
     /// Whether neither run.toml nor a time column tells how long a row lasts.
@@ -168,7 +168,7 @@ fn knowledge(
 }
 
 /// 1σ of the parameters of the terms that a table of them switches on, in SI; zero for the others.
-pub(crate) fn term_sigma(
+pub fn term_sigma(
     document: Document,
     table: &str,
     terms: &std::collections::BTreeMap<String, TermFile>,

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::digest::digest_of;
-use super::error::{FileError, Place};
-use super::small_file;
+use crate::formats::error::{FileError, Place};
+use crate::formats::small_file;
 use crate::study::Shard;
 
 /// The name of the file in its directory.

@@ -7,14 +7,14 @@ use serde::Deserialize;
 use toml::Spanned;
 use toml::de::DeTable;
 
-use super::draft::motion::Motion;
-use super::error::{FileError, Place};
 use super::instrument::InstrumentFields;
-use super::schema::{Document, FORMAT, META, Positive, RunFile, StandstillFile};
-use super::segments;
-use super::small_file;
-use super::table_log::TableLogFile;
+use super::{Document, FORMAT, META, Positive, RunFile, StandstillFile};
 use crate::earth::Site;
+use crate::formats::draft::motion::Motion;
+use crate::formats::error::{FileError, Place};
+use crate::formats::inputs::segments;
+use crate::formats::inputs::table_log::TableLogFile;
+use crate::formats::small_file;
 use crate::imu::{Instrument, NoiseKeys, Output, PerSensor, Sensor};
 use crate::noise;
 use crate::recording::{ImuSamples, Recording, faults, nanoseconds};
@@ -32,11 +32,7 @@ impl Run {
     }
 
     /// The same of the text of a `run.toml` that stands, or would stand, beside this file, and was read from `source`.
-    pub(super) fn of_text(
-        path: &Path,
-        text: &str,
-        source: Option<&Path>,
-    ) -> Result<Self, FileError> {
+    pub fn of_text(path: &Path, text: &str, source: Option<&Path>) -> Result<Self, FileError> {
         let document = Document { file: path, text };
         let file = run_file(document)?;
         let directory = path.parent().unwrap_or(Path::new(""));
@@ -235,7 +231,7 @@ fn clock_note(imu: &ImuSamples, instrument: &InstrumentFields) -> Option<String>
 }
 
 /// The name of the directory of a `run.toml`, else the file's own.
-pub(super) fn name(path: &Path) -> String {
+pub fn name(path: &Path) -> String {
     let full = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let named = match full.file_name() {
         Some(file) if file == "run.toml" => full.parent().and_then(Path::file_name),

@@ -6,18 +6,18 @@ mod wander;
 
 use std::path::Path;
 
-use super::error::{FileError, Place};
+use crate::formats::error::{FileError, Place};
 use crate::recording::nanoseconds;
 use crate::statistics::median;
-pub(super) use following::Following;
-pub(super) use late::REACH;
+pub use following::Following;
+pub use late::REACH;
 use late::punctual;
 use wander::Knots;
-pub(super) use wander::Wander;
+pub use wander::Wander;
 
 /// The uniform clock of stamps that do not go back.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Uniform {
+pub struct Uniform {
     /// Due time of the first sample, s.
     pub first: f64,
     /// s

@@ -7,8 +7,8 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::digest::digest_of_bytes;
-use super::error::{FileError, Place, list};
 use super::job::{JOB_FILE, Job, Part};
+use crate::formats::error::{FileError, Place, list};
 
 /// Results of the runs of a study, as MessagePack: numbers come back to the bit.
 const RESULTS: &str = "runs.msgpack";

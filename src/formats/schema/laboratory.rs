@@ -6,10 +6,10 @@ use serde::Deserialize;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::error::{FileError, Place as At, list};
-use super::schema::{Document, Finite, NonNegative};
-use super::small_file;
+use super::{Document, Finite, NonNegative};
 use crate::certificate::{Condition, Contact, Day, DecisionRule, Equipment, Laboratory, Place};
+use crate::formats::error::{FileError, Place as At, list};
+use crate::formats::small_file;
 
 /// The version of the format.
 const FORMAT: &str = "turncal-laboratory/1";
@@ -281,7 +281,7 @@ impl LaboratoryFile {
 mod tests {
     use super::*;
 
-    pub(crate) const LAB: &str = include_str!("../../examples/lab.toml");
+    pub(crate) const LAB: &str = include_str!("../../../examples/lab.toml");
 
     fn read(text: &str) -> Result<Laboratory, FileError> {
         let directory = tempfile::tempdir().unwrap();
