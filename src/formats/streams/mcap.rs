@@ -6,10 +6,10 @@
 use std::collections::BTreeMap;
 
 use super::bytes::{Broken, Input, Slice};
-use super::channel::{Reader, Topics};
-use super::packed::unpack;
-use super::ros::Encoding;
-use super::{Log, Stream, json, protobuf};
+use super::messages::packed::unpack;
+use super::messages::ros::Encoding;
+use super::messages::{Reader, Topics, json, protobuf};
+use super::{Log, Stream};
 
 const MAGIC: u64 = 8;
 const SCHEMA: u8 = 3;

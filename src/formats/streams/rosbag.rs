@@ -4,9 +4,9 @@
 //! data; chunks hold connections and messages, packed.
 
 use super::bytes::{Broken, Input, Slice};
-use super::channel::{Reader, Topics};
-use super::packed::unpack;
-use super::ros::Encoding;
+use super::messages::packed::unpack;
+use super::messages::ros::Encoding;
+use super::messages::{Reader, Topics};
 use super::{Log, Stream};
 
 const FIRST_LINE: u64 = 13;

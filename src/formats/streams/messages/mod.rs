@@ -1,16 +1,21 @@
-//! A topic of a log: messages of one type, each with the time at which it was logged.
+//! Topics of a log: messages of one type each, with the time at which they were logged.
+
+#[cfg(feature = "mcap")]
+pub mod json;
+pub mod packed;
+#[cfg(feature = "mcap")]
+pub mod protobuf;
+pub mod ros;
 
 use std::collections::BTreeMap;
 
 use super::bytes::Broken;
-use super::ros::{self, Encoding};
 use super::{Column, Stream};
-#[cfg(feature = "mcap")]
-use super::{json, protobuf};
+use ros::Encoding;
 
 /// The topics of a log, by the numbers that its messages have.
 #[derive(Default)]
-pub(super) struct Topics {
+pub struct Topics {
     pub streams: Vec<Stream>,
     pub readers: Vec<Reader>,
     of_number: BTreeMap<u32, usize>,
@@ -45,7 +50,7 @@ impl Topics {
 const LOG_TIME: &str = "log_time";
 
 /// How its messages are read.
-pub(super) enum Reader {
+pub enum Reader {
     Ros(ros::Message),
     #[cfg(feature = "mcap")]
     Protobuf(protobuf::Message),

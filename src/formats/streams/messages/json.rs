@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use super::Column;
-use super::bytes::Broken;
+use crate::formats::streams::Column;
+use crate::formats::streams::bytes::Broken;
 
 /// Longer lists are no columns.
 const LONGEST: usize = 64;
@@ -50,7 +50,7 @@ fn flatten(value: &Value, path: &str, all: &mut Vec<(String, f64)>) {
 }
 
 /// The columns that the first message of a stream shows.
-pub(super) fn columns(bytes: &[u8], offset: u64) -> Result<Vec<Column>, Broken> {
+pub fn columns(bytes: &[u8], offset: u64) -> Result<Vec<Column>, Broken> {
     let all = numbers(bytes, offset)?;
     Ok(all
         .into_iter()
@@ -59,7 +59,7 @@ pub(super) fn columns(bytes: &[u8], offset: u64) -> Result<Vec<Column>, Broken> 
 }
 
 /// The numbers of a message in these columns, NaN where it has none.
-pub(super) fn values(
+pub fn values(
     columns: &[Column],
     bytes: &[u8],
     offset: u64,

@@ -8,8 +8,8 @@
 
 mod definition;
 
-use super::Column;
-use super::bytes::{Broken, Kind};
+use crate::formats::streams::Column;
+use crate::formats::streams::bytes::{Broken, Kind};
 use definition::Parser;
 
 /// Longer arrays of numbers are no columns.
@@ -17,13 +17,13 @@ const LONGEST: usize = 64;
 
 /// How numbers follow one another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Encoding {
+pub enum Encoding {
     Ros1,
     Cdr,
 }
 
 /// A type of messages.
-pub(super) struct Message {
+pub struct Message {
     fields: Vec<Field>,
     pub columns: Vec<Column>,
     encoding: Encoding,

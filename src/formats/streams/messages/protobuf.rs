@@ -4,15 +4,15 @@ use prost_reflect::{
     DescriptorPool, DynamicMessage, FieldDescriptor, Kind, MessageDescriptor, ReflectMessage, Value,
 };
 
-use super::Column;
-use super::bytes::Broken;
+use crate::formats::streams::Column;
+use crate::formats::streams::bytes::Broken;
 
 /// Messages within messages.
 const DEEPEST: usize = 8;
 const MOST_COLUMNS: usize = 4096;
 
 /// A type of messages.
-pub(super) struct Message {
+pub struct Message {
     descriptor: MessageDescriptor,
     pub columns: Vec<Column>,
     /// The fields that lead to each column.
