@@ -148,13 +148,17 @@ impl Laboratory {
         };
         let of_item = [("model", meta("instrument")), ("serial", meta("serial"))];
         let mut table = document.of_format(FORMAT)?;
-        check_complete(path, table.get_ref(), &of_item)?;
         let values = table.get_mut().iter_mut();
         for (name, value) in values.filter(|(name, _)| name.get_ref() != "conditions") {
             document.as_written(value);
             say_something(document, name.get_ref(), value)?;
         }
-        let file: LaboratoryFile = document.fill(table)?;
+        let file: Result<LaboratoryFile, FileError> = document.fill(table.clone());
+        // All that is missing is named at once, unless another error comes first.
+        if !matches!(&file, Err(error) if !error.message.starts_with("found no `")) {
+            check_complete(path, table.get_ref(), &of_item)?;
+        }
+        let file = file?;
         let [(_, model), (_, serial)] = of_item;
         let days = &file.certificate;
         if days.end < days.begin || days.issued < days.end {

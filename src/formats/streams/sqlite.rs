@@ -243,7 +243,10 @@ impl Page {
         let pointers = self.begin + if self.is_leaf { 8 } else { 12 };
         let pointer = self.bytes.get(pointers + 2 * number..).unwrap_or_default();
         let place = big_endian(pointer, self.offset).whole(2, "a cell's place")? as usize;
-        let cell = self.bytes.get(place..).unwrap_or_default();
+        let cell = self.bytes.get(place..).ok_or_else(|| {
+            let found = format!("a cell at byte {place} of a page");
+            Broken::new(self.offset, found, "one within it")
+        })?;
         Ok(big_endian(cell, self.offset + place as u64))
     }
 }
