@@ -12,7 +12,7 @@ mod trajectory;
 
 use std::path::{Path, PathBuf};
 
-use include_dir::{Dir, include_dir};
+use include_dir::Dir;
 use serde::de::DeserializeOwned;
 
 use crate::formats::{Document, FileError, Place as At};
@@ -75,7 +75,7 @@ impl Room {
     }
 }
 
-static MODELS: Dir = include_dir!("$CARGO_MANIFEST_DIR/models");
+static MODELS: Dir = include_dir::include_dir!("$CARGO_MANIFEST_DIR/models");
 
 /// Why a model cannot be had.
 #[derive(Debug, thiserror::Error)]

@@ -308,25 +308,12 @@ fn prior(
 ) -> Result<Prior, FileError> {
     let (file, axes) = (prior_of(imu, sensor), imu.body_axes.unwrap_or_default());
     let bias = file.bias.map_or_else(Vector3::zeros, OneOrThree::vector);
-    let usual_bias = nominal.abs() * *USUAL_BIAS.get(sensor);
-    let bias_words = match sensor {
-        Sensor::Gyro => "bias ± 2 °/s",
-        Sensor::Accel => "bias ± 1 m/s²",
-    };
     let mut assumed = Vec::new();
-    let mut sigma = |key: &str, stated: Option<OneOrThree>, most: f64, usual, words| {
-        let Some(stated) = stated.map(OneOrThree::vector) else {
-            assumed.push(words);
-            return Ok(usual);
-        };
-        match stated.iter().all(|&s| s > 0.0 && s <= most) {
-            true => Ok(stated),
-            false => Err(document.wrong(
-                &format!("imu.prior.{}.{key}", sensor.name()),
-                format_args!("numbers above zero, at most {most}"),
-                "Correct this value.",
-            )),
-        }
+    let mut sigma = |key: &str, stated: Option<OneOrThree>, most, usual, words| {
+        let path = format!("imu.prior.{}.{key}", sensor.name());
+        let stated = stated_sigma(document, &path, stated, most)?;
+        assumed.extend(stated.is_none().then_some(words));
+        Ok::<_, FileError>(stated.unwrap_or(usual))
     };
     let scale_sigma = sigma(
         "scale_sigma_ppm",
@@ -346,8 +333,11 @@ fn prior(
         "bias_sigma",
         file.bias_sigma,
         WIDEST_BIAS * nominal.amax(),
-        usual_bias,
-        bias_words,
+        nominal.abs() * *USUAL_BIAS.get(sensor),
+        match sensor {
+            Sensor::Gyro => "bias ± 2 °/s",
+            Sensor::Accel => "bias ± 1 m/s²",
+        },
     )?;
     if !assumed.is_empty() {
         notes.push(format!(
@@ -362,4 +352,21 @@ fn prior(
         bias: axes.vector(bias.component_div(&nominal)),
         bias_sigma: axes.each(bias_sigma.component_div(&nominal.abs())),
     })
+}
+
+/// A 1σ of each axis, as far as it is stated.
+fn stated_sigma(
+    document: Document,
+    path: &str,
+    stated: Option<OneOrThree>,
+    most: f64,
+) -> Result<Option<Vector3<f64>>, FileError> {
+    let stated = stated.map(OneOrThree::vector);
+    match stated.iter().flatten().all(|&s| s > 0.0 && s <= most) {
+        true => Ok(stated),
+        false => {
+            let expected = format_args!("numbers above zero, at most {most}");
+            Err(document.wrong(path, expected, "Correct this value."))
+        }
+    }
 }

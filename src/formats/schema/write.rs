@@ -259,15 +259,24 @@ const COMMENTS: [(&str, &str); 8] = [
 ];
 
 fn configuration_text(run: &Run, output: Output) -> Result<String, toml::ser::Error> {
-    let fields = toml::to_string(&run_file(run, output))?;
     let mut text = format!("format = \"{FORMAT}\"\n\n");
-    for line in fields.lines() {
-        let comment = COMMENTS.iter().find(|(table, _)| line.starts_with(table));
+    for paragraph in toml::to_string(&run_file(run, output))?.split("\n\n") {
+        let paragraph = paragraph.trim_end();
+        let (table, fields) = paragraph.split_once('\n').unwrap_or((paragraph, ""));
+        // Columns are one line of their table, as the line that puts them in order is.
+        if table.ends_with(".columns]") {
+            let fields: Vec<&str> = fields.lines().collect();
+            text.truncate(text.trim_end().len());
+            text += &format!("\ncolumns = {{ {} }}\n\n", fields.join(", "));
+            continue;
+        }
+        let comment = COMMENTS.iter().find(|(of, _)| table.starts_with(of));
         if let Some((_, comment)) = comment.filter(|(_, comment)| !text.contains(comment)) {
             text += &format!("# {comment}\n");
         }
-        text += &format!("{line}\n");
+        text += &format!("{paragraph}\n\n");
     }
+    text.truncate(text.trim_end().len() + 1);
     Ok(text)
 }
 
