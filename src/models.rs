@@ -9,20 +9,19 @@ mod instrument;
 mod machine;
 mod thermal;
 mod trajectory;
-mod values;
 
 use std::path::{Path, PathBuf};
 
+use include_dir::Dir;
 use serde::de::DeserializeOwned;
 
-use crate::shown::excerpt;
+use crate::formats::{Document, FileError, Place as At};
 
 pub use catalogue::Embedded;
 pub use instrument::{InstallationModel, Instrument, Spread, Variation};
 pub use machine::{path, turntable};
 pub use thermal::ThermalVariation;
 pub use trajectory::trajectory;
-pub(crate) use values::{Finite, NonNegative, OneOrThree, Positive};
 
 /// A folder of models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,87 +67,15 @@ impl Room {
         }
     }
 
-    fn embedded(self) -> &'static [(&'static str, &'static str)] {
-        match self {
-            Self::Imu => IMU,
-            Self::Installation => INSTALLATION,
-            Self::Turntable => TURNTABLE,
-            Self::Path => PATH,
-            Self::Scenario => SCENARIO,
-            Self::Campaign => CAMPAIGN,
-            Self::Trajectory => TRAJECTORY,
-        }
+    /// Name and text of each model of the folder, in the order of their names.
+    fn embedded(self) -> impl Iterator<Item = (&'static str, &'static str)> {
+        let folder = MODELS.get_dir(self.name());
+        let files = folder.into_iter().flat_map(Dir::files);
+        files.filter_map(|file| Some((file.path().file_stem()?.to_str()?, file.contents_utf8()?)))
     }
 }
 
-macro_rules! embed {
-    ($list:ident, $room:literal, $($name:literal),+ $(,)?) => {
-        const $list: &[(&str, &str)] = &[
-            $(($name, include_str!(concat!("../models/", $room, "/", $name, ".toml")))),+
-        ];
-    };
-}
-
-embed!(
-    IMU,
-    "imu",
-    "industrial-mems",
-    "industrial-mems-warming",
-    "navigation-fog",
-    "navigation-fog-warming",
-    "paper",
-    "paper-unsteady",
-    "ring-laser",
-    "tactical-fog",
-);
-embed!(
-    INSTALLATION,
-    "installation",
-    "general",
-    "six-angle",
-    "three-angle",
-);
-embed!(
-    TURNTABLE,
-    "turntable",
-    "three-axis",
-    "three-axis-with-errors",
-    "two-axis",
-);
-embed!(
-    PATH,
-    "path",
-    "nineteen-position",
-    "single-axis",
-    "six-position",
-    "three-axis",
-    "three-axis-hour",
-    "three-axis-two-hours",
-    "two-axis",
-);
-embed!(
-    SCENARIO,
-    "scenario",
-    "demo",
-    "demo-six-position",
-    "experiment",
-    "mems",
-    "nineteen-position",
-    "real-table",
-    "single-axis",
-    "two-axis",
-    "warming",
-    "warming-mems",
-);
-embed!(
-    CAMPAIGN,
-    "campaign",
-    "days",
-    "five-soaks",
-    "mountings",
-    "ramp"
-);
-embed!(TRAJECTORY, "trajectory", "flight", "vehicle");
+static MODELS: Dir = include_dir::include_dir!("$CARGO_MANIFEST_DIR/models");
 
 /// Why a model cannot be had.
 #[derive(Debug, thiserror::Error)]
@@ -170,37 +97,14 @@ pub enum ModelError {
         /// All embedded names.
         known: String,
     },
-    /// A file that cannot be read.
-    #[error("{file}: cannot be read: {source}")]
-    Unreadable {
-        /// The file.
-        file: String,
-        /// What the system says.
-        source: std::io::Error,
-    },
-    /// A file that is not what it should be.
-    #[error("{file}{place}: {message}")]
-    Malformed {
-        /// The file.
-        file: String,
-        /// Line and column, where they are known.
-        place: String,
-        /// What the parser says, and the line if it is short enough.
-        message: String,
-    },
-    /// Values that do not fit together.
-    #[error("{file}: {message}")]
-    Inconsistent {
-        /// The file.
-        file: String,
-        /// What is wrong and what to do.
-        message: String,
-    },
+    /// A file that cannot be read, or is not what it should be.
+    #[error(transparent)]
+    File(#[from] FileError),
 }
 
 /// The embedded names of a folder, in order.
 pub fn names(room: Room) -> impl Iterator<Item = &'static str> {
-    room.embedded().iter().map(|&(name, _)| name)
+    room.embedded().map(|(name, _)| name)
 }
 
 /// Where a model is named, which decides what its name can mean.
@@ -234,33 +138,31 @@ impl Text {
     }
 
     pub(crate) fn parse<T: DeserializeOwned>(&self) -> Result<T, ModelError> {
-        toml::from_str(&self.text).map_err(|error| self.malformed(&error))
+        let document = self.document();
+        Ok(document.fill(document.parse()?)?)
     }
 
-    /// The parser's message without its picture of the line, which may be as long as the file.
-    fn malformed(&self, error: &toml::de::Error) -> ModelError {
-        let before = error.span().and_then(|span| self.text.get(..span.start));
-        let begun = before.map_or(0, |before| before.rfind('\n').map_or(0, |end| end + 1));
-        let place = before.map(|before| {
-            let line = 1 + before.matches('\n').count();
-            let column = 1 + before[begun..].chars().count();
-            format!(", line {line}, column {column}")
-        });
-        let line = self.text[begun..].lines().next().unwrap_or_default();
-        let line = before.map(|_| format!(", in `{}`", excerpt(line.trim())));
-        ModelError::Malformed {
-            file: self.file.clone(),
-            place: place.unwrap_or_default(),
-            message: excerpt(error.message()) + &line.unwrap_or_default(),
+    pub(crate) fn document(&self) -> Document<'_> {
+        Document {
+            file: Path::new(&self.file),
+            text: &self.text,
         }
     }
 
+    /// Values that do not fit together: what is wrong and what to do.
     pub(crate) fn inconsistent(&self, message: impl Into<String>) -> ModelError {
-        ModelError::Inconsistent {
-            file: self.file.clone(),
-            message: message.into(),
-        }
+        inconsistent(&self.file, message)
     }
+}
+
+/// The same of a file by its name.
+pub(crate) fn inconsistent(file: &str, message: impl Into<String>) -> ModelError {
+    let error = FileError {
+        file: file.into(),
+        place: At::File,
+        message: message.into(),
+    };
+    error.into()
 }
 
 /// Finds a model: the file at `name_or_path` if there is one, else the embedded model of that name.
@@ -275,23 +177,18 @@ pub fn text(room: Room, name_or_path: &str, named_in: &Place) -> Result<Text, Mo
     };
     if let Some(path) = path.filter(|path| path.is_file()) {
         let file = path.display().to_string();
-        return match std::fs::read_to_string(&path) {
-            Ok(text) => Ok(Text {
-                text,
-                file,
-                place: Place::File(path),
-            }),
-            Err(source) => Err(ModelError::Unreadable { file, source }),
-        };
-    }
-    if let Some((name, text)) = room
-        .embedded()
-        .iter()
-        .find(|(name, _)| *name == name_or_path)
-    {
+        let text = std::fs::read_to_string(&path);
+        let text = text.map_err(|error| inconsistent(&file, format!("cannot be read: {error}")))?;
         return Ok(Text {
-            text: (*text).into(),
-            file: (*name).into(),
+            text,
+            file,
+            place: Place::File(path),
+        });
+    }
+    if let Some((name, text)) = room.embedded().find(|(name, _)| *name == name_or_path) {
+        return Ok(Text {
+            text: text.into(),
+            file: name.into(),
             place: Place::Embedded,
         });
     }
@@ -377,7 +274,7 @@ mod tests {
             (
                 Room::Installation,
                 "form = \"general\"\nangles_deg = { sigma = -1.0 }",
-                ["line 2", "found -1, expected a number above zero"],
+                ["line 2", "sigma = -1.0, expected a number above zero"],
             ),
             (
                 Room::Installation,
@@ -387,12 +284,12 @@ mod tests {
             (
                 Room::Installation,
                 "form = \"general\"\nangle_deg = { sigma = 1.0 }",
-                ["line 2", "expected `form` or `angles_deg`"],
+                ["line 2", "expected one of `form`, `angles_deg`"],
             ),
             (
                 Room::Imu,
                 "[gyro]\npulse_arcsec = \"fine\"",
-                ["line 2", "expected f64"],
+                ["line 2", "expected a finite number"],
             ),
             (
                 Room::Turntable,
@@ -400,7 +297,11 @@ mod tests {
                 ["line 3", "not all zero"],
             ),
             (Room::Turntable, "axis = []", ["without axes", "[[axis]]"]),
-            (Room::Path, "first_dwell_s = nan", ["line 1", "found NaN"]),
+            (
+                Room::Path,
+                "first_dwell_s = nan",
+                ["line 1", "first_dwell_s = nan"],
+            ),
             (Room::Path, "first_dwell_s = 1", ["[axes]", "[body]"]),
             (
                 Room::Scenario,

@@ -1,8 +1,11 @@
 //! What a calibration laboratory states of itself, its customer and the item: nothing of it can be known
 //! from data.
 
+use serde::Deserialize;
+
 /// Who or where: a laboratory or a customer.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Contact {
     /// Name.
     pub name: String,
@@ -21,7 +24,8 @@ pub struct Contact {
 }
 
 /// A day.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize)]
+#[serde(try_from = "String")]
 pub struct Day {
     /// Year.
     pub year: u16,
@@ -57,6 +61,14 @@ impl Day {
     }
 }
 
+impl TryFrom<String> for Day {
+    type Error = &'static str;
+
+    fn try_from(text: String) -> Result<Self, Self::Error> {
+        Self::parse(&text).ok_or("a day such as 2026-03-31")
+    }
+}
+
 impl std::fmt::Display for Day {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{:04}-{:02}-{:02}", self.year, self.month, self.day)
@@ -64,7 +76,8 @@ impl std::fmt::Display for Day {
 }
 
 /// Where a calibration was performed, in the words of the Digital Calibration Certificate.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Place {
     /// In the laboratory.
     Laboratory,
@@ -119,7 +132,8 @@ pub struct Equipment {
 }
 
 /// How conformity is decided (ISO/IEC 17025, 7.8.6; ILAC-G8).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum DecisionRule {
     /// A limit is kept if the value is within it by the expanded uncertainty: guard band w = U.
     GuardBand,

@@ -10,7 +10,7 @@ use super::progress::Activity;
 /// Writes the log of another program as a plain run directory
 ///
 /// The streams that hold the instrument become CSV files with every column and all digits, beside a draft of
-/// run.toml as `turncal init` makes it. Reads MCAP, ROS 1 bags, PX4 ULog, ArduPilot DataFlash, MATLAB and NumPy
+/// run.toml as `turncal init` makes it. Reads MCAP, ROS bags, PX4 ULog, ArduPilot DataFlash, MATLAB and NumPy
 /// files; calibrate and check read them as they are, too.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:

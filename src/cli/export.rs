@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use anyhow::Context;
-use clap::ValueEnum;
 use turncal::formats::export;
 use turncal::formats::write_whole;
 use turncal::run::Run;
@@ -28,7 +27,7 @@ pub struct Export {
     calibration: PathBuf,
     /// What to write
     #[arg(long, value_enum)]
-    format: Format,
+    format: export::Format,
     /// A run of the same instrument, for noise figures, sample rate and nominal scales
     #[arg(long, value_name = "RUN.toml", value_parser = run_file)]
     run: Option<PathBuf>,
@@ -43,67 +42,11 @@ pub struct Export {
     force: bool,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Format {
-    /// IMU intrinsics of Kalibr, model scale-misalignment
-    Kalibr,
-    /// The part of a KF-GINS configuration that is about the IMU
-    KfGins,
-    /// A C99 header with constants and a function
-    C,
-    /// A function file of Octave or MATLAB
-    Octave,
-    /// Every value with its name, σ and unit
-    Text,
-    /// Parameters of PX4: CAL_GYRO0, CAL_ACC0
-    Px4,
-    /// Parameters of ArduPilot: INS_GYROFFS, INS_ACCOFFS, INS_ACCSCAL
-    Ardupilot,
-    /// IMU intrinsics of OpenVINS, model kalibr
-    OpenVinsKalibr,
-    /// IMU intrinsics of OpenVINS, model rpng
-    OpenVinsRpng,
-    /// IMU intrinsics of iKalibr
-    Ikalibr,
-    /// The accelerometers' calibration of the ROS package imu_calib
-    ImuCalib,
-    /// Covariances of ROS sensor_msgs/Imu; needs --run
-    RosCovariance,
-    /// Noise of an IMU in Gazebo
-    Gazebo,
-    /// A structure for MATLAB, a MAT file
-    Mat,
-    /// Zeros of accelerometers for Betaflight
-    Betaflight,
-}
-
-impl From<Format> for export::Format {
-    fn from(format: Format) -> Self {
-        match format {
-            Format::Kalibr => Self::Kalibr,
-            Format::KfGins => Self::KfGins,
-            Format::C => Self::C,
-            Format::Octave => Self::Octave,
-            Format::Text => Self::Text,
-            Format::Px4 => Self::Px4,
-            Format::Ardupilot => Self::ArduPilot,
-            Format::OpenVinsKalibr => Self::OpenVinsKalibr,
-            Format::OpenVinsRpng => Self::OpenVinsRpng,
-            Format::Ikalibr => Self::IKalibr,
-            Format::ImuCalib => Self::ImuCalib,
-            Format::RosCovariance => Self::RosCovariance,
-            Format::Gazebo => Self::Gazebo,
-            Format::Mat => Self::Mat,
-            Format::Betaflight => Self::Betaflight,
-        }
-    }
-}
-
 impl Export {
     pub fn run(&self) -> anyhow::Result<()> {
         let record = at_temperature(&self.calibration, self.temperature_degc)?;
         let run = self.run.as_deref().map(Run::read).transpose()?;
-        let exported = export::write(&record, self.format.into(), run.as_ref())
+        let exported = export::write(&record, self.format, run.as_ref())
             .with_context(|| self.calibration.display().to_string())?;
         let text = exported.bytes();
         match &self.output {

@@ -21,7 +21,7 @@ use super::progress::Activity;
   turncal init Gyroscope.csv Accelerometer.csv")]
 pub struct Init {
     /// Rows of numbers below a line of names, or without one: `.csv`, `.txt`, `.tsv`, `.dat` or `.log`, also
-    /// with `.gz`; or MCAP, a ROS 1 bag, PX4 ULog, ArduPilot DataFlash, MAT, NPY or NPZ, whose streams are listed
+    /// with `.gz`; or MCAP, a ROS bag, PX4 ULog, ArduPilot DataFlash, MAT, NPY or NPZ, whose streams are listed
     #[arg(value_name = "IMU.csv")]
     log: PathBuf,
     /// Rows of the accelerometers, where the other file has those of the gyros alone

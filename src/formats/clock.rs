@@ -3,8 +3,6 @@
 mod stamps;
 mod wraps;
 
-use super::error::FileError;
-use super::fields::Fields;
 pub(super) use stamps::{Stamp, Stamps};
 
 /// What the numbers of a time column are.
@@ -49,35 +47,4 @@ pub(super) struct Clock<'a> {
     /// s
     pub period: Option<f64>,
     pub breaks: Breaks,
-}
-
-impl<'a> Clock<'a> {
-    /// Reads `time_unit` and `sample_period_s` of a log's table, and `time` of its columns.
-    pub fn of_fields(fields: &Fields<'a>, columns: &Fields<'a>) -> Result<Self, FileError> {
-        let unit = match fields.get("time_unit") {
-            Some(field) => field.choice(&TimeUnit::WORDS)?,
-            None => TimeUnit::PerSecond(1.0),
-        };
-        let period = fields.get("sample_period_s");
-        if unit == TimeUnit::Count && period.is_none() {
-            return Err(fields.missing("sample_period_s", "what a count lasts"));
-        }
-        let (column, nanoseconds) = match columns.get("time") {
-            None => (None, None),
-            Some(field) => match field.texts().as_deref() {
-                Ok(&[seconds, nanoseconds]) => (Some(seconds), Some(nanoseconds)),
-                _ => (Some(field.text()?), None),
-            },
-        };
-        if let (Some(_), Some(field)) = (nanoseconds, fields.get("time_unit")) {
-            field.choice(&[("s", ())])?;
-        }
-        Ok(Self {
-            column,
-            nanoseconds,
-            unit,
-            period: period.map(|field| field.positive()).transpose()?,
-            breaks: Breaks::None,
-        })
-    }
 }

@@ -3,54 +3,39 @@
 //! A [`crate::run::Run`] read here is in SI, on right-front-up body axes and in normalised outputs (see
 //! [`crate::imu::Nominal`]); the files' units and axes end at this door.
 
-mod axes;
-mod calibration_file;
-mod campaign;
 mod clock;
-mod course;
 mod csv_file;
-mod digest;
+mod directories;
 mod door;
 pub mod draft;
 pub(crate) mod error;
 pub mod export;
-mod fields;
 mod imu_log;
-mod instrument;
-mod job;
-mod joined;
-#[cfg(feature = "certificate")]
-mod laboratory;
-mod lot_directory;
+mod inputs;
 mod names;
-mod parts;
-mod plausible;
 mod quantity;
-mod read;
 mod rows;
-mod segments;
+mod schema;
 mod sheet;
 mod small_file;
-mod source;
-mod specification;
 mod streams;
-mod table_log;
-mod temperature;
-mod uniform;
-mod whole;
-mod write;
 
 pub use crate::imu::NoiseKeys;
-pub use campaign::{Campaign, campaign_text};
-pub use digest::{digest_of_bytes, input_digests};
+pub(crate) use directories::write_whole_with;
+pub use directories::{
+    JOB_FILE, Job, JobKind, LotDirectory, Part, Parts, WholeDirectory, abandon_unfinished,
+    digest_of_bytes, input_digests, part_is_there, read_part_unit, unit_key, write_part,
+    write_whole,
+};
 pub use door::Opened;
 pub use error::{FileError, Place};
-pub use job::{JOB_FILE, Job, JobKind, Part};
-pub use lot_directory::{LotDirectory, read_part_unit, unit_key};
-pub use parts::{Parts, part_is_there, write_part};
+// By these names the readers of rows know them.
+use inputs::{course, joined, source, temperature, uniform};
 pub(crate) use quantity::unit_scale;
+pub use schema::{Campaign, campaign_text, write_run};
+pub(crate) use schema::{
+    Document, Finite, Latitude, NonNegative, OneOrThree, Positive, TermFile, day_to_day,
+    term_sigma, write_rows,
+};
+use schema::{axes, instrument};
 pub(crate) use sheet::Sheet;
-pub(crate) use whole::write_whole_with;
-pub use whole::{WholeDirectory, abandon_unfinished, write_whole};
-pub(crate) use write::write_rows;
-pub use write::write_run;

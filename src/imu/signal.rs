@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// What one sample holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Output {
     /// Whole pulses counted during the sample.
     Pulse,

@@ -16,8 +16,8 @@ impl Embedded {
     /// All embedded models, folder by folder.
     pub fn all() -> impl Iterator<Item = Self> {
         Room::ALL.into_iter().flat_map(|room| {
-            let models = room.embedded().iter();
-            models.map(move |&(name, text)| Self { room, name, text })
+            let models = room.embedded();
+            models.map(move |(name, text)| Self { room, name, text })
         })
     }
 

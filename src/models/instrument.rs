@@ -3,14 +3,14 @@
 use nalgebra::{SVector, Vector3};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal, StandardUniform};
-use serde::de::Error as _;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 use super::thermal::{AccelThermalFile, GyroThermalFile, ThermalVariation};
-use super::{Finite, ModelError, NonNegative, Place, Positive, Room, text};
+use super::{ModelError, Place, Room, text};
+use crate::formats::{Finite, NonNegative, Positive, TermFile, term_sigma};
 use crate::imu::{
-    ANGLES, GaussMarkov, InstallationForm, Noise, PerSensor, Prior, Sensor, Term, TermVector,
+    ANGLES, GaussMarkov, InstallationForm, Noise, PerSensor, Prior, Sensor, TermVector,
 };
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, PPM};
 
@@ -158,7 +158,7 @@ impl Instrument {
                     bias: accel.bias_ug.times(MICRO_G),
                 },
             },
-            term_sigma: term_sigma(&terms),
+            term_sigma: term_sigma(text.document(), "terms", &terms)?,
             thermal: (gyro.temperature.is_some() || accel.temperature.is_some()).then(|| {
                 PerSensor {
                     gyro: gyro.temperature.unwrap_or_default().in_si(),
@@ -193,38 +193,7 @@ struct InstrumentFile {
     gyro: GyroFile,
     accel: AccelFile,
     #[serde(default)]
-    terms: BTreeMap<TermName, TermFile>,
-}
-
-/// An error term as a run's `[imu.terms]` has it.
-#[derive(Clone, Copy, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct TermFile {
-    sigma: Positive,
-}
-
-/// The name of an error term.
-#[derive(PartialEq, Eq, PartialOrd, Ord)]
-struct TermName(Term);
-
-impl<'de> Deserialize<'de> for TermName {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let name = String::deserialize(deserializer)?;
-        let term = Term::ALL.into_iter().find(|term| term.name() == name);
-        term.map(Self)
-            .ok_or_else(|| D::Error::unknown_field(&name, &Term::NAMES))
-    }
-}
-
-/// 1σ of the parameters of these terms in SI, zero for the others.
-fn term_sigma(terms: &BTreeMap<TermName, TermFile>) -> TermVector {
-    let mut all = TermVector::zeros();
-    for (&TermName(term), given) in terms {
-        for parameter in term.parameters() {
-            all[parameter] = given.sigma.0 * term.entry().unit.1;
-        }
-    }
-    all
+    terms: BTreeMap<String, TermFile>,
 }
 
 #[derive(Deserialize)]

@@ -5,9 +5,10 @@ use std::num::NonZeroU16;
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 
-use super::{Finite, ModelError, NonNegative, Place, Positive, Room, text};
+use super::{ModelError, Place, Room, text};
 use crate::attitude::from_pitch_roll_heading;
 use crate::earth::Site;
+use crate::formats::{Finite, NonNegative, Positive};
 use crate::turntable::{AxesStep, Axis, BodyStep, Moves, Path, Rotation, Table, TableErrors};
 use crate::units::{ARCSEC, DEGREE};
 

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::NonNegative;
+use crate::formats::NonNegative;
 use crate::imu::{ParameterKind, Triad, TriadVector};
 use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
 

@@ -2,7 +2,8 @@
 
 use serde::Deserialize;
 
-use super::{Finite, ModelError, NonNegative, Place, Positive, Room, text};
+use super::{ModelError, Place, Room, text};
+use crate::formats::{Finite, NonNegative, Positive};
 use crate::navigation::{Change, Segment, Start, Trajectory};
 use crate::units::DEGREE;
 

@@ -1,5 +1,7 @@
 //! A simulated campaign: one instrument recorded several times.
 
+use std::collections::BTreeMap;
+
 use nalgebra::Vector3;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
@@ -8,14 +10,13 @@ use super::scenario::ChamberFile;
 use super::{Chamber, Draws, Scenario, Simulated};
 use crate::calibration::result::{Calibration, FORMAT_WITH_TEMPERATURE};
 use crate::calibration::{
-    DayToDay, Difference, Group, ParameterVector, TemperatureOptions, ThermalRecord, Together,
+    DayToDay, Difference, ParameterVector, TemperatureOptions, ThermalRecord, Together,
     truth_record,
 };
-use crate::imu::{ParameterKind, Sensor};
-use crate::models::{self, ModelError, NonNegative, Place, Room};
+use crate::formats::{NonNegative, day_to_day};
+use crate::models::{self, ModelError, Place, Room};
 use crate::recording::Temperature;
 use crate::turntable::TableError;
-use crate::units::ARCSEC;
 
 /// Recordings of one instrument, to be simulated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -75,7 +76,7 @@ impl SimulatedCampaign {
         Ok(Self {
             name: text.name(),
             recordings: recordings.collect::<Result<_, ModelError>>()?,
-            day_to_day: file.day_to_day.in_si(),
+            day_to_day: day_to_day(text.document(), &file.day_to_day)?,
             scenario,
         })
     }
@@ -144,7 +145,7 @@ struct CampaignFile {
     scenario: String,
     seed: Option<u64>,
     #[serde(default)]
-    day_to_day: DayToDayFile,
+    day_to_day: BTreeMap<String, NonNegative>,
     recording: Vec<RecordingFile>,
 }
 
@@ -153,37 +154,4 @@ struct CampaignFile {
 struct RecordingFile {
     name: String,
     chamber: Option<ChamberFile>,
-}
-
-#[derive(Deserialize, Default, Clone, Copy)]
-#[serde(deny_unknown_fields, default)]
-struct DayToDayFile {
-    gyro_scale_ppm: NonNegative,
-    gyro_installation_arcsec: NonNegative,
-    gyro_bias_deg_per_h: NonNegative,
-    accel_scale_ppm: NonNegative,
-    accel_installation_arcsec: NonNegative,
-    accel_bias_ug: NonNegative,
-    mounting_arcsec: NonNegative,
-}
-
-impl DayToDayFile {
-    fn in_si(self) -> DayToDay {
-        let of = |group: Group| {
-            let stated = match (group.sensor(), group.kind()) {
-                (Sensor::Gyro, ParameterKind::Scale) => self.gyro_scale_ppm,
-                (Sensor::Gyro, ParameterKind::Installation) => self.gyro_installation_arcsec,
-                (Sensor::Gyro, ParameterKind::Bias) => self.gyro_bias_deg_per_h,
-                (Sensor::Accel, ParameterKind::Scale) => self.accel_scale_ppm,
-                (Sensor::Accel, ParameterKind::Installation) => self.accel_installation_arcsec,
-                (Sensor::Accel, ParameterKind::Bias) => self.accel_bias_ug,
-            };
-            let (_, unit) = DayToDay::key(group);
-            stated.0 * unit
-        };
-        DayToDay {
-            parameters: ParameterVector::from_fn(|i, _| of(Group::of(i))),
-            mounting: self.mounting_arcsec.0 * ARCSEC,
-        }
-    }
 }

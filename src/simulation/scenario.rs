@@ -9,12 +9,10 @@ use super::{Chamber, Integrator};
 use crate::calibration::ErrorTerm;
 use crate::calibration::model::{USUAL_LEVEL, USUAL_NORTH, usual_axis_error, usual_variation};
 use crate::earth::Site;
+use crate::formats::{Finite, Latitude, NonNegative, OneOrThree, Positive};
 use crate::imu::BodyFrame;
 use crate::imu::{ANGLES, InstallationForm, Output, PerSensor, Sensor, TermVector, Triad};
-use crate::models::{
-    self, Finite, InstallationModel, Instrument, ModelError, NonNegative, OneOrThree, Place,
-    Positive, Room,
-};
+use crate::models::{self, InstallationModel, Instrument, ModelError, Place, Room};
 use crate::turntable::{Imperfection, Motion, Path, Table, TableError};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, PPM};
 
@@ -100,7 +98,7 @@ impl Scenario {
             table_name,
             path,
             path_name,
-            output: file.imu.output.into(),
+            output: file.imu.output,
             integrator: Integrator {
                 period: 1.0 / file.imu.sample_rate_hz.0,
                 lever_arm: Vector3::from(file.imu.lever_arm_m.map(|component| component.0)),
@@ -126,10 +124,8 @@ impl Scenario {
     /// If it does not exist, is malformed, or does not fit the table.
     pub fn with_path(mut self, name_or_path: &str) -> Result<Self, ModelError> {
         (self.path, self.path_name) = models::path(name_or_path, &Place::CommandLine, &self.site)?;
-        self.check().map_err(|message| ModelError::Inconsistent {
-            file: name_or_path.into(),
-            message,
-        })?;
+        let checked = self.check();
+        checked.map_err(|message| models::inconsistent(name_or_path, message))?;
         Ok(self)
     }
 
@@ -283,24 +279,6 @@ struct SiteFile {
     gravity_m_s2: Option<Positive>,
 }
 
-#[derive(Deserialize)]
-#[serde(try_from = "f64")]
-struct Latitude(f64);
-
-impl TryFrom<f64> for Latitude {
-    type Error = String;
-
-    fn try_from(degrees: f64) -> Result<Self, String> {
-        if degrees.abs() <= 90.0 {
-            Ok(Self(degrees))
-        } else {
-            Err(format!(
-                "found {degrees}, expected a latitude from -90 to 90"
-            ))
-        }
-    }
-}
-
 impl SiteFile {
     fn in_si(&self) -> Site {
         let site = Site::with_normal_gravity(
@@ -318,28 +296,10 @@ impl SiteFile {
 struct ImuFile {
     model: String,
     installation: String,
-    output: OutputFile,
+    output: Output,
     sample_rate_hz: Positive,
     #[serde(default)]
     lever_arm_m: [Finite; 3],
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum OutputFile {
-    Pulse,
-    Increment,
-    Rate,
-}
-
-impl From<OutputFile> for Output {
-    fn from(file: OutputFile) -> Self {
-        match file {
-            OutputFile::Pulse => Self::Pulse,
-            OutputFile::Increment => Self::Increment,
-            OutputFile::Rate => Self::Rate,
-        }
-    }
 }
 
 #[derive(Deserialize)]

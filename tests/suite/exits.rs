@@ -422,3 +422,121 @@ for n in {raw:?}:
     }
     assert_eq!(found.len(), expected.len());
 }
+
+/// The lists of numbers behind a key, outside of comments.
+fn lists(text: &str, key: &str) -> Vec<Vec<f64>> {
+    let lines = text.lines().map(str::trim_start);
+    let lines = lines.filter_map(|line| line.strip_prefix(key));
+    let list = |line: &str| {
+        let line = line.replace(['f', '{', '}', '[', ']', '=', ':'], " ");
+        let parts = line.split(|c: char| c == ',' || c.is_whitespace());
+        parts.filter_map(|part| part.parse().ok()).collect()
+    };
+    lines.map(list).collect()
+}
+
+#[test]
+fn dlio_gives_specific_force_and_leaves_of_the_gyros_what_its_file_states() {
+    let text = exported(Format::Dlio).text;
+    let sm = Matrix3::from_row_slice(&lists(&text, "sm")[0]);
+    let biases = lists(&text, "bias");
+    let [accel, gyro] = [0, 1].map(|k| Vector3::from_column_slice(&biases[k]));
+    let divisors = divisors(&text);
+    for vector in &record().test_vectors {
+        let n = halves(&vector.raw);
+        let n = [0, 1].map(|k| n[k].component_div(&divisors[k]));
+        let [rate, force] = halves(&vector.calibrated);
+        assert!((sm * n[1] - accel - force).norm() < 1e-9 * (1.0 + force.norm()));
+        let (errors, constant) = left(&text, "gyro");
+        let found = n[0] - gyro;
+        assert!((found - (rate + errors * rate + constant)).norm() < 1e-12);
+    }
+    assert!(text.contains("calibration: false"));
+}
+
+#[test]
+fn inav_takes_whole_counts_and_gains_and_leaves_what_its_file_states() {
+    let text = exported(Format::Inav).text;
+    let of = |name: &str| {
+        let value = |axis: &str| lists(&text, &format!("set {name}_{axis} "))[0][0];
+        Vector3::from(["x", "y", "z"].map(value))
+    };
+    let (zero, gain, gyro_zero) = (of("acczero"), of("accgain"), of("gyro_zero"));
+    let [per_g, per_rad_s] = [2048.0 / 9.80665, 16.4 * 180.0 / std::f64::consts::PI];
+    let divisors = divisors(&text);
+    off_by_what_is_left(
+        &text,
+        |v| v,
+        |n| {
+            let n = [0, 1].map(|k| n[k].component_div(&divisors[k]));
+            let rate = (n[0] * per_rad_s - gyro_zero) / per_rad_s;
+            let counted = (n[1] * per_g - zero).component_mul(&gain) / 4096.0;
+            [rate, counted / per_g]
+        },
+    );
+    assert!(left(&text, "accel").0.diagonal().amax() < 2.0 / 4096.0);
+}
+
+#[test]
+fn the_memory_of_a_realsense_gives_the_test_vectors_to_32_bits() {
+    let memory = exported(Format::RealSense).binary.unwrap();
+    assert_eq!(memory.len(), 520);
+    let whole = |at: usize| u32::from_le_bytes(memory[at..at + 4].try_into().unwrap());
+    // Memory, calibration and IMU table, each behind a head with its kind, size and sum.
+    for (head, kind) in [(0, 0x09), (16, 0x20), (32, 0x20)] {
+        let size = whole(head + 4) as usize;
+        let mut sum = flate2::Crc::new();
+        sum.update(&memory[head + 16..head + 16 + size]);
+        assert_eq!(sum.sum(), whole(head + 12));
+        assert_eq!(memory[head + 2], kind);
+    }
+    assert_eq!((whole(36), whole(48)), (244, 1 << 8));
+    let values: Vec<f64> = (0..24)
+        .map(|k| f64::from(f32::from_bits(whole(48 + 13 * 4 + 4 * k))))
+        .collect();
+    let text = exported(Format::Dlio).text;
+    let divisors = divisors(&text);
+    for vector in &record().test_vectors {
+        for (k, at) in [(1, 0), (0, 12)] {
+            let n = halves(&vector.raw)[k].component_div(&divisors[k]);
+            let u = halves(&vector.calibrated)[k];
+            let matrix = Matrix3::from_column_slice(&values[at..at + 9]);
+            let bias = Vector3::from_column_slice(&values[at + 9..at + 12]);
+            assert!((matrix * n - bias - u).norm() < 1e-5 * (1.0 + u.norm()));
+        }
+    }
+}
+
+#[test]
+fn depthai_gives_the_test_vectors_by_one_affine_map_a_triad() {
+    let file: serde_json::Value = serde_json::from_str(&exported(Format::DepthAi).text).unwrap();
+    let map = |name: &str| -> [[f64; 4]; 3] { serde_json::from_value(file[name].clone()).unwrap() };
+    let divisors = divisors(&exported(Format::Dlio).text);
+    for vector in &record().test_vectors {
+        for (k, name) in ["gyroscope", "accelerometer"].into_iter().enumerate() {
+            let n = halves(&vector.raw)[k].component_div(&divisors[k]);
+            let u = halves(&vector.calibrated)[k];
+            let found = map(name).map(|[x, y, z, constant]| x * n.x + y * n.y + z * n.z + constant);
+            assert!((Vector3::from(found) - u).norm() < 1e-9 * (1.0 + u.norm()));
+        }
+    }
+}
+
+#[test]
+fn slimevr_gives_the_test_vectors_in_counts_but_for_what_its_file_states() {
+    let text = exported(Format::SlimeVr).text;
+    let vector = |key: &str| Vector3::from_column_slice(&lists(&text, key)[0]);
+    let inverse = Matrix3::from_row_slice(&lists(&text, ".A_Ainv")[0]);
+    let divisors = divisors(&exported(Format::Dlio).text);
+    for TestVector { raw, calibrated } in &record().test_vectors {
+        let [rate, force] = halves(raw);
+        let force = (inverse * (force - vector(".A_B"))).component_div(&divisors[1]);
+        let rate = (rate - vector(".G_off")).component_mul(&vector(".G_Sens"));
+        let rate = rate.component_div(&divisors[0]);
+        let [true_rate, true_force] = halves(calibrated);
+        assert!((force - true_force).norm() < 1e-4 * (1.0 + true_force.norm()));
+        let (errors, constant) = left(&text, "gyro");
+        let expected = true_rate + errors * true_rate + constant;
+        assert!((rate - expected).norm() < 1e-4 * (1.0 + true_rate.norm()));
+    }
+}

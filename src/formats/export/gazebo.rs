@@ -6,29 +6,21 @@
 //!
 //! Source: gz-sensors, `GaussianNoiseModel.cc`; SDFormat 1.6 and later, `noise.sdf`.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use super::Exported;
-use super::along::{Along, Remainder};
-use super::source::{Document, Source};
-use crate::imu::Sensor;
+use super::document::Document;
+use super::source::{Axes, Held, Source};
+use crate::imu::{PerSensor, Sensor};
 
 pub(super) fn write(source: &Source) -> Exported {
-    let along = Along::log(source);
-    let remainder = |sensor| {
-        let triad = along.triads.get(sensor);
-        Remainder::of(sensor, triad, &Matrix3::identity(), &triad.bias)
-    };
-    let left = Sensor::ALL.map(remainder);
+    let axes = Axes::log(source);
+    let held = PerSensor::from_fn(|sensor| Held::offset(axes.triads.get(sensor).bias));
     let notes = [
-        left[0].words(),
-        left[1].words(),
-        "the sign of the bias: Gazebo draws it anew for each axis, so half of them have the other"
-            .to_owned(),
+        "the sign of the bias: Gazebo draws it anew for each axis, so half of them have the other",
     ];
-    let mut file = Document::holding(source, "", notes, |_| false);
-    along.introduce(&mut file, "Gazebo writes rad/s and m/s^2, here");
-    left.iter().for_each(|left| left.lines(&mut file));
+    let reads = ("", "Gazebo writes rad/s and m/s^2, here");
+    let mut file = Document::correcting(source, &axes, reads, &held, &notes);
     if source.run.is_none() {
         file.comment("no noise: export with --run RUN.toml");
     }
@@ -39,7 +31,7 @@ pub(super) fn write(source: &Source) -> Exported {
         ("linear_acceleration", Sensor::Accel),
     ] {
         file.line(&format!("  <{name}>"));
-        let triad = along.triads.get(sensor);
+        let triad = axes.triads.get(sensor);
         let sigma = source
             .record
             .sigma
@@ -58,7 +50,7 @@ pub(super) fn write(source: &Source) -> Exported {
                 noise.map(|(run, noise)| noise.random_walk / run.recording.imu.period.sqrt());
             set("stddev", stddev.unwrap_or(0.0));
             set("bias_mean", triad.bias[axis]);
-            let of_record = along.axis_of_record(axis);
+            let of_record = axes.axis_of_record(axis);
             set("bias_stddev", sigma[of_record] / triad.nominal[axis].abs());
             if let Some(bias) = noise.and_then(|(_, noise)| noise.gauss_markov) {
                 let tau = bias.correlation_time;

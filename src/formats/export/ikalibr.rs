@@ -8,25 +8,25 @@
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::Exported;
-use super::along::{Along, upper};
-use super::source::{Document, Source, yaml_list, yaml_number};
+use super::document::{Document, SIGMA, yaml_list, yaml_number};
+use super::source::{Axes, Source, upper};
 use crate::imu::{PerSensor, Sensor};
 use crate::units::ARCSEC;
 
 pub(super) fn write(source: &Source) -> Exported {
-    let along = Along::log(source);
-    let (accel, own) = upper(&along.triads.accel.sensitivity);
-    let (gyro, of_gyro) = upper(&along.triads.gyro.sensitivity);
+    let axes = Axes::log(source);
+    let (accel, own) = upper(&axes.triads.accel.sensitivity);
+    let (gyro, of_gyro) = upper(&axes.triads.gyro.sensitivity);
     let accel_to_gyro = Rotation3::from_matrix_unchecked(of_gyro * own.transpose());
     let turn = crate::attitude::log(&own).norm() / ARCSEC;
     let notes = [
         format!(
             "the body frame: its own is {turn:.1} arcsec from that of the calibration, by the rotation below"
         ),
-        "sigma and covariance of the parameters; they are in calibration.json".to_owned(),
+        SIGMA.to_owned(),
     ];
     let mut file = Document::holding(source, "#", notes, |_| false);
-    along.introduce(&mut file, "iKalibr reads rad/s and m/s^2, here");
+    axes.introduce(&mut file, "iKalibr reads rad/s and m/s^2, here");
     for (axis, row) in ["x", "y", "z"].iter().zip(own.row_iter()) {
         let row: Vector3<f64> = row.transpose();
         file.comment(&format!(
@@ -39,7 +39,7 @@ pub(super) fn write(source: &Source) -> Exported {
     let maps = PerSensor { gyro, accel };
     for (name, sensor) in [("ACCE", Sensor::Accel), ("GYRO", Sensor::Gyro)] {
         file.line(&format!("      {name}:"));
-        column(&mut file, "BIAS", along.triads.get(sensor).bias.as_slice());
+        column(&mut file, "BIAS", axes.triads.get(sensor).bias.as_slice());
         column(&mut file, "MAP_COEFF", &coefficients(maps.get(sensor)));
     }
     let q = UnitQuaternion::from_rotation_matrix(&accel_to_gyro);

@@ -1,4 +1,4 @@
-//! Kalibr's IMU intrinsics, model `scale-misalignment`.
+//! Kalibr's IMU intrinsics, model `scale-misalignment`, and those of OpenVINS.
 //!
 //! From true to measured, in rad/s and m/s²: `a = M_a C_i_b f + b_a`,
 //! `ω = M_g C_gyro_i C_i_b ω_b + A C_gyro_i C_i_b f + b_g`, with both `M` lower triangular and both
@@ -8,16 +8,32 @@
 //! Source: Rehder et al., "Extending kalibr: calibrating the extrinsics of multiple IMUs and of
 //! individual axes", ICRA 2016; the keys are those of Kalibr's IMU chain files.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 
 use super::Exported;
-use super::source::{Document, Source, divide, yaml_list, yaml_number};
+use super::document::{Document, SIGMA, yaml_list, yaml_number};
+use super::source::{Axes, Source, upper};
 use crate::calibration::result::frame::accelerometer_frame;
 use crate::imu::{Noise, PerSensor, Sensor, Term};
 use crate::units::ARCSEC;
 
+/// What Kalibr and OpenVINS find themselves.
+const BIASES: &str =
+    "biases, which it finds itself, so no error is left of them; they are in a comment";
+
+fn biases(file: &mut Document, axes: &Axes) {
+    for (name, sensor) in [
+        ("gyroscopes", Sensor::Gyro),
+        ("accelerometers", Sensor::Accel),
+    ] {
+        let bias = yaml_list(&axes.triads.get(sensor).bias);
+        file.comment(&format!("bias of {name}: {bias}"));
+    }
+}
+
 pub(super) fn write(source: &Source) -> Exported {
-    let triads = PerSensor::from_fn(|sensor| source.normalised(sensor));
+    let axes = Axes::right_front_up(source);
+    let triads = &axes.triads;
     let imu_b = accelerometer_frame(&triads.accel.sensitivity);
     let gyro = triads.gyro.sensitivity * imu_b.transpose();
     let gyro_imu = accelerometer_frame(&gyro);
@@ -25,19 +41,10 @@ pub(super) fn write(source: &Source) -> Exported {
         gyro: lower(gyro * gyro_imu.transpose()),
         accel: lower(triads.accel.sensitivity * imu_b.transpose()),
     };
-    let q = Term::GSensitivity.parameters().start;
-    let q = Matrix3::from_fn(|i, j| source.correction.terms[q + 3 * i + j]);
-    let of_force = triads.gyro.sensitivity * q * (gyro_imu * imu_b).transpose();
-
-    let notes = [
-        "biases, which Kalibr finds itself; they are in a comment".to_owned(),
-        "sigma and covariance of the parameters; they are in calibration.json".to_owned(),
-    ];
+    let of_force = triads.gyro.sensitivity * axes.g_sensitivity * (gyro_imu * imu_b).transpose();
+    let notes = [BIASES, SIGMA].map(str::to_owned);
     let mut file = Document::holding(source, "#", notes, |term| term == Term::GSensitivity);
-    file.comment("");
-    file.comment("Kalibr reads rad/s and m/s^2;");
-    let nominal = PerSensor::from_fn(|sensor| triads.get(sensor).nominal.into());
-    file.comment(&divide(&nominal));
+    axes.introduce(&mut file, "Kalibr reads rad/s and m/s^2, here");
     file.comment("measured = M C_i_b f + bias");
     file.comment("measured = M C_gyro_i C_i_b w + A C_gyro_i C_i_b f + bias");
     let turned = turn(&imu_b) / ARCSEC;
@@ -45,39 +52,23 @@ pub(super) fn write(source: &Source) -> Exported {
         "T_i_b takes the body frame above to the axes of the accelerometers, {turned:.1} arcsec \
          away; what takes it for the identity gets u along those"
     ));
-    for (name, sensor) in [
-        ("gyroscopes", Sensor::Gyro),
-        ("accelerometers", Sensor::Accel),
-    ] {
-        let bias = triads.get(sensor).bias;
-        file.comment(&format!("bias of {name}: {}", yaml_list(&bias)));
-    }
+    biases(&mut file, &axes);
     file.line("imu0:\n  model: scale-misalignment\n  T_i_b:");
-    for i in 0..4 {
-        let of_rotation = |j| {
-            if i < 3 && j < 3 {
-                imu_b[(i, j)]
-            } else {
-                f64::from(u8::from(i == j))
-            }
-        };
-        file.line(&format!(
-            "  - {}",
-            yaml_list(&[0, 1, 2, 3].map(of_rotation))
-        ));
+    for row in imu_b.to_homogeneous().row_iter() {
+        file.line(&format!("  - {}", yaml_list(row.iter())));
     }
     file.line("  time_offset: 0.0\n  gyroscopes:");
-    matrix(&mut file, "M", &matrices.gyro);
-    matrix(&mut file, "A", &of_force);
-    matrix(&mut file, "C_gyro_i", &gyro_imu);
+    matrix(&mut file, "    M", &matrices.gyro);
+    matrix(&mut file, "    A", &of_force);
+    matrix(&mut file, "    C_gyro_i", &gyro_imu);
     file.line("  accelerometers:");
-    matrix(&mut file, "M", &matrices.accel);
+    matrix(&mut file, "    M", &matrices.accel);
     noise(&mut file, source);
     file.finish()
 }
 
 /// Above the diagonal there is only rounding.
-pub(super) fn lower(mut matrix: Matrix3<f64>) -> Matrix3<f64> {
+fn lower(mut matrix: Matrix3<f64>) -> Matrix3<f64> {
     matrix.fill_upper_triangle(0.0, 1);
     matrix
 }
@@ -87,15 +78,16 @@ fn turn(rotation: &Matrix3<f64>) -> f64 {
     crate::attitude::log(rotation).norm()
 }
 
+/// A matrix row by row below its name, which is indented.
 fn matrix(file: &mut Document, name: &str, matrix: &Matrix3<f64>) {
-    file.line(&format!("    {name}:"));
-    for i in 0..3 {
-        let row: Vector3<f64> = matrix.row(i).transpose();
-        file.line(&format!("    - {}", yaml_list(&row)));
+    let indent = " ".repeat(name.len() - name.trim_start().len());
+    file.line(&format!("{name}:"));
+    for row in matrix.row_iter() {
+        file.line(&format!("{indent}- {}", yaml_list(row.iter())));
     }
 }
 
-pub(super) fn noise(file: &mut Document, source: &Source) {
+fn noise(file: &mut Document, source: &Source) {
     let missing = match source.run {
         Some(_) => "[imu.noise] of the run does not state it",
         None => "`turncal allan` finds it; or export with --run RUN.toml",
@@ -128,4 +120,55 @@ pub(super) fn noise(file: &mut Document, source: &Source) {
     let rate = source.run.map(|run| run.recording.imu.period.recip());
     key("update_rate", rate, "Hz");
     file.line("  # rostopic: /imu0  # the topic of your recording");
+}
+
+/// Which triangle intrinsics are kept in.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Model {
+    Kalibr,
+    Rpng,
+}
+
+/// OpenVINS' IMU intrinsics, in its models `kalibr` and `rpng`.
+///
+/// From measured to true, in rad/s and m/s²: `a = R_IMUtoACCᵀ Ta⁻¹ (a_m − b_a)`,
+/// `ω = R_IMUtoGYROᵀ Tw⁻¹ (ω_m − Tg a − b_g)`, with `Ta`, `Tw` lower triangular (`kalibr`) or upper (`rpng`): only
+/// that triangle of their inverses is read. `Tg` acts on the corrected a along the IMU's axes, so it is what Kalibr
+/// calls `A C_gyro_i`; the comment in OpenVINS' example files says otherwise.
+///
+/// Source: OpenVINS, `VioManagerOptions::print_and_load_state` and `Propagator::predict_and_compute`.
+pub(super) fn open_vins(source: &Source, model: Model) -> Exported {
+    let axes = Axes::log(source);
+    let parts = PerSensor::from_fn(|sensor| {
+        let a = axes.triads.get(sensor).sensitivity;
+        match model {
+            Model::Kalibr => {
+                let rotation = accelerometer_frame(&a);
+                (lower(a * rotation.transpose()), rotation)
+            }
+            Model::Rpng => upper(&a),
+        }
+    });
+    let of_force = axes.triads.gyro.sensitivity * axes.g_sensitivity;
+    let name = match model {
+        Model::Kalibr => "kalibr",
+        Model::Rpng => "rpng",
+    };
+    let notes = [BIASES, SIGMA].map(str::to_owned);
+    let mut file = Document::holding(source, "#", notes, |term| term == Term::GSensitivity);
+    file.begin("%YAML:1.0");
+    axes.introduce(&mut file, "OpenVINS reads rad/s and m/s^2, here");
+    file.comment(&format!(
+        "set imu_intrinsics_model: \"{name}\" in its estimator_config.yaml"
+    ));
+    biases(&mut file, &axes);
+    file.line("imu0:");
+    matrix(&mut file, "  Tw", &parts.gyro.0);
+    matrix(&mut file, "  R_IMUtoGYRO", &parts.gyro.1);
+    matrix(&mut file, "  Ta", &parts.accel.0);
+    matrix(&mut file, "  R_IMUtoACC", &parts.accel.1);
+    matrix(&mut file, "  Tg", &of_force);
+    file.line("  time_offset: 0.0");
+    noise(&mut file, source);
+    file.finish()
 }

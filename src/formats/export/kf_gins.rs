@@ -9,7 +9,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::Exported;
-use super::source::{Document, Normalised, Source, divide, yaml_list, yaml_number};
+use super::document::{Document, yaml_list, yaml_number};
+use super::source::{Axes, Normalised, Source};
 use crate::calibration::result::TriadRecord;
 use crate::imu::{PerSensor, Sensor};
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, PPM};
@@ -20,36 +21,15 @@ const MILLIGAL: f64 = 1e-5;
 const M_PER_S_PER_SQRT_H: f64 = 1.0 / 60.0;
 const HOUR: f64 = 3600.0;
 
-/// A triad along front, right, down.
-struct FrontRightDown {
-    scale_error: Vector3<f64>,
-    bias: Vector3<f64>,
-    /// `A_ij / A_ii`, the part of another axis' input that stays in the output, pure number.
-    misalignment: Matrix3<f64>,
-}
-
-impl FrontRightDown {
-    fn new(triad: &Normalised) -> Self {
-        let turn = Matrix3::new(0.0, 1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0);
-        let a = turn * triad.sensitivity * turn.transpose();
-        Self {
-            scale_error: a.diagonal().add_scalar(-1.0),
-            bias: turn * triad.bias,
-            misalignment: Matrix3::from_fn(|i, j| if i == j { 0.0 } else { a[(i, j)] / a[(i, i)] }),
-        }
-    }
-}
-
-/// Values of right, front, up without a sign, as front, right, down.
-fn reordered(values: Vector3<f64>) -> [f64; 3] {
-    [values.y, values.x, values.z]
-}
-
 pub(super) fn write(source: &Source) -> Exported {
-    let normalised = PerSensor::from_fn(|sensor| source.normalised(sensor));
-    let triads = PerSensor::from_fn(|sensor| FrontRightDown::new(normalised.get(sensor)));
+    let axes = Axes::front_right_down(source);
+    // `A_ij / A_ii`, the part of another axis' input that stays in the output.
+    let misalignment = PerSensor::from_fn(|sensor| {
+        let a = axes.triads.get(sensor).sensitivity;
+        Matrix3::from_fn(|i, j| if i == j { 0.0 } else { a[(i, j)] / a[(i, i)] })
+    });
     let largest = |sensor| {
-        let tilt = triads.get(sensor).misalignment.amax();
+        let tilt = misalignment.get(sensor).amax();
         format!("{:.1} arcsec ({:.1} ppm)", tilt / ARCSEC, tilt / PPM)
     };
     let lost = format!(
@@ -63,15 +43,10 @@ pub(super) fn write(source: &Source) -> Exported {
         "sigma of misalignment, and covariance; they are in calibration.json".to_owned(),
     ];
     let mut file = Document::holding(source, "#", notes, |_| false);
-    file.comment("");
-    let nominal = PerSensor::from_fn(|sensor| reordered(normalised.get(sensor).nominal));
-    file.comment("KF-GINS reads rad and m/s a sample, along front, right, down;");
-    file.comment(&divide(&nominal));
+    axes.introduce(&mut file, "KF-GINS reads rad and m/s a sample,");
     for sensor in Sensor::ALL {
-        for (axis, row) in ["front", "right", "down"]
-            .iter()
-            .zip(triads.get(sensor).misalignment.row_iter())
-        {
+        let rows = misalignment.get(sensor).row_iter();
+        for (axis, row) in ["front", "right", "down"].iter().zip(rows) {
             let row: Vector3<f64> = row.transpose() / ARCSEC;
             file.comment(&format!(
                 "lost, {} {axis}: {:.3} {:.3} {:.3} arcsec of front, right, down",
@@ -83,35 +58,33 @@ pub(super) fn write(source: &Source) -> Exported {
         }
     }
     file.comment("front, right, down:");
-    let PerSensor { gyro, accel } = &triads;
+    let PerSensor { gyro, accel } = &axes.triads;
+    let error = |triad: &Normalised| triad.sensitivity.diagonal().add_scalar(-1.0);
     for (key, values, unit, name) in [
         ("initgyrbias", gyro.bias, DEG_PER_H, "deg/h"),
         ("initaccbias", accel.bias, MILLIGAL, "mGal"),
-        ("initgyrscale", gyro.scale_error, PPM, "ppm"),
-        ("initaccscale", accel.scale_error, PPM, "ppm"),
+        ("initgyrscale", error(gyro), PPM, "ppm"),
+        ("initaccscale", error(accel), PPM, "ppm"),
     ] {
         file.line(&format!("{key}: {}  # {name}", yaml_list(&(values / unit))));
     }
-    sigma(&mut file, source, &normalised);
+    sigma(&mut file, source, &axes);
     noise(&mut file, source);
     file.finish()
 }
 
-fn sigma(file: &mut Document, source: &Source, normalised: &PerSensor<Normalised>) {
+fn sigma(file: &mut Document, source: &Source, axes: &Axes) {
     file.comment(
         "1 sigma of the calibration; biases that change from switch-on to switch-on need more",
     );
-    let of = |sensor, values: fn(&TriadRecord) -> [f64; 3]| {
-        let sigma = source.record.sigma.as_ref()?.get(sensor);
-        let nominal = normalised.get(sensor).nominal;
-        let sigma = Vector3::from(values(sigma)).component_div(&nominal.abs());
-        sigma.iter().all(|&s| s > 0.0).then(|| reordered(sigma))
-    };
+    let bias = |sigma: &TriadRecord| sigma.bias;
+    let scale = |sigma: &TriadRecord| sigma.scale;
+    type Values = fn(&TriadRecord) -> [f64; 3];
     for (key, sensor, values, unit, name) in [
         (
             "initbgstd",
             Sensor::Gyro,
-            bias as fn(&TriadRecord) -> [f64; 3],
+            bias as Values,
             DEG_PER_H,
             "deg/h",
         ),
@@ -119,26 +92,22 @@ fn sigma(file: &mut Document, source: &Source, normalised: &PerSensor<Normalised
         ("initsgstd", Sensor::Gyro, scale, PPM, "ppm"),
         ("initsastd", Sensor::Accel, scale, PPM, "ppm"),
     ] {
-        match of(sensor, values) {
-            Some(sigma) => {
-                file.line(&format!(
-                    "{key}: {}  # {name}",
-                    yaml_list(&sigma.map(|s| s / unit))
-                ));
-            }
+        let of_record = source
+            .record
+            .sigma
+            .as_ref()
+            .map(|sigma| values(sigma.get(sensor)));
+        let nominal = axes.triads.get(sensor).nominal;
+        let sigma = of_record.map(|of| {
+            Vector3::from_fn(|k, _| of[axes.axis_of_record(k)] / nominal[k].abs() / unit)
+        });
+        match sigma.filter(|sigma| sigma.iter().all(|&s| s > 0.0)) {
+            Some(sigma) => file.line(&format!("{key}: {}  # {name}", yaml_list(&sigma))),
             None => file.comment(&format!(
                 "{key}: the calibration states no sigma of all three"
             )),
         }
     }
-}
-
-fn bias(sigma: &TriadRecord) -> [f64; 3] {
-    sigma.bias
-}
-
-fn scale(sigma: &TriadRecord) -> [f64; 3] {
-    sigma.scale
 }
 
 fn noise(file: &mut Document, source: &Source) {
@@ -147,45 +116,39 @@ fn noise(file: &mut Document, source: &Source) {
         None => "`turncal allan` finds it; or export with --run RUN.toml",
     };
     // A key without children is no mapping, so without figures it is a comment, too.
-    file.line(if source.run.is_some() {
-        "imunoise:"
-    } else {
-        "# imunoise:"
+    file.line(match source.run {
+        Some(_) => "imunoise:",
+        None => "# imunoise:",
     });
     let noise = source.run.map(|run| run.instrument.noise);
-    let bias = |sensor| {
-        noise
-            .as_ref()
-            .and_then(|noise| noise.get(sensor).gauss_markov)
-    };
-    let mut key = |name: &str, value: Option<f64>, unit: &str| match value {
-        Some(value) => {
-            file.line(&format!("  {name}: {}  # {unit}", yaml_list(&[value; 3])));
-        }
-        None => file.line(&format!("#  {name}: [ , , ]  # {unit}: {missing}")),
-    };
-    let walk = |sensor, unit| {
-        noise
-            .as_ref()
-            .map(|noise| noise.get(sensor).random_walk / unit)
-    };
-    key("arw", walk(Sensor::Gyro, DEG_PER_SQRT_H), "deg/sqrt(h)");
-    key(
-        "vrw",
-        walk(Sensor::Accel, M_PER_S_PER_SQRT_H),
-        "m/s/sqrt(h)",
-    );
-    let sigma = |sensor, unit: f64| bias(sensor).map(|bias| bias.sigma / unit);
-    key("gbstd", sigma(Sensor::Gyro, DEG_PER_H), "deg/h");
-    key("abstd", sigma(Sensor::Accel, MILLIGAL), "mGal");
+    let of = |sensor| noise.as_ref().map(|noise| noise.get(sensor));
+    let varying = |sensor| of(sensor).and_then(|noise| noise.gauss_markov);
+    let walk = |sensor, unit: f64| of(sensor).map(|noise| noise.random_walk / unit);
+    let sigma = |sensor, unit: f64| varying(sensor).map(|bias| bias.sigma / unit);
+    for (name, value, unit) in [
+        ("arw", walk(Sensor::Gyro, DEG_PER_SQRT_H), "deg/sqrt(h)"),
+        (
+            "vrw",
+            walk(Sensor::Accel, M_PER_S_PER_SQRT_H),
+            "m/s/sqrt(h)",
+        ),
+        ("gbstd", sigma(Sensor::Gyro, DEG_PER_H), "deg/h"),
+        ("abstd", sigma(Sensor::Accel, MILLIGAL), "mGal"),
+    ] {
+        file.line(&match value {
+            Some(value) => format!("  {name}: {}  # {unit}", yaml_list(&[value; 3])),
+            None => format!("#  {name}: [ , , ]  # {unit}: {missing}"),
+        });
+    }
     file.line("#  gsstd: [ , , ]  # ppm: 1σ by which scale factors vary, from the data sheet");
     file.line("#  asstd: [ , , ]  # ppm: the same");
-    let times = Sensor::ALL.map(bias).into_iter().flatten();
-    match times.map(|bias| bias.correlation_time).reduce(f64::min) {
-        Some(time) => file.line(&format!(
+    let times = Sensor::ALL.map(varying).into_iter().flatten();
+    let shortest = times.map(|bias| bias.correlation_time).reduce(f64::min);
+    file.line(&match shortest {
+        Some(time) => format!(
             "  corrtime: {}  # h, one for all; the shorter of gyros and accelerometers",
             yaml_number(time / HOUR)
-        )),
-        None => file.line(&format!("#  corrtime:   # h: {missing}")),
-    }
+        ),
+        None => format!("#  corrtime:   # h: {missing}"),
+    });
 }

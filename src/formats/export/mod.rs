@@ -2,65 +2,78 @@
 //!
 //! Every format says in comments what `N` and `u` are, and names what it cannot hold.
 
-mod along;
 mod autopilot;
-mod betaflight;
-mod c;
+mod cameras;
+mod code;
+mod document;
 mod gazebo;
 mod ikalibr;
-mod imu_calib;
 mod kalibr;
 mod kf_gins;
 mod mat;
-mod octave;
-mod open_vins;
 mod ros;
 mod samples;
+mod slimevr;
 mod source;
 mod text;
-mod thermal;
 
 pub use samples::{HEADER, sample_rows, write_samples};
 
 use crate::calibration::CorrectionError;
 use crate::calibration::result::Calibration;
 use crate::run::Run;
-use open_vins::Model;
+use kalibr::Model;
 use source::Source;
 
 /// A format of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Format {
-    /// Kalibr's IMU intrinsics, model `scale-misalignment`.
+    /// IMU intrinsics of Kalibr, model scale-misalignment
     Kalibr,
-    /// The part of a KF-GINS configuration that is about the IMU.
+    /// The part of a KF-GINS configuration that is about the IMU
     KfGins,
-    /// A C99 header with a function.
+    /// A C99 header with constants and a function
     C,
-    /// An Octave or MATLAB function file.
+    /// A function file of Octave or MATLAB
     Octave,
-    /// Every value with its name, σ and unit.
+    /// Every value with its name, σ and unit
     Text,
-    /// Parameters of PX4.
+    /// Parameters of PX4: CAL_GYRO0, CAL_ACC0
     Px4,
-    /// Parameters of ArduPilot.
+    /// Parameters of ArduPilot: INS_GYROFFS, INS_ACCOFFS, INS_ACCSCAL
+    #[cfg_attr(feature = "cli", value(name = "ardupilot"))]
     ArduPilot,
-    /// OpenVINS' IMU intrinsics, model `kalibr`.
+    /// IMU intrinsics of OpenVINS, model kalibr
     OpenVinsKalibr,
-    /// The same, model `rpng`.
+    /// IMU intrinsics of OpenVINS, model rpng
     OpenVinsRpng,
-    /// iKalibr's IMU intrinsics.
+    /// IMU intrinsics of iKalibr
+    #[cfg_attr(feature = "cli", value(name = "ikalibr"))]
     IKalibr,
-    /// The accelerometers' calibration of the ROS package `imu_calib`.
+    /// The accelerometers' calibration of the ROS package imu_calib
     ImuCalib,
-    /// The covariances of ROS' `sensor_msgs/Imu`.
+    /// Covariances of ROS sensor_msgs/Imu; needs --run
     RosCovariance,
-    /// The noise of an IMU in Gazebo.
+    /// IMU intrinsics of DLIO (direct LiDAR-inertial odometry)
+    Dlio,
+    /// Noise of an IMU in Gazebo
     Gazebo,
-    /// A structure for MATLAB.
+    /// A structure for MATLAB, a MAT file
     Mat,
-    /// What Betaflight holds.
+    /// Zeros of accelerometers for Betaflight
     Betaflight,
+    /// Zeros and gains for INAV
+    Inav,
+    /// Memory of the IMU of a RealSense D400 camera, as rs-imu-calibration writes it
+    #[cfg_attr(feature = "cli", value(name = "realsense"))]
+    RealSense,
+    /// IMU calibration of a DepthAI (OAK) camera, JSON
+    #[cfg_attr(feature = "cli", value(name = "depthai"))]
+    DepthAi,
+    /// Calibration of a SlimeVR tracker
+    #[cfg_attr(feature = "cli", value(name = "slimevr"))]
+    SlimeVr,
 }
 
 impl Exported {
@@ -72,7 +85,7 @@ impl Exported {
 
 impl Format {
     /// Every format.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 20] = [
         Self::Kalibr,
         Self::KfGins,
         Self::C,
@@ -85,9 +98,14 @@ impl Format {
         Self::IKalibr,
         Self::ImuCalib,
         Self::RosCovariance,
+        Self::Dlio,
         Self::Gazebo,
         Self::Mat,
         Self::Betaflight,
+        Self::Inav,
+        Self::RealSense,
+        Self::DepthAi,
+        Self::SlimeVr,
     ];
 }
 
@@ -116,24 +134,33 @@ pub fn write(
     let mut exported = match format {
         Format::Kalibr => kalibr::write(&source),
         Format::KfGins => kf_gins::write(&source),
-        Format::C => c::write(&source),
-        Format::Octave => octave::write(&source),
+        Format::C => code::c(&source),
+        Format::Octave => code::octave(&source),
         Format::Text => text::write(&source),
         Format::Px4 => autopilot::px4(&source),
         Format::ArduPilot => autopilot::ardupilot(&source),
-        Format::OpenVinsKalibr => open_vins::write(&source, Model::Kalibr),
-        Format::OpenVinsRpng => open_vins::write(&source, Model::Rpng),
+        Format::OpenVinsKalibr => kalibr::open_vins(&source, Model::Kalibr),
+        Format::OpenVinsRpng => kalibr::open_vins(&source, Model::Rpng),
         Format::IKalibr => ikalibr::write(&source),
-        Format::ImuCalib => imu_calib::write(&source),
-        Format::RosCovariance => ros::write(&source),
+        Format::ImuCalib => ros::imu_calib(&source),
+        Format::RosCovariance => ros::covariance(&source),
+        Format::Dlio => ros::dlio(&source),
         Format::Gazebo => gazebo::write(&source),
         Format::Mat => mat::write(&source),
-        Format::Betaflight => betaflight::write(&source),
+        Format::Betaflight => autopilot::betaflight(&source),
+        Format::Inav => autopilot::inav(&source),
+        Format::RealSense => cameras::realsense(&source),
+        Format::DepthAi => cameras::depthai(&source),
+        Format::SlimeVr => slimevr::write(&source),
     };
-    exported.notes.extend(match format {
-        Format::C => None,
-        Format::Px4 | Format::ArduPilot => thermal::autopilot_note(&source),
-        _ => thermal::note(&source),
+    exported.notes.extend(match (format, &record.temperature) {
+        (Format::C, _) | (_, None) => None,
+        (Format::Px4 | Format::ArduPilot, _) => autopilot::thermal_note(&source),
+        (_, Some(thermal)) => Some(format!(
+            "change with temperature; this is the calibration at {} °C, another temperature is written with \
+             --temperature-degc",
+            thermal.range.gyro.reference
+        )),
     });
     Ok(exported)
 }

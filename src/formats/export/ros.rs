@@ -1,14 +1,15 @@
-//! The covariances of `sensor_msgs/Imu`.
+//! ROS: covariances of `sensor_msgs/Imu`, the accelerometers' calibration of `imu_calib`, and DLIO's intrinsics.
 //!
-//! Row-major about x, y, z: the variance of a sample, density² × rate.
-//!
-//! Source: ROS common_interfaces, `sensor_msgs/Imu`.
+//! Source: ROS common_interfaces, `sensor_msgs/Imu`; imu_calib, `AccelCalib::applyCalib` and
+//! `ApplyCalib::rawImuCallback`; direct_lidar_inertial_odometry, `odom.cc`, `callbackImu`, and `cfg/dlio.yaml`.
 
 use super::Exported;
-use super::source::{Document, Source, yaml_list};
-use crate::imu::Sensor;
+use super::document::{Document, yaml_list};
+use super::source::{Axes, Held, Source};
+use crate::imu::{PerSensor, Sensor};
 
-pub(super) fn write(source: &Source) -> Exported {
+/// Row-major about x, y, z: the variance of a sample, density² × rate.
+pub(super) fn covariance(source: &Source) -> Exported {
     let notes = [
         "scale, misalignment and bias; publish what `turncal apply` writes, whose errors they are not".to_owned(),
         "wander of biases, which is not white; `turncal allan` finds it".to_owned(),
@@ -28,10 +29,50 @@ pub(super) fn write(source: &Source) -> Exported {
         };
         let density = run.instrument.noise.get(sensor).random_walk;
         let variance = density.powi(2) / run.recording.imu.period;
-        let all: Vec<f64> = (0..9)
-            .map(|k| if k % 4 == 0 { variance } else { 0.0 })
-            .collect();
+        let all = [0, 1, 2, 3, 4, 5, 6, 7, 8].map(|k| if k % 4 == 0 { variance } else { 0.0 });
         file.line(&format!("{key}: {}", yaml_list(&all)));
     }
+    file.finish()
+}
+
+/// All of the accelerometers, and the offset of the gyros.
+fn held(axes: &Axes) -> PerSensor<Held> {
+    PerSensor {
+        gyro: Held::offset(axes.triads.gyro.bias),
+        accel: Held::all(&axes.triads.accel),
+    }
+}
+
+/// `SM n − bias` of the accelerometers, so the bias is in corrected units.
+pub(super) fn imu_calib(source: &Source) -> Exported {
+    let axes = Axes::log(source);
+    let held = held(&axes);
+    let notes = [
+        "biases of the gyros: imu_calib takes their mean at its start, and with it the rate of the Earth, up to \
+                  15.041 deg/h",
+    ];
+    let reads = ("#", "imu_calib reads rad/s and m/s^2, here");
+    let mut file = Document::correcting(source, &axes, reads, &held, &notes);
+    file.line(&format!("SM: {}", yaml_list(&held.accel.rows())));
+    let bias = held.accel.matrix * held.accel.offset;
+    file.line(&format!("bias: {}", yaml_list(&bias)));
+    file.finish()
+}
+
+/// `sm n − bias` of the accelerometers and `n − bias` of the gyros, along the axes of `baselink`.
+pub(super) fn dlio(source: &Source) -> Exported {
+    let axes = Axes::log(source);
+    let held = held(&axes);
+    let notes = [
+        "scale and misalignment of gyros, nor the turn from the log's axes to baselink, which DLIO makes first",
+    ];
+    let reads = ("#", "DLIO reads rad/s and m/s^2, here");
+    let mut file = Document::correcting(source, &axes, reads, &held, &notes);
+    file.line("dlio:\n  imu:\n    calibration: false\n    intrinsics:\n      accel:");
+    let bias = held.accel.matrix * held.accel.offset;
+    file.line(&format!("        bias: {}", yaml_list(&bias)));
+    file.line(&format!("        sm: {}", yaml_list(&held.accel.rows())));
+    let bias = yaml_list(&held.gyro.offset);
+    file.line(&format!("      gyro:\n        bias: {bias}"));
     file.finish()
 }

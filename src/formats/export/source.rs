@@ -2,14 +2,16 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::Exported;
+use super::document::{Document, yaml_list};
 use crate::calibration::result::Calibration;
 use crate::calibration::result::{EQUATION, Method};
 use crate::calibration::{Correction, CorrectionError};
+use crate::formats::axes::BodyAxes;
 use crate::formats::unit_scale;
-use crate::imu::{PerSensor, Sensor, Term};
+use crate::imu::{AxisOrder, PerSensor, Sensor, Term};
 use crate::run::Aiding;
 use crate::run::Run;
+use crate::units::{ARCSEC, DEGREE, PPM, STANDARD_GRAVITY};
 
 /// A calibration and, perhaps, a run of its instrument.
 pub(super) struct Source<'a> {
@@ -102,7 +104,7 @@ impl<'a> Source<'a> {
 
     /// A triad in rad/s or m/s². Without a run the nominal scale is that of the unit; for counts the
     /// calibrated scale factors, rounded to three digits.
-    pub fn normalised(&self, sensor: Sensor) -> Normalised {
+    fn normalised(&self, sensor: Sensor) -> Normalised {
         let sensitivity = self.correction.sensitivity.get(sensor);
         let unit = self
             .row_unit(sensor)
@@ -161,130 +163,191 @@ impl<'a> Source<'a> {
     }
 }
 
-/// A file in the making.
-pub(super) struct Document {
-    mark: &'static str,
-    text: String,
-    notes: Vec<String>,
+/// Both triads along other axes than right, front, up.
+pub(super) struct Axes {
+    pub triads: PerSensor<Normalised>,
+    /// What of specific force the gyros add to their rate.
+    pub g_sensitivity: Matrix3<f64>,
+    /// From these axes to right, front, up.
+    order: AxisOrder,
 }
 
-impl Document {
-    /// Begins with what all formats say; `notes` are what this one does not hold, beside the error terms but for those
-    /// of which `held` is true.
-    pub fn holding(
-        source: &Source,
-        mark: &'static str,
-        notes: impl IntoIterator<Item = String>,
-        held: fn(Term) -> bool,
-    ) -> Self {
-        let notes = notes.into_iter().chain(source.terms_note(held));
-        let mut document = Self::new(source, mark, notes);
-        for line in source.term_lines(|term| !held(term)) {
-            document.comment(&line);
-        }
-        document
+impl Axes {
+    /// Along front, right, down, as autopilots have it.
+    pub fn front_right_down(source: &Source) -> Self {
+        Self::new(source, BodyAxes::Frd.order())
     }
 
-    /// The same of a format in which error terms have no place.
-    pub fn new(
-        source: &Source,
-        mark: &'static str,
-        notes: impl IntoIterator<Item = String>,
-    ) -> Self {
-        let mut document = Self {
-            mark,
-            text: String::new(),
-            notes: notes.into_iter().collect(),
+    /// Along right, front, up.
+    pub fn right_front_up(source: &Source) -> Self {
+        Self::new(source, AxisOrder::IDENTITY)
+    }
+
+    /// Along the axes of the run's log, else right, front, up.
+    pub fn log(source: &Source) -> Self {
+        let log = source.run.and_then(|run| run.recording.imu.log.as_ref());
+        Self::new(
+            source,
+            log.map_or(AxisOrder::IDENTITY, |log| log.named.axes),
+        )
+    }
+
+    fn new(source: &Source, order: AxisOrder) -> Self {
+        let turn = order.matrix();
+        let turned = |matrix: Matrix3<f64>| turn.transpose() * matrix * turn;
+        let q = Term::GSensitivity.parameters().start;
+        let g_sensitivity = Matrix3::from_fn(|i, j| source.correction.terms[q + 3 * i + j]);
+        Self {
+            triads: PerSensor::from_fn(|sensor| {
+                let triad = source.normalised(sensor);
+                let mut nominal = triad.nominal;
+                for (axis, &of) in order.source.iter().enumerate() {
+                    nominal[of] = triad.nominal[axis];
+                }
+                Normalised {
+                    nominal,
+                    sensitivity: turned(triad.sensitivity),
+                    bias: turn.transpose() * triad.bias,
+                }
+            }),
+            g_sensitivity: turned(g_sensitivity),
+            order,
+        }
+    }
+
+    /// The axes in words.
+    fn words(&self) -> &'static str {
+        let of = |axes: BodyAxes| axes.order() == self.order;
+        match (of(BodyAxes::Rfu), of(BodyAxes::Frd), of(BodyAxes::Flu)) {
+            (true, ..) => "right, front, up",
+            (_, true, _) => "front, right, down",
+            (_, _, true) => "front, left, up",
+            _ => "the axes of the log",
+        }
+    }
+
+    /// The axis right, front or up that lies along one of these.
+    pub fn axis_of_record(&self, axis: usize) -> usize {
+        let of = self.order.source.iter().position(|&source| source == axis);
+        of.unwrap_or(axis)
+    }
+
+    /// Says along which axes what follows is, `what` being what a reader does there, and what raw output is divided
+    /// by before.
+    pub fn introduce(&self, file: &mut Document, what: &str) {
+        file.comment("");
+        file.comment(&format!("{what} along {};", self.words()));
+        let [gyro, accel] = Sensor::ALL.map(|sensor| yaml_list(&self.triads.get(sensor).nominal));
+        file.comment(&format!(
+            "divide the raw output for that: gyros by {gyro}, accelerometers by {accel}"
+        ));
+    }
+}
+
+/// What a program makes of the output n of a triad: `matrix (n − offset)`.
+pub(super) struct Held {
+    pub matrix: Matrix3<f64>,
+    pub offset: Vector3<f64>,
+}
+
+impl Held {
+    /// The offset alone.
+    pub fn offset(offset: Vector3<f64>) -> Self {
+        Self {
+            matrix: Matrix3::identity(),
+            offset,
+        }
+    }
+
+    /// All of a triad: a calibration that can be exported has an inverse.
+    pub fn all(triad: &Normalised) -> Self {
+        let inverse = triad.sensitivity.try_inverse();
+        Self {
+            matrix: inverse.unwrap_or_else(Matrix3::identity),
+            offset: triad.bias,
+        }
+    }
+
+    /// The matrix row by row.
+    pub fn rows(&self) -> Vec<f64> {
+        self.matrix.transpose().iter().copied().collect()
+    }
+}
+
+/// What a reader that makes `matrix (n − offset)` of a triad's output leaves of its input u: `errors u + constant`.
+pub(super) struct Remainder {
+    sensor: Sensor,
+    errors: Matrix3<f64>,
+    constant: Vector3<f64>,
+}
+
+impl Remainder {
+    pub fn of(sensor: Sensor, axes: &Axes, held: &Held) -> Self {
+        let triad = axes.triads.get(sensor);
+        Self {
+            sensor,
+            errors: held.matrix * triad.sensitivity - Matrix3::identity(),
+            constant: held.matrix * (triad.bias - held.offset),
+        }
+    }
+
+    /// Whether it is not more than rounding.
+    pub fn is_none(&self) -> bool {
+        self.errors.amax() < 1e-12 && self.constant.amax() < 1e-12
+    }
+
+    /// The largest length of `errors u` for u of length one.
+    fn largest(&self) -> f64 {
+        self.errors.singular_values().max()
+    }
+
+    /// How much that is, in a sentence.
+    pub fn words(&self) -> String {
+        let scale = self.errors.diagonal().amax();
+        let mut across = self.errors;
+        across.fill_diagonal(0.0);
+        let worst = self.largest();
+        let (name, example) = match self.sensor {
+            Sensor::Gyro => ("gyros", format!("{:.3} deg/s at 100 deg/s", 100.0 * worst)),
+            Sensor::Accel => ("accelerometers", format!("{:.3} mg at 1 g", 1e3 * worst)),
         };
-        for line in source.about() {
-            document.comment(&line);
-        }
-        for note in document.notes.clone() {
-            document.comment(&format!("not held: {note}"));
-        }
-        document
+        let bias = match self.sensor {
+            Sensor::Gyro => format!("{:.3} deg/h", self.constant.amax() / DEGREE * 3600.0),
+            Sensor::Accel => format!("{:.3} mg", 1e3 * self.constant.amax() / STANDARD_GRAVITY),
+        };
+        format!(
+            "{name}: what is left is up to {:.1} ppm of scale and {:.1} arcsec of misalignment, together {example} \
+             in any direction, and {bias} of bias",
+            scale / PPM,
+            across.amax() / ARCSEC
+        )
     }
 
-    /// Begins a file of code: it corrects K, E and D, and has terms and test vectors in comments.
-    pub fn of_code(source: &Source, mark: &'static str) -> Self {
-        let sigma = "sigma and covariance of the parameters; they are in calibration.json";
-        let mut document = Self::holding(source, mark, [sigma.to_owned()], |_| false);
-        let vectors = source.test_vectors();
-        if !vectors.is_empty() {
-            document.comment("");
-            document.comment("test vectors, raw -> calibrated, gyros x y z, accelerometers x y z:");
-            vectors.iter().for_each(|line| document.comment(line));
-        }
-        document
-    }
-
-    /// A comment of one line, whatever is in it: names and warnings come from files.
-    pub fn comment(&mut self, line: &str) {
-        let breaks = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
-        let line = line.replace(breaks, " ");
-        let line = line.trim_end();
-        self.text += self.mark;
-        if !line.is_empty() {
-            self.text.push(' ');
-            self.text += line;
-        }
-        // In C a backslash at the end, or its trigraph ??/, would take the next line in.
-        if line.ends_with(['\\', '/']) {
-            self.text.push('.');
-        }
-        self.text.push('\n');
-    }
-
-    pub fn line(&mut self, line: &str) {
-        self.text += line;
-        self.text.push('\n');
-    }
-
-    /// A line before all others.
-    pub fn begin(&mut self, line: &str) {
-        self.text.insert_str(0, &format!("{line}\n"));
-    }
-
-    /// Puts all so far between these, which only end a comment together.
-    pub fn enclose(&mut self, open: &str, close: &str) {
-        self.text = format!("{open}\n{}{close}\n", self.text.replace("--", "- -"));
-    }
-
-    pub fn finish(self) -> Exported {
-        Exported {
-            text: self.text,
-            binary: None,
-            notes: self.notes,
+    /// All figures, a line an axis: parts of u, and the constant in rad/s or m/s².
+    pub fn lines(&self, file: &mut Document) {
+        for (axis, name) in ["x", "y", "z"].iter().enumerate() {
+            let row: Vector3<f64> = self.errors.row(axis).transpose();
+            let constant = [self.constant[axis]];
+            file.comment(&format!(
+                "left, {} {name}: {} of u and {}",
+                self.sensor.name(),
+                yaml_list(&row),
+                yaml_list(&constant)
+            ));
         }
     }
 }
 
-/// A number that YAML 1.1 takes for one: with a point, and a sign in its exponent.
-pub(super) fn yaml_number(value: f64) -> String {
-    let text = format!("{:e}", value + 0.0);
-    let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
-    let point = if mantissa.contains('.') { "" } else { ".0" };
-    let sign = if exponent.starts_with('-') { "" } else { "+" };
-    format!("{mantissa}{point}e{sign}{exponent}")
-}
-
-/// Three numbers as a YAML list.
-pub(super) fn yaml_list<'a>(values: impl IntoIterator<Item = &'a f64>) -> String {
-    let values: Vec<String> = values.into_iter().map(|&v| yaml_number(v)).collect();
-    format!("[{}]", values.join(", "))
-}
-
-/// What to divide raw output by, in words.
-pub(super) fn divide(nominal: &PerSensor<[f64; 3]>) -> String {
-    let list = |sensor| {
-        let values: &[f64; 3] = nominal.get(sensor);
-        yaml_list(values)
-    };
-    format!(
-        "divide the raw output for that: gyros by {}, accelerometers by {}",
-        list(Sensor::Gyro),
-        list(Sensor::Accel)
-    )
+/// The rotation R and the upper triangular U with positive diagonal of `A = U R`.
+pub(super) fn upper(a: &Matrix3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
+    let reverse = Matrix3::new(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0);
+    let reversed = reverse * a * reverse;
+    let rotation = crate::calibration::result::frame::accelerometer_frame(&reversed);
+    let rotation = reverse * rotation * reverse;
+    let mut upper = a * rotation.transpose();
+    // Below the diagonal there is only rounding.
+    upper.fill_lower_triangle(0.0, 1);
+    (upper, rotation)
 }
 
 #[cfg(test)]
@@ -292,18 +355,30 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_floats_of_yaml_1_1_and_keep_every_bit() {
-        for (value, text) in [
-            (0.0, "0.0e+0"),
-            (-0.0, "0.0e+0"),
-            (2e6, "2.0e+6"),
-            (-1.5e-7, "-1.5e-7"),
-            (0.1, "1.0e-1"),
-        ] {
-            assert_eq!(yaml_number(value), text);
-        }
-        for value in [std::f64::consts::PI, 1e-300 / 3.0, 2e300 / 7.0] {
-            assert_eq!(yaml_number(value).parse(), Ok(value));
-        }
+    fn what_is_left_is_as_long_as_the_longest_error_vector_of_any_input() {
+        // Each row is 1e-3 long, yet along (1, 1, 1)/√3 all three err by it at once.
+        let errors = Matrix3::repeat(1e-3 / 3f64.sqrt());
+        let left = Remainder {
+            sensor: Sensor::Accel,
+            errors,
+            constant: Vector3::zeros(),
+        };
+        let input = Vector3::repeat(1.0 / 3f64.sqrt());
+        assert!(((errors * input).norm() - 1.732e-3).abs() < 1e-6);
+        let words = left.words();
+        assert!(
+            words.contains("together 1.732 mg at 1 g in any direction"),
+            "{words}"
+        );
+    }
+
+    #[test]
+    fn a_matrix_is_its_upper_triangle_times_a_rotation() {
+        let a = Matrix3::new(1.1, 0.2, -0.3, 0.1, 0.9, 0.05, -0.2, 0.3, 1.2);
+        let (u, r) = upper(&a);
+        assert!((u * r - a).amax() < 1e-14);
+        assert!((r * r.transpose() - Matrix3::identity()).amax() < 1e-14);
+        assert!(r.determinant() > 0.0 && u.diagonal().min() > 0.0);
+        assert_eq!([u[(1, 0)], u[(2, 0)], u[(2, 1)]], [0.0; 3]);
     }
 }

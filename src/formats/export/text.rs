@@ -3,7 +3,8 @@
 use nalgebra::Vector3;
 
 use super::Exported;
-use super::source::{Document, Source};
+use super::document::Document;
+use super::source::Source;
 use crate::calibration::result::TriadRecord;
 use crate::imu::{AXES, Sensor, Term};
 

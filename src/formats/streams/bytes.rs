@@ -43,6 +43,12 @@ impl Input {
         })
     }
 
+    /// The file itself, at any place.
+    #[cfg_attr(not(feature = "npy"), allow(dead_code))]
+    pub fn into_source(self) -> Box<dyn Source> {
+        self.source
+    }
+
     /// Bytes read or passed over so far.
     pub fn offset(&self) -> u64 {
         self.offset
@@ -111,6 +117,7 @@ pub(super) struct Slice<'a> {
     base: u64,
     /// … or all of them, where they were packed.
     is_packed: bool,
+    pub big_endian: bool,
 }
 
 impl<'a> Slice<'a> {
@@ -120,6 +127,7 @@ impl<'a> Slice<'a> {
             at: 0,
             base,
             is_packed: false,
+            big_endian: false,
         }
     }
 
@@ -131,13 +139,18 @@ impl<'a> Slice<'a> {
         }
     }
 
+    /// The same bytes, whole numbers in them in this order.
+    pub fn in_order(self, big_endian: bool) -> Self {
+        Self { big_endian, ..self }
+    }
+
     /// Some of these bytes, which are at this place.
     pub fn of(&self, bytes: &'a [u8], place: u64) -> Self {
         Self {
             bytes,
             at: 0,
             base: place,
-            is_packed: self.is_packed,
+            ..*self
         }
     }
 
@@ -172,13 +185,14 @@ impl<'a> Slice<'a> {
         Ok(bytes)
     }
 
-    /// A whole number, little-endian, of at most eight bytes.
+    /// A whole number of at most eight bytes.
     pub fn whole(&mut self, size: usize, what: &str) -> Result<u64, Broken> {
         let bytes = self.take(size, what)?;
-        Ok(bytes
-            .iter()
-            .rev()
-            .fold(0, |whole, &byte| whole << 8 | u64::from(byte)))
+        let add = |whole: u64, &byte: &u8| whole << 8 | u64::from(byte);
+        Ok(match self.big_endian {
+            true => bytes.iter().fold(0, add),
+            false => bytes.iter().rev().fold(0, add),
+        })
     }
 
     /// The length of what follows.

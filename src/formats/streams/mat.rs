@@ -51,27 +51,19 @@ pub(super) fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
     while input.left() > 0 {
         let offset = input.offset();
         input.take(8, &mut bytes, "an element's type and size")?;
-        let mut tag = Bytes::new(&bytes, offset, big_endian);
+        let mut tag = Slice::new(&bytes, offset).in_order(big_endian);
         let (kind, size) = (tag.whole(4, "a type")?, tag.whole(4, "a size")?);
         input.take(size, &mut bytes, "an element")?;
-        match kind {
-            MATRIX => matrix(
-                Bytes::new(&bytes, offset + 8, big_endian),
-                "",
-                0,
-                &mut arrays,
-            )?,
+        let unpacked;
+        let content = match kind {
+            MATRIX => Slice::new(&bytes, offset + 8),
             COMPRESSED => {
-                let unpacked = unpack(&bytes, offset, big_endian)?;
-                matrix(
-                    Bytes::packed(&unpacked, offset, big_endian),
-                    "",
-                    0,
-                    &mut arrays,
-                )?;
+                unpacked = unpack(&bytes, offset, big_endian)?;
+                Slice::packed(&unpacked, offset)
             }
-            _ => {}
-        }
+            _ => continue,
+        };
+        matrix(content.in_order(big_endian), "", 0, &mut arrays)?;
     }
     Ok(Box::new(Arrays::new(arrays)))
 }
@@ -82,7 +74,7 @@ fn unpack(packed: &[u8], offset: u64, big_endian: bool) -> Result<Vec<u8>, Broke
     let mut decoder = ZlibDecoder::new(packed);
     let mut tag = [0; 8];
     decoder.read_exact(&mut tag).map_err(broken)?;
-    let mut tag = Bytes::new(&tag, offset, big_endian);
+    let mut tag = Slice::new(&tag, offset).in_order(big_endian);
     let (kind, size) = (tag.whole(4, "a type")?, tag.whole(4, "a size")?);
     if kind != MATRIX {
         return Ok(Vec::new());
@@ -111,78 +103,43 @@ fn unpack(packed: &[u8], offset: u64, big_endian: bool) -> Result<Vec<u8>, Broke
     Ok(unpacked)
 }
 
-/// Elements in memory.
-#[derive(Clone, Copy)]
-struct Bytes<'a> {
-    slice: Slice<'a>,
-    big_endian: bool,
-}
-
 /// An element's type and content.
 struct Element<'a> {
     kind: u64,
     bytes: &'a [u8],
     offset: u64,
+    big_endian: bool,
 }
 
-impl<'a> Bytes<'a> {
-    fn new(bytes: &'a [u8], offset: u64, big_endian: bool) -> Self {
-        Self {
-            slice: Slice::new(bytes, offset),
-            big_endian,
-        }
-    }
-
-    fn packed(bytes: &'a [u8], place: u64, big_endian: bool) -> Self {
-        Self {
-            slice: Slice::packed(bytes, place),
-            big_endian,
-        }
-    }
-
-    fn whole(&mut self, size: usize, what: &str) -> Result<u64, Broken> {
-        let bytes = self.slice.take(size, what)?;
-        let add = |whole: u64, byte: &u8| whole << 8 | u64::from(*byte);
-        Ok(match self.big_endian {
-            true => bytes.iter().fold(0, add),
-            false => bytes.iter().rev().fold(0, add),
-        })
-    }
-
-    fn element(&mut self, what: &str) -> Result<Element<'a>, Broken> {
-        let first = self.whole(4, what)?;
+impl<'a> Element<'a> {
+    fn next(slice: &mut Slice<'a>, what: &str) -> Result<Self, Broken> {
+        let first = slice.whole(4, what)?;
         // A short one has its size in the upper half of its type, and four bytes.
-        if first >> 16 != 0 {
-            let offset = self.slice.offset();
-            let (kind, size) = (first & 0xffff, (first >> 16) as usize);
-            let all = self.slice.take(4, what)?;
-            let bytes = all.get(..size).ok_or_else(|| {
-                Broken::new(
-                    offset,
-                    format_args!("a short element of {size} bytes"),
-                    "at most 4",
-                )
-            })?;
-            return Ok(Element {
-                kind,
-                bytes,
-                offset,
-            });
-        }
-        let size = self.whole(4, what)? as usize;
-        let offset = self.slice.offset();
-        let bytes = self.slice.take(size, what)?;
-        let padding = (8 - size % 8) % 8;
-        self.slice.take(padding.min(self.slice.left()), what)?;
-        Ok(Element {
-            kind: first,
+        let is_short = first >> 16 != 0;
+        let (kind, size) = match is_short {
+            true => (first & 0xffff, (first >> 16) as usize),
+            false => (first, slice.whole(4, what)? as usize),
+        };
+        let offset = slice.offset();
+        let whole = match is_short {
+            true => 4,
+            false => size
+                .checked_next_multiple_of(8)
+                .unwrap_or(size)
+                .clamp(size, slice.left().max(size)),
+        };
+        let bytes = slice.take(whole, what)?.get(..size).ok_or_else(|| {
+            let found = format_args!("a short element of {size} bytes");
+            Broken::new(offset, found, "at most 4")
+        })?;
+        Ok(Self {
+            kind,
             bytes,
             offset,
+            big_endian: slice.big_endian,
         })
     }
-}
 
-impl Element<'_> {
     fn kind(&self) -> Option<Kind> {
         Some(match self.kind {
             1 => Kind::I8,
@@ -199,38 +156,40 @@ impl Element<'_> {
         })
     }
 
-    fn number(&self, kind: Kind, index: usize, big_endian: bool) -> Option<f64> {
+    fn number(&self, kind: Kind, index: usize) -> Option<f64> {
         let at = index.checked_mul(kind.size())?;
-        kind.number(self.bytes.get(at..)?, big_endian)
+        kind.number(self.bytes.get(at..)?, self.big_endian)
     }
 
-    fn text(&self) -> String {
-        let end = self.bytes.iter().position(|&byte| byte == 0);
-        String::from_utf8_lossy(&self.bytes[..end.unwrap_or(self.bytes.len())]).into_owned()
+    /// A number from zero on; zero if there is none.
+    fn count(&self, index: usize) -> usize {
+        self.number(Kind::I32, index).unwrap_or(0.0).max(0.0) as usize
     }
+}
+
+/// The text before the first zero.
+fn text(bytes: &[u8]) -> String {
+    let text = bytes.split(|&byte| byte == 0).next().unwrap_or_default();
+    String::from_utf8_lossy(text).into_owned()
 }
 
 /// Adds the columns of an array, those of the fields of a structure by their names.
 fn matrix(
-    mut bytes: Bytes,
+    mut slice: Slice,
     name: &str,
     depth: usize,
     arrays: &mut Vec<Array>,
 ) -> Result<(), Broken> {
-    if bytes.slice.left() == 0 {
+    if slice.left() == 0 {
         return Ok(());
     }
-    let big_endian = bytes.big_endian;
-    let flags = bytes.element("an array's kind")?;
-    let class = Kind::U32.number(flags.bytes, big_endian).unwrap_or(0.0) as u32 as u8;
-    let dimensions = bytes.element("an array's size")?;
-    let count = dimensions.bytes.len() / 4;
-    let size = |k| {
-        let size = dimensions.number(Kind::I32, k, big_endian).unwrap_or(0.0);
-        size.max(0.0) as usize
-    };
-    let shape: Vec<usize> = (0..count).map(size).collect();
-    let own = bytes.element("an array's name")?.text();
+    let flags = Element::next(&mut slice, "an array's kind")?;
+    let class = flags.number(Kind::U32, 0).unwrap_or(0.0) as u32 as u8;
+    let dimensions = Element::next(&mut slice, "an array's size")?;
+    let shape: Vec<usize> = (0..dimensions.bytes.len() / 4)
+        .map(|k| dimensions.count(k))
+        .collect();
+    let own = text(Element::next(&mut slice, "an array's name")?.bytes);
     let name = match (name.is_empty(), own.is_empty()) {
         (true, _) => own,
         (false, true) => name.to_owned(),
@@ -238,44 +197,44 @@ fn matrix(
     };
     match class {
         STRUCT if shape.iter().all(|&size| size == 1) && depth < DEEPEST => {
-            let length = bytes.element("the length of names")?;
-            let length = length.number(Kind::I32, 0, big_endian).unwrap_or(0.0) as usize;
-            let names = bytes.element("names of fields")?;
-            let broken = || {
-                Broken::new(
-                    names.offset,
-                    format_args!("names of {length} bytes"),
-                    "some",
-                )
-            };
-            let names = names
-                .bytes
-                .chunks(Some(length).filter(|&l| l > 0).ok_or_else(broken)?);
-            for field in names {
-                let end = field
-                    .iter()
-                    .position(|&byte| byte == 0)
-                    .unwrap_or(field.len());
-                let field = format!("{name}.{}", String::from_utf8_lossy(&field[..end]));
-                let element = bytes.element("a field")?;
-                if element.kind == MATRIX {
-                    let content = Bytes {
-                        slice: bytes.slice.of(element.bytes, element.offset),
-                        big_endian,
-                    };
-                    matrix(content, &field, depth + 1, arrays)?;
-                }
-            }
+            structure(&mut slice, &name, depth, arrays)
         }
         // Numbers, from double to uint64.
         6..=15 => {
-            let data = bytes.element("numbers")?;
+            let data = Element::next(&mut slice, "numbers")?;
             if let Some(kind) = data.kind() {
-                let number = |index| data.number(kind, index, big_endian);
+                let number = |index| data.number(kind, index);
                 arrays.extend(columns(&name, &shape, true, data.offset, number)?);
             }
+            Ok(())
         }
-        _ => {}
+        _ => Ok(()),
+    }
+}
+
+/// Adds the arrays that are fields of a structure.
+fn structure(
+    slice: &mut Slice,
+    name: &str,
+    depth: usize,
+    arrays: &mut Vec<Array>,
+) -> Result<(), Broken> {
+    let length = Element::next(slice, "the length of names")?.count(0);
+    let names = Element::next(slice, "names of fields")?;
+    if length == 0 {
+        return Err(Broken::new(names.offset, "names of 0 bytes", "some"));
+    }
+    for field in names.bytes.chunks(length) {
+        let element = Element::next(slice, "a field")?;
+        if element.kind == MATRIX {
+            let content = slice.of(element.bytes, element.offset);
+            matrix(
+                content,
+                &format!("{name}.{}", text(field)),
+                depth + 1,
+                arrays,
+            )?;
+        }
     }
     Ok(())
 }

@@ -6,10 +6,10 @@
 use std::collections::BTreeMap;
 
 use super::bytes::{Broken, Input, Slice};
-use super::channel::Reader;
-use super::packed::unpack;
-use super::ros::Encoding;
-use super::{Log, Stream, json, protobuf};
+use super::messages::packed::unpack;
+use super::messages::ros::Encoding;
+use super::messages::{Reader, Topics, json, protobuf};
+use super::{Log, Stream};
 
 const MAGIC: u64 = 8;
 const SCHEMA: u8 = 3;
@@ -23,9 +23,7 @@ pub(super) fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
     Ok(Box::new(Mcap {
         input,
         schemas: BTreeMap::new(),
-        channels: BTreeMap::new(),
-        streams: Vec::new(),
-        readers: Vec::new(),
+        topics: Topics::default(),
         chunk: Vec::new(),
         at: 0,
         record: Vec::new(),
@@ -44,10 +42,7 @@ struct Schema {
 struct Mcap {
     input: Input,
     schemas: BTreeMap<u16, Schema>,
-    /// The stream of each channel.
-    channels: BTreeMap<u16, usize>,
-    streams: Vec<Stream>,
-    readers: Vec<Reader>,
+    topics: Topics,
     /// Records of the chunk that is read, and how far it is.
     chunk: Vec<u8>,
     at: usize,
@@ -64,7 +59,7 @@ const BEFORE_DATA: usize = 22;
 
 impl Log for Mcap {
     fn streams(&self) -> &[Stream] {
-        &self.streams
+        &self.topics.streams
     }
 
     fn advance(&mut self) -> Result<Option<usize>, Broken> {
@@ -90,7 +85,7 @@ impl Log for Mcap {
             return Ok(());
         };
         let data = self.record.get(BEFORE_DATA..).unwrap_or_default();
-        self.readers[stream].values(time, data, self.offset, row)
+        self.topics.readers[stream].values(time, data, self.offset, row)
     }
 
     fn offset(&self) -> u64 {
@@ -188,24 +183,14 @@ impl Mcap {
         let topic = record.text(length, "a topic")?;
         let length = record.length(4, "a length")?;
         let encoding = record.text(length, "an encoding of messages")?;
-        if self.channels.contains_key(&number) {
-            return Ok(());
-        }
-        let reader = match self.schemas.get(&schema) {
+        let reader = || match self.schemas.get(&schema) {
             Some(schema) => reader(&encoding, schema),
             None if encoding == "json" => Reader::Json(Vec::new()),
             None => Reader::Unknown(format!(
                 "messages of encoding `{encoding}` without a schema are not read"
             )),
         };
-        let stream = self.streams.iter().position(|stream| stream.name == topic);
-        // The same topic again, as when a recorder starts anew.
-        let stream = stream.unwrap_or_else(|| {
-            self.streams.push(reader.stream(&topic));
-            self.readers.push(reader);
-            self.streams.len() - 1
-        });
-        self.channels.insert(number, stream);
+        self.topics.add(number.into(), &topic, reader);
         Ok(())
     }
 
@@ -215,19 +200,15 @@ impl Mcap {
         record.take(4, "a message's number")?;
         let time = record.whole(8, "a time")?;
         record.take(8, "a time")?;
-        let Some(&stream) = self.channels.get(&channel) else {
-            return Err(Broken::new(
-                self.offset,
-                format_args!("a message of channel {channel}"),
-                "a channel that was described before it",
-            ));
-        };
-        if let Reader::Json(columns) = &mut self.readers[stream]
+        let stream = self.topics.stream(channel.into(), self.offset)?;
+        let Topics {
+            streams, readers, ..
+        } = &mut self.topics;
+        if let Reader::Json(columns) = &mut readers[stream]
             && columns.is_empty()
         {
             *columns = json::columns(&self.record[BEFORE_DATA..], self.offset)?;
-            let name = self.streams[stream].name.clone();
-            self.streams[stream] = self.readers[stream].stream(&name);
+            streams[stream] = readers[stream].stream(&streams[stream].name);
         }
         self.current = Some((stream, time));
         Ok(Some(stream))

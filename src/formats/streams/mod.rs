@@ -7,29 +7,25 @@ mod arrays;
 // A build that reads no logs only tells what they are.
 #[cfg_attr(not(feature = "logs"), allow(dead_code))]
 mod bytes;
-#[cfg(any(feature = "mcap", feature = "rosbag"))]
-mod channel;
 #[cfg(any(feature = "dataflash", feature = "ulog"))]
 mod corrections;
 #[cfg(feature = "dataflash")]
 mod dataflash;
-#[cfg(feature = "mcap")]
-mod json;
 #[cfg(feature = "mat")]
 mod mat;
 #[cfg(feature = "mcap")]
 mod mcap;
+#[cfg(any(feature = "mcap", feature = "rosbag"))]
+mod messages;
 #[cfg(feature = "npy")]
 mod npy;
-#[cfg(any(feature = "mcap", feature = "rosbag"))]
-mod packed;
-#[cfg(feature = "mcap")]
-mod protobuf;
-#[cfg(any(feature = "mcap", feature = "rosbag"))]
-mod ros;
 #[cfg(feature = "rosbag")]
 mod rosbag;
+#[cfg(feature = "rosbag")]
+mod rosbag2;
 mod rows;
+#[cfg(feature = "rosbag")]
+mod sqlite;
 #[cfg(feature = "ulog")]
 mod ulog;
 
@@ -109,7 +105,7 @@ macro_rules! reader {
     }};
 }
 
-fn formats() -> [Format; 7] {
+fn formats() -> [Format; 8] {
     [
         Format {
             name: "a PX4 ULog file",
@@ -140,6 +136,12 @@ fn formats() -> [Format; 7] {
             feature: "rosbag",
             begins: &[b"#ROSBAG V2.0\n"],
             open: reader!("rosbag", rosbag::open),
+        },
+        Format {
+            name: "a ROS 2 bag",
+            feature: "rosbag",
+            begins: &[b"SQLite format 3\0"],
+            open: reader!("rosbag", rosbag2::open),
         },
         Format {
             name: "a NumPy array",

@@ -3,12 +3,10 @@
 //! Source: wiki.ros.org/Bags/Format/2.0: a line of the version, then records of a head (fields `name=value`) and
 //! data; chunks hold connections and messages, packed.
 
-use std::collections::BTreeMap;
-
 use super::bytes::{Broken, Input, Slice};
-use super::channel::Reader;
-use super::packed::unpack;
-use super::ros::Encoding;
+use super::messages::packed::unpack;
+use super::messages::ros::Encoding;
+use super::messages::{Reader, Topics};
 use super::{Log, Stream};
 
 const FIRST_LINE: u64 = 13;
@@ -20,9 +18,7 @@ pub(super) fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
     input.skip(FIRST_LINE, "the first line")?;
     Ok(Box::new(Bag {
         input,
-        connections: BTreeMap::new(),
-        streams: Vec::new(),
-        readers: Vec::new(),
+        topics: Topics::default(),
         chunk: Vec::new(),
         at: 0,
         head: Vec::new(),
@@ -34,10 +30,7 @@ pub(super) fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
 
 struct Bag {
     input: Input,
-    /// The stream of each connection.
-    connections: BTreeMap<u32, usize>,
-    streams: Vec<Stream>,
-    readers: Vec<Reader>,
+    topics: Topics,
     /// Records of the chunk that is read, and how far it is.
     chunk: Vec<u8>,
     at: usize,
@@ -51,7 +44,7 @@ struct Bag {
 
 impl Log for Bag {
     fn streams(&self) -> &[Stream] {
-        &self.streams
+        &self.topics.streams
     }
 
     fn advance(&mut self) -> Result<Option<usize>, Broken> {
@@ -63,13 +56,7 @@ impl Log for Bag {
                     let connection = head.whole("conn", 4)? as u32;
                     let time = head.whole("time", 8)?;
                     let (seconds, nanoseconds) = (time & 0xffff_ffff, time >> 32);
-                    let Some(&stream) = self.connections.get(&connection) else {
-                        return Err(Broken::new(
-                            self.offset,
-                            format_args!("a message of connection {connection}"),
-                            "a connection that was described before it",
-                        ));
-                    };
+                    let stream = self.topics.stream(connection, self.offset)?;
                     self.current = Some((stream, seconds * 1_000_000_000 + nanoseconds));
                     return Ok(Some(stream));
                 }
@@ -98,7 +85,7 @@ impl Log for Bag {
         let Some((stream, time)) = self.current else {
             return Ok(());
         };
-        self.readers[stream].values(time, &self.data, self.offset, row)
+        self.topics.readers[stream].values(time, &self.data, self.offset, row)
     }
 
     fn offset(&self) -> u64 {
@@ -145,18 +132,8 @@ impl Bag {
             described.field("type"),
             described.field("message_definition"),
         );
-        if self.connections.contains_key(&number) {
-            return Ok(());
-        }
-        let reader = Reader::of_ros(&text(kind), &text(definition), Encoding::Ros1);
-        let stream = self.streams.iter().position(|stream| stream.name == topic);
-        // Several programs may publish on one topic.
-        let stream = stream.unwrap_or_else(|| {
-            self.streams.push(reader.stream(&topic));
-            self.readers.push(reader);
-            self.streams.len() - 1
-        });
-        self.connections.insert(number, stream);
+        let reader = || Reader::of_ros(&text(kind), &text(definition), Encoding::Ros1);
+        self.topics.add(number, &topic, reader);
         Ok(())
     }
 }

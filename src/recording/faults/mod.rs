@@ -1,13 +1,11 @@
 //! What is wrong with a log's rows, and what was done about it.
 
 mod chance;
-mod clipped;
-mod held;
+mod ends;
 mod impossible;
 mod interpolation;
 mod notes;
 mod repair;
-mod saturated;
 mod slower;
 mod sound;
 mod spikes;
@@ -20,8 +18,7 @@ use rayon::prelude::*;
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::{ColumnFacts, ImuSamples};
 use chance::Limit;
-use clipped::clipped;
-use held::held;
+use ends::Ends;
 pub(crate) use notes::notes;
 pub(crate) use repair::{Repaired, Rows};
 pub use slower::Slower;
@@ -179,28 +176,18 @@ fn find(
         &steps,
         limit,
     );
-    let repeats: [stuck::Column; 6] = std::array::from_fn(|k| stuck::Column {
+    let judged: [stuck::Column; 6] = std::array::from_fn(|k| stuck::Column {
         values: &columns[k],
+        facts: &facts[k],
         step: steps[k],
         pulses,
+        full_scale: full_scale[k],
     });
     let of_column = |column: usize| {
-        let (values, facts) = (&columns[column], &facts[column]);
         let spikes = &spikes[column];
-        let stuck = repeats[column].stuck(limit);
-        let triad = std::array::from_fn(|axis| &repeats[column - column % 3 + axis]);
-        let range = saturated::Column {
-            values,
-            smallest: facts.smallest,
-            largest: facts.largest,
-            step: facts.step,
-            full_scale: full_scale[column],
-            spikes,
-            stuck: &stuck,
-            held: held(triad, column % 3, limit),
-            clipped: clipped(triad, column % 3, limit),
-        };
-        let saturated = range.saturated();
+        let stuck = judged[column].stuck(limit);
+        let triad = std::array::from_fn(|axis| &judged[column - column % 3 + axis]);
+        let saturated = Ends::of(triad, column % 3, spikes, &stuck, limit).saturated();
         // The row before a run has its value.
         let free = |rows: &Range<usize>| {
             !saturated

@@ -6,15 +6,19 @@ use nalgebra::{DMatrix, DVector};
 use statrs::function::erf::erf;
 
 use super::chance::Limit;
+use crate::recording::ColumnFacts;
 
-/// What repeats of a column are judged by.
+/// What a column is judged by.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Column<'a> {
     pub values: &'a [f64],
+    pub facts: &'a ColumnFacts,
     /// What values differ by at least; zero if they are all the same.
     pub step: f64,
     /// Whether values are whole pulses, what is left over being carried into the next.
     pub pulses: bool,
+    /// What the instrument's data sheet says.
+    pub full_scale: Option<f64>,
 }
 
 /// Rows in which noise is measured at one level.
@@ -70,6 +74,16 @@ pub(super) fn runs(column: &[f64]) -> Vec<Range<usize>> {
 }
 
 impl Column<'_> {
+    /// The smallest value and the largest.
+    pub fn extremes(&self) -> [f64; 2] {
+        [self.facts.smallest, self.facts.largest]
+    }
+
+    /// The probability that noise of this variance, steps², repeats a value in the middle of its step.
+    pub fn repeats_at_best(variance: f64) -> f64 {
+        erf((8.0 * variance).sqrt().recip())
+    }
+
     /// Rows in which noise is measured.
     pub fn blocks(&self) -> impl Iterator<Item = &[f64]> {
         self.values.chunks_exact(BLOCK)
@@ -82,7 +96,7 @@ impl Column<'_> {
     /// of it (Anderson's inequality). Noise that is correlated stays longer; it shows in how often
     /// repeats are repeated.
     pub fn repeat_probability(&self, variance: f64) -> f64 {
-        let white = erf((8.0 * variance).sqrt().recip());
+        let white = Self::repeats_at_best(variance);
         // Pulses count an angle that walks: it stays between two edges of a step with the largest
         // eigenvalue of such a walk (Siegmund's correction of the edges: 0.5826 σ each).
         let walk = -0.5 * std::f64::consts::PI.powi(2) * variance

@@ -1,11 +1,10 @@
 //! The head of an array: a Python dictionary of its type, order and shape.
 
+use serde::Deserialize;
+
 use super::super::arrays::{Array, columns};
 use super::super::bytes::{Broken, Kind, Slice};
 use super::LONGEST_HEADER;
-
-/// Lists within lists: NumPy's types need three.
-const DEEPEST: usize = 8;
 
 pub(super) struct Header {
     /// Of each item of the array.
@@ -50,33 +49,18 @@ impl Header {
         let text = String::from_utf8_lossy(file.take(length, "the head")?);
         let wrong =
             |what: &str| Broken::new(begins, format_args!("the head `{}`", text.trim()), what);
-        let mut parser = Parser { text: text.trim() };
-        let head = parser
-            .value(0)
-            .ok_or_else(|| wrong("a Python dictionary"))?;
-        let entry = |name: &str| match &head {
-            Value::Dictionary(entries) => entries
-                .iter()
-                .find(|(key, _)| key == name)
-                .map(|(_, value)| value),
-            _ => None,
+        let head = format!("head = {}", as_toml(text.trim()));
+        let Ok(Document { head }) = toml::from_str(&head) else {
+            return Err(wrong(
+                "a Python dictionary of `descr`, `fortran_order` and `shape`",
+            ));
         };
-        let (Some(descr), Some(Value::Flag(order)), Some(Value::List(shape))) =
-            (entry("descr"), entry("fortran_order"), entry("shape"))
-        else {
-            return Err(wrong("`descr`, `fortran_order` and `shape`"));
-        };
-        let whole = |value: &Value| match value {
-            Value::Whole(size) => Some(*size),
-            _ => None,
-        };
-        let shape: Option<Vec<usize>> = shape.iter().map(whole).collect();
-        let (fields, size) = fields(descr).ok_or_else(|| wrong("a type of numbers"))?;
+        let (fields, size) = fields(&head.descr).ok_or_else(|| wrong("a type of numbers"))?;
         Ok(Self {
             fields,
             size,
-            first_is_fastest: *order,
-            shape: shape.ok_or_else(|| wrong("a shape of whole numbers"))?,
+            first_is_fastest: head.fortran_order,
+            shape: head.shape,
             begin: file.position(),
         })
     }
@@ -145,127 +129,86 @@ fn item_kind(text: &str) -> Option<(Option<(Kind, bool)>, usize)> {
 }
 
 /// The numbers of an item and its size in bytes.
-fn fields(descr: &Value) -> Option<(Vec<Field>, usize)> {
-    match descr {
-        Value::Text(text) => {
-            // The unit of a time follows in brackets.
-            let text = text.split_once('[').map_or(&**text, |(kind, _)| kind);
-            let (kind, size) = item_kind(text)?;
+fn fields(descr: &Descr) -> Option<(Vec<Field>, usize)> {
+    // The unit of a time follows in brackets.
+    let item = |text: &str| item_kind(text.split_once('[').map_or(text, |(kind, _)| kind));
+    let list = match descr {
+        Descr::One(text) => {
+            let (kind, size) = item(text)?;
             let field = Field {
                 name: None,
                 kind,
                 place: 0,
                 count: 1,
             };
-            Some((vec![field], size.max(1)))
+            return Some((vec![field], size.max(1)));
         }
-        Value::List(list) => {
-            let (mut fields, mut place) = (Vec::new(), 0usize);
-            for entry in list {
-                let Value::List(entry) = entry else {
-                    return None;
-                };
-                let (Value::Text(name), Value::Text(kind)) = (entry.first()?, entry.get(1)?) else {
-                    return None;
-                };
-                let kind = kind.split_once('[').map_or(&**kind, |(kind, _)| kind);
-                let (kind, size) = item_kind(kind)?;
-                let count = match entry.get(2) {
-                    None => 1,
-                    Some(Value::Whole(count)) => *count,
-                    Some(Value::List(shape)) => {
-                        shape.iter().try_fold(1usize, |all, size| match size {
-                            Value::Whole(size) => all.checked_mul(*size),
-                            _ => None,
-                        })?
-                    }
-                    Some(_) => return None,
-                };
-                fields.push(Field {
-                    name: Some(name.clone()),
-                    kind,
-                    place,
-                    count: if count > 64 { 0 } else { count },
-                });
-                place = place.checked_add(size.checked_mul(count)?)?;
-            }
-            Some((fields, place.max(1)))
-        }
-        _ => None,
+        Descr::Fields(list) => list,
+    };
+    let (mut fields, mut place) = (Vec::new(), 0usize);
+    for field in list {
+        let (name, kind, shape) = match field {
+            Named::Number(name, kind) => (name, kind, &[][..]),
+            Named::Array(name, kind, shape) => (name, kind, &shape[..]),
+        };
+        let (kind, size) = item(kind)?;
+        let mut sizes = shape.iter();
+        let count = sizes.try_fold(1usize, |all, size| all.checked_mul(*size))?;
+        fields.push(Field {
+            name: Some(name.clone()),
+            kind,
+            place,
+            count: if count > 64 { 0 } else { count },
+        });
+        place = place.checked_add(size.checked_mul(count)?)?;
     }
+    Some((fields, place.max(1)))
 }
 
-/// What a head is made of.
-enum Value {
-    Text(String),
-    Flag(bool),
-    Whole(usize),
-    /// Or a tuple.
-    List(Vec<Value>),
-    Dictionary(Vec<(String, Value)>),
+/// A head by the name that makes it a TOML document.
+#[derive(Deserialize)]
+struct Document {
+    head: Head,
 }
 
-struct Parser<'a> {
-    text: &'a str,
+#[derive(Deserialize)]
+struct Head {
+    descr: Descr,
+    fortran_order: bool,
+    shape: Vec<usize>,
 }
 
-impl Parser<'_> {
-    fn next(&mut self, mark: char) -> bool {
-        self.text = self.text.trim_start();
-        match self.text.strip_prefix(mark) {
-            Some(rest) => {
-                self.text = rest;
-                true
-            }
-            None => false,
-        }
-    }
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Descr {
+    One(String),
+    Fields(Vec<Named>),
+}
 
-    fn value(&mut self, depth: usize) -> Option<Value> {
-        if depth > DEEPEST {
-            return None;
+/// Name and type of a field, and its shape.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Named {
+    Number(String, String),
+    Array(String, String, Vec<usize>),
+}
+
+/// A Python dictionary as TOML has it, which has other brackets, colons and words for truth.
+fn as_toml(text: &str) -> String {
+    let mut quote = None;
+    let outside = |c: char| match c {
+        '(' => '[',
+        ')' => ']',
+        ':' => '=',
+        other => other.to_ascii_lowercase(),
+    };
+    let letter = |c: char| {
+        match quote {
+            Some(open) if open == c => quote = None,
+            None if matches!(c, '\'' | '"') => quote = Some(c),
+            _ => (),
         }
-        self.text = self.text.trim_start();
-        for (word, flag) in [("True", true), ("False", false)] {
-            if let Some(rest) = self.text.strip_prefix(word) {
-                self.text = rest;
-                return Some(Value::Flag(flag));
-            }
-        }
-        for (open, close) in [('[', ']'), ('(', ')')] {
-            if self.next(open) {
-                let mut list = Vec::new();
-                while !self.next(close) {
-                    list.push(self.value(depth + 1)?);
-                    self.next(',');
-                }
-                return Some(Value::List(list));
-            }
-        }
-        if self.next('{') {
-            let mut entries = Vec::new();
-            while !self.next('}') {
-                let Value::Text(key) = self.value(depth + 1)? else {
-                    return None;
-                };
-                if !self.next(':') {
-                    return None;
-                }
-                entries.push((key, self.value(depth + 1)?));
-                self.next(',');
-            }
-            return Some(Value::Dictionary(entries));
-        }
-        for quote in ['\'', '"'] {
-            if self.next(quote) {
-                let (text, rest) = self.text.split_once(quote)?;
-                self.text = rest;
-                return Some(Value::Text(text.to_owned()));
-            }
-        }
-        let end = self.text.find(|c: char| !c.is_ascii_digit());
-        let (number, rest) = self.text.split_at(end.unwrap_or(self.text.len()));
-        self.text = rest.strip_prefix('L').unwrap_or(rest);
-        number.parse().ok().map(Value::Whole)
-    }
+        if quote.is_some() { c } else { outside(c) }
+    };
+    text.chars().map(letter).collect()
 }

@@ -80,6 +80,12 @@ fn fixtures() -> Vec<Fixture> {
         ("/imu", write::bag(true), ros("header.stamp"), none),
         (
             "/imu",
+            include_bytes!("bag.db3").to_vec(),
+            ros("header.stamp"),
+            none,
+        ),
+        (
+            "/imu",
             write::mcap(Messages::Ros1, false),
             ros("header.stamp"),
             none,

@@ -139,9 +139,12 @@ pub fn npz(deflated: bool) -> Vec<u8> {
             }
             false => content.clone(),
         };
+        let mut sum = flate2::Crc::new();
+        sum.update(content);
         let head = [
             &[20, 0, 0, 0, if deflated { 8 } else { 0 }, 0][..],
-            &[0; 8],
+            &[0; 4],
+            &sum.sum().to_le_bytes(),
             &(packed.len() as u32).to_le_bytes(),
             &(content.len() as u32).to_le_bytes(),
             &(name.len() as u16).to_le_bytes(),
@@ -371,16 +374,30 @@ fn descriptors() -> Vec<u8> {
         of("count", 4, 17, ""),
     ]
     .concat();
-    field(
-        1,
-        &[
-            field(1, b"imu.proto"),
-            field(2, b"lab"),
-            field(4, &vector),
-            field(4, &imu),
-        ]
-        .concat(),
-    )
+    let timestamp = [
+        field(1, b"Timestamp"),
+        of("seconds", 1, 3, ""),
+        of("nanos", 2, 5, ""),
+    ]
+    .concat();
+    let name = b"google/protobuf/timestamp.proto";
+    let of_time = [
+        field(1, name),
+        field(2, b"google.protobuf"),
+        field(4, &timestamp),
+        field(12, b"proto3"),
+    ]
+    .concat();
+    let of_imu = [
+        field(1, b"imu.proto"),
+        field(2, b"lab"),
+        field(3, name),
+        field(4, &vector),
+        field(4, &imu),
+        field(12, b"proto3"),
+    ]
+    .concat();
+    [field(1, &of_time), field(1, &of_imu)].concat()
 }
 
 fn protobuf(k: usize) -> Vec<u8> {

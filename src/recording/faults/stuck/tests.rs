@@ -34,8 +34,10 @@ fn pulses(values: &[f64]) -> Vec<f64> {
 fn find(values: &[f64], pulses: bool) -> Vec<Range<usize>> {
     let column = Column {
         values,
+        facts: &ColumnFacts::of("", values, 1.0),
         step: 1.0,
         pulses,
+        full_scale: None,
     };
     column.stuck(Limit::of_rows(values.len()))
 }

@@ -1,0 +1,143 @@
+//! What tells one input from another: SHA-256 of bytes and of files.
+
+use std::ffi::OsStr;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::formats::small_file;
+
+/// What a run.toml or a campaign.toml names beside it; neither need be right.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct Inputs {
+    imu: Named,
+    turntable: Named,
+    segments: Named,
+    recording: Vec<Named>,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct Named {
+    file: Option<String>,
+    run: Option<String>,
+}
+
+impl Inputs {
+    fn read(path: &Path) -> Self {
+        let text = small_file::text(path).unwrap_or_default();
+        toml::from_str(&text).unwrap_or_default()
+    }
+}
+
+/// SHA-256 of a value as JSON, in hexadecimal digits.
+pub fn digest_of(value: &impl Serialize) -> String {
+    // What cannot be written as JSON, a map without names, is in none of the values that come here.
+    let text = serde_json::to_vec(value).unwrap_or_default();
+    hexadecimal(&Sha256::digest(text))
+}
+
+/// SHA-256 of some bytes.
+pub fn digest_of_bytes(bytes: &[u8]) -> String {
+    hexadecimal(&Sha256::digest(bytes))
+}
+
+fn hexadecimal(digest: &[u8]) -> String {
+    digest.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn digest_of_file(path: &Path) -> io::Result<String> {
+    let mut file = File::open(path)?;
+    let mut hash = Sha256::new();
+    let mut buffer = vec![0; 1 << 16];
+    loop {
+        match file.read(&mut buffer)? {
+            0 => return Ok(hexadecimal(&hash.finalize())),
+            count => hash.update(&buffer[..count]),
+        }
+    }
+}
+
+/// The files of a run, as its run.toml names them, each with its digest, or with what the system says
+/// where it cannot be read. The run.toml comes first; the others are those that it names.
+///
+/// Of a campaign its file, then those of each recording, in the order of their paths.
+pub fn input_digests(run: &Path) -> Vec<(String, String)> {
+    let recordings = Inputs::read(run).recording.into_iter();
+    let mut recordings: Vec<String> = recordings.filter_map(|named| named.run).collect();
+    if recordings.is_empty() {
+        return digests_of_run(run);
+    }
+    recordings.sort();
+    let directory = run.parent().unwrap_or(Path::new(""));
+    let mut all = vec![("campaign.toml".to_owned(), digest_or_error(run))];
+    for recording in recordings {
+        let folder = Path::new(&recording).parent().unwrap_or(Path::new(""));
+        let of_recording = digests_of_run(&directory.join(&recording)).into_iter();
+        all.extend(
+            of_recording.map(|(name, digest)| (folder.join(name).display().to_string(), digest)),
+        );
+    }
+    all
+}
+
+/// The digest of a file, or what the system says where it cannot be read.
+fn digest_or_error(path: &Path) -> String {
+    digest_of_file(path).unwrap_or_else(|error| error.kind().to_string())
+}
+
+fn digests_of_run(run: &Path) -> Vec<(String, String)> {
+    let name = match run.extension() == Some(OsStr::new("toml")) {
+        true => "run.toml".into(),
+        false => run.file_name().unwrap_or_default().to_string_lossy(),
+    };
+    let mut all = vec![(name.into_owned(), digest_or_error(run))];
+    let directory = run.parent().unwrap_or(Path::new(""));
+    let Inputs {
+        imu,
+        turntable,
+        segments,
+        ..
+    } = Inputs::read(run);
+    let files = [imu, turntable, segments].into_iter();
+    all.extend(files.filter_map(|named| named.file).map(|file| {
+        let digest = digest_or_error(&directory.join(&file));
+        (file, digest)
+    }));
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_digest_is_sha_256() {
+        // FIPS 180-4, the example "abc".
+        assert_eq!(
+            digest_of_bytes(b"abc"),
+            "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+        );
+        assert_eq!(digest_of(&"abc"), digest_of_bytes(b"\"abc\""));
+    }
+
+    #[test]
+    fn inputs_are_all_files_of_a_run_and_change_with_each() {
+        let directory = tempfile::tempdir().unwrap();
+        let run = directory.path().join("run.toml");
+        let text = "[imu]\nfile = \"a.csv\"\n[turntable]\nfile = \"b.csv\"\n";
+        std::fs::write(&run, text).unwrap();
+        std::fs::write(directory.path().join("a.csv"), "1").unwrap();
+        let first = input_digests(&run);
+        let names: Vec<&str> = first.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["run.toml", "a.csv", "b.csv"]);
+        std::fs::write(directory.path().join("b.csv"), "2").unwrap();
+        let second = input_digests(&run);
+        assert_eq!(first[..2], second[..2]);
+        assert!(first[2] != second[2]);
+    }
+}

@@ -1,0 +1,271 @@
+//! `job.json`: which job a directory holds, or which part of it, so that parts of one job are told from parts of
+//! another and a job begun is known again.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::digest::digest_of;
+use crate::formats::error::{FileError, Place};
+use crate::formats::small_file;
+use crate::study::Shard;
+
+/// The name of the file in its directory.
+pub const JOB_FILE: &str = "job.json";
+/// The version of the format.
+const FORMAT: &str = "turncal-job/1";
+
+/// A job of many runs.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Job {
+    /// Always [`FORMAT`].
+    format: String,
+    /// What kind.
+    pub job: JobKind,
+    /// The program's version.
+    pub version: String,
+    /// The kind of processor and its features, by which sums are rounded.
+    pub processor: Vec<String>,
+    /// All that decides what a run gives.
+    pub options: Value,
+    /// How many runs there are in all.
+    pub runs: u64,
+    /// Names of the runs of a lot.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub names: Vec<String>,
+    /// What results are held against; does not change what a run gives.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub specification: Option<crate::lot::Specification>,
+}
+
+/// What kind of job.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum JobKind {
+    /// Calibrations of a lot.
+    Lot,
+    /// `study accuracy`.
+    StudyAccuracy,
+    /// `study experiment`.
+    StudyExperiment,
+}
+
+/// A job, or a part of it, as its directory says.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Part {
+    /// The job.
+    #[serde(flatten)]
+    pub job: Job,
+    /// SHA-256 of the job.
+    pub digest: String,
+    /// Which part; none if it is all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shard: Option<Shard>,
+    /// Numbers of the runs in it, from zero; none if it is all.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub holds: Vec<u64>,
+    /// SHA-256 of the file of results beside it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub results: Option<String>,
+}
+
+impl Job {
+    /// A job of this program on this processor.
+    pub fn new(job: JobKind, options: Value, runs: u64) -> Self {
+        Self {
+            format: FORMAT.to_owned(),
+            job,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            processor: processor(),
+            options,
+            runs,
+            names: Vec::new(),
+            specification: None,
+        }
+    }
+
+    /// SHA-256 of what decides what a run gives.
+    pub fn key(&self) -> String {
+        digest_of(&(&self.version, &self.processor, self.job, &self.options))
+    }
+
+    /// How two jobs differ in what decides what a run gives, in words; none if they do not.
+    pub fn difference(&self, other: &Self) -> Option<String> {
+        let differ = |what: &str, a: String, b: String| Some(format!("{what} {a} and {b}"));
+        if self.job != other.job {
+            return differ("jobs", kind(self.job), kind(other.job));
+        }
+        if self.version != other.version {
+            let (a, b) = (self.version.clone(), other.version.clone());
+            return differ("turncal", a, b);
+        }
+        if self.processor != other.processor {
+            let (a, b) = (self.processor.join(" "), other.processor.join(" "));
+            return differ("processors with the features", a, b);
+        }
+        (self.options != other.options).then(|| of_values("", &self.options, &other.options))
+    }
+}
+
+fn kind(of: JobKind) -> String {
+    match of {
+        JobKind::Lot => "`calibrate` of a lot".to_owned(),
+        JobKind::StudyAccuracy => "`study accuracy`".to_owned(),
+        JobKind::StudyExperiment => "`study experiment`".to_owned(),
+    }
+}
+
+/// The first value in which two differ.
+fn of_values(name: &str, a: &Value, b: &Value) -> String {
+    if let (Value::Object(a), Value::Object(b)) = (a, b) {
+        let names = a.keys().chain(b.keys().filter(|key| !a.contains_key(*key)));
+        for key in names {
+            let [one, other] = [a, b].map(|of| of.get(key).unwrap_or(&Value::Null));
+            if one != other {
+                let full = match name {
+                    "" => key.clone(),
+                    _ => format!("{name}.{key}"),
+                };
+                return of_values(&full, one, other);
+            }
+        }
+    }
+    let short = |value: &Value| {
+        let text = value.to_string();
+        match text.char_indices().nth(60) {
+            Some((end, _)) => format!("{}…", &text[..end]),
+            None => text,
+        }
+    };
+    format!("{name} = {} and {}", short(a), short(b))
+}
+
+impl Part {
+    /// All of a job, or the part of it that holds these runs.
+    pub fn new(job: Job, shard: Option<Shard>) -> Self {
+        Self {
+            digest: digest_of(&job),
+            holds: shard.map_or_else(Vec::new, |shard| shard.runs(job.runs)),
+            shard,
+            results: None,
+            job,
+        }
+    }
+
+    /// Numbers of its runs.
+    pub fn held(&self) -> Vec<u64> {
+        match self.shard {
+            Some(_) => self.holds.clone(),
+            None => Shard::WHOLE.runs(self.job.runs),
+        }
+    }
+
+    /// Reads the `job.json` of a directory.
+    pub fn read(directory: &Path) -> Result<Self, FileError> {
+        let path = directory.join(JOB_FILE);
+        let advice = "Give a directory that turncal wrote for a lot, or with --shard.";
+        let bytes = small_file::bytes(&path)
+            .map_err(|error| FileError::io(&path, "read the job", &error, advice))?;
+        let wrong = |found: String| {
+            let expected = format!("a job in the format {FORMAT}");
+            FileError::new(&path, Place::File, found, expected, advice)
+        };
+        let part: Self =
+            serde_json::from_slice(&bytes).map_err(|error| wrong(error.to_string()))?;
+        if part.job.format != FORMAT {
+            return Err(wrong(format!("format = {:?}", part.job.format)));
+        }
+        if part.digest != digest_of(&part.job) {
+            return Err(wrong("a job that its digest does not fit".to_owned()));
+        }
+        if let Some(shard) = part.shard
+            && part.holds != shard.runs(part.job.runs)
+        {
+            return Err(wrong(format!("other runs than those of part {shard}")));
+        }
+        Ok(part)
+    }
+
+    /// The bytes of its file.
+    pub fn to_json(&self) -> Vec<u8> {
+        // Names, numbers and texts are all there is: these can always be written.
+        let mut bytes = serde_json::to_vec_pretty(self).unwrap_or_default();
+        bytes.push(b'\n');
+        bytes
+    }
+}
+
+/// Architecture, system and the features by which numerical code is chosen while it runs.
+fn processor() -> Vec<String> {
+    let mut all = vec![
+        std::env::consts::ARCH.to_owned(),
+        std::env::consts::OS.to_owned(),
+    ];
+    all.extend(features().into_iter().map(str::to_owned));
+    all
+}
+
+#[cfg(target_arch = "x86_64")]
+fn features() -> Vec<&'static str> {
+    let all = [
+        ("sse4.1", std::is_x86_feature_detected!("sse4.1")),
+        ("avx", std::is_x86_feature_detected!("avx")),
+        ("avx2", std::is_x86_feature_detected!("avx2")),
+        ("fma", std::is_x86_feature_detected!("fma")),
+        ("avx512f", std::is_x86_feature_detected!("avx512f")),
+    ];
+    all.into_iter()
+        .filter(|(_, has)| *has)
+        .map(|(name, _)| name)
+        .collect()
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+fn features() -> Vec<&'static str> {
+    Vec::new()
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    fn job(options: Value) -> Job {
+        Job::new(JobKind::Lot, options, 5)
+    }
+
+    #[test]
+    fn jobs_differ_by_what_decides_a_run_and_say_by_what() {
+        let one = job(json!({"noise": "auto", "with": []}));
+        assert_eq!(one.difference(&one.clone()), None);
+        let mut other = job(json!({"noise": "stated", "with": []}));
+        let words = one.difference(&other).unwrap();
+        assert_eq!(words, "noise = \"auto\" and \"stated\"");
+        assert!(one.key() != other.key());
+        other.version = "0.0.0".to_owned();
+        assert!(one.difference(&other).unwrap().starts_with("turncal "));
+    }
+
+    #[test]
+    fn a_part_comes_back_from_its_file_and_a_changed_one_is_refused() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join(JOB_FILE);
+        let shard = "2/3".parse().unwrap();
+        let part = Part::new(job(json!({"step": 0.1 + 0.2})), Some(shard));
+        assert_eq!(part.held(), [1, 4]);
+        std::fs::write(&path, part.to_json()).unwrap();
+        assert_eq!(Part::read(directory.path()), Ok(part.clone()));
+        let text = String::from_utf8(part.to_json()).unwrap();
+        for (from, to) in [
+            ("\"runs\": 5", "\"runs\": 6"),
+            ("turncal-job/1", "turncal-job/2"),
+            ("\"index\": 2", "\"index\": 3"),
+        ] {
+            assert!(text.contains(from), "{text}");
+            std::fs::write(&path, text.replace(from, to)).unwrap();
+            assert!(Part::read(directory.path()).is_err(), "{to}");
+        }
+    }
+}

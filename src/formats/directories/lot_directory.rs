@@ -1,0 +1,310 @@
+//! The directory of a lot, which grows unit by unit: `job.json`, `units/NAME/` each whole or not there at all,
+//! and what is said of all of them last. Begun again by the same job, it goes on where it was.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File, TryLockError};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::digest::{digest_of, input_digests};
+use super::job::{JOB_FILE, Part};
+use super::whole::{WholeDirectory, clear_abandoned, list_anew, write_whole};
+use crate::calibration::result::Calibration;
+use crate::formats::error::{FileError, Place};
+use crate::formats::small_file;
+use crate::imu::PerSensor;
+use crate::lot::{Calibrated, Unit};
+use crate::noise::RestNoise;
+
+/// The directory of the units in that of the lot.
+const UNITS: &str = "units";
+/// What is known of a unit beside its calibration.
+const UNIT_FILE: &str = "unit.json";
+const CALIBRATION_FILE: &str = "calibration.json";
+/// The version of the format of [`UNIT_FILE`].
+const FORMAT: &str = "turncal-unit/1";
+
+/// A lot's directory, in which no other process works as long as this lives.
+pub struct LotDirectory {
+    root: PathBuf,
+    /// Locked; none where the file system has no locks.
+    _lock: Option<File>,
+}
+
+/// A unit's file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct UnitRecord {
+    format: String,
+    name: String,
+    /// SHA-256 of what decides the result: job, options, files.
+    key: String,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    meta: BTreeMap<String, String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    nominal: Option<PerSensor<[f64; 3]>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    noise_at_rest: Option<RestNoise>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    failure: Option<String>,
+}
+
+/// What decides the result of a unit: the job without its list of units, and the unit's files.
+pub fn unit_key(job: &str, run: &Path) -> String {
+    digest_of(&(job, input_digests(run)))
+}
+
+/// A unit in the directory of a part of its lot.
+pub fn read_part_unit(part: &Path, name: &str) -> Result<Unit, FileError> {
+    let directory = part.join(UNITS).join(name);
+    let record = UnitRecord::read(&directory)?;
+    read_unit(&directory, &record.key)
+}
+
+impl LotDirectory {
+    /// Begins a lot's directory, or goes on with one that the same job has begun; `waiting` is told if another
+    /// process has to finish first. With `force` everything begins anew.
+    ///
+    /// # Errors
+    /// [`FileError`] if it holds another job, another part of this one, units that are not of this lot, or
+    /// anything that turncal did not write where that would have to go.
+    pub fn open(
+        target: &Path,
+        part: &Part,
+        force: bool,
+        inputs: &[&Path],
+        waiting: &dyn Fn(),
+    ) -> Result<Self, FileError> {
+        let units = target.join(UNITS);
+        let begun = target.join(JOB_FILE).is_file();
+        if begun && !force {
+            let lock = lock(&units, waiting);
+            check_same(target, &Part::read(target)?, part)?;
+            check_units(&units, part)?;
+            write_whole(&target.join(JOB_FILE), &part.to_json(), true)?;
+            return Ok(Self {
+                root: target.to_owned(),
+                _lock: lock,
+            });
+        }
+        if begun {
+            drop(lock(&units, waiting));
+            clear_abandoned(&units);
+        }
+        let whole = WholeDirectory::create(target, force, inputs)?;
+        let refused = |error: std::io::Error| {
+            let advice = "Choose a directory that can be written.";
+            FileError::io(target, "write here", &error, advice)
+        };
+        fs::write(whole.path().join(JOB_FILE), part.to_json()).map_err(refused)?;
+        fs::create_dir(whole.path().join(UNITS)).map_err(refused)?;
+        whole.commit_growing(&[JOB_FILE, UNITS, &below_units()])?;
+        Ok(Self {
+            root: target.to_owned(),
+            _lock: lock(&units, waiting),
+        })
+    }
+
+    /// The unit as it was calibrated before, if nothing that decides its result has changed since.
+    pub fn kept(&self, name: &str, key: &str) -> Option<Unit> {
+        read_unit(&self.root.join(UNITS).join(name), key).ok()
+    }
+
+    /// Puts a unit in its place; `write` puts further files into its directory.
+    ///
+    /// # Errors
+    /// What `write` says, or [`FileError`] if the unit cannot be written.
+    pub fn put<E: From<FileError>>(
+        &self,
+        unit: &Unit,
+        key: &str,
+        write: impl FnOnce(&Path) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let target = self.root.join(UNITS).join(&unit.name);
+        let whole = WholeDirectory::create(&target, true, &[])?;
+        write_unit(unit, key, &whole.path())?;
+        write(&whole.path())?;
+        Ok(whole.commit()?)
+    }
+
+    /// Copies a unit from the directory of a part.
+    pub fn copy(&self, part: &Path, name: &str) -> Result<Unit, FileError> {
+        let from = part.join(UNITS).join(name);
+        let record = UnitRecord::read(&from)?;
+        let unit = read_unit(&from, &record.key)?;
+        if let Some(kept) = self.kept(name, &record.key) {
+            return Ok(kept);
+        }
+        let target = self.root.join(UNITS).join(name);
+        let whole = WholeDirectory::create(&target, true, &[])?;
+        copy_all(&from, &whole.path())
+            .map_err(|error| FileError::io(&from, "copy the unit", &error, "Make room."))?;
+        whole.commit()?;
+        Ok(unit)
+    }
+
+    /// Puts what is said of all units in place; files of an earlier time that are not among these go.
+    pub fn finish(&self, files: &[(String, String)]) -> Result<(), FileError> {
+        clear_abandoned(&self.root.join(UNITS));
+        let below = below_units();
+        let mut names = vec![JOB_FILE, UNITS, &below];
+        names.extend(files.iter().map(|(name, _)| name.as_str()));
+        list_anew(&self.root, &names)?;
+        for (name, text) in files {
+            write_whole(&self.root.join(name), text.as_bytes(), true)?;
+        }
+        Ok(())
+    }
+}
+
+fn below_units() -> String {
+    format!("{UNITS}/")
+}
+
+/// Waits until no other process works in the directory.
+fn lock(units: &Path, waiting: &dyn Fn()) -> Option<File> {
+    let file = File::open(units).ok()?;
+    match file.try_lock() {
+        Ok(()) => Some(file),
+        Err(TryLockError::WouldBlock) => {
+            waiting();
+            file.lock().is_ok().then_some(file)
+        }
+        Err(TryLockError::Error(_)) => None,
+    }
+}
+
+/// Refuses a directory that was begun for something else.
+fn check_same(target: &Path, found: &Part, expected: &Part) -> Result<(), FileError> {
+    let difference = found.job.difference(&expected.job).or_else(|| {
+        let words = |part: &Part| {
+            let shard = part.shard;
+            shard.map_or_else(
+                || "the whole lot".to_owned(),
+                |shard| format!("part {shard}"),
+            )
+        };
+        (found.shard != expected.shard).then(|| format!("{} and {}", words(found), words(expected)))
+    });
+    difference.map_or(Ok(()), |difference| {
+        Err(FileError::new(
+            target,
+            Place::File,
+            format_args!("a lot begun with other options: {difference}"),
+            "the job that was begun here, to go on with it",
+            "Give the same options, choose another directory, or give --force to begin anew.",
+        ))
+    })
+}
+
+/// Refuses a directory with units that the lot does not have.
+fn check_units(units: &Path, part: &Part) -> Result<(), FileError> {
+    let held: Vec<&str> = part
+        .held()
+        .into_iter()
+        .filter_map(|run| part.job.names.get(usize::try_from(run).ok()?))
+        .map(String::as_str)
+        .collect();
+    let entries = fs::read_dir(units).into_iter().flatten().flatten();
+    let mut others: Vec<String> = entries
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .filter(|name| !name.starts_with('.') && !held.contains(&name.as_str()))
+        .collect();
+    others.sort();
+    others.first().map_or(Ok(()), |other| {
+        Err(FileError::new(
+            units,
+            Place::File,
+            format_args!("unit `{other}`, which is not among the runs given"),
+            "units of this lot only",
+            "Give its run.toml, too, choose another directory, or give --force to begin anew.",
+        ))
+    })
+}
+
+impl UnitRecord {
+    fn read(directory: &Path) -> Result<Self, FileError> {
+        let path = directory.join(UNIT_FILE);
+        let advice = "Calibrate the unit again.";
+        let bytes = small_file::bytes(&path)
+            .map_err(|error| FileError::io(&path, "read the unit", &error, advice))?;
+        let expected = format!("a unit in the format {FORMAT}");
+        let record: Self = serde_json::from_slice(&bytes)
+            .map_err(|error| FileError::new(&path, Place::File, error, &expected, advice))?;
+        if record.format != FORMAT {
+            let found = format_args!("format = {:?}", record.format);
+            return Err(FileError::new(&path, Place::File, found, expected, advice));
+        }
+        Ok(record)
+    }
+}
+
+fn read_unit(directory: &Path, key: &str) -> Result<Unit, FileError> {
+    let record = UnitRecord::read(directory)?;
+    let wrong = |found: &str| {
+        let (expected, advice) = ("the unit as it was written", "Calibrate it again.");
+        Err(FileError::new(
+            directory,
+            Place::File,
+            found,
+            expected,
+            advice,
+        ))
+    };
+    if record.key != key {
+        return wrong("another key");
+    }
+    let calibrated = match (record.failure, record.nominal) {
+        (Some(failure), _) => Err(failure),
+        (None, Some(nominal)) => Ok(Calibrated {
+            calibration: Calibration::read(&directory.join(CALIBRATION_FILE))?,
+            nominal,
+            noise: record.noise_at_rest,
+        }),
+        (None, None) => return wrong("neither a calibration nor a failure"),
+    };
+    Ok(Unit {
+        name: record.name,
+        meta: record.meta,
+        calibrated,
+    })
+}
+
+fn write_unit(unit: &Unit, key: &str, directory: &Path) -> Result<(), FileError> {
+    let calibrated = unit.calibrated.as_ref().ok();
+    let record = UnitRecord {
+        format: FORMAT.to_owned(),
+        name: unit.name.clone(),
+        key: key.to_owned(),
+        meta: unit.meta.clone(),
+        nominal: calibrated.map(|of| of.nominal),
+        noise_at_rest: calibrated.and_then(|of| of.noise),
+        failure: unit.calibrated.as_ref().err().cloned(),
+    };
+    let path = directory.join(UNIT_FILE);
+    let refused = |error: std::io::Error| FileError::io(&path, "write it", &error, "Make room.");
+    let mut bytes = serde_json::to_vec_pretty(&record).map_err(|error| refused(error.into()))?;
+    bytes.push(b'\n');
+    fs::write(&path, bytes).map_err(refused)?;
+    if let Some(calibrated) = calibrated {
+        let path = directory.join(CALIBRATION_FILE);
+        let bytes = calibrated.calibration.to_json(&path)?;
+        fs::write(&path, bytes).map_err(refused)?;
+    }
+    Ok(())
+}
+
+/// Copies files and directories but for the list of what they are, which the copy gets anew.
+fn copy_all(from: &Path, to: &Path) -> std::io::Result<()> {
+    for entry in fs::read_dir(from)? {
+        let entry = entry?;
+        let target = to.join(entry.file_name());
+        if entry.file_type()?.is_dir() {
+            fs::create_dir(&target)?;
+            copy_all(&entry.path(), &target)?;
+        } else if entry.file_name() != super::whole::LIST {
+            fs::write(&target, fs::read(entry.path())?)?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,205 @@
+//! Output that appears whole or not at all: written beside its place, then renamed into it.
+//!
+//! A process that ends on a signal takes away what it has not finished ([`abandon_unfinished`]); what a
+//! process that was killed left beside its output goes when the next output is begun there.
+
+mod manifest;
+mod stage;
+#[cfg(test)]
+mod tests;
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use crate::formats::error::{FileError, Place};
+pub use manifest::FILE as LIST;
+use stage::Stage;
+pub use stage::abandon_unfinished;
+
+fn taken(target: &Path) -> FileError {
+    FileError::new(
+        target,
+        Place::File,
+        "something of this name already",
+        "a name that is free",
+        "Choose another name, or give --force to replace it.",
+    )
+}
+
+/// The system does not let anything be written where `target` is to be.
+fn unwritable(target: &Path, doing: &str, error: &io::Error) -> FileError {
+    let advice = "Choose a directory that can be written.";
+    FileError::io(target, doing, error, advice)
+}
+
+/// A directory in the making. Dropped without [`Self::commit`] it leaves nothing behind.
+pub struct WholeDirectory {
+    stage: Stage,
+    force: bool,
+}
+
+impl WholeDirectory {
+    /// Begins a directory that will appear at `target`.
+    ///
+    /// An existing directory is replaced only with `force`, and only while it holds nothing but what was
+    /// written by a [`WholeDirectory`]; a file never, and never a directory that holds one of `inputs` or
+    /// the current directory: replacing it would delete them.
+    pub fn create(target: &Path, force: bool, inputs: &[&Path]) -> Result<Self, FileError> {
+        if let Ok(existing) = fs::symlink_metadata(target) {
+            if !force {
+                return Err(taken(target));
+            }
+            if !existing.is_dir() {
+                let what = if existing.is_symlink() {
+                    "link"
+                } else {
+                    "file"
+                };
+                return Err(FileError::new(
+                    target,
+                    Place::File,
+                    format_args!("a {what} of this name"),
+                    "a directory or nothing",
+                    format_args!("Choose another name or remove the {what}."),
+                ));
+            }
+            let inside = |path: &Path| match (path.canonicalize(), target.canonicalize()) {
+                (Ok(path), Ok(target)) => path.starts_with(target),
+                _ => false,
+            };
+            let held = inputs
+                .iter()
+                .copied()
+                .chain([Path::new(".")])
+                .find(|path| inside(path));
+            if let Some(held) = held {
+                return Err(FileError::new(
+                    target,
+                    Place::File,
+                    format_args!(
+                        "{} in this directory",
+                        if held == Path::new(".") {
+                            "the current directory".into()
+                        } else {
+                            held.display().to_string()
+                        }
+                    ),
+                    "a directory that can be replaced",
+                    "Choose another name; replacing this one would delete what is still needed.",
+                ));
+            }
+            only_output(target)?;
+        }
+        let stage = Stage::new(target)?;
+        fs::create_dir(stage.new_path())
+            .map_err(|error| unwritable(target, "write here", &error))?;
+        Ok(Self { stage, force })
+    }
+
+    /// Where to write until then.
+    pub fn path(&self) -> PathBuf {
+        self.stage.new_path()
+    }
+
+    /// Puts the directory in its place, with a list of its entries in the file `.turncal`.
+    pub fn commit(self) -> Result<(), FileError> {
+        let list = manifest::of_all(&self.path())
+            .map_err(|error| unwritable(self.stage.target(), "put the output in place", &error))?;
+        self.commit_with(&list)
+    }
+
+    /// The same for a directory that grows: see [`list_anew`].
+    pub fn commit_growing(self, names: &[&str]) -> Result<(), FileError> {
+        let list = manifest::of_names(names.iter().copied());
+        self.commit_with(&list)
+    }
+
+    fn commit_with(self, list: &str) -> Result<(), FileError> {
+        let target = self.stage.target();
+        // Something may have been put into it since.
+        if self.force && target.is_dir() {
+            only_output(target)?;
+        }
+        fs::write(self.path().join(manifest::FILE), list)
+            .map_err(|error| unwritable(target, "put the output in place", &error))?;
+        self.stage.commit(self.force)
+    }
+}
+
+/// Writes the list of a directory that grows, in which nothing but these names is turncal's; what is in a name
+/// that ends in `/` has a list of its own. Files that the list before named and this one does not go.
+pub fn list_anew(directory: &Path, names: &[&str]) -> Result<(), FileError> {
+    for old in manifest::listed_files(directory) {
+        let still = |name: &&str| old.file_name() == Some(name.as_ref());
+        if !names.iter().any(still) {
+            fs::remove_file(&old)
+                .map_err(|error| unwritable(directory, "remove what is out of date", &error))?;
+        }
+    }
+    let list = manifest::of_names(names.iter().copied());
+    write_whole(&directory.join(manifest::FILE), list.as_bytes(), true)
+}
+
+/// Removes what a killed process left unfinished in a directory.
+pub fn clear_abandoned(directory: &Path) {
+    stage::remove_abandoned(directory);
+}
+
+/// Refuses a directory that holds anything beside what was written by a [`WholeDirectory`].
+fn only_output(directory: &Path) -> Result<(), FileError> {
+    let foreign = manifest::foreign(directory)
+        .map_err(|error| unwritable(directory, "look into the directory", &error))?;
+    foreign.map_or(Ok(()), |foreign| {
+        Err(FileError::new(
+            directory,
+            Place::File,
+            format_args!(
+                "`{}` in it, which no list of what turncal wrote there (`{}`) names",
+                foreign.display(),
+                manifest::FILE,
+            ),
+            "a directory that holds only what turncal wrote",
+            "Move it elsewhere or choose another name; replacing the directory would delete it.",
+        ))
+    })
+}
+
+/// Writes a file whole or not at all; an existing one is replaced only with `force`, a directory
+/// never.
+pub fn write_whole(path: &Path, bytes: &[u8], force: bool) -> Result<(), FileError> {
+    write_whole_with(path, force, |mut file| file.write_all(bytes))
+}
+
+/// The same for what is too long to be held: `write` gets the file that will appear.
+pub fn write_whole_with(
+    path: &Path,
+    force: bool,
+    write: impl FnOnce(File) -> io::Result<()>,
+) -> Result<(), FileError> {
+    match fs::symlink_metadata(path) {
+        Ok(_) if !force => return Err(taken(path)),
+        Ok(existing) if existing.is_dir() => {
+            return Err(FileError::new(
+                path,
+                Place::File,
+                "a directory of this name",
+                "a file or nothing",
+                "Choose another name.",
+            ));
+        }
+        _ => {}
+    }
+    let stage = Stage::new(path)?;
+    File::create_new(stage.new_path())
+        .and_then(write)
+        .map_err(|error| {
+            FileError::io(
+                path,
+                "write the file",
+                &error,
+                "Make room or choose another place.",
+            )
+        })?;
+    stage.commit(force)
+}

@@ -1,0 +1,254 @@
+//! A place beside an output in which it is made.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use super::{FileError, Place, taken, unwritable};
+
+const PREFIX: &str = ".turncal-";
+/// Locked as long as the process lives that made the stage.
+const LOCK: &str = "turncal.lock";
+const NEW: &str = "new";
+const OLD: &str = "old";
+
+/// The stages of this process, each with the directories that were made for it, innermost first.
+static UNFINISHED: Mutex<BTreeMap<PathBuf, Vec<PathBuf>>> = Mutex::new(BTreeMap::new());
+
+/// Whoever holds this is not interrupted by a signal's end of the process.
+fn unfinished() -> MutexGuard<'static, BTreeMap<PathBuf, Vec<PathBuf>>> {
+    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes what this process has begun and not finished, and lets no output appear any more: for a
+/// process that is about to end. Threads that begin, finish or give up an output wait for that end.
+pub fn abandon_unfinished() {
+    let unfinished = unfinished();
+    for (stage, parents) in unfinished.iter() {
+        // Another thread may be writing into it.
+        for _ in 0..100 {
+            if remove(stage, parents) {
+                break;
+            }
+            thread::sleep(Duration::from_millis(10));
+        }
+    }
+    std::mem::forget(unfinished);
+}
+
+/// Removes a stage and the directories that were made for it, as far as they are empty.
+fn remove(stage: &Path, parents: &[PathBuf]) -> bool {
+    let gone = match fs::remove_dir_all(stage) {
+        Ok(()) => true,
+        Err(error) => error.kind() == io::ErrorKind::NotFound,
+    };
+    // The first that is not empty ends this; so does a target that is in place.
+    let _ = parents.iter().try_for_each(fs::remove_dir);
+    gone
+}
+
+/// A place that something new is going to take.
+pub struct Stage {
+    /// Holds the new thing and, while they change places, the old one. Goes away on drop.
+    beside: PathBuf,
+    /// None where the file system has no locks.
+    lock: Option<File>,
+    target: PathBuf,
+}
+
+impl Stage {
+    pub fn new(target: &Path) -> Result<Self, FileError> {
+        if target.file_name().is_none() {
+            return Err(FileError::new(
+                target,
+                Place::File,
+                "a path without a name of its own",
+                "the name of something to be written",
+                "Give a name that does not end in `..` or `/`.",
+            ));
+        }
+        let parent = match target.parent() {
+            Some(parent) if parent != Path::new("") => parent,
+            _ => Path::new("."),
+        };
+        let mut unfinished = unfinished();
+        let missing: Vec<PathBuf> = parent
+            .ancestors()
+            .take_while(|ancestor| *ancestor != Path::new("") && !ancestor.exists())
+            .map(Path::to_owned)
+            .collect();
+        let begun = fs::create_dir_all(parent).and_then(|()| {
+            remove_abandoned(parent);
+            begin(parent)
+        });
+        match begun {
+            Ok((beside, lock)) => {
+                unfinished.insert(beside.clone(), missing);
+                Ok(Self {
+                    beside,
+                    lock,
+                    target: target.to_owned(),
+                })
+            }
+            Err(error) => {
+                let _ = missing.iter().try_for_each(fs::remove_dir);
+                let file = parent.ancestors().find(|ancestor| ancestor.is_file());
+                Err(file.map_or_else(
+                    || unwritable(target, "write here", &error),
+                    |file| {
+                        FileError::new(
+                            target,
+                            Place::File,
+                            format_args!("a file, {}, on the way", file.display()),
+                            "directories",
+                            "Choose another name.",
+                        )
+                    },
+                ))
+            }
+        }
+    }
+
+    pub fn new_path(&self) -> PathBuf {
+        self.beside.join(NEW)
+    }
+
+    pub fn target(&self) -> &Path {
+        &self.target
+    }
+
+    /// Puts the new thing in its place; what is there is replaced only with `force`.
+    pub fn commit(self, force: bool) -> Result<(), FileError> {
+        let mut unfinished = unfinished();
+        let old = self.beside.join(OLD);
+        let exists = fs::symlink_metadata(&self.target).is_ok();
+        if exists && !force {
+            return Err(taken(&self.target));
+        }
+        // The target is never missing where the system can exchange two names.
+        if exists && exchange(&self.new_path(), &self.target).is_ok() {
+            return Ok(());
+        }
+        let refused = |error| unwritable(&self.target, "put the output in place", &error);
+        if exists {
+            fs::rename(&self.target, &old).map_err(refused)?;
+        }
+        let Err(error) = fs::rename(self.new_path(), &self.target) else {
+            return Ok(());
+        };
+        if exists && fs::rename(&old, &self.target).is_err() {
+            unfinished.remove(&self.beside);
+            let doing = format!(
+                "put the output in place; the old one is in {}",
+                self.beside.display()
+            );
+            return Err(FileError::io(
+                &self.target,
+                &doing,
+                &error,
+                "Move it back by hand.",
+            ));
+        }
+        Err(refused(error))
+    }
+}
+
+impl Drop for Stage {
+    fn drop(&mut self) {
+        self.lock = None;
+        // What is not in the list holds the only copy of what was to be replaced.
+        if let Some(parents) = unfinished().remove(&self.beside) {
+            remove(&self.beside, &parents);
+        }
+    }
+}
+
+/// Makes a stage and locks it.
+fn begin(parent: &Path) -> io::Result<(PathBuf, Option<File>)> {
+    const ATTEMPTS: usize = 20;
+    for _ in 0..ATTEMPTS {
+        let beside = tempfile::Builder::new()
+            .prefix(PREFIX)
+            .tempdir_in(parent)?
+            .keep();
+        let lock = beside.join(LOCK);
+        let file = match File::create_new(&lock) {
+            Ok(file) => file,
+            // Taken for abandoned by another process before it could be locked.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+            Err(error) => {
+                let _ = fs::remove_dir(&beside);
+                return Err(error);
+            }
+        };
+        match file.try_lock() {
+            Ok(()) if lock.exists() => return Ok((beside, Some(file))),
+            Ok(()) | Err(TryLockError::WouldBlock) => {}
+            Err(TryLockError::Error(_)) => return Ok((beside, None)),
+        }
+    }
+    Err(io::ErrorKind::ResourceBusy.into())
+}
+
+/// Removes the stages in a directory whose processes live no more.
+pub fn remove_abandoned(parent: &Path) {
+    let Ok(entries) = fs::read_dir(parent) else {
+        return;
+    };
+    for entry in entries.flatten() {
+        let is_stage = entry
+            .file_name()
+            .as_encoded_bytes()
+            .starts_with(PREFIX.as_bytes())
+            && entry.file_type().is_ok_and(|kind| kind.is_dir());
+        if is_stage {
+            // What cannot be removed, another user's for one, does no harm.
+            let _ = remove_if_abandoned(&entry.path());
+        }
+    }
+}
+
+fn remove_if_abandoned(stage: &Path) -> io::Result<()> {
+    let lock = stage.join(LOCK);
+    match fs::symlink_metadata(&lock) {
+        Ok(found) if found.is_file() => {}
+        Ok(_) => return Ok(()),
+        // Not locked yet, or never to be: one that is still empty is made again.
+        Err(_) => return fs::remove_dir(stage),
+    }
+    let file = OpenOptions::new().read(true).write(true).open(&lock)?;
+    if file.try_lock().is_err() {
+        return Ok(());
+    }
+    let [new, old] = [NEW, OLD].map(|name| stage.join(name));
+    if new.exists() && old.exists() {
+        // Its process ended while they changed places: the old one has no other copy.
+        return Ok(());
+    }
+    for thing in [new, old] {
+        match fs::symlink_metadata(&thing) {
+            Ok(found) if found.is_dir() => fs::remove_dir_all(&thing)?,
+            Ok(_) => fs::remove_file(&thing)?,
+            Err(_) => {}
+        }
+    }
+    drop(file);
+    fs::remove_file(&lock)?;
+    fs::remove_dir(stage)
+}
+
+/// Lets two things change places at once.
+#[cfg(any(target_os = "linux", target_vendor = "apple"))]
+fn exchange(a: &Path, b: &Path) -> io::Result<()> {
+    use rustix::fs::{CWD, RenameFlags, renameat_with};
+    Ok(renameat_with(CWD, a, CWD, b, RenameFlags::EXCHANGE)?)
+}
+
+#[cfg(not(any(target_os = "linux", target_vendor = "apple")))]
+fn exchange(_: &Path, _: &Path) -> io::Result<()> {
+    Err(io::ErrorKind::Unsupported.into())
+}

@@ -1,0 +1,161 @@
+//! A file of an export in the making: comments, what it does not hold, numbers.
+
+use super::Exported;
+use super::source::{Axes, Held, Remainder, Source};
+use crate::imu::{PerSensor, Sensor, Term};
+
+/// What hardly any format holds.
+pub(super) const SIGMA: &str =
+    "sigma and covariance of the parameters; they are in calibration.json";
+
+/// A file in the making.
+pub(super) struct Document {
+    mark: &'static str,
+    text: String,
+    notes: Vec<String>,
+}
+
+impl Document {
+    /// Begins with what all formats say; `notes` are what this one does not hold, beside the error terms but for those
+    /// of which `held` is true.
+    pub fn holding(
+        source: &Source,
+        mark: &'static str,
+        notes: impl IntoIterator<Item = String>,
+        held: fn(Term) -> bool,
+    ) -> Self {
+        let notes = notes.into_iter().chain(source.terms_note(held));
+        let mut document = Self::new(source, mark, notes);
+        for line in source.term_lines(|term| !held(term)) {
+            document.comment(&line);
+        }
+        document
+    }
+
+    /// The same of a format in which error terms have no place.
+    pub fn new(
+        source: &Source,
+        mark: &'static str,
+        notes: impl IntoIterator<Item = String>,
+    ) -> Self {
+        let mut document = Self {
+            mark,
+            text: String::new(),
+            notes: notes.into_iter().collect(),
+        };
+        for line in source.about() {
+            document.comment(&line);
+        }
+        for note in document.notes.clone() {
+            document.comment(&format!("not held: {note}"));
+        }
+        document
+    }
+
+    /// Begins a file for a program that makes `matrix (n − offset)` of both triads' output, says what that leaves, and
+    /// what else it does not hold.
+    pub fn correcting(
+        source: &Source,
+        axes: &Axes,
+        (mark, reads): (&'static str, &str),
+        held: &PerSensor<Held>,
+        notes: &[&str],
+    ) -> Self {
+        let left = Sensor::ALL.map(|sensor| Remainder::of(sensor, axes, held.get(sensor)));
+        let left: Vec<Remainder> = left.into_iter().filter(|left| !left.is_none()).collect();
+        let notes = notes.iter().copied().chain([SIGMA]).map(str::to_owned);
+        let notes = left.iter().map(Remainder::words).chain(notes);
+        let mut document = Self::holding(source, mark, notes, |_| false);
+        axes.introduce(&mut document, reads);
+        left.iter().for_each(|left| left.lines(&mut document));
+        document
+    }
+
+    /// Begins a file of code: it corrects K, E and D, and has terms and test vectors in comments.
+    pub fn of_code(source: &Source, mark: &'static str) -> Self {
+        let mut document = Self::holding(source, mark, [SIGMA.to_owned()], |_| false);
+        let vectors = source.test_vectors();
+        if !vectors.is_empty() {
+            document.comment("");
+            document.comment("test vectors, raw -> calibrated, gyros x y z, accelerometers x y z:");
+            vectors.iter().for_each(|line| document.comment(line));
+        }
+        document
+    }
+
+    /// A comment of one line, whatever is in it: names and warnings come from files.
+    pub fn comment(&mut self, line: &str) {
+        let breaks = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
+        let line = line.replace(breaks, " ");
+        let line = line.trim_end();
+        self.text += self.mark;
+        if !line.is_empty() {
+            self.text.push(' ');
+            self.text += line;
+        }
+        // In C a backslash at the end, or its trigraph ??/, would take the next line in.
+        if line.ends_with(['\\', '/']) {
+            self.text.push('.');
+        }
+        self.text.push('\n');
+    }
+
+    pub fn line(&mut self, line: &str) {
+        self.text += line;
+        self.text.push('\n');
+    }
+
+    /// A line before all others.
+    pub fn begin(&mut self, line: &str) {
+        self.text.insert_str(0, &format!("{line}\n"));
+    }
+
+    /// Puts all so far between these, which only end a comment together.
+    pub fn enclose(&mut self, open: &str, close: &str) {
+        self.text = format!("{open}\n{}{close}\n", self.text.replace("--", "- -"));
+    }
+
+    pub fn finish(self) -> Exported {
+        Exported {
+            text: self.text,
+            binary: None,
+            notes: self.notes,
+        }
+    }
+}
+
+/// A number that YAML 1.1 takes for one: with a point, and a sign in its exponent.
+pub(super) fn yaml_number(value: f64) -> String {
+    let text = format!("{:e}", value + 0.0);
+    let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
+    let point = if mantissa.contains('.') { "" } else { ".0" };
+    let sign = if exponent.starts_with('-') { "" } else { "+" };
+    format!("{mantissa}{point}e{sign}{exponent}")
+}
+
+/// Three numbers as a YAML list.
+pub(super) fn yaml_list<'a>(values: impl IntoIterator<Item = &'a f64>) -> String {
+    let values: Vec<String> = values.into_iter().map(|&v| yaml_number(v)).collect();
+    format!("[{}]", values.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_floats_of_yaml_1_1_and_keep_every_bit() {
+        for (value, text) in [
+            (0.0, "0.0e+0"),
+            (-0.0, "0.0e+0"),
+            (2e6, "2.0e+6"),
+            (-1.5e-7, "-1.5e-7"),
+            (0.1, "1.0e-1"),
+        ] {
+            assert_eq!(yaml_number(value), text);
+        }
+        for value in [std::f64::consts::PI, 1e-300 / 3.0, 2e300 / 7.0] {
+            assert_eq!(yaml_number(value).parse(), Ok(value));
+        }
+    }
+}

@@ -1,0 +1,320 @@
+//! Two streams, each with its own clock, as rows of one.
+//!
+//! Gyros stand as they are. Accelerometers are integrated over each sample of the gyros: the integral is known at
+//! the edges of their own samples, and between those follows the cubic through four of them. What is passed on
+//! from sample to sample is exact, so errors do not add up; what is left is the error of the integral at an edge,
+//! which the record itself tells (see [`Course::edge_error`]).
+
+use std::path::{Path, PathBuf};
+
+use super::course::Course;
+use super::source::Source;
+use super::uniform::Uniform;
+use crate::formats::clock::{Breaks, Clock, Stamp, Stamps, TimeUnit};
+use crate::formats::error::{FileError, Place};
+use crate::imu::{Output, PerSensor};
+
+/// The column of time, in s.
+pub const TIME: &str = "time";
+
+/// One of the streams, as `run.toml` describes it.
+pub struct Part<'a> {
+    pub source: &'a Source<'a>,
+    pub clock: Clock<'a>,
+    pub columns: [&'a str; 3],
+    /// Columns that are passed on as they are.
+    pub further: &'a [&'a str],
+}
+
+/// Both streams at one row of the gyros' clock.
+pub struct Joined {
+    file: PathBuf,
+    header: Vec<String>,
+    units: Vec<String>,
+    remarks: Vec<String>,
+    /// Time, gyros, accelerometers, further columns of the gyros' stream.
+    rows: Vec<Vec<f64>>,
+    error: [f64; 3],
+    /// Rows given out, with this one.
+    at: usize,
+}
+
+/// The columns of both triads by names that tell them apart.
+pub fn distinct(triads: &PerSensor<[&str; 3]>) -> PerSensor<[String; 3]> {
+    let bare = |name: &str| name.strip_prefix('-').unwrap_or(name).to_owned();
+    let clash = |name: &str| triads.gyro.iter().any(|other| bare(other) == bare(name));
+    PerSensor {
+        gyro: triads.gyro.map(str::to_owned),
+        accel: triads.accel.map(|name| match clash(name) {
+            true => format!("{name} of accelerometers"),
+            false => name.to_owned(),
+        }),
+    }
+}
+
+impl Joined {
+    /// Reads both streams, whose stamps come so many samples after a sample's begin.
+    pub fn read(parts: &PerSensor<Part>, output: Output, lag: f64) -> Result<Self, FileError> {
+        let gyro = Track::read(&parts.gyro)?;
+        let accel = Track::read(&parts.accel)?;
+        let courses = accel.courses();
+        let (rows, weights) = rows_of_both(&gyro, &accel, &courses, output, lag);
+        let file = parts.gyro.source.file.clone();
+        if rows.is_empty() {
+            return Err(apart(&parts.accel.source.file, &gyro, &accel));
+        }
+        let squares = courses.iter().map(Course::edge_error);
+        let count = courses.len() as f64;
+        let mean = squares.fold([0.0; 3], |mean, of| {
+            [0, 1, 2].map(|k| mean[k] + of[k] / count)
+        });
+        let weight = weights / rows.len() as f64;
+        let seconds = match output {
+            Output::Rate => accel.clock.period,
+            Output::Increment | Output::Pulse => 1.0,
+        };
+        let names = distinct(&PerSensor::from_fn(|sensor| parts.get(sensor).columns));
+        let bare = |name: &String| name.strip_prefix('-').unwrap_or(name).to_owned();
+        let mut header = vec![TIME.to_owned()];
+        header.extend(names.gyro.iter().chain(&names.accel).map(bare));
+        header.extend(parts.gyro.further.iter().map(|&name| name.to_owned()));
+        let mut units = vec!["s".to_owned()];
+        units.extend(gyro.units.iter().chain(&accel.units).cloned());
+        units.resize(header.len(), String::new());
+        Ok(Self {
+            file,
+            header,
+            units,
+            remarks: remarks_of_both(gyro, accel),
+            rows,
+            error: mean.map(|square| seconds * (weight * square).sqrt()),
+            at: 0,
+        })
+    }
+
+    pub fn file(&self) -> &Path {
+        &self.file
+    }
+
+    pub fn header(&self) -> &[String] {
+        &self.header
+    }
+
+    pub fn units(&self) -> &[String] {
+        &self.units
+    }
+
+    pub fn remarks(&self) -> &[String] {
+        &self.remarks
+    }
+
+    /// RMS error of the accelerometers' integrals at an edge of a sample, in their columns' unit times s.
+    pub fn integral_error(&self) -> [f64; 3] {
+        self.error
+    }
+
+    pub fn advance(&mut self) -> bool {
+        self.at += 1;
+        self.at <= self.rows.len()
+    }
+
+    pub fn sample(&self) -> u64 {
+        self.at as u64
+    }
+
+    pub fn value(&self, column: usize) -> f64 {
+        let row = self.at.checked_sub(1).and_then(|row| self.rows.get(row));
+        row.and_then(|row| row.get(column))
+            .copied()
+            .unwrap_or(f64::NAN)
+    }
+}
+
+/// The rows at which both streams have samples, and the sum of the weights of their edges' errors.
+fn rows_of_both(
+    gyro: &Track,
+    accel: &Track,
+    courses: &[Course],
+    output: Output,
+    lag: f64,
+) -> (Vec<Vec<f64>>, f64) {
+    let mut rows = Vec::with_capacity(gyro.clock.numbers.len());
+    // Against the accelerometers' first stamp: seconds since 1970 have no digits left for parts of samples.
+    let ahead = gyro.clock.first - accel.clock.first;
+    let place = |number: f64| accel.clock.number(ahead + gyro.clock.time(number)) + lag;
+    let mut course = 0;
+    let mut weights = 0.0;
+    for (k, &number) in gyro.clock.numbers.iter().enumerate() {
+        let time = gyro.clock.first + gyro.clock.time(number as f64);
+        let begin = place(number as f64 - lag);
+        let end = place(number as f64 + 1.0 - lag);
+        while courses
+            .get(course)
+            .is_some_and(|course| course.end() < begin)
+        {
+            course += 1;
+        }
+        let course = courses.get(course);
+        // Where one of both lacks samples, the row does.
+        let Some((sums, weight)) = course.and_then(|course| course.between(begin, end)) else {
+            continue;
+        };
+        let factor = match output {
+            // Clocks that are one give values as they stand, to the last bit.
+            Output::Rate if (end - begin - 1.0).abs() > 1e-9 => (end - begin).recip(),
+            _ => 1.0,
+        };
+        weights += weight;
+        let mut row = vec![time];
+        row.extend(gyro.columns.iter().map(|column| column[k]));
+        row.extend(sums.map(|sum| sum * factor));
+        row.extend(gyro.further.iter().map(|column| column[k]));
+        rows.push(row);
+    }
+    (rows, weights)
+}
+
+/// Streams whose times do not overlap.
+fn apart(file: &Path, gyro: &Track, accel: &Track) -> FileError {
+    let of = |track: &Track| {
+        let last = track.clock.numbers.last().map_or(0.0, |&last| last as f64);
+        let (first, period) = (track.clock.first, track.clock.period);
+        format!("{first} s to {} s", first + last * period)
+    };
+    FileError::new(
+        file,
+        Place::File,
+        format_args!("accelerometers from {}", of(accel)),
+        format_args!("times that overlap the gyros', {}", of(gyro)),
+        "Bring both streams to one clock, or correct time_unit.",
+    )
+}
+
+/// What both streams have to say, each remark once, and that they are two.
+fn remarks_of_both(gyro: Track, accel: Track) -> Vec<String> {
+    let mut remarks = gyro.remarks;
+    remarks.extend(
+        accel
+            .remarks
+            .into_iter()
+            .filter(|remark| !remarks.contains(remark))
+            .collect::<Vec<_>>(),
+    );
+    let uneven = accel.clock.uneven();
+    remarks.extend(uneven.map(|said| format!("Accelerometers: {said}")));
+    remarks.push(format!(
+        "Gyros every {} s and accelerometers every {} s are two streams: accelerometers are integrated over the \
+         gyros' samples. If their clocks may be apart, estimate by how much: --with time-offset.",
+        rounded(gyro.clock.period),
+        rounded(accel.clock.period)
+    ));
+    remarks
+}
+
+/// Seven digits.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.6e}").parse().unwrap_or(value)
+}
+
+/// The samples of a stream on its own uniform clock.
+struct Track {
+    clock: Uniform,
+    columns: [Vec<f64>; 3],
+    further: Vec<Vec<f64>>,
+    units: [String; 3],
+    remarks: Vec<String>,
+}
+
+impl Track {
+    fn read(part: &Part) -> Result<Self, FileError> {
+        let mut rows = part.source.open()?;
+        let mut stamps = part.clock.start(&mut rows)?;
+        let mut places = [0; 3];
+        for (place, name) in places.iter_mut().zip(part.columns) {
+            *place = rows.signed_column(name)?.0;
+        }
+        let further = part.further.iter().map(|name| rows.column(name));
+        let further: Vec<usize> = further.collect::<Result<_, FileError>>()?;
+        let mut others = vec![Vec::new(); further.len()];
+        let units = places.map(|k| rows.units().map_or(String::new(), |units| units[k].clone()));
+        let mut columns = [const { Vec::<f64>::new() }; 3];
+        while rows.advance()? && !rows.may_be_cut() {
+            if places.iter().any(|&place| rows.is_blank(place)) {
+                continue;
+            }
+            let mut row = [0.0; 3];
+            for (value, &place) in row.iter_mut().zip(&places) {
+                *value = rows.number(place)?;
+            }
+            let place = match stamps.look(&rows)? {
+                Stamp::New(place) => place,
+                Stamp::Again(place) => {
+                    if columns.each_ref().map(|column| column[place - 1]) == row {
+                        continue;
+                    }
+                    if stamps.is_count() {
+                        return Err(Stamps::same(&rows));
+                    }
+                    stamps.again(place, &rows)?
+                }
+            };
+            for (column, value) in columns.iter_mut().zip(row) {
+                column.insert(place, value);
+            }
+            for (column, &of) in others.iter_mut().zip(&further) {
+                column.insert(place, rows.number(of).unwrap_or(f64::NAN));
+            }
+        }
+        if stamps.of_rows.len() < 2 {
+            return Err(rows.error(
+                format_args!("{} samples", stamps.of_rows.len()),
+                "a stream of samples",
+                "Name another stream, or record it again.",
+            ));
+        }
+        let mut remarks = rows.remarks().to_vec();
+        remarks.extend(rows.cut_off("It is left out"));
+        remarks.extend(stamps.notes(rows.file(), 0));
+        let clock = Uniform::new(&part.source.file, &stamps.of_rows, part.clock.period)
+            .map_err(|error| rows.placed(error))?;
+        Ok(Self {
+            clock,
+            columns,
+            further: others,
+            units,
+            remarks,
+        })
+    }
+
+    /// Samples that follow one another, by their numbers.
+    fn courses(&self) -> Vec<Course> {
+        let numbers = &self.clock.numbers;
+        let mut courses: Vec<Course> = Vec::new();
+        for (k, &number) in numbers.iter().enumerate() {
+            let follows = k > 0 && number == numbers[k - 1] + 1;
+            if !follows {
+                courses.push(Course {
+                    begin: number as f64,
+                    ..Course::default()
+                });
+            }
+            if let Some(course) = courses.last_mut() {
+                for (sums, column) in course.sums.iter_mut().zip(&self.columns) {
+                    sums.push(column[k]);
+                }
+            }
+        }
+        courses
+    }
+}
+
+/// The clock of the rows of both.
+pub fn clock(period: Option<f64>) -> Clock<'static> {
+    Clock {
+        column: Some(TIME),
+        nanoseconds: None,
+        unit: TimeUnit::PerSecond(1.0),
+        period,
+        breaks: Breaks::None,
+    }
+}

@@ -1,0 +1,131 @@
+//! The file of labelled sections.
+
+use std::path::Path;
+
+use nalgebra::Vector3;
+
+use crate::formats::csv_file::CsvFile;
+use crate::formats::error::FileError;
+use crate::formats::schema::axes::BodyAxes;
+use crate::recording::{ImuSamples, LabelledMotion, Segment};
+use crate::units::DEGREE;
+
+/// Reads the sections of a run with these samples, which are stamped so many samples after they begin; what
+/// the file leaves open goes to `notes`.
+pub fn read(
+    file: &Path,
+    imu: &ImuSamples,
+    lag: f64,
+    axes: BodyAxes,
+    notes: &mut Vec<String>,
+) -> Result<Vec<Segment>, FileError> {
+    let mut csv = CsvFile::open(file)?;
+    let start_column = csv.column("start")?;
+    let end_column = csv.column("end")?;
+    let label_column = csv.column("label")?;
+    let record = (imu.start(), imu.end());
+    // Stamps may name either end of a sample, so borders can be out by one, and are rounded.
+    let slack = 1.5 * imu.period;
+    // The first row at or after a time; times are printed rounded.
+    let row = |time: f64| {
+        let row = (imu.edge(time) - lag - 0.01).ceil();
+        (row.max(0.0) as usize).min(imu.len())
+    };
+    let mut segments = Vec::new();
+    while csv.advance()? {
+        let start = csv.number(start_column)?;
+        let end = csv.number(end_column)?;
+        if end <= start {
+            return Err(csv.error_here(
+                format_args!("a segment from {start} s to {end} s"),
+                "an end after the start",
+                "Correct the row.",
+            ));
+        }
+        if start < record.0 - slack || end > record.1 + slack {
+            return Err(csv.error_here(
+                format_args!("a segment from {start} s to {end} s"),
+                format_args!(
+                    "times inside the IMU record, {} s to {} s",
+                    record.0, record.1
+                ),
+                "Correct the row.",
+            ));
+        }
+        if row(start) == row(end) {
+            return Err(csv.error_here(
+                format_args!("no sample from {start} s to {end} s"),
+                format_args!("a segment of several samples of {} s", imu.period),
+                "Correct or remove the row.",
+            ));
+        }
+        let label = csv.text(label_column)?.to_owned();
+        segments.push(Segment {
+            start,
+            end,
+            samples: row(start)..row(end),
+            motion: motion_of(&label, axes),
+            label,
+        });
+    }
+    // A label that lacks letters is none, which is said elsewhere.
+    notes.extend(
+        csv.cut_off("It is used")
+            .filter(|_| label_column + 1 != csv.header().len()),
+    );
+    Ok(segments)
+}
+
+/// What a label says, its axes being those of the file.
+fn motion_of(label: &str, axes: BodyAxes) -> Option<LabelledMotion> {
+    let axis = |name: &str| {
+        let index = ["x", "y", "z"].into_iter().position(|axis| axis == name)?;
+        Some(axes.vector(Vector3::ith(index, 1.0)))
+    };
+    if let Some(turn) = label.strip_prefix("rot_") {
+        let (name, angle) = turn.split_at_checked(1)?;
+        let angle: f64 = angle.parse().ok()?;
+        let turns = angle.is_finite() && angle != 0.0;
+        return turns.then_some(LabelledMotion::Turns {
+            axis: axis(name)?,
+            angle: angle * DEGREE,
+        });
+    }
+    let (name, way) = label.split_once('_')?;
+    let up = match way {
+        "up" => axis(name)?,
+        "down" => -axis(name)?,
+        _ => return None,
+    };
+    Some(LabelledMotion::Stands { up })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn labels_name_axes_of_the_file() {
+        let frd = BodyAxes::WORDS[1].1;
+        let of = |label| motion_of(label, frd);
+        let up = |up| Some(LabelledMotion::Stands { up });
+        assert_eq!(of("x_up"), up(Vector3::y()));
+        assert_eq!(of("z_down"), up(Vector3::z()));
+        let Some(LabelledMotion::Turns { axis, angle }) = of("rot_z-360") else {
+            panic!("no turn");
+        };
+        assert_eq!(axis * angle, Vector3::z() * (360.0 * DEGREE));
+        for other in [
+            "still",
+            "x_left",
+            "w_up",
+            "rot_",
+            "rot_x",
+            "rot_é+90",
+            "rot_x+NaN",
+            "_up",
+        ] {
+            assert_eq!(of(other), None, "{other}");
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Where rows come from, as `run.toml` says it.
+
+use std::path::{Path, PathBuf};
+
+use crate::formats::clock::{Breaks, Clock, TimeUnit};
+use crate::formats::csv_file::CsvFile;
+use crate::formats::error::{FileError, Place};
+use crate::formats::rows::LogRows;
+use crate::formats::schema::{Document, ImuFile, Positive, TimeColumn};
+use crate::formats::streams::{self, StreamRows};
+
+/// Where rows come from.
+#[derive(Debug, Clone)]
+pub struct Source<'a> {
+    pub file: PathBuf,
+    /// Of a file of several streams the one that is meant.
+    pub stream: Option<&'a str>,
+    /// Whether what is whole of a damaged file is used.
+    pub salvage: bool,
+}
+
+impl Source<'_> {
+    /// A file of which nothing is known.
+    pub fn of_file(file: &Path) -> Self {
+        Self {
+            file: file.to_owned(),
+            stream: None,
+            salvage: false,
+        }
+    }
+
+    /// Opens it by its content.
+    pub fn open(&self) -> Result<LogRows, FileError> {
+        let Some(log) = streams::open(&self.file)? else {
+            if let Some(stream) = self.stream {
+                return Err(FileError::new(
+                    &self.file,
+                    Place::File,
+                    "rows of text",
+                    format_args!("a log with a stream `{stream}`"),
+                    "Leave `stream` out, or name another file.",
+                ));
+            }
+            return CsvFile::open(&self.file).map(LogRows::text);
+        };
+        let rows = StreamRows::open(&self.file, log, self.stream, self.salvage)?;
+        Ok(LogRows::stream(rows))
+    }
+}
+
+impl<'a> Source<'a> {
+    /// What a table says of its file.
+    pub fn of_fields(
+        directory: &Path,
+        file: &str,
+        stream: &'a Option<String>,
+        salvage: Option<bool>,
+    ) -> Self {
+        Self {
+            file: directory.join(file),
+            stream: stream.as_deref(),
+            salvage: salvage.unwrap_or(false),
+        }
+    }
+}
+
+/// The clock that a table says of its rows.
+pub fn clock<'a>(
+    document: Document,
+    table: &str,
+    column: Option<&'a TimeColumn>,
+    (unit, period): (Option<TimeUnit>, Option<Positive>),
+) -> Result<Clock<'a>, FileError> {
+    if unit == Some(TimeUnit::Count) && period.is_none() {
+        return Err(document.missing(&format!("{table}.sample_period_s"), "what a count lasts"));
+    }
+    let seconds = TimeUnit::PerSecond(1.0);
+    let (column, nanoseconds) = match column {
+        None => (None, None),
+        Some(TimeColumn::One(column)) => (Some(column.as_str()), None),
+        Some(TimeColumn::SecondsAndNanoseconds([seconds, rest])) => {
+            (Some(seconds.as_str()), Some(rest.as_str()))
+        }
+    };
+    if nanoseconds.is_some() && unit.is_some_and(|unit| unit != seconds) {
+        let path = format!("{table}.time_unit");
+        return Err(document.wrong(&path, "`s`", "Choose it, or leave it out."));
+    }
+    Ok(Clock {
+        column,
+        nanoseconds,
+        unit: unit.unwrap_or(seconds),
+        period: period.map(|period| period.0),
+        breaks: Breaks::None,
+    })
+}
+
+/// Where the accelerometers are, if not in the rows of the gyros, and their clock.
+pub fn accel_from<'a>(
+    document: Document,
+    imu: &'a ImuFile,
+    directory: &Path,
+    gyro: &Source<'a>,
+    of_gyro: Clock<'a>,
+) -> Result<Option<(Source<'a>, Clock<'a>)>, FileError> {
+    let Some(fields) = &imu.accel_from else {
+        return Ok(None);
+    };
+    let source = Source {
+        file: (fields.file.as_ref()).map_or_else(|| gyro.file.clone(), |file| directory.join(file)),
+        stream: fields.stream.as_deref().or(gyro.stream),
+        salvage: fields.salvage.unwrap_or(gyro.salvage),
+    };
+    let stated = (fields.time_unit, fields.sample_period_s);
+    let mut clock = clock(document, "imu.accel_from", fields.time.as_ref(), stated)?;
+    if clock.column.is_none() {
+        (clock.column, clock.nanoseconds) = (of_gyro.column, of_gyro.nanoseconds);
+    }
+    if fields.time_unit.is_none() {
+        clock.unit = of_gyro.unit;
+    }
+    match clock.column {
+        Some(_) => Ok(Some((source, clock))),
+        None => Err(document.missing(
+            "imu.accel_from.time",
+            "the column of its time, for two streams need both",
+        )),
+    }
+}

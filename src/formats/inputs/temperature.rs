@@ -1,0 +1,270 @@
+//! Temperature columns of a log.
+
+use crate::formats::error::FileError;
+use crate::formats::rows::LogRows;
+use crate::formats::schema::{TemperatureColumn, ThreeColumns};
+use crate::imu::PerSensor;
+use crate::recording::{TEMPERATURE_SPACING, Temperature, TemperatureFacts};
+
+/// Beyond this, °C, no instrument is calibrated: the column is in another unit, or no temperature.
+const LARGEST: f64 = 100.0;
+/// More spans of [`TEMPERATURE_SPACING`] than this are no recording: a year.
+const MOST_SPANS: f64 = 366.0 * 86_400.0;
+
+/// What a column's numbers are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TemperatureUnit {
+    /// K for one of them.
+    kelvin: f64,
+    /// 0 °C in them.
+    zero: f64,
+}
+
+impl TemperatureUnit {
+    /// The words for it in `run.toml`.
+    pub const WORDS: [(&'static str, Self); 3] = [
+        ("degC", Self::new(1.0, 0.0)),
+        ("K", Self::new(1.0, 273.15)),
+        ("degF", Self::new(5.0 / 9.0, 32.0)),
+    ];
+
+    const fn new(kelvin: f64, zero: f64) -> Self {
+        Self { kelvin, zero }
+    }
+
+    fn celsius(self, value: f64) -> f64 {
+        (value - self.zero) * self.kelvin
+    }
+}
+
+/// What `run.toml` says of them.
+pub struct TemperatureColumns<'a> {
+    names: Vec<&'a str>,
+    of: PerSensor<[usize; 3]>,
+    unit: TemperatureUnit,
+}
+
+impl<'a> TemperatureColumns<'a> {
+    /// A column of both triads, or one or three of each.
+    pub fn of_fields(column: &'a TemperatureColumn, unit: TemperatureUnit) -> Self {
+        let mut all = Self {
+            names: Vec::new(),
+            of: PerSensor::default(),
+            unit,
+        };
+        match column {
+            TemperatureColumn::One(name) => all.names.push(name),
+            TemperatureColumn::Triads { gyro, accel } => {
+                all.of.gyro = all.places(gyro);
+                all.of.accel = all.places(accel);
+            }
+        }
+        all
+    }
+
+    fn places(&mut self, columns: &'a ThreeColumns) -> [usize; 3] {
+        let names = match columns {
+            ThreeColumns::One(name) => [name; 3],
+            ThreeColumns::Three(names) => names.each_ref(),
+        };
+        names.map(|name| {
+            let known = self.names.iter().position(|known| known == name);
+            known.unwrap_or_else(|| {
+                self.names.push(name);
+                self.names.len() - 1
+            })
+        })
+    }
+
+    /// The columns, each once.
+    pub fn names(&self) -> &[&'a str] {
+        &self.names
+    }
+
+    /// The column of the first axis, as it is named.
+    pub fn first(&self) -> &'a str {
+        self.names[0]
+    }
+
+    /// Ready to read a file.
+    pub fn start(&self, csv: &mut LogRows) -> Result<Temperatures, FileError> {
+        let places = self.names.iter().map(|name| csv.column(name));
+        let names = self.names.iter().map(|name| (*name).to_owned());
+        Ok(Temperatures {
+            channels: places
+                .zip(names)
+                .map(|(place, name)| Ok(Channel::new(place?, name)))
+                .collect::<Result<_, FileError>>()?,
+            of: self.of,
+            unit: self.unit,
+            first: None,
+        })
+    }
+}
+
+/// Temperatures as a file is read.
+pub struct Temperatures {
+    channels: Vec<Channel>,
+    of: PerSensor<[usize; 3]>,
+    unit: TemperatureUnit,
+    /// Stamp of the first row, s.
+    first: Option<f64>,
+}
+
+struct Channel {
+    place: usize,
+    name: String,
+    /// Sum and number of values in each span.
+    spans: Vec<(f64, u32)>,
+    smallest: f64,
+    largest: f64,
+    sum: f64,
+    count: usize,
+    /// Rows without a number, and the line of the first.
+    missing: (usize, u64),
+    /// The first value that is no temperature, as it stands, and its line.
+    beyond: Option<(f64, u64)>,
+}
+
+/// What was read of them.
+pub struct Read {
+    pub temperature: Option<Temperature>,
+    pub facts: Option<TemperatureFacts>,
+    /// What is wrong with them, a sentence each.
+    pub notes: Vec<String>,
+}
+
+impl Temperatures {
+    /// Takes a row with this stamp, s.
+    pub fn take(&mut self, csv: &LogRows, time: f64) {
+        let first = *self.first.get_or_insert(time);
+        let span = (time - first) / TEMPERATURE_SPACING;
+        if !(0.0..MOST_SPANS).contains(&span) {
+            return;
+        }
+        for channel in &mut self.channels {
+            channel.take(csv, span as usize, self.unit);
+        }
+    }
+
+    /// What was read, of a file whose stamps are so much later than its first sample's begin, s.
+    pub fn read(self, file: &str) -> Read {
+        let facts = self.channels.first().and_then(|channel| {
+            (channel.count > 0).then(|| TemperatureFacts {
+                smallest: channel.smallest,
+                mean: channel.sum / channel.count as f64,
+                largest: channel.largest,
+            })
+        });
+        let notes: Vec<String> = self
+            .channels
+            .iter()
+            .flat_map(|channel| channel.notes(file))
+            .collect();
+        let sound = |channel: &Channel| channel.beyond.is_none() && channel.count > 0;
+        let usable = self.channels.iter().all(sound);
+        let first = self.first.unwrap_or(0.0);
+        let values = self.channels.into_iter().map(Channel::filled).collect();
+        let temperature = usable
+            .then(|| Temperature::new(first + 0.5 * TEMPERATURE_SPACING, values, self.of))
+            .flatten();
+        Read {
+            temperature,
+            facts,
+            notes,
+        }
+    }
+}
+
+impl Channel {
+    fn new(place: usize, name: String) -> Self {
+        Self {
+            place,
+            name,
+            spans: Vec::new(),
+            smallest: f64::INFINITY,
+            largest: f64::NEG_INFINITY,
+            sum: 0.0,
+            count: 0,
+            missing: (0, 0),
+            beyond: None,
+        }
+    }
+
+    fn take(&mut self, csv: &LogRows, span: usize, unit: TemperatureUnit) {
+        let value = csv
+            .number(self.place)
+            .ok()
+            .filter(|value| value.is_finite());
+        let Some(value) = value else {
+            if self.missing.0 == 0 {
+                self.missing.1 = csv.line();
+            }
+            self.missing.0 += 1;
+            return;
+        };
+        let celsius = unit.celsius(value);
+        if celsius.abs() > LARGEST {
+            self.beyond.get_or_insert((value, csv.line()));
+            return;
+        }
+        if self.spans.len() <= span {
+            self.spans.resize(span + 1, (0.0, 0));
+        }
+        let (sum, count) = &mut self.spans[span];
+        *sum += celsius;
+        *count += 1;
+        self.smallest = self.smallest.min(celsius);
+        self.largest = self.largest.max(celsius);
+        self.sum += celsius;
+        self.count += 1;
+    }
+
+    fn notes(&self, file: &str) -> Vec<String> {
+        let mut notes = Vec::new();
+        if let Some((value, line)) = self.beyond {
+            let (name, largest) = (&self.name, LARGEST);
+            notes.push(format!(
+                "{file}, line {line}, column {name}: found {value}, expected a temperature within ±{largest} °C. \
+                 The column is not used; if it is in kelvin or fahrenheit, say temperature_unit = \"K\" or \"degF\" \
+                 in [imu]."
+            ));
+        }
+        let (missing, line) = self.missing;
+        if missing > 0 {
+            let name = &self.name;
+            notes.push(format!(
+                "{file}, column {name}: {missing} row(s) hold no temperature, the first in line {line}. It is \
+                 interpolated there."
+            ));
+        }
+        notes
+    }
+
+    /// Means of the spans, those without a value on the straight line between their neighbours.
+    fn filled(self) -> Vec<f64> {
+        let known: Vec<(usize, f64)> = self
+            .spans
+            .iter()
+            .enumerate()
+            .filter(|(_, (_, count))| *count > 0)
+            .map(|(k, (sum, count))| (k, sum / f64::from(*count)))
+            .collect();
+        let Some(&(_, last)) = known.last() else {
+            return Vec::new();
+        };
+        let mut filled = Vec::with_capacity(self.spans.len());
+        let mut before: Option<(usize, f64)> = None;
+        for (k, value) in known {
+            let (from, start) = before.unwrap_or((k, value));
+            for j in filled.len()..k {
+                let part = (j as f64 - from as f64) / (k - from).max(1) as f64;
+                filled.push(start + (value - start) * part.max(0.0));
+            }
+            filled.push(value);
+            before = Some((k, value));
+        }
+        filled.resize(self.spans.len(), last);
+        filled
+    }
+}

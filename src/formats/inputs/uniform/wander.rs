@@ -1,0 +1,150 @@
+//! How far a clock of samples wanders from a uniform one.
+
+use crate::statistics::median;
+
+/// Rows that share a knot: many against jitter, few against what an oscillator's rate changes by.
+const ROWS: usize = 64;
+/// Stamps nearer than this part of a sample to their due times need no other clock.
+const WITHIN: f64 = 0.5;
+
+/// Rows of about one time: the mean of their numbers, and the median of how far their stamps are off, s.
+#[derive(Debug, Clone, Copy)]
+struct Knot {
+    number: f64,
+    off: f64,
+}
+
+/// Stamps as they come, against a clock that they are referred to.
+#[derive(Debug, Clone, Default)]
+pub struct Knots {
+    rows: Vec<(usize, f64)>,
+    knots: Vec<Knot>,
+    count: usize,
+    squares: f64,
+    largest: f64,
+}
+
+impl Knots {
+    pub fn of(rows: impl IntoIterator<Item = (usize, f64)>) -> Self {
+        let mut knots = Self::default();
+        for (number, off) in rows {
+            knots.push(number, off);
+        }
+        knots.finish()
+    }
+
+    pub fn push(&mut self, number: usize, off: f64) {
+        self.rows.push((number, off));
+        if self.rows.len() == ROWS {
+            self.tie();
+        }
+    }
+
+    /// With the rows that are left, if they are enough to tell a wander from jitter.
+    pub fn finish(mut self) -> Self {
+        if 2 * self.rows.len() >= ROWS || self.knots.is_empty() {
+            self.tie();
+        }
+        self
+    }
+
+    fn tie(&mut self) {
+        let mut offs: Vec<f64> = self.rows.iter().map(|&(_, off)| off).collect();
+        let Some(off) = median(&mut offs) else {
+            return;
+        };
+        let numbers = self.rows.iter().map(|&(number, _)| number as f64);
+        let number = numbers.sum::<f64>() / self.rows.len() as f64;
+        self.knots.push(Knot { number, off });
+        for (_, of_row) in self.rows.drain(..) {
+            let jitter = (of_row - off).abs();
+            self.count += 1;
+            self.squares += jitter * jitter;
+            self.largest = self.largest.max(jitter);
+        }
+    }
+
+    /// RMS and largest of how far stamps are off their knots, s.
+    pub fn jitter(&self) -> (f64, f64) {
+        let mean = self.squares / self.count.max(1) as f64;
+        (mean.sqrt(), self.largest)
+    }
+
+    /// From a clock whose first sample is due so much later than that of the one that stamps are referred to, and
+    /// whose period is so much longer; none if stamps are as near to that one as makes no difference.
+    pub fn wander(&self, later: f64, longer: f64, period: f64) -> Option<Wander> {
+        let knots = self.knots.iter().map(|knot| {
+            let off = (knot.off - later - knot.number * longer) / period;
+            (knot.number, off)
+        });
+        let knots: Vec<_> = knots.collect();
+        let wanders = knots.iter().any(|(_, off)| off.abs() > WITHIN);
+        (wanders && knots.len() > 1).then_some(Wander { knots })
+    }
+}
+
+/// The samples of a clock that wanders on the axis of time of a uniform one, both counted in samples.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Wander {
+    /// Number, and how much later it is than its number says; between them straight lines.
+    knots: Vec<(f64, f64)>,
+}
+
+impl Wander {
+    /// When a sample is, which need not be a whole one.
+    pub fn time(&self, number: f64) -> f64 {
+        let behind = self.knots.partition_point(|&(knot, _)| knot <= number);
+        self.between(behind, |(knot, off)| (knot, knot + off), number)
+    }
+
+    /// The sample of a time.
+    pub fn number(&self, time: f64) -> f64 {
+        let behind = self
+            .knots
+            .partition_point(|&(knot, off)| knot + off <= time);
+        self.between(behind, |(knot, off)| (knot + off, knot), time)
+    }
+
+    /// The sample from which on the clock does not go forward any more; none of one that does.
+    pub fn stops(&self) -> Option<usize> {
+        let time = |(number, off): (f64, f64)| number + off;
+        let forward = |pair: &[(f64, f64)]| time(pair[1]) > time(pair[0]);
+        let stops = self.knots.windows(2).find(|pair| !forward(pair));
+        stops.map(|pair| pair[0].0 as usize)
+    }
+
+    /// The most by which a sample is off, in samples.
+    pub fn largest(&self) -> f64 {
+        let offs = self.knots.iter().map(|(_, off)| off.abs());
+        offs.fold(0.0, f64::max)
+    }
+
+    /// On the line through the knots before and behind, as seen along either axis.
+    fn between(&self, behind: usize, seen: impl Fn((f64, f64)) -> (f64, f64), at: f64) -> f64 {
+        let behind = behind.clamp(1, self.knots.len() - 1);
+        let (x, y) = seen(self.knots[behind - 1]);
+        let (next_x, next_y) = seen(self.knots[behind]);
+        y + (next_y - y) * (at - x) / (next_x - x)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clock_stops_going_on_where_its_times_do_not_increase() {
+        let stops = |offs: [f64; 3]| {
+            let knots = offs.into_iter().enumerate();
+            let knots = knots.map(|(k, off)| (32.0 + 64.0 * k as f64, off));
+            let wander = Wander {
+                knots: knots.collect(),
+            };
+            wander.stops()
+        };
+        assert_eq!(stops([0.0, -60.0, 60.0]), None);
+        assert_eq!(stops([0.0, 60.0, -10.0]), Some(96));
+        assert_eq!(stops([0.0, -64.0, 0.0]), Some(32));
+        assert_eq!(stops([0.0, f64::NAN, 0.0]), Some(32));
+    }
+}

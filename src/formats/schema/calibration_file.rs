@@ -1,0 +1,334 @@
+//! `calibration.json` and `truth.json`: read with every value that cannot be refused, written whole.
+//!
+//! A calibration that was reached here is written whatever its size, because its findings say what it is worth.
+
+use std::collections::HashSet;
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+use nalgebra::DMatrix;
+
+use crate::calibration::result::{Calibration, FORMAT, FORMAT_WITH_TEMPERATURE, TriadRecord};
+use crate::formats::directories::write_whole;
+use crate::formats::error::{FileError, Place, suggestion};
+use crate::formats::small_file;
+use crate::imu::{AXES, PARAMETERS, PerSensor, Sensor, Term, ThermalRange, Triad};
+use crate::shown::excerpt;
+use crate::units::{DEGREE, STANDARD_GRAVITY};
+
+/// An entry of an installation matrix beyond this is of an axis across the one that it is named for.
+const INSTALLATION: f64 = 100.0;
+/// A bias, in rad/s or m/s², beyond the range of any instrument: registers that read half their range at zero
+/// included.
+const BIAS: f64 = 1e6;
+/// Scale factors, in the file's quantity for one rad/s or m/s².
+const SCALES: RangeInclusive<f64> = 1e-12..=1e15;
+/// Gravity anywhere near the surface of the Earth, m/s².
+const GRAVITY: RangeInclusive<f64> = 9.7..=9.9;
+/// Errors of a table's base and axes are small angles, rad.
+const TABLE: f64 = 180.0 * DEGREE;
+/// Digits that another program may have rounded a correlation to.
+const ROUNDING: f64 = 1e-6;
+
+/// What is wrong: what was found, and what was expected.
+type Wrong = (String, String);
+type Checked = Result<(), Wrong>;
+
+/// Refuses what does not hold.
+macro_rules! expect {
+    ($holds:expr, $expected:expr, $($found:tt)+) => {
+        if !$holds {
+            return Err((format!($($found)+), $expected.to_string()));
+        }
+    };
+}
+
+impl Calibration {
+    /// Reads and checks a record.
+    pub fn read(path: &Path) -> Result<Self, FileError> {
+        let bytes = small_file::bytes(path).map_err(|error| {
+            let advice = "Give the path of a calibration.json or truth.json.";
+            FileError::io(path, "read the calibration", &error, advice)
+        })?;
+        let record: Self = serde_json::from_slice(&bytes).map_err(|error| {
+            let (line, column) = (error.line() as u64, error.column() as u64);
+            let at = format!(" at line {line} column {column}");
+            let what = excerpt(&error.to_string().replace(&at, ""));
+            FileError {
+                file: path.to_owned(),
+                place: Place::Character { line, column },
+                message: format!(
+                    "not a calibration in the format {FORMAT}: {what}. Correct the file or write it \
+                     again."
+                ),
+            }
+        })?;
+        let checked = record.check();
+        let checked = checked.and_then(|()| record.check_sizes());
+        let checked = checked.and_then(|()| record.check_correlations());
+        checked.map_err(|wrong| refused(path, &wrong))?;
+        Ok(record)
+    }
+
+    /// The record as the bytes of its file, `path` being named in errors.
+    pub fn to_json(&self, path: &Path) -> Result<Vec<u8>, FileError> {
+        let written = || serde_json::to_vec_pretty(self);
+        let expected = "values that JSON can hold".to_owned();
+        let bytes = self
+            .check()
+            .and_then(|()| written().map_err(|error| (error.to_string(), expected)));
+        let mut bytes = bytes.map_err(|wrong| refused(path, &wrong))?;
+        bytes.push(b'\n');
+        Ok(bytes)
+    }
+
+    /// Writes the record whole or not at all; an existing file only with `force`.
+    pub fn write(&self, path: &Path, force: bool) -> Result<(), FileError> {
+        write_whole(path, &self.to_json(path)?, force)
+    }
+
+    fn check(&self) -> Checked {
+        let formats = [FORMAT, FORMAT_WITH_TEMPERATURE];
+        expect!(
+            formats.contains(&self.format.as_str()),
+            format!("{FORMAT:?} or {FORMAT_WITH_TEMPERATURE:?}"),
+            "format = {:?}",
+            self.format
+        );
+        for (name, triad) in [("gyro", &self.gyro), ("accel", &self.accel)] {
+            expect!(
+                triad.values().all(f64::is_finite),
+                "finite numbers",
+                "a value in {name} that is not finite"
+            );
+            expect!(
+                !triad.scale.contains(&0.0),
+                "three scale factors, none of them zero",
+                "{name}.scale with a zero"
+            );
+        }
+        let of_triads =
+            |sigma: &PerSensor<TriadRecord>| [("gyro", sigma.gyro), ("accel", sigma.accel)];
+        for (name, sigma) in self.sigma.iter().flat_map(of_triads) {
+            for value in sigma.values() {
+                expect!(
+                    value.is_finite() && value >= 0.0,
+                    "finite numbers that are zero or above",
+                    "{value} in sigma.{name}"
+                );
+            }
+        }
+        self.check_parameters()?;
+        self.check_covariance()?;
+        self.check_temperature()
+    }
+
+    fn check_parameters(&self) -> Checked {
+        let form = self.installation_form.unwrap_or_default();
+        let of_sensor =
+            |sensor| (0..PARAMETERS).filter_map(move |p| Triad::parameter_name(sensor, form, p));
+        let known: Vec<String> = Sensor::ALL.into_iter().flat_map(of_sensor).collect();
+        let mut seen = HashSet::new();
+        for (field, names) in [("parameters", &self.parameters), ("fixed", &self.fixed)] {
+            for name in names {
+                let expected = || {
+                    let known = known.iter().map(String::as_str);
+                    let advice = suggestion(name, known, "This form does not have it.");
+                    format!("names of parameters of the {} form. {advice}", form.name())
+                };
+                expect!(known.contains(name), expected(), "`{name}` in {field}");
+                expect!(seen.insert(name), "every parameter once", "`{name}` twice");
+            }
+        }
+        Ok(())
+    }
+
+    fn check_covariance(&self) -> Checked {
+        let size = self.parameters.len();
+        expect!(
+            self.covariance.len() == size,
+            format!("{size}, one for each entry of parameters"),
+            "{} row(s) in covariance",
+            self.covariance.len()
+        );
+        for (i, row) in self.covariance.iter().enumerate() {
+            expect!(
+                row.len() == size,
+                format!("{size}, for covariance is square"),
+                "{} value(s) in row {} of covariance",
+                row.len(),
+                i + 1
+            );
+            expect!(
+                row.iter().all(|value| value.is_finite()) && row[i] >= 0.0,
+                "finite numbers, none below zero on the diagonal",
+                "a value in row {} of covariance that cannot be",
+                i + 1
+            );
+        }
+        Ok(())
+    }
+
+    fn check_temperature(&self) -> Checked {
+        let Some(thermal) = &self.temperature else {
+            return Ok(());
+        };
+        for sensor in Sensor::ALL {
+            let ThermalRange {
+                lowest,
+                highest,
+                reference,
+                largest_rate: rate,
+            } = *thermal.range.get(sensor);
+            let all = [lowest, highest, reference, rate];
+            expect!(
+                all.iter().all(|v| v.is_finite()) && lowest <= highest && rate >= 0.0,
+                "a finite range, its lower end first, and a rate that is not negative",
+                "temperature.range.{} from {lowest} to {highest} °C",
+                sensor.name()
+            );
+        }
+        let n = thermal.coefficients.len();
+        let rows = || thermal.covariance.iter().chain(&thermal.cross);
+        let coefficients = thermal.coefficients.iter().map(|c| &c.value);
+        expect!(
+            coefficients.chain(rows().flatten()).all(|v| v.is_finite()),
+            "finite numbers",
+            "a number in temperature that is not finite"
+        );
+        let covered = thermal.covariance.is_empty()
+            || (thermal.covariance.len() == n && thermal.cross.len() == self.parameters.len());
+        expect!(
+            covered && rows().all(|row| row.len() == n),
+            "a row of covariance for each coefficient, one of cross for each parameter",
+            "temperature.covariance or .cross of another size"
+        );
+        let none = PerSensor::default();
+        let anywhere = thermal.range.state(&none, &none);
+        let expected = || "names of parameters and orders from 1 to 5".to_owned();
+        let at = self.in_state(&anywhere);
+        at.map_or_else(|found| Err((found.to_string(), expected())), |_| Ok(()))
+    }
+
+    /// Refuses values beyond what an instrument has.
+    fn check_sizes(&self) -> Checked {
+        check_triad("gyro", &self.gyro, &self.gyro)?;
+        check_triad("accel", &self.accel, &self.accel)?;
+        if let Some(sigma) = &self.sigma {
+            check_triad("sigma.gyro", &sigma.gyro, &self.gyro)?;
+            check_triad("sigma.accel", &sigma.accel, &self.accel)?;
+        }
+        for (name, term) in &self.terms {
+            let known = Term::parameter_named(name).and_then(Term::of);
+            let largest = known.map_or(TABLE, |term| term.entry().largest);
+            expect!(
+                term.value.abs() <= largest,
+                format!("a value from {:.3} to {largest:.3} in SI", -largest),
+                "terms.{name}.value = {:e}",
+                term.value
+            );
+            let sigma = term.sigma.unwrap_or(0.0);
+            expect!(
+                (0.0..=largest).contains(&sigma),
+                format!("a 1σ from 0 to {largest:.3} in SI"),
+                "terms.{name}.sigma = {sigma:e}"
+            );
+        }
+        if let Some(gravity) = &self.gravity {
+            expect!(
+                GRAVITY.contains(&gravity.m_s2),
+                format!("{} to {} m/s²", GRAVITY.start(), GRAVITY.end()),
+                "gravity.m_s2 = {}",
+                gravity.m_s2
+            );
+            expect!(
+                (0.0..=STANDARD_GRAVITY).contains(&gravity.sigma_m_s2),
+                "a 1σ in m/s², zero or above",
+                "gravity.sigma_m_s2 = {}",
+                gravity.sigma_m_s2
+            );
+        }
+        Ok(())
+    }
+
+    /// Refuses what is no covariance: not symmetric, or with a combination of parameters of negative
+    /// variance.
+    fn check_correlations(&self) -> Checked {
+        let size = self.parameters.len();
+        if size == 0 {
+            return Ok(());
+        }
+        let sigma: Vec<f64> = (0..size).map(|k| self.covariance[k][k].sqrt()).collect();
+        let mut correlation = DMatrix::identity(size, size);
+        for (i, j) in (0..size).flat_map(|i| (0..i).map(move |j| (i, j))) {
+            let both = format!("of {} and {}", self.parameters[i], self.parameters[j]);
+            let (value, mirrored) = (self.covariance[i][j], self.covariance[j][i]);
+            let scale = sigma[i] * sigma[j];
+            expect!(
+                (value - mirrored).abs() <= ROUNDING * scale,
+                "the same twice, for covariance is symmetric",
+                "the covariance {both} twice, {value:e} and {mirrored:e}"
+            );
+            expect!(
+                value.abs() <= (1.0 + ROUNDING) * scale,
+                "a correlation from −1 to 1",
+                "a covariance {both} of {value:e} beside σ of {:e} and {:e}",
+                sigma[i],
+                sigma[j]
+            );
+            let of_both = if scale > 0.0 { value / scale } else { 0.0 };
+            correlation[(i, j)] = of_both;
+            correlation[(j, i)] = of_both;
+        }
+        let least = correlation.symmetric_eigenvalues().min();
+        expect!(
+            least >= -ROUNDING * size as f64,
+            "a positive semidefinite matrix",
+            "a covariance by which a combination of parameters has a negative variance (smallest eigenvalue of the \
+             correlations {least:.3})"
+        );
+        Ok(())
+    }
+}
+
+/// Values, or their 1σ, against what an instrument of this triad's scale factors can have.
+fn check_triad(name: &str, values: &TriadRecord, of: &TriadRecord) -> Checked {
+    for (i, axis) in AXES.iter().enumerate() {
+        let (scale, largest) = (of.scale[i], *SCALES.end());
+        expect!(
+            SCALES.contains(&scale.abs()),
+            format!("{:e} to {largest:e} in magnitude", SCALES.start()),
+            "{name}.scale.{axis} = {scale:e}"
+        );
+        let installation = AXES
+            .iter()
+            .zip(values.installation[i])
+            .map(|(other, value)| (format!("installation.{axis}{other}"), value, INSTALLATION));
+        let scale_and_bias = [
+            (format!("scale.{axis}"), values.scale[i], largest),
+            (format!("bias.{axis}"), values.bias[i], BIAS * scale.abs()),
+        ];
+        for (field, value, largest) in installation.chain(scale_and_bias) {
+            expect!(
+                value.abs() <= largest,
+                format!("at most {largest:e} in magnitude"),
+                "{name}.{field} = {value:e}"
+            );
+        }
+    }
+    Ok(())
+}
+
+fn refused(path: &Path, (found, expected): &Wrong) -> FileError {
+    let advice = "Correct the file, or write the calibration again.";
+    FileError::new(path, Place::File, found, expected, advice)
+}
+
+impl TriadRecord {
+    fn values(&self) -> impl Iterator<Item = f64> {
+        self.scale
+            .into_iter()
+            .chain(self.installation.into_iter().flatten())
+            .chain(self.bias)
+    }
+}

@@ -1,0 +1,304 @@
+//! `campaign.toml`: recordings of one instrument that are calibrated together.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::{Celsius, Document, NonNegative};
+use crate::calibration::{DayToDay, Group, TemperatureOptions, Together};
+use crate::formats::error::FileError;
+use crate::formats::small_file;
+use crate::imu::{HIGHEST_ORDER, InstallationForm, ParameterKind};
+use crate::recording::Temperature;
+use crate::run::Run;
+use crate::units::ARCSEC;
+
+/// The version of the format.
+const FORMAT: &str = "turncal-campaign/1";
+/// Recordings of one instrument with what they have in common.
+#[derive(Debug, Clone)]
+pub struct Campaign {
+    /// The name of its directory, or of the file.
+    pub name: String,
+    /// In the order of their names, whatever that of the file.
+    pub runs: Vec<Run>,
+    /// What they have in common.
+    pub together: Together,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CampaignFile {
+    /// Groups of parameters that each recording has for itself.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    own: Vec<String>,
+    temperature: Option<TemperatureFile>,
+    recording: Vec<RecordingFile>,
+    /// 1σ from one recording to the next.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    day_to_day: BTreeMap<String, NonNegative>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RecordingFile {
+    run: PathBuf,
+    temperature_degc: Option<Celsius>,
+}
+
+/// Whether parameters follow temperature, and how.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[serde(
+    untagged,
+    deny_unknown_fields,
+    expecting = "true, false, or a table with `highest_order` (1 to 5), `rate` and `reference_degc`"
+)]
+enum TemperatureFile {
+    Follows(bool),
+    With {
+        highest_order: Option<u8>,
+        rate: Option<bool>,
+        reference_degc: Option<Celsius>,
+    },
+}
+
+impl Campaign {
+    /// Whether a file says that it is one.
+    pub fn is_at(path: &Path) -> bool {
+        let Ok(text) = small_file::text(path) else {
+            return false;
+        };
+        let document = Document {
+            file: path,
+            text: &text,
+        };
+        let Ok(table) = document.parse() else {
+            return false;
+        };
+        let format = table.get_ref().get("format");
+        let format = format.and_then(|format| format.get_ref().as_str());
+        format.is_some_and(|format| format.starts_with("turncal-campaign/"))
+    }
+
+    /// Reads a campaign and its recordings, whose paths are relative to it.
+    ///
+    /// # Errors
+    /// [`FileError`] if it or a recording cannot be read, or a value cannot be.
+    pub fn read(path: &Path) -> Result<Self, FileError> {
+        let text = small_file::text(path).map_err(|error| {
+            let advice = "Give the path of a campaign.toml.";
+            FileError::io(path, "read the campaign", &error, advice)
+        })?;
+        let document = Document {
+            file: path,
+            text: &text,
+        };
+        let mut file: CampaignFile = document.fill(document.of_format(FORMAT)?)?;
+        if file.recording.is_empty() {
+            return Err(document.missing("recording", ""));
+        }
+        let directory = path.parent().unwrap_or(Path::new(""));
+        let named = &mut file.recording;
+        named
+            .iter_mut()
+            .for_each(|one| one.run = directory.join(&one.run));
+        named.sort_by(|a, b| a.run.cmp(&b.run));
+        if let Some(pair) = named.windows(2).find(|pair| pair[0].run == pair[1].run) {
+            let advice = "Name every recording once.";
+            let found = format_args!("{} twice", pair[0].run.display());
+            let place = crate::formats::error::Place::File;
+            return Err(FileError::new(
+                path,
+                place,
+                found,
+                "each recording once",
+                advice,
+            ));
+        }
+        let temperature = file
+            .temperature
+            .map(|of| temperature(document, of))
+            .transpose()?;
+        let runs = named.par_iter().map(|named| {
+            let mut run = Run::read(&named.run)?;
+            let of_meta = run.recording.meta.get("temperature_degc");
+            let of_meta = || Celsius::try_from(of_meta?.parse::<f64>().ok()?).ok();
+            let stated = named.temperature_degc.or_else(of_meta).map(|of| of.0);
+            let of_run = &mut run.recording.imu.temperature;
+            *of_run = of_run.take().or(stated.map(Temperature::constant));
+            Ok(run)
+        });
+        let mut runs: Vec<Run> = runs.collect::<Result<_, FileError>>()?;
+        doubt_stuck(&mut runs);
+        let mut day_to_day = day_to_day(document, &file.day_to_day)?;
+        own_parameters(document, &file.own, &runs, &mut day_to_day)?;
+        let temperature = match temperature {
+            Some(stated) => stated,
+            None => {
+                let known = |run: &Run| run.recording.imu.temperature.is_some();
+                runs.iter().all(known).then(TemperatureOptions::default)
+            }
+        };
+        Ok(Self {
+            name: super::read::name(path),
+            runs,
+            together: Together {
+                day_to_day,
+                temperature,
+            },
+        })
+    }
+}
+
+/// The `campaign.toml` of recordings with these paths, relative to it, that differ from day to day by this 1σ.
+pub fn campaign_text(paths: &[String], day_to_day: &DayToDay) -> Result<String, toml::ser::Error> {
+    let lines = Group::all().filter_map(|group| {
+        let (key, unit) = DayToDay::key(group);
+        let first = *group.parameters(InstallationForm::General).first()?;
+        Some((key, day_to_day.parameters[first] / unit))
+    });
+    let mounting = (MOUNTING.to_owned(), day_to_day.mounting / ARCSEC);
+    let lines = lines.chain([mounting]).filter(|&(_, sigma)| sigma > 0.0);
+    let recording = |path: &String| RecordingFile {
+        run: path.into(),
+        temperature_degc: None,
+    };
+    let file = CampaignFile {
+        own: Vec::new(),
+        temperature: None,
+        recording: paths.iter().map(recording).collect(),
+        day_to_day: lines
+            .map(|(key, sigma)| (key, three_digits(sigma)))
+            .collect(),
+    };
+    let text = toml::to_string(&file)?;
+    let comment = "\n# 1σ from one recording to the next\n[day_to_day]";
+    let text = text.replace("\n[day_to_day]", comment);
+    Ok(format!("format = \"{FORMAT}\"\n\n{text}"))
+}
+
+fn three_digits(value: f64) -> NonNegative {
+    NonNegative(format!("{value:.2e}").parse().unwrap_or(value))
+}
+
+/// Notes temperatures that never change where those of other recordings do.
+fn doubt_stuck(runs: &mut [Run]) {
+    let facts = |run: &Run| {
+        run.recording
+            .imu
+            .log
+            .as_ref()
+            .and_then(|log| log.temperature)
+    };
+    let stuck: Vec<Option<f64>> = runs
+        .iter()
+        .map(|run| {
+            facts(run)
+                .filter(|of| of.smallest == of.largest)
+                .map(|of| of.smallest)
+        })
+        .collect();
+    let any_varies = runs
+        .iter()
+        .zip(&stuck)
+        .any(|(run, stuck)| facts(run).is_some() && stuck.is_none());
+    for (run, stuck) in runs.iter_mut().zip(stuck).filter(|_| any_varies) {
+        if let Some(value) = stuck {
+            run.recording.notes.push(format!(
+                "The temperature of {} is {value} °C in every row, that of other recordings varies: is its sensor stuck? \
+                 Say temperature_degc beside the recording in the campaign, and leave the column out of its run.toml.",
+                run.recording.name
+            ));
+        }
+    }
+}
+
+/// How parameters follow temperature; none if they do not.
+fn temperature(
+    document: Document,
+    stated: TemperatureFile,
+) -> Result<Option<TemperatureOptions>, FileError> {
+    let usual = TemperatureOptions::default();
+    match stated {
+        TemperatureFile::Follows(follows) => Ok(follows.then_some(usual)),
+        TemperatureFile::With {
+            highest_order: Some(order),
+            ..
+        } if !(1..=HIGHEST_ORDER).contains(&usize::from(order)) => {
+            let expected = format_args!("a whole number from 1 to {HIGHEST_ORDER}");
+            let path = "temperature.highest_order";
+            Err(document.wrong(path, expected, "Correct this value."))
+        }
+        TemperatureFile::With {
+            highest_order,
+            rate,
+            reference_degc,
+        } => Ok(Some(TemperatureOptions {
+            highest_order: highest_order.map_or(usual.highest_order, usize::from),
+            rate: rate.unwrap_or(usual.rate),
+            reference: reference_degc.map(|of| of.0).or(usual.reference),
+        })),
+    }
+}
+
+/// The key of the mounting in `[day_to_day]`.
+const MOUNTING: &str = "mounting_arcsec";
+
+/// The name of a group in `own`.
+fn own_name(group: Group) -> String {
+    let kind = match group.kind() {
+        ParameterKind::Scale => "scale",
+        ParameterKind::Installation => "installation",
+        ParameterKind::Bias => "bias",
+    };
+    format!("{}.{kind}", group.sensor().name())
+}
+
+/// 1σ by which recordings differ, from a table `[day_to_day]`.
+pub fn day_to_day(
+    document: Document,
+    stated: &BTreeMap<String, NonNegative>,
+) -> Result<DayToDay, FileError> {
+    let keys: Vec<(String, f64)> = Group::all().map(DayToDay::key).collect();
+    let known = keys.iter().map(|(key, _)| key.as_str());
+    let known: Vec<&str> = known.chain([MOUNTING]).collect();
+    document.only("day_to_day", stated.keys(), &known)?;
+    let mut differ = DayToDay::default();
+    for (group, (key, unit)) in Group::all().zip(&keys) {
+        for i in group.parameters(InstallationForm::General) {
+            differ.parameters[i] = stated.get(key).map_or(0.0, |sigma| sigma.0 * unit);
+        }
+    }
+    differ.mounting = stated.get(MOUNTING).map_or(0.0, |sigma| sigma.0 * ARCSEC);
+    Ok(differ)
+}
+
+/// What differs as much as instruments do has nothing in common.
+fn own_parameters(
+    document: Document,
+    own: &[String],
+    runs: &[Run],
+    day_to_day: &mut DayToDay,
+) -> Result<(), FileError> {
+    let form = InstallationForm::General;
+    for name in own {
+        let Some(group) = Group::all().find(|&group| own_name(group) == *name) else {
+            let known: Vec<String> = Group::all().map(own_name).collect();
+            return Err(document.wrong(
+                "own",
+                format_args!("names among {}", known.join(", ")),
+                "Name groups of parameters that each recording has for itself.",
+            ));
+        };
+        for i in group.parameters(form) {
+            let (sensor, of_triad) = crate::calibration::sensor_and_parameter(i);
+            let prior = runs
+                .first()
+                .map(|run| run.instrument.prior.get(sensor).sigma(form));
+            day_to_day.parameters[i] = prior.map_or(0.0, |prior| prior[of_triad]);
+        }
+    }
+    Ok(())
+}

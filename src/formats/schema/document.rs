@@ -1,0 +1,230 @@
+//! A TOML document whose errors name line, column, field, what was found and what to do.
+
+use std::fmt::Display;
+use std::ops::Range;
+use std::path::Path;
+
+use serde::Deserialize;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue, Deserializer};
+
+use crate::formats::error::{FileError, Place, list, suggestion};
+
+/// What fields hold that must be there.
+const MEANINGS: [(&str, &str); 19] = [
+    ("accel", "the names of three columns, or of one"),
+    ("accel_unit", "the unit of a row"),
+    ("column", "the column that tells instruments apart"),
+    ("columns", "the names of the columns"),
+    ("file", "a file name"),
+    ("format", "the format of this file"),
+    ("gyro", "the names of three columns, or of one"),
+    ("gyro_unit", "the unit of a row"),
+    ("imu", "a table of the instrument and its record"),
+    (
+        "number",
+        "what the column says of the instrument that is meant",
+    ),
+    ("output", "what a row holds: pulse, increment or rate"),
+    ("position_sigma_arcsec", "a 1σ in seconds of arc"),
+    ("reading_sigma_arcsec", "a 1σ in seconds of arc"),
+    (
+        "recording",
+        "a [[recording]] for each run, with run = \"its run.toml\"",
+    ),
+    ("run", "the path of a run.toml"),
+    ("sigma", "1σ of each of its parameters"),
+    ("time", "the name of a column"),
+    ("time_stamp", "which moment of a sample its time names"),
+    ("uncertainty", "the expanded uncertainty, k = 2"),
+];
+/// What serde expects, in words for users.
+const KINDS: [(&str, &str); 5] = [
+    ("f64", "a finite number"),
+    ("a string", "a text in quotes"),
+    ("a boolean", "true or false"),
+    ("a map", "a table"),
+    ("an array of length 3", "three texts in quotes, in brackets"),
+];
+
+/// The text that spans refer to.
+#[derive(Clone, Copy)]
+pub struct Document<'a> {
+    pub file: &'a Path,
+    pub text: &'a str,
+}
+
+impl<'a> Document<'a> {
+    /// The fields of a document of this format, which is not among them.
+    pub fn of_format(self, format: &str) -> Result<Spanned<DeTable<'a>>, FileError> {
+        let mut table = self.parse()?;
+        match table.get_mut().remove("format") {
+            Some(said) if said.get_ref().as_str() == Some(format) => Ok(table),
+            Some(_) => Err(self.wrong("format", format_args!("`{format}`"), "Choose it.")),
+            None => Err(self.missing("format", "")),
+        }
+    }
+
+    /// All fields.
+    pub fn parse(self) -> Result<Spanned<DeTable<'a>>, FileError> {
+        DeTable::parse(self.text).map_err(|error| {
+            let found = format_args!("TOML that cannot be read ({})", error.message());
+            self.error(error.span(), found, "a TOML document", "Correct this line.")
+        })
+    }
+
+    /// Fields as a type has them.
+    pub fn fill<T: Deserialize<'a>>(self, table: Spanned<DeTable<'a>>) -> Result<T, FileError> {
+        T::deserialize(Deserializer::from(table)).map_err(|error| self.refused(&error))
+    }
+
+    /// A number or a date as the text that stands in the file; so are those of a table.
+    pub fn as_written(self, value: &mut Spanned<DeValue<'a>>) {
+        let span = value.span();
+        match value.get_mut() {
+            DeValue::Table(table) => {
+                let values = table.iter_mut();
+                values.for_each(|(_, value)| self.as_written(value));
+            }
+            DeValue::Array(_) | DeValue::String(_) => (),
+            other => *other = DeValue::String(self.written(span).into()),
+        }
+    }
+
+    /// What stands for a value in the file, its first line.
+    pub fn written(self, span: Range<usize>) -> &'a str {
+        let text = self.text.get(span).and_then(|text| text.lines().next());
+        text.unwrap_or("a value")
+    }
+
+    /// The error of a field, `table.name`, that is there.
+    pub fn wrong(self, path: &str, expected: impl Display, advice: impl Display) -> FileError {
+        let span = self.span_of(path);
+        let source = span.clone().map_or("nothing", |span| self.written(span));
+        self.error(span, format_args!("{path} = {source}"), expected, advice)
+    }
+
+    /// The error of a field, `table.name`, that is not there; `meaning` says what it holds.
+    pub fn missing(self, path: &str, meaning: &str) -> FileError {
+        let (table, name) = path.rsplit_once('.').unwrap_or(("", path));
+        let tables = std::iter::successors(Some(table), |of| Some(of.rsplit_once('.')?.0));
+        let span = tables.into_iter().find_map(|table| self.span_of(table));
+        self.no_field(span, table, name, meaning)
+    }
+
+    /// Refuses names of fields in a table, `table.table`, that are not among the known ones.
+    pub fn only(
+        self,
+        path: &str,
+        names: impl IntoIterator<Item: AsRef<str>>,
+        known: &[&str],
+    ) -> Result<(), FileError> {
+        let mut names = names.into_iter();
+        match names.find(|name| !known.contains(&name.as_ref())) {
+            Some(name) => {
+                let name = name.as_ref();
+                let span = self.span_of(&format!("{path}.{name}"));
+                Err(self.unknown(span, path, name, known))
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn unknown(
+        self,
+        span: Option<Range<usize>>,
+        table: &str,
+        name: &str,
+        known: &[&str],
+    ) -> FileError {
+        let known = || known.iter().copied();
+        self.error(
+            span,
+            format_args!("the unknown field `{name}`{}", within(table)),
+            format_args!("one of {}", list(known())),
+            suggestion(name, known(), "Remove or rename it."),
+        )
+    }
+
+    fn no_field(
+        self,
+        span: Option<Range<usize>>,
+        table: &str,
+        name: &str,
+        meaning: &str,
+    ) -> FileError {
+        let known = MEANINGS.iter().find(|(known, _)| *known == name);
+        let meaning = match (meaning, known) {
+            ("", Some((_, known))) => known,
+            ("", None) => "a value",
+            _ => meaning,
+        };
+        let found = format_args!("no `{name}`{}", within(table));
+        self.error(span, found, meaning, format_args!("Add `{name}`."))
+    }
+
+    fn span_of(self, path: &str) -> Option<Range<usize>> {
+        let table = self.parse().ok()?;
+        let mut names = path.split('.');
+        let mut value: &Spanned<DeValue> = table.get_ref().get(names.next()?)?;
+        for name in names {
+            value = value.get_ref().as_table()?.get(name)?;
+        }
+        Some(value.span())
+    }
+
+    /// What serde says, in the words of this program.
+    fn refused(self, error: &toml::de::Error) -> FileError {
+        let (message, span) = (error.message(), error.span());
+        let told = error.to_string();
+        let keys = told.rsplit_once("\nin `").map_or("", |(_, keys)| keys);
+        let path = keys.trim_end().trim_end_matches('`');
+        let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+        if let ("missing field ", [name]) = (message.split('`').next().unwrap_or(""), &quoted[..]) {
+            return self.no_field(span, path, name, "");
+        }
+        if let (true, [name, known @ ..]) = (message.starts_with("unknown field"), &quoted[..]) {
+            return self.unknown(span, path, name, known);
+        }
+        let source = span.clone().map_or("a value", |span| self.written(span));
+        let found = format_args!("{path} = {source}");
+        if let (true, [name, known @ ..]) = (message.starts_with("unknown variant"), &quoted[..]) {
+            let known = || known.iter().copied();
+            let expected = format_args!("one of {}", list(known()));
+            let advice = suggestion(name, known(), "Choose one of them.");
+            return self.error(span, found, expected, advice);
+        }
+        let expected = message.rsplit_once("expected ").map_or(message, |of| of.1);
+        let in_words = KINDS.iter().find(|(kind, _)| *kind == expected);
+        let expected = match in_words {
+            Some((_, words)) => words,
+            None if expected.starts_with("struct ") => "a table",
+            None => expected,
+        };
+        self.error(span, found, expected, "Correct this value.")
+    }
+
+    fn error(
+        self,
+        span: Option<Range<usize>>,
+        found: impl Display,
+        expected: impl Display,
+        advice: impl Display,
+    ) -> FileError {
+        let place = match span.and_then(|span| self.text.get(..span.start)) {
+            Some(before) => Place::Character {
+                line: 1 + before.matches('\n').count() as u64,
+                column: 1 + before.chars().rev().take_while(|&c| c != '\n').count() as u64,
+            },
+            None => Place::File,
+        };
+        FileError::new(self.file, place, found, expected, advice)
+    }
+}
+
+fn within(table: &str) -> String {
+    match table {
+        "" => String::new(),
+        _ => format!(" in [{table}]"),
+    }
+}

@@ -1,0 +1,24 @@
+//! What users write and turncal writes for them: fields of TOML and JSON files as serde structs, and errors that name
+//! line, column and field.
+
+pub mod axes;
+mod calibration_file;
+mod campaign;
+mod document;
+pub mod instrument;
+#[cfg(feature = "certificate")]
+mod laboratory;
+mod read;
+mod run;
+mod specification;
+mod values;
+mod write;
+
+pub use campaign::{Campaign, campaign_text, day_to_day};
+pub use document::Document;
+pub use instrument::term_sigma;
+pub use run::*;
+pub use values::{
+    Angle, Celsius, Finite, Gravity, Height, Latitude, Longitude, NonNegative, OneOrThree, Positive,
+};
+pub use write::{write_rows, write_run};

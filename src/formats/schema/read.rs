@@ -1,0 +1,322 @@
+//! `run.toml` and the files that it names, as one [`Run`].
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use toml::Spanned;
+use toml::de::DeTable;
+
+use super::instrument::InstrumentFields;
+use super::{Document, FORMAT, META, Positive, RunFile, StandstillFile};
+use crate::earth::Site;
+use crate::formats::draft::motion::Motion;
+use crate::formats::error::{FileError, Place};
+use crate::formats::inputs::segments;
+use crate::formats::inputs::table_log::TableLogFile;
+use crate::formats::small_file;
+use crate::imu::{Instrument, NoiseKeys, Output, PerSensor, Sensor};
+use crate::noise;
+use crate::recording::{ImuSamples, Recording, faults, nanoseconds};
+use crate::run::{Run, SET_BY_HAND, Standstill};
+use crate::units::{ARCSEC, DEGREE, MILLIGAL, PPM};
+
+impl Run {
+    /// Reads `run.toml` and the files that it names, relative to itself.
+    ///
+    /// Everything is checked: every field is known, every number finite and possible, time uniform,
+    /// the files overlap. Samples, nominal scales and priors come back along right-front-up
+    /// whatever `body_axes` says. What is not stated of place, noise, period and prior is wide, with a note that says so.
+    pub fn read(path: &Path) -> Result<Self, FileError> {
+        Self::of_text(path, &text_of(path)?, Some(path))
+    }
+
+    /// The same of the text of a `run.toml` that stands, or would stand, beside this file, and was read from `source`.
+    pub fn of_text(path: &Path, text: &str, source: Option<&Path>) -> Result<Self, FileError> {
+        let document = Document { file: path, text };
+        let file = run_file(document)?;
+        let directory = path.parent().unwrap_or(Path::new(""));
+        let mut notes = Vec::new();
+        let site = site(document, &file, &mut notes)?;
+        let instrument = InstrumentFields::of_file(document, &file, directory, &mut notes)?;
+        let table_log = file
+            .turntable
+            .as_ref()
+            .map(|fields| TableLogFile::of_fields(document, fields, directory, &mut notes));
+        let table_log = table_log.transpose()?;
+        let segments_file = file.segments.as_ref().map(|of| directory.join(&of.file));
+
+        // The small files' fields are checked before the large files are read.
+        let mut files: Vec<PathBuf> = source.map(Path::to_owned).into_iter().collect();
+        files.push(instrument.log.source.file.clone());
+        files.extend(other_file(&instrument));
+        files.extend(table_log.as_ref().map(|log| log.source.file.clone()));
+        files.extend(segments_file.clone());
+        let imu = samples(&instrument, &mut notes)?;
+        let known = with_noise(&instrument, &imu, &mut notes);
+        let table = (table_log.as_ref()).map(|log| log.read(&imu, &mut notes));
+        let table = table.transpose()?;
+        let log = &instrument.log;
+        let segments = segments_file
+            .map(|file| segments::read(&file, &imu, log.stamp.lag(), log.axes, &mut notes));
+        let segments = segments.transpose()?.unwrap_or_default();
+        let position_sigma = file.segments.and_then(|of| of.position_sigma_deg);
+        let mut run = Self {
+            recording: Recording {
+                name: name(path),
+                meta: file.meta,
+                imu,
+                table,
+                segments,
+                files,
+                notes,
+            },
+            instrument: known,
+            site,
+            table: table_log.map_or_else(Default::default, |log| log.accuracy),
+            standstill: standstill(&file.standstill),
+            segment_sigma: position_sigma.map_or(SET_BY_HAND, |sigma| sigma.0 * DEGREE),
+        };
+        let doubts = run.doubts();
+        run.recording.notes.extend(doubts);
+        Ok(run)
+    }
+
+    /// `[meta]` of a `run.toml` alone, for a run whose logs cannot be read.
+    ///
+    /// # Errors
+    /// [`FileError`] if not even that can be read.
+    pub fn read_meta(path: &Path) -> Result<BTreeMap<String, String>, FileError> {
+        let text = text_of(path)?;
+        let document = Document {
+            file: path,
+            text: &text,
+        };
+        #[derive(Deserialize)]
+        struct Meta {
+            #[serde(default)]
+            meta: BTreeMap<String, String>,
+        }
+        let Meta { meta } = fill(document, document.parse()?)?;
+        Ok(meta)
+    }
+}
+
+/// The fields of a `run.toml`.
+fn run_file(document: Document) -> Result<RunFile, FileError> {
+    fill(document, document.of_format(FORMAT)?)
+}
+
+/// The same with numbers and dates of `[meta]` as they are written.
+fn fill<'a, T: Deserialize<'a>>(
+    document: Document<'a>,
+    mut table: Spanned<DeTable<'a>>,
+) -> Result<T, FileError> {
+    if let Some(meta) = table.get_mut().get_mut("meta") {
+        document.as_written(meta);
+        let names = meta
+            .get_ref()
+            .as_table()
+            .into_iter()
+            .flat_map(DeTable::keys);
+        document.only("meta", names.map(|name| name.get_ref().as_ref()), &META)?;
+    }
+    document.fill(table)
+}
+
+/// The samples of the record, and what they show against what is stated.
+fn samples(
+    instrument: &InstrumentFields,
+    notes: &mut Vec<String>,
+) -> Result<ImuSamples, FileError> {
+    let mut imu = instrument.log.read(notes)?;
+    if instrument.without_period {
+        imu = with_found_period(imu, instrument, notes)?;
+    }
+    notes.extend(faults::notes(&imu));
+    notes.extend(clock_note(&imu, instrument));
+    Ok(imu)
+}
+
+/// What is known of the instrument, white noise that is not stated being what the record shows.
+fn with_noise(
+    instrument: &InstrumentFields,
+    imu: &ImuSamples,
+    notes: &mut Vec<String>,
+) -> Instrument {
+    let mut known = instrument.known.clone();
+    for sensor in Sensor::ALL {
+        if !known.noise_is_stated.get(sensor) {
+            let random_walk = noise::white_noise(imu, sensor);
+            known.noise.get_mut(sensor).random_walk = random_walk;
+            notes.push(noise_note(sensor, random_walk));
+        }
+    }
+    known
+}
+
+/// The file of the accelerometers, if it is another than that of the gyros.
+fn other_file(instrument: &InstrumentFields) -> Option<PathBuf> {
+    let (source, _) = instrument.log.accel_from.as_ref()?;
+    (source.file != instrument.log.source.file).then(|| source.file.clone())
+}
+
+fn text_of(path: &Path) -> Result<String, FileError> {
+    let advice = "Give the path of a run.toml.";
+    small_file::text(path).map_err(|error| FileError::io(path, "read the run", &error, advice))
+}
+
+/// Rates of which nothing tells how long a row lasts, with the period at which they turn the instrument as gravity's
+/// direction turns.
+fn with_found_period(
+    imu: ImuSamples,
+    instrument: &InstrumentFields,
+    notes: &mut Vec<String>,
+) -> Result<ImuSamples, FileError> {
+    let rates = |sensor| {
+        imu.of(sensor)
+            .iter()
+            .map(|sample| sample / imu.period)
+            .collect()
+    };
+    let motion = Motion::find(&PerSensor::from_fn(rates), &[], imu.period);
+    let Some(period) = motion.angle.filter(|&period| period > 0.0) else {
+        return Err(FileError::new(
+            &instrument.log.source.file,
+            Place::File,
+            "rows without a time, whose turns do not show how long a row lasts",
+            "a time column, or sample_period_s in run.toml",
+            "Add sample_period_s to [imu].",
+        ));
+    };
+    // The scale factors of the gyros are taken to be right on average.
+    let sigma = instrument.known.prior.gyro.scale_sigma.norm() / 3.0;
+    notes.push(format!(
+        "run.toml does not state sample_period_s, and the log has no time. turncal found {:.4} s ± {:.1} % from the turns, \
+         which widens the σ of the gyro scale factors as much.",
+        period,
+        100.0 * sigma
+    ));
+    Ok(imu.with_period(period, sigma))
+}
+
+/// What it means that stamps were taken and not `sample_period_s`.
+///
+/// Rates are integrated over the period to angles, increments of velocity divided by it to specific
+/// force: a scale changes by as much as the period.
+fn clock_note(imu: &ImuSamples, instrument: &InstrumentFields) -> Option<String> {
+    let off = imu.log.as_ref()?.off_stated_period?;
+    let (sensor, triad) = match instrument.log.output {
+        Output::Rate => (Sensor::Gyro, "gyros"),
+        Output::Pulse | Output::Increment => (Sensor::Accel, "accelerometers"),
+    };
+    let sigma = instrument.known.prior.get(sensor).scale_sigma.min();
+    let ppm = |part: f64| format!("{:.2}", part / PPM);
+    let found = format!(
+        "Stamps come every {} s, {} ppm {} than sample_period_s says; stamps are taken, and the scale of the \
+         {triad} is by as much another",
+        nanoseconds(imu.period),
+        ppm(off.abs()),
+        if off > 0.0 { "more" } else { "less" },
+    );
+    Some(if off.abs() <= sigma {
+        format!("{found}, within its prior σ of {} ppm.", ppm(sigma))
+    } else {
+        format!(
+            "{found}, beyond its prior σ of {} ppm: if the instrument's clock is right and the stamps are not, \
+             leave the time column out.",
+            ppm(sigma)
+        )
+    })
+}
+
+/// The name of the directory of a `run.toml`, else the file's own.
+pub fn name(path: &Path) -> String {
+    let full = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let named = match full.file_name() {
+        Some(file) if file == "run.toml" => full.parent().and_then(Path::file_name),
+        _ => full.file_stem(),
+    };
+    named.map_or_else(
+        || "run".to_owned(),
+        |name| name.to_string_lossy().into_owned(),
+    )
+}
+
+/// That white noise is not stated, and what is taken for it.
+fn noise_note(sensor: Sensor, random_walk: f64) -> String {
+    let (key, unit) = NoiseKeys::of(sensor).random_walk;
+    format!(
+        "run.toml does not state {key}. turncal starts with {:.3}, which the quieter part of the record shows, and \
+         estimates the noise from there.",
+        random_walk / unit
+    )
+}
+
+/// 1σ of a height that is not stated, m.
+const USUAL_HEIGHT: f64 = 500.0;
+/// How much gravity falls with height, (m/s²)/m.
+const FREE_AIR: f64 = 0.3086 * MILLIGAL;
+
+fn site(document: Document, run: &RunFile, notes: &mut Vec<String>) -> Result<Site, FileError> {
+    let file = &run.site;
+    if file.latitude_deg.is_none() && run.turntable.is_some() {
+        let meaning = "a latitude, north positive: beside a [turntable] Earth rate must be known";
+        return Err(document.missing("site.latitude_deg", meaning));
+    }
+    let longitude = file.longitude_deg.map_or(0.0, |degrees| degrees.0 * DEGREE);
+    let height = file.height_m.map(|height| height.0);
+    let mut site = match file.latitude_deg {
+        Some(degrees) => {
+            Site::with_normal_gravity(degrees.0 * DEGREE, longitude, height.unwrap_or(0.0))
+        }
+        None => Site::unknown(),
+    };
+    if height.is_none() {
+        site.gravity_sigma = site.gravity_sigma.hypot(FREE_AIR * USUAL_HEIGHT);
+    }
+    if let Some(gravity) = &file.gravity_m_s2 {
+        let sigma = stated_gravity_sigma(document.written(gravity.span()));
+        site = site.with_gravity(gravity.get_ref().0, sigma);
+    }
+    if let Some(sigma) = file.gravity_sigma_mgal {
+        site.gravity_sigma = sigma.0 * MILLIGAL;
+    }
+    if !site.is_known {
+        notes.push(
+            "run.toml does not state latitude_deg in [site]. turncal estimates Earth rate as an unknown vector, which \
+             widens the σ of the gyro biases."
+                .to_owned(),
+        );
+    }
+    if file.gravity_m_s2.is_none() && (!site.is_known || height.is_none()) {
+        notes.push(format!(
+            "run.toml does not state the place in [site]. turncal assumed a gravity of {:.4} ± {:.4} m/s², which widens \
+             the σ of the accelerometer scale factors by as much. State latitude_deg and height_m, or gravity_m_s2.",
+            site.gravity, site.gravity_sigma
+        ));
+    }
+    Ok(site)
+}
+
+/// 1σ of a gravity that is stated without one, m/s²: of its last digit, and no less than a milligal.
+fn stated_gravity_sigma(written: &str) -> f64 {
+    let digits = written
+        .split_once('.')
+        .map_or(0, |(_, digits)| digits.len());
+    let last = 10f64.powi(-i32::try_from(digits).unwrap_or(i32::MAX));
+    MILLIGAL.max(last / 12f64.sqrt())
+}
+
+fn standstill(file: &StandstillFile) -> Standstill {
+    let usual = Standstill::default();
+    let or = |stated: Option<Positive>, usual| stated.map_or(usual, |stated| stated.0);
+    Standstill {
+        sigma: PerSensor {
+            gyro: (file.attitude_sigma_arcsec.map(|sigma| sigma.0 * ARCSEC)).or(usual.sigma.gyro),
+            accel: (file.velocity_sigma_m_s.map(|sigma| sigma.0)).or(usual.sigma.accel),
+        },
+        turning: (file.turning_deg_per_sqrt_s).map_or(usual.turning, |of| of.0 * DEGREE),
+        position_sigma: or(file.position_sigma_m, usual.position_sigma),
+    }
+}

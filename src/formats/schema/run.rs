@@ -1,0 +1,229 @@
+//! The fields of `run.toml`: what is read and what is written.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use toml::Spanned;
+
+use super::axes::BodyAxes;
+use super::values::{
+    Angle, Finite, Gravity, Height, Latitude, Longitude, NonNegative, OneOrThree, Positive,
+};
+use crate::formats::clock::TimeUnit;
+use crate::formats::imu_log::TimeStamp;
+use crate::formats::inputs::temperature::TemperatureUnit;
+use crate::imu::Output;
+
+/// The version of the format.
+pub const FORMAT: &str = "turncal-run/1";
+
+/// Fields of `[meta]`.
+pub const META: [&str; 8] = [
+    "instrument",
+    "serial",
+    "operator",
+    "date",
+    "temperature_degc",
+    "laboratory",
+    "table",
+    "notes",
+];
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunFile {
+    #[serde(default)]
+    pub site: SiteFile,
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub meta: BTreeMap<String, String>,
+    pub imu: ImuFile,
+    #[serde(default)]
+    pub standstill: StandstillFile,
+    pub turntable: Option<TurntableFile>,
+    pub segments: Option<SegmentsFile>,
+}
+
+#[derive(Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SiteFile {
+    pub latitude_deg: Option<Latitude>,
+    pub longitude_deg: Option<Longitude>,
+    pub height_m: Option<Height>,
+    /// Its digits are its accuracy where none is stated.
+    pub gravity_m_s2: Option<Spanned<Gravity>>,
+    pub gravity_sigma_mgal: Option<NonNegative>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ImuFile {
+    pub file: String,
+    pub stream: Option<String>,
+    pub salvage: Option<bool>,
+    pub accel_from: Option<AccelFromFile>,
+    pub output: Output,
+    pub gyro_unit: String,
+    pub accel_unit: String,
+    pub gyro_full_scale: Option<Positive>,
+    pub accel_full_scale: Option<Positive>,
+    pub time_unit: Option<TimeUnit>,
+    pub sample_period_s: Option<Positive>,
+    pub time_stamp: TimeStamp,
+    pub continuous: Option<bool>,
+    pub instance: Option<InstanceFile>,
+    pub temperature_unit: Option<TemperatureUnit>,
+    pub body_axes: Option<BodyAxes>,
+    pub columns: ImuColumns,
+    /// By the names of [`crate::imu::NoiseKeys`].
+    #[serde(default)]
+    pub noise: BTreeMap<String, NonNegative>,
+    #[serde(default)]
+    pub prior: PriorsFile,
+    /// By the names of error terms.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub terms: BTreeMap<String, TermFile>,
+}
+
+/// What it does not say is as in `[imu]`.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AccelFromFile {
+    pub file: Option<String>,
+    pub stream: Option<String>,
+    pub salvage: Option<bool>,
+    pub time: Option<TimeColumn>,
+    pub time_unit: Option<TimeUnit>,
+    pub sample_period_s: Option<Positive>,
+}
+
+/// The column that tells instruments apart, and what it says of the one that is meant.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InstanceFile {
+    pub column: String,
+    pub number: Finite,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ImuColumns {
+    pub time: Option<TimeColumn>,
+    pub gyro: [String; 3],
+    pub accel: [String; 3],
+    pub temperature: Option<TemperatureColumn>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "the name of a column, or those of seconds and nanoseconds"
+)]
+pub enum TimeColumn {
+    One(String),
+    SecondsAndNanoseconds([String; 2]),
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(
+    untagged,
+    deny_unknown_fields,
+    expecting = "the name of a column, or `gyro` and `accel` with the name of a column or three each"
+)]
+pub enum TemperatureColumn {
+    One(String),
+    Triads {
+        gyro: ThreeColumns,
+        accel: ThreeColumns,
+    },
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum ThreeColumns {
+    One(String),
+    Three([String; 3]),
+}
+
+#[derive(Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PriorsFile {
+    pub gyro: PriorFile,
+    pub accel: PriorFile,
+}
+
+#[derive(Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PriorFile {
+    pub scale: Option<OneOrThree>,
+    pub scale_sigma_ppm: Option<OneOrThree>,
+    pub installation_sigma_arcsec: Option<OneOrThree>,
+    pub bias: Option<OneOrThree>,
+    pub bias_sigma: Option<OneOrThree>,
+}
+
+/// 1σ of each parameter of an error term, around zero.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TermFile {
+    pub sigma: Positive,
+}
+
+#[derive(Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StandstillFile {
+    pub velocity_sigma_m_s: Option<Positive>,
+    pub attitude_sigma_arcsec: Option<Positive>,
+    pub turning_deg_per_sqrt_s: Option<NonNegative>,
+    pub position_sigma_m: Option<Positive>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TurntableFile {
+    pub file: String,
+    pub stream: Option<String>,
+    pub salvage: Option<bool>,
+    pub time_unit: Option<TimeUnit>,
+    pub sample_period_s: Option<Positive>,
+    pub columns: TableColumns,
+    pub axes: Option<Vec<String>>,
+    pub position_sigma_arcsec: Angle,
+    pub reading_sigma_arcsec: Angle,
+    pub level_sigma_arcsec: Option<Angle>,
+    pub north_sigma_arcsec: Option<Angle>,
+    pub nonorthogonality_sigma_arcsec: Option<Angle>,
+    pub wobble_sigma_arcsec: Option<Angle>,
+    pub encoder_sigma_arcsec: Option<Angle>,
+    pub time_sigma_ms: Option<Positive>,
+}
+
+impl TurntableFile {
+    /// Keys and 1σ of errors of the axes, in the order of [`crate::turntable::AxisError::ALL`].
+    pub fn axis_errors(&self) -> [(&'static str, Option<Angle>); 3] {
+        [
+            (
+                "nonorthogonality_sigma_arcsec",
+                self.nonorthogonality_sigma_arcsec,
+            ),
+            ("wobble_sigma_arcsec", self.wobble_sigma_arcsec),
+            ("encoder_sigma_arcsec", self.encoder_sigma_arcsec),
+        ]
+    }
+}
+
+/// A quaternion `[w, x, y, z]`, or angles about axes, outermost first, or both.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TableColumns {
+    pub time: TimeColumn,
+    pub quaternion: Option<[String; 4]>,
+    pub angles: Option<Vec<String>>,
+    pub axes: Option<Vec<String>>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SegmentsFile {
+    pub file: String,
+    pub position_sigma_deg: Option<Positive>,
+}

@@ -1,0 +1,116 @@
+//! Values that are checked where they are read, so that the error names their line.
+
+use nalgebra::Vector3;
+use serde::de::{Deserializer, Error};
+use serde::ser::Serializer;
+use serde::{Deserialize, Serialize};
+
+use super::axes::BodyAxes;
+use crate::formats::clock::TimeUnit;
+use crate::formats::error::list;
+use crate::formats::imu_log::TimeStamp;
+use crate::formats::inputs::temperature::TemperatureUnit;
+
+/// Squares and quotients of such numbers are still numbers.
+fn has_size(value: f64) -> bool {
+    value == 0.0 || (1e-30..=1e30).contains(&value.abs())
+}
+
+macro_rules! checked {
+    ($($(#[$meta:meta])* $name:ident, $says:literal, $holds:expr;)+) => {$(
+        $(#[$meta])*
+        #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+        #[serde(try_from = "f64", into = "f64")]
+        pub struct $name(pub f64);
+
+        impl TryFrom<f64> for $name {
+            type Error = &'static str;
+
+            fn try_from(value: f64) -> Result<Self, Self::Error> {
+                let holds: fn(f64) -> bool = $holds;
+                match has_size(value) {
+                    true if holds(value) => Ok(Self(value)),
+                    true => Err($says),
+                    false => Err("a finite number, 0 or of magnitude 1e-30 to 1e30"),
+                }
+            }
+        }
+
+        impl From<$name> for f64 {
+            fn from(value: $name) -> f64 {
+                value.0
+            }
+        }
+    )+};
+}
+
+checked!(
+    /// Any number.
+    #[derive(Default)]
+    Finite, "a finite number", |_| true;
+    /// Above zero.
+    Positive, "a number above zero", |v| v > 0.0;
+    /// Zero or above.
+    #[derive(Default)]
+    NonNegative, "zero or a number above it", |v| v >= 0.0;
+    /// 1σ of an angle, ″: beyond half a turn no error of an angle is.
+    Angle, "a number above zero, at most 648000", |v| v > 0.0 && v <= 648_000.0;
+    /// °
+    Latitude, "a latitude from -90 to 90", |v| v.abs() <= 90.0;
+    /// °
+    Longitude, "a longitude from -180 to 360", |v| (-180.0..=360.0).contains(&v);
+    /// From the shore of the Dead Sea to above any laboratory, m.
+    Height, "a height from -500 to 9000", |v| (-500.0..=9000.0).contains(&v);
+    /// m/s²
+    Gravity, "a number from 9.7 to 9.9", |v| (9.7..=9.9).contains(&v);
+    /// A temperature that an instrument may have, °C.
+    Celsius, "a number from -100 to 100", |v| v.abs() <= 100.0;
+);
+
+/// Three values, or one for all three axes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "three numbers, or one for all axes")]
+pub enum OneOrThree {
+    One(Finite),
+    Three([Finite; 3]),
+}
+
+impl OneOrThree {
+    pub fn vector(self) -> Vector3<f64> {
+        match self {
+            Self::One(value) => Vector3::repeat(value.0),
+            Self::Three(values) => Vector3::from(values.map(|value| value.0)),
+        }
+    }
+}
+
+impl From<Vector3<f64>> for OneOrThree {
+    fn from(v: Vector3<f64>) -> Self {
+        Self::Three([Finite(v.x), Finite(v.y), Finite(v.z)])
+    }
+}
+
+/// Types that a table of words stands for.
+macro_rules! by_words {
+    ($($name:ident),+) => {$(
+        impl<'de> Deserialize<'de> for $name {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                let said = String::deserialize(deserializer)?;
+                let known = Self::WORDS.iter().find(|(word, _)| *word == said);
+                known.map(|&(_, meaning)| meaning).ok_or_else(|| {
+                    let words = list(Self::WORDS.iter().map(|&(word, _)| word));
+                    D::Error::custom(format!("unknown variant `{said}`, expected one of {words}"))
+                })
+            }
+        }
+
+        impl Serialize for $name {
+            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                let known = Self::WORDS.iter().find(|(_, meaning)| meaning == self);
+                serializer.serialize_str(known.map_or("", |(word, _)| word))
+            }
+        }
+    )+};
+}
+
+by_words!(BodyAxes, TemperatureUnit, TimeStamp, TimeUnit);

@@ -1,0 +1,113 @@
+//! Topics of a log: messages of one type each, with the time at which they were logged.
+
+#[cfg(feature = "mcap")]
+pub mod json;
+pub mod packed;
+#[cfg(feature = "mcap")]
+pub mod protobuf;
+pub mod ros;
+
+use std::collections::BTreeMap;
+
+use super::bytes::Broken;
+use super::{Column, Stream};
+use ros::Encoding;
+
+/// The topics of a log, by the numbers that its messages have.
+#[derive(Default)]
+pub struct Topics {
+    pub streams: Vec<Stream>,
+    pub readers: Vec<Reader>,
+    of_number: BTreeMap<u32, usize>,
+}
+
+impl Topics {
+    /// Adds a number of a topic, which may be known by another: a recorder begins anew, or several programs publish.
+    pub fn add(&mut self, number: u32, topic: &str, reader: impl FnOnce() -> Reader) {
+        if self.of_number.contains_key(&number) {
+            return;
+        }
+        let known = self.streams.iter().position(|stream| stream.name == topic);
+        let stream = known.unwrap_or_else(|| {
+            let reader = reader();
+            self.streams.push(reader.stream(topic));
+            self.readers.push(reader);
+            self.streams.len() - 1
+        });
+        self.of_number.insert(number, stream);
+    }
+
+    /// The stream of a message.
+    pub fn stream(&self, number: u32, offset: u64) -> Result<usize, Broken> {
+        self.of_number.get(&number).copied().ok_or_else(|| {
+            let found = format_args!("a message of channel {number}");
+            Broken::new(offset, found, "a channel that was described before it")
+        })
+    }
+}
+
+/// The column of the time of logging, in s.
+const LOG_TIME: &str = "log_time";
+
+/// How its messages are read.
+pub enum Reader {
+    Ros(ros::Message),
+    #[cfg(feature = "mcap")]
+    Protobuf(protobuf::Message),
+    /// The first message shows its columns.
+    #[cfg(feature = "mcap")]
+    Json(Vec<Column>),
+    /// Only the time of its messages is known; why.
+    Unknown(String),
+}
+
+impl Reader {
+    /// Of messages of ROS by the text of their definition.
+    pub fn of_ros(name: &str, definition: &str, encoding: Encoding) -> Self {
+        match ros::Message::parse(name, definition, encoding) {
+            Ok(message) => Self::Ros(message),
+            Err(wrong) => Self::Unknown(format!("its definition cannot be read: {wrong}")),
+        }
+    }
+
+    /// The stream of a topic.
+    pub fn stream(&self, topic: &str) -> Stream {
+        let mut columns = vec![Column::new(LOG_TIME, "s")];
+        let mut remarks = Vec::new();
+        match self {
+            Self::Ros(message) => columns.extend_from_slice(&message.columns),
+            #[cfg(feature = "mcap")]
+            Self::Protobuf(message) => columns.extend_from_slice(&message.columns),
+            #[cfg(feature = "mcap")]
+            Self::Json(known) => columns.extend_from_slice(known),
+            Self::Unknown(why) => remarks.push(format!("`{topic}`: {why}")),
+        }
+        Stream {
+            name: topic.to_owned(),
+            columns,
+            remarks,
+            is_inertial: true,
+            axes: None,
+        }
+    }
+
+    /// The values of a message that was logged at this time in ns.
+    pub fn values(
+        &self,
+        time: u64,
+        bytes: &[u8],
+        offset: u64,
+        row: &mut Vec<f64>,
+    ) -> Result<(), Broken> {
+        row.clear();
+        row.push((time / 1_000_000_000) as f64 + 1e-9 * (time % 1_000_000_000) as f64);
+        match self {
+            Self::Ros(message) => message.values(bytes, offset, row),
+            #[cfg(feature = "mcap")]
+            Self::Protobuf(message) => message.values(bytes, offset, row),
+            #[cfg(feature = "mcap")]
+            Self::Json(columns) => json::values(columns, bytes, offset, row),
+            Self::Unknown(_) => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! Records that a log packs together.
+
+use std::io::Read;
+
+use crate::formats::streams::bytes::Broken;
+
+/// Chunks are of some megabytes; what claims more is damaged or a bomb.
+const LONGEST: u64 = 1 << 27;
+
+/// Unpacks a chunk of so many bytes by the method that the file names.
+pub fn unpack(method: &str, packed: &[u8], size: u64, offset: u64) -> Result<Vec<u8>, Broken> {
+    if size > LONGEST {
+        return Err(Broken::new(
+            offset,
+            format_args!("a chunk of {size} bytes"),
+            format_args!("at most {LONGEST}"),
+        ));
+    }
+    let mut unpacked = Vec::new();
+    let broken = |error: &dyn std::fmt::Display| {
+        Broken::new(offset, error, format_args!("a chunk packed by {method}"))
+    };
+    let read = match method {
+        "" | "none" => {
+            unpacked.extend_from_slice(packed);
+            Ok(0)
+        }
+        "lz4" => {
+            let decoder = lz4_flex::frame::FrameDecoder::new(packed);
+            decoder.take(size + 1).read_to_end(&mut unpacked)
+        }
+        "zstd" => {
+            let decoder =
+                ruzstd::decoding::StreamingDecoder::new(packed).map_err(|error| broken(&error))?;
+            decoder.take(size + 1).read_to_end(&mut unpacked)
+        }
+        "bz2" => bzip2_rs::DecoderReader::new(packed)
+            .take(size + 1)
+            .read_to_end(&mut unpacked),
+        other => {
+            return Err(Broken::new(
+                offset,
+                format_args!("a chunk packed by `{other}`"),
+                "none, lz4, zstd or bz2",
+            ));
+        }
+    };
+    read.map_err(|error| broken(&error))?;
+    if unpacked.len() as u64 != size {
+        return Err(Broken::new(
+            offset,
+            format_args!("{} bytes in a chunk", unpacked.len()),
+            format_args!("{size}, as it says"),
+        ));
+    }
+    Ok(unpacked)
+}

@@ -1,0 +1,109 @@
+//! ROS 2 bags as SQLite files: `topics`, `messages` and, from ROS 2 Iron on, `message_definitions`.
+//!
+//! Source: rosbag2, `rosbag2_storage_sqlite3`, `sqlite_storage.cpp`.
+
+use std::collections::BTreeMap;
+
+use super::bytes::{Broken, Input};
+use super::messages::{Reader, Topics, ros::Encoding};
+use super::sqlite::{Database, Row, Table};
+use super::{Log, Stream};
+
+/// The definition of `sensor_msgs/msg/Imu`, which earlier bags lack.
+const IMU: &str = "std_msgs/Header header
+geometry_msgs/Quaternion orientation
+float64[9] orientation_covariance
+geometry_msgs/Vector3 angular_velocity
+float64[9] angular_velocity_covariance
+geometry_msgs/Vector3 linear_acceleration
+float64[9] linear_acceleration_covariance
+====
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+====
+MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+====
+MSG: geometry_msgs/Vector3
+float64 x
+float64 y
+float64 z
+";
+
+struct Bag {
+    database: Database,
+    messages: Table,
+    topics: Topics,
+    /// Stream and row of the message.
+    current: Option<(usize, Row)>,
+}
+
+pub(super) fn open(input: Input) -> Result<Box<dyn Log>, Broken> {
+    let mut database = Database::open(input)?;
+    let mut definitions = BTreeMap::from([("sensor_msgs/msg/Imu".to_owned(), IMU.to_owned())]);
+    if let Some(mut table) = database.table("message_definitions")? {
+        while let Some(row) = database.next(&mut table)? {
+            let text = row.get("encoded_message_definition").text();
+            if row.get("encoding").bytes() == b"ros2msg" {
+                definitions.insert(row.get("topic_type").text(), text);
+            }
+        }
+    }
+    let missing = |name| Broken::new(0, format!("no table `{name}`"), "a bag of ROS 2");
+    let mut topics = Topics::default();
+    let mut table = database.table("topics")?.ok_or_else(|| missing("topics"))?;
+    while let Some(row) = database.next(&mut table)? {
+        let (kind, encoding) = (
+            row.get("type").text(),
+            row.get("serialization_format").text(),
+        );
+        let reader = || match definitions.get(&kind).filter(|_| encoding == "cdr") {
+            Some(definition) => Reader::of_ros(&kind, definition, Encoding::Cdr),
+            None => Reader::Unknown(format!(
+                "messages `{kind}` of encoding `{encoding}` are not read, because the bag does not define them"
+            )),
+        };
+        let number = row.get("id").whole().unwrap_or(0) as u32;
+        topics.add(number, &row.get("name").text(), reader);
+    }
+    let messages = database.table("messages")?;
+    Ok(Box::new(Bag {
+        messages: messages.ok_or_else(|| missing("messages"))?,
+        database,
+        topics,
+        current: None,
+    }))
+}
+
+impl Log for Bag {
+    fn streams(&self) -> &[Stream] {
+        &self.topics.streams
+    }
+
+    fn advance(&mut self) -> Result<Option<usize>, Broken> {
+        let Some(row) = self.database.next(&mut self.messages)? else {
+            return Ok(None);
+        };
+        let topic = row.get("topic_id").whole().unwrap_or(0) as u32;
+        let stream = self.topics.stream(topic, row.offset)?;
+        self.current = Some((stream, row));
+        Ok(Some(stream))
+    }
+
+    fn values(&mut self, row: &mut Vec<f64>) -> Result<(), Broken> {
+        let Some((stream, message)) = &self.current else {
+            return Ok(());
+        };
+        let time = message.get("timestamp").whole().unwrap_or(0) as u64;
+        let data = message.get("data").bytes();
+        self.topics.readers[*stream].values(time, data, message.offset, row)
+    }
+
+    fn offset(&self) -> u64 {
+        self.current.as_ref().map_or(0, |(_, row)| row.offset)
+    }
+}
