@@ -7,8 +7,8 @@ pub mod dcc;
 mod laboratory;
 mod results;
 
-use crate::calibration::ComparisonError;
 use crate::calibration::result::{Calibration, Provenance};
+use crate::calibration::{ComparisonError, Correction, CorrectionError};
 use crate::imu::BodyFrame;
 use crate::lot::Specification;
 
@@ -44,6 +44,9 @@ pub enum CertificateError {
     /// The calibrations cannot be compared, or not with limits.
     #[error(transparent)]
     Comparison(#[from] ComparisonError),
+    /// A calibration that corrects nothing.
+    #[error(transparent)]
+    Correction(#[from] CorrectionError),
 }
 
 /// What a certificate says.
@@ -88,6 +91,7 @@ impl Certificate {
         if calibration.findings.iter().any(|f| f.kind == "unexplained") {
             return not_usable("leaves more than noise explains");
         }
+        Correction::of_record(&calibration)?;
         let missing = |field| CertificateError::Missing { field };
         let provenance = calibration.provenance.clone();
         let provenance = provenance.ok_or(missing("provenance"))?;

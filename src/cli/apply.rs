@@ -1,8 +1,9 @@
 //! `turncal apply`
 
+use std::ops::Range;
 use std::path::PathBuf;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::error::ErrorKind;
 use turncal::calibration::result::Calibration;
 use turncal::calibration::{Correction, TEMPERATURE_TOLERANCE, ThermalRecord};
@@ -41,6 +42,10 @@ pub struct Apply {
     /// File to write, `.csv` or `.csv.gz` [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
+    /// Write rows that the log has lost, too, interpolated and with 1 in a column `filled`; not where so much is lost
+    /// that calibrate would begin anew
+    #[arg(long)]
+    fill: bool,
     /// Replace the output file if it exists
     #[arg(long)]
     force: bool,
@@ -63,6 +68,15 @@ impl Apply {
         let run = self.of_log.open(&self.run)?.run;
         let correction = Correction::for_run(&record, &run)
             .with_context(|| format!("{}, {}", self.calibration.display(), self.run.display()))?;
+        let lost: usize = run.recording.imu.lost().iter().map(Range::len).sum();
+        if let Some(missing) = run.recording.imu.missing().next().filter(|_| self.fill) {
+            bail!(
+                "{}: {} rows are missing from {:.3} s on, too many to fill. Leave --fill out, or cut the log there",
+                self.run.display(),
+                missing.len(),
+                run.recording.imu.time(missing.start)
+            );
+        }
         activity.next("writing");
         match &self.output {
             Some(output) => {
@@ -70,15 +84,22 @@ impl Apply {
                     output,
                     run.recording.files.iter().chain([&self.calibration]),
                 )?;
-                write_samples(output, &correction, &run, self.force)?;
+                write_samples(output, &correction, &run, self.fill, self.force)?;
             }
-            None => stream(|rows| sample_rows(rows, &correction, &run))?,
+            None => stream(|rows| sample_rows(rows, &correction, &run, self.fill))?,
         }
         drop(activity);
         eprintln!(
-            "{} samples of {} s; x right, y front, z up, along: {}",
-            run.recording.imu.len(),
+            "{} rows of {} s{}; x right, y front, z up, along: {}",
+            run.recording.imu.len() - if self.fill { 0 } else { lost },
             run.recording.imu.period,
+            match (lost, self.fill) {
+                (0, _) => String::new(),
+                (lost, true) => format!(", {lost} of them lost in the log and interpolated"),
+                (lost, false) => format!(
+                    ", {lost} that the log has lost are left out (--fill interpolates them)"
+                ),
+            },
             record.body_frame.words()
         );
         for note in notes(&record, &correction, &run) {

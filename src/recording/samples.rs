@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::Vector3;
 use thiserror::Error;
 
-use super::{Bridge, Fault, LogFacts, Series, Temperature};
+use super::{Bridge, Fault, FaultKind, LogFacts, Series, Temperature};
 use crate::imu::{PerSensor, Sensor};
 
 /// The samples of both triads, at one period, in one stretch or several.
@@ -235,6 +235,16 @@ impl ImuSamples {
         let all = [0].into_iter().chain(ends).zip(starts.chain([self.len()]));
         all.map(|(end, start)| end..start)
             .filter(|missing| !missing.is_empty())
+    }
+
+    /// The samples that the log has no row for, interpolated or not, in order.
+    pub fn lost(&self) -> Vec<Range<usize>> {
+        let faults = self.faults.iter();
+        let bridged = faults.filter(|fault| fault.kind == FaultKind::Missing);
+        let mut lost: Vec<_> = bridged.map(|fault| fault.samples.clone()).collect();
+        lost.extend(self.missing());
+        lost.sort_by_key(|lost| lost.start);
+        lost
     }
 
     /// Time that the samples last, s.

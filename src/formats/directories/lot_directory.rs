@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::digest::{digest_of, input_digests};
+use super::digest::{digest_of, digest_of_bytes, input_digests};
 use super::job::{JOB_FILE, Part};
 use super::whole::{WholeDirectory, clear_abandoned, list_anew, write_whole};
 use crate::calibration::result::Calibration;
@@ -45,6 +45,9 @@ struct UnitRecord {
     nominal: Option<PerSensor<[f64; 3]>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     noise_at_rest: Option<RestNoise>,
+    /// SHA-256 of its calibration's file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    calibration_sha256: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     failure: Option<String>,
 }
@@ -254,10 +257,15 @@ fn read_unit(directory: &Path, key: &str) -> Result<Unit, FileError> {
     if record.key != key {
         return wrong("another key");
     }
+    let path = directory.join(CALIBRATION_FILE);
+    let digest = fs::read(&path).ok().map(|bytes| digest_of_bytes(&bytes));
+    if record.failure.is_none() && record.calibration_sha256 != digest {
+        return wrong("a calibration.json that is not the one that was written with it");
+    }
     let calibrated = match (record.failure, record.nominal) {
         (Some(failure), _) => Err(failure),
         (None, Some(nominal)) => Ok(Calibrated {
-            calibration: Calibration::read(&directory.join(CALIBRATION_FILE))?,
+            calibration: Calibration::read(&path)?,
             nominal,
             noise: record.noise_at_rest,
         }),
@@ -272,6 +280,10 @@ fn read_unit(directory: &Path, key: &str) -> Result<Unit, FileError> {
 
 fn write_unit(unit: &Unit, key: &str, directory: &Path) -> Result<(), FileError> {
     let calibrated = unit.calibrated.as_ref().ok();
+    let path = directory.join(CALIBRATION_FILE);
+    let json = calibrated
+        .map(|of| of.calibration.to_json(&path))
+        .transpose()?;
     let record = UnitRecord {
         format: FORMAT.to_owned(),
         name: unit.name.clone(),
@@ -279,17 +291,15 @@ fn write_unit(unit: &Unit, key: &str, directory: &Path) -> Result<(), FileError>
         meta: unit.meta.clone(),
         nominal: calibrated.map(|of| of.nominal),
         noise_at_rest: calibrated.and_then(|of| of.noise),
+        calibration_sha256: json.as_deref().map(digest_of_bytes),
         failure: unit.calibrated.as_ref().err().cloned(),
     };
-    let path = directory.join(UNIT_FILE);
     let refused = |error: std::io::Error| FileError::io(&path, "write it", &error, "Make room.");
     let mut bytes = serde_json::to_vec_pretty(&record).map_err(|error| refused(error.into()))?;
     bytes.push(b'\n');
-    fs::write(&path, bytes).map_err(refused)?;
-    if let Some(calibrated) = calibrated {
-        let path = directory.join(CALIBRATION_FILE);
-        let bytes = calibrated.calibration.to_json(&path)?;
-        fs::write(&path, bytes).map_err(refused)?;
+    fs::write(directory.join(UNIT_FILE), bytes).map_err(refused)?;
+    if let Some(json) = json {
+        fs::write(&path, json).map_err(refused)?;
     }
     Ok(())
 }

@@ -12,13 +12,28 @@ use crate::run::Run;
 pub const HEADER: &str = "start_s,end_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,\
                           accel_y_m_s2,accel_z_m_s2";
 
-/// Writes a row a sample, [`HEADER`] first, of a calibration that changes with temperature `in_range` after it: whether
-/// it holds at the temperature of the row. A row holds means over its sample, so it is itself a record
-/// of `output = "rate"` in `rad/s` and `m/s^2`.
-pub fn sample_rows(file: &mut dyn Write, correction: &Correction, run: &Run) -> io::Result<()> {
+/// Writes a row a row of the log, [`HEADER`] first, of a calibration that changes with temperature `in_range` after it:
+/// whether it holds at the temperature of the row. A row holds means over its sample, so it is itself a record of
+/// `output = "rate"` in `rad/s` and `m/s^2`.
+///
+/// With `fill` samples that the log has lost are written too, interpolated, and a last column `filled` is 1 there.
+pub fn sample_rows(
+    file: &mut dyn Write,
+    correction: &Correction,
+    run: &Run,
+    fill: bool,
+) -> io::Result<()> {
     let changes = correction.changes();
-    writeln!(file, "{HEADER}{}", if changes { ",in_range" } else { "" })?;
-    for sample in correction.samples(run) {
+    let in_range = if changes { ",in_range" } else { "" };
+    let filled = if fill { ",filled" } else { "" };
+    writeln!(file, "{HEADER}{in_range}{filled}")?;
+    let mut lost = run.recording.imu.lost().into_iter().peekable();
+    for (k, sample) in correction.samples(run).enumerate() {
+        while lost.next_if(|lost| lost.end <= k).is_some() {}
+        let is_lost = lost.peek().is_some_and(|lost| lost.contains(&k));
+        if is_lost && !fill {
+            continue;
+        }
         let [start, end] = [sample.start, sample.end].map(nanoseconds);
         write!(file, "{start},{end}")?;
         for value in sample.rate.iter().chain(&sample.force) {
@@ -26,6 +41,9 @@ pub fn sample_rows(file: &mut dyn Write, correction: &Correction, run: &Run) -> 
         }
         if changes {
             write!(file, ",{}", u8::from(sample.in_range))?;
+        }
+        if fill {
+            write!(file, ",{}", u8::from(is_lost))?;
         }
         writeln!(file)?;
     }
@@ -38,9 +56,10 @@ pub fn write_samples(
     path: &Path,
     correction: &Correction,
     run: &Run,
+    fill: bool,
     force: bool,
 ) -> Result<(), FileError> {
     write_whole_with(path, force, |file| {
-        write_rows(path, file, &|rows| sample_rows(rows, correction, run))
+        write_rows(path, file, &|rows| sample_rows(rows, correction, run, fill))
     })
 }

@@ -346,36 +346,32 @@ impl<'a> Layout<'a> {
     /// A text in lines that are no wider than this; a word that is, is broken anywhere.
     fn broken(&self, text: &str, style: Style, room: f32) -> Vec<String> {
         let mut lines = vec![String::new()];
+        let (space, mut filled) = (self.width(" ", style), 0.0);
         for word in text.split(' ') {
-            let mut word = word.to_owned();
-            while let Some(line) = lines.last_mut() {
-                let joined = match line.is_empty() {
-                    true => word.clone(),
-                    false => format!("{line} {word}"),
-                };
-                if self.width(&joined, style) <= room {
-                    *line = joined;
-                    break;
-                }
-                if !line.is_empty() {
-                    lines.push(String::new());
+            let width = self.width(word, style);
+            match lines.last_mut() {
+                Some(line) if !line.is_empty() && filled + space + width <= room => {
+                    line.push(' ');
+                    line.push_str(word);
+                    filled += space + width;
                     continue;
                 }
-                let mut cut = word.len();
-                while self.width(&word[..cut], style) > room {
-                    let before = word[..cut].char_indices().next_back();
-                    match before {
-                        Some((at, _)) if at > 0 => cut = at,
-                        _ => break,
-                    }
+                Some(line) if !line.is_empty() => {
+                    lines.push(String::new());
+                    filled = 0.0;
                 }
-                let rest = word.split_off(cut);
-                line.push_str(&word);
-                if rest.is_empty() {
-                    break;
+                _ => {}
+            }
+            for character in word.chars() {
+                let width = self.width(character.encode_utf8(&mut [0; 4]), style);
+                if filled > 0.0 && filled + width > room {
+                    lines.push(String::new());
+                    filled = 0.0;
                 }
-                lines.push(String::new());
-                word = rest;
+                if let Some(line) = lines.last_mut() {
+                    line.push(character);
+                }
+                filled += width;
             }
         }
         lines

@@ -2,8 +2,7 @@
 //! columns are exchanged.
 //!
 //! Each statement has rivals, and the likelihood of the motion under each is its weight, as for axes. Another
-//! sensitivity of the gyros is only looked for where what is stated needs a larger prior, or noise more than ten times as
-//! large.
+//! sensitivity of the gyros is only looked for where they miss a turn.
 
 use std::fmt;
 
@@ -12,7 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 use super::likelihood::TooSmall;
 use super::motion::Motion;
 use super::sensitivity::{Axes, Sensitivity};
-use super::{FALSE_ALARMS, Hypotheses, Mounting, TOLD_APART};
+use super::{FALSE_ALARMS, Hypotheses, Mounting, Part, TOLD_APART};
 use crate::calibration::problem::Problem;
 use crate::imu::{AxisOrder, PerSensor, Sensor};
 use crate::run::Run;
@@ -20,8 +19,8 @@ use crate::statistics::median;
 
 /// Sensitivities from a hundredth to a hundred times the stated one are tried …
 const WIDEST: f64 = 100.0;
-/// … each this many times the one before: a turn that is linear in what is left between two.
-const STEP: f64 = 1.05;
+/// … each this many times the one before: what is left of a turn between two is linear.
+const STEP: f64 = 1.1;
 /// The sensitivity of the next range differs by two: half way to it …
 pub const NEXT_RANGE: f64 = std::f64::consts::SQRT_2;
 /// … a stated one is wrong however large its prior, and within the widest tolerance of data sheets, 10 %, it is right
@@ -59,61 +58,41 @@ impl Contradiction {
             return Some(Self::Quaternions(said));
         }
         let measured = Motion::of(problem, recording, run);
-        let of_stated = Weighed::of(problem, run, &measured, TooSmall::CARELESS_PRIOR);
+        let stated = Weighed::of(problem, run, &measured);
         let gain = |rival: &Run| {
             let problem = Problem::new(rival, &problem.options);
-            let motion = Motion::of(&problem, 0, rival);
-            let of = Weighed::of(&problem, rival, &motion, TooSmall::CARELESS_PRIOR);
-            match of.is_explained {
-                true => of.log_likelihood - of_stated.log_likelihood,
-                false => f64::NEG_INFINITY,
-            }
+            Weighed::of(&problem, rival, &Motion::of(&problem, 0, rival)).above(&stated)
         };
-        let limit = -FALSE_ALARMS.ln();
         if let Some((axes, factor)) = by_magnitude(run, &measured) {
-            return Some(match gain(&exchanged(run)) > limit {
+            return Some(match gain(&exchanged(run)) > -FALSE_ALARMS.ln() {
                 true => Self::Exchanged,
                 false => Self::Sensitivity(Sensitivity::of(run, Sensor::Accel, axes, vec![factor])),
             });
         }
-        let mountings = Hypotheses::of(problem, run, measured.clone());
+        let mountings = Hypotheses::of(problem, run, measured);
         let mounting = Mounting::likeliest(problem, run, &mountings);
-        let is_explained = || {
-            let of = |too_small| Weighed::of(problem, run, &measured, too_small);
-            let stated = of(TooSmall::STATED_PRIOR);
-            stated.is_explained && of(TooSmall::ANY).log_likelihood - stated.log_likelihood < limit
-        };
-        if mounting.is_none() && is_explained() {
+        let misses = mountings.motion.misses_a_turn(WIDEST_TOLERANCE / 2.0);
+        if mounting.is_none() && (stated.is_explained || !misses) {
             return None;
         }
-        let of_axes = Axes::ALL.map(|axes| {
-            let tried = factors(|factor| gain(&less_sensitive(run, axes, factor)));
-            let largest = tried
-                .first()
-                .map_or(f64::NEG_INFINITY, |likeliest| likeliest.1);
-            (axes, tried, largest)
-        });
-        let likeliest = of_axes.into_iter().max_by(|a, b| a.2.total_cmp(&b.2));
-        let by_mounting = mounting
+        let limit = mounting
             .as_ref()
-            .map_or(limit, |of| of.log_ratio.max(limit));
-        match likeliest {
-            Some((axes, tried, gain))
-                if gain > by_mounting && is_another(run, Sensor::Gyro, tried[0].0) =>
-            {
-                let factors = told_apart(&tried);
-                Some(Self::Sensitivity(Sensitivity::of(
-                    run,
-                    Sensor::Gyro,
-                    axes,
-                    factors,
-                )))
-            }
-            _ => mounting.map(Self::Axes).or_else(|| {
-                let any = Weighed::of(problem, run, &measured, TooSmall::ANY);
-                (!any.is_explained).then_some(Self::Unexplained)
-            }),
-        }
+            .map_or(-FALSE_ALARMS.ln(), |of| of.log_ratio);
+        let sensitivity = Axes::ALL.into_iter().find_map(|axes| {
+            let tried = factors(|factor| {
+                let rival = less_sensitive(run, axes, factor);
+                let motion = Motion::of(problem, recording, &rival);
+                sum(&parts(problem, &rival, &motion, TooSmall::ANY))
+            });
+            let (factor, _) = *tried.first()?;
+            let is_another = is_another(run, Sensor::Gyro, factor);
+            (is_another && gain(&less_sensitive(run, axes, factor)) > limit)
+                .then(|| Sensitivity::of(run, Sensor::Gyro, axes, told_apart(&tried)))
+        });
+        let sensitivity = sensitivity.map(Self::Sensitivity);
+        sensitivity
+            .or(mounting.map(Self::Axes))
+            .or(stated.is_nothing.then_some(Self::Unexplained))
     }
 }
 
@@ -181,15 +160,16 @@ fn told_apart(tried: &[(f64, f64)]) -> Vec<f64> {
     chosen
 }
 
-/// The gyros' sensitivities that are tried with what each gains, the likeliest first; it is found to a thousandth.
-fn factors(gain: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
+/// The gyros' sensitivities that are tried with the logarithm of the likelihood of each, the likeliest first; it is found
+/// to a thousandth.
+fn factors(log_likelihood: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
     let reach = (WIDEST.ln() / STEP.ln()) as i32;
-    let with_gain = |factor| (factor, gain(factor));
-    let mut tried: Vec<_> = (-reach..=reach).map(|k| with_gain(STEP.powi(k))).collect();
+    let weighed = |factor| (factor, log_likelihood(factor));
+    let mut tried: Vec<_> = (-reach..=reach).map(|k| weighed(STEP.powi(k))).collect();
     let mut step = STEP.sqrt();
     while step > 1.001 {
         tried.sort_by(|a, b| b.1.total_cmp(&a.1));
-        tried.extend([tried[0].0 / step, tried[0].0 * step].map(with_gain));
+        tried.extend([tried[0].0 / step, tried[0].0 * step].map(weighed));
         step = step.sqrt();
     }
     tried.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -230,27 +210,50 @@ fn exchanged(run: &Run) -> Run {
     run
 }
 
-/// What is stated, weighed by the motion that it makes of a record.
+/// What is stated, or a rival of it, weighed by the motion that it makes of a record.
 struct Weighed {
-    /// Logarithm of its likelihood, or of that of nothing being as it should where that is larger.
+    /// Logarithm of its likelihood, noise and prior being nearly as they are stated.
     log_likelihood: f64,
-    /// Whether it explains more than nothing does.
+    /// Whether it is hardly more likely with any other noise and prior, and more than that nothing is as it should be.
     is_explained: bool,
+    /// Whether no noise and no prior make it likelier than that.
+    is_nothing: bool,
 }
 
 impl Weighed {
-    fn of(problem: &Problem, run: &Run, motion: &Motion, too_small: TooSmall) -> Self {
-        // A rate at rest is as large as the factor that is tried makes it: it does not tell factors apart.
-        let mut motion = motion.clone();
-        motion.upward = None;
-        let stated = AxisOrder::IDENTITY;
-        let hypotheses = Hypotheses::among(problem, run, motion, &[stated], too_small);
-        let parts = hypotheses.parts(&PerSensor::from_fn(|_| stated));
+    fn of(problem: &Problem, run: &Run, motion: &Motion) -> Self {
+        let parts = |too_small| parts(problem, run, motion, too_small);
+        let is_nothing = |parts: &[Part]| parts.iter().any(|part| part.of < part.none);
+        let (careless, any) = (parts(TooSmall::CARELESS), parts(TooSmall::ANY));
+        let log_likelihood = sum(&careless);
         Self {
-            log_likelihood: parts.iter().map(|part| part.of.max(part.none)).sum(),
-            is_explained: parts.iter().all(|part| part.of >= part.none),
+            log_likelihood,
+            is_explained: !is_nothing(&careless) && sum(&any) - log_likelihood < -FALSE_ALARMS.ln(),
+            is_nothing: is_nothing(&any),
         }
     }
+
+    /// Logarithm of how much likelier than another it is, if it explains the motion.
+    fn above(&self, other: &Self) -> f64 {
+        match self.is_explained {
+            true => self.log_likelihood - other.log_likelihood,
+            false => f64::NEG_INFINITY,
+        }
+    }
+}
+
+/// How likely the motion is with the axes that are stated, by all that it is known from.
+fn parts(problem: &Problem, run: &Run, motion: &Motion, too_small: TooSmall) -> Vec<Part> {
+    // A rate at rest is as large as the factor that is tried makes it: it does not tell factors apart.
+    let mut motion = motion.clone();
+    motion.upward = None;
+    let stated = AxisOrder::IDENTITY;
+    let hypotheses = Hypotheses::among(problem, run, motion, &[stated], too_small);
+    hypotheses.parts(&PerSensor::from_fn(|_| stated))
+}
+
+fn sum(parts: &[Part]) -> f64 {
+    parts.iter().map(|part| part.of).sum()
 }
 
 impl fmt::Display for Contradiction {

@@ -28,16 +28,10 @@ impl TooSmall {
         prior: &FACTORS,
     };
 
-    /// The prior by at most ten.
-    pub const CARELESS_PRIOR: Self = Self {
-        noise: &FACTORS,
-        prior: FACTORS.split_at(3).0,
-    };
-
-    /// Noise by at most ten.
-    pub const STATED_PRIOR: Self = Self {
+    /// Noise by at most ten, the prior by three.
+    pub const CARELESS: Self = Self {
         noise: FACTORS.split_at(3).0,
-        prior: FACTORS.split_at(1).0,
+        prior: FACTORS.split_at(2).0,
     };
 }
 
@@ -92,7 +86,8 @@ pub fn by_table(
             for of in motion.moves.iter().filter(|_| sensor == Sensor::Gyro) {
                 add_turn(equations, of, order);
             }
-            for rest in &motion.rests {
+            let is_told = sensor == Sensor::Accel || motion.upward.is_some();
+            for rest in motion.rests.iter().filter(|_| is_told) {
                 let mut sensed = rest.get(sensor).clone();
                 sensed.variance += position_sigma.powi(2);
                 add_sensed(equations, sensor, &sensed, order, 1.0);

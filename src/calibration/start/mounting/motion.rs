@@ -1,5 +1,6 @@
 //! What a record shows of its motion, as the columns stand: dwells, moves between them, labelled sections.
 
+use std::f64::consts::PI;
 use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
@@ -41,6 +42,8 @@ pub struct Move {
     pub turns: [Turned; 2],
     /// Variance of the turn about each axis, rad².
     pub variance: f64,
+    /// All that the gyros turn, one way and the other, rad.
+    pub way: f64,
 }
 
 /// A turn as gyros make it.
@@ -66,6 +69,22 @@ pub struct Motion {
 }
 
 impl Motion {
+    /// Whether the gyros miss any turn by more than this part of their way.
+    pub fn misses_a_turn(&self, part: f64) -> bool {
+        self.moves.iter().any(|of| {
+            let turned = &of.turns[0].rotation;
+            let [before, after] = [0, 1].map(|next| self.rests.get(of.from + next));
+            let missed = match (of.known, before.zip(after)) {
+                (Some(known), _) => log(&(turned * known.transpose())).norm(),
+                (None, Some((before, after))) => {
+                    before.accel.found.angle(&(turned * after.accel.found))
+                }
+                (None, None) => 0.0,
+            };
+            missed > part * of.way.min(PI)
+        })
+    }
+
     /// That of the recording with this number.
     pub fn of(problem: &Problem, recording: usize, run: &Run) -> Self {
         let stretches = problem.stretches().iter();
@@ -214,8 +233,10 @@ impl Legs<'_> {
         };
         // A reading is between two samples.
         let of_table = self.position_sigma.powi(2) + fastest.powi(2);
+        let increments = self.increments(samples.clone());
         Move {
             from: self.from,
+            way: increments.map(|increment| increment.norm()).sum(),
             turns: [1.0, -1.0].map(turned),
             variance: angle_variance(self.run, &samples) + known.map_or(0.0, |_| 2.0 * of_table),
             known,
