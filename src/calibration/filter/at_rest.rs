@@ -3,10 +3,10 @@
 use nalgebra::DMatrix;
 
 use super::Filter;
+use super::columns::Linear;
 use super::gain_cache::StepModel;
 use super::input_prior::InputPrior;
 use super::propagation::{effect_of, of_moving, own};
-use super::update::Linear;
 use crate::calibration::record::Rest;
 use crate::calibration::{
     ATTITUDE, Constant, DisturbanceKind, Known, NAVIGATION, POSITION, VELOCITY,
