@@ -3,10 +3,10 @@
 use nalgebra::DMatrix;
 
 use super::Filter;
+use super::columns::Linear;
 use super::gain_cache::StepModel;
 use super::input_prior::InputPrior;
 use super::propagation::{effect_of, of_moving, own};
-use super::update::Linear;
 use crate::calibration::record::Rest;
 use crate::calibration::{
     ATTITUDE, Constant, DisturbanceKind, Known, NAVIGATION, POSITION, VELOCITY,
@@ -135,9 +135,9 @@ impl Filter {
             for (k, column) in constants.iter().enumerate() {
                 driven.push((row, M - 3 + k, column[own(row)]));
             }
-            for column in 0..first {
+            for (column, noise) in noise[row].iter_mut().enumerate().take(first) {
                 let of_block = (&of_navigation, block.duration);
-                noise[row][column] = self.noise_of_moving(of_block, row, column);
+                *noise = self.noise_of_moving(of_block, row, column);
             }
         }
         for (k, &(state, sigma, correlation_time)) in self.varying.iter().enumerate() {

@@ -10,8 +10,7 @@ use crate::run::Aiding;
 pub const SOURCES: usize = Source::ALL.len();
 
 /// Variance of each source over its reference, in the order of [`Source::ALL`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Factors(pub [f64; SOURCES]);
+pub type Factors = [f64; SOURCES];
 
 /// What variances are counted in: what is stated; for what is not, as much as the stated random walks
 /// make of the same.
@@ -58,7 +57,7 @@ impl Scale {
         };
         let reference = Source::ALL.map(reference);
         let initial = |k: usize| over(Source::ALL[k].sigma(problem).powi(2), reference[k]);
-        let initial = Factors(std::array::from_fn(initial));
+        let initial = std::array::from_fn(initial);
         Self {
             reference,
             stated: std::array::from_fn(|k| reference[k] > 0.0 && Source::ALL[k].stated(problem)),
@@ -72,7 +71,7 @@ impl Scale {
         let mut broad = self.initial;
         for k in self.present() {
             if !self.stated[k] {
-                broad.0[k] = broad.0[k].max(1.0);
+                broad[k] = broad[k].max(1.0);
             }
         }
         broad
@@ -85,14 +84,14 @@ impl Scale {
 
     /// σ of a source at some factors, in SI and radians.
     pub fn sigma(&self, factors: &Factors, source: usize) -> f64 {
-        (factors.0[source] * self.reference[source]).sqrt()
+        (factors[source] * self.reference[source]).sqrt()
     }
 
     /// A model with these factors. What is as it was stays untouched.
     pub fn apply(&self, factors: &Factors, model: &Model) -> Model {
         let mut model = model.clone();
         for (k, source) in Source::ALL.into_iter().enumerate() {
-            if factors.0[k] != self.initial.0[k] {
+            if factors[k] != self.initial[k] {
                 source.set(&mut model, self.sigma(factors, k), self.correlation_time);
             }
         }

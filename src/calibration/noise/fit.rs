@@ -75,7 +75,7 @@ impl Likelihood<'_> {
     ) -> Result<Slope, CalibrationError> {
         let differences = sources.par_iter().map(|&k| {
             let mut moved = *factors;
-            moved.0[k] = match factors.0[k] {
+            moved[k] = match factors[k] {
                 0.0 => DIFFERENCE,
                 v => v * (2.0 * DIFFERENCE).exp(),
             };
@@ -108,7 +108,7 @@ impl Likelihood<'_> {
     fn penalty(&self, factors: &Factors) -> f64 {
         let stated = (0..SOURCES).filter(|&k| self.scale.stated[k]);
         stated
-            .map(|k| (0.5 * factors.0[k].ln() / LOG_SIGMA).powi(2))
+            .map(|k| (0.5 * factors[k].ln() / LOG_SIGMA).powi(2))
             .sum()
     }
 
@@ -157,7 +157,7 @@ impl Likelihood<'_> {
         sources: &[usize],
     ) -> Result<Vec<usize>, CalibrationError> {
         let at = *factors;
-        let above_zero = sources.iter().copied().filter(|&k| at.0[k] > 0.0);
+        let above_zero = sources.iter().copied().filter(|&k| at[k] > 0.0);
         let mut left: Vec<usize> = above_zero.collect();
         let slope = self.slope(self.replay(&at)?, &at, &left)?;
         let slope = slope.with_prior(self.scale, &at, &left);
@@ -167,7 +167,7 @@ impl Likelihood<'_> {
         // How far each variance is from what is stated, in itself; 1σ of one is twice that of ln σ.
         let stated = |k: usize| self.scale.stated[k];
         let mut values = DVector::from_fn(left.len(), |i, _| match stated(left[i]) {
-            true => at.0[left[i]].ln(),
+            true => at[left[i]].ln(),
             false => 1.0,
         });
         let mut covariance = inverse * 4.0;
@@ -195,14 +195,14 @@ impl Likelihood<'_> {
             values = values.remove_row(least);
             covariance = covariance.remove_row(least).remove_column(least);
             let source = left.remove(least);
-            factors.0[source] = if stated(source) { 1.0 } else { 0.0 };
+            factors[source] = if stated(source) { 1.0 } else { 0.0 };
         }
     }
 
     /// Whether the score of any source is beyond chance; where a variance is zero and would fall it is not.
     fn is_called_for(&self, slope: &Slope, stated: &Factors, present: &[usize]) -> bool {
         present.iter().enumerate().any(|(i, &k)| {
-            let one_sided = usize::from(stated.0[k] == 0.0);
+            let one_sided = usize::from(stated[k] == 0.0);
             let limit = limit(1 - one_sided, one_sided, SCREEN / present.len() as f64);
             let (score, information) = (slope.score[i], slope.information[(i, i)]);
             let rises = score > 0.0 || one_sided == 0;
@@ -231,7 +231,7 @@ impl Likelihood<'_> {
             let slope = slope.with_prior(self.scale, &at, &moving);
             let cost = deviance + self.penalty(&at);
             let (free, rests): (Vec<usize>, Vec<usize>) =
-                (0..moving.len()).partition(|&i| at.0[moving[i]] > 0.0 || slope.score[i] > 0.0);
+                (0..moving.len()).partition(|&i| at[moving[i]] > 0.0 || slope.score[i] > 0.0);
             resting.extend(rests.iter().map(|&i| moving[i]));
             let of_free = slope.score.select_rows(&free);
             let information = slope.information.select_rows(&free).select_columns(&free);
@@ -269,7 +269,7 @@ impl Likelihood<'_> {
         while fraction > SHORTEST {
             let mut there = *at;
             for (&k, step) in free.iter().zip(step) {
-                let v = &mut there.0[k];
+                let v = &mut there[k];
                 if *v > 0.0 {
                     *v *= (2.0 * (fraction * step).clamp(-LONGEST, LONGEST)).exp();
                     if *v < NOTHING && !self.scale.stated[k] {
@@ -335,7 +335,7 @@ impl Slope {
             .enumerate()
             .filter(|(_, k)| scale.stated[**k])
         {
-            self.score[i] -= 0.5 * at.0[k].ln() / LOG_SIGMA.powi(2);
+            self.score[i] -= 0.5 * at[k].ln() / LOG_SIGMA.powi(2);
             self.information[(i, i)] += LOG_SIGMA.powi(-2);
         }
         self

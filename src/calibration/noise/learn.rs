@@ -143,7 +143,7 @@ impl Likelihood<'_> {
     fn test(&self, fit: &Fit) -> Result<NoiseTest, CalibrationError> {
         let stated = self.scale.initial;
         let free = fit.sources.iter();
-        let (bounded, free): (Vec<usize>, Vec<usize>) = free.partition(|&&k| stated.0[k] == 0.0);
+        let (bounded, free): (Vec<usize>, Vec<usize>) = free.partition(|&&k| stated[k] == 0.0);
         let ratio = match fit.sources.is_empty() {
             true => 0.0,
             false => self.replay(&stated)?.deviance() - fit.deviance,
@@ -167,15 +167,15 @@ impl Likelihood<'_> {
         let stated = self.scale.initial;
         let of = |(&k, sigma): (&usize, &Option<f64>)| {
             let used = self.scale.sigma(factors, k);
-            let interval = sigma.map(|sigma| match factors.0[k] {
+            let interval = sigma.map(|sigma| match factors[k] {
                 0.0 => {
                     let mut upper = *factors;
-                    upper.0[k] = ONE_SIDED * sigma;
+                    upper[k] = ONE_SIDED * sigma;
                     [0.0, self.scale.sigma(&upper, k)]
                 }
                 _ => [-1.0, 1.0].map(|side| used * (side * INTERVAL * sigma).exp()),
             });
-            let stated = (stated.0[k] > 0.0).then(|| self.scale.sigma(&stated, k));
+            let stated = (stated[k] > 0.0).then(|| self.scale.sigma(&stated, k));
             SourceFigures::new(Source::ALL[k], stated, used, interval)
         };
         Ok(NoiseReport {

@@ -1,8 +1,7 @@
 //! What happens in a record at one point of linearisation: navigation is done once, the filter as often as noise is tried
 //! or a variance is changed.
 
-use super::Part;
-use super::smoothed::Smoothed;
+use super::{Part, Smoothed};
 use crate::calibration::filter::{DwellFilters, Filter, Gate, Judge, Since, Taken, dwell_filters};
 use crate::calibration::record::{Event, Rest, events};
 use crate::calibration::{

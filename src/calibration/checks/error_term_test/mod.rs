@@ -5,7 +5,6 @@
 
 mod bias_variation;
 mod evidence;
-mod explanation;
 mod terms_on;
 
 use serde::{Deserialize, Serialize};
@@ -19,9 +18,8 @@ use crate::calibration::{
 use crate::statistics::{FALSE_ALARM, ln_survival};
 pub use bias_variation::{bias_variation, biases_may_vary};
 pub use evidence::Evidence;
-pub use explanation::UnmodelledEffect;
-use explanation::{Explanation, seen_and_left_off};
-use terms_on::{TermsOn, With};
+pub use terms_on::UnmodelledEffect;
+use terms_on::{Explanation, TermsOn, With, seen_and_left_off};
 
 /// An error term against the same calibration without it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

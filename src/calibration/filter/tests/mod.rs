@@ -8,7 +8,7 @@ use nalgebra::{DVector, Matrix3, SVector, Vector3};
 
 use super::*;
 use crate::calibration::constants::{Known, Prior};
-use crate::calibration::filter::update::Linear;
+use crate::calibration::filter::columns::Linear;
 use crate::calibration::linearisation::Linearisation;
 use crate::calibration::problem::Stretch;
 use crate::calibration::record::{Rest, part_of};
