@@ -38,7 +38,7 @@ impl Estimate {
         self.covariance.diagonal().map(|v| v.max(0.0).sqrt())
     }
 
-    /// Covariance of its parameters and of what is estimated beside them, given that of these and between them.
+    /// Joint covariance of its parameters and of further constants, given that of the constants and between both.
     pub fn covariance_with<'a>(
         &self,
         cross: impl Into<DMatrixView<'a, f64>>,

@@ -85,7 +85,7 @@ impl PerSensor<ThermalRange> {
         })
     }
 
-    /// Both triads' functions where all axes have one temperature in °C that changes by so many K/s.
+    /// Both triads' functions at one temperature in °C of all axes and its rate in K/s.
     pub fn everywhere(&self, temperature: f64, rate: f64) -> ThermalState {
         PerSensor::from_fn(|sensor| [self.get(sensor).values(temperature, rate); 3])
     }

@@ -139,7 +139,7 @@ impl Calibration {
         Some(covariance)
     }
 
-    /// How its parameters change with temperature, normalised by nominal scales; none where they do not.
+    /// How its parameters change with temperature, normalised by nominal scales; `None` if they do not.
     ///
     /// # Errors
     /// If coefficients are of no parameter.

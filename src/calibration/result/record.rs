@@ -250,7 +250,7 @@ pub fn truth_record(truth: &PerSensor<Triad>, run: &Run) -> Calibration {
     }
 }
 
-/// The matrices of `u = correction (N − bias)`, by nominal scales; none where one has no inverse.
+/// The matrices of `u = correction (N − bias)`, by nominal scales; `None` if one has no inverse.
 pub fn correction_of(
     triads: &PerSensor<Triad>,
     nominal: &PerSensor<Nominal>,

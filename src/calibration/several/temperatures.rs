@@ -35,7 +35,7 @@ impl Default for TemperatureOptions {
     }
 }
 
-/// The polynomials that the temperatures of a problem's dwells support; none where the instrument was at one.
+/// The polynomials that the temperatures of a problem's dwells support; `None` if the instrument was at one.
 pub fn model(
     problem: &Problem,
     options: TemperatureOptions,
