@@ -1,6 +1,8 @@
 //! Rows of numbers below a line of names, plain or gzipped, read row by row without keeping their text.
 
 mod ahead;
+mod clock_text;
+mod heading;
 mod lines;
 mod row;
 
@@ -14,11 +16,9 @@ use super::error::{FileError, Place};
 use super::names::Names;
 use crate::room;
 use ahead::Ahead;
+use heading::{Heading, Looks};
 use lines::{LONGEST, Lines, Stop};
 use row::{LONGEST_FIELD, MOST_COLUMNS, Malformed, Row};
-
-/// What the names of such files end in, each also with `.gz` behind it.
-const ENDINGS: [&str; 5] = [".csv", ".txt", ".tsv", ".dat", ".log"];
 
 /// Bytes that a value takes while a record is read: it is held as it stands, repaired and in SI. To ask for
 /// what a calibration takes would refuse what may find room.
@@ -27,20 +27,23 @@ const BYTES_A_VALUE: usize = 32;
 const BYTES_LOOKED_AT: usize = 16;
 /// The same where rows are packed as they come.
 const BYTES_PACKED: usize = 4;
+/// What a gzipped file begins with.
+const GZIP: [u8; 2] = [0x1f, 0x8b];
 /// So many rows always find room.
 const FEW_ROWS: usize = 1 << 12;
 
 /// A file of rows at one of them.
 ///
-/// Commas, semicolons, tabs or blanks part the fields, as the first row shows. Lines that begin with `#`, `%`
-/// or `//` are comments. A first row of numbers makes the columns' names `1`, `2`, …; a row of units below the
-/// names is passed over. Numbers may have a decimal comma where commas do not part them.
+/// Commas, semicolons, tabs or blanks part the fields, as most rows show. Lines that begin with `#`, `%` or `//` are
+/// comments; those above the names, or above rows of numbers without names, are a preamble. Columns without names are
+/// called `1`, `2`, …. Numbers may have a decimal comma where commas do not part them; a time may be that of a clock.
 pub(super) struct CsvFile {
     file: PathBuf,
     lines: Lines,
+    heading: Heading,
     names: Names,
-    units: Option<Vec<String>>,
-    decimal_comma: bool,
+    /// Of rows of several kinds the word of those that are given out, and its column.
+    tag: Option<(usize, String)>,
     row: Row,
     rows: usize,
     packed: bool,
@@ -58,11 +61,19 @@ enum Cut {
 }
 
 impl CsvFile {
-    /// Opens a file and reads its header.
-    pub fn open(path: &Path) -> Result<Self, FileError> {
-        let is_gzipped = is_gzipped_by_name(path)?;
-        let source = source(path, is_gzipped)?;
-        let (lines, heading) = Lines::open(source).map_err(|stop| stopped(path, &stop))?;
+    /// Opens a file and reads its header; of rows that tags tell apart those with this one.
+    pub fn open(path: &Path, tag: Option<&str>) -> Result<Self, FileError> {
+        let stopped = |stop: Stop| stopped(path, &stop);
+        let mut lines = Lines::open(source(path)?).map_err(stopped)?;
+        let looks = Looks::of(lines.ahead());
+        let tags = tag.map(|tag| {
+            let tags = looks
+                .tags()
+                .filter(|tags| tags.names.iter().any(|name| name == tag));
+            tags.ok_or_else(|| no_tag(path, tag))
+        });
+        let tags = tags.transpose()?;
+        let heading = looks.heading(tags.as_ref().zip(tag)).map_err(stopped)?;
         let heading = heading.ok_or_else(|| {
             FileError::new(
                 path,
@@ -72,18 +83,29 @@ impl CsvFile {
                 "Record or export the file again.",
             )
         })?;
+        lines.skip(heading.above);
         Ok(Self {
             file: path.to_owned(),
             lines,
             row: Row::new(heading.delimiter.byte()),
-            decimal_comma: heading.delimiter.leaves_commas(),
             names: Names::new(&heading.names),
-            units: heading.units,
+            tag: tags
+                .zip(tag)
+                .map(|(tags, tag)| (tags.column, tag.to_owned())),
             rows: 0,
             packed: false,
             line: heading.line,
+            heading,
             cut: None,
         })
+    }
+
+    /// The tags that tell rows of several kinds apart.
+    pub fn tags(path: &Path) -> Result<Vec<String>, FileError> {
+        let lines = Lines::open(source(path)?).map_err(|stop| stopped(path, &stop))?;
+        Ok(Looks::of(lines.ahead())
+            .tags()
+            .map_or_else(Vec::new, |tags| tags.names))
     }
 
     /// The names of the columns.
@@ -96,14 +118,19 @@ impl CsvFile {
         &self.file
     }
 
-    /// What comments say of the rate of rows, Hz.
+    /// What lines without rows say of the rate of rows, Hz.
     pub fn rate(&self) -> Option<f64> {
-        self.lines.rate()
+        self.heading.rate
     }
 
-    /// The row of units below the names, if there is one.
+    /// The units of the columns, if the file says them.
     pub fn units(&self) -> Option<&[String]> {
-        self.units.as_deref()
+        self.heading.units.as_deref()
+    }
+
+    /// What the file says of its values that is not followed, or is read otherwise.
+    pub fn remarks(&self) -> &[String] {
+        &self.heading.remarks
     }
 
     /// The index of a named column, which nothing else may be.
@@ -115,14 +142,22 @@ impl CsvFile {
     /// Goes to the next row; false at the end of the file, and at a last row that the end of the file cuts
     /// off.
     pub fn advance(&mut self) -> Result<bool, FileError> {
-        let more = self.lines.advance();
-        if !more.map_err(|stop| stopped(&self.file, &stop))? {
-            return Ok(false);
-        }
-        self.line = self.lines.number();
+        let split = loop {
+            let more = self.lines.advance();
+            if !more.map_err(|stop| stopped(&self.file, &stop))? {
+                return Ok(false);
+            }
+            let line = self.lines.line();
+            self.heading.delimiter.tidy(&mut line.text);
+            let split = self.row.split(&line.text);
+            self.line = line.number;
+            match &self.tag {
+                Some((column, tag)) if self.bytes(*column) != tag.as_bytes() => {}
+                _ => break split,
+            }
+        };
         self.rows += 1;
         self.reserve()?;
-        let split = self.row.split(self.lines.line());
         let (found, expected) = (self.row.len(), self.header().len());
         let is_cut = split == Err(Malformed::Quote) || found < expected;
         if is_cut && !self.lines.is_ended() {
@@ -194,11 +229,15 @@ impl CsvFile {
 
     /// The finite number in a column of the row.
     pub fn number(&self, column: usize) -> Result<f64, FileError> {
+        let clock = self.heading.clocks.get(column).copied().flatten();
         std::str::from_utf8(self.bytes(column))
             .ok()
-            .and_then(|text| match text.parse() {
-                Err(_) if self.decimal_comma => text.replacen(',', ".", 1).parse().ok(),
-                number => number.ok(),
+            .and_then(|text| match (clock, text.parse()) {
+                (Some(clock), _) => clock.seconds(text),
+                (None, Err(_)) if self.heading.delimiter.leaves_commas() => {
+                    text.replacen(',', ".", 1).parse().ok()
+                }
+                (None, number) => number.ok(),
             })
             .filter(|number: &f64| number.is_finite())
             .ok_or_else(|| self.not(column, "a finite number"))
@@ -264,30 +303,19 @@ impl CsvFile {
     }
 }
 
-/// Whether the name says that the file is gzipped; an error if it is none of a file of rows.
-fn is_gzipped_by_name(path: &Path) -> Result<bool, FileError> {
-    let name = path.to_string_lossy().to_lowercase();
-    let plain = name.strip_suffix(".gz");
-    if !ENDINGS
-        .iter()
-        .any(|end| plain.unwrap_or(&name).ends_with(end))
-    {
-        return Err(FileError::new(
-            path,
-            Place::File,
-            "a file of another kind",
-            format_args!(
-                "a name that ends in {}, or in one of them and .gz",
-                ENDINGS.join(", ")
-            ),
-            "Rename or convert the file.",
-        ));
-    }
-    Ok(plain.is_some())
+/// The error of a tag that tells no rows of a file apart.
+fn no_tag(path: &Path, tag: &str) -> FileError {
+    FileError::new(
+        path,
+        Place::File,
+        "rows of text",
+        format_args!("a log with a stream `{tag}`"),
+        "Leave `stream` out, or name another file.",
+    )
 }
 
 /// The bytes of a regular file, unzipped.
-fn source(path: &Path, is_gzipped: bool) -> Result<Box<dyn BufRead>, FileError> {
+fn source(path: &Path) -> Result<Box<dyn BufRead>, FileError> {
     let refused = |error| {
         FileError::io(
             path,
@@ -314,17 +342,20 @@ fn source(path: &Path, is_gzipped: bool) -> Result<Box<dyn BufRead>, FileError> 
         let file = File::open(path).map_err(refused)?;
         Ok(BufReader::with_capacity(1 << 16, file))
     };
-    Ok(if is_gzipped {
-        match Ahead::of(MultiGzDecoder::new(opened()?)) {
-            Ok(ahead) => Box::new(ahead),
-            // The system lets no thread be started.
-            Err(_) => {
-                let decoder = MultiGzDecoder::new(opened()?);
-                Box::new(BufReader::with_capacity(1 << 16, decoder))
-            }
-        }
-    } else {
-        Box::new(opened()?)
+    let mut plain = opened()?;
+    let begin = plain
+        .fill_buf()
+        .map_err(|error| stopped(path, &Stop::System(error)))?;
+    if !begin.starts_with(&GZIP) {
+        return Ok(Box::new(plain));
+    }
+    Ok(match Ahead::of(MultiGzDecoder::new(plain)) {
+        Ok(ahead) => Box::new(ahead),
+        // The system lets no thread be started.
+        Err(_) => Box::new(BufReader::with_capacity(
+            1 << 16,
+            MultiGzDecoder::new(opened()?),
+        )),
     })
 }
 
@@ -344,6 +375,13 @@ fn stopped(file: &Path, stop: &Stop) -> FileError {
             "Is this the right file? Record or export it again.",
         ),
         Stop::Malformed { line, what } => malformed(file, *line, *what),
+        Stop::Binary => FileError::new(
+            file,
+            Place::File,
+            "a file of another kind",
+            "rows of text, or a log of a program that turncal knows",
+            "Convert the file.",
+        ),
     }
 }
 

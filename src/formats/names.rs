@@ -34,9 +34,21 @@ impl Names {
         &self.taken
     }
 
-    /// The index of a named column, which nothing else may be.
+    /// The index of a column by its name, or by its number where none is called so; nothing else may be that column.
     pub fn find(&mut self, name: &str) -> Result<usize, Wrong> {
-        let mut places = (0..self.all.len()).filter(|&i| self.all[i] == name);
+        let mut places: Vec<usize> = (0..self.all.len())
+            .filter(|&i| self.all[i] == name)
+            .collect();
+        if let Ok(number) = name.parse::<usize>()
+            && places.is_empty()
+        {
+            places.extend(
+                number
+                    .checked_sub(1)
+                    .filter(|&place| place < self.all.len()),
+            );
+        }
+        let mut places = places.into_iter();
         let header = || self.all.iter().map(String::as_str);
         match (places.next(), places.next()) {
             (Some(index), None) if self.taken.contains(&index) => Err(Wrong {
@@ -51,7 +63,8 @@ impl Names {
             (Some(_), Some(_)) => Err(Wrong {
                 found: format!("two columns named `{name}`"),
                 expected: "one".to_owned(),
-                advice: "Rename one of them.".to_owned(),
+                advice: "Name it by its number, the first being `1`, or rename one of them."
+                    .to_owned(),
             }),
             (None, _) => Err(Wrong {
                 found: format!("no column named `{}`", excerpt(name)),

@@ -72,7 +72,7 @@ impl LogRows {
     /// What was done to the values, a sentence each.
     pub fn remarks(&self) -> &[String] {
         match &self.kind {
-            Kind::Text(_) => &[],
+            Kind::Text(csv) => csv.remarks(),
             Kind::Stream(rows) => rows.remarks(),
             Kind::Joined(rows) => rows.remarks(),
         }

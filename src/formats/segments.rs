@@ -19,7 +19,7 @@ pub(super) fn read(
     axes: BodyAxes,
     notes: &mut Vec<String>,
 ) -> Result<Vec<Segment>, FileError> {
-    let mut csv = CsvFile::open(file)?;
+    let mut csv = CsvFile::open(file, None)?;
     let start_column = csv.column("start")?;
     let end_column = csv.column("end")?;
     let label_column = csv.column("label")?;

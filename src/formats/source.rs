@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::clock::Clock;
 use super::csv_file::CsvFile;
-use super::error::{FileError, Place};
+use super::error::FileError;
 use super::fields::Fields;
 use super::rows::LogRows;
 use super::streams::{self, StreamRows};
@@ -32,16 +32,7 @@ impl Source<'_> {
     /// Opens it by its content.
     pub fn open(&self) -> Result<LogRows, FileError> {
         let Some(log) = streams::open(&self.file)? else {
-            if let Some(stream) = self.stream {
-                return Err(FileError::new(
-                    &self.file,
-                    Place::File,
-                    "rows of text",
-                    format_args!("a log with a stream `{stream}`"),
-                    "Leave `stream` out, or name another file.",
-                ));
-            }
-            return CsvFile::open(&self.file).map(LogRows::text);
+            return CsvFile::open(&self.file, self.stream).map(LogRows::text);
         };
         let rows = StreamRows::open(&self.file, log, self.stream, self.salvage)?;
         Ok(LogRows::stream(rows))
