@@ -55,7 +55,9 @@ impl<'a> Clock<'a> {
     /// Reads `time_unit` and `sample_period_s` of a log's table, and `time` of its columns.
     pub fn of_fields(fields: &Fields<'a>, columns: &Fields<'a>) -> Result<Self, FileError> {
         let unit = match fields.get("time_unit") {
-            Some(field) => field.choice(&TimeUnit::WORDS)?,
+            Some(field) if field.text().is_ok() => field.choice(&TimeUnit::WORDS)?,
+            // Ticks of a clock of its own.
+            Some(field) => TimeUnit::PerSecond(field.positive()?.recip()),
             None => TimeUnit::PerSecond(1.0),
         };
         let period = fields.get("sample_period_s");

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::name::Name;
+use super::name::{self, Name};
 use super::units::offset;
 use crate::formats::Sheet;
 use crate::imu::{PerSensor, Sensor};
@@ -33,8 +33,15 @@ const NUMBERS: f64 = 0.5;
 const LACKING: f64 = 0.1;
 /// So many instruments may share a log.
 const MOST_INSTANCES: usize = 8;
-/// Part of the steps of a time that go forward.
+/// Part of the steps of a time that go forward, and of one that is named so, which may stay for many rows.
 const FORWARD: f64 = 0.9;
+const SELDOM_FORWARD: f64 = 0.01;
+/// Accelerometers keep gravity's magnitude within this part in half of the rows …
+const EVEN: f64 = 0.05;
+/// … and what departs from its median by more in them is none.
+const UNEVEN: f64 = 0.2;
+/// Gyros that turn say more than this many times what they say in half of the rows.
+const LIVELY: f64 = 3.0;
 
 /// Of both triads, row by row.
 type Samples = PerSensor<Vec<Vector3<f64>>>;
@@ -42,34 +49,63 @@ type Samples = PerSensor<Vec<Vector3<f64>>>;
 impl Columns {
     pub fn find(sheet: &Sheet) -> Self {
         let names: Vec<Name> = sheet.names.iter().map(|name| Name::of(name)).collect();
+        let units = |k: usize| names[k].unit.or_else(|| name::unit(&sheet.units[k]));
+        let mut found = PerSensor::from_fn(|sensor| by_name(&names, sheet, sensor));
+        // Of several the first with a unit, and that is gravity's in those of the accelerometers.
+        let is_bare = |triad: &[usize; 3]| units(triad[0]).is_none_or(|unit| unit.word == "count");
+        found.gyro.sort_by_key(is_bare);
+        found
+            .accel
+            .sort_by_key(|triad| (unevenness(sheet, triad) > UNEVEN, is_bare(triad)));
+        let of_triads = found.gyro.iter().chain(&found.accel).flatten();
+        let of_triads: Vec<usize> = of_triads.copied().collect();
+        // Rows of another sensor may have other times.
+        let is_sample = |row: &usize| {
+            of_triads.is_empty()
+                || of_triads
+                    .iter()
+                    .any(|&k| sheet.columns[k][*row].is_finite())
+        };
+        let count = sheet.columns.first().map_or(0, Vec::len);
+        let rows: Vec<usize> = (0..count).filter(is_sample).collect();
+        let forward = |k: usize| forward(rows.iter().map(|&row| sheet.columns[k][row]));
         let split = split_time(sheet, &names);
-        let time = split.map(|pair| pair[0]).or_else(|| time(sheet, &names));
+        let time = split
+            .map(|pair| pair[0])
+            .or_else(|| time(sheet, &names, forward));
         let temperature =
             (0..names.len()).find(|&k| names[k].is_temperature() && is_numeric(sheet, k));
-        let mut found = PerSensor::from_fn(|sensor| by_name(&names, sheet, sensor));
-        let by_size = Sensor::ALL
+        let is_named = Sensor::ALL
             .iter()
-            .all(|&sensor| found.get(sensor).is_empty());
-        let is_echo = by_size && is_echo(sheet);
+            .any(|&sensor| !found.get(sensor).is_empty());
+        let is_echo = !is_named && is_echo(sheet);
         if is_echo {
             found = PerSensor {
                 gyro: vec![ECHO_GYRO],
                 accel: vec![ECHO_ACCEL],
             };
-        } else if by_size {
-            found = by_numbers(sheet, &names, [time, temperature]);
         }
+        let lacks = |found: &PerSensor<Vec<_>>, sensor: Sensor| found.get(sensor).is_empty();
+        let lacked = PerSensor::from_fn(|sensor| lacks(&found, sensor));
+        if lacked.gyro || lacked.accel {
+            let taken = [time, temperature].into_iter().flatten().chain(of_triads);
+            by_numbers(sheet, &names, &taken.collect::<Vec<_>>(), &mut found);
+        }
+        let is_new = |&sensor: &Sensor| *lacked.get(sensor) && !lacks(&found, sensor);
         let first = |triads: &Vec<[usize; 3]>| triads.first().copied();
+        let counts = |k: &usize| names[*k].is_counter() && forward(*k).0 >= FORWARD;
         Self {
-            names: sheet.names.clone(),
+            names: (0..names.len())
+                .map(|k| distinct(&sheet.names, k))
+                .collect(),
             time,
             nanoseconds: split.map(|pair| pair[1]),
-            counter: (0..names.len()).find(|&k| names[k].is_counter() && goes_forward(sheet, k)),
+            counter: (0..names.len()).find(counts),
             triads: PerSensor::from_fn(|sensor| first(found.get(sensor))),
             others: PerSensor::from_fn(|sensor| {
                 found.get(sensor).iter().skip(1).copied().collect()
             }),
-            by_size: by_size && !is_echo,
+            by_size: Sensor::ALL.iter().any(is_new),
             temperature,
             quaternion: quaternion(sheet, time),
         }
@@ -84,18 +120,16 @@ impl Columns {
         })
     }
 
-    /// The rows in which both triads are numbers, and their samples.
+    /// The rows in which the triads are numbers, and their samples: zeros of a triad that is not there.
     pub fn samples(&self, sheet: &Sheet) -> Option<(Vec<usize>, Samples)> {
-        let triads = PerSensor {
-            gyro: self.triads.gyro?,
-            accel: self.triads.accel?,
-        };
-        let at = |columns: &[usize; 3], row: usize| {
-            Vector3::from(columns.map(|k| sheet.columns[k][row]))
+        let at = |sensor: Sensor, row: usize| match self.triads.get(sensor) {
+            Some(columns) => Vector3::from(columns.map(|k| sheet.columns[k][row])),
+            None => Vector3::zeros(),
         };
         let (mut rows, mut samples) = (Vec::new(), PerSensor::from_fn(|_| Vec::new()));
-        for row in 0..sheet.columns[triads.gyro[0]].len() {
-            let both = PerSensor::from_fn(|sensor| at(triads.get(sensor), row));
+        let any = self.triads.gyro.or(self.triads.accel)?;
+        for row in 0..sheet.columns[any[0]].len() {
+            let both = PerSensor::from_fn(|sensor| at(sensor, row));
             if (both.gyro + both.accel)
                 .iter()
                 .all(|value| value.is_finite())
@@ -107,6 +141,15 @@ impl Columns {
             }
         }
         (rows.len() > 1).then_some((rows, samples))
+    }
+}
+
+/// The name of a column, or its number where others are called so, too, or it has none.
+fn distinct(names: &[String], column: usize) -> String {
+    let like = names.iter().filter(|name| **name == names[column]);
+    match names[column].is_empty() || like.count() > 1 {
+        true => (column + 1).to_string(),
+        false => names[column].clone(),
     }
 }
 
@@ -160,11 +203,14 @@ fn both(seconds: &[f64], nanoseconds: &[f64]) -> Vec<f64> {
 fn split_time(sheet: &Sheet, names: &[Name]) -> Option<[usize; 2]> {
     let is_pair = |k: &usize| match is_echo(sheet) {
         true => *k == 0,
-        false => names[*k].is_seconds() && names[k + 1].is_nanoseconds(),
+        false => {
+            let is_whole = sheet.columns[*k].iter().all(|value| value.fract() == 0.0);
+            is_whole && names[*k].is_part_of_time("s") && names[k + 1].is_part_of_time("ns")
+        }
     };
     let pair = (0..names.len().saturating_sub(1)).find(is_pair)?;
     let times = both(&sheet.columns[pair], &sheet.columns[pair + 1]);
-    are_forward(&times).then_some([pair, pair + 1])
+    (forward(times.into_iter()).0 >= FORWARD).then_some([pair, pair + 1])
 }
 
 /// The column that tells rows of several instruments apart, with what it says of the first.
@@ -184,19 +230,33 @@ pub(super) fn instance(sheet: &Sheet) -> Option<(usize, f64)> {
     Some((column, *sheet.columns[column].first()?))
 }
 
-fn goes_forward(sheet: &Sheet, column: usize) -> bool {
-    are_forward(&sheet.columns[column])
-}
-
-fn are_forward(values: &[f64]) -> bool {
-    let forward = values.windows(2).filter(|pair| pair[1] > pair[0]).count();
-    forward as f64 >= FORWARD * (values.len() as f64 - 1.0)
+/// The parts of the steps between values that go forward and back.
+fn forward(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (mut steps, mut forward, mut back) = (0.0, 0.0, 0.0);
+    let mut last = f64::NAN;
+    for value in values {
+        steps += f64::from(!last.is_nan());
+        forward += f64::from(value > last);
+        back += f64::from(value < last);
+        last = value;
+    }
+    (forward / f64::max(steps, 1.0), back / f64::max(steps, 1.0))
 }
 
 /// The column most like a time by its name, else the first that goes forward.
-fn time(sheet: &Sheet, names: &[Name]) -> Option<usize> {
-    let forward = (0..names.len()).filter(|&k| goes_forward(sheet, k));
-    let best = forward.max_by_key(|&k| (names[k].is_time(), names.len() - k))?;
+fn time(sheet: &Sheet, names: &[Name], forward: impl Fn(usize) -> (f64, f64)) -> Option<usize> {
+    let goes_on = |k: &usize| match forward(*k) {
+        (forward, _) if forward >= FORWARD => true,
+        (forward, back) => {
+            names[*k].is_time() > 1 && forward > SELDOM_FORWARD && back < 1.0 - FORWARD
+        }
+    };
+    let rank = |k: &usize| {
+        let is_text = sheet.units[*k] == "h:m:s";
+        let is_of_time = names[*k].is_of_time() || name::unit(&sheet.units[*k]).is_some();
+        (names[*k].is_time(), is_of_time && !is_text, names.len() - k)
+    };
+    let best = (0..names.len()).filter(goes_on).max_by_key(rank)?;
     // The angle of an integrating sensor goes forward, too.
     let named_otherwise = names[best].is_time() == 0 && names[best].sensor().is_some();
     (!named_otherwise).then_some(best)
@@ -205,9 +265,16 @@ fn time(sheet: &Sheet, names: &[Name]) -> Option<usize> {
 /// Complete triads of a sensor, in order of their columns.
 fn by_name(names: &[Name], sheet: &Sheet, sensor: Sensor) -> Vec<[usize; 3]> {
     let of_sensor = |k: &usize| names[*k].sensor() == Some(sensor) && is_numeric(sheet, *k);
-    let candidates: Vec<usize> = (0..names.len()).filter(of_sensor).collect();
+    by_stem(
+        names,
+        &(0..names.len()).filter(of_sensor).collect::<Vec<_>>(),
+    )
+}
+
+/// Three columns each whose names differ by the axis alone.
+fn by_stem(names: &[Name], candidates: &[usize]) -> Vec<[usize; 3]> {
     let mut triads = Vec::new();
-    for &first in &candidates {
+    for &first in candidates {
         let axes = match names[first].axis {
             Some('x') => ['x', 'y', 'z'],
             Some('0') => ['0', '1', '2'],
@@ -226,35 +293,69 @@ fn by_name(names: &[Name], sheet: &Sheet, sensor: Sensor) -> Vec<[usize; 3]> {
     triads
 }
 
-/// Triads side by side: gravity keeps the magnitude of one of them, the other is a gyro's.
+/// The triads that names do not show, by gravity, which keeps the magnitude of the accelerometers', and by turns.
 fn by_numbers(
     sheet: &Sheet,
     names: &[Name],
-    taken: [Option<usize>; 2],
-) -> PerSensor<Vec<[usize; 3]>> {
-    let is_free = |&k: &usize| {
-        !taken.contains(&Some(k)) && !names[k].is_of_another_sensor() && is_numeric(sheet, k)
+    taken: &[usize],
+    found: &mut PerSensor<Vec<[usize; 3]>>,
+) {
+    let varies = |k: usize| {
+        let mut values = sheet.columns[k].iter().filter(|value| value.is_finite());
+        values
+            .next()
+            .is_some_and(|first| values.any(|value| value != first))
     };
-    let free: Vec<usize> = (0..sheet.names.len()).filter(is_free).collect();
-    let mut triads: Vec<(f64, [usize; 3])> = free
-        .chunks_exact(3)
-        .map(|columns| [columns[0], columns[1], columns[2]])
-        .map(|triad| (unevenness(sheet, &triad), triad))
+    let is_free = |&k: &usize| {
+        !taken.contains(&k) && !names[k].is_of_another_sensor() && is_numeric(sheet, k) && varies(k)
+    };
+    let free: Vec<usize> = (0..names.len()).filter(is_free).collect();
+    let has_stem = |k: &usize| names[*k].stem.contains(char::is_alphabetic);
+    let mut triads = by_stem(
+        names,
+        &free.iter().copied().filter(has_stem).collect::<Vec<_>>(),
+    );
+    if triads.is_empty() {
+        let side_by_side = free.chunks_exact(3);
+        triads = side_by_side
+            .map(|columns| [columns[0], columns[1], columns[2]])
+            .collect();
+    }
+    let mut sizes: Vec<([usize; 3], (f64, f64))> = triads
+        .into_iter()
+        .map(|triad| (triad, magnitude(sheet, &triad)))
         .collect();
-    triads.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut triads = triads.into_iter().map(|(_, triad)| triad);
-    let accel = triads.next();
-    let mut gyro: Vec<[usize; 3]> = triads.collect();
-    // Of several, the gyro is usually beside the accelerometer.
-    gyro.sort_by_key(|triad| accel.map_or(0, |accel| triad[0].abs_diff(accel[0])));
-    PerSensor {
-        accel: accel.filter(|_| !gyro.is_empty()).into_iter().collect(),
-        gyro,
+    if found.accel.is_empty() {
+        // A compass stands behind them.
+        let even = sizes
+            .iter()
+            .position(|(_, (uneven, lively))| *uneven < EVEN && *lively < LIVELY);
+        let least = || {
+            let of = |k: &usize| sizes[*k].1.0;
+            (0..sizes.len()).min_by(|a, b| of(a).total_cmp(&of(b)))
+        };
+        let is_pair = found.gyro.is_empty() && sizes.len() > 1;
+        let is_gravity = |(uneven, lively): (f64, f64)| uneven < UNEVEN && lively < LIVELY;
+        let best = even
+            .or_else(least)
+            .filter(|&k| is_pair || is_gravity(sizes[k].1));
+        found.accel.extend(best.map(|k| sizes.remove(k).0));
+    }
+    if found.gyro.is_empty() {
+        // Of several, the gyro is usually beside the accelerometer.
+        let place = found.accel.first().map_or(0, |accel| accel[0]);
+        sizes.sort_by_key(|(triad, (_, lively))| (*lively < LIVELY, triad[0].abs_diff(place)));
+        found.gyro.extend(sizes.iter().map(|(triad, _)| *triad));
     }
 }
 
-/// Median departure of a triad's magnitude from its median, relative.
 fn unevenness(sheet: &Sheet, triad: &[usize; 3]) -> f64 {
+    magnitude(sheet, triad).0
+}
+
+/// Median departure of a triad's magnitude from its median, and its largest in all but a hundredth of the rows, over
+/// the median.
+fn magnitude(sheet: &Sheet, triad: &[usize; 3]) -> (f64, f64) {
     let rows = 0..sheet.columns[triad[0]].len();
     let at = |row: usize| Vector3::from(triad.map(|k| sheet.columns[k][row]));
     let samples: Vec<Vector3<f64>> = rows
@@ -269,10 +370,19 @@ fn unevenness(sheet: &Sheet, triad: &[usize; 3]) -> f64 {
     let middle = median(&mut sizes).unwrap_or(0.0);
     let mut off: Vec<f64> = sizes.iter().map(|size| (size - middle).abs()).collect();
     let off = median(&mut off).unwrap_or(0.0);
+    let hundredth = sizes.len().saturating_sub(1) / 100;
+    let largest = match sizes.is_empty() {
+        true => 0.0,
+        false => {
+            *sizes
+                .select_nth_unstable_by(hundredth, |a, b| b.total_cmp(a))
+                .1
+        }
+    };
     if middle > 0.0 {
-        off / middle
+        (off / middle, largest / middle)
     } else {
-        f64::INFINITY
+        (f64::INFINITY, f64::INFINITY)
     }
 }
 

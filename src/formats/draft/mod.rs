@@ -219,6 +219,20 @@ impl Draft {
     }
 }
 
+impl Draft {
+    /// The triads that the log has; both where nothing shows any.
+    fn present(&self) -> impl Iterator<Item = Sensor> {
+        let triads = &self.columns.triads;
+        let joined = self
+            .streams
+            .as_ref()
+            .is_some_and(|streams| streams.accel.is_some());
+        let none = joined || triads.gyro.is_none() && triads.accel.is_none();
+        let is_present = move |sensor: &Sensor| none || triads.get(*sensor).is_some();
+        Sensor::ALL.into_iter().filter(is_present)
+    }
+}
+
 /// Keeps the rows of one of several instruments, and says by which column and number.
 fn retain_instance(sheet: &mut Sheet) -> Option<(usize, f64)> {
     let (column, number) = columns::instance(sheet)?;
@@ -234,9 +248,18 @@ fn retain_samples(sheet: &mut Sheet, columns: &Columns) {
         .flatten()
         .flatten()
         .collect();
-    if columns.time.is_some() && !of_triads.is_empty() {
-        sheet.retain(|columns, row| of_triads.iter().any(|&k| columns[k][row].is_finite()));
-    }
+    let Some(time) = columns.time.filter(|_| !of_triads.is_empty()) else {
+        return;
+    };
+    sheet.retain(|columns, row| of_triads.iter().any(|&k| columns[k][row].is_finite()));
+    // A row that is there twice is one sample.
+    let of_samples: Vec<usize> = of_triads.into_iter().chain([time]).collect();
+    sheet.retain(|columns, row| {
+        row == 0
+            || of_samples
+                .iter()
+                .any(|&k| columns[k][row] != columns[k][row - 1])
+    });
 }
 
 /// The noise of both triads in the longest rest, in the file's quantity per second.

@@ -81,7 +81,7 @@ impl Motion {
         let force = SIGMAS * noise(&accel) + PART * usual;
         let steady = |k: usize| {
             let near =
-                |other: Option<&Vector3<f64>>| other.is_none_or(|f| (f - accel[k]).norm() < force);
+                |other: Option<&Vector3<f64>>| other.is_none_or(|f| (f - accel[k]).norm() <= force);
             near(k.checked_sub(1).and_then(|k| accel.get(k))) && near(accel.get(k + 1))
         };
         let standing: Vec<usize> = (0..accel.len()).filter(|&k| steady(k)).collect();

@@ -28,7 +28,7 @@ impl Draft {
         }
         self.rows(&mut text);
         self.noise_table(&mut text);
-        for sensor in Sensor::ALL {
+        for sensor in self.present() {
             self.prior(&mut text, sensor);
         }
         self.table(&mut text);
@@ -78,7 +78,7 @@ impl Draft {
             Output::Rate => "rate",
         };
         line(text, "output", &quoted(output), &found.output_why);
-        for sensor in Sensor::ALL {
+        for sensor in self.present() {
             let (key, unit) = (format!("{}_unit", sensor.name()), found.units.get(sensor));
             match unit.word {
                 Some(word) => line(text, &key, &quoted(word), &unit.why),
@@ -104,12 +104,12 @@ impl Draft {
             .as_ref()
             .filter(|streams| streams.accel.is_some());
         let unit = unit
-            .map(|streams| streams.time.gyro.1)
+            .map(|streams| &streams.time.gyro.1)
             .filter(|unit| !unit.is_empty());
         if let Some(unit) = unit {
-            line(text, "time_unit", &quoted(unit), "as the file says");
+            line(text, "time_unit", &word_or_number(unit), "as the file says");
         } else if clock.unit != "s" {
-            line(text, "time_unit", &quoted(clock.unit), &clock.why);
+            line(text, "time_unit", &word_or_number(&clock.unit), &clock.why);
         }
     }
 
@@ -302,7 +302,7 @@ impl Draft {
         text.push_str(
             "\n# white noise at rest; better from hours at rest, by turncal allan\n[imu.noise]\n",
         );
-        for sensor in Sensor::ALL {
+        for sensor in self.present() {
             let keys = NoiseKeys::of(sensor);
             let (key, unit) = keys.random_walk;
             let Some((figures, scale)) = self.figures(sensor) else {
@@ -372,6 +372,14 @@ fn places(count: usize) -> String {
 /// A number to seven digits.
 pub(super) fn seven(value: f64) -> f64 {
     format!("{value:.6e}").parse().unwrap_or(value)
+}
+
+/// A word in quotes, or a number as it is.
+pub(super) fn word_or_number(text: &str) -> String {
+    match text.parse::<f64>() {
+        Ok(_) => text.to_owned(),
+        Err(_) => quoted(text),
+    }
 }
 
 pub(super) fn quoted(text: &str) -> String {

@@ -58,15 +58,17 @@ impl Quantities {
             units: PerSensor::default(),
             opposed: false,
         };
-        let Some(motion) = motion else {
-            return found;
-        };
         let named = PerSensor::from_fn(|sensor| {
             let first = columns.triads.get(sensor).map(|triad| triad[0])?;
             Name::of(&sheet.names[first])
                 .unit
                 .or_else(|| name::unit(&sheet.units[first]))
         });
+        let Some(motion) = motion else {
+            "too few rows hold numbers to show it".clone_into(&mut found.units.gyro.why);
+            found.units.accel.why.clone_from(&found.units.gyro.why);
+            return found;
+        };
         found.opposed = motion.angle.is_some_and(|angle| angle < 0.0);
         let period = clock.period;
         found.accelerometers(
@@ -77,6 +79,11 @@ impl Quantities {
             motion.sum_variance,
         );
         found.gyros(named.gyro, whole.gyro, motion, period);
+        for sensor in Sensor::ALL {
+            if columns.triads.get(sensor).is_none() {
+                *found.units.get_mut(sensor) = Unit::default();
+            }
+        }
         found
     }
 
@@ -165,7 +172,7 @@ impl Quantities {
 
     fn accelerometers(
         &mut self,
-        named: Option<&'static str>,
+        named: Option<name::Unit>,
         whole: bool,
         gravity: f64,
         period: Option<f64>,
@@ -176,6 +183,7 @@ impl Quantities {
         let known = [
             ("m/s^2", Output::Rate, STANDARD_GRAVITY),
             ("g", Output::Rate, 1.0),
+            ("mg", Output::Rate, 1e3),
             ("m/s", Output::Increment, STANDARD_GRAVITY * seconds),
             ("g*s", Output::Increment, seconds),
         ];
@@ -183,6 +191,9 @@ impl Quantities {
             let factor = gravity / expected;
             factor < GRAVITY_FACTOR && factor > GRAVITY_FACTOR.recip()
         };
+        let scaled = named.and_then(|unit| Scale::of_unit(Sensor::Accel, unit));
+        let scaled = scaled.filter(|scale| fits(scale.value.x * STANDARD_GRAVITY));
+        let named = named.map(|unit| unit.word);
         let by_name = known.iter().find(|(unit, ..)| Some(*unit) == named);
         let by_size: Vec<_> = known
             .iter()
@@ -190,6 +201,12 @@ impl Quantities {
             .collect();
         let mut unit = Unit::default();
         match (by_name, by_size.first()) {
+            _ if scaled.is_some() => {
+                self.output = Output::Rate;
+                unit.word = Some("count");
+                unit.why = format!("as the file says; {size}");
+                unit.scale = scaled;
+            }
             (Some(&(name, _, expected)), Some(&&(word, output, _))) if !fits(expected) => {
                 self.output = output;
                 unit.word = Some(word);
@@ -217,22 +234,18 @@ impl Quantities {
                 unit.word = Some("count");
                 unit.why = why_count(whole, named, &format!("no known unit makes {size}"));
                 let per_g = gravity * self.per_second(seconds);
-                unit.scale = match named {
-                    Some("mg") => Some(Scale::of_name(1e3 / STANDARD_GRAVITY, "mg")),
-                    _ => None,
-                };
                 unit.likely = per_g.is_finite().then(|| likely_for_g(per_g));
             }
         }
         let shown = known.iter().find(|(word, ..)| Some(*word) == unit.word);
-        unit.is_shown = shown.is_some_and(|&(.., expected)| fits(expected));
+        unit.is_shown = shown.is_some_and(|&(.., expected)| fits(expected)) || unit.scale.is_some();
         self.units.accel = unit;
         self.output_why = output_why(self.output, seconds);
     }
 
     fn gyros(
         &mut self,
-        named: Option<&'static str>,
+        named: Option<name::Unit>,
         whole: bool,
         motion: &Motion,
         period: Option<f64>,
@@ -251,6 +264,9 @@ impl Quantities {
                 .filter(|f| f.is_finite())
         };
         let fits = |unit: f64| turns(unit).is_some_and(turns_fit);
+        let scaled = named.and_then(|unit| Scale::of_unit(Sensor::Gyro, unit));
+        let scaled = scaled.filter(|scale| turns(scale.value.x.recip()).is_none_or(turns_fit));
+        let named = named.map(|unit| unit.word);
         let by_name = known.iter().find(|(word, _)| Some(*word) == named);
         let by_turn = known.iter().find(|&&(_, unit)| fits(unit));
         // Without a clock each unit needs a period of its own.
@@ -261,6 +277,11 @@ impl Quantities {
             .filter(|scale| scale.is_finite());
         let mut unit = Unit::default();
         match (by_name, by_turn) {
+            _ if scaled.is_some() => {
+                unit.word = Some("count");
+                unit.why = "as the file says".to_owned();
+                unit.scale = scaled;
+            }
             (Some(&(name, value)), _) if turns(value).is_some_and(|factor| !turns_fit(factor)) => {
                 let why = why_named(turns(value));
                 match by_turn {
@@ -294,10 +315,7 @@ impl Quantities {
             _ if whole || self.output == Output::Pulse || angle.is_some() || named.is_some() => {
                 unit.word = Some("count");
                 unit.why = why_count(whole, named, "no known unit fits the turns of gravity");
-                unit.scale = match named {
-                    Some("mdps") => Some(Scale::of_name(1e3 / DEGREE, "mdps")),
-                    _ => measured.map(|value| Scale::of_steps(value, self.output)),
-                };
+                unit.scale = measured.map(|value| Scale::of_steps(value, self.output));
             }
             _ if is_turned => {
                 unit.why = "gravity turns too seldom or too roughly to show it".to_owned();
@@ -336,7 +354,12 @@ fn output_why(output: Output, seconds: f64) -> String {
 /// Units of gyros, with the angle in one row of a unit of it.
 fn angle_units(output: Output) -> &'static [(&'static str, f64)] {
     match output {
-        Output::Rate => &[("rad/s", 1.0), ("deg/s", DEGREE), ("deg/h", DEG_PER_H)],
+        Output::Rate => &[
+            ("rad/s", 1.0),
+            ("deg/s", DEGREE),
+            ("deg/h", DEG_PER_H),
+            ("mdps", 1e-3 * DEGREE),
+        ],
         Output::Increment => &[("rad", 1.0), ("deg", DEGREE), ("arcsec", ARCSEC)],
         Output::Pulse => &[],
     }
