@@ -15,7 +15,7 @@ use crate::calibration::checks::finding::Finding;
 use crate::calibration::checks::quality::Quality;
 use crate::calibration::start::closed_form::{ClosedForm, six_position};
 use crate::calibration::start::mounting::Mounting;
-use crate::imu::PerSensor;
+use crate::imu::{PerSensor, Sensor};
 use crate::room;
 use crate::run::Run;
 use crate::units::DEGREE;
@@ -68,6 +68,10 @@ impl Problem<'_> {
                 samples,
                 megabytes: (bytes + BYTES_BESIDE) >> 20,
             });
+        }
+        let lacks = |&sensor: &Sensor| self.runs().any(|run| !run.recording.imu.has(sensor));
+        if let Some(sensor) = Sensor::ALL.into_iter().find(lacks) {
+            return Err(CalibrationError::OneTriad { sensor });
         }
         if let Some(mounting) = Mounting::contradicted(self) {
             return Err(CalibrationError::Mounting(Box::new(mounting)));

@@ -14,7 +14,7 @@ use crate::run::Run;
 /// The log on standard input.
 const STANDARD_INPUT: &str = "-";
 /// What rows of standard input are called as a file.
-const PIPED: &str = "imu.csv";
+const PIPED: &str = "stdin.csv";
 
 /// A run, and where it was a log alone, the draft by which it was read.
 #[derive(Debug)]

@@ -58,6 +58,7 @@ pub(super) struct ImuLog<'a> {
     pub accel_from: Option<(Source<'a>, Clock<'a>)>,
     /// Of rows of several instruments those that have this number in this column.
     pub instance: Option<(&'a str, f64)>,
+    /// Without names where the log has the other triad alone.
     pub triads: PerSensor<[&'a str; 3]>,
     pub temperature: Option<TemperatureColumns<'a>>,
     pub output: Output,
@@ -75,7 +76,8 @@ pub(super) struct ImuLog<'a> {
 struct Layout {
     /// Gyro x, y, z and accelerometer x, y, z as they stand.
     names: [FileColumn; 6],
-    places: [usize; 6],
+    /// None of a triad that is not there.
+    places: [Option<usize>; 6],
     /// Right, front or up, whichever each lies along.
     body_axes: [usize; 6],
 }
@@ -401,21 +403,16 @@ impl ImuLog<'_> {
             None => PerSensor::from_fn(|sensor| self.triads.get(sensor).map(str::to_owned)),
         };
         let names = names.gyro.iter().chain(&names.accel);
-        let found = names.map(|name| csv.signed_column(name));
-        let found = found.collect::<Result<Vec<_>, _>>()?;
-        let (places, names): (Vec<_>, Vec<_>) = found.into_iter().unzip();
-        let mut names = names.into_iter();
-        let mut name = |_| {
-            names.next().unwrap_or(FileColumn {
-                name: String::new(),
-                reversed: false,
-            })
-        };
-        Ok(Layout {
-            names: std::array::from_fn(&mut name),
-            places: std::array::from_fn(|k| places[k]),
+        let mut layout = Layout {
+            names: std::array::from_fn(|_| FileColumn::default()),
+            places: [None; 6],
             body_axes: std::array::from_fn(|k| self.axes.body_axis(k % 3)),
-        })
+        };
+        for (k, name) in names.enumerate().filter(|(_, name)| !name.is_empty()) {
+            let (place, column) = csv.signed_column(name)?;
+            (layout.places[k], layout.names[k]) = (Some(place), column);
+        }
+        Ok(layout)
     }
 }
 

@@ -97,21 +97,14 @@ impl<'a> InstrumentFields<'a> {
         }
         let full_scale = |name| fields.get(name).map(|field| field.positive()).transpose();
 
-        let mut known = knowledge(&fields, output, axes, notes)?;
-        let three = |name| -> Result<[&'a str; 3], FileError> {
-            columns
-                .need(name, "the names of three columns")?
-                .three_texts()
-        };
+        let triads = triads(&columns, accel_from.is_some())?;
+        let mut known = knowledge(&fields, &triads, (output, axes), notes)?;
         let log = ImuLog {
             source,
             clock,
             accel_from,
             instance,
-            triads: PerSensor {
-                gyro: three("gyro")?,
-                accel: three("accel")?,
-            },
+            triads,
             temperature,
             output,
             axes,
@@ -140,14 +133,16 @@ impl<'a> InstrumentFields<'a> {
 /// Units, nominal scales, priors and noise of both triads, with every error term off.
 fn knowledge(
     imu: &Fields,
-    output: Output,
-    axes: BodyAxes,
+    triads: &PerSensor<[&str; 3]>,
+    row: (Output, BodyAxes),
     notes: &mut Vec<String>,
 ) -> Result<Instrument, FileError> {
     let priors = imu.table("prior", &["gyro", "accel"])?;
-    let priors = priors.as_ref();
-    let gyro = triad(imu, priors, Sensor::Gyro, (output, axes), notes)?;
-    let accel = triad(imu, priors, Sensor::Accel, (output, axes), notes)?;
+    let mut of = |sensor: Sensor| match triads.get(sensor) {
+        ["", ..] => Ok(TriadKnowledge::of_none(sensor)),
+        _ => triad(imu, priors.as_ref(), sensor, row, notes),
+    };
+    let (gyro, accel) = (of(Sensor::Gyro)?, of(Sensor::Accel)?);
     let (noise, motion_noise) = noise(imu, notes)?;
     let noise_is_stated = |sensor| {
         let noise = imu
@@ -172,6 +167,25 @@ fn knowledge(
         noise_is_stated: PerSensor::from_fn(noise_is_stated),
         motion_noise,
         term_sigma: TermVector::zeros(),
+    })
+}
+
+/// The names of the columns of both triads; none of one that is not there.
+fn triads<'a>(
+    columns: &Fields<'a>,
+    needs_both: bool,
+) -> Result<PerSensor<[&'a str; 3]>, FileError> {
+    let has = |sensor: Sensor| columns.get(sensor.name()).is_some();
+    let may_lack = !needs_both && Sensor::ALL.into_iter().any(has);
+    let of = |sensor: Sensor| match may_lack && !has(sensor) {
+        true => Ok([""; 3]),
+        false => columns
+            .need(sensor.name(), "the names of three columns")?
+            .three_texts(),
+    };
+    Ok(PerSensor {
+        gyro: of(Sensor::Gyro)?,
+        accel: of(Sensor::Accel)?,
     })
 }
 
@@ -322,6 +336,22 @@ struct TriadKnowledge {
     unit: String,
     nominal: Nominal,
     prior: Prior,
+}
+
+impl TriadKnowledge {
+    /// Of a triad that is not there: nothing depends on it.
+    fn of_none(sensor: Sensor) -> Self {
+        Self {
+            unit: "count".to_owned(),
+            nominal: Nominal(Vector3::repeat(1.0)),
+            prior: Prior {
+                scale_sigma: Vector3::repeat(USUAL_SCALE),
+                installation_sigma: Vector3::repeat(USUAL_INSTALLATION),
+                bias: Vector3::zeros(),
+                bias_sigma: Vector3::repeat(*USUAL_BIAS.get(sensor)),
+            },
+        }
+    }
 }
 
 fn triad(

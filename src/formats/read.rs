@@ -87,7 +87,8 @@ impl Run {
         notes.extend(faults::notes(&imu));
         notes.extend(clock_note(&imu, &instrument));
         let mut known = instrument.known;
-        let without_noise = |sensor: &Sensor| !known.noise_is_stated.get(*sensor);
+        let without_noise =
+            |sensor: &Sensor| !known.noise_is_stated.get(*sensor) && imu.has(*sensor);
         for sensor in Sensor::ALL.into_iter().filter(without_noise) {
             let random_walk = noise::white_noise(&imu, sensor);
             known.noise.get_mut(sensor).random_walk = random_walk;
@@ -219,9 +220,12 @@ fn clock_note(imu: &ImuSamples, instrument: &InstrumentFields) -> Option<String>
     })
 }
 
-/// The name of the directory of a `run.toml`, else the file's own.
+/// The name of the directory of a `run.toml`, else the file's own without its endings.
 pub(super) fn name(path: &Path) -> String {
-    let full = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let mut full = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    if full.extension().is_some_and(|of| of == "gz") {
+        full.set_extension("");
+    }
     let named = match full.file_name() {
         Some(file) if file == "run.toml" => full.parent().and_then(Path::file_name),
         _ => full.file_stem(),

@@ -73,11 +73,20 @@ impl Look {
         }
     }
 
-    /// The fields if there are as many, be it by the delimiter of others.
+    /// The fields if there are as many, be it by the delimiter of others; an empty one behind the last is none.
     fn fields(&self, delimiter: Delimiter, count: usize) -> Option<Vec<String>> {
-        let fits = |fields: &Vec<String>| fields.len() == count;
-        let own = || self.fields.clone().ok().filter(fits);
-        delimiter.fields(&self.text).ok().filter(fits).or_else(own)
+        let fits = |mut fields: Vec<String>| {
+            if fields.len() == count + 1 {
+                fields.pop_if(|last| last.is_empty());
+            }
+            (fields.len() == count).then_some(fields)
+        };
+        let own = || self.fields.clone().ok().and_then(fits);
+        delimiter
+            .fields(&self.text)
+            .ok()
+            .and_then(fits)
+            .or_else(own)
     }
 
     /// As many words, of names or units.
@@ -109,8 +118,8 @@ struct Shape {
 }
 
 impl Shape {
-    /// Of the last of some rows, for names may be among the first.
-    fn of(rows: &[&Look]) -> Option<Self> {
+    /// Of the last of some rows, for names may be among the first; a last column that is always empty has to have a name.
+    fn of(rows: &[&Look], all: &[Look]) -> Option<Self> {
         let rows = &rows[rows.len() - ROWS.min(rows.len().div_ceil(2))..];
         let mut shapes = BTreeMap::new();
         for row in rows {
@@ -121,9 +130,14 @@ impl Shape {
         let most = shapes
             .into_iter()
             .max_by_key(|((_, columns), count)| (*count, *columns));
-        let ((delimiter, columns), _) = most?;
+        let ((delimiter, mut columns), _) = most?;
         let rows = rows.iter().filter_map(|row| row.fields(delimiter, columns));
         let rows: Vec<Vec<String>> = rows.collect();
+        let ends_empty = |fields: &Vec<String>| fields.last().is_some_and(String::is_empty);
+        let mut names = all.iter().filter_map(|look| look.words(delimiter, columns));
+        if columns > 1 && rows.iter().all(ends_empty) && names.all(|names| ends_empty(&names)) {
+            columns -= 1;
+        }
         let are_numbers = |column: usize| {
             let filled = rows
                 .iter()
@@ -173,7 +187,7 @@ impl Looks {
             .filter(|look| !look.is_comment)
             .filter(is_of_tag)
             .collect();
-        let Some(shape) = Shape::of(&rows) else {
+        let Some(shape) = Shape::of(&rows, &self.0) else {
             return rows
                 .iter()
                 .find_map(|row| row.malformed())
@@ -280,9 +294,10 @@ impl Looks {
             let is_near = fields.len() > 2
                 && (shape.delimiter != Delimiter::Blanks || fields.len().abs_diff(columns) < 2);
             let has_numbers = fields.iter().any(|field| is_number(field));
-            if fields.len() == columns || is_near && !has_numbers {
+            let fitting = look.fields(shape.delimiter, columns);
+            if fitting.is_some() || is_near && !has_numbers {
                 named = Named {
-                    names: fields,
+                    names: fitting.unwrap_or(fields),
                     units: None,
                     line: look.number,
                     above: above + 1,
@@ -464,7 +479,8 @@ impl Delimiter {
         // A comma with a tab behind it is a comma.
         let parts = |byte: &u8| match Self::Byte(*byte).fields(row) {
             Ok(fields) => {
-                fields.len() > 1 && !(*byte == b'\t' && fields.iter().any(|f| f.ends_with(',')))
+                fields.iter().filter(|field| !field.is_empty()).count() > 1
+                    && !(*byte == b'\t' && fields.iter().any(|f| f.ends_with(',')))
             }
             // Whoever reads the row by it says what is wrong.
             Err(_) => row.as_bytes().contains(byte),
@@ -507,8 +523,7 @@ impl Delimiter {
         }
     }
 
-    /// The fields of one row, without quotes and blanks around them; an empty one behind a last delimiter
-    /// is none.
+    /// The fields of one row, without quotes and blanks around them.
     fn fields(self, line: &str) -> Result<Vec<String>, Malformed> {
         let mut text = line.as_bytes().to_vec();
         self.tidy(&mut text);
@@ -518,11 +533,7 @@ impl Delimiter {
             let text = String::from_utf8_lossy(field);
             text.trim().trim_matches('"').trim().to_owned()
         };
-        let mut fields: Vec<String> = row.fields().map(name).collect();
-        if fields.len() > 1 && fields.last().is_some_and(String::is_empty) {
-            fields.pop();
-        }
-        Ok(fields)
+        Ok(row.fields().map(name).collect())
     }
 }
 

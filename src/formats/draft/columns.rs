@@ -254,7 +254,10 @@ fn time(sheet: &Sheet, names: &[Name], forward: impl Fn(usize) -> (f64, f64)) ->
     let rank = |k: &usize| {
         let is_text = sheet.units[*k] == "h:m:s";
         let is_of_time = names[*k].is_of_time() || name::unit(&sheet.units[*k]).is_some();
-        (names[*k].is_time(), is_of_time && !is_text, names.len() - k)
+        // Raw ticks behind times that have a unit.
+        let is_raw = names[*k].unit.is_some_and(|unit| unit.word == "count");
+        let named = names[*k].is_time().saturating_sub(u8::from(is_raw));
+        (named, is_of_time && !is_text, names.len() - k)
     };
     let best = (0..names.len()).filter(goes_on).max_by_key(rank)?;
     // The angle of an integrating sensor goes forward, too.
@@ -386,8 +389,14 @@ fn magnitude(sheet: &Sheet, triad: &[usize; 3]) -> (f64, f64) {
     }
 }
 
-/// Four columns side by side whose squares add up to one in every row.
+/// Four columns side by side with names that begin alike or say nothing, whose squares add up to one in every row.
 fn quaternion(sheet: &Sheet, time: Option<usize>) -> Option<[usize; 4]> {
+    let begin = |k: usize| {
+        sheet.names[k]
+            .chars()
+            .next()
+            .filter(|_| sheet.names[k].len() > 2)
+    };
     let rows = sheet.columns.first()?.len();
     let places = 0..sheet.names.len().saturating_sub(3);
     places.map(|k| [k, k + 1, k + 2, k + 3]).find(|four| {
@@ -396,7 +405,9 @@ fn quaternion(sheet: &Sheet, time: Option<usize>) -> Option<[usize; 4]> {
                 .map(|&k| sheet.columns[k][row].powi(2))
                 .sum::<f64>()
         };
-        !four.iter().any(|&k| Some(k) == time)
+        !four
+            .iter()
+            .any(|&k| Some(k) == time || begin(k) != begin(four[0]))
             && (0..rows).all(|row| (norm(row) - 1.0).abs() < 1e-3)
     })
 }

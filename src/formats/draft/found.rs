@@ -156,7 +156,10 @@ impl Draft {
             },
             value,
             certainty,
-            why: unit.why.clone(),
+            why: match self.down.filter(|_| sensor == Sensor::Accel) {
+                Some(down) => format!("{}; at the beginning {}", unit.why, self.down_words(down)),
+                None => unit.why.clone(),
+            },
         }
     }
 

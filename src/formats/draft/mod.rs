@@ -65,6 +65,8 @@ pub struct Draft {
     noise: PerSensor<Option<NoiseFigures>>,
     /// Output of the gyros at rest above that, the file's quantity a row.
     rest: Option<Vector3<f64>>,
+    /// The column of the accelerometers that shows gravity with a minus at first.
+    down: Option<usize>,
     /// Sections laid end to end, as far as gravity shows.
     cuts: usize,
     /// The rows that were looked at where the log has more.
@@ -175,6 +177,9 @@ impl Draft {
         let mut blocked = Vec::new();
         let mut registers = None;
         let cuts = motion.as_ref().map_or(0, |motion| motion.cuts);
+        let first_force = triads
+            .as_ref()
+            .map(|triads| at_first(&triads.accel, period));
         let is_asked = quantities.has_counts() || cuts > 0;
         if let Some(triads) = triads.as_mut().filter(|_| is_asked) {
             let found = Registers::find(triads, period);
@@ -194,6 +199,8 @@ impl Draft {
             }
         }
         quantities.state(stated);
+        let down = first_force.and_then(points_down);
+        let down = down.and_then(|axis| Some(columns.triads.accel?[axis]));
         let at_rest = triads.as_ref().zip(motion.as_ref());
         let noise = at_rest
             .and_then(|(triads, motion)| noise_at_rest(triads, motion, &quantities, clock.period))
@@ -206,6 +213,7 @@ impl Draft {
             registers,
             blocked,
             rest: motion.as_ref().map(|motion| motion.rest),
+            down,
             cuts: motion.as_ref().map_or(0, |motion| motion.cuts),
             instance,
             columns,
@@ -260,6 +268,17 @@ fn retain_samples(sheet: &mut Sheet, columns: &Columns) {
                 .iter()
                 .any(|&k| columns[k][row] != columns[k][row - 1])
     });
+}
+
+/// Specific force in the first rows.
+fn at_first(accel: &[Vector3<f64>], period: f64) -> Vector3<f64> {
+    let rows = ((motion::WINDOW / period).round() as usize).clamp(1, accel.len().max(1));
+    motion::mean(&accel[..rows.min(accel.len())])
+}
+
+/// The axis along which a force points backwards and hardly any other way.
+fn points_down(force: Vector3<f64>) -> Option<usize> {
+    (0..3).find(|&axis| force[axis] < -0.9 * force.norm())
 }
 
 /// The noise of both triads in the longest rest, in the file's quantity per second.

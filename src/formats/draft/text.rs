@@ -205,11 +205,15 @@ impl Draft {
         }
         let names: Vec<String> = columns.names.iter().map(|name| quoted(name)).collect();
         for sensor in missing {
-            let _ = writeln!(
-                text,
-                "# TODO: {sensor} = three of {}; no names or numbers showed them",
-                names.join(", ")
-            );
+            let why = "no names or numbers showed them";
+            let names = names.join(", ");
+            let _ = match columns.triads.gyro.or(columns.triads.accel) {
+                None => writeln!(text, "# TODO: {sensor} = three of {names}; {why}"),
+                Some(_) => writeln!(
+                    text,
+                    "# {sensor} = three of {names}; {why}, and without them `turncal allan` alone takes the log"
+                ),
+            };
         }
         let fields = fields.join(", ");
         if let Some(axes) = self.turned_axes() {
@@ -245,6 +249,15 @@ impl Draft {
         if columns.by_size && columns.triads.gyro.is_some() {
             text.push_str("# The triads were told by their numbers: gravity keeps the magnitude of the accelerometers'.\n");
         }
+        if let Some((down, accel)) = self.down.zip(columns.triads.accel) {
+            let reversed = accel.map(|k| quoted(&format!("-{}", columns.names[k])));
+            let _ = writeln!(
+                text,
+                "# At the beginning {}. If the sensor lay that side up, write accel = [{}].",
+                self.down_words(down),
+                reversed.join(", ")
+            );
+        }
     }
 
     /// The field of the columns of time; where there is none, a remark instead.
@@ -277,6 +290,14 @@ impl Draft {
                 None
             }
         }
+    }
+
+    /// That an axis points down, or the accelerometers have the sign of gravity.
+    pub(super) fn down_words(&self, down: usize) -> String {
+        format!(
+            "{} is negative: it points down, or the accelerometers give gravity instead of specific force, as iOS does",
+            self.columns.names[down]
+        )
     }
 
     /// Where gyros do not turn as the accelerometers' columns lie.

@@ -137,23 +137,22 @@ struct Steps {
 
 impl Steps {
     fn of(stamps: &[f64]) -> Self {
-        let mut rows = Vec::with_capacity(stamps.len());
-        let (mut time, mut last) = (0.0, f64::NAN);
-        let mut forward = Vec::new();
-        for (&stamp, line) in stamps.iter().zip(1..) {
-            let step = stamp - last;
-            if step > 0.0 {
-                time += step;
-                forward.push(step);
-            }
-            if stamp.is_finite() {
-                last = stamp;
-            }
-            rows.push((time, line));
-        }
+        let steps = || stamps.windows(2).map(|pair| pair[1] - pair[0]);
+        let mut forward: Vec<f64> = steps().filter(|&step| step > 0.0).collect();
         let is_whole = forward.iter().all(|step| step.fract() == 0.0);
-        let repeated = stamps.len().saturating_sub(1) - forward.len();
+        let repeated = steps().filter(|&step| step <= 0.0).count();
         let usual = median(&mut forward).unwrap_or(1.0);
+        // A clock that goes back begins again, or was set.
+        let goes_on = |time: &mut f64, step: f64| {
+            *time += match step {
+                _ if step.is_nan() => 0.0,
+                _ if step < 0.0 => usual,
+                _ => step,
+            };
+            Some(*time)
+        };
+        let times = std::iter::once(0.0).chain(steps().scan(0.0, goes_on));
+        let rows: Vec<(f64, u64)> = times.zip(1..).collect();
         let clock = Uniform::new(Path::new(""), &rows, None).ok();
         let numbers = clock.as_ref().map_or(&[][..], |clock| &clock.numbers);
         let gap = |(row, pair): (usize, &[usize])| {

@@ -9,7 +9,6 @@ mod words;
 
 use super::document::{Block, Document, List};
 use super::number::{count, three_digits};
-use crate::imu::Sensor;
 use crate::noise::NoiseAnalysis;
 
 /// Of the deviations a terminal shows every so-manieth.
@@ -28,10 +27,10 @@ pub fn document(run: &str, analysis: &NoiseAnalysis) -> Document {
         three_digits(period.recip())
     ));
     document.warnings.items = words::warnings(analysis);
-    for sensor in Sensor::ALL {
+    for &sensor in &analysis.sensors {
         document.page(figure::figure(analysis, sensor));
     }
-    for sensor in Sensor::ALL {
+    for &sensor in &analysis.sensors {
         document.both(tables::coefficients(analysis, sensor));
     }
     document.terminal(tables::deviations(analysis, EVERY));

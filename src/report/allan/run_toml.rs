@@ -18,7 +18,7 @@ struct Field {
 /// `[imu.noise]` with all that was found, ready to be pasted.
 pub(super) fn noise_table(analysis: &NoiseAnalysis) -> String {
     let mut text = "[imu.noise]\n".to_owned();
-    for sensor in Sensor::ALL {
+    for &sensor in &analysis.sensors {
         let fields = of_triad(analysis, sensor);
         if fields.is_empty() {
             let name = sensor.name();
