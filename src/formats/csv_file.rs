@@ -6,6 +6,8 @@ mod heading;
 mod lines;
 mod row;
 
+use std::borrow::Cow;
+use std::fmt::Display;
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -13,7 +15,7 @@ use std::path::{Path, PathBuf};
 use flate2::read::MultiGzDecoder;
 
 use super::error::{FileError, Place};
-use super::names::Names;
+use super::rows::Rows;
 use crate::room;
 use ahead::Ahead;
 use heading::{Heading, Looks};
@@ -41,7 +43,6 @@ pub(super) struct CsvFile {
     file: PathBuf,
     lines: Lines,
     heading: Heading,
-    names: Names,
     /// Of rows of several kinds the word of those that are given out, and its column.
     tag: Option<(usize, String)>,
     row: Row,
@@ -88,7 +89,6 @@ impl CsvFile {
             file: path.to_owned(),
             lines,
             row: Row::new(heading.delimiter.byte()),
-            names: Names::new(&heading.names),
             tag: tags
                 .zip(tag)
                 .map(|(tags, tag)| (tags.column, tag.to_owned())),
@@ -108,40 +108,58 @@ impl CsvFile {
             .map_or_else(Vec::new, |tags| tags.names))
     }
 
-    /// The names of the columns.
-    pub fn header(&self) -> &[String] {
-        self.names.all()
+    /// Makes sure, as rows become more, that there is room for what is made of them.
+    fn reserve(&self, used: usize) -> Result<(), FileError> {
+        if self.rows < FEW_ROWS || !self.rows.is_power_of_two() {
+            return Ok(());
+        }
+        let a_row = match used {
+            0 => self.header().len() * BYTES_LOOKED_AT,
+            used if self.packed => used * BYTES_PACKED,
+            used => used * BYTES_A_VALUE,
+        };
+        if room::is_there((2 * self.rows).saturating_mul(a_row)) {
+            return Ok(());
+        }
+        Err(self.error_here(
+            format_args!("row {}, and no memory for as many more", self.rows),
+            "a record that fits into memory",
+            "Give it more memory, or split the record.",
+        ))
     }
 
-    /// The file's path.
-    pub fn path(&self) -> &Path {
+    fn bytes(&self, column: usize) -> &[u8] {
+        self.row.get(column).unwrap_or_default().trim_ascii()
+    }
+
+    fn error_here(&self, found: impl Display, expected: impl Display, advice: &str) -> FileError {
+        FileError::new(&self.file, self.place(None), found, expected, advice)
+    }
+}
+
+impl Rows for CsvFile {
+    fn file(&self) -> &Path {
         &self.file
     }
 
-    /// What lines without rows say of the rate of rows, Hz.
-    pub fn rate(&self) -> Option<f64> {
+    fn header(&self) -> &[String] {
+        &self.heading.names
+    }
+
+    fn units(&self) -> &[String] {
+        self.heading.units.as_deref().unwrap_or_default()
+    }
+
+    fn rate(&self) -> Option<f64> {
         self.heading.rate
     }
 
-    /// The units of the columns, if the file says them.
-    pub fn units(&self) -> Option<&[String]> {
-        self.heading.units.as_deref()
-    }
-
-    /// What the file says of its values that is not followed, or is read otherwise.
-    pub fn remarks(&self) -> &[String] {
+    fn remarks(&self) -> &[String] {
         &self.heading.remarks
     }
 
-    /// The index of a named column, which nothing else may be.
-    pub fn column(&mut self, name: &str) -> Result<usize, FileError> {
-        let found = self.names.find(name);
-        found.map_err(|wrong| self.error_here(wrong.found, wrong.expected, wrong.advice))
-    }
-
-    /// Goes to the next row; false at the end of the file, and at a last row that the end of the file cuts
-    /// off.
-    pub fn advance(&mut self) -> Result<bool, FileError> {
+    /// False also at a last row that the end of the file cuts off.
+    fn advance(&mut self, used: &[usize]) -> Result<bool, FileError> {
         let split = loop {
             let more = self.lines.advance();
             if !more.map_err(|stop| stopped(&self.file, &stop))? {
@@ -157,7 +175,7 @@ impl CsvFile {
             }
         };
         self.rows += 1;
-        self.reserve()?;
+        self.reserve(used.len())?;
         let (found, expected) = (self.row.len(), self.header().len());
         let is_cut = split == Err(Malformed::Quote) || found < expected;
         if is_cut && !self.lines.is_ended() {
@@ -173,20 +191,54 @@ impl CsvFile {
                 "Complete or remove the row.",
             ));
         }
-        let last_is_used = self.names.taken().contains(&(expected - 1));
-        if !self.lines.is_ended() && last_is_used && !ends_in_delimiter {
+        if !self.lines.is_ended() && used.contains(&(expected - 1)) && !ends_in_delimiter {
             self.cut = Some(Cut::Number);
         }
         Ok(true)
     }
 
-    /// Whether the row is the last and no line end shows that its last number is whole.
-    pub fn may_be_cut(&self) -> bool {
+    fn value(&self, column: usize) -> f64 {
+        let text = std::str::from_utf8(self.bytes(column)).unwrap_or_default();
+        let clock = self.heading.clocks.get(column).copied().flatten();
+        let number = match (clock, text.parse()) {
+            (Some(clock), _) => clock.seconds(text),
+            (None, Err(_)) if self.heading.delimiter.leaves_commas() => {
+                text.replacen(',', ".", 1).parse().ok()
+            }
+            (None, number) => number.ok(),
+        };
+        number.unwrap_or(f64::NAN)
+    }
+
+    fn shown(&self, column: usize) -> Cow<'_, str> {
+        String::from_utf8_lossy(self.bytes(column))
+    }
+
+    /// Also of what loggers write for nothing.
+    fn is_blank(&self, column: usize) -> bool {
+        let bytes = self.bytes(column);
+        bytes.is_empty() || bytes.eq_ignore_ascii_case(b"nan")
+    }
+
+    fn line(&self) -> u64 {
+        self.line
+    }
+
+    fn place(&self, column: Option<usize>) -> Place {
+        let line = self.line;
+        let name = column.map(|column| self.header().get(column).cloned().unwrap_or_default());
+        name.map_or(Place::Line(line), |column| Place::Column { line, column })
+    }
+
+    fn place_of_names(&self) -> Place {
+        Place::Line(self.heading.line)
+    }
+
+    fn may_be_cut(&self) -> bool {
         self.cut == Some(Cut::Number)
     }
 
-    /// What the end of the file leaves open, in a sentence, with what was done about its last row.
-    pub fn cut_off(&self, done: &str) -> Option<String> {
+    fn cut_off(&self, done: &str) -> Option<String> {
         let (file, line) = (self.file.display(), self.line);
         let what = match self.cut? {
             Cut::Row => "is cut off: fields are missing. It is left out",
@@ -197,109 +249,8 @@ impl CsvFile {
         ))
     }
 
-    /// Makes sure, as rows become more, that there is room for what is made of them.
-    fn reserve(&self) -> Result<(), FileError> {
-        if self.rows < FEW_ROWS || !self.rows.is_power_of_two() {
-            return Ok(());
-        }
-        let a_row = match self.names.taken().len() {
-            0 => self.header().len() * BYTES_LOOKED_AT,
-            taken if self.packed => taken * BYTES_PACKED,
-            taken => taken * BYTES_A_VALUE,
-        };
-        if room::is_there((2 * self.rows).saturating_mul(a_row)) {
-            return Ok(());
-        }
-        Err(self.error_here(
-            format_args!("row {}, and no memory for as many more", self.rows),
-            "a record that fits into memory",
-            "Give it more memory, or split the record.",
-        ))
-    }
-
-    /// Takes less memory for granted: rows are packed as they come.
-    pub fn pack(&mut self) {
+    fn pack(&mut self) {
         self.packed = true;
-    }
-
-    /// Line of the row.
-    pub fn line(&self) -> u64 {
-        self.line
-    }
-
-    /// The finite number in a column of the row.
-    pub fn number(&self, column: usize) -> Result<f64, FileError> {
-        let clock = self.heading.clocks.get(column).copied().flatten();
-        std::str::from_utf8(self.bytes(column))
-            .ok()
-            .and_then(|text| match (clock, text.parse()) {
-                (Some(clock), _) => clock.seconds(text),
-                (None, Err(_)) if self.heading.delimiter.leaves_commas() => {
-                    text.replacen(',', ".", 1).parse().ok()
-                }
-                (None, number) => number.ok(),
-            })
-            .filter(|number: &f64| number.is_finite())
-            .ok_or_else(|| self.not(column, "a finite number"))
-    }
-
-    /// The text in a column of the row, not empty.
-    pub fn text(&self, column: usize) -> Result<&str, FileError> {
-        std::str::from_utf8(self.bytes(column))
-            .ok()
-            .filter(|text| !text.is_empty())
-            .ok_or_else(|| self.not(column, "a text"))
-    }
-
-    /// Whether nothing stands in a column of the row, or what loggers write for that.
-    pub fn is_blank(&self, column: usize) -> bool {
-        let bytes = self.bytes(column);
-        bytes.is_empty() || bytes.eq_ignore_ascii_case(b"nan")
-    }
-
-    fn bytes(&self, column: usize) -> &[u8] {
-        self.row.get(column).unwrap_or_default().trim_ascii()
-    }
-
-    /// The error of a row's value that is not what it should be.
-    pub fn not(&self, column: usize, expected: &str) -> FileError {
-        let bytes = self.bytes(column);
-        let found = if bytes.is_empty() {
-            "an empty field".to_owned()
-        } else {
-            format!("`{}`", String::from_utf8_lossy(bytes))
-        };
-        let place = Place::Column {
-            line: self.line,
-            column: self.header().get(column).cloned().unwrap_or_default(),
-        };
-        FileError::new(
-            &self.file,
-            place,
-            found,
-            expected,
-            "Correct the value or record the file again.",
-        )
-    }
-
-    /// An error of the whole file.
-    pub fn error(
-        &self,
-        found: impl std::fmt::Display,
-        expected: impl std::fmt::Display,
-        advice: impl std::fmt::Display,
-    ) -> FileError {
-        FileError::new(&self.file, Place::File, found, expected, advice)
-    }
-
-    /// An error of the row.
-    pub fn error_here(
-        &self,
-        found: impl std::fmt::Display,
-        expected: impl std::fmt::Display,
-        advice: impl std::fmt::Display,
-    ) -> FileError {
-        FileError::new(&self.file, Place::Line(self.line), found, expected, advice)
     }
 }
 

@@ -387,7 +387,7 @@ impl ImuLog<'_> {
                 further: &[],
             },
         };
-        Joined::read(&parts, self.output, self.stamp.lag()).map(LogRows::joined)
+        Joined::read(&parts, self.output, self.stamp.lag()).map(LogRows::new)
     }
 
     fn clock_of_rows(&self) -> Clock<'_> {

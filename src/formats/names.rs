@@ -25,10 +25,6 @@ impl Names {
         }
     }
 
-    pub fn all(&self) -> &[String] {
-        &self.all
-    }
-
     /// The columns that were found.
     pub fn taken(&self) -> &[usize] {
         &self.taken

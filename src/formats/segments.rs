@@ -5,8 +5,8 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use super::axes::BodyAxes;
-use super::csv_file::CsvFile;
 use super::error::FileError;
+use super::source::Source;
 use crate::recording::{ImuSamples, LabelledMotion, Segment};
 use crate::units::DEGREE;
 
@@ -19,7 +19,7 @@ pub(super) fn read(
     axes: BodyAxes,
     notes: &mut Vec<String>,
 ) -> Result<Vec<Segment>, FileError> {
-    let mut csv = CsvFile::open(file, None)?;
+    let mut csv = Source::of_file(file).open()?;
     let start_column = csv.column("start")?;
     let end_column = csv.column("end")?;
     let label_column = csv.column("label")?;
@@ -59,7 +59,7 @@ pub(super) fn read(
                 "Correct or remove the row.",
             ));
         }
-        let label = csv.text(label_column)?.to_owned();
+        let label = csv.text(label_column)?.into_owned();
         segments.push(Segment {
             start,
             end,

@@ -32,10 +32,10 @@ impl Source<'_> {
     /// Opens it by its content.
     pub fn open(&self) -> Result<LogRows, FileError> {
         let Some(log) = streams::open(&self.file)? else {
-            return CsvFile::open(&self.file, self.stream).map(LogRows::text);
+            return CsvFile::open(&self.file, self.stream).map(LogRows::new);
         };
         let rows = StreamRows::open(&self.file, log, self.stream, self.salvage)?;
-        Ok(LogRows::stream(rows))
+        Ok(LogRows::new(rows))
     }
 }
 

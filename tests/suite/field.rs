@@ -19,6 +19,8 @@ const TRUTH: [[f64; 3]; 4] = [
     [0.12, -0.2, 0.31],
 ];
 
+const DEGREES: f64 = 180.0 / std::f64::consts::PI;
+
 fn file(case: &str, name: &str) -> Option<PathBuf> {
     Some(shared(&format!("field/{case}"))?.join(name))
 }
@@ -57,8 +59,30 @@ fn assert_calibrates(log: &Path, further: &[&str]) {
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{message}");
     let result: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    println!("{result:#}");
-    let _ = TRUTH;
+    for (of, sensor, degrees) in [(0, "gyro", DEGREES), (2, "accel", 1.0)] {
+        for axis in 0..3 {
+            let number = |path: &str| {
+                result
+                    .pointer(&format!("{path}/{axis}"))
+                    .unwrap()
+                    .as_f64()
+                    .unwrap()
+            };
+            let nominal = number(&format!("/provenance/nominal/{sensor}"));
+            for (quantity, zero, unit, truth) in [
+                ("scale", 1.0, 1.0, TRUTH[of]),
+                ("bias", 0.0, degrees, TRUTH[of + 1]),
+            ] {
+                let found = unit * (number(&format!("/{sensor}/{quantity}")) / nominal - zero);
+                let sigma = unit * number(&format!("/sigma/{sensor}/{quantity}")) / nominal;
+                let off = (found - truth[axis]) / sigma;
+                assert!(
+                    off.abs() < 4.0,
+                    "{sensor} {quantity} {axis}: {found} ± {sigma}"
+                );
+            }
+        }
+    }
 }
 
 #[test]
@@ -298,6 +322,49 @@ fn a_time_is_judged_in_the_rows_of_the_instrument() {
         ],
     );
     assert!(text.contains("# sample_period_s = 0.00100"), "{text}");
+}
+
+#[test]
+fn a_log_of_one_triad_has_allan_figures_and_no_calibration() {
+    let Some(log) = file("r09-one-triad-only", "gyr_static.mat") else {
+        return;
+    };
+    let turncal = |command: &str| {
+        let mut turncal = Command::new(env!("CARGO_BIN_EXE_turncal"));
+        turncal
+            .arg(command)
+            .arg(&log)
+            .args(["--rate", "100", "--gyro-unit", "deg/s"])
+            .output()
+            .unwrap()
+    };
+    let figures = turncal("allan");
+    let text = String::from_utf8_lossy(&figures.stdout);
+    assert!(
+        figures.status.success() && text.contains("angle random walk") && !text.contains("µg"),
+        "{text}"
+    );
+    let refused = turncal("calibrate");
+    let message = String::from_utf8_lossy(&refused.stderr);
+    assert!(
+        refused.status.code() == Some(1) && message.contains("no columns of accel"),
+        "{message}"
+    );
+}
+
+#[test]
+fn rows_of_standard_input_are_called_so() {
+    let Some(log) = file("b21-formats-that-read", "bno.csv") else {
+        return;
+    };
+    let mut command = Command::new(env!("CARGO_BIN_EXE_turncal"));
+    let output = command
+        .args(["check", "-", "--json"])
+        .write_stdin(fs::read(log).unwrap())
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("\"stdin\""), "{text}");
 }
 
 #[test]

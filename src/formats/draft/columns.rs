@@ -75,20 +75,16 @@ impl Columns {
             .or_else(|| time(sheet, &names, forward));
         let temperature =
             (0..names.len()).find(|&k| names[k].is_temperature() && is_numeric(sheet, k));
-        let is_named = Sensor::ALL
-            .iter()
-            .any(|&sensor| !found.get(sensor).is_empty());
-        let is_echo = !is_named && is_echo(sheet);
-        if is_echo {
-            found = PerSensor {
-                gyro: vec![ECHO_GYRO],
-                accel: vec![ECHO_ACCEL],
-            };
-        }
+        let quaternion = quaternion(sheet, time);
         let lacks = |found: &PerSensor<Vec<_>>, sensor: Sensor| found.get(sensor).is_empty();
         let lacked = PerSensor::from_fn(|sensor| lacks(&found, sensor));
         if lacked.gyro || lacked.accel {
-            let taken = [time, temperature].into_iter().flatten().chain(of_triads);
+            let taken = [time, split.map(|pair| pair[1]), temperature]
+                .into_iter()
+                .flatten();
+            let taken = taken
+                .chain(of_triads)
+                .chain(quaternion.into_iter().flatten());
             by_numbers(sheet, &names, &taken.collect::<Vec<_>>(), &mut found);
         }
         let is_new = |&sensor: &Sensor| *lacked.get(sensor) && !lacks(&found, sensor);
@@ -107,7 +103,7 @@ impl Columns {
             }),
             by_size: Sensor::ALL.iter().any(is_new),
             temperature,
-            quaternion: quaternion(sheet, time),
+            quaternion,
         }
     }
 
@@ -182,35 +178,34 @@ fn is_numeric(sheet: &Sheet, column: usize) -> bool {
     numbers as f64 >= NUMBERS * values.len() as f64
 }
 
-/// The columns of `sensor_msgs/Imu` as `ros2 topic echo --csv` writes them, without names: seconds,
-/// nanoseconds, frame, orientation, angular velocity and linear acceleration, each with its covariance.
-const ECHO: usize = 40;
-const ECHO_GYRO: [usize; 3] = [16, 17, 18];
-const ECHO_ACCEL: [usize; 3] = [28, 29, 30];
-
-fn is_echo(sheet: &Sheet) -> bool {
-    let is_numbered = sheet.names.first().is_some_and(|name| name == "1");
-    is_numbered && sheet.names.len() == ECHO && (0..ECHO).all(|k| is_numeric(sheet, k) != (k == 2))
-}
-
 fn both(seconds: &[f64], nanoseconds: &[f64]) -> Vec<f64> {
     let rows = seconds.iter().zip(nanoseconds);
     rows.map(|(seconds, nanoseconds)| seconds + 1e-9 * nanoseconds)
         .collect()
 }
 
-/// Whole seconds with the nanoseconds beside them.
+/// Whole seconds with the nanoseconds beside them, by their names or, without names, their numbers.
 fn split_time(sheet: &Sheet, names: &[Name]) -> Option<[usize; 2]> {
-    let is_pair = |k: &usize| match is_echo(sheet) {
-        true => *k == 0,
-        false => {
-            let is_whole = sheet.columns[*k].iter().all(|value| value.fract() == 0.0);
-            is_whole && names[*k].is_part_of_time("s") && names[k + 1].is_part_of_time("ns")
-        }
+    let is_whole = |k: usize| sheet.columns[k].iter().all(|value| value.fract() == 0.0);
+    let is_pair = |k: &usize| {
+        let is_named = names[*k].is_part_of_time("s") && names[k + 1].is_part_of_time("ns");
+        let is_numbered = sheet.names[*k] == (k + 1).to_string();
+        let are_nanoseconds = || {
+            sheet.columns[k + 1]
+                .iter()
+                .all(|value| (0.0..1e9).contains(value))
+        };
+        (is_named || is_numbered && are_nanoseconds()) && is_whole(*k) && is_whole(k + 1)
     };
-    let pair = (0..names.len().saturating_sub(1)).find(is_pair)?;
-    let times = both(&sheet.columns[pair], &sheet.columns[pair + 1]);
-    (forward(times.into_iter()).0 >= FORWARD).then_some([pair, pair + 1])
+    let goes_on = |k: &usize| {
+        let seconds = forward(sheet.columns[*k].iter().copied());
+        let times = both(&sheet.columns[*k], &sheet.columns[k + 1]);
+        seconds.0 > 0.0 && seconds.0 < FORWARD && forward(times.into_iter()).0 >= FORWARD
+    };
+    let pair = (0..names.len().saturating_sub(1))
+        .filter(is_pair)
+        .find(goes_on)?;
+    Some([pair, pair + 1])
 }
 
 /// The column that tells rows of several instruments apart, with what it says of the first.
@@ -275,7 +270,7 @@ fn by_name(names: &[Name], sheet: &Sheet, sensor: Sensor) -> Vec<[usize; 3]> {
 }
 
 /// Three columns each whose names differ by the axis alone.
-fn by_stem(names: &[Name], candidates: &[usize]) -> Vec<[usize; 3]> {
+pub(super) fn by_stem(names: &[Name], candidates: &[usize]) -> Vec<[usize; 3]> {
     let mut triads = Vec::new();
     for &first in candidates {
         let axes = match names[first].axis {

@@ -135,11 +135,19 @@ impl Draft {
 
     fn triad_found(&self, sensor: Sensor) -> Found {
         let unit = self.quantities.units.get(sensor);
-        let names = self.columns.triads.get(sensor);
-        let names = names.map_or_else(
-            || "no columns".to_owned(),
-            |triad| triad.map(|k| self.columns.names[k].as_str()).join(" "),
-        );
+        let what = match sensor {
+            Sensor::Gyro => "gyros",
+            Sensor::Accel => "accels",
+        };
+        let Some(triad) = self.columns.triads.get(sensor) else {
+            return Found {
+                what,
+                value: "no columns".to_owned(),
+                certainty: Certainty::Unknown,
+                why: "no names or numbers showed them".to_owned(),
+            };
+        };
+        let names = triad.map(|k| self.columns.names[k].as_str()).join(" ");
         let certainty = match unit.word {
             None => Certainty::Unknown,
             Some(_) if unit.is_shown => Certainty::Certain,
@@ -150,10 +158,7 @@ impl Draft {
             value += &format!(" ({})", scale.why);
         }
         Found {
-            what: match sensor {
-                Sensor::Gyro => "gyros",
-                Sensor::Accel => "accels",
-            },
+            what,
             value,
             certainty,
             why: match self.down.filter(|_| sensor == Sensor::Accel) {

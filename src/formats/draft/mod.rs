@@ -9,7 +9,6 @@ mod gravity;
 mod least_squares;
 pub(super) mod motion;
 mod name;
-mod noise;
 mod priors;
 mod registers;
 mod rests;
@@ -32,7 +31,6 @@ use crate::formats::instrument::USUAL_PERIOD;
 use crate::formats::source::Source;
 use crate::formats::{FileError, Place, Sheet, write_rows};
 use crate::imu::{PerSensor, Sensor};
-use crate::noise::NoiseFigures;
 use columns::Columns;
 pub use found::{Certainty, Found, OpenQuestion};
 use motion::Motion;
@@ -44,6 +42,8 @@ use units::Quantities;
 
 /// Fewer rows than a run may have show nothing.
 const FEWEST_ROWS: usize = 100;
+/// Fewer windows at rest show no noise.
+const FEWEST_WINDOWS: usize = 8;
 
 /// What a log shows of the instrument and its record.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,8 +61,8 @@ pub struct Draft {
     registers: Option<Registers>,
     /// Why the columns cannot be taken as they are.
     blocked: Vec<String>,
-    /// In the file's quantity per second, where something is at rest.
-    noise: PerSensor<Option<NoiseFigures>>,
+    /// White noise in the file's quantity per second and root of one, where something is at rest.
+    random_walk: PerSensor<Option<f64>>,
     /// Output of the gyros at rest above that, the file's quantity a row.
     rest: Option<Vector3<f64>>,
     /// The column of the accelerometers that shows gravity with a minus at first.
@@ -202,8 +202,8 @@ impl Draft {
         let down = first_force.and_then(points_down);
         let down = down.and_then(|axis| Some(columns.triads.accel?[axis]));
         let at_rest = triads.as_ref().zip(motion.as_ref());
-        let noise = at_rest
-            .and_then(|(triads, motion)| noise_at_rest(triads, motion, &quantities, clock.period))
+        let random_walk = at_rest
+            .and_then(|(triads, motion)| white_noise(triads, motion, &quantities, clock.period))
             .unwrap_or_default();
         if let Some(streams) = streams.as_ref().filter(|streams| streams.accel.is_none()) {
             columns.names = streams.columns(Sensor::Gyro);
@@ -220,7 +220,7 @@ impl Draft {
             clock,
             quantities,
             offset,
-            noise,
+            random_walk,
             only,
             stated: stated.clone(),
         }
@@ -281,20 +281,21 @@ fn points_down(force: Vector3<f64>) -> Option<usize> {
     (0..3).find(|&axis| force[axis] < -0.9 * force.norm())
 }
 
-/// The noise of both triads in the longest rest, in the file's quantity per second.
-fn noise_at_rest(
+/// White noise of both triads in the longest rest, by how means of windows differ.
+fn white_noise(
     triads: &PerSensor<Vec<Vector3<f64>>>,
     motion: &Motion,
     quantities: &Quantities,
     period: Option<f64>,
-) -> Option<PerSensor<Option<NoiseFigures>>> {
-    let (period, rest) = (period?, motion.longest_rest.clone());
-    let at_rest = PerSensor::from_fn(|sensor| &triads.get(sensor)[rest.clone()]);
-    Some(noise::figures(
-        &at_rest,
-        period,
-        quantities.per_second(period),
-    ))
+) -> Option<PerSensor<Option<f64>>> {
+    let period = period?;
+    let length = ((motion::WINDOW / period).round() as usize).max(1);
+    Some(PerSensor::from_fn(|sensor| {
+        let means = motion::means(&triads.get(sensor)[motion.longest_rest.clone()], length);
+        let sigma = motion::noise(&means) * quantities.per_second(period);
+        let shows = means.len() >= FEWEST_WINDOWS && sigma > 0.0;
+        shows.then_some(sigma * (length as f64 * period).sqrt())
+    }))
 }
 
 /// Of the gyros, and of accelerometers in the same stream.

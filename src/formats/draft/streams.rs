@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::columns::Columns;
+use super::columns::{Columns, by_stem};
 use super::name::{self, Name};
 use super::text::{line, quoted, word_or_number};
 use super::{FEWEST_ROWS, time};
@@ -336,7 +336,7 @@ pub(super) fn joined(members: &PerSensor<Member>) -> Result<Sheet, FileError> {
         }
     };
     let joined = Joined::read(&PerSensor::from_fn(part), Output::Rate, 1.0)?;
-    let mut sheet = Sheet::of(LogRows::joined(joined), FEWEST_ROWS)?;
+    let mut sheet = Sheet::of(LogRows::new(joined), FEWEST_ROWS)?;
     let of = |sensor: Sensor| ["x", "y", "z"].map(|axis| format!("{}_{axis}", sensor.name()));
     let triads = Sensor::ALL.map(of);
     sheet.names = std::iter::once("time".to_owned())
@@ -425,23 +425,7 @@ impl Places {
         let triads = PerSensor::from_fn(|sensor| {
             let of = |k: &usize| all[*k].sensor() == Some(sensor);
             let candidates: Vec<usize> = (0..all.len()).filter(of).collect();
-            candidates.iter().find_map(|&first| {
-                let axes = match all[first].axis {
-                    Some('x') => ['x', 'y', 'z'],
-                    Some('0') => ['0', '1', '2'],
-                    _ => return None,
-                };
-                let along = |axis| {
-                    let is = |k: &&usize| {
-                        all[**k].stem == all[first].stem && all[**k].axis == Some(axis)
-                    };
-                    candidates.iter().find(is).copied()
-                };
-                match axes.map(along) {
-                    [Some(x), Some(y), Some(z)] => Some([x, y, z]),
-                    _ => None,
-                }
-            })
+            by_stem(&all, &candidates).into_iter().next()
         });
         let best = (0..all.len()).rev().max_by_key(|&k| all[k].is_time());
         let named = best.filter(|&k| all[k].is_time() > 1);

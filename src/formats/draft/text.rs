@@ -6,7 +6,6 @@ use super::Draft;
 use super::name::axes_of_program;
 use super::units::short;
 use crate::imu::{NoiseKeys, Output, Sensor};
-use crate::noise::NoiseFigures;
 
 impl Draft {
     /// The draft as a `run.toml` in which the log is named so. Lines with `TODO` must be completed before it
@@ -324,35 +323,21 @@ impl Draft {
             "\n# white noise at rest; better from hours at rest, by turncal allan\n[imu.noise]\n",
         );
         for sensor in self.present() {
-            let keys = NoiseKeys::of(sensor);
-            let (key, unit) = keys.random_walk;
-            let Some((figures, scale)) = self.figures(sensor) else {
-                let _ = writeln!(
+            let (key, unit) = NoiseKeys::of(sensor).random_walk;
+            let _ = match self.white_noise(sensor) {
+                Some(walk) => writeln!(text, "{key} = {:?}", short(walk / unit)),
+                None => writeln!(
                     text,
                     "# {key} =  # the data sheet's figure; without it, that of the quieter part of the record"
-                );
-                continue;
+                ),
             };
-            let walk = format!("{:?}", short(figures.noise.random_walk / scale / unit));
-            match figures.random_walk_is_limit {
-                true => line(text, key, &walk, "a limit: its slope was not found"),
-                false => {
-                    let _ = writeln!(text, "{key} = {walk}");
-                }
-            }
-            if let Some(of) = figures.noise.gauss_markov {
-                let (key, unit) = keys.gauss_markov;
-                let _ = writeln!(text, "{key} = {:?}", short(of.sigma / scale / unit));
-                let time = short(of.correlation_time);
-                let _ = writeln!(text, "{} = {time:?}", keys.correlation_time);
-            }
         }
     }
 
-    /// The noise of a triad, with the file's quantity per second for one rad/s or m/s².
-    pub(super) fn figures(&self, sensor: Sensor) -> Option<(&NoiseFigures, f64)> {
-        let figures = self.noise.get(sensor).as_ref()?;
-        Some((figures, self.quantities.scale(sensor)?.abs()))
+    /// White noise of a triad at rest, (rad/s)√s or (m/s²)√s.
+    pub(super) fn white_noise(&self, sensor: Sensor) -> Option<f64> {
+        let scale = self.quantities.scale(sensor)?;
+        Some((*self.random_walk.get(sensor))? / scale.abs())
     }
 
     fn table(&self, text: &mut String) {
