@@ -51,14 +51,8 @@ impl Opened {
             None => path.to_owned(),
         };
         let draft = Draft::of_stream(&file, stream, stated)?;
-        if let Some(open) = draft.open_questions().into_iter().next() {
-            return Err(FileError::new(
-                path,
-                Place::File,
-                open.found,
-                open.expected,
-                open.advice,
-            ));
+        if let Some([found, expected, advice]) = draft.open_question() {
+            return Err(FileError::new(path, Place::File, found, expected, advice));
         }
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let run = Run::of_text(&file, &draft.to_toml(&name), None)?;

@@ -5,7 +5,7 @@ use std::fmt::Display;
 use std::path::Path;
 
 use super::error::{FileError, Place};
-use super::names::Names;
+use super::names;
 use crate::recording::FileColumn;
 
 /// A file that gives rows of numbers one after the other.
@@ -81,7 +81,7 @@ pub(super) trait Rows {
 /// A file at one of its rows, and the columns of it that are used.
 pub(super) struct LogRows {
     rows: Box<dyn Rows>,
-    names: Names,
+    used: Vec<usize>,
 }
 
 impl std::ops::Deref for LogRows {
@@ -95,24 +95,19 @@ impl std::ops::Deref for LogRows {
 impl LogRows {
     pub fn new(rows: impl Rows + 'static) -> Self {
         Self {
-            names: Names::new(rows.header()),
             rows: Box::new(rows),
+            used: Vec::new(),
         }
     }
 
     /// The index of a named column, which nothing else may be.
     pub fn column(&mut self, name: &str) -> Result<usize, FileError> {
-        let found = self.names.find(name);
-        found.map_err(|wrong| {
-            let place = self.place_of_names();
-            FileError::new(
-                self.file(),
-                place,
-                wrong.found,
-                wrong.expected,
-                wrong.advice,
-            )
-        })
+        let found = names::find(self.header(), &self.used, name);
+        let place = found.map_err(|[found, expected, advice]| {
+            FileError::new(self.file(), self.place_of_names(), found, expected, advice)
+        })?;
+        self.used.push(place);
+        Ok(place)
     }
 
     /// The same of a name that a minus may precede, which turns the sign of the column's values.
@@ -128,7 +123,7 @@ impl LogRows {
 
     /// Goes to the next row; false at the end.
     pub fn advance(&mut self) -> Result<bool, FileError> {
-        self.rows.advance(self.names.taken())
+        self.rows.advance(&self.used)
     }
 
     /// Takes less memory for granted: rows are packed as they come.

@@ -244,69 +244,67 @@ impl Looks {
         tag: Option<(&Tags, &str)>,
     ) -> Result<Named, Stop> {
         let Self(looks) = self;
-        let columns = shape.numbers.len();
-        let words = |k: usize| looks[k].words(shape.delimiter, columns);
-        let is_own = |k: &usize| {
-            tag.is_some_and(|(tags, tag)| words(*k).is_some_and(|words| words[tags.column] == tag))
+        let words = |k: usize| looks[k].words(shape.delimiter, shape.numbers.len());
+        let is = |k: &usize, fits: fn(&Tags, &str, &str) -> bool| {
+            let of_tag =
+                |words: Vec<String>| tag.map(|(tags, tag)| fits(tags, tag, &words[tags.column]));
+            words(*k).and_then(of_tag)
         };
+        let own = (0..looks.len()).rfind(|k| is(k, |_, tag, word| tag == word) == Some(true));
         let is_shared = |k: &usize| {
-            let is_other = |words: &Vec<String>| {
-                tag.is_some_and(|(tags, _)| tags.names.contains(&words[tags.column]))
-            };
-            words(*k).is_some_and(|words| !is_other(&words))
-        };
-        let own = (0..looks.len()).rfind(is_own);
-        if let Some(last) = own.or_else(|| (0..first).rfind(is_shared)) {
-            let is_comment = looks[last].is_comment;
-            let goes_on =
-                |k: &usize| own.is_none() && looks[*k].is_comment == is_comment && is_shared(k);
-            let begin = (0..last).rev().take_while(goes_on).last().unwrap_or(last);
-            let levels: Vec<Vec<String>> = (begin..=last).filter_map(words).collect();
-            let (names, units) = names_and_units(&levels, is_comment);
-            let above = if tag.is_some() { 0 } else { last + 1 };
-            return Ok(Named {
-                names,
-                units,
-                line: looks[begin].number,
-                above,
+            let is_other = is(k, |tags, _, word| {
+                tags.names.iter().any(|name| name == word)
             });
-        }
-        let line = looks.get(first).map_or(0, |look| look.number);
-        let mut named = Named {
+            words(*k).is_some() && is_other != Some(true)
+        };
+        let Some(last) = own.or_else(|| (0..first).rfind(is_shared)) else {
+            return self.unnamed(shape, first, tag.is_some());
+        };
+        let is_comment = looks[last].is_comment;
+        let goes_on =
+            |k: &usize| own.is_none() && looks[*k].is_comment == is_comment && is_shared(k);
+        let begin = (0..last).rev().take_while(goes_on).last().unwrap_or(last);
+        let levels: Vec<Vec<String>> = (begin..=last).filter_map(words).collect();
+        let (names, units) = names_and_units(&levels, is_comment);
+        Ok(Named {
+            names,
+            units,
+            line: looks[begin].number,
+            above: if tag.is_some() { 0 } else { last + 1 },
+        })
+    }
+
+    /// The same where no line has as many words as rows have columns: numbers, unless what stands above the rows is no
+    /// preamble, but names or a row that do not fit them.
+    fn unnamed(&self, shape: &Shape, first: usize, is_tagged: bool) -> Result<Named, Stop> {
+        let Self(looks) = self;
+        let columns = shape.numbers.len();
+        let numbered = |above: usize| Named {
             names: (1..=columns).map(|n| n.to_string()).collect(),
             units: None,
-            line,
-            above: first,
+            line: looks.get(first).map_or(0, |look| look.number),
+            above,
         };
-        // What stands above rows and is not of a preamble is names, or a row, that does not fit them.
-        let above = (0..first)
-            .rfind(|&k| !looks[k].is_comment)
-            .filter(|_| tag.is_none());
-        if let Some(above) = above {
-            let look = &looks[above];
-            let fields = shape
-                .delimiter
-                .fields(&look.text)
-                .map_err(|what| Stop::Malformed {
-                    line: look.number,
-                    what,
-                })?;
-            let is_near = fields.len() > 2
-                && (shape.delimiter != Delimiter::Blanks || fields.len().abs_diff(columns) < 2);
-            let has_numbers = fields.iter().any(|field| is_number(field));
-            let fitting = look.fields(shape.delimiter, columns);
-            if fitting.is_some() || is_near && !has_numbers {
-                named = Named {
-                    names: fitting.unwrap_or(fields),
-                    units: None,
-                    line: look.number,
-                    above: above + 1,
-                };
-            } else if is_near {
-                named.above = above;
-            }
+        let above = (0..first).rfind(|&k| !looks[k].is_comment && !is_tagged);
+        let Some((above, look)) = above.map(|k| (k, &looks[k])) else {
+            return Ok(numbered(first));
+        };
+        if let Some(stop) = look.malformed() {
+            return Err(stop);
         }
-        Ok(named)
+        let fields = shape.delimiter.fields(&look.text).unwrap_or_default();
+        let is_near = fields.len() > 2
+            && (shape.delimiter != Delimiter::Blanks || fields.len().abs_diff(columns) < 2);
+        let has_numbers = fields.iter().any(|field| is_number(field));
+        Ok(match look.fields(shape.delimiter, columns) {
+            None if !is_near => numbered(first),
+            None if has_numbers => numbered(above),
+            fitting => Named {
+                names: fitting.unwrap_or(fields),
+                line: look.number,
+                ..numbered(above + 1)
+            },
+        })
     }
 
     /// What tells rows of several kinds apart: words, or small numbers before a time, of rows that are of several widths
@@ -478,12 +476,13 @@ impl Delimiter {
         }
         // A comma with a tab behind it is a comma.
         let parts = |byte: &u8| match Self::Byte(*byte).fields(row) {
+            _ if !row.as_bytes().contains(byte) => false,
             Ok(fields) => {
                 fields.iter().filter(|field| !field.is_empty()).count() > 1
                     && !(*byte == b'\t' && fields.iter().any(|f| f.ends_with(',')))
             }
             // Whoever reads the row by it says what is wrong.
-            Err(_) => row.as_bytes().contains(byte),
+            Err(_) => true,
         };
         let byte = [b';', b'\t', b','].into_iter().find(parts);
         // A single column has no delimiter.

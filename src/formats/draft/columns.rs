@@ -56,7 +56,7 @@ impl Columns {
         found.gyro.sort_by_key(is_bare);
         found
             .accel
-            .sort_by_key(|triad| (unevenness(sheet, triad) > UNEVEN, is_bare(triad)));
+            .sort_by_key(|triad| (magnitude(sheet, triad).0 > UNEVEN, is_bare(triad)));
         let of_triads = found.gyro.iter().chain(&found.accel).flatten();
         let of_triads: Vec<usize> = of_triads.copied().collect();
         // Rows of another sensor may have other times.
@@ -298,45 +298,50 @@ fn by_numbers(
     taken: &[usize],
     found: &mut PerSensor<Vec<[usize; 3]>>,
 ) {
-    let varies = |k: usize| {
-        let mut values = sheet.columns[k].iter().filter(|value| value.is_finite());
-        values
-            .next()
-            .is_some_and(|first| values.any(|value| value != first))
+    let varies = |k: &usize| {
+        let mut values = sheet.columns[*k].iter().filter(|value| value.is_finite());
+        let first = values.next();
+        first.is_some_and(|first| values.any(|value| value != first))
     };
-    let is_free = |&k: &usize| {
-        !taken.contains(&k) && !names[k].is_of_another_sensor() && is_numeric(sheet, k) && varies(k)
+    let is_free = |k: &usize| {
+        !taken.contains(k) && !names[*k].is_of_another_sensor() && is_numeric(sheet, *k)
     };
-    let free: Vec<usize> = (0..names.len()).filter(is_free).collect();
     let has_stem = |k: &usize| names[*k].stem.contains(char::is_alphabetic);
-    let mut triads = by_stem(
-        names,
-        &free.iter().copied().filter(has_stem).collect::<Vec<_>>(),
-    );
-    if triads.is_empty() {
-        let side_by_side = free.chunks_exact(3);
-        triads = side_by_side
-            .map(|columns| [columns[0], columns[1], columns[2]])
-            .collect();
-    }
-    let mut sizes: Vec<([usize; 3], (f64, f64))> = triads
-        .into_iter()
-        .map(|triad| (triad, magnitude(sheet, &triad)))
-        .collect();
-    if found.accel.is_empty() {
-        // A compass stands behind them.
-        let even = sizes
+    let magnitudes = |free: &[usize]| {
+        let named: Vec<usize> = free.iter().copied().filter(has_stem).collect();
+        let mut triads = by_stem(names, &named);
+        if triads.is_empty() {
+            triads = free
+                .chunks_exact(3)
+                .map(|of| [of[0], of[1], of[2]])
+                .collect();
+        }
+        triads.retain(|triad| triad.iter().any(varies));
+        let with_size = |triad| (triad, magnitude(sheet, &triad));
+        triads.into_iter().map(with_size).collect::<Vec<_>>()
+    };
+    let even = |sizes: &[([usize; 3], (f64, f64))], limit: f64| {
+        sizes
             .iter()
-            .position(|(_, (uneven, lively))| *uneven < EVEN && *lively < LIVELY);
-        let least = || {
-            let of = |k: &usize| sizes[*k].1.0;
-            (0..sizes.len()).min_by(|a, b| of(a).total_cmp(&of(b)))
-        };
+            .position(|&(_, (uneven, lively))| uneven < limit && lively < LIVELY)
+    };
+    let mut free: Vec<usize> = (0..names.len()).filter(is_free).collect();
+    let mut sizes = magnitudes(&free);
+    if even(&sizes, EVEN).is_none() {
+        // Constants may stand between triads.
+        free.retain(varies);
+        sizes = magnitudes(&free);
+    }
+    if found.accel.is_empty() {
         let is_pair = found.gyro.is_empty() && sizes.len() > 1;
-        let is_gravity = |(uneven, lively): (f64, f64)| uneven < UNEVEN && lively < LIVELY;
-        let best = even
-            .or_else(least)
-            .filter(|&k| is_pair || is_gravity(sizes[k].1));
+        let of = |k: &usize| sizes[*k].1.0;
+        let least = || {
+            (0..sizes.len())
+                .min_by(|a, b| of(a).total_cmp(&of(b)))
+                .filter(|_| is_pair)
+        };
+        // A compass usually stands behind them.
+        let best = even(&sizes, EVEN).or_else(least).or(even(&sizes, UNEVEN));
         found.accel.extend(best.map(|k| sizes.remove(k).0));
     }
     if found.gyro.is_empty() {
@@ -345,10 +350,6 @@ fn by_numbers(
         sizes.sort_by_key(|(triad, (_, lively))| (*lively < LIVELY, triad[0].abs_diff(place)));
         found.gyro.extend(sizes.iter().map(|(triad, _)| *triad));
     }
-}
-
-fn unevenness(sheet: &Sheet, triad: &[usize; 3]) -> f64 {
-    magnitude(sheet, triad).0
 }
 
 /// Median departure of a triad's magnitude from its median, and its largest in all but a hundredth of the rows, over
@@ -369,14 +370,8 @@ fn magnitude(sheet: &Sheet, triad: &[usize; 3]) -> (f64, f64) {
     let mut off: Vec<f64> = sizes.iter().map(|size| (size - middle).abs()).collect();
     let off = median(&mut off).unwrap_or(0.0);
     let hundredth = sizes.len().saturating_sub(1) / 100;
-    let largest = match sizes.is_empty() {
-        true => 0.0,
-        false => {
-            *sizes
-                .select_nth_unstable_by(hundredth, |a, b| b.total_cmp(a))
-                .1
-        }
-    };
+    sizes.sort_unstable_by(|a, b| b.total_cmp(a));
+    let largest = sizes.get(hundredth).copied().unwrap_or(0.0);
     if middle > 0.0 {
         (off / middle, largest / middle)
     } else {

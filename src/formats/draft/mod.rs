@@ -32,7 +32,7 @@ use crate::formats::source::Source;
 use crate::formats::{FileError, Place, Sheet, write_rows};
 use crate::imu::{PerSensor, Sensor};
 use columns::Columns;
-pub use found::{Certainty, Found, OpenQuestion};
+pub use found::{Certainty, Found};
 use motion::Motion;
 use registers::Registers;
 pub use stated::Stated;

@@ -71,14 +71,13 @@ impl Quantities {
         };
         found.opposed = motion.angle.is_some_and(|angle| angle < 0.0);
         let period = clock.period;
-        found.accelerometers(
-            named.accel,
-            whole.accel,
-            motion.gravity,
-            period,
-            motion.sum_variance,
-        );
-        found.gyros(named.gyro, whole.gyro, motion, period);
+        let words = PerSensor::from_fn(|sensor| named.get(sensor).map(|unit| unit.word));
+        if !found.scaled(Sensor::Accel, named.accel, motion, period) {
+            found.accelerometers(words.accel, whole.accel, motion, period);
+        }
+        if !found.scaled(Sensor::Gyro, named.gyro, motion, period) {
+            found.gyros(words.gyro, whole.gyro, motion, period);
+        }
         for sensor in Sensor::ALL {
             if columns.triads.get(sensor).is_none() {
                 *found.units.get_mut(sensor) = Unit::default();
@@ -170,14 +169,49 @@ impl Quantities {
             .or_else(|| crate::formats::unit_scale(sensor, unit.word?))
     }
 
+    /// Takes a unit of which the file states how many of `run.toml`'s one is, unless motion contradicts it.
+    fn scaled(
+        &mut self,
+        sensor: Sensor,
+        named: Option<name::Unit>,
+        motion: &Motion,
+        period: Option<f64>,
+    ) -> bool {
+        let Some(scale) = named.and_then(|unit| Scale::of_unit(sensor, unit)) else {
+            return false;
+        };
+        let of_one = scale.value.x;
+        let factor = match sensor {
+            Sensor::Accel => motion.gravity / (of_one * STANDARD_GRAVITY),
+            Sensor::Gyro => {
+                let turned = motion.angle.zip(period);
+                turned.map_or(1.0, |(angle, period)| angle.abs() * of_one / period)
+            }
+        };
+        if turns_fit(factor) {
+            *self.units.get_mut(sensor) = Unit {
+                word: Some("count"),
+                why: "as the file says".to_owned(),
+                is_shown: true,
+                scale: Some(scale),
+                likely: None,
+            };
+        }
+        turns_fit(factor)
+    }
+
     fn accelerometers(
         &mut self,
-        named: Option<name::Unit>,
+        named: Option<&'static str>,
         whole: bool,
-        gravity: f64,
+        motion: &Motion,
         period: Option<f64>,
-        sum_variance: Option<f64>,
     ) {
+        let Motion {
+            gravity,
+            sum_variance,
+            ..
+        } = *motion;
         let size = format!("{} at rest", short(gravity));
         let seconds = period.unwrap_or(f64::NAN);
         let known = [
@@ -191,9 +225,6 @@ impl Quantities {
             let factor = gravity / expected;
             factor < GRAVITY_FACTOR && factor > GRAVITY_FACTOR.recip()
         };
-        let scaled = named.and_then(|unit| Scale::of_unit(Sensor::Accel, unit));
-        let scaled = scaled.filter(|scale| fits(scale.value.x * STANDARD_GRAVITY));
-        let named = named.map(|unit| unit.word);
         let by_name = known.iter().find(|(unit, ..)| Some(*unit) == named);
         let by_size: Vec<_> = known
             .iter()
@@ -201,12 +232,6 @@ impl Quantities {
             .collect();
         let mut unit = Unit::default();
         match (by_name, by_size.first()) {
-            _ if scaled.is_some() => {
-                self.output = Output::Rate;
-                unit.word = Some("count");
-                unit.why = format!("as the file says; {size}");
-                unit.scale = scaled;
-            }
             (Some(&(name, _, expected)), Some(&&(word, output, _))) if !fits(expected) => {
                 self.output = output;
                 unit.word = Some(word);
@@ -238,14 +263,14 @@ impl Quantities {
             }
         }
         let shown = known.iter().find(|(word, ..)| Some(*word) == unit.word);
-        unit.is_shown = shown.is_some_and(|&(.., expected)| fits(expected)) || unit.scale.is_some();
+        unit.is_shown = shown.is_some_and(|&(.., expected)| fits(expected));
         self.units.accel = unit;
         self.output_why = output_why(self.output, seconds);
     }
 
     fn gyros(
         &mut self,
-        named: Option<name::Unit>,
+        named: Option<&'static str>,
         whole: bool,
         motion: &Motion,
         period: Option<f64>,
@@ -264,9 +289,6 @@ impl Quantities {
                 .filter(|f| f.is_finite())
         };
         let fits = |unit: f64| turns(unit).is_some_and(turns_fit);
-        let scaled = named.and_then(|unit| Scale::of_unit(Sensor::Gyro, unit));
-        let scaled = scaled.filter(|scale| turns(scale.value.x.recip()).is_none_or(turns_fit));
-        let named = named.map(|unit| unit.word);
         let by_name = known.iter().find(|(word, _)| Some(*word) == named);
         let by_turn = known.iter().find(|&&(_, unit)| fits(unit));
         // Without a clock each unit needs a period of its own.
@@ -277,11 +299,6 @@ impl Quantities {
             .filter(|scale| scale.is_finite());
         let mut unit = Unit::default();
         match (by_name, by_turn) {
-            _ if scaled.is_some() => {
-                unit.word = Some("count");
-                unit.why = "as the file says".to_owned();
-                unit.scale = scaled;
-            }
             (Some(&(name, value)), _) if turns(value).is_some_and(|factor| !turns_fit(factor)) => {
                 let why = why_named(turns(value));
                 match by_turn {
