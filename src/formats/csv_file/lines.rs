@@ -105,6 +105,9 @@ impl Lines {
                 }
             }
             let line = std::mem::take(&mut lines.line);
+            if line.comment().is_none() {
+                lines.row = line.number;
+            }
             bytes += line.text.len();
             lines.ahead.push_back(line);
         }

@@ -42,8 +42,6 @@ use units::Quantities;
 
 /// Fewer rows than a run may have show nothing.
 const FEWEST_ROWS: usize = 100;
-/// Fewer windows at rest show no noise.
-const FEWEST_WINDOWS: usize = 8;
 
 /// What a log shows of the instrument and its record.
 #[derive(Debug, Clone, PartialEq)]
@@ -290,11 +288,18 @@ fn white_noise(
 ) -> Option<PerSensor<Option<f64>>> {
     let period = period?;
     let length = ((motion::WINDOW / period).round() as usize).max(1);
-    Some(PerSensor::from_fn(|sensor| {
-        let means = motion::means(&triads.get(sensor)[motion.longest_rest.clone()], length);
+    let walk = |samples: &[Vector3<f64>], (times, fewest): (usize, usize)| {
+        let means = motion::means(samples, times * length);
         let sigma = motion::noise(&means) * quantities.per_second(period);
-        let shows = means.len() >= FEWEST_WINDOWS && sigma > 0.0;
-        shows.then_some(sigma * (length as f64 * period).sqrt())
+        let shows = means.len() >= fewest && sigma > 0.0;
+        shows.then_some(sigma * ((times * length) as f64 * period).sqrt())
+    };
+    Some(PerSensor::from_fn(|sensor| {
+        let samples = &triads.get(sensor)[motion.longest_rest.clone()];
+        // Steps of the output look like more noise in short windows.
+        let lengths = [(1, 8), (4, 24), (16, 24)];
+        let walks = lengths.into_iter().filter_map(|of| walk(samples, of));
+        walks.reduce(f64::min)
     }))
 }
 
