@@ -62,7 +62,9 @@ struct Look {
 impl Look {
     fn of(line: &Line) -> Self {
         let comment = line.comment();
-        let text = text_of(comment.unwrap_or(&line.text)).trim().to_owned();
+        let text = text_of(comment.unwrap_or(&line.text));
+        // Tabs may stand for fields without a value.
+        let text = text.trim_matches(' ').to_owned();
         let delimiter = Delimiter::of_row(&text);
         Self {
             number: line.number,

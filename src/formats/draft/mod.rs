@@ -175,9 +175,10 @@ impl Draft {
         let mut blocked = Vec::new();
         let mut registers = None;
         let cuts = motion.as_ref().map_or(0, |motion| motion.cuts);
-        let first_force = triads
+        let down = triads
             .as_ref()
-            .map(|triads| at_first(&triads.accel, period));
+            .and_then(|triads| points_down(&triads.accel, period));
+        let down = down.and_then(|axis| Some(columns.triads.accel?[axis]));
         let is_asked = quantities.has_counts() || cuts > 0;
         if let Some(triads) = triads.as_mut().filter(|_| is_asked) {
             let found = Registers::find(triads, period);
@@ -197,8 +198,6 @@ impl Draft {
             }
         }
         quantities.state(stated);
-        let down = first_force.and_then(points_down);
-        let down = down.and_then(|axis| Some(columns.triads.accel?[axis]));
         let at_rest = triads.as_ref().zip(motion.as_ref());
         let random_walk = at_rest
             .and_then(|(triads, motion)| white_noise(triads, motion, &quantities, clock.period))
@@ -268,14 +267,10 @@ fn retain_samples(sheet: &mut Sheet, columns: &Columns) {
     });
 }
 
-/// Specific force in the first rows.
-fn at_first(accel: &[Vector3<f64>], period: f64) -> Vector3<f64> {
+/// The axis along which specific force points backwards, and hardly any other way, in the first rows.
+fn points_down(accel: &[Vector3<f64>], period: f64) -> Option<usize> {
     let rows = ((motion::WINDOW / period).round() as usize).clamp(1, accel.len().max(1));
-    motion::mean(&accel[..rows.min(accel.len())])
-}
-
-/// The axis along which a force points backwards and hardly any other way.
-fn points_down(force: Vector3<f64>) -> Option<usize> {
+    let force = motion::mean(accel.get(..rows)?);
     (0..3).find(|&axis| force[axis] < -0.9 * force.norm())
 }
 
