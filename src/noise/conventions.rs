@@ -464,7 +464,8 @@ mod tests {
     #[test]
     fn a_suggestion_is_of_the_same_dimension() {
         for (unit, hint) in [
-            ("deg/h/s/sqrt(Hz)", ""),
+            ("m/s/s/s/s/sqrt(Hz)", ""),
+            ("deg/h/s/sqrt(Hz)", "Did you mean `°/s²/√Hz`"),
             ("m/h/sqrt(Hz)", "Did you mean `m/s/√h`"),
             ("deg/sqrt(Hs)", "Did you mean"),
         ] {
