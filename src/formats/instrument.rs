@@ -98,6 +98,14 @@ impl<'a> InstrumentFields<'a> {
         let full_scale = |name| fields.get(name).map(|field| field.positive()).transpose();
 
         let triads = triads(&columns, accel_from.is_some())?;
+        for sensor in Sensor::ALL {
+            if triads.get(sensor)[0].is_empty() {
+                notes.push(format!(
+                    "The log has no columns of {}: they are taken to be zero.",
+                    sensor.name()
+                ));
+            }
+        }
         let mut known = knowledge(&fields, &triads, (output, axes), notes)?;
         let log = ImuLog {
             source,
