@@ -127,10 +127,10 @@ fn pulse_of(error: [f64; 3]) -> f64 {
 }
 
 /// What was read besides samples.
-struct Read<'a> {
-    layout: &'a Layout,
+struct Read {
     clock: Uniform,
     facts: [ColumnFacts; 6],
+    /// Rows of the file.
     rows: usize,
     faults: Vec<Fault>,
     bridges: Vec<Bridge>,
@@ -194,25 +194,11 @@ impl ImuLog<'_> {
     /// The samples of a log that was packed as it was read.
     fn packed(&self, layout: &Layout, whole: Whole) -> ImuSamples {
         let Whole {
-            clock,
-            facts,
+            read,
             packed,
             samples,
-            faults,
-            bridges,
-            rows,
             missing: _,
-            error,
         } = whole;
-        let read = Read {
-            layout,
-            clock,
-            facts,
-            rows,
-            faults,
-            bridges,
-            error,
-        };
         // Samples are then whole steps, as pulses are. Pulses are rounded a second time where some of them are
         // interpolated: what is not whole there stays with the sum.
         let roundings: f64 = match self.output {
@@ -224,7 +210,7 @@ impl ImuLog<'_> {
             gyro: Series::packed(packed.gyro),
             accel: Series::packed(packed.accel),
         };
-        self.samples(read, samples, series, pulse)
+        self.samples(layout, read, samples, series, pulse)
     }
 
     /// The samples of a log whose rows are all held.
@@ -286,7 +272,6 @@ impl ImuLog<'_> {
             Output::Increment | Output::Rate => 0.0,
         });
         let read = Read {
-            layout: &layout,
             clock,
             facts,
             rows: count,
@@ -294,18 +279,19 @@ impl ImuLog<'_> {
             bridges,
             error,
         };
-        (self.samples(read, samples, series, pulse), missing)
+        let imu = self.samples(&layout, read, samples, series, pulse);
+        (imu, missing)
     }
 
     fn samples(
         &self,
+        layout: &Layout,
         read: Read,
         samples: usize,
         series: PerSensor<Series>,
         pulse: PerSensor<f64>,
     ) -> ImuSamples {
         let Read {
-            layout,
             clock,
             facts,
             rows,

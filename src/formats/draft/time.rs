@@ -153,7 +153,9 @@ impl Steps {
         };
         let times = std::iter::once(0.0).chain(steps().scan(0.0, goes_on));
         let rows: Vec<(f64, u64)> = times.zip(1..).collect();
-        let clock = Uniform::new(Path::new(""), &rows, None).ok();
+        let is_clock = !forward.is_empty();
+        let clock = is_clock.then(|| Uniform::new(Path::new(""), &rows, None).ok());
+        let clock = clock.flatten();
         let numbers = clock.as_ref().map_or(&[][..], |clock| &clock.numbers);
         let gap = |(row, pair): (usize, &[usize])| {
             let missing = pair[1].saturating_sub(pair[0] + 1) as f64;

@@ -280,8 +280,8 @@ impl ImuLog<'_> {
                 .map(|clock| Samples::Held(Box::new((held, clock)))),
         };
         let samples = match samples.map_err(|error| csv.placed(error))? {
-            Samples::Long(whole) if known.is_none() && whole.clock.wander.is_some() => {
-                let Whole { clock, .. } = *whole;
+            Samples::Long(whole) if known.is_none() && whole.read.clock.wander.is_some() => {
+                let clock = whole.read.clock;
                 // What was read is let go of before it is read again.
                 drop((csv, stamps, temperature));
                 return self.content(sizes, notes, Some(&clock));
@@ -289,7 +289,7 @@ impl ImuLog<'_> {
             samples => samples,
         };
         let clock = match &samples {
-            Samples::Long(whole) => &whole.clock,
+            Samples::Long(whole) => &whole.read.clock,
             Samples::Held(held) => &held.1,
         };
         notes.extend(clock.uneven());
