@@ -127,11 +127,8 @@ impl Lines {
 
     /// Passes over this many lines of the first ones.
     pub fn skip(&mut self, lines: usize) {
-        self.row = self
-            .ahead
-            .drain(..lines)
-            .last()
-            .map_or(0, |line| line.number);
+        let passed = self.ahead.drain(..lines).next_back();
+        self.row = passed.map_or(0, |line| line.number);
     }
 
     /// Goes to the next line that is no comment; false at the end of the file.

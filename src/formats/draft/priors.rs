@@ -155,14 +155,9 @@ impl Draft {
                 sigma = sigma.map(|sigma| sigma.max(2.0 * rest));
             }
         }
-        match sigma {
-            Some(sigma) => line(
-                text,
-                "bias_sigma",
-                &format!("{:?}", short(sigma)),
-                "in the file's unit, per second",
-            ),
-            None => {}
+        if let Some(sigma) = sigma {
+            let value = format!("{:?}", short(sigma));
+            line(text, "bias_sigma", &value, "in the file's unit, per second");
         }
     }
 
