@@ -310,13 +310,13 @@ fn by_numbers(
     let magnitudes = |free: &[usize]| {
         let named: Vec<usize> = free.iter().copied().filter(has_stem).collect();
         let mut triads = by_stem(names, &named);
+        triads.retain(|triad| triad.iter().any(varies));
         if triads.is_empty() {
-            triads = free
-                .chunks_exact(3)
-                .map(|of| [of[0], of[1], of[2]])
+            let side_by_side = free.chunks_exact(3).map(|of| [of[0], of[1], of[2]]);
+            triads = side_by_side
+                .filter(|triad| triad.iter().all(varies))
                 .collect();
         }
-        triads.retain(|triad| triad.iter().any(varies));
         let with_size = |triad| (triad, magnitude(sheet, &triad));
         triads.into_iter().map(with_size).collect::<Vec<_>>()
     };

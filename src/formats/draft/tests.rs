@@ -420,3 +420,32 @@ fn a_counter_that_other_packets_share_is_no_time_and_a_compass_no_gyro() {
         ],
     );
 }
+
+#[test]
+fn rows_that_a_tag_tells_apart_are_streams_and_constants_no_axes() {
+    let text = draft("", |k, [gx, gy, gz, ax, ay, az]| {
+        let time = 10 * k;
+        format!("1 {time} {ax} {ay} {az}\n2 {time} {gx} {gy} {gz}")
+    });
+    has(
+        &text,
+        &[
+            "stream = \"2\"",
+            "accel_from = { stream = \"1\", time = \"2\", time_unit = \"ms\" }",
+            "gyro_unit = \"rad/s\"",
+            "columns = { time = \"2\", gyro = [\"3\", \"4\", \"5\"], accel = [\"3\", \"4\", \"5\"] }",
+        ],
+    );
+    let text = draft("", |k, v| {
+        let compass = (k as f64).sin();
+        format!("Raw:{k},1\nUni:{},{compass},7,9", joined(&v, ","))
+    });
+    has(
+        &text,
+        &[
+            "stream = \"Uni\"",
+            "gyro_unit = \"rad/s\"",
+            "columns = { gyro = [\"2\", \"3\", \"4\"], accel = [\"5\", \"6\", \"7\"] }",
+        ],
+    );
+}
