@@ -17,6 +17,15 @@ pub enum CalibrationError {
          --aiding table out"
     )]
     NoTable,
+    /// A log of one triad.
+    #[error(
+        "the log has no columns of {0}, and a calibration needs both triads: name the columns in run.toml, or see the \
+         noise of the triad that is there by `turncal allan`", .sensor.name()
+    )]
+    OneTriad {
+        /// The one that is not there.
+        sensor: Sensor,
+    },
     /// Less memory than a calibration takes.
     #[error(
         "{samples} samples were read, and there is no memory to calibrate them, about {megabytes} MB; give it \

@@ -7,7 +7,7 @@ use crate::calibration::{
     Estimate, Finding, Method, Outcome, Problem, Progress, Quality, estimate, six_position,
     test_error_terms,
 };
-use crate::imu::PerSensor;
+use crate::imu::{PerSensor, Sensor};
 use crate::room;
 use crate::run::Run;
 use crate::units::DEGREE;
@@ -62,6 +62,10 @@ impl Problem<'_> {
                 samples: self.runs().map(|run| run.recording.imu.len()).sum(),
                 megabytes: bytes >> 20,
             });
+        }
+        let lacks = |&sensor: &Sensor| self.runs().any(|run| !run.recording.imu.has(sensor));
+        if let Some(sensor) = Sensor::ALL.into_iter().find(lacks) {
+            return Err(CalibrationError::OneTriad { sensor });
         }
         if let Some((run, contradiction)) = Contradiction::of(self) {
             return Err(CalibrationError::Contradicted {

@@ -1,9 +1,13 @@
 //! Rows of numbers below a line of names, plain or gzipped, read row by row without keeping their text.
 
 mod ahead;
+mod clock_text;
+mod heading;
 mod lines;
 mod row;
 
+use std::borrow::Cow;
+use std::fmt::Display;
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -11,14 +15,12 @@ use std::path::{Path, PathBuf};
 use flate2::read::MultiGzDecoder;
 
 use super::error::{FileError, Place};
-use super::names::Names;
+use super::rows::Rows;
 use crate::room;
 use ahead::Ahead;
+use heading::{Heading, Looks};
 use lines::{LONGEST, Lines, Stop};
 use row::{LONGEST_FIELD, MOST_COLUMNS, Malformed, Row};
-
-/// What the names of such files end in, each also with `.gz` behind it.
-const ENDINGS: [&str; 5] = [".csv", ".txt", ".tsv", ".dat", ".log"];
 
 /// Bytes that a value takes while a record is read: it is held as it stands, repaired and in SI. To ask for
 /// what a calibration takes would refuse what may find room.
@@ -27,20 +29,22 @@ const BYTES_A_VALUE: usize = 32;
 const BYTES_LOOKED_AT: usize = 16;
 /// The same where rows are packed as they come.
 const BYTES_PACKED: usize = 4;
+/// What a gzipped file begins with.
+const GZIP: [u8; 2] = [0x1f, 0x8b];
 /// So many rows always find room.
 const FEW_ROWS: usize = 1 << 12;
 
 /// A file of rows at one of them.
 ///
-/// Commas, semicolons, tabs or blanks part the fields, as the first row shows. Lines that begin with `#`, `%`
-/// or `//` are comments. A first row of numbers makes the columns' names `1`, `2`, …; a row of units below the
-/// names is passed over. Numbers may have a decimal comma where commas do not part them.
+/// Commas, semicolons, tabs or blanks part the fields, as most rows show. Lines that begin with `#`, `%` or `//` are
+/// comments; those above the names, or above rows of numbers without names, are a preamble. Columns without names are
+/// called `1`, `2`, …. Numbers may have a decimal comma where commas do not part them; a time may be that of a clock.
 pub(super) struct CsvFile {
     file: PathBuf,
     lines: Lines,
-    names: Names,
-    units: Option<Vec<String>>,
-    decimal_comma: bool,
+    heading: Heading,
+    /// Of rows of several kinds the word of those that are given out, and its column.
+    tag: Option<(usize, String)>,
     row: Row,
     rows: usize,
     packed: bool,
@@ -58,11 +62,19 @@ enum Cut {
 }
 
 impl CsvFile {
-    /// Opens a file and reads its header.
-    pub fn open(path: &Path) -> Result<Self, FileError> {
-        let is_gzipped = is_gzipped_by_name(path)?;
-        let source = source(path, is_gzipped)?;
-        let (lines, heading) = Lines::open(source).map_err(|stop| stopped(path, &stop))?;
+    /// Opens a file and reads its header; of rows that tags tell apart those with this one.
+    pub fn open(path: &Path, tag: Option<&str>) -> Result<Self, FileError> {
+        let stopped = |stop: Stop| stopped(path, &stop);
+        let mut lines = Lines::open(source(path)?).map_err(stopped)?;
+        let looks = Looks::of(lines.ahead());
+        let tags = tag.map(|tag| {
+            let tags = looks
+                .tags()
+                .filter(|tags| tags.names.iter().any(|name| name == tag));
+            tags.ok_or_else(|| no_tag(path, tag))
+        });
+        let tags = tags.transpose()?;
+        let heading = looks.heading(tags.as_ref().zip(tag)).map_err(stopped)?;
         let heading = heading.ok_or_else(|| {
             FileError::new(
                 path,
@@ -72,57 +84,98 @@ impl CsvFile {
                 "Record or export the file again.",
             )
         })?;
+        lines.skip(heading.above);
         Ok(Self {
             file: path.to_owned(),
             lines,
             row: Row::new(heading.delimiter.byte()),
-            decimal_comma: heading.delimiter.leaves_commas(),
-            names: Names::new(&heading.names),
-            units: heading.units,
+            tag: tags
+                .zip(tag)
+                .map(|(tags, tag)| (tags.column, tag.to_owned())),
             rows: 0,
             packed: false,
             line: heading.line,
+            heading,
             cut: None,
         })
     }
 
-    /// The names of the columns.
-    pub fn header(&self) -> &[String] {
-        self.names.all()
+    /// The tags that tell rows of several kinds apart.
+    pub fn tags(path: &Path) -> Result<Vec<String>, FileError> {
+        let lines = Lines::open(source(path)?).map_err(|stop| stopped(path, &stop))?;
+        Ok(Looks::of(lines.ahead())
+            .tags()
+            .map_or_else(Vec::new, |tags| tags.names))
     }
 
-    /// The file's path.
-    pub fn path(&self) -> &Path {
+    /// Makes sure, as rows become more, that there is room for what is made of them.
+    fn reserve(&self, used: usize) -> Result<(), FileError> {
+        if self.rows < FEW_ROWS || !self.rows.is_power_of_two() {
+            return Ok(());
+        }
+        let a_row = match used {
+            0 => self.header().len() * BYTES_LOOKED_AT,
+            used if self.packed => used * BYTES_PACKED,
+            used => used * BYTES_A_VALUE,
+        };
+        if room::is_there((2 * self.rows).saturating_mul(a_row)) {
+            return Ok(());
+        }
+        Err(self.error_here(
+            format_args!("row {}, and no memory for as many more", self.rows),
+            "a record that fits into memory",
+            "Give it more memory, or split the record.",
+        ))
+    }
+
+    fn bytes(&self, column: usize) -> &[u8] {
+        self.row.get(column).unwrap_or_default().trim_ascii()
+    }
+
+    fn error_here(&self, found: impl Display, expected: impl Display, advice: &str) -> FileError {
+        FileError::new(&self.file, self.place(None), found, expected, advice)
+    }
+}
+
+impl Rows for CsvFile {
+    fn file(&self) -> &Path {
         &self.file
     }
 
-    /// What comments say of the rate of rows, Hz.
-    pub fn rate(&self) -> Option<f64> {
-        self.lines.rate()
+    fn header(&self) -> &[String] {
+        &self.heading.names
     }
 
-    /// The row of units below the names, if there is one.
-    pub fn units(&self) -> Option<&[String]> {
-        self.units.as_deref()
+    fn units(&self) -> &[String] {
+        self.heading.units.as_deref().unwrap_or_default()
     }
 
-    /// The index of a named column, which nothing else may be.
-    pub fn column(&mut self, name: &str) -> Result<usize, FileError> {
-        let found = self.names.find(name);
-        found.map_err(|wrong| self.error_here(wrong.found, wrong.expected, wrong.advice))
+    fn rate(&self) -> Option<f64> {
+        self.heading.rate
     }
 
-    /// Goes to the next row; false at the end of the file, and at a last row that the end of the file cuts
-    /// off.
-    pub fn advance(&mut self) -> Result<bool, FileError> {
-        let more = self.lines.advance();
-        if !more.map_err(|stop| stopped(&self.file, &stop))? {
-            return Ok(false);
-        }
-        self.line = self.lines.number();
+    fn remarks(&self) -> &[String] {
+        &self.heading.remarks
+    }
+
+    /// False also at a last row that the end of the file cuts off.
+    fn advance(&mut self, used: &[usize]) -> Result<bool, FileError> {
+        let split = loop {
+            let more = self.lines.advance();
+            if !more.map_err(|stop| stopped(&self.file, &stop))? {
+                return Ok(false);
+            }
+            let line = self.lines.line();
+            self.heading.delimiter.tidy(&mut line.text);
+            let split = self.row.split(&line.text);
+            self.line = line.number;
+            match &self.tag {
+                Some((column, tag)) if self.bytes(*column) != tag.as_bytes() => {}
+                _ => break split,
+            }
+        };
         self.rows += 1;
-        self.reserve()?;
-        let split = self.row.split(self.lines.line());
+        self.reserve(used.len())?;
         let (found, expected) = (self.row.len(), self.header().len());
         let is_cut = split == Err(Malformed::Quote) || found < expected;
         if is_cut && !self.lines.is_ended() {
@@ -138,20 +191,54 @@ impl CsvFile {
                 "Complete or remove the row.",
             ));
         }
-        let last_is_used = self.names.taken().contains(&(expected - 1));
-        if !self.lines.is_ended() && last_is_used && !ends_in_delimiter {
+        if !self.lines.is_ended() && used.contains(&(expected - 1)) && !ends_in_delimiter {
             self.cut = Some(Cut::Number);
         }
         Ok(true)
     }
 
-    /// Whether the row is the last and no line end shows that its last number is whole.
-    pub fn may_be_cut(&self) -> bool {
+    fn value(&self, column: usize) -> f64 {
+        let text = std::str::from_utf8(self.bytes(column)).unwrap_or_default();
+        let clock = self.heading.clocks.get(column).copied().flatten();
+        let number = match (clock, text.parse()) {
+            (Some(clock), _) => clock.seconds(text),
+            (None, Err(_)) if self.heading.delimiter.leaves_commas() => {
+                text.replacen(',', ".", 1).parse().ok()
+            }
+            (None, number) => number.ok(),
+        };
+        number.unwrap_or(f64::NAN)
+    }
+
+    fn shown(&self, column: usize) -> Cow<'_, str> {
+        String::from_utf8_lossy(self.bytes(column))
+    }
+
+    /// Also of what loggers write for nothing.
+    fn is_blank(&self, column: usize) -> bool {
+        let bytes = self.bytes(column);
+        bytes.is_empty() || bytes.eq_ignore_ascii_case(b"nan")
+    }
+
+    fn line(&self) -> u64 {
+        self.line
+    }
+
+    fn place(&self, column: Option<usize>) -> Place {
+        let line = self.line;
+        let name = column.map(|column| self.header().get(column).cloned().unwrap_or_default());
+        name.map_or(Place::Line(line), |column| Place::Column { line, column })
+    }
+
+    fn place_of_names(&self) -> Place {
+        Place::Line(self.heading.line)
+    }
+
+    fn may_be_cut(&self) -> bool {
         self.cut == Some(Cut::Number)
     }
 
-    /// What the end of the file leaves open, in a sentence, with what was done about its last row.
-    pub fn cut_off(&self, done: &str) -> Option<String> {
+    fn cut_off(&self, done: &str) -> Option<String> {
         let (file, line) = (self.file.display(), self.line);
         let what = match self.cut? {
             Cut::Row => "is cut off: fields are missing. It is left out",
@@ -162,132 +249,24 @@ impl CsvFile {
         ))
     }
 
-    /// Makes sure, as rows become more, that there is room for what is made of them.
-    fn reserve(&self) -> Result<(), FileError> {
-        if self.rows < FEW_ROWS || !self.rows.is_power_of_two() {
-            return Ok(());
-        }
-        let a_row = match self.names.taken().len() {
-            0 => self.header().len() * BYTES_LOOKED_AT,
-            taken if self.packed => taken * BYTES_PACKED,
-            taken => taken * BYTES_A_VALUE,
-        };
-        if room::is_there((2 * self.rows).saturating_mul(a_row)) {
-            return Ok(());
-        }
-        Err(self.error_here(
-            format_args!("row {}, and no memory for as many more", self.rows),
-            "a record that fits into memory",
-            "Give it more memory, or split the record.",
-        ))
-    }
-
-    /// Takes less memory for granted: rows are packed as they come.
-    pub fn pack(&mut self) {
+    fn pack(&mut self) {
         self.packed = true;
-    }
-
-    /// Line of the row.
-    pub fn line(&self) -> u64 {
-        self.line
-    }
-
-    /// The finite number in a column of the row.
-    pub fn number(&self, column: usize) -> Result<f64, FileError> {
-        std::str::from_utf8(self.bytes(column))
-            .ok()
-            .and_then(|text| match text.parse() {
-                Err(_) if self.decimal_comma => text.replacen(',', ".", 1).parse().ok(),
-                number => number.ok(),
-            })
-            .filter(|number: &f64| number.is_finite())
-            .ok_or_else(|| self.not(column, "a finite number"))
-    }
-
-    /// The text in a column of the row, not empty.
-    pub fn text(&self, column: usize) -> Result<&str, FileError> {
-        std::str::from_utf8(self.bytes(column))
-            .ok()
-            .filter(|text| !text.is_empty())
-            .ok_or_else(|| self.not(column, "a text"))
-    }
-
-    /// Whether nothing stands in a column of the row, or what loggers write for that.
-    pub fn is_blank(&self, column: usize) -> bool {
-        let bytes = self.bytes(column);
-        bytes.is_empty() || bytes.eq_ignore_ascii_case(b"nan")
-    }
-
-    fn bytes(&self, column: usize) -> &[u8] {
-        self.row.get(column).unwrap_or_default().trim_ascii()
-    }
-
-    /// The error of a row's value that is not what it should be.
-    pub fn not(&self, column: usize, expected: &str) -> FileError {
-        let bytes = self.bytes(column);
-        let found = if bytes.is_empty() {
-            "an empty field".to_owned()
-        } else {
-            format!("`{}`", String::from_utf8_lossy(bytes))
-        };
-        let place = Place::Column {
-            line: self.line,
-            column: self.header().get(column).cloned().unwrap_or_default(),
-        };
-        FileError::new(
-            &self.file,
-            place,
-            found,
-            expected,
-            "Correct the value or record the file again.",
-        )
-    }
-
-    /// An error of the whole file.
-    pub fn error(
-        &self,
-        found: impl std::fmt::Display,
-        expected: impl std::fmt::Display,
-        advice: impl std::fmt::Display,
-    ) -> FileError {
-        FileError::new(&self.file, Place::File, found, expected, advice)
-    }
-
-    /// An error of the row.
-    pub fn error_here(
-        &self,
-        found: impl std::fmt::Display,
-        expected: impl std::fmt::Display,
-        advice: impl std::fmt::Display,
-    ) -> FileError {
-        FileError::new(&self.file, Place::Line(self.line), found, expected, advice)
     }
 }
 
-/// Whether the name says that the file is gzipped; an error if it is none of a file of rows.
-fn is_gzipped_by_name(path: &Path) -> Result<bool, FileError> {
-    let name = path.to_string_lossy().to_lowercase();
-    let plain = name.strip_suffix(".gz");
-    if !ENDINGS
-        .iter()
-        .any(|end| plain.unwrap_or(&name).ends_with(end))
-    {
-        return Err(FileError::new(
-            path,
-            Place::File,
-            "a file of another kind",
-            format_args!(
-                "a name that ends in {}, or in one of them and .gz",
-                ENDINGS.join(", ")
-            ),
-            "Rename or convert the file.",
-        ));
-    }
-    Ok(plain.is_some())
+/// The error of a tag that tells no rows of a file apart.
+fn no_tag(path: &Path, tag: &str) -> FileError {
+    FileError::new(
+        path,
+        Place::File,
+        "rows of text",
+        format_args!("a log with a stream `{tag}`"),
+        "Leave `stream` out, or name another file.",
+    )
 }
 
 /// The bytes of a regular file, unzipped.
-fn source(path: &Path, is_gzipped: bool) -> Result<Box<dyn BufRead>, FileError> {
+fn source(path: &Path) -> Result<Box<dyn BufRead>, FileError> {
     let refused = |error| {
         FileError::io(
             path,
@@ -314,17 +293,20 @@ fn source(path: &Path, is_gzipped: bool) -> Result<Box<dyn BufRead>, FileError> 
         let file = File::open(path).map_err(refused)?;
         Ok(BufReader::with_capacity(1 << 16, file))
     };
-    Ok(if is_gzipped {
-        match Ahead::of(MultiGzDecoder::new(opened()?)) {
-            Ok(ahead) => Box::new(ahead),
-            // The system lets no thread be started.
-            Err(_) => {
-                let decoder = MultiGzDecoder::new(opened()?);
-                Box::new(BufReader::with_capacity(1 << 16, decoder))
-            }
-        }
-    } else {
-        Box::new(opened()?)
+    let mut plain = opened()?;
+    let begin = plain
+        .fill_buf()
+        .map_err(|error| stopped(path, &Stop::System(error)))?;
+    if !begin.starts_with(&GZIP) {
+        return Ok(Box::new(plain));
+    }
+    Ok(match Ahead::of(MultiGzDecoder::new(plain)) {
+        Ok(ahead) => Box::new(ahead),
+        // The system lets no thread be started.
+        Err(_) => Box::new(BufReader::with_capacity(
+            1 << 16,
+            MultiGzDecoder::new(opened()?),
+        )),
     })
 }
 
@@ -344,6 +326,13 @@ fn stopped(file: &Path, stop: &Stop) -> FileError {
             "Is this the right file? Record or export it again.",
         ),
         Stop::Malformed { line, what } => malformed(file, *line, *what),
+        Stop::Binary => FileError::new(
+            file,
+            Place::File,
+            "a file of another kind",
+            "rows of text, or a log of a program that turncal knows",
+            "Convert the file.",
+        ),
     }
 }
 

@@ -14,7 +14,7 @@ use crate::run::Run;
 /// The log on standard input.
 const STANDARD_INPUT: &str = "-";
 /// What rows of standard input are called as a file.
-const PIPED: &str = "imu.csv";
+const PIPED: &str = "stdin.csv";
 
 /// A run, and where it was a log alone, the draft by which it was read.
 #[derive(Debug)]
@@ -51,14 +51,8 @@ impl Opened {
             None => path.to_owned(),
         };
         let draft = Draft::of_stream(&file, stream, stated)?;
-        if let Some(open) = draft.open_questions().into_iter().next() {
-            return Err(FileError::new(
-                path,
-                Place::File,
-                open.found,
-                open.expected,
-                open.advice,
-            ));
+        if let Some([found, expected, advice]) = draft.open_question() {
+            return Err(FileError::new(path, Place::File, found, expected, advice));
         }
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let run = Run::of_text(&file, &draft.to_toml(&name), None)?;

@@ -58,6 +58,7 @@ pub(super) struct ImuLog<'a> {
     pub accel_from: Option<(Source<'a>, Clock<'a>)>,
     /// Of rows of several instruments those that have this number in this column.
     pub instance: Option<(&'a str, f64)>,
+    /// Without names where the log has the other triad alone.
     pub triads: PerSensor<[&'a str; 3]>,
     pub temperature: Option<TemperatureColumns<'a>>,
     pub output: Output,
@@ -75,7 +76,8 @@ pub(super) struct ImuLog<'a> {
 struct Layout {
     /// Gyro x, y, z and accelerometer x, y, z as they stand.
     names: [FileColumn; 6],
-    places: [usize; 6],
+    /// None of a triad that is not there.
+    places: [Option<usize>; 6],
     /// Right, front or up, whichever each lies along.
     body_axes: [usize; 6],
 }
@@ -125,10 +127,10 @@ fn pulse_of(error: [f64; 3]) -> f64 {
 }
 
 /// What was read besides samples.
-struct Read<'a> {
-    layout: &'a Layout,
+struct Read {
     clock: Uniform,
     facts: [ColumnFacts; 6],
+    /// Rows of the file.
     rows: usize,
     faults: Vec<Fault>,
     bridges: Vec<Bridge>,
@@ -192,25 +194,11 @@ impl ImuLog<'_> {
     /// The samples of a log that was packed as it was read.
     fn packed(&self, layout: &Layout, whole: Whole) -> ImuSamples {
         let Whole {
-            clock,
-            facts,
+            read,
             packed,
             samples,
-            faults,
-            bridges,
-            rows,
             missing: _,
-            error,
         } = whole;
-        let read = Read {
-            layout,
-            clock,
-            facts,
-            rows,
-            faults,
-            bridges,
-            error,
-        };
         // Samples are then whole steps, as pulses are. Pulses are rounded a second time where some of them are
         // interpolated: what is not whole there stays with the sum.
         let roundings: f64 = match self.output {
@@ -222,7 +210,7 @@ impl ImuLog<'_> {
             gyro: Series::packed(packed.gyro),
             accel: Series::packed(packed.accel),
         };
-        self.samples(read, samples, series, pulse)
+        self.samples(layout, read, samples, series, pulse)
     }
 
     /// The samples of a log whose rows are all held.
@@ -284,7 +272,6 @@ impl ImuLog<'_> {
             Output::Increment | Output::Rate => 0.0,
         });
         let read = Read {
-            layout: &layout,
             clock,
             facts,
             rows: count,
@@ -292,18 +279,19 @@ impl ImuLog<'_> {
             bridges,
             error,
         };
-        (self.samples(read, samples, series, pulse), missing)
+        let imu = self.samples(&layout, read, samples, series, pulse);
+        (imu, missing)
     }
 
     fn samples(
         &self,
+        layout: &Layout,
         read: Read,
         samples: usize,
         series: PerSensor<Series>,
         pulse: PerSensor<f64>,
     ) -> ImuSamples {
         let Read {
-            layout,
             clock,
             facts,
             rows,
@@ -385,7 +373,7 @@ impl ImuLog<'_> {
                 further: &[],
             },
         };
-        Joined::read(&parts, self.output, self.stamp.lag()).map(LogRows::joined)
+        Joined::read(&parts, self.output, self.stamp.lag()).map(LogRows::new)
     }
 
     fn clock_of_rows(&self) -> Clock<'_> {
@@ -401,21 +389,16 @@ impl ImuLog<'_> {
             None => PerSensor::from_fn(|sensor| self.triads.get(sensor).map(str::to_owned)),
         };
         let names = names.gyro.iter().chain(&names.accel);
-        let found = names.map(|name| csv.signed_column(name));
-        let found = found.collect::<Result<Vec<_>, _>>()?;
-        let (places, names): (Vec<_>, Vec<_>) = found.into_iter().unzip();
-        let mut names = names.into_iter();
-        let mut name = |_| {
-            names.next().unwrap_or(FileColumn {
-                name: String::new(),
-                reversed: false,
-            })
-        };
-        Ok(Layout {
-            names: std::array::from_fn(&mut name),
-            places: std::array::from_fn(|k| places[k]),
+        let mut layout = Layout {
+            names: std::array::from_fn(|_| FileColumn::default()),
+            places: [None; 6],
             body_axes: std::array::from_fn(|k| self.axes.body_axis(k % 3)),
-        })
+        };
+        for (k, name) in names.enumerate().filter(|(_, name)| !name.is_empty()) {
+            let (place, column) = csv.signed_column(name)?;
+            (layout.places[k], layout.names[k]) = (Some(place), column);
+        }
+        Ok(layout)
     }
 }
 

@@ -3,68 +3,39 @@
 use super::error::{choice, nearest};
 use crate::shown::excerpt;
 
-/// The names of a file's columns, and which of them are taken.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Names {
-    all: Vec<String>,
-    taken: Vec<usize>,
-}
-
-/// Why a name is none, in the words of an error.
-pub(super) struct Wrong {
-    pub found: String,
-    pub expected: String,
-    pub advice: String,
-}
-
-impl Names {
-    pub fn new(all: &[String]) -> Self {
-        Self {
-            all: all.to_vec(),
-            taken: Vec::new(),
-        }
+/// The place of a column by its name, or by its number where none is called so; none of those that are taken. Else
+/// what was found and expected, and what to do.
+pub(super) fn find(all: &[String], taken: &[usize], name: &str) -> Result<usize, [String; 3]> {
+    let mut places: Vec<usize> = (0..all.len()).filter(|&place| all[place] == name).collect();
+    if let Ok(number) = name.parse::<usize>()
+        && (1..=all.len()).contains(&number)
+        && places.is_empty()
+    {
+        places.push(number - 1);
     }
-
-    pub fn all(&self) -> &[String] {
-        &self.all
-    }
-
-    /// The columns that were found.
-    pub fn taken(&self) -> &[usize] {
-        &self.taken
-    }
-
-    /// The index of a named column, which nothing else may be.
-    pub fn find(&mut self, name: &str) -> Result<usize, Wrong> {
-        let mut places = (0..self.all.len()).filter(|&i| self.all[i] == name);
-        let header = || self.all.iter().map(String::as_str);
-        match (places.next(), places.next()) {
-            (Some(index), None) if self.taken.contains(&index) => Err(Wrong {
-                found: format!("`{name}` named for two quantities"),
-                expected: "a column of its own for each".to_owned(),
-                advice: "Correct `columns` in run.toml.".to_owned(),
-            }),
-            (Some(index), None) => {
-                self.taken.push(index);
-                Ok(index)
-            }
-            (Some(_), Some(_)) => Err(Wrong {
-                found: format!("two columns named `{name}`"),
-                expected: "one".to_owned(),
-                advice: "Rename one of them.".to_owned(),
-            }),
-            (None, _) => Err(Wrong {
-                found: format!("no column named `{}`", excerpt(name)),
-                expected: format!("one of {}", choice(name, header())),
-                advice: match nearest(name, header()) {
-                    Some(like) => {
-                        format!(
-                            "Did you mean `{like}`? Correct `columns` in run.toml or this header."
-                        )
-                    }
-                    None => "Correct `columns` in run.toml or this header.".to_owned(),
+    let header = || all.iter().map(String::as_str);
+    match places[..] {
+        [place] if !taken.contains(&place) => Ok(place),
+        [_] => Err([
+            format!("`{name}` named for two quantities"),
+            "a column of its own for each".to_owned(),
+            "Correct `columns` in run.toml.".to_owned(),
+        ]),
+        [_, ..] => Err([
+            format!("two columns named `{name}`"),
+            "one".to_owned(),
+            "Name it by its number, the first being `1`, or rename one of them.".to_owned(),
+        ]),
+        [] => {
+            let advice = "Correct `columns` in run.toml or this header.";
+            Err([
+                format!("no column named `{}`", excerpt(name)),
+                format!("one of {}", choice(name, header())),
+                match nearest(name, header()) {
+                    Some(like) => format!("Did you mean `{like}`? {advice}"),
+                    None => advice.to_owned(),
                 },
-            }),
+            ])
         }
     }
 }
@@ -74,9 +45,9 @@ mod tests {
     use super::*;
 
     fn expected(names: &[String], wanted: &str) -> String {
-        let wrong = Names::new(names).find(wanted).unwrap_err();
-        assert_eq!(wrong.found, format!("no column named `{wanted}`"));
-        wrong.expected
+        let [found, expected, _] = find(names, &[], wanted).unwrap_err();
+        assert_eq!(found, format!("no column named `{wanted}`"));
+        expected
     }
 
     #[test]

@@ -31,11 +31,13 @@ pub(super) fn units(sensor: Sensor, output: Output) -> &'static [(&'static str, 
             ("rad/s", Some(1.0)),
             ("deg/s", Some(1.0 / DEGREE)),
             ("deg/h", Some(1.0 / DEG_PER_H)),
+            ("mdps", Some(1e3 / DEGREE)),
         ],
         (Output::Rate, Sensor::Accel) => &[
             ("count", None),
             ("m/s^2", Some(1.0)),
             ("g", Some(1.0 / STANDARD_GRAVITY)),
+            ("mg", Some(1e3 / STANDARD_GRAVITY)),
         ],
     }
 }

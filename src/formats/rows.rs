@@ -1,114 +1,113 @@
-//! LogRows of numbers, whatever a file holds them in.
+//! Rows of numbers, whatever a file holds them in.
 
+use std::borrow::Cow;
+use std::fmt::Display;
 use std::path::Path;
 
-use super::csv_file::CsvFile;
 use super::error::{FileError, Place};
-use super::joined::Joined;
-use super::names::Names;
-use super::streams::StreamRows;
+use super::names;
 use crate::recording::FileColumn;
 
-/// A file at one of its rows.
-pub(super) struct LogRows {
-    kind: Kind,
-    /// Of what is no text; a text knows its own.
-    names: Names,
-}
-
-enum Kind {
-    Text(Box<CsvFile>),
-    Stream(StreamRows),
-    Joined(Joined),
-}
-
-impl LogRows {
-    pub fn text(csv: CsvFile) -> Self {
-        Self {
-            kind: Kind::Text(Box::new(csv)),
-            names: Names::default(),
-        }
-    }
-
-    pub fn stream(rows: StreamRows) -> Self {
-        Self {
-            names: Names::new(rows.header()),
-            kind: Kind::Stream(rows),
-        }
-    }
-
-    pub fn joined(rows: Joined) -> Self {
-        Self {
-            names: Names::new(rows.header()),
-            kind: Kind::Joined(rows),
-        }
-    }
+/// A file that gives rows of numbers one after the other.
+pub(super) trait Rows {
+    fn file(&self) -> &Path;
 
     /// The names of the columns.
-    pub fn header(&self) -> &[String] {
-        match &self.kind {
-            Kind::Text(csv) => csv.header(),
-            Kind::Stream(_) | Kind::Joined(_) => self.names.all(),
-        }
-    }
+    fn header(&self) -> &[String];
+
+    /// The units of the columns; none at all where the file says none.
+    fn units(&self) -> &[String];
 
     /// What the file says of the rate of rows, Hz.
-    pub fn rate(&self) -> Option<f64> {
-        match &self.kind {
-            Kind::Text(csv) => csv.rate(),
-            Kind::Stream(_) | Kind::Joined(_) => None,
-        }
-    }
-
-    /// Of the columns, if the file says them.
-    pub fn units(&self) -> Option<&[String]> {
-        match &self.kind {
-            Kind::Text(csv) => csv.units(),
-            Kind::Stream(rows) => Some(rows.units()),
-            Kind::Joined(rows) => Some(rows.units()),
-        }
+    fn rate(&self) -> Option<f64> {
+        None
     }
 
     /// What was done to the values, a sentence each.
-    pub fn remarks(&self) -> &[String] {
-        match &self.kind {
-            Kind::Text(_) => &[],
-            Kind::Stream(rows) => rows.remarks(),
-            Kind::Joined(rows) => rows.remarks(),
-        }
-    }
+    fn remarks(&self) -> &[String];
 
     /// Error of the integrals of the accelerometers' columns over any rows, in the columns' unit times s: what
     /// putting two streams on one grid left.
-    pub fn integral_error(&self) -> [f64; 3] {
-        match &self.kind {
-            Kind::Joined(rows) => rows.integral_error(),
-            Kind::Text(_) | Kind::Stream(_) => [0.0; 3],
-        }
+    fn integral_error(&self) -> [f64; 3] {
+        [0.0; 3]
+    }
+
+    /// Goes to the next row, of which these columns are used; false at the end.
+    fn advance(&mut self, used: &[usize]) -> Result<bool, FileError>;
+
+    /// The number in a column of the row; NaN is none.
+    fn value(&self, column: usize) -> f64;
+
+    /// What stands in a column of the row.
+    fn shown(&self, column: usize) -> Cow<'_, str> {
+        self.value(column).to_string().into()
+    }
+
+    /// Whether nothing stands in a column of the row.
+    fn is_blank(&self, column: usize) -> bool {
+        self.value(column).is_nan()
+    }
+
+    /// Line of a text, sample of another file.
+    fn line(&self) -> u64;
+
+    /// The place of the row or of a column in it …
+    fn place(&self, column: Option<usize>) -> Place;
+
+    /// … and of the names.
+    fn place_of_names(&self) -> Place {
+        Place::File
+    }
+
+    /// An error of a row that names its line, with what its number counts in this file.
+    fn placed(&self, error: FileError) -> FileError {
+        error
+    }
+
+    /// Whether the row is the last and no line end shows that its last number is whole.
+    fn may_be_cut(&self) -> bool {
+        false
+    }
+
+    /// What the end of the file leaves open, in a sentence, with what was done about its last row.
+    fn cut_off(&self, _done: &str) -> Option<String> {
+        None
     }
 
     /// Takes less memory for granted: rows are packed as they come.
-    pub fn pack(&mut self) {
-        if let Kind::Text(csv) = &mut self.kind {
-            csv.pack();
+    fn pack(&mut self) {}
+}
+
+/// A file at one of its rows, and the columns of it that are used.
+pub(super) struct LogRows {
+    rows: Box<dyn Rows>,
+    used: Vec<usize>,
+}
+
+impl std::ops::Deref for LogRows {
+    type Target = dyn Rows;
+
+    fn deref(&self) -> &Self::Target {
+        &*self.rows
+    }
+}
+
+impl LogRows {
+    pub fn new(rows: impl Rows + 'static) -> Self {
+        Self {
+            rows: Box::new(rows),
+            used: Vec::new(),
         }
     }
 
     /// The index of a named column, which nothing else may be.
     pub fn column(&mut self, name: &str) -> Result<usize, FileError> {
-        if let Kind::Text(csv) = &mut self.kind {
-            return csv.column(name);
-        }
-        let found = self.names.find(name);
-        found.map_err(|wrong| {
-            FileError::new(
-                self.file(),
-                Place::File,
-                wrong.found,
-                wrong.expected,
-                wrong.advice,
-            )
-        })
+        let found = names::find(self.header(), &self.used, name);
+        let place = found.map_err(|[found, expected, advice]| {
+            FileError::new(self.file(), self.place_of_names(), found, expected, advice)
+        })?;
+        self.used.push(place);
+        Ok(place)
     }
 
     /// The same of a name that a minus may precede, which turns the sign of the column's values.
@@ -124,110 +123,66 @@ impl LogRows {
 
     /// Goes to the next row; false at the end.
     pub fn advance(&mut self) -> Result<bool, FileError> {
-        match &mut self.kind {
-            Kind::Text(csv) => csv.advance(),
-            Kind::Stream(rows) => rows.advance(),
-            Kind::Joined(rows) => Ok(rows.advance()),
-        }
+        self.rows.advance(&self.used)
     }
 
-    /// Whether the row is the last and no line end shows that its last number is whole.
-    pub fn may_be_cut(&self) -> bool {
-        matches!(&self.kind, Kind::Text(csv) if csv.may_be_cut())
-    }
-
-    /// What the end of the file leaves open, in a sentence, with what was done about its last row.
-    pub fn cut_off(&self, done: &str) -> Option<String> {
-        match &self.kind {
-            Kind::Text(csv) => csv.cut_off(done),
-            Kind::Stream(rows) => rows.cut_off(),
-            Kind::Joined(_) => None,
-        }
-    }
-
-    /// Line of a text, sample of another file.
-    pub fn line(&self) -> u64 {
-        match &self.kind {
-            Kind::Text(csv) => csv.line(),
-            Kind::Stream(rows) => rows.sample(),
-            Kind::Joined(rows) => rows.sample(),
-        }
+    /// Takes less memory for granted: rows are packed as they come.
+    pub fn pack(&mut self) {
+        self.rows.pack();
     }
 
     /// The finite number in a column of the row.
     pub fn number(&self, column: usize) -> Result<f64, FileError> {
-        let value = match &self.kind {
-            Kind::Text(csv) => return csv.number(column),
-            Kind::Stream(rows) => rows.value(column),
-            Kind::Joined(rows) => rows.value(column),
-        };
+        let value = self.value(column);
         match value.is_finite() {
             true => Ok(value),
             false => Err(self.not(column, "a finite number")),
         }
     }
 
-    /// Whether nothing stands in a column of the row.
-    pub fn is_blank(&self, column: usize) -> bool {
-        match &self.kind {
-            Kind::Text(csv) => csv.is_blank(column),
-            Kind::Stream(rows) => rows.value(column).is_nan(),
-            Kind::Joined(_) => false,
+    /// The text in a column of the row, not empty.
+    pub fn text(&self, column: usize) -> Result<Cow<'_, str>, FileError> {
+        let text = self.shown(column);
+        match text.is_empty() {
+            false => Ok(text),
+            true => Err(self.not(column, "a text")),
         }
     }
 
     /// The error of a row's value that is not what it should be.
     pub fn not(&self, column: usize, expected: &str) -> FileError {
-        let (value, place) = match &self.kind {
-            Kind::Text(csv) => return csv.not(column, expected),
-            Kind::Stream(rows) => (rows.value(column), rows.place(Some(column))),
-            Kind::Joined(rows) => (rows.value(column), Place::Line(rows.sample())),
+        let shown = self.shown(column);
+        let found = match shown.is_empty() {
+            true => "an empty field".to_owned(),
+            false => format!("`{shown}`"),
         };
         let advice = "Correct the value or record the file again.";
-        FileError::new(self.file(), place, value, expected, advice)
+        FileError::new(
+            self.file(),
+            self.place(Some(column)),
+            found,
+            expected,
+            advice,
+        )
     }
 
     /// An error of the whole file.
     pub fn error(
         &self,
-        found: impl std::fmt::Display,
-        expected: impl std::fmt::Display,
-        advice: impl std::fmt::Display,
+        found: impl Display,
+        expected: impl Display,
+        advice: impl Display,
     ) -> FileError {
-        match &self.kind {
-            Kind::Text(csv) => csv.error(found, expected, advice),
-            _ => FileError::new(self.file(), Place::File, found, expected, advice),
-        }
+        FileError::new(self.file(), Place::File, found, expected, advice)
     }
 
     /// An error of the row.
     pub fn error_here(
         &self,
-        found: impl std::fmt::Display,
-        expected: impl std::fmt::Display,
-        advice: impl std::fmt::Display,
+        found: impl Display,
+        expected: impl Display,
+        advice: impl Display,
     ) -> FileError {
-        let place = match &self.kind {
-            Kind::Text(csv) => return csv.error_here(found, expected, advice),
-            Kind::Stream(rows) => rows.place(None),
-            Kind::Joined(rows) => Place::Line(rows.sample()),
-        };
-        FileError::new(self.file(), place, found, expected, advice)
-    }
-
-    /// An error of a row that names its line, with what its number counts in this file.
-    pub fn placed(&self, error: FileError) -> FileError {
-        match &self.kind {
-            Kind::Stream(rows) => rows.placed(error),
-            Kind::Text(_) | Kind::Joined(_) => error,
-        }
-    }
-
-    pub fn file(&self) -> &Path {
-        match &self.kind {
-            Kind::Text(csv) => csv.path(),
-            Kind::Stream(rows) => rows.file(),
-            Kind::Joined(rows) => rows.file(),
-        }
+        FileError::new(self.file(), self.place(None), found, expected, advice)
     }
 }

@@ -32,10 +32,8 @@ impl Sheet {
     /// Reads rows, of which there are at least so many, as far as it takes to see what they are.
     pub(super) fn of(mut csv: LogRows, fewest: usize) -> Result<Self, FileError> {
         let names = csv.header().to_vec();
-        let units = match csv.units() {
-            Some(units) => units.to_vec(),
-            None => vec![String::new(); names.len()],
-        };
+        let mut units = csv.units().to_vec();
+        units.resize(names.len(), String::new());
         let mut columns = vec![Vec::new(); names.len()];
         let most = MOST / names.len().max(1);
         let mut goes_on = false;
@@ -45,7 +43,8 @@ impl Sheet {
                 break;
             }
             for (index, column) in columns.iter_mut().enumerate() {
-                column.push(csv.number(index).unwrap_or(f64::NAN));
+                let value = csv.value(index);
+                column.push(if value.is_finite() { value } else { f64::NAN });
             }
         }
         let rows = columns.first().map_or(0, Vec::len);

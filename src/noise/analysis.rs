@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::clusters::Clusters;
 use super::triad::TriadNoise;
-use crate::imu::PerSensor;
+use crate::imu::{PerSensor, Sensor};
 use crate::recording::Segment;
 use crate::run::Run;
 
@@ -156,6 +156,8 @@ pub struct NoiseAnalysis {
     pub pulse: PerSensor<f64>,
     /// Both triads.
     pub triads: PerSensor<TriadNoise>,
+    /// Those that were recorded.
+    pub sensors: Vec<Sensor>,
 }
 
 impl NoiseAnalysis {
@@ -172,6 +174,10 @@ impl NoiseAnalysis {
             pulse: imu.pulse,
             triads,
             stretch,
+            sensors: Sensor::ALL
+                .into_iter()
+                .filter(|&sensor| imu.has(sensor))
+                .collect(),
         }
     }
 

@@ -128,6 +128,7 @@ static QUANTITIES: [Quantity; 6] = [
         row("°/h/√h", Linear(DEG_PER_H / SQRT_H), "rate random walk: IEEE Std 952", &["deg/h1.5", "deg/h3/2"]),
         row("°/h/√s", Linear(DEG_PER_H), "rate random walk in a second", &[]),
         row("rad/s²/√Hz", Linear(1.0), "Kalibr `gyroscope_random_walk`; rad/s/√s", &["rad/s/sqrts"]),
+        row("°/s²/√Hz", Linear(DEGREE), "the same in degrees: logs of MEMS gyros; °/s/√s", &["deg/s/sqrts"]),
         row("°/s/√h", Linear(DEGREE / SQRT_H), "rate random walk in an hour", &[]),
         row("rad²/s³", Power(1.0), "power spectral density of the bias rate: Q of a Kalman filter", &[]),
     ] },
@@ -242,19 +243,92 @@ impl Convention {
     }
 }
 
-/// A unit in the one spelling that stands for all of its spellings.
-fn normalised(unit: &str) -> String {
-    const SAME: &str = "µ=u μ=u °=deg ″=arcsec √=sqrt ²=2 ³=3 ⁵=5 –=- dps=deg/s hr=h";
+/// A unit in the one spelling that stands for all of its spellings: of seconds that divide it their power.
+pub(crate) fn normalised(unit: &str) -> String {
+    const SAME: &str = "µ=u μ=u °=deg º=deg ″=arcsec √=sqrt ²=2 ³=3 ⁵=5 ⁻=- ¹=1 –=- dps=deg/s";
     let text = unit.to_lowercase().replace(['^', '(', ')', ' '], "");
     let pairs = SAME.split(' ').filter_map(|pair| pair.split_once('='));
-    pairs.fold(text, |text, (from, to)| text.replace(from, to))
+    let text = pairs.fold(text, |text, (from, to)| text.replace(from, to));
+    let mut parts = text.split('/').map(part);
+    let above = parts.next().unwrap_or_default();
+    let (seconds, others): (Vec<_>, Vec<_>) =
+        parts.partition(|part| power_of_seconds(part).is_some());
+    let power: u32 = seconds
+        .iter()
+        .filter_map(|part| power_of_seconds(part))
+        .sum();
+    let seconds = match power {
+        0 => String::new(),
+        1 => "/s".to_owned(),
+        _ => format!("/s{power}"),
+    };
+    let others = others.iter().map(|part| format!("/{part}"));
+    above + &seconds + &others.collect::<String>()
 }
 
+fn power_of_seconds(part: &str) -> Option<u32> {
+    match part.strip_prefix('s')? {
+        "" => Some(1),
+        power => power.parse().ok(),
+    }
+}
+
+/// What stands between strokes, with the usual word for a time and its root.
+fn part(part: &str) -> String {
+    let base = part.strip_prefix("sqrt").or(part.strip_prefix("rt"));
+    let root = if base.is_some() { "sqrt" } else { "" };
+    let base = base.unwrap_or(part);
+    let power = &base[base.trim_end_matches(|c: char| c.is_ascii_digit()).len()..];
+    let base = match &base[..base.len() - power.len()] {
+        "sec" | "secs" | "second" => "s",
+        "hr" | "hour" => "h",
+        base => base,
+    };
+    format!("{root}{base}{power}")
+}
+
+/// Twice the powers of angle, length and time in a normalised unit whose parts are all known.
+fn dimension(unit: &str) -> Option<[i32; 3]> {
+    let mut all = [0i32; 3];
+    for (k, part) in unit.split('/').enumerate() {
+        let (base, root) = match part.strip_prefix("sqrt") {
+            Some(base) => (base, 1),
+            None => (part, 2),
+        };
+        let name = base.trim_end_matches(|c: char| c.is_ascii_digit());
+        let power = match &base[name.len()..] {
+            "" => 1,
+            power => power.parse::<i32>().ok()?,
+        };
+        let of: [i32; 3] = match name {
+            "rad" | "deg" | "mdeg" | "arcsec" => [1, 0, 0],
+            "m" => [0, 1, 0],
+            "g" | "mg" | "ug" | "mgal" => [0, 1, -2],
+            "s" | "h" => [0, 0, 1],
+            "hz" => [0, 0, -1],
+            _ => return None,
+        };
+        let sign: i32 = if k == 0 { root } else { -root };
+        for (all, of) in all.iter_mut().zip(of) {
+            *all = all.saturating_add(sign.saturating_mul(power).saturating_mul(of));
+        }
+    }
+    Some(all)
+}
+
+/// The unit most like one that is not known, of the same dimension if that is clear.
 fn hint(unit: &str) -> String {
     let wanted = normalised(unit);
+    let wanted_dimension = dimension(&wanted);
+    let fits =
+        |name: &String| wanted_dimension.is_none_or(|wanted| dimension(name) == Some(wanted));
     let likeness = |name: String| strsim::normalized_damerau_levenshtein(&wanted, &name);
     all()
-        .flat_map(|(_, row)| row.names().map(|name| (likeness(name), row.unit)))
+        .flat_map(|(_, row)| {
+            row.names()
+                .filter(fits)
+                .map(|name| (likeness(name), row.unit))
+        })
         .filter(|(likeness, _)| *likeness >= 0.6)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map_or_else(String::new, |(_, unit)| format!(" Did you mean `{unit}`?"))
@@ -369,6 +443,39 @@ mod tests {
                 let conversion = convert(3.0, convention.unit, Some(50.0)).unwrap();
                 assert_close(value(&conversion, conversion.given.1.unit), 3.0);
             }
+        }
+    }
+
+    #[test]
+    fn spellings_of_time_and_its_root_are_one_unit() {
+        for (figure, unit, expected, si) in [
+            (0.0135, "deg/sec/sqrt(Hz)", 2.356_194e-4, "rad/s/√Hz"),
+            (0.001_947_4, "deg/s/s/sqrt(Hz)", 3.398_854e-5, "rad/s²/√Hz"),
+            (2.509e-4, "m/s^2/s/sqrt(Hz)", 2.509e-4, "m/s³/√Hz"),
+            (3.8, "mdps/rtHz", 6.632_251e-5, "rad/s/√Hz"),
+            (0.06, "m/sec/√hr", 1e-3, "m/s²/√Hz"),
+            (1.0, "m/(sec^2)/rt(Hz)", 1.0, "m/s²/√Hz"),
+        ] {
+            let conversion = convert(figure, unit, None).unwrap_or_else(|error| panic!("{error}"));
+            assert_close(value(&conversion, si), expected);
+        }
+    }
+
+    #[test]
+    fn a_suggestion_is_of_the_same_dimension() {
+        for (unit, hint) in [
+            ("m/s/s/s/s/sqrt(Hz)", ""),
+            ("deg/h/s/sqrt(Hz)", "Did you mean `°/s²/√Hz`"),
+            ("m/h/sqrt(Hz)", "Did you mean `m/s/√h`"),
+            ("deg/sqrt(Hs)", "Did you mean"),
+        ] {
+            let error = convert(1.0, unit, None).unwrap_err().to_string();
+            assert_eq!(
+                error.contains("Did you mean"),
+                !hint.is_empty(),
+                "{unit}: {error}"
+            );
+            assert!(error.contains(hint), "{unit}: {error}");
         }
     }
 

@@ -38,9 +38,9 @@ pub struct NamedColumns {
 }
 
 /// A column of a triad.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FileColumn {
-    /// Its name in the file.
+    /// Its name in the file; empty of a triad that is not there.
     pub name: String,
     /// Whether its values are read with their sign turned round.
     pub reversed: bool,

@@ -38,6 +38,14 @@ pub struct ImuSamples {
     pub log: Option<LogFacts>,
 }
 
+impl ImuSamples {
+    /// Whether a triad was recorded; the samples of one that was not are zeros.
+    pub fn has(&self, sensor: Sensor) -> bool {
+        let is_named = |log: &LogFacts| !log.named.triads.get(sensor)[0].name.is_empty();
+        self.log.as_ref().is_none_or(is_named)
+    }
+}
+
 /// Samples without a break.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Stretch {

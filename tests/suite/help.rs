@@ -157,7 +157,10 @@ fn wrong_usage_is_status_two_and_says_what_to_do() {
         (&velocity, "--aiding velocity does not observe the table"),
         (&study, "leave one of them out"),
         (&["calibrate", here], "this is a directory; give"),
-        (&["calibrate", &log], "turncal init"),
+        (
+            &["export", "c.json", "--format", "c", "--run", &log],
+            "turncal init",
+        ),
         (&["calibrte"], "'calibrate'"),
         (
             &["calibrate", "run.toml", "--with", "size_effect"],

@@ -18,6 +18,7 @@ mod exits;
 mod export;
 mod faults;
 mod features;
+mod field;
 mod fuzz;
 mod help;
 mod init;

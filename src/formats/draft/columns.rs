@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::name::Name;
+use super::name::{self, Name};
 use super::units::offset;
 use crate::formats::Sheet;
 use crate::imu::{PerSensor, Sensor};
@@ -33,8 +33,15 @@ const NUMBERS: f64 = 0.5;
 const LACKING: f64 = 0.1;
 /// So many instruments may share a log.
 const MOST_INSTANCES: usize = 8;
-/// Part of the steps of a time that go forward.
+/// Part of the steps of a time that go forward, and of one that is named so, which may stay for many rows.
 const FORWARD: f64 = 0.9;
+const SELDOM_FORWARD: f64 = 0.01;
+/// Accelerometers keep gravity's magnitude within this part in half of the rows …
+const EVEN: f64 = 0.05;
+/// … and what departs from its median by more in them is none.
+const UNEVEN: f64 = 0.2;
+/// Gyros that turn say more than this many times what they say in half of the rows.
+const LIVELY: f64 = 3.0;
 
 /// Of both triads, row by row.
 type Samples = PerSensor<Vec<Vector3<f64>>>;
@@ -42,36 +49,61 @@ type Samples = PerSensor<Vec<Vector3<f64>>>;
 impl Columns {
     pub fn find(sheet: &Sheet) -> Self {
         let names: Vec<Name> = sheet.names.iter().map(|name| Name::of(name)).collect();
+        let units = |k: usize| names[k].unit.or_else(|| name::unit(&sheet.units[k]));
+        let mut found = PerSensor::from_fn(|sensor| by_name(&names, sheet, sensor));
+        // Of several the first with a unit, and that is gravity's in those of the accelerometers.
+        let is_bare = |triad: &[usize; 3]| units(triad[0]).is_none_or(|unit| unit.word == "count");
+        found.gyro.sort_by_key(is_bare);
+        found
+            .accel
+            .sort_by_key(|triad| (magnitude(sheet, triad).0 > UNEVEN, is_bare(triad)));
+        let of_triads = found.gyro.iter().chain(&found.accel).flatten();
+        let of_triads: Vec<usize> = of_triads.copied().collect();
+        // Rows of another sensor may have other times.
+        let is_sample = |row: &usize| {
+            of_triads.is_empty()
+                || of_triads
+                    .iter()
+                    .any(|&k| sheet.columns[k][*row].is_finite())
+        };
+        let count = sheet.columns.first().map_or(0, Vec::len);
+        let rows: Vec<usize> = (0..count).filter(is_sample).collect();
+        let forward = |k: usize| forward(rows.iter().map(|&row| sheet.columns[k][row]));
         let split = split_time(sheet, &names);
-        let time = split.map(|pair| pair[0]).or_else(|| time(sheet, &names));
+        let time = split
+            .map(|pair| pair[0])
+            .or_else(|| time(sheet, &names, forward));
         let temperature =
             (0..names.len()).find(|&k| names[k].is_temperature() && is_numeric(sheet, k));
-        let mut found = PerSensor::from_fn(|sensor| by_name(&names, sheet, sensor));
-        let by_size = Sensor::ALL
-            .iter()
-            .all(|&sensor| found.get(sensor).is_empty());
-        let is_echo = by_size && is_echo(sheet);
-        if is_echo {
-            found = PerSensor {
-                gyro: vec![ECHO_GYRO],
-                accel: vec![ECHO_ACCEL],
-            };
-        } else if by_size {
-            found = by_numbers(sheet, &names, [time, temperature]);
+        let quaternion = quaternion(sheet, time);
+        let lacks = |found: &PerSensor<Vec<_>>, sensor: Sensor| found.get(sensor).is_empty();
+        let lacked = PerSensor::from_fn(|sensor| lacks(&found, sensor));
+        if lacked.gyro || lacked.accel {
+            let taken = [time, split.map(|pair| pair[1]), temperature]
+                .into_iter()
+                .flatten();
+            let taken = taken
+                .chain(of_triads)
+                .chain(quaternion.into_iter().flatten());
+            by_numbers(sheet, &names, &taken.collect::<Vec<_>>(), &mut found);
         }
+        let is_new = |&sensor: &Sensor| *lacked.get(sensor) && !lacks(&found, sensor);
         let first = |triads: &Vec<[usize; 3]>| triads.first().copied();
+        let counts = |k: &usize| names[*k].is_counter() && forward(*k).0 >= FORWARD;
         Self {
-            names: sheet.names.clone(),
+            names: (0..names.len())
+                .map(|k| distinct(&sheet.names, k))
+                .collect(),
             time,
             nanoseconds: split.map(|pair| pair[1]),
-            counter: (0..names.len()).find(|&k| names[k].is_counter() && goes_forward(sheet, k)),
+            counter: (0..names.len()).find(counts),
             triads: PerSensor::from_fn(|sensor| first(found.get(sensor))),
             others: PerSensor::from_fn(|sensor| {
                 found.get(sensor).iter().skip(1).copied().collect()
             }),
-            by_size: by_size && !is_echo,
+            by_size: Sensor::ALL.iter().any(is_new),
             temperature,
-            quaternion: quaternion(sheet, time),
+            quaternion,
         }
     }
 
@@ -84,18 +116,16 @@ impl Columns {
         })
     }
 
-    /// The rows in which both triads are numbers, and their samples.
+    /// The rows in which the triads are numbers, and their samples: zeros of a triad that is not there.
     pub fn samples(&self, sheet: &Sheet) -> Option<(Vec<usize>, Samples)> {
-        let triads = PerSensor {
-            gyro: self.triads.gyro?,
-            accel: self.triads.accel?,
-        };
-        let at = |columns: &[usize; 3], row: usize| {
-            Vector3::from(columns.map(|k| sheet.columns[k][row]))
+        let at = |sensor: Sensor, row: usize| match self.triads.get(sensor) {
+            Some(columns) => Vector3::from(columns.map(|k| sheet.columns[k][row])),
+            None => Vector3::zeros(),
         };
         let (mut rows, mut samples) = (Vec::new(), PerSensor::from_fn(|_| Vec::new()));
-        for row in 0..sheet.columns[triads.gyro[0]].len() {
-            let both = PerSensor::from_fn(|sensor| at(triads.get(sensor), row));
+        let any = self.triads.gyro.or(self.triads.accel)?;
+        for row in 0..sheet.columns[any[0]].len() {
+            let both = PerSensor::from_fn(|sensor| at(sensor, row));
             if (both.gyro + both.accel)
                 .iter()
                 .all(|value| value.is_finite())
@@ -107,6 +137,15 @@ impl Columns {
             }
         }
         (rows.len() > 1).then_some((rows, samples))
+    }
+}
+
+/// The name of a column, or its number where others are called so, too, or it has none.
+fn distinct(names: &[String], column: usize) -> String {
+    let like = names.iter().filter(|name| **name == names[column]);
+    match names[column].is_empty() || like.count() > 1 {
+        true => (column + 1).to_string(),
+        false => names[column].clone(),
     }
 }
 
@@ -139,32 +178,34 @@ fn is_numeric(sheet: &Sheet, column: usize) -> bool {
     numbers as f64 >= NUMBERS * values.len() as f64
 }
 
-/// The columns of `sensor_msgs/Imu` as `ros2 topic echo --csv` writes them, without names: seconds,
-/// nanoseconds, frame, orientation, angular velocity and linear acceleration, each with its covariance.
-const ECHO: usize = 40;
-const ECHO_GYRO: [usize; 3] = [16, 17, 18];
-const ECHO_ACCEL: [usize; 3] = [28, 29, 30];
-
-fn is_echo(sheet: &Sheet) -> bool {
-    let is_numbered = sheet.names.first().is_some_and(|name| name == "1");
-    is_numbered && sheet.names.len() == ECHO && (0..ECHO).all(|k| is_numeric(sheet, k) != (k == 2))
-}
-
 fn both(seconds: &[f64], nanoseconds: &[f64]) -> Vec<f64> {
     let rows = seconds.iter().zip(nanoseconds);
     rows.map(|(seconds, nanoseconds)| seconds + 1e-9 * nanoseconds)
         .collect()
 }
 
-/// Whole seconds with the nanoseconds beside them.
+/// Whole seconds with the nanoseconds beside them, by their names or, without names, their numbers.
 fn split_time(sheet: &Sheet, names: &[Name]) -> Option<[usize; 2]> {
-    let is_pair = |k: &usize| match is_echo(sheet) {
-        true => *k == 0,
-        false => names[*k].is_seconds() && names[k + 1].is_nanoseconds(),
+    let is_whole = |k: usize| sheet.columns[k].iter().all(|value| value.fract() == 0.0);
+    let is_pair = |k: &usize| {
+        let is_named = names[*k].is_part_of_time("s") && names[k + 1].is_part_of_time("ns");
+        let is_numbered = sheet.names[*k] == (k + 1).to_string();
+        let are_nanoseconds = || {
+            sheet.columns[k + 1]
+                .iter()
+                .all(|value| (0.0..1e9).contains(value))
+        };
+        (is_named || is_numbered && are_nanoseconds()) && is_whole(*k) && is_whole(k + 1)
     };
-    let pair = (0..names.len().saturating_sub(1)).find(is_pair)?;
-    let times = both(&sheet.columns[pair], &sheet.columns[pair + 1]);
-    are_forward(&times).then_some([pair, pair + 1])
+    let goes_on = |k: &usize| {
+        let seconds = forward(sheet.columns[*k].iter().copied());
+        let times = both(&sheet.columns[*k], &sheet.columns[k + 1]);
+        seconds.0 > 0.0 && seconds.0 < FORWARD && forward(times.into_iter()).0 >= FORWARD
+    };
+    let pair = (0..names.len().saturating_sub(1))
+        .filter(is_pair)
+        .find(goes_on)?;
+    Some([pair, pair + 1])
 }
 
 /// The column that tells rows of several instruments apart, with what it says of the first.
@@ -184,19 +225,36 @@ pub(super) fn instance(sheet: &Sheet) -> Option<(usize, f64)> {
     Some((column, *sheet.columns[column].first()?))
 }
 
-fn goes_forward(sheet: &Sheet, column: usize) -> bool {
-    are_forward(&sheet.columns[column])
-}
-
-fn are_forward(values: &[f64]) -> bool {
-    let forward = values.windows(2).filter(|pair| pair[1] > pair[0]).count();
-    forward as f64 >= FORWARD * (values.len() as f64 - 1.0)
+/// The parts of the steps between values that go forward and back.
+fn forward(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (mut steps, mut forward, mut back) = (0.0, 0.0, 0.0);
+    let mut last = f64::NAN;
+    for value in values {
+        steps += f64::from(!last.is_nan());
+        forward += f64::from(value > last);
+        back += f64::from(value < last);
+        last = value;
+    }
+    (forward / f64::max(steps, 1.0), back / f64::max(steps, 1.0))
 }
 
 /// The column most like a time by its name, else the first that goes forward.
-fn time(sheet: &Sheet, names: &[Name]) -> Option<usize> {
-    let forward = (0..names.len()).filter(|&k| goes_forward(sheet, k));
-    let best = forward.max_by_key(|&k| (names[k].is_time(), names.len() - k))?;
+fn time(sheet: &Sheet, names: &[Name], forward: impl Fn(usize) -> (f64, f64)) -> Option<usize> {
+    let goes_on = |k: &usize| match forward(*k) {
+        (forward, _) if forward >= FORWARD => true,
+        (forward, back) => {
+            names[*k].is_time() > 1 && forward > SELDOM_FORWARD && back < 1.0 - FORWARD
+        }
+    };
+    let rank = |k: &usize| {
+        let is_text = sheet.units[*k] == "h:m:s";
+        let is_of_time = names[*k].is_of_time() || name::unit(&sheet.units[*k]).is_some();
+        // Raw ticks behind times that have a unit.
+        let is_raw = names[*k].unit.is_some_and(|unit| unit.word == "count");
+        let named = names[*k].is_time().saturating_sub(u8::from(is_raw));
+        (named, is_of_time && !is_text, names.len() - k)
+    };
+    let best = (0..names.len()).filter(goes_on).max_by_key(rank)?;
     // The angle of an integrating sensor goes forward, too.
     let named_otherwise = names[best].is_time() == 0 && names[best].sensor().is_some();
     (!named_otherwise).then_some(best)
@@ -205,9 +263,16 @@ fn time(sheet: &Sheet, names: &[Name]) -> Option<usize> {
 /// Complete triads of a sensor, in order of their columns.
 fn by_name(names: &[Name], sheet: &Sheet, sensor: Sensor) -> Vec<[usize; 3]> {
     let of_sensor = |k: &usize| names[*k].sensor() == Some(sensor) && is_numeric(sheet, *k);
-    let candidates: Vec<usize> = (0..names.len()).filter(of_sensor).collect();
+    by_stem(
+        names,
+        &(0..names.len()).filter(of_sensor).collect::<Vec<_>>(),
+    )
+}
+
+/// Three columns each whose names differ by the axis alone.
+pub(super) fn by_stem(names: &[Name], candidates: &[usize]) -> Vec<[usize; 3]> {
     let mut triads = Vec::new();
-    for &first in &candidates {
+    for &first in candidates {
         let axes = match names[first].axis {
             Some('x') => ['x', 'y', 'z'],
             Some('0') => ['0', '1', '2'],
@@ -226,35 +291,70 @@ fn by_name(names: &[Name], sheet: &Sheet, sensor: Sensor) -> Vec<[usize; 3]> {
     triads
 }
 
-/// Triads side by side: gravity keeps the magnitude of one of them, the other is a gyro's.
+/// The triads that names do not show, by gravity, which keeps the magnitude of the accelerometers', and by turns.
 fn by_numbers(
     sheet: &Sheet,
     names: &[Name],
-    taken: [Option<usize>; 2],
-) -> PerSensor<Vec<[usize; 3]>> {
-    let is_free = |&k: &usize| {
-        !taken.contains(&Some(k)) && !names[k].is_of_another_sensor() && is_numeric(sheet, k)
+    taken: &[usize],
+    found: &mut PerSensor<Vec<[usize; 3]>>,
+) {
+    let varies = |k: &usize| {
+        let mut values = sheet.columns[*k].iter().filter(|value| value.is_finite());
+        let first = values.next();
+        first.is_some_and(|first| values.any(|value| value != first))
     };
-    let free: Vec<usize> = (0..sheet.names.len()).filter(is_free).collect();
-    let mut triads: Vec<(f64, [usize; 3])> = free
-        .chunks_exact(3)
-        .map(|columns| [columns[0], columns[1], columns[2]])
-        .map(|triad| (unevenness(sheet, &triad), triad))
-        .collect();
-    triads.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut triads = triads.into_iter().map(|(_, triad)| triad);
-    let accel = triads.next();
-    let mut gyro: Vec<[usize; 3]> = triads.collect();
-    // Of several, the gyro is usually beside the accelerometer.
-    gyro.sort_by_key(|triad| accel.map_or(0, |accel| triad[0].abs_diff(accel[0])));
-    PerSensor {
-        accel: accel.filter(|_| !gyro.is_empty()).into_iter().collect(),
-        gyro,
+    let is_free = |k: &usize| {
+        !taken.contains(k) && !names[*k].is_of_another_sensor() && is_numeric(sheet, *k)
+    };
+    let has_stem = |k: &usize| names[*k].stem.contains(char::is_alphabetic);
+    let magnitudes = |free: &[usize]| {
+        let named: Vec<usize> = free.iter().copied().filter(has_stem).collect();
+        let mut triads = by_stem(names, &named);
+        triads.retain(|triad| triad.iter().any(varies));
+        if triads.is_empty() {
+            let side_by_side = free.chunks_exact(3).map(|of| [of[0], of[1], of[2]]);
+            triads = side_by_side
+                .filter(|triad| triad.iter().all(varies))
+                .collect();
+        }
+        let with_size = |triad| (triad, magnitude(sheet, &triad));
+        triads.into_iter().map(with_size).collect::<Vec<_>>()
+    };
+    let even = |sizes: &[([usize; 3], (f64, f64))], limit: f64| {
+        sizes
+            .iter()
+            .position(|&(_, (uneven, lively))| uneven < limit && lively < LIVELY)
+    };
+    let mut free: Vec<usize> = (0..names.len()).filter(is_free).collect();
+    let mut sizes = magnitudes(&free);
+    if even(&sizes, EVEN).is_none() {
+        // Constants may stand between triads.
+        free.retain(varies);
+        sizes = magnitudes(&free);
+    }
+    if found.accel.is_empty() {
+        let is_pair = found.gyro.is_empty() && sizes.len() > 1;
+        let of = |k: &usize| sizes[*k].1.0;
+        let least = || {
+            (0..sizes.len())
+                .min_by(|a, b| of(a).total_cmp(&of(b)))
+                .filter(|_| is_pair)
+        };
+        // A compass usually stands behind them.
+        let best = even(&sizes, EVEN).or_else(least).or(even(&sizes, UNEVEN));
+        found.accel.extend(best.map(|k| sizes.remove(k).0));
+    }
+    if found.gyro.is_empty() {
+        // Of several, the gyro is usually beside the accelerometer.
+        let place = found.accel.first().map_or(0, |accel| accel[0]);
+        sizes.sort_by_key(|(triad, (_, lively))| (*lively < LIVELY, triad[0].abs_diff(place)));
+        found.gyro.extend(sizes.iter().map(|(triad, _)| *triad));
     }
 }
 
-/// Median departure of a triad's magnitude from its median, relative.
-fn unevenness(sheet: &Sheet, triad: &[usize; 3]) -> f64 {
+/// Median departure of a triad's magnitude from its median, and its largest in all but a hundredth of the rows, over
+/// the median.
+fn magnitude(sheet: &Sheet, triad: &[usize; 3]) -> (f64, f64) {
     let rows = 0..sheet.columns[triad[0]].len();
     let at = |row: usize| Vector3::from(triad.map(|k| sheet.columns[k][row]));
     let samples: Vec<Vector3<f64>> = rows
@@ -269,15 +369,24 @@ fn unevenness(sheet: &Sheet, triad: &[usize; 3]) -> f64 {
     let middle = median(&mut sizes).unwrap_or(0.0);
     let mut off: Vec<f64> = sizes.iter().map(|size| (size - middle).abs()).collect();
     let off = median(&mut off).unwrap_or(0.0);
+    let hundredth = sizes.len().saturating_sub(1) / 100;
+    sizes.sort_unstable_by(|a, b| b.total_cmp(a));
+    let largest = sizes.get(hundredth).copied().unwrap_or(0.0);
     if middle > 0.0 {
-        off / middle
+        (off / middle, largest / middle)
     } else {
-        f64::INFINITY
+        (f64::INFINITY, f64::INFINITY)
     }
 }
 
-/// Four columns side by side whose squares add up to one in every row.
+/// Four columns side by side with names that begin alike or say nothing, whose squares add up to one in every row.
 fn quaternion(sheet: &Sheet, time: Option<usize>) -> Option<[usize; 4]> {
+    let begin = |k: usize| {
+        sheet.names[k]
+            .chars()
+            .next()
+            .filter(|_| sheet.names[k].len() > 2)
+    };
     let rows = sheet.columns.first()?.len();
     let places = 0..sheet.names.len().saturating_sub(3);
     places.map(|k| [k, k + 1, k + 2, k + 3]).find(|four| {
@@ -286,7 +395,9 @@ fn quaternion(sheet: &Sheet, time: Option<usize>) -> Option<[usize; 4]> {
                 .map(|&k| sheet.columns[k][row].powi(2))
                 .sum::<f64>()
         };
-        !four.iter().any(|&k| Some(k) == time)
+        !four
+            .iter()
+            .any(|&k| Some(k) == time || begin(k) != begin(four[0]))
             && (0..rows).all(|row| (norm(row) - 1.0).abs() < 1e-3)
     })
 }

@@ -4,9 +4,11 @@ use nalgebra::Vector3;
 
 use super::axes::Axes;
 use super::gravity::Gravity;
+use super::name::Unit;
 use super::rests::TOLERANCE;
 use super::units::short;
-use crate::imu::Output;
+use crate::formats::unit_scale;
+use crate::imu::{Output, Sensor};
 use crate::units::{DEGREE, STANDARD_GRAVITY};
 
 /// Counts for a degree a second that data sheets state …
@@ -32,14 +34,15 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// Of a unit that the file names.
-    pub fn of_name(value: f64, name: &str) -> Self {
-        Self {
-            value: Vector3::repeat(value),
+    /// Of a unit that the file names and that is another number of one of `run.toml`'s.
+    pub fn of_unit(sensor: Sensor, unit: Unit) -> Option<Self> {
+        let of_one = unit_scale(sensor, unit.word).filter(|_| unit.times != 1.0)?;
+        Some(Self {
+            value: Vector3::repeat(of_one / unit.times),
             off: 0.0,
             is_named: true,
-            why: format!("{name}, as the file says"),
-        }
+            why: format!("one is {} {}, as the file says", unit.times, unit.word),
+        })
     }
 
     /// Of the accelerometers' axes by gravity at rest, in the file's quantity per second for one m/s².

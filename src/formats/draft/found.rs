@@ -1,7 +1,7 @@
 //! What a log shows, and how sure that is.
 
-use super::Draft;
 use super::units::short;
+use super::{Draft, Stated};
 use crate::imu::Sensor;
 
 /// How sure something is.
@@ -39,73 +39,60 @@ pub struct Found {
     pub why: String,
 }
 
-/// Something that must be known, is not shown by the log and has no usual value.
-#[derive(Debug, Clone, PartialEq)]
-pub struct OpenQuestion {
-    /// What the log has.
-    pub found: String,
-    /// What is needed.
-    pub expected: String,
-    /// What to do.
-    pub advice: String,
-}
+/// What is known of one thing, how surely, and why.
+type Evidence = (String, Certainty, String);
 
 impl Draft {
     /// What was found, in the order in which it is shown.
     pub fn found(&self) -> Vec<Found> {
-        let mut found = vec![self.time_found()];
-        found.extend(Sensor::ALL.map(|sensor| self.triad_found(sensor)));
-        found.push(self.axes_found());
-        found.push(self.place_found());
-        found
-    }
-
-    /// What stands between the draft and a run.
-    pub fn open_questions(&self) -> Vec<OpenQuestion> {
-        let text = self.to_toml("log");
-        let open = text.lines().filter_map(|line| {
-            let (field, why) = line.strip_prefix("# ")?.split_once("TODO: ")?;
-            let field = field
-                .split('=')
-                .next()
-                .unwrap_or_default()
-                .trim()
-                .trim_end_matches("  #");
-            let (expected, advice) = match field {
-                "gyro_unit" => ("the unit of the gyros", "State it with --gyro-unit."),
-                "accel_unit" => (
-                    "the unit of the accelerometers",
-                    "State it with --accel-unit.",
-                ),
-                "sample_period_s" => ("the rate of the rows", "State it with --rate."),
-                _ => (
-                    "what run.toml needs",
-                    "Write a draft by `turncal init LOG -o run.toml` and complete it.",
-                ),
-            };
-            Some(OpenQuestion {
-                found: format!("nothing that shows `{field}` ({why})"),
-                expected: expected.to_owned(),
-                advice: advice.to_owned(),
-            })
+        let all = [
+            ("time", self.time_found()),
+            ("gyros", self.triad_found(Sensor::Gyro)),
+            ("accels", self.triad_found(Sensor::Accel)),
+            ("axes", self.axes_found()),
+            ("place", self.place_found()),
+        ];
+        let found = all.map(|(what, (value, certainty, why))| Found {
+            what,
+            value,
+            certainty,
+            why,
         });
-        open.collect()
+        found.into()
     }
 
-    fn time_found(&self) -> Found {
+    /// The first thing that stands between the draft and a run: what the log has, what is needed, what to do.
+    pub(in crate::formats) fn open_question(&self) -> Option<[String; 3]> {
+        let text = self.to_toml("log");
+        let mut open = text
+            .lines()
+            .filter_map(|line| line.strip_prefix("# ")?.split_once("TODO: "));
+        let (field, why) = open.next()?;
+        let field = field.split('=').next().unwrap_or_default().trim();
+        let field = field.trim_end_matches("  #");
+        let (expected, advice) = match field {
+            "gyro_unit" => ("the unit of the gyros", "State it with --gyro-unit."),
+            "accel_unit" => (
+                "the unit of the accelerometers",
+                "State it with --accel-unit.",
+            ),
+            "sample_period_s" => ("the rate of the rows", "State it with --rate."),
+            _ => (
+                "what run.toml needs",
+                "Write a draft by `turncal init LOG -o run.toml` and complete it.",
+            ),
+        };
+        let found = format!("nothing that shows `{field}` ({why})");
+        Some([found, expected.to_owned(), advice.to_owned()])
+    }
+
+    fn time_found(&self) -> Evidence {
         let clock = &self.clock;
         let name = self.columns.time.map(|k| self.columns.names[k].as_str());
-        let rate = clock
-            .period
-            .map(|period| format!("{} Hz", short(period.recip())));
-        let (value, certainty, why) = match (name, rate) {
-            _ if self.stated.rate_hz.is_some() => {
-                let rate = short(self.stated.rate_hz.unwrap_or_default());
-                (
-                    format!("{rate} Hz"),
-                    Certainty::Certain,
-                    "as stated".to_owned(),
-                )
+        let hertz = |rate: f64| format!("{} Hz", short(rate));
+        let (value, certainty) = match (name, clock.period.map(f64::recip)) {
+            _ if let Some(rate) = self.stated.rate_hz => {
+                return (hertz(rate), Certainty::Certain, "as stated".to_owned());
             }
             (Some(name), Some(rate)) => {
                 let certainty = match clock.why.starts_with("as the file") {
@@ -113,33 +100,23 @@ impl Draft {
                     false => Certainty::Guess,
                 };
                 (
-                    format!("{name}, {}, {rate}", clock.unit),
+                    format!("{name}, {}, {}", clock.unit, hertz(rate)),
                     certainty,
-                    clock.why.clone(),
                 )
             }
-            (None, Some(rate)) => (rate, Certainty::Guess, clock.why.clone()),
-            (_, None) => (
-                "period of the rows".to_owned(),
-                Certainty::Unknown,
-                clock.why.clone(),
-            ),
+            (None, Some(rate)) => (hertz(rate), Certainty::Guess),
+            (_, None) => ("period of the rows".to_owned(), Certainty::Unknown),
         };
-        Found {
-            what: "time",
-            value,
-            certainty,
-            why,
-        }
+        (value, certainty, clock.why.clone())
     }
 
-    fn triad_found(&self, sensor: Sensor) -> Found {
+    fn triad_found(&self, sensor: Sensor) -> Evidence {
         let unit = self.quantities.units.get(sensor);
-        let names = self.columns.triads.get(sensor);
-        let names = names.map_or_else(
-            || "no columns".to_owned(),
-            |triad| triad.map(|k| self.columns.names[k].as_str()).join(" "),
-        );
+        let Some(triad) = self.columns.triads.get(sensor) else {
+            let why = "no names or numbers showed them";
+            return ("no columns".to_owned(), Certainty::Unknown, why.to_owned());
+        };
+        let names = triad.map(|k| self.columns.names[k].as_str()).join(" ");
         let certainty = match unit.word {
             None => Certainty::Unknown,
             Some(_) if unit.is_shown => Certainty::Certain,
@@ -149,18 +126,14 @@ impl Draft {
         if let Some(scale) = &unit.scale {
             value += &format!(" ({})", scale.why);
         }
-        Found {
-            what: match sensor {
-                Sensor::Gyro => "gyros",
-                Sensor::Accel => "accels",
-            },
-            value,
-            certainty,
-            why: unit.why.clone(),
+        let mut why = unit.why.clone();
+        if let Some(down) = self.down.filter(|_| sensor == Sensor::Accel) {
+            why += &format!("; at the beginning {}", self.down_words(down));
         }
+        (value, certainty, why)
     }
 
-    fn axes_found(&self) -> Found {
+    fn axes_found(&self) -> Evidence {
         let of_streams = self.streams.as_ref().and_then(|streams| streams.axes);
         let (value, certainty, why) = match of_streams {
             Some(axes) => (
@@ -170,39 +143,30 @@ impl Draft {
             ),
             None => ("x right, y front, z up", Certainty::Guess, "please check"),
         };
-        Found {
-            what: "axes",
-            value: value.to_owned(),
-            certainty,
-            why: why.to_owned(),
-        }
+        (value.to_owned(), certainty, why.to_owned())
     }
 
-    fn place_found(&self) -> Found {
-        let stated = &self.stated;
+    fn place_found(&self) -> Evidence {
+        let Stated {
+            latitude_deg,
+            height_m,
+            gravity_m_s2,
+            ..
+        } = self.stated;
         let place = [
-            stated
-                .latitude_deg
-                .map(|degrees| format!("latitude {degrees}°")),
-            stated.height_m.map(|height| format!("height {height} m")),
-            stated
-                .gravity_m_s2
-                .map(|gravity| format!("gravity {gravity} m/s²")),
+            latitude_deg.map(|degrees| format!("latitude {degrees}°")),
+            height_m.map(|height| format!("height {height} m")),
+            gravity_m_s2.map(|gravity| format!("gravity {gravity} m/s²")),
         ];
         let place: Vec<String> = place.into_iter().flatten().collect();
-        let (value, certainty, why) = match place.is_empty() {
-            false => (place.join(", "), Certainty::Certain, "as stated"),
-            true => (
-                "gravity 9.806 ± 0.015 m/s²".to_owned(),
-                Certainty::Unknown,
-                "state --latitude and --height for smaller σ",
-            ),
-        };
-        Found {
-            what: "place",
-            value,
-            certainty,
-            why: why.to_owned(),
+        if !place.is_empty() {
+            return (place.join(", "), Certainty::Certain, "as stated".to_owned());
         }
+        let why = "state --latitude and --height for smaller σ";
+        (
+            "gravity 9.806 ± 0.015 m/s²".to_owned(),
+            Certainty::Unknown,
+            why.to_owned(),
+        )
     }
 }

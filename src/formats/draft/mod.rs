@@ -9,7 +9,6 @@ mod gravity;
 mod least_squares;
 pub(super) mod motion;
 mod name;
-mod noise;
 mod priors;
 mod registers;
 mod rests;
@@ -32,9 +31,8 @@ use crate::formats::instrument::USUAL_PERIOD;
 use crate::formats::source::Source;
 use crate::formats::{FileError, Place, Sheet, write_rows};
 use crate::imu::{PerSensor, Sensor};
-use crate::noise::NoiseFigures;
 use columns::Columns;
-pub use found::{Certainty, Found, OpenQuestion};
+pub use found::{Certainty, Found};
 use motion::Motion;
 use registers::Registers;
 pub use stated::Stated;
@@ -61,10 +59,12 @@ pub struct Draft {
     registers: Option<Registers>,
     /// Why the columns cannot be taken as they are.
     blocked: Vec<String>,
-    /// In the file's quantity per second, where something is at rest.
-    noise: PerSensor<Option<NoiseFigures>>,
+    /// White noise in the file's quantity per second and root of one, where something is at rest.
+    random_walk: PerSensor<Option<f64>>,
     /// Output of the gyros at rest above that, the file's quantity a row.
     rest: Option<Vector3<f64>>,
+    /// The column of the accelerometers that shows gravity with a minus at first.
+    down: Option<usize>,
     /// Sections laid end to end, as far as gravity shows.
     cuts: usize,
     /// The rows that were looked at where the log has more.
@@ -175,6 +175,10 @@ impl Draft {
         let mut blocked = Vec::new();
         let mut registers = None;
         let cuts = motion.as_ref().map_or(0, |motion| motion.cuts);
+        let down = triads
+            .as_ref()
+            .and_then(|triads| points_down(&triads.accel, period));
+        let down = down.and_then(|axis| Some(columns.triads.accel?[axis]));
         let is_asked = quantities.has_counts() || cuts > 0;
         if let Some(triads) = triads.as_mut().filter(|_| is_asked) {
             let found = Registers::find(triads, period);
@@ -195,8 +199,8 @@ impl Draft {
         }
         quantities.state(stated);
         let at_rest = triads.as_ref().zip(motion.as_ref());
-        let noise = at_rest
-            .and_then(|(triads, motion)| noise_at_rest(triads, motion, &quantities, clock.period))
+        let random_walk = at_rest
+            .and_then(|(triads, motion)| white_noise(triads, motion, &quantities, clock.period))
             .unwrap_or_default();
         if let Some(streams) = streams.as_ref().filter(|streams| streams.accel.is_none()) {
             columns.names = streams.columns(Sensor::Gyro);
@@ -206,16 +210,31 @@ impl Draft {
             registers,
             blocked,
             rest: motion.as_ref().map(|motion| motion.rest),
+            down,
             cuts: motion.as_ref().map_or(0, |motion| motion.cuts),
             instance,
             columns,
             clock,
             quantities,
             offset,
-            noise,
+            random_walk,
             only,
             stated: stated.clone(),
         }
+    }
+}
+
+impl Draft {
+    /// The triads that the log has; both where nothing shows any.
+    fn present(&self) -> impl Iterator<Item = Sensor> {
+        let triads = &self.columns.triads;
+        let joined = self
+            .streams
+            .as_ref()
+            .is_some_and(|streams| streams.accel.is_some());
+        let none = joined || triads.gyro.is_none() && triads.accel.is_none();
+        let is_present = move |sensor: &Sensor| none || triads.get(*sensor).is_some();
+        Sensor::ALL.into_iter().filter(is_present)
     }
 }
 
@@ -234,25 +253,49 @@ fn retain_samples(sheet: &mut Sheet, columns: &Columns) {
         .flatten()
         .flatten()
         .collect();
-    if columns.time.is_some() && !of_triads.is_empty() {
-        sheet.retain(|columns, row| of_triads.iter().any(|&k| columns[k][row].is_finite()));
-    }
+    let Some(time) = columns.time.filter(|_| !of_triads.is_empty()) else {
+        return;
+    };
+    sheet.retain(|columns, row| of_triads.iter().any(|&k| columns[k][row].is_finite()));
+    // A row that is there twice is one sample.
+    let of_samples: Vec<usize> = of_triads.into_iter().chain([time]).collect();
+    sheet.retain(|columns, row| {
+        row == 0
+            || of_samples
+                .iter()
+                .any(|&k| columns[k][row] != columns[k][row - 1])
+    });
 }
 
-/// The noise of both triads in the longest rest, in the file's quantity per second.
-fn noise_at_rest(
+/// The axis along which specific force points backwards, and hardly any other way, in the first rows.
+fn points_down(accel: &[Vector3<f64>], period: f64) -> Option<usize> {
+    let rows = ((motion::WINDOW / period).round() as usize).clamp(1, accel.len().max(1));
+    let force = motion::mean(accel.get(..rows)?);
+    (0..3).find(|&axis| force[axis] < -0.9 * force.norm())
+}
+
+/// White noise of both triads in the longest rest, by how means of windows differ.
+fn white_noise(
     triads: &PerSensor<Vec<Vector3<f64>>>,
     motion: &Motion,
     quantities: &Quantities,
     period: Option<f64>,
-) -> Option<PerSensor<Option<NoiseFigures>>> {
-    let (period, rest) = (period?, motion.longest_rest.clone());
-    let at_rest = PerSensor::from_fn(|sensor| &triads.get(sensor)[rest.clone()]);
-    Some(noise::figures(
-        &at_rest,
-        period,
-        quantities.per_second(period),
-    ))
+) -> Option<PerSensor<Option<f64>>> {
+    let period = period?;
+    let length = ((motion::WINDOW / period).round() as usize).max(1);
+    let walk = |samples: &[Vector3<f64>], (times, fewest): (usize, usize)| {
+        let means = motion::means(samples, times * length);
+        let sigma = motion::noise(&means) * quantities.per_second(period);
+        let shows = means.len() >= fewest && sigma > 0.0;
+        shows.then_some(sigma * ((times * length) as f64 * period).sqrt())
+    };
+    Some(PerSensor::from_fn(|sensor| {
+        let samples = &triads.get(sensor)[motion.longest_rest.clone()];
+        // Steps of the output look like more noise in short windows.
+        let lengths = [(1, 8), (4, 24), (16, 24)];
+        let walks = lengths.into_iter().filter_map(|of| walk(samples, of));
+        walks.reduce(f64::min)
+    }))
 }
 
 /// Of the gyros, and of accelerometers in the same stream.

@@ -62,7 +62,7 @@ fn level<'a>(vectors: impl Iterator<Item = &'a Vector3<f64>> + Clone) -> Vector3
 }
 
 /// 1σ of the noise of means of windows, from how they differ from one to the next.
-fn noise(means: &[Vector3<f64>]) -> f64 {
+pub(super) fn noise(means: &[Vector3<f64>]) -> f64 {
     let differences = means.windows(2).map(|pair| pair[1] - pair[0]);
     let mut changes: Vec<f64> = differences
         .flat_map(|d| <[f64; 3]>::from(d.abs()))
@@ -81,7 +81,7 @@ impl Motion {
         let force = SIGMAS * noise(&accel) + PART * usual;
         let steady = |k: usize| {
             let near =
-                |other: Option<&Vector3<f64>>| other.is_none_or(|f| (f - accel[k]).norm() < force);
+                |other: Option<&Vector3<f64>>| other.is_none_or(|f| (f - accel[k]).norm() <= force);
             near(k.checked_sub(1).and_then(|k| accel.get(k))) && near(accel.get(k + 1))
         };
         let standing: Vec<usize> = (0..accel.len()).filter(|&k| steady(k)).collect();

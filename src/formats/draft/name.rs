@@ -1,48 +1,73 @@
 //! What the name of a column says: a quantity, an axis, a unit.
 
 use crate::imu::Sensor;
+use crate::noise::normalised;
 
-/// Units as names write them, and as `run.toml` does.
-const UNITS: [(&str, &[&str]); 17] = [
-    (
-        "m/s^2",
-        &[
-            "m/s^2", "m/s2", "m/s²", "m/s/s", "ms^-2", "ms-2", "mps2", "ms2",
-        ],
-    ),
+/// Units as `run.toml` writes them, how many of them one of the file's is, and its normalised spellings.
+const UNITS: [(&str, f64, &[&str]); 26] = [
+    ("m/s^2", 1.0, &["m/s2", "ms-2", "mps2", "ms2"]),
+    ("m/s^2", 1e-2, &["cm/s2", "gal"]),
+    ("m/s^2", 1e-3, &["mm/s2"]),
     (
         "rad/s",
-        &["rad/s", "rads^-1", "rads-1", "rads", "radps", "rps"],
+        1.0,
+        &["rad/s", "rads-1", "rads", "radps", "rps", "radpersec"],
     ),
+    ("rad/s", 1e-3, &["mrad/s"]),
     (
         "deg/s",
-        &["deg/s", "°/s", "degs^-1", "degs-1", "degs", "dps", "degps"],
+        1.0,
+        &["deg/s", "degs-1", "degs", "degps", "degpersec"],
     ),
-    ("deg/h", &["deg/h", "°/h", "dph", "deg/hr"]),
-    ("m/s", &["m/s", "mps"]),
-    ("g*s", &["g*s", "gs"]),
-    ("mg", &["mg"]),
-    ("g", &["g"]),
-    ("count", &["count", "counts", "lsb", "raw", "cnt"]),
-    ("arcsec", &["arcsec", "\""]),
-    ("rad", &["rad"]),
-    ("deg", &["deg", "°"]),
-    ("s", &["s", "sec", "secs", "seconds"]),
-    ("ms", &["ms", "msec", "millis", "milliseconds"]),
-    ("us", &["us", "µs", "μs", "usec", "micros", "microseconds"]),
-    ("ns", &["ns", "nsec", "nanos", "nanoseconds"]),
-    ("mdps", &["mdps"]),
+    ("deg/s", 6.0, &["rpm"]),
+    ("deg/h", 1.0, &["deg/h", "dph"]),
+    ("mdps", 1.0, &["mdeg/s"]),
+    ("m/s", 1.0, &["m/s", "mps"]),
+    ("g*s", 1.0, &["g*s", "gs"]),
+    ("mg", 1.0, &["mg"]),
+    ("g", 1.0, &["g"]),
+    ("g", 1e-6, &["ug"]),
+    ("count", 1.0, &["count", "counts", "lsb", "raw", "cnt"]),
+    ("arcsec", 1.0, &["arcsec", "\""]),
+    ("rad", 1.0, &["rad"]),
+    ("deg", 1.0, &["deg"]),
+    ("s", 1.0, &["s", "sec", "secs", "seconds", "h:m:s"]),
+    (
+        "ms",
+        1.0,
+        &["ms", "msec", "msecs", "millis", "milliseconds"],
+    ),
+    (
+        "us",
+        1.0,
+        &["us", "usec", "usecs", "micros", "microseconds"],
+    ),
+    (
+        "ns",
+        1.0,
+        &["ns", "nsec", "nsecs", "nanos", "nanosec", "nanoseconds"],
+    ),
+    ("degC", 1.0, &["degc", "celsius"]),
+    ("uT", 1.0, &["ut", "microtesla"]),
+    ("gauss", 1.0, &["gauss"]),
+    ("hPa", 1.0, &["hpa", "pa", "mbar"]),
 ];
 
+/// A unit as `run.toml` writes it, and how many of it one of a file's is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Unit {
+    pub word: &'static str,
+    pub times: f64,
+}
+
 /// A name taken apart.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Name {
     /// Letters and digits in lower case, without axis and unit.
     pub stem: String,
     /// What stands for the axis.
     pub axis: Option<char>,
-    /// As `run.toml` writes it; others as they are known.
-    pub unit: Option<&'static str>,
+    pub unit: Option<Unit>,
 }
 
 /// The body axes of the program whose columns have such names; none if it is not known.
@@ -54,14 +79,42 @@ pub(super) fn axes_of_program(columns: &[String]) -> Option<&'static str> {
     is_autopilot.then_some("frd")
 }
 
-/// The unit that a text names.
-pub(super) fn unit(text: &str) -> Option<&'static str> {
-    let text: String = text.chars().filter(|c| !c.is_whitespace()).collect();
-    let text = text.trim_matches(['[', ']', '(', ')']).to_lowercase();
-    let known = UNITS
-        .iter()
-        .find(|(_, spellings)| spellings.contains(&text.as_str()));
-    known.map(|&(unit, _)| unit)
+/// The unit that a text names, of which a number before it says how many.
+pub(super) fn unit(text: &str) -> Option<Unit> {
+    let text = text.trim_matches(['[', ']', ' ']);
+    let text = text.strip_suffix("/LSB").unwrap_or(text);
+    let number = match text.split_once(' ') {
+        Some((number, rest)) => number.parse::<f64>().ok().map(|number| (number, rest)),
+        None => None,
+    };
+    let (times, text) = number.unwrap_or((1.0, text));
+    let text = normalised(text);
+    let spells = |(_, _, spellings): &&(_, _, &[&str])| spellings.contains(&text.as_str());
+    let &(word, of, _) = UNITS.iter().find(spells)?;
+    (times > 0.0).then_some(Unit {
+        word,
+        times: times * of,
+    })
+}
+
+/// The words of a name in lower case: what blanks, marks or capitals part.
+fn words(name: &str) -> Vec<String> {
+    let letters: Vec<char> = name.chars().collect();
+    let mut words = vec![String::new()];
+    for (k, &c) in letters.iter().enumerate() {
+        let before = k.checked_sub(1).map_or(' ', |k| letters[k]);
+        let ends_capitals =
+            before.is_uppercase() && letters.get(k + 1).is_some_and(|c| c.is_lowercase());
+        let begins = c.is_uppercase() && (before.is_lowercase() || ends_capitals);
+        if begins || !c.is_alphanumeric() {
+            words.push(String::new());
+        }
+        if let Some(word) = words.last_mut().filter(|_| c.is_alphanumeric()) {
+            word.extend(c.to_lowercase());
+        }
+    }
+    words.retain(|word| !word.is_empty());
+    words
 }
 
 impl Name {
@@ -73,33 +126,37 @@ impl Name {
             let within = Self::of(inside);
             match found {
                 // `%float(RawGyroX)`
-                None if within.axis.is_some() && within.stem.len() > 1 => return within,
+                None if within.axis.is_some() && within.sensor().is_some() => return within,
                 // An index is no unit.
                 None if inside.chars().all(|c| c.is_ascii_digit()) => {}
                 _ => rest = name[..open].to_owned(),
             }
         }
-        let rest = rest
-            .to_lowercase()
-            .replace("m_s2", "mps2")
-            .replace("rad_s", "radps");
-        let mut words: Vec<&str> = rest
-            .split(|c: char| !c.is_alphanumeric())
-            .filter(|word| !word.is_empty())
-            .collect();
-        // `gyro_x_dps`, `timestamp_us`; but the last letter of `acc_g` may as well be a name.
-        if let [.., before, last] = words[..]
-            && let Some(named) = unit(last)
-            && found.is_none()
-            && (axis_at_end(before).is_some() || named.len() > 1)
-        {
+        let mut words = words(&rest);
+        // `gyro_x_dps`, `timestamp_us`, `acc_z_m_s2`; but the last letter of `acc_g` may as well be a name.
+        let named = (1..words.len().min(4)).rev().find_map(|count| {
+            let (before, last) = words.split_at(words.len() - count);
+            let named = unit(&last.concat())?;
+            let is_long = count > 1 || last[0].len() > 1;
+            (is_long || axis_at_end(before.last()?).is_some()).then_some((named, count))
+        });
+        if let Some((named, count)) = named.filter(|_| found.is_none()) {
             found = Some(named);
-            words.pop();
+            words.truncate(words.len() - count);
         }
+        // `Gyroscope X CAL`
+        let single = words
+            .iter()
+            .position(|word| matches!(word.as_str(), "x" | "y" | "z"));
+        let axis = match single {
+            Some(place) if words.len() > 1 => words.remove(place).chars().next(),
+            _ => None,
+        };
         let whole = words.concat();
-        let (stem, axis) = match (axis_at_end(&whole), axis_at_start(&whole)) {
-            (Some((stem, axis)), _) | (None, Some((stem, axis))) => (stem, Some(axis)),
-            (None, None) => (whole.as_str(), None),
+        let (stem, axis) = match (axis, axis_at_end(&whole), axis_at_start(&whole)) {
+            (Some(axis), ..) => (whole.as_str(), Some(axis)),
+            (_, Some((stem, axis)), _) | (_, None, Some((stem, axis))) => (stem, Some(axis)),
+            (_, None, None) => (whole.as_str(), None),
         };
         Self {
             stem: stem.to_owned(),
@@ -126,11 +183,12 @@ impl Name {
             "deltatheta",
             "dtheta",
             "wrs",
+            "rotationrate",
         ]) || is(&["g", "w", "wb", "om", "rate", "pqr"])
         {
             Some(Sensor::Gyro)
         } else if has(&["acc", "specificforce", "deltav", "dvel", "velinc", "ars"])
-            || is(&["a", "f", "fb", "sf", "dv", "force"])
+            || is(&["a", "f", "fb", "sf", "dv", "force", "gf"])
         {
             Some(Sensor::Accel)
         } else {
@@ -149,8 +207,12 @@ impl Name {
             "std",
             "bias",
             "orientation",
+            "useracc",
         ];
-        others.iter().any(|other| self.stem.contains(other))
+        let is_magnetic = self
+            .unit
+            .is_some_and(|unit| ["uT", "gauss"].contains(&unit.word));
+        is_magnetic || others.iter().any(|other| self.stem.contains(other))
     }
 
     /// How much like a column of time it is, more is more.
@@ -158,12 +220,16 @@ impl Name {
         let whole = self.whole();
         let is = |all: &[&str]| all.contains(&whole.as_str());
         // The instrument's own time before that of whoever received it.
-        let ends = ["headerstamp", "timestampsample", "sampleus"];
-        if ends.iter().any(|end| whole.ends_with(end)) {
+        let ends = ["headerstamp", "timestampsample"];
+        if ends.iter().any(|end| whole.ends_with(end)) || whole == "sample" && self.is_of_time() {
             4
         } else if is(&["t", "time", "timestamp", "tow", "gpstime", "stamp"]) {
             3
-        } else if whole.contains("time") || is(&["sec", "seconds", "secs", "ms", "us", "ns"]) {
+        } else if ["time", "tow", "clock", "stamp", "elapsed"]
+            .iter()
+            .any(|part| whole.contains(part))
+            || is(&["sec", "seconds", "secs", "ms", "us", "ns"])
+        {
             2
         } else if self.is_counter() {
             1
@@ -174,23 +240,21 @@ impl Name {
 
     pub fn is_counter(&self) -> bool {
         let whole = self.whole();
-        let parts = ["count", "sample", "index", "packet", "seq"];
+        let parts = ["count", "cntr", "sample", "index", "packet", "seq"];
         parts.iter().any(|part| whole.contains(part)) || ["n", "i", "k", "id"].contains(&&*whole)
     }
 
-    /// Whole seconds of a time that goes on in another column.
-    pub fn is_seconds(&self) -> bool {
-        let whole = self.whole();
-        ["sec", "secs", "seconds"]
-            .iter()
-            .any(|end| whole.ends_with(end))
+    /// Whether its unit is one of time.
+    pub fn is_of_time(&self) -> bool {
+        self.unit
+            .is_some_and(|unit| ["s", "ms", "us", "ns"].contains(&unit.word))
     }
 
-    /// What goes on there.
-    pub fn is_nanoseconds(&self) -> bool {
-        let whole = self.whole();
-        let ends = ["nanosec", "nsec", "nsecs", "nanosecs", "nanoseconds"];
-        ends.iter().any(|end| whole.ends_with(end))
+    /// Whole seconds of a time that goes on in another column, or what goes on there.
+    pub fn is_part_of_time(&self, word: &str) -> bool {
+        self.unit
+            .or_else(|| unit(&self.whole()))
+            .is_some_and(|unit| unit.word == word)
     }
 
     /// Whether it tells several instruments apart.
@@ -209,7 +273,7 @@ impl Name {
     }
 
     pub fn is_temperature(&self) -> bool {
-        self.stem.contains("temp")
+        self.stem.contains("temp") || self.unit.is_some_and(|unit| unit.word == "degC")
     }
 
     fn whole(&self) -> String {
@@ -263,10 +327,14 @@ mod tests {
             ("wx", Gyro, 'x', None),
             ("%float(RawGyroX)", Gyro, 'x', None),
             ("Acc X (calibrated)", Accel, 'x', None),
+            ("X Accel [x8004]", Accel, 'x', None),
+            ("UncalGyroXRadPerSec", Gyro, 'x', Some("rad/s")),
+            ("Gyroscope Y CAL", Gyro, 'y', None),
+            ("acc_z_m_s2", Accel, 'z', Some("m/s^2")),
         ] {
             let name = Name::of(text);
             assert_eq!(
-                (name.sensor(), name.axis, name.unit),
+                (name.sensor(), name.axis, name.unit.map(|unit| unit.word)),
                 (Some(sensor), Some(axis), unit),
                 "{text}"
             );
@@ -285,14 +353,14 @@ mod tests {
         assert_eq!(
             (
                 Name::of("timestamp_us").is_time(),
-                Name::of("timestamp_us").unit
+                Name::of("timestamp_us").unit.map(|unit| unit.word)
             ),
             (3, Some("us"))
         );
         assert_eq!(
             (
                 Name::of("#timestamp [ns]").is_time(),
-                Name::of("timestamp [ns]").unit
+                Name::of("timestamp [ns]").unit.map(|unit| unit.word)
             ),
             (3, Some("ns"))
         );

@@ -63,10 +63,7 @@ const CLASSES: [Class; 3] = [
 impl Draft {
     /// By the noise of the gyros, else that of the accelerometers.
     fn class(&self) -> &'static Class {
-        let walk = |sensor| {
-            let (figures, scale) = self.figures(sensor)?;
-            Some(figures.noise.random_walk / scale)
-        };
+        let walk = |sensor| self.white_noise(sensor);
         let is_of = |class: &&Class| match (walk(Sensor::Gyro), walk(Sensor::Accel)) {
             (Some(walk), _) => walk < class.angle_random_walk,
             (None, Some(walk)) => walk < class.velocity_random_walk,
@@ -158,14 +155,9 @@ impl Draft {
                 sigma = sigma.map(|sigma| sigma.max(2.0 * rest));
             }
         }
-        match sigma {
-            Some(sigma) => line(
-                text,
-                "bias_sigma",
-                &format!("{:?}", short(sigma)),
-                "in the file's unit, per second",
-            ),
-            None => {}
+        if let Some(sigma) = sigma {
+            let value = format!("{:?}", short(sigma));
+            line(text, "bias_sigma", &value, "in the file's unit, per second");
         }
     }
 

@@ -3,27 +3,28 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use super::columns::Columns;
-use super::name::Name;
-use super::text::{line, quoted};
+use super::columns::{Columns, by_stem};
+use super::name::{self, Name};
+use super::text::{line, quoted, word_or_number};
 use super::{FEWEST_ROWS, time};
 use crate::formats::clock::{Breaks, Clock, TimeUnit};
+use crate::formats::csv_file::CsvFile;
 use crate::formats::joined::{Joined, Part};
 use crate::formats::rows::LogRows;
 use crate::formats::source::Source;
-use crate::formats::streams::{self, Column, Found};
+use crate::formats::streams::{self, Column, Found, Stream};
 use crate::formats::{FileError, Sheet};
 use crate::imu::{Output, PerSensor, Sensor};
 
 /// A log's streams, and those that hold gyros and accelerometers.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Streams {
-    pub found: Vec<Found>,
+    pub found: Vec<(Found, Places)>,
     /// The stream of the gyros, and of the accelerometers if that is another.
     pub gyro: String,
     pub accel: Option<String>,
     /// The time of both where there are two, and its unit.
-    pub time: PerSensor<(String, &'static str)>,
+    pub time: PerSensor<(String, String)>,
     /// The body axes that programs of this kind have.
     pub axes: Option<&'static str>,
     /// Where and why the file is damaged.
@@ -47,31 +48,38 @@ fn one_line(text: &str) -> String {
 }
 
 /// The place of each triad and of time in a stream.
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Places {
     pub triads: PerSensor<Option<[usize; 3]>>,
-    time: Option<usize>,
+    pub time: Option<usize>,
 }
 
 impl Streams {
-    /// Looks at a log; none if it is a text, whose rows are one stream.
+    /// Looks at a log; none if it is a text whose rows are one stream.
     pub fn of_file(file: &Path, wanted: Option<&str>) -> Result<Option<(Self, Sheet)>, FileError> {
-        let Some(log) = streams::open(file)? else {
-            return Ok(None);
+        let (found, damage) = match streams::open(file)? {
+            Some(log) => {
+                let (found, damage) = streams::survey(file, log);
+                let with_places = |found: Found| {
+                    let places = Places::of(&found);
+                    (found, places)
+                };
+                (found.into_iter().map(with_places).collect(), damage)
+            }
+            None => (tagged(file)?, None),
         };
-        let (found, damage) = streams::survey(file, log);
-        if found.is_empty()
-            && let Some(damage) = damage
-        {
-            return Err(damage);
+        match damage {
+            Some(damage) if found.is_empty() => return Err(damage),
+            None if found.is_empty() => return Ok(None),
+            _ => {}
         }
-        let places: Vec<Places> = found.iter().map(Places::of).collect();
-        let Some((gyro, accel)) = chosen(&found, &places, wanted) else {
+        let Some((gyro, accel)) = chosen(&found, wanted) else {
             return Err(no_samples(file));
         };
         let salvage = damage.is_some();
         let source = |k: usize| Source {
             file: file.to_owned(),
-            stream: Some(&found[k].stream.name),
+            stream: Some(&found[k].0.stream.name),
             salvage,
         };
         let numbers = PerSensor {
@@ -80,8 +88,9 @@ impl Streams {
         };
         let mut time = PerSensor::from_fn(|sensor| {
             let k = *numbers.get(sensor);
-            let column = &found[k].stream.columns[places[k].time.unwrap_or(0)];
-            (column.name.clone(), column.unit)
+            let (found, places) = &found[k];
+            let column = &found.stream.columns[places.time.unwrap_or(0)];
+            (column.name.clone(), column.unit.to_owned())
         });
         let sheet = if accel.is_some() {
             let sources = PerSensor::from_fn(|sensor| source(*numbers.get(sensor)));
@@ -90,22 +99,22 @@ impl Streams {
                 let k = *numbers.get(sensor);
                 Member {
                     source: sources.get(sensor),
-                    found: &found[k],
-                    triad: places[k].triads.get(sensor).unwrap_or_default(),
+                    found: &found[k].0,
+                    triad: found[k].1.triads.get(sensor).unwrap_or_default(),
                     time: time.get(sensor).clone(),
                 }
             }))?
         } else {
             let mut sheet = Sheet::of(source(gyro).open()?, FEWEST_ROWS)?;
-            sheet.names = names(&found[gyro]);
+            sheet.names = names(&found[gyro].0);
             sheet
         };
-        let name = |k: usize| found[k].stream.name.clone();
+        let name = |k: usize| found[k].0.stream.name.clone();
         let streams = Self {
             gyro: name(gyro),
             accel: accel.map(name),
             time,
-            axes: found[gyro].stream.axes,
+            axes: found[gyro].0.stream.axes,
             damage: damage.map(|damage| damage.to_string()),
             written: None,
             found,
@@ -119,8 +128,11 @@ impl Streams {
             Sensor::Gyro => &self.gyro,
             Sensor::Accel => self.accel.as_ref().unwrap_or(&self.gyro),
         };
-        let found = self.found.iter().find(|found| found.stream.name == *name);
-        let columns = found.iter().flat_map(|found| &found.stream.columns);
+        let found = self
+            .found
+            .iter()
+            .find(|(found, _)| found.stream.name == *name);
+        let columns = found.iter().flat_map(|(found, _)| &found.stream.columns);
         columns.map(|column| column.name.clone()).collect()
     }
 
@@ -140,12 +152,12 @@ impl Streams {
             };
             let mut keys = format!("{place}time = {}", quoted(time));
             if !unit.is_empty() {
-                let _ = write!(keys, ", time_unit = {}", quoted(unit));
+                let _ = write!(keys, ", time_unit = {}", word_or_number(unit));
             }
             let why = "accelerometers have a clock of their own; --with time-offset finds how far they are apart";
             line(text, "accel_from", &format!("{{ {keys} }}"), why);
         }
-        for found in &self.found {
+        for (found, _) in &self.found {
             let is_taken =
                 found.stream.name == self.gyro || self.accel.as_ref() == Some(&found.stream.name);
             for remark in found.stream.remarks.iter().filter(|_| is_taken) {
@@ -164,9 +176,7 @@ impl Streams {
     /// What the log holds, a comment a stream.
     fn list(&self, text: &mut String) {
         let mut others = Vec::new();
-        for found in &self.found {
-            let Found { stream, samples } = found;
-            let Places { triads, .. } = Places::of(found);
+        for (Found { stream, samples }, Places { triads, .. }) in &self.found {
             if triads.gyro.is_none() && triads.accel.is_none() {
                 others.push(format!("{} ({samples})", one_line(&stream.name)));
                 continue;
@@ -204,42 +214,41 @@ impl Streams {
             Sensor::Gyro => &self.gyro,
             Sensor::Accel => self.accel.as_ref()?,
         };
-        let found = self.found.iter().find(|found| found.stream.name == *name)?;
-        let triad = (*Places::of(found).triads.get(sensor))?;
+        let (found, places) = self
+            .found
+            .iter()
+            .find(|(found, _)| found.stream.name == *name)?;
+        let triad = (*places.triads.get(sensor))?;
         Some(triad.map(|k| found.stream.columns[k].name.clone()))
     }
 }
 
 /// The stream of the gyros, and of the accelerometers if that is another; where no stream that is meant has them,
 /// the longest.
-fn chosen(
-    found: &[Found],
-    places: &[Places],
-    wanted: Option<&str>,
-) -> Option<(usize, Option<usize>)> {
+fn chosen(found: &[(Found, Places)], wanted: Option<&str>) -> Option<(usize, Option<usize>)> {
+    let samples = |k: Option<usize>| k.map_or(0, |k| found[k].0.samples);
     let is_meant = |k: &usize| match wanted {
-        Some(name) => found[*k].stream.name == name,
-        None => found[*k].stream.is_inertial && found[*k].samples >= FEWEST_ROWS as u64,
+        Some(name) => found[*k].0.stream.name == name,
+        None => found[*k].0.stream.is_inertial && samples(Some(*k)) >= FEWEST_ROWS as u64,
     };
     let with = |sensor: Sensor, other: bool| {
         let of = (0..found.len()).filter(is_meant).filter(|&k| {
             // Streams are put together by their times.
-            if !other && places[k].time.is_none() {
+            let Places { triads, time } = &found[k].1;
+            if !other && time.is_none() {
                 return false;
             }
-            let triads = &places[k].triads;
             let has_both = triads.gyro.is_some() && triads.accel.is_some();
             triads.get(sensor).is_some() && (!other || has_both)
         });
         // Of equal ones the first.
-        of.rev().max_by_key(|&k| found[k].samples)
+        of.rev().max_by_key(|&k| samples(Some(k)))
     };
     let (both, gyro, accel) = (
         with(Sensor::Gyro, true),
         with(Sensor::Gyro, false),
         with(Sensor::Accel, false),
     );
-    let samples = |k: Option<usize>| k.map_or(0, |k| found[k].samples);
     let apart = samples(gyro).min(samples(accel));
     match (both, gyro, accel) {
         (Some(both), ..) if samples(Some(both)) >= apart => Some((both, None)),
@@ -247,8 +256,8 @@ fn chosen(
         _ => {
             let most = (0..found.len())
                 .filter(is_meant)
-                .max_by_key(|&k| found[k].samples);
-            let any = most.or((0..found.len()).max_by_key(|&k| found[k].samples))?;
+                .max_by_key(|&k| samples(Some(k)));
+            let any = most.or((0..found.len()).max_by_key(|&k| samples(Some(k))))?;
             Some((any, None))
         }
     }
@@ -266,7 +275,7 @@ fn no_samples(file: &Path) -> FileError {
 
 /// Finds the units of times by their steps where the log does not say them.
 fn find_units(
-    time: &mut PerSensor<(String, &'static str)>,
+    time: &mut PerSensor<(String, String)>,
     sources: &PerSensor<Source>,
 ) -> Result<(), FileError> {
     for sensor in Sensor::ALL {
@@ -279,7 +288,7 @@ fn find_units(
 }
 
 /// The word for the unit of a column of time, by its steps.
-fn unit_of(source: &Source, name: &str) -> Result<&'static str, FileError> {
+fn unit_of(source: &Source, name: &str) -> Result<String, FileError> {
     let sheet = Sheet::of(source.open()?, FEWEST_ROWS)?;
     let mut columns = Columns::find(&sheet);
     columns.time = sheet.names.iter().position(|known| known == name);
@@ -292,7 +301,7 @@ pub(super) struct Member<'a> {
     pub found: &'a Found,
     pub triad: [usize; 3],
     /// The column of its time and the word for its unit.
-    pub time: (String, &'static str),
+    pub time: (String, String),
 }
 
 /// Both triads on one clock, as columns whose names say what they are.
@@ -304,13 +313,21 @@ pub(super) fn joined(members: &PerSensor<Member>) -> Result<Sheet, FileError> {
             triad,
             time: (name, unit),
         } = members.get(sensor);
-        let unit = TimeUnit::WORDS.iter().find(|(word, _)| word == unit);
+        let word = TimeUnit::WORDS.iter().find(|(word, _)| word == unit);
+        let ticks = || {
+            unit.parse()
+                .ok()
+                .map(|tick: f64| TimeUnit::PerSecond(tick.recip()))
+        };
         Part {
             source,
             clock: Clock {
                 column: Some(name),
                 nanoseconds: None,
-                unit: unit.map_or(TimeUnit::PerSecond(1.0), |&(_, unit)| unit),
+                unit: word
+                    .map(|&(_, unit)| unit)
+                    .or_else(ticks)
+                    .unwrap_or(TimeUnit::PerSecond(1.0)),
                 period: None,
                 breaks: Breaks::None,
             },
@@ -319,7 +336,7 @@ pub(super) fn joined(members: &PerSensor<Member>) -> Result<Sheet, FileError> {
         }
     };
     let joined = Joined::read(&PerSensor::from_fn(part), Output::Rate, 1.0)?;
-    let mut sheet = Sheet::of(LogRows::joined(joined), FEWEST_ROWS)?;
+    let mut sheet = Sheet::of(LogRows::new(joined), FEWEST_ROWS)?;
     let of = |sensor: Sensor| ["x", "y", "z"].map(|axis| format!("{}_{axis}", sensor.name()));
     let triads = Sensor::ALL.map(of);
     sheet.names = std::iter::once("time".to_owned())
@@ -345,29 +362,70 @@ fn names(found: &Found) -> Vec<String> {
     bare().map(|name| format!("{stream}.{name}")).collect()
 }
 
+/// The streams of a text whose rows tags tell apart; none of another.
+fn tagged(file: &Path) -> Result<Vec<(Found, Places)>, FileError> {
+    let tags = CsvFile::tags(file)?;
+    let of_tag = |tag: String| {
+        let source = Source {
+            file: file.to_owned(),
+            stream: Some(&tag),
+            salvage: false,
+        };
+        let sheet = Sheet::of(source.open()?, 1)?;
+        let found = of_rows(tag, &sheet);
+        let sheet = Sheet {
+            names: names(&found),
+            ..sheet
+        };
+        let Columns {
+            mut triads,
+            time,
+            by_size,
+            ..
+        } = Columns::find(&sheet);
+        // The tag may say what names do not.
+        if by_size
+            && let Some(sensor) = Name::of(&found.stream.name).sensor()
+            && let (Some(triad), None) | (None, Some(triad)) = (triads.gyro, triads.accel)
+        {
+            triads = PerSensor::default();
+            *triads.get_mut(sensor) = Some(triad);
+        }
+        Ok((found, Places { triads, time }))
+    };
+    tags.into_iter().map(of_tag).collect()
+}
+
+/// Rows of a text as a stream.
+pub(super) fn of_rows(name: String, sheet: &Sheet) -> Found {
+    let column = |(name, unit): (&String, &String)| {
+        let unit = Name::of(name).unit.or_else(|| name::unit(unit));
+        Column {
+            name: name.clone(),
+            unit: unit
+                .filter(|unit| unit.times == 1.0)
+                .map_or("", |unit| unit.word),
+        }
+    };
+    Found {
+        stream: Stream {
+            name,
+            columns: sheet.names.iter().zip(&sheet.units).map(column).collect(),
+            remarks: Vec::new(),
+            is_inertial: true,
+            axes: None,
+        },
+        samples: sheet.columns.first().map_or(0, Vec::len) as u64,
+    }
+}
+
 impl Places {
     pub fn of(found: &Found) -> Self {
         let all: Vec<Name> = names(found).iter().map(|name| Name::of(name)).collect();
         let triads = PerSensor::from_fn(|sensor| {
             let of = |k: &usize| all[*k].sensor() == Some(sensor);
             let candidates: Vec<usize> = (0..all.len()).filter(of).collect();
-            candidates.iter().find_map(|&first| {
-                let axes = match all[first].axis {
-                    Some('x') => ['x', 'y', 'z'],
-                    Some('0') => ['0', '1', '2'],
-                    _ => return None,
-                };
-                let along = |axis| {
-                    let is = |k: &&usize| {
-                        all[**k].stem == all[first].stem && all[**k].axis == Some(axis)
-                    };
-                    candidates.iter().find(is).copied()
-                };
-                match axes.map(along) {
-                    [Some(x), Some(y), Some(z)] => Some([x, y, z]),
-                    _ => None,
-                }
-            })
+            by_stem(&all, &candidates).into_iter().next()
         });
         let best = (0..all.len()).rev().max_by_key(|&k| all[k].is_time());
         let named = best.filter(|&k| all[k].is_time() > 1);

@@ -74,7 +74,7 @@ fn si_rates_are_known_by_gravity_and_its_turns() {
             "continuous = true",
             "# sample_period_s = 0.01 ",
             "columns = { time = \"time\", gyro = [\"wx\", \"wy\", \"wz\"], accel = [\"fx\", \"fy\", \"fz\"] }",
-            "# latitude_deg =  # TODO",
+            "# latitude_deg =  # north positive",
         ],
     );
     assert!(!text.contains("time_unit"), "{text}");
@@ -302,17 +302,23 @@ fn a_rate_in_a_comment_decides_what_a_time_without_a_unit_is() {
     has(
         &text,
         &[
-            "time_unit = \"count\"",
-            "sample_period_s = 0.01  # 100 Hz, as the file says",
+            "time_unit = 0.0001  # steps of 100 at 100 Hz",
+            "# sample_period_s = 0.01  # 100 Hz",
             "gyro_unit = \"rad/s\"",
-            "columns = { time = \"PacketCounter\", ",
+            "columns = { time = \"SampleTimeFine\", ",
         ],
     );
     // Without a counter and without the comment.
     let text = draft(&format!("SampleTimeFine\t{names}"), |k, v| {
         format!("{}\t{}\t", 48_211 + 100 * k, row(v))
     });
-    has(&text, &["sample_period_s = 0.01 ", "columns = { gyro = "]);
+    has(
+        &text,
+        &[
+            "time_unit = 0.0001",
+            "columns = { time = \"SampleTimeFine\", ",
+        ],
+    );
     // Neither a counter nor a time.
     let text = draft(&format!("{comments}{names}"), |_, v| {
         format!("{}\t", row(v))
@@ -408,10 +414,38 @@ fn a_counter_that_other_packets_share_is_no_time_and_a_compass_no_gyro() {
     has(
         &text,
         &[
-            "# sample_period_s =  # TODO",
-            "# TODO: a counter that other packets share is no time",
+            "# a counter that other packets share is no time: the period of the rows is found from the turns",
             "columns = { gyro = [\"%float(RawGyroX)\", \"%float(RawGyroY)\", \"%float(RawGyroZ)\"], \
              accel = [\"%float(RawAccelX)\", ",
+        ],
+    );
+}
+
+#[test]
+fn rows_that_a_tag_tells_apart_are_streams_and_constants_no_axes() {
+    let text = draft("", |k, [gx, gy, gz, ax, ay, az]| {
+        let time = 10 * k;
+        format!("1 {time} {ax} {ay} {az}\n2 {time} {gx} {gy} {gz}")
+    });
+    has(
+        &text,
+        &[
+            "stream = \"2\"",
+            "accel_from = { stream = \"1\", time = \"2\", time_unit = \"ms\" }",
+            "gyro_unit = \"rad/s\"",
+            "columns = { time = \"2\", gyro = [\"3\", \"4\", \"5\"], accel = [\"3\", \"4\", \"5\"] }",
+        ],
+    );
+    let text = draft("", |k, v| {
+        let compass = (k as f64).sin();
+        format!("Raw:{k},1\nUni:{},{compass},7,9", joined(&v, ","))
+    });
+    has(
+        &text,
+        &[
+            "stream = \"Uni\"",
+            "gyro_unit = \"rad/s\"",
+            "columns = { gyro = [\"2\", \"3\", \"4\"], accel = [\"5\", \"6\", \"7\"] }",
         ],
     );
 }

@@ -6,7 +6,6 @@ use super::Draft;
 use super::name::axes_of_program;
 use super::units::short;
 use crate::imu::{NoiseKeys, Output, Sensor};
-use crate::noise::NoiseFigures;
 
 impl Draft {
     /// The draft as a `run.toml` in which the log is named so. Lines with `TODO` must be completed before it
@@ -28,7 +27,7 @@ impl Draft {
         }
         self.rows(&mut text);
         self.noise_table(&mut text);
-        for sensor in Sensor::ALL {
+        for sensor in self.present() {
             self.prior(&mut text, sensor);
         }
         self.table(&mut text);
@@ -78,7 +77,7 @@ impl Draft {
             Output::Rate => "rate",
         };
         line(text, "output", &quoted(output), &found.output_why);
-        for sensor in Sensor::ALL {
+        for sensor in self.present() {
             let (key, unit) = (format!("{}_unit", sensor.name()), found.units.get(sensor));
             match unit.word {
                 Some(word) => line(text, &key, &quoted(word), &unit.why),
@@ -104,12 +103,12 @@ impl Draft {
             .as_ref()
             .filter(|streams| streams.accel.is_some());
         let unit = unit
-            .map(|streams| streams.time.gyro.1)
+            .map(|streams| &streams.time.gyro.1)
             .filter(|unit| !unit.is_empty());
         if let Some(unit) = unit {
-            line(text, "time_unit", &quoted(unit), "as the file says");
+            line(text, "time_unit", &word_or_number(unit), "as the file says");
         } else if clock.unit != "s" {
-            line(text, "time_unit", &quoted(clock.unit), &clock.why);
+            line(text, "time_unit", &word_or_number(&clock.unit), &clock.why);
         }
     }
 
@@ -205,11 +204,15 @@ impl Draft {
         }
         let names: Vec<String> = columns.names.iter().map(|name| quoted(name)).collect();
         for sensor in missing {
-            let _ = writeln!(
-                text,
-                "# TODO: {sensor} = three of {}; no names or numbers showed them",
-                names.join(", ")
-            );
+            let why = "no names or numbers showed them";
+            let names = names.join(", ");
+            let _ = match columns.triads.gyro.or(columns.triads.accel) {
+                None => writeln!(text, "# TODO: {sensor} = three of {names}; {why}"),
+                Some(_) => writeln!(
+                    text,
+                    "# {sensor} = three of {names}; {why}, and without them `turncal allan` alone takes the log"
+                ),
+            };
         }
         let fields = fields.join(", ");
         if let Some(axes) = self.turned_axes() {
@@ -245,6 +248,15 @@ impl Draft {
         if columns.by_size && columns.triads.gyro.is_some() {
             text.push_str("# The triads were told by their numbers: gravity keeps the magnitude of the accelerometers'.\n");
         }
+        if let Some((down, accel)) = self.down.zip(columns.triads.accel) {
+            let reversed = accel.map(|k| quoted(&format!("-{}", columns.names[k])));
+            let _ = writeln!(
+                text,
+                "# At the beginning {}. If the sensor lay that side up, write accel = [{}].",
+                self.down_words(down),
+                reversed.join(", ")
+            );
+        }
     }
 
     /// The field of the columns of time; where there is none, a remark instead.
@@ -279,6 +291,14 @@ impl Draft {
         }
     }
 
+    /// That an axis points down, or the accelerometers have the sign of gravity.
+    pub(super) fn down_words(&self, down: usize) -> String {
+        format!(
+            "{} is negative: it points down, or the accelerometers give gravity instead of specific force, as iOS does",
+            self.columns.names[down]
+        )
+    }
+
     /// Where gyros do not turn as the accelerometers' columns lie.
     fn turned_axes(&self) -> Option<String> {
         let axes = self.registers.as_ref()?.axes.as_ref();
@@ -302,36 +322,22 @@ impl Draft {
         text.push_str(
             "\n# white noise at rest; better from hours at rest, by turncal allan\n[imu.noise]\n",
         );
-        for sensor in Sensor::ALL {
-            let keys = NoiseKeys::of(sensor);
-            let (key, unit) = keys.random_walk;
-            let Some((figures, scale)) = self.figures(sensor) else {
-                let _ = writeln!(
+        for sensor in self.present() {
+            let (key, unit) = NoiseKeys::of(sensor).random_walk;
+            let _ = match self.white_noise(sensor) {
+                Some(walk) => writeln!(text, "{key} = {:?}", short(walk / unit)),
+                None => writeln!(
                     text,
                     "# {key} =  # the data sheet's figure; without it, that of the quieter part of the record"
-                );
-                continue;
+                ),
             };
-            let walk = format!("{:?}", short(figures.noise.random_walk / scale / unit));
-            match figures.random_walk_is_limit {
-                true => line(text, key, &walk, "a limit: its slope was not found"),
-                false => {
-                    let _ = writeln!(text, "{key} = {walk}");
-                }
-            }
-            if let Some(of) = figures.noise.gauss_markov {
-                let (key, unit) = keys.gauss_markov;
-                let _ = writeln!(text, "{key} = {:?}", short(of.sigma / scale / unit));
-                let time = short(of.correlation_time);
-                let _ = writeln!(text, "{} = {time:?}", keys.correlation_time);
-            }
         }
     }
 
-    /// The noise of a triad, with the file's quantity per second for one rad/s or m/s².
-    pub(super) fn figures(&self, sensor: Sensor) -> Option<(&NoiseFigures, f64)> {
-        let figures = self.noise.get(sensor).as_ref()?;
-        Some((figures, self.quantities.scale(sensor)?.abs()))
+    /// White noise of a triad at rest, (rad/s)√s or (m/s²)√s.
+    pub(super) fn white_noise(&self, sensor: Sensor) -> Option<f64> {
+        let scale = self.quantities.scale(sensor)?;
+        Some((*self.random_walk.get(sensor))? / scale.abs())
     }
 
     fn table(&self, text: &mut String) {
@@ -372,6 +378,14 @@ fn places(count: usize) -> String {
 /// A number to seven digits.
 pub(super) fn seven(value: f64) -> f64 {
     format!("{value:.6e}").parse().unwrap_or(value)
+}
+
+/// A word in quotes, or a number as it is.
+pub(super) fn word_or_number(text: &str) -> String {
+    match text.parse::<f64>() {
+        Ok(_) => text.to_owned(),
+        Err(_) => quoted(text),
+    }
 }
 
 pub(super) fn quoted(text: &str) -> String {

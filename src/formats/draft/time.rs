@@ -1,25 +1,27 @@
 //! The clock of a log.
 
+use std::path::Path;
+
 use super::columns::Columns;
 use super::name;
 use super::name::Name;
+use super::text::seven;
 use crate::formats::Sheet;
+use crate::formats::uniform::Uniform;
 use crate::statistics::median;
 
 /// Units of time in s, with the words that `run.toml` has for them.
 const UNITS: [(&str, f64); 4] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)];
 /// No unit of three orders is right at two of these periods, s: 5 kHz to 5 Hz.
 pub(super) const PERIODS: std::ops::Range<f64> = 2e-4..0.2;
-/// A step this much longer than the usual one is a gap.
-const GAP: f64 = 1.5;
 /// Steps within this factor are those of a stated rate.
 const STATED: f64 = 1.2;
 
 /// What the column of time shows.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Clock {
-    /// The word for `time_unit`.
-    pub unit: &'static str,
+    /// The word or number for `time_unit`.
+    pub unit: String,
     /// Why it is that.
     pub why: String,
     /// Time from row to row in s, if something tells it.
@@ -33,56 +35,62 @@ pub(super) struct Clock {
 }
 
 impl Clock {
-    /// Looks at the column of time, or takes another or none where `run.toml` has no word for its unit.
+    /// Looks at the column of time, or takes none where other packets share its counter.
     pub fn find(sheet: &Sheet, columns: &mut Columns) -> Self {
+        let stated = sheet.rate.map(f64::recip);
         let Some((column, stamps)) = columns.time.zip(columns.stamps(sheet)) else {
-            let period = sheet.rate.map(f64::recip);
-            return Self::without(period, "no column goes forward like a time");
+            return Self::without(stated, "no column goes forward like a time");
         };
         let steps = Steps::of(&stamps);
         let name = Name::of(&sheet.names[column]);
-        if name.is_counter() && name.is_time() < 2 && steps.usual != 1.0 {
-            let period = sheet.rate.map(f64::recip);
+        if name.is_counter() && name.is_time() < 2 && !steps.is_count {
             columns.time = None;
-            return Self::without(period, "a counter that other packets share is no time");
+            return Self::without(stated, "a counter that other packets share is no time");
         }
         let named = name.unit.or_else(|| name::unit(&sheet.units[column]));
-        let named = UNITS.iter().find(|(unit, _)| Some(*unit) == named);
-        let stated = sheet.rate.map(f64::recip);
-        let known = stated.or(name.tick().map(|tick| tick * steps.mean));
-        let near = |period: f64| {
-            move |second: f64| (steps.usual * second / period).ln().abs() < STATED.ln()
-        };
-        let (unit, why) = match (named, known) {
-            _ if columns.nanoseconds.is_some() => ("s", "seconds and nanoseconds".to_owned()),
-            (Some(&(unit, _)), _) => (unit, "as the file says".to_owned()),
+        let named = named.and_then(|unit| Some(unit.times * second(unit.word)?));
+        let tick = name.tick().map(|tick| tick * steps.mean);
+        let known = stated.or(tick.filter(|period| PERIODS.contains(period)));
+        let rate = |period: f64| short(period.recip());
+        let usual = short(steps.mean);
+        let (second, why) = match (named, known) {
+            _ if columns.nanoseconds.is_some() => (Some(1.0), "seconds and nanoseconds".to_owned()),
+            (Some(second), _) => (Some(second), "as the file says".to_owned()),
             _ if (steps.is_count || name.is_counter()) && name.is_time() < 2 => {
-                ("count", "steps of one: a counter of samples".to_owned())
+                (None, "steps of one: a counter of samples".to_owned())
             }
             (None, Some(period)) => {
-                let fits = near(period);
-                let Some(&(unit, _)) = UNITS.iter().find(|unit| fits(unit.1)) else {
-                    return Self::of_counter(sheet, columns, period);
-                };
-                let rate = short(period.recip());
+                let is_near =
+                    |second: &f64| (steps.mean * second / period).ln().abs() < STATED.ln();
+                let of_unit = UNITS.iter().map(|(_, second)| *second).find(is_near);
+                // Ticks of a clock of its own.
+                let second = of_unit
+                    .or(name.tick().filter(is_near))
+                    .unwrap_or(period / steps.mean);
                 (
-                    unit,
-                    format!("steps of {} at {rate} Hz", short(steps.usual)),
+                    Some(second),
+                    format!("steps of {usual} at {} Hz", rate(period)),
                 )
             }
             (None, None) => {
-                let likely = UNITS
-                    .iter()
-                    .find(|(_, second)| PERIODS.contains(&(steps.usual * second)));
-                let unit = likely.map_or("s", |&(unit, _)| unit);
-                (unit, format!("steps of {}", short(steps.usual)))
+                let is_usual = |second: &f64| PERIODS.contains(&(steps.mean * second));
+                let likely = UNITS.iter().map(|(_, second)| *second).find(is_usual);
+                (Some(likely.unwrap_or(1.0)), format!("steps of {usual}"))
             }
         };
-        let second = UNITS.iter().find(|(word, _)| *word == unit);
+        let is_unit =
+            |(_, of): &&(&str, f64)| second.is_some_and(|second| (second / of - 1.0).abs() < 1e-9);
+        let word = UNITS
+            .iter()
+            .find(is_unit)
+            .map(|(word, _)| (*word).to_owned());
         Self {
-            unit,
+            unit: match second {
+                Some(second) => word.unwrap_or_else(|| format!("{:?}", seven(second))),
+                None => "count".to_owned(),
+            },
             why,
-            period: second.map(|(_, second)| steps.mean * second).or(stated),
+            period: second.map(|second| steps.mean * second).or(stated),
             is_stated: second.is_none() && stated.is_some(),
             gaps: steps.gaps,
             repeated: steps.repeated,
@@ -96,30 +104,9 @@ impl Clock {
         self.gaps.iter().filter(long).map(first).collect()
     }
 
-    /// By a counter of rows of this period, in s; without one rows follow one another.
-    fn of_counter(sheet: &Sheet, columns: &mut Columns, period: f64) -> Self {
-        let time = columns.time;
-        columns.time = columns.counter.filter(|counter| {
-            Some(*counter) != time && Steps::of(&sheet.columns[*counter]).is_count
-        });
-        let unit = "no unit of time here is that of the file's";
-        let Some(stamps) = columns.stamps(sheet) else {
-            return Self::without(Some(period), unit);
-        };
-        let Steps { gaps, repeated, .. } = Steps::of(&stamps);
-        Self {
-            unit: "count",
-            why: format!("{unit} times, but rows are counted"),
-            period: Some(period),
-            is_stated: true,
-            gaps,
-            repeated,
-        }
-    }
-
     fn without(period: Option<f64>, why: &str) -> Self {
         Self {
-            unit: "s",
+            unit: "s".to_owned(),
             why: why.to_owned(),
             period,
             is_stated: period.is_some(),
@@ -138,12 +125,11 @@ pub(super) struct Gap {
     missing: f64,
 }
 
-/// How times go on.
+/// How times go on, as they do where rows are read.
 struct Steps {
-    usual: f64,
-    /// Of those that are no gap.
+    /// From sample to sample, rows that are missing counted.
     mean: f64,
-    /// Whether those are all one.
+    /// Whether they are whole numbers, most of them one.
     is_count: bool,
     gaps: Vec<Gap>,
     repeated: usize,
@@ -151,31 +137,48 @@ struct Steps {
 
 impl Steps {
     fn of(stamps: &[f64]) -> Self {
-        let steps = || {
-            let steps = stamps.windows(2).map(|pair| pair[1] - pair[0]);
-            steps.filter(|step| step.is_finite())
-        };
+        let steps = || stamps.windows(2).map(|pair| pair[1] - pair[0]);
         let mut forward: Vec<f64> = steps().filter(|&step| step > 0.0).collect();
+        let is_whole = forward.iter().all(|step| step.fract() == 0.0);
+        let repeated = steps().filter(|&step| step <= 0.0).count();
         let usual = median(&mut forward).unwrap_or(1.0);
-        // Rounding of printed stamps averages out over the steps without gaps.
-        let even: Vec<f64> = forward
-            .iter()
-            .copied()
-            .filter(|&step| step < GAP * usual)
-            .collect();
-        let gap = |before: usize| {
-            let step = stamps[before] - stamps[before - 1];
-            let missing = step / usual - 1.0;
-            (step >= GAP * usual).then_some(Gap { before, missing })
+        // A clock that goes back begins again, or was set.
+        let goes_on = |time: &mut f64, step: f64| {
+            *time += match step {
+                _ if step.is_nan() => 0.0,
+                _ if step < 0.0 => usual,
+                _ => step,
+            };
+            Some(*time)
+        };
+        let times = std::iter::once(0.0).chain(steps().scan(0.0, goes_on));
+        let rows: Vec<(f64, u64)> = times.zip(1..).collect();
+        let is_clock = !forward.is_empty();
+        let clock = is_clock.then(|| Uniform::new(Path::new(""), &rows, None).ok());
+        let clock = clock.flatten();
+        let numbers = clock.as_ref().map_or(&[][..], |clock| &clock.numbers);
+        let gap = |(row, pair): (usize, &[usize])| {
+            let missing = pair[1].saturating_sub(pair[0] + 1) as f64;
+            (missing > 0.0).then_some(Gap {
+                before: row + 1,
+                missing,
+            })
         };
         Self {
-            usual,
-            mean: even.iter().sum::<f64>() / even.len().max(1) as f64,
-            is_count: usual == 1.0 && even.iter().all(|&step| step == 1.0),
-            gaps: (1..stamps.len()).filter_map(gap).collect(),
-            repeated: steps().filter(|&step| step <= 0.0).count(),
+            mean: clock.as_ref().map_or(usual, |clock| clock.period),
+            is_count: usual == 1.0 && is_whole,
+            gaps: numbers.windows(2).enumerate().filter_map(gap).collect(),
+            repeated,
         }
     }
+}
+
+/// How long one of a unit of time is.
+fn second(word: &str) -> Option<f64> {
+    UNITS
+        .iter()
+        .find(|(unit, _)| *unit == word)
+        .map(|(_, second)| *second)
 }
 
 /// A number to six digits.

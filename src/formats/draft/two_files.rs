@@ -4,12 +4,10 @@ use std::path::Path;
 
 use super::FEWEST_ROWS;
 use super::columns::{self, Columns};
-use super::name;
-use super::name::Name;
-use super::streams::{Member, Places, Streams, Written, joined};
+use super::streams::{Member, Places, Streams, Written, joined, of_rows};
 use super::time::Clock;
 use crate::formats::source::Source;
-use crate::formats::streams::{Column, Found, Stream};
+use crate::formats::streams::Found;
 use crate::formats::{FileError, Place, Sheet};
 use crate::imu::{PerSensor, Sensor};
 
@@ -28,8 +26,8 @@ impl Streams {
         };
         let sources = PerSensor::from_fn(|sensor| Source::of_file(files.get(sensor)));
         let member = |sensor: Sensor| -> Result<Member, FileError> {
-            let (found, time) = looked.get(sensor);
-            let triad = *Places::of(found).triads.get(sensor);
+            let ((found, places), time) = looked.get(sensor);
+            let triad = *places.triads.get(sensor);
             let names = || {
                 found
                     .stream
@@ -65,10 +63,10 @@ impl Streams {
         let sheet = joined(&members)?;
         let time = PerSensor::from_fn(|sensor| members.get(sensor).time.clone());
         let streams = Self {
-            gyro: looked.gyro.0.stream.name.clone(),
-            accel: Some(looked.accel.0.stream.name.clone()),
+            gyro: looked.gyro.0.0.stream.name.clone(),
+            accel: Some(looked.accel.0.0.stream.name.clone()),
             time,
-            axes: looked.gyro.0.stream.axes,
+            axes: looked.gyro.0.0.stream.axes,
             damage: None,
             written: Some(Written {
                 accel: accel_name.map(str::to_owned),
@@ -79,8 +77,8 @@ impl Streams {
     }
 }
 
-/// A file as a stream of its own, and its column of time with the word for its unit.
-type Looked = (Found, Option<(String, &'static str)>);
+/// A file as a stream of its own, and its column of time with the unit.
+type Looked = ((Found, Places), Option<(String, String)>);
 
 fn look(file: &Path, sensor: Sensor) -> Result<Looked, FileError> {
     let mut sheet = Sheet::read(file, FEWEST_ROWS)?;
@@ -93,27 +91,15 @@ fn look(file: &Path, sensor: Sensor) -> Result<Looked, FileError> {
     let time = columns
         .time
         .map(|place| (sheet.names[place].clone(), clock.unit));
-    let column = |(name, unit): (&String, &String)| {
-        let unit = Name::of(name).unit.or_else(|| name::unit(unit));
-        Column {
-            name: name.clone(),
-            unit: unit.unwrap_or(""),
-        }
-    };
     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
     // As PX4's ulog2csv calls its files.
     let is_of_px4 = ["sensor_gyro_", "sensor_accel_"]
         .iter()
         .any(|topic| stem.contains(topic));
-    let stream = Stream {
-        name: stem.into_owned(),
-        columns: sheet.names.iter().zip(&sheet.units).map(column).collect(),
-        remarks: Vec::new(),
-        is_inertial: true,
-        axes: is_of_px4.then_some("frd"),
-    };
-    let samples = sheet.columns.first().map_or(0, Vec::len) as u64;
-    Ok((Found { stream, samples }, time))
+    let mut found = of_rows(stem.into_owned(), &sheet);
+    found.stream.axes = is_of_px4.then_some("frd");
+    let places = Places::of(&found);
+    Ok(((found, places), time))
 }
 
 fn words(sensor: Sensor) -> &'static str {

@@ -58,25 +58,31 @@ impl Quantities {
             units: PerSensor::default(),
             opposed: false,
         };
-        let Some(motion) = motion else {
-            return found;
-        };
         let named = PerSensor::from_fn(|sensor| {
             let first = columns.triads.get(sensor).map(|triad| triad[0])?;
             Name::of(&sheet.names[first])
                 .unit
                 .or_else(|| name::unit(&sheet.units[first]))
         });
+        let Some(motion) = motion else {
+            "too few rows hold numbers to show it".clone_into(&mut found.units.gyro.why);
+            found.units.accel.why.clone_from(&found.units.gyro.why);
+            return found;
+        };
         found.opposed = motion.angle.is_some_and(|angle| angle < 0.0);
         let period = clock.period;
-        found.accelerometers(
-            named.accel,
-            whole.accel,
-            motion.gravity,
-            period,
-            motion.sum_variance,
-        );
-        found.gyros(named.gyro, whole.gyro, motion, period);
+        let words = PerSensor::from_fn(|sensor| named.get(sensor).map(|unit| unit.word));
+        if !found.scaled(Sensor::Accel, named.accel, motion, period) {
+            found.accelerometers(words.accel, whole.accel, motion, period);
+        }
+        if !found.scaled(Sensor::Gyro, named.gyro, motion, period) {
+            found.gyros(words.gyro, whole.gyro, motion, period);
+        }
+        for sensor in Sensor::ALL {
+            if columns.triads.get(sensor).is_none() {
+                *found.units.get_mut(sensor) = Unit::default();
+            }
+        }
         found
     }
 
@@ -163,19 +169,55 @@ impl Quantities {
             .or_else(|| crate::formats::unit_scale(sensor, unit.word?))
     }
 
+    /// Takes a unit of which the file states how many of `run.toml`'s one is, unless motion contradicts it.
+    fn scaled(
+        &mut self,
+        sensor: Sensor,
+        named: Option<name::Unit>,
+        motion: &Motion,
+        period: Option<f64>,
+    ) -> bool {
+        let Some(scale) = named.and_then(|unit| Scale::of_unit(sensor, unit)) else {
+            return false;
+        };
+        let of_one = scale.value.x;
+        let factor = match sensor {
+            Sensor::Accel => motion.gravity / (of_one * STANDARD_GRAVITY),
+            Sensor::Gyro => {
+                let turned = motion.angle.zip(period);
+                turned.map_or(1.0, |(angle, period)| angle.abs() * of_one / period)
+            }
+        };
+        if turns_fit(factor) {
+            *self.units.get_mut(sensor) = Unit {
+                word: Some("count"),
+                why: "as the file says".to_owned(),
+                is_shown: true,
+                scale: Some(scale),
+                likely: None,
+            };
+        }
+        turns_fit(factor)
+    }
+
     fn accelerometers(
         &mut self,
         named: Option<&'static str>,
         whole: bool,
-        gravity: f64,
+        motion: &Motion,
         period: Option<f64>,
-        sum_variance: Option<f64>,
     ) {
+        let Motion {
+            gravity,
+            sum_variance,
+            ..
+        } = *motion;
         let size = format!("{} at rest", short(gravity));
         let seconds = period.unwrap_or(f64::NAN);
         let known = [
             ("m/s^2", Output::Rate, STANDARD_GRAVITY),
             ("g", Output::Rate, 1.0),
+            ("mg", Output::Rate, 1e3),
             ("m/s", Output::Increment, STANDARD_GRAVITY * seconds),
             ("g*s", Output::Increment, seconds),
         ];
@@ -217,10 +259,6 @@ impl Quantities {
                 unit.word = Some("count");
                 unit.why = why_count(whole, named, &format!("no known unit makes {size}"));
                 let per_g = gravity * self.per_second(seconds);
-                unit.scale = match named {
-                    Some("mg") => Some(Scale::of_name(1e3 / STANDARD_GRAVITY, "mg")),
-                    _ => None,
-                };
                 unit.likely = per_g.is_finite().then(|| likely_for_g(per_g));
             }
         }
@@ -294,10 +332,7 @@ impl Quantities {
             _ if whole || self.output == Output::Pulse || angle.is_some() || named.is_some() => {
                 unit.word = Some("count");
                 unit.why = why_count(whole, named, "no known unit fits the turns of gravity");
-                unit.scale = match named {
-                    Some("mdps") => Some(Scale::of_name(1e3 / DEGREE, "mdps")),
-                    _ => measured.map(|value| Scale::of_steps(value, self.output)),
-                };
+                unit.scale = measured.map(|value| Scale::of_steps(value, self.output));
             }
             _ if is_turned => {
                 unit.why = "gravity turns too seldom or too roughly to show it".to_owned();
@@ -336,7 +371,12 @@ fn output_why(output: Output, seconds: f64) -> String {
 /// Units of gyros, with the angle in one row of a unit of it.
 fn angle_units(output: Output) -> &'static [(&'static str, f64)] {
     match output {
-        Output::Rate => &[("rad/s", 1.0), ("deg/s", DEGREE), ("deg/h", DEG_PER_H)],
+        Output::Rate => &[
+            ("rad/s", 1.0),
+            ("deg/s", DEGREE),
+            ("deg/h", DEG_PER_H),
+            ("mdps", 1e-3 * DEGREE),
+        ],
         Output::Increment => &[("rad", 1.0), ("deg", DEGREE), ("arcsec", ARCSEC)],
         Output::Pulse => &[],
     }

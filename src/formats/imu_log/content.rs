@@ -74,7 +74,7 @@ impl Held {
 struct Reading<'a> {
     log: &'a ImuLog<'a>,
     /// Of the values of a sample in a row.
-    places: [usize; 6],
+    places: [Option<usize>; 6],
     /// The column that tells instruments apart, and what it says of this one.
     instance: Option<(usize, f64)>,
     stamps: Stamps,
@@ -95,7 +95,7 @@ impl<'a> Reading<'a> {
     fn begin(
         log: &'a ImuLog<'a>,
         csv: &mut LogRows,
-        places: [usize; 6],
+        places: [Option<usize>; 6],
     ) -> Result<Self, FileError> {
         let temperature = log.temperature.as_ref();
         let temperature = temperature.map(|columns| columns.start(csv)).transpose()?;
@@ -126,11 +126,11 @@ impl<'a> Reading<'a> {
             return Ok(());
         }
         // Rows that another sensor wrote, or in which a sensor said nothing; a time tells that they are missing.
-        let empty = self.places.iter().filter(|&&place| csv.is_blank(place));
-        match empty.count() {
+        let places = || self.places.iter().flatten();
+        match places().filter(|&&place| csv.is_blank(place)).count() {
             0 => {}
             _ if self.log.clock_of_rows().column.is_none() => {}
-            6 => {
+            all if all == places().count() => {
                 self.blank += 1;
                 return Ok(());
             }
@@ -141,7 +141,9 @@ impl<'a> Reading<'a> {
         }
         let mut row = [0.0; 6];
         for (value, &place) in row.iter_mut().zip(&self.places) {
-            *value = self.log.value(csv, place)?;
+            if let Some(place) = place {
+                *value = self.log.value(csv, place)?;
+            }
         }
         if let Some(place) = self.place(csv, row)? {
             self.held.insert(place, row);
@@ -278,8 +280,8 @@ impl ImuLog<'_> {
                 .map(|clock| Samples::Held(Box::new((held, clock)))),
         };
         let samples = match samples.map_err(|error| csv.placed(error))? {
-            Samples::Long(whole) if known.is_none() && whole.clock.wander.is_some() => {
-                let Whole { clock, .. } = *whole;
+            Samples::Long(whole) if known.is_none() && whole.read.clock.wander.is_some() => {
+                let clock = whole.read.clock;
                 // What was read is let go of before it is read again.
                 drop((csv, stamps, temperature));
                 return self.content(sizes, notes, Some(&clock));
@@ -287,7 +289,7 @@ impl ImuLog<'_> {
             samples => samples,
         };
         let clock = match &samples {
-            Samples::Long(whole) => &whole.clock,
+            Samples::Long(whole) => &whole.read.clock,
             Samples::Held(held) => &held.1,
         };
         notes.extend(clock.uneven());

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::content::Held;
 use super::even::{Even, reached};
-use super::{ImuLog, Layout};
+use super::{ImuLog, Layout, Read};
 use crate::formats::clock::Stamps;
 use crate::formats::error::FileError;
 use crate::formats::uniform::{Following, REACH, Uniform};
@@ -57,18 +57,11 @@ pub(super) struct LongLog<'a> {
 
 /// What a long log has come to.
 pub(super) struct Whole {
-    pub clock: Uniform,
-    pub facts: [ColumnFacts; 6],
+    pub read: Read,
     pub packed: PerSensor<Packed>,
     pub samples: usize,
-    pub faults: Vec<Fault>,
-    pub bridges: Vec<Bridge>,
-    /// Rows of the file.
-    pub rows: usize,
-    /// Samples without one.
+    /// Samples without a row.
     pub missing: usize,
-    /// RMS errors of integrals, in the columns' quantity times samples.
-    pub error: PerSensor<[f64; 3]>,
 }
 
 impl<'a> LongLog<'a> {
@@ -288,15 +281,17 @@ impl<'a> LongLog<'a> {
             None => self.next,
         };
         Ok(Whole {
-            clock,
-            facts,
+            read: Read {
+                clock,
+                facts,
+                rows: self.rows + duplicates,
+                faults,
+                bridges,
+                error,
+            },
             packed,
             samples,
-            faults,
-            bridges,
-            rows: self.rows + duplicates,
             missing: self.next - self.rows,
-            error,
         })
     }
 }

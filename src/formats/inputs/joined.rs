@@ -12,6 +12,7 @@ use super::source::Source;
 use super::uniform::Uniform;
 use crate::formats::clock::{Breaks, Clock, Stamp, Stamps, TimeUnit};
 use crate::formats::error::{FileError, Place};
+use crate::formats::rows::Rows;
 use crate::imu::{Output, PerSensor};
 
 /// The column of time, in s.
@@ -91,38 +92,47 @@ impl Joined {
             at: 0,
         })
     }
+}
 
-    pub fn file(&self) -> &Path {
+impl Rows for Joined {
+    fn file(&self) -> &Path {
         &self.file
     }
 
-    pub fn header(&self) -> &[String] {
+    fn header(&self) -> &[String] {
         &self.header
     }
 
-    pub fn units(&self) -> &[String] {
+    fn units(&self) -> &[String] {
         &self.units
     }
 
-    pub fn remarks(&self) -> &[String] {
+    fn remarks(&self) -> &[String] {
         &self.remarks
     }
 
-    /// RMS error of the accelerometers' integrals at an edge of a sample, in their columns' unit times s.
-    pub fn integral_error(&self) -> [f64; 3] {
+    fn integral_error(&self) -> [f64; 3] {
         self.error
     }
 
-    pub fn advance(&mut self) -> bool {
+    fn advance(&mut self, _used: &[usize]) -> Result<bool, FileError> {
         self.at += 1;
-        self.at <= self.rows.len()
+        Ok(self.at <= self.rows.len())
     }
 
-    pub fn sample(&self) -> u64 {
+    fn is_blank(&self, _column: usize) -> bool {
+        false
+    }
+
+    fn line(&self) -> u64 {
         self.at as u64
     }
 
-    pub fn value(&self, column: usize) -> f64 {
+    fn place(&self, _column: Option<usize>) -> Place {
+        Place::Line(self.line())
+    }
+
+    fn value(&self, column: usize) -> f64 {
         let row = self.at.checked_sub(1).and_then(|row| self.rows.get(row));
         row.and_then(|row| row.get(column))
             .copied()
@@ -236,7 +246,7 @@ impl Track {
         let further = part.further.iter().map(|name| rows.column(name));
         let further: Vec<usize> = further.collect::<Result<_, FileError>>()?;
         let mut others = vec![Vec::new(); further.len()];
-        let units = places.map(|k| rows.units().map_or(String::new(), |units| units[k].clone()));
+        let units = places.map(|k| rows.units().get(k).cloned().unwrap_or_default());
         let mut columns = [const { Vec::<f64>::new() }; 3];
         while rows.advance()? && !rows.may_be_cut() {
             if places.iter().any(|&place| rows.is_blank(place)) {

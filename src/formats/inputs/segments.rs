@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use crate::formats::csv_file::CsvFile;
+use super::source::Source;
 use crate::formats::error::FileError;
 use crate::formats::schema::axes::BodyAxes;
 use crate::recording::{ImuSamples, LabelledMotion, Segment};
@@ -19,7 +19,7 @@ pub fn read(
     axes: BodyAxes,
     notes: &mut Vec<String>,
 ) -> Result<Vec<Segment>, FileError> {
-    let mut csv = CsvFile::open(file)?;
+    let mut csv = Source::of_file(file).open()?;
     let start_column = csv.column("start")?;
     let end_column = csv.column("end")?;
     let label_column = csv.column("label")?;
@@ -59,7 +59,7 @@ pub fn read(
                 "Correct or remove the row.",
             ));
         }
-        let label = csv.text(label_column)?.to_owned();
+        let label = csv.text(label_column)?.into_owned();
         segments.push(Segment {
             start,
             end,

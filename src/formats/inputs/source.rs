@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::formats::clock::{Breaks, Clock, TimeUnit};
 use crate::formats::csv_file::CsvFile;
-use crate::formats::error::{FileError, Place};
+use crate::formats::error::FileError;
 use crate::formats::rows::LogRows;
 use crate::formats::schema::{Document, ImuFile, Positive, TimeColumn};
 use crate::formats::streams::{self, StreamRows};
@@ -32,19 +32,10 @@ impl Source<'_> {
     /// Opens it by its content.
     pub fn open(&self) -> Result<LogRows, FileError> {
         let Some(log) = streams::open(&self.file)? else {
-            if let Some(stream) = self.stream {
-                return Err(FileError::new(
-                    &self.file,
-                    Place::File,
-                    "rows of text",
-                    format_args!("a log with a stream `{stream}`"),
-                    "Leave `stream` out, or name another file.",
-                ));
-            }
-            return CsvFile::open(&self.file).map(LogRows::text);
+            return CsvFile::open(&self.file, self.stream).map(LogRows::new);
         };
         let rows = StreamRows::open(&self.file, log, self.stream, self.salvage)?;
-        Ok(LogRows::stream(rows))
+        Ok(LogRows::new(rows))
     }
 }
 

@@ -75,16 +75,16 @@ impl<'a> InstrumentFields<'a> {
         };
         let without_period = with_usual_period(document, run, &mut of_gyro)?;
         let columns = &imu.columns;
-        let names = |names: &'a [String; 3]| names.each_ref().map(String::as_str);
+        let names = |sensor| match columns_of(imu, sensor) {
+            Some(names) => names.each_ref().map(String::as_str),
+            None => [""; 3],
+        };
         let log = ImuLog {
             source,
             clock: of_gyro,
             accel_from,
             instance: (imu.instance.as_ref()).map(|of| (of.column.as_str(), of.number.0)),
-            triads: PerSensor {
-                gyro: names(&columns.gyro),
-                accel: names(&columns.accel),
-            },
+            triads: PerSensor::from_fn(names),
             temperature: columns.temperature.as_ref().map(|column| {
                 let unit = imu.temperature_unit.unwrap_or(TemperatureUnit::WORDS[0].1);
                 TemperatureColumns::of_fields(column, unit)
@@ -132,8 +132,8 @@ fn knowledge(
     notes: &mut Vec<String>,
 ) -> Result<Instrument, FileError> {
     let unit = PerSensor {
-        gyro: imu.gyro_unit.clone(),
-        accel: imu.accel_unit.clone(),
+        gyro: unit(document, imu, Sensor::Gyro, notes)?,
+        accel: unit(document, imu, Sensor::Accel, notes)?,
     };
     let gyro = nominal(document, imu, Sensor::Gyro, &unit.gyro)?;
     let accel = nominal(document, imu, Sensor::Accel, &unit.accel)?;
@@ -250,6 +250,41 @@ fn noise(
     ))
 }
 
+/// The columns of a triad, if it is there.
+fn columns_of(imu: &ImuFile, sensor: Sensor) -> Option<&[String; 3]> {
+    match sensor {
+        Sensor::Gyro => imu.columns.gyro.as_ref(),
+        Sensor::Accel => imu.columns.accel.as_ref(),
+    }
+}
+
+/// The unit of a triad; one of two may be missing from a log.
+fn unit(
+    document: Document,
+    imu: &ImuFile,
+    sensor: Sensor,
+    notes: &mut Vec<String>,
+) -> Result<String, FileError> {
+    let [gyro, accel] = Sensor::ALL.map(|sensor| columns_of(imu, sensor).is_some());
+    let (is_there, unit) = match sensor {
+        Sensor::Gyro => (gyro, &imu.gyro_unit),
+        Sensor::Accel => (accel, &imu.accel_unit),
+    };
+    let name = sensor.name();
+    if !is_there && (imu.accel_from.is_some() || !(gyro || accel)) {
+        let path = format!("imu.columns.{name}");
+        return Err(document.missing(&path, "the names of three columns"));
+    }
+    if !is_there {
+        notes.push(format!(
+            "The log has no columns of {name}: they are taken to be zero."
+        ));
+        return Ok("count".to_owned());
+    }
+    let missing = || document.missing(&format!("imu.{name}_unit"), "the unit of the file");
+    unit.clone().ok_or_else(missing)
+}
+
 fn prior_of(imu: &ImuFile, sensor: Sensor) -> &PriorFile {
     match sensor {
         Sensor::Gyro => &imu.prior.gyro,
@@ -264,6 +299,9 @@ fn nominal(
     sensor: Sensor,
     unit: &str,
 ) -> Result<Vector3<f64>, FileError> {
+    if columns_of(imu, sensor).is_none() {
+        return Ok(Vector3::repeat(1.0));
+    }
     let known = units(sensor, imu.output);
     let names = || known.iter().map(|&(name, _)| name);
     let Some(&(_, of_unit)) = known.iter().find(|(name, _)| *name == unit) else {
@@ -339,7 +377,7 @@ fn prior(
             Sensor::Accel => "bias ± 1 m/s²",
         },
     )?;
-    if !assumed.is_empty() {
+    if !assumed.is_empty() && columns_of(imu, sensor).is_some() {
         notes.push(format!(
             "run.toml does not state everything in [imu.prior.{}]. turncal assumed (1σ): {}.",
             sensor.name(),

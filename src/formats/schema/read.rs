@@ -146,7 +146,7 @@ fn with_noise(
 ) -> Instrument {
     let mut known = instrument.known.clone();
     for sensor in Sensor::ALL {
-        if !known.noise_is_stated.get(sensor) {
+        if !known.noise_is_stated.get(sensor) && imu.has(sensor) {
             let random_walk = noise::white_noise(imu, sensor);
             known.noise.get_mut(sensor).random_walk = random_walk;
             notes.push(noise_note(sensor, random_walk));
@@ -230,9 +230,12 @@ fn clock_note(imu: &ImuSamples, instrument: &InstrumentFields) -> Option<String>
     })
 }
 
-/// The name of the directory of a `run.toml`, else the file's own.
+/// The name of the directory of a `run.toml`, else the file's own without its endings.
 pub fn name(path: &Path) -> String {
-    let full = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    let mut full = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    if full.extension().is_some_and(|of| of == "gz") {
+        full.set_extension("");
+    }
     let named = match full.file_name() {
         Some(file) if file == "run.toml" => full.parent().and_then(Path::file_name),
         _ => full.file_stem(),

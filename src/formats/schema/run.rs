@@ -62,8 +62,8 @@ pub struct ImuFile {
     pub salvage: Option<bool>,
     pub accel_from: Option<AccelFromFile>,
     pub output: Output,
-    pub gyro_unit: String,
-    pub accel_unit: String,
+    pub gyro_unit: Option<String>,
+    pub accel_unit: Option<String>,
     pub gyro_full_scale: Option<Positive>,
     pub accel_full_scale: Option<Positive>,
     pub time_unit: Option<TimeUnit>,
@@ -108,8 +108,8 @@ pub struct InstanceFile {
 #[serde(deny_unknown_fields)]
 pub struct ImuColumns {
     pub time: Option<TimeColumn>,
-    pub gyro: [String; 3],
-    pub accel: [String; 3],
+    pub gyro: Option<[String; 3]>,
+    pub accel: Option<[String; 3]>,
     pub temperature: Option<TemperatureColumn>,
 }
 

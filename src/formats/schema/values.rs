@@ -95,12 +95,7 @@ macro_rules! by_words {
     ($($name:ident),+) => {$(
         impl<'de> Deserialize<'de> for $name {
             fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-                let said = String::deserialize(deserializer)?;
-                let known = Self::WORDS.iter().find(|(word, _)| *word == said);
-                known.map(|&(_, meaning)| meaning).ok_or_else(|| {
-                    let words = list(Self::WORDS.iter().map(|&(word, _)| word));
-                    D::Error::custom(format!("unknown variant `{said}`, expected one of {words}"))
-                })
+                by_word(&Self::WORDS, &String::deserialize(deserializer)?)
             }
         }
 
@@ -113,4 +108,40 @@ macro_rules! by_words {
     )+};
 }
 
-by_words!(BodyAxes, TemperatureUnit, TimeStamp, TimeUnit);
+by_words!(BodyAxes, TemperatureUnit, TimeStamp);
+
+/// A word, or what a tick of a clock of its own lasts, s.
+#[derive(Serialize, Deserialize)]
+#[serde(untagged, expecting = "a unit of time, or what a tick lasts in s")]
+enum TimeUnitFile {
+    Tick(Positive),
+    Word(String),
+}
+
+impl<'de> Deserialize<'de> for TimeUnit {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let word = match TimeUnitFile::deserialize(deserializer)? {
+            TimeUnitFile::Tick(tick) => return Ok(Self::PerSecond(tick.0.recip())),
+            TimeUnitFile::Word(word) => word,
+        };
+        by_word(&Self::WORDS, &word)
+    }
+}
+
+impl Serialize for TimeUnit {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let known = Self::WORDS.iter().find(|(_, meaning)| meaning == self);
+        match (known, self) {
+            (None, Self::PerSecond(ticks)) => serializer.serialize_f64(ticks.recip()),
+            (known, _) => serializer.serialize_str(known.map_or("", |(word, _)| word)),
+        }
+    }
+}
+
+fn by_word<T: Copy, E: Error>(words: &[(&str, T)], said: &str) -> Result<T, E> {
+    let known = words.iter().find(|(word, _)| *word == said);
+    known.map(|&(_, meaning)| meaning).ok_or_else(|| {
+        let words = list(words.iter().map(|&(word, _)| word));
+        E::custom(format!("unknown variant `{said}`, expected one of {words}"))
+    })
+}

@@ -327,8 +327,8 @@ fn imu_file(run: &Run, output: Output) -> ImuFile {
         salvage: None,
         accel_from: None,
         output,
-        gyro_unit: instrument.unit.gyro.clone(),
-        accel_unit: instrument.unit.accel.clone(),
+        gyro_unit: Some(instrument.unit.gyro.clone()),
+        accel_unit: Some(instrument.unit.accel.clone()),
         gyro_full_scale: None,
         accel_full_scale: None,
         time_unit: None,
@@ -340,8 +340,8 @@ fn imu_file(run: &Run, output: Output) -> ImuFile {
         body_axes: None,
         columns: ImuColumns {
             time: Some(TimeColumn::One(name("t"))),
-            gyro: ["gx", "gy", "gz"].map(name),
-            accel: ["ax", "ay", "az"].map(name),
+            gyro: Some(["gx", "gy", "gz"].map(name)),
+            accel: Some(["ax", "ay", "az"].map(name)),
             temperature: (imu.temperature.as_ref())
                 .map(|_| TemperatureColumn::One(name("temperature"))),
         },

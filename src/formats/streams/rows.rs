@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::bytes::Broken;
 use super::{Log, Stream};
 use crate::formats::error::{FileError, Place, list, suggestion};
+use crate::formats::rows::Rows;
 
 /// A log at one sample of one of its streams.
 pub(in crate::formats) struct StreamRows {
@@ -130,27 +131,39 @@ impl StreamRows {
         })
     }
 
-    pub fn file(&self) -> &Path {
+    fn next(&mut self) -> Result<bool, Broken> {
+        if self.damage.is_some() {
+            return Ok(false);
+        }
+        while let Some(stream) = self.log.advance()? {
+            if stream == self.stream {
+                self.log.values(&mut self.row)?;
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+}
+
+impl Rows for StreamRows {
+    fn file(&self) -> &Path {
         &self.file
     }
 
-    /// The names of the columns.
-    pub fn header(&self) -> &[String] {
+    fn header(&self) -> &[String] {
         &self.names
     }
 
-    /// Of the columns, empty where the file does not say it.
-    pub fn units(&self) -> &[String] {
+    fn units(&self) -> &[String] {
         &self.units
     }
 
-    /// What was done to the values.
-    pub fn remarks(&self) -> &[String] {
+    fn remarks(&self) -> &[String] {
         &self.log.streams()[self.stream].remarks
     }
 
-    /// Goes to the next sample; false at the end, and at a damage where what is before it is to be used.
-    pub fn advance(&mut self) -> Result<bool, FileError> {
+    /// False also at a damage where what is before it is to be used.
+    fn advance(&mut self, _used: &[usize]) -> Result<bool, FileError> {
         if self.is_ahead {
             self.is_ahead = false;
             self.samples = 1;
@@ -169,21 +182,7 @@ impl StreamRows {
         }
     }
 
-    fn next(&mut self) -> Result<bool, Broken> {
-        if self.damage.is_some() {
-            return Ok(false);
-        }
-        while let Some(stream) = self.log.advance()? {
-            if stream == self.stream {
-                self.log.values(&mut self.row)?;
-                return Ok(true);
-            }
-        }
-        Ok(false)
-    }
-
-    /// Where the file is damaged and what was used, in a sentence.
-    pub fn cut_off(&self) -> Option<String> {
+    fn cut_off(&self, _done: &str) -> Option<String> {
         let Broken {
             offset,
             found,
@@ -197,18 +196,15 @@ impl StreamRows {
         ))
     }
 
-    /// The number of the sample, from one.
-    pub fn sample(&self) -> u64 {
+    fn line(&self) -> u64 {
         self.samples
     }
 
-    /// The value in a column of the sample; NaN is none.
-    pub fn value(&self, column: usize) -> f64 {
+    fn value(&self, column: usize) -> f64 {
         self.row.get(column).copied().unwrap_or(f64::NAN)
     }
 
-    /// The place of a column of the sample.
-    pub fn place(&self, column: Option<usize>) -> Place {
+    fn place(&self, column: Option<usize>) -> Place {
         Place::Sample {
             number: self.samples,
             stream: self.name.clone(),
@@ -217,8 +213,7 @@ impl StreamRows {
         }
     }
 
-    /// The same error where a number that was taken for that of a line is that of a sample.
-    pub fn placed(&self, mut error: FileError) -> FileError {
+    fn placed(&self, mut error: FileError) -> FileError {
         if let Place::Line(number) = error.place {
             error.place = Place::Sample {
                 number,

@@ -21,6 +21,7 @@ pub(super) fn data(run: &str, analysis: &NoiseAnalysis) -> Value {
             "triad": axis(&triad.mean, sensor),
         })
     };
+    let of = |sensor: Sensor| analysis.sensors.contains(&sensor).then(|| triad(sensor));
     let stretch = &analysis.stretch;
     json!({
         "run": run,
@@ -30,8 +31,8 @@ pub(super) fn data(run: &str, analysis: &NoiseAnalysis) -> Value {
         "sample_period_s": analysis.period,
         "duration_s": analysis.duration(),
         "stands": stretch.stands,
-        "gyro": triad(Sensor::Gyro),
-        "accel": triad(Sensor::Accel),
+        "gyro": of(Sensor::Gyro),
+        "accel": of(Sensor::Accel),
         "imu_noise": fields(analysis),
         "imu_noise_toml": noise_table(analysis),
         "warnings": words::warnings(analysis),
@@ -99,7 +100,7 @@ struct Field {
 /// `[imu.noise]` with all that was found, ready to be pasted.
 pub(super) fn noise_table(analysis: &NoiseAnalysis) -> String {
     let mut text = "[imu.noise]\n".to_owned();
-    for sensor in Sensor::ALL {
+    for &sensor in &analysis.sensors {
         let fields = of_triad(analysis, sensor);
         if fields.is_empty() {
             let name = sensor.name();

@@ -6,7 +6,6 @@ mod quantity;
 mod tables;
 mod words;
 
-use crate::imu::Sensor;
 use crate::noise::NoiseAnalysis;
 use crate::report::prelude::*;
 
@@ -26,10 +25,10 @@ pub fn document(run: &str, analysis: &NoiseAnalysis) -> Document {
         three_digits(period.recip())
     ));
     document.warnings.items = words::warnings(analysis);
-    for sensor in Sensor::ALL {
+    for &sensor in &analysis.sensors {
         document.page(figure::figure(analysis, sensor));
     }
-    for sensor in Sensor::ALL {
+    for &sensor in &analysis.sensors {
         document.both(tables::coefficients(analysis, sensor));
     }
     document.terminal(tables::deviations(analysis, EVERY));

@@ -113,7 +113,7 @@ pub(super) fn deviations(analysis: &NoiseAnalysis, every: usize) -> Table {
     let triads = &analysis.triads;
     let row = |(point, tau): (usize, &f64)| {
         let mut row = vec![three_digits(*tau)];
-        for sensor in Sensor::ALL {
+        for &sensor in &analysis.sensors {
             let unit = deviation_unit(sensor).1;
             for axis in &triads.get(sensor).axes {
                 let variance = axis.curve.variance.get(point).copied();
@@ -125,7 +125,7 @@ pub(super) fn deviations(analysis: &NoiseAnalysis, every: usize) -> Table {
         row.push(or_dash(least, |least| count(least.round() as usize)));
         row
     };
-    let axes = Sensor::ALL.into_iter().flat_map(|sensor| {
+    let axes = analysis.sensors.iter().flat_map(|&sensor| {
         let symbol = deviation_unit(sensor).0;
         AXES.map(|axis| format!("{} {axis}, {symbol}", sensor.name()))
     });

@@ -43,7 +43,7 @@ pub(super) fn warnings(analysis: &NoiseAnalysis) -> Vec<String> {
             analysis.stretch.name
         ));
     }
-    for sensor in Sensor::ALL {
+    for &sensor in &analysis.sensors {
         let triad = analysis.triads.get(sensor);
         let name = sensor.name();
         for (axis, letter) in triad.axes.iter().zip(AXES) {
@@ -118,7 +118,7 @@ fn unlike(triad: &TriadNoise, sensor: Sensor) -> Option<String> {
 /// Of each slope that a triad does not show: what it is below, and how it could be seen.
 pub(super) fn advice(analysis: &NoiseAnalysis) -> Vec<String> {
     let mut sentences = Vec::new();
-    for sensor in Sensor::ALL {
+    for &sensor in &analysis.sensors {
         let mean = &analysis.triads.get(sensor).mean;
         let found = |process| of_kind(mean.found(), process).is_some();
         for &Hidden { process, limit } in mean.hidden() {

@@ -422,7 +422,7 @@ fn missing_damaged_and_foreign_files_have_their_message() {
     fs::write(at("run.toml"), RUN.replace("imu.csv", "imu.csv.gz")).unwrap();
     fs::write(at("imu.csv.gz"), &whole).unwrap();
     assert!(Run::read(&at("run.toml")).is_ok());
-    for damaged in [&whole[..whole.len() / 2], &flipped, b"t,gx\n1,2\n"] {
+    for damaged in [&whole[..whole.len() / 2], &flipped] {
         fs::write(at("imu.csv.gz"), damaged).unwrap();
         assert_says(&error(), "imu.csv.gz", "damaged or cut off");
     }
@@ -432,7 +432,12 @@ fn missing_damaged_and_foreign_files_have_their_message() {
     assert_says(&error(), "imu.csv", "`gx` named for two & run.toml");
 
     fs::write(at("run.toml"), RUN.replace("imu.csv", "imu.mat")).unwrap();
-    assert_says(&error(), "imu.mat", ".csv & .txt & .gz");
+    assert_says(&error(), "imu.mat", "cannot open & relative to run.toml");
+    fs::write(at("imu.mat"), b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR").unwrap();
+    assert_says(&error(), "imu.mat", "of another kind & rows of text");
+    // What a file holds counts, not how it is called.
+    fs::write(at("imu.mat"), imu()).unwrap();
+    assert!(Run::read(&at("run.toml")).is_ok());
     fs::write(at("run.toml"), [0xff, 0xfe]).unwrap();
     assert_says(&error(), "run.toml", "cannot read");
     fs::remove_file(at("run.toml")).unwrap();

@@ -105,7 +105,13 @@ fn without_a_time_turns_tell_the_unit_that_has_a_usual_rate() {
     fs::write(&path, "wx,wy,wz,fx,fy,fz\n".to_owned() + &rows).unwrap();
     let text = Draft::of_file(&path).unwrap().to_toml("log.csv");
     let why = "gyro_unit = \"rad/s\"  # gravity turns as far at about ";
-    has(&text, &[why, "# sample_period_s =  # TODO"]);
+    has(
+        &text,
+        &[
+            why,
+            "# no column goes forward like a time: the period of the rows is found from the turns",
+        ],
+    );
     let rate = text.split(why).nth(1).unwrap().split(' ').next().unwrap();
     let rate: f64 = rate.parse().unwrap();
     assert!((rate - 100.0).abs() < 5.0, "{rate} Hz");

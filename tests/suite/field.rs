@@ -1,0 +1,456 @@
+//! Logs from the field: real ones, and ones rebuilt from public reports with a known truth.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use turncal::formats::Opened;
+use turncal::formats::draft::{Draft, Stated};
+use turncal::noise::conventions::convert;
+use turncal::run::Run;
+
+use crate::shared::shared;
+
+/// Gyro K − 1 and D in °/s, accelerometer K − 1 and D in m/s² of the rebuilt logs.
+const TRUTH: [[f64; 3]; 4] = [
+    [0.012, -0.009, 0.006],
+    [0.8, -0.5, 0.3],
+    [0.008, -0.006, 0.015],
+    [0.12, -0.2, 0.31],
+];
+
+const DEGREES: f64 = 180.0 / std::f64::consts::PI;
+
+fn file(case: &str, name: &str) -> Option<PathBuf> {
+    Some(shared(&format!("field/{case}"))?.join(name))
+}
+
+fn draft(log: &Path) -> String {
+    let draft = Draft::of_file(log).unwrap_or_else(|error| panic!("{error}"));
+    draft.to_toml("log")
+}
+
+fn opened(log: &Path, stated: &Stated) -> Run {
+    let opened = Opened::new(log, None, stated);
+    opened.unwrap_or_else(|error| panic!("{error}")).run
+}
+
+fn has(text: &str, lines: &[&str]) {
+    for line in lines {
+        let is_there = text.lines().any(|found| found.starts_with(line));
+        assert!(is_there, "no `{line}` in\n{text}");
+    }
+}
+
+fn assert_rate(run: &Run, hertz: f64) {
+    let found = run.recording.imu.period.recip();
+    assert!((found / hertz - 1.0).abs() < 2e-3, "{found} Hz");
+}
+
+/// What the closed form makes of a log alone is the truth of the rebuilt ones.
+fn assert_calibrates(log: &Path, further: &[&str]) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_turncal"));
+    command
+        .arg("calibrate")
+        .arg(log)
+        .args(["--method", "six-position", "--json"])
+        .args(further);
+    let output = command.output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{message}");
+    let result: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    for (of, sensor, degrees) in [(0, "gyro", DEGREES), (2, "accel", 1.0)] {
+        for axis in 0..3 {
+            let number = |path: &str| {
+                result
+                    .pointer(&format!("{path}/{axis}"))
+                    .unwrap()
+                    .as_f64()
+                    .unwrap()
+            };
+            let nominal = number(&format!("/provenance/nominal/{sensor}"));
+            for (quantity, zero, unit, truth) in [
+                ("scale", 1.0, 1.0, TRUTH[of]),
+                ("bias", 0.0, degrees, TRUTH[of + 1]),
+            ] {
+                let found = unit * (number(&format!("/{sensor}/{quantity}")) / nominal - zero);
+                let sigma = unit * number(&format!("/sigma/{sensor}/{quantity}")) / nominal;
+                let off = (found - truth[axis]) / sigma;
+                assert!(
+                    off.abs() < 4.0,
+                    "{sensor} {quantity} {axis}: {found} ± {sigma}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_date_and_a_time_of_day_over_midnight_and_a_banner_in_place_of_names() {
+    for (name, columns) in [
+        (
+            "ola.txt",
+            "columns = { time = \"rtcTime\", gyro = [\"gX\", \"gY\", \"gZ\"], accel = [\"aX\", ",
+        ),
+        (
+            "ola_banner.txt",
+            "columns = { time = \"2\", gyro = [\"6\", \"7\", \"8\"], accel = [\"3\", \"4\", \"5\"]",
+        ),
+    ] {
+        let Some(log) = file("b01-openlog-artemis", name) else {
+            continue;
+        };
+        let text = draft(&log);
+        has(
+            &text,
+            &[
+                "gyro_unit = \"deg/s\"",
+                "accel_unit = \"mg\"",
+                "# sample_period_s = 0.01 ",
+                columns,
+            ],
+        );
+        assert_rate(&opened(&log, &Stated::default()), 100.0);
+    }
+}
+
+#[test]
+fn the_log_of_a_camera_has_its_scales_before_its_names() {
+    for name in ["log.gcsv", "log_renamed.csv"] {
+        let Some(log) = file("b02-gyroflow-gcsv", name) else {
+            continue;
+        };
+        let text = draft(&log);
+        has(
+            &text,
+            &[
+                "gyro_unit = \"count\"  # as the file says",
+                "accel_unit = \"count\"  # as the file says",
+                "time_unit = \"ms\"  # as the file says",
+                "scale = 818.5115",
+                "scale = 208.838",
+                "columns = { time = \"t\", gyro = [\"gx\", \"gy\", \"gz\"], accel = [\"ax\", \"ay\", \"az\"] }",
+            ],
+        );
+        let run = opened(&log, &Stated::default());
+        assert_rate(&run, 100.0);
+        let said = run.recording.notes.join("\n");
+        assert!(said.contains("orientation YxZ"), "{said}");
+    }
+}
+
+#[test]
+fn rows_that_come_in_bursts_and_stamps_that_repeat_have_the_rate_of_samples() {
+    let cases = [
+        (
+            "b07-gyro-factor-2.5-mirror",
+            "burst.csv",
+            "time = \"stamp\"",
+        ),
+        (
+            "b10-zed-repeated-stamps",
+            "zed.csv",
+            "time = \"timestamp_ns\"",
+        ),
+    ];
+    for (case, name, time) in cases {
+        let Some(log) = file(case, name) else {
+            continue;
+        };
+        let text = draft(&log);
+        has(
+            &text,
+            &[
+                "gyro_unit = \"rad/s\"",
+                "accel_unit = \"m/s^2\"",
+                &format!("columns = {{ {time}"),
+            ],
+        );
+        assert_rate(&opened(&log, &Stated::default()), 400.0);
+    }
+}
+
+#[test]
+fn accelerometers_that_give_gravity_are_remarked() {
+    let Some(log) = file("b09-ios-gravity-sign", "ios.csv") else {
+        return;
+    };
+    let text = draft(&log);
+    assert!(text.contains("az is negative"), "{text}");
+    assert!(
+        text.contains("iOS") && text.contains("[\"-ax\", \"-ay\", \"-az\"]"),
+        "{text}"
+    );
+}
+
+#[test]
+fn units_of_noise_are_read_as_data_sheets_and_programs_write_them() {
+    for (value, unit, rate, expected, si) in [
+        (0.66, "deg/sqrt(hr)", None, 1.920e-4, "rad/s/√Hz"),
+        (0.23, "mg/sqrt(Hz)", None, 2.256e-3, "m/s²/√Hz"),
+        (60.0, "µg/√Hz", None, 5.884e-4, "m/s²/√Hz"),
+        (2.127e-3, "rad/s", Some(400.0), 1.063e-4, "rad/s/√Hz"),
+        (0.0135, "deg/sec/sqrt(Hz)", None, 2.356e-4, "rad/s/√Hz"),
+        (
+            0.001_947_4,
+            "deg/s/s/sqrt(Hz)",
+            None,
+            3.399e-5,
+            "rad/s²/√Hz",
+        ),
+        (0.000_250_9, "m/s^2/s/sqrt(Hz)", None, 2.509e-4, "m/s³/√Hz"),
+        (3.8, "mdps/rtHz", None, 6.63e-5, "rad/s/√Hz"),
+    ] {
+        let conversion = convert(value, unit, rate).unwrap_or_else(|error| panic!("{error}"));
+        let line = conversion.lines.iter().find(|(_, row)| row.unit == si);
+        let found = line.unwrap_or_else(|| panic!("no {si} of {unit}")).0;
+        assert!((found / expected - 1.0).abs() < 1e-3, "{unit}: {found}");
+    }
+}
+
+#[test]
+fn rows_that_a_tag_tells_apart_are_streams_with_clocks_of_their_own() {
+    let cases = [
+        (
+            "gnsslogger.txt",
+            "UncalGyro",
+            "UncalAccel",
+            "UncalGyroXRadPerSec",
+            "utcTimeMillis",
+        ),
+        ("tagged.txt", "2", "1", "3", "2"),
+    ];
+    for (name, gyro, accel, first, time) in cases {
+        let Some(log) = file("b18-rows-tagged-by-sensor", name) else {
+            continue;
+        };
+        let text = draft(&log);
+        has(
+            &text,
+            &[
+                &format!("stream = \"{gyro}\""),
+                &format!(
+                    "accel_from = {{ stream = \"{accel}\", time = \"{time}\", time_unit = \"ms\" }}"
+                ),
+                "gyro_unit = \"rad/s\"",
+                "accel_unit = \"m/s^2\"",
+                "time_unit = \"ms\"",
+                &format!("columns = {{ time = \"{time}\", gyro = [\"{first}\", "),
+            ],
+        );
+        assert_rate(&opened(&log, &Stated::default()), 100.0);
+    }
+}
+
+#[test]
+fn where_names_show_one_triad_numbers_show_the_other() {
+    let Some(log) = file("b19-kalibr-bag-csv", "kalibr.csv") else {
+        return;
+    };
+    has(
+        &draft(&log),
+        &[
+            "gyro_unit = \"rad/s\"",
+            "accel_unit = \"m/s^2\"",
+            "time_unit = \"ns\"",
+            "columns = { time = \"timestamp\", gyro = [\"omega_x\", \"omega_y\", \"omega_z\"], accel = [\"alpha_x\", \
+             \"alpha_y\", \"alpha_z\"] }",
+        ],
+    );
+    assert_rate(&opened(&log, &Stated::default()), 100.0);
+}
+
+#[test]
+fn of_four_lines_of_names_the_columns_with_units_are_taken() {
+    for (name, time) in [
+        ("shimmer.csv", "Timestamp CAL"),
+        ("shimmer_without_line1.csv", "Timestamp CAL"),
+    ] {
+        let Some(log) = file("r05-shimmer3-four-header-lines", name) else {
+            continue;
+        };
+        has(
+            &draft(&log),
+            &[
+                "gyro_unit = \"deg/s\"  # as the file says",
+                "accel_unit = \"m/s^2\"  # as the file says",
+                "time_unit = \"ms\"  # as the file says",
+                &format!(
+                    "columns = {{ time = \"{time}\", gyro = [\"Gyroscope X CAL\", \"Gyroscope Y CAL\", \"Gyroscope Z \
+                     CAL\"], accel = [\"Wide Range Accelerometer X CAL\", "
+                ),
+            ],
+        );
+        assert_rate(&opened(&log, &Stated::default()), 51.2);
+    }
+}
+
+#[test]
+fn a_fraction_of_a_second_that_lost_its_zeros_is_read_as_a_number() {
+    let Some(log) = file("r06-razor9dof-unpadded-fraction", "razor.csv") else {
+        return;
+    };
+    let run = Run::read(&log.with_file_name("run.toml")).unwrap_or_else(|error| panic!("{error}"));
+    assert!(
+        (run.recording.imu.period / 0.0206 - 1.0).abs() < 5e-3,
+        "{}",
+        run.recording.imu.period
+    );
+    let said = run.recording.notes.join("\n");
+    assert!(said.contains("have lost the zeros before them"), "{said}");
+    has(
+        &draft(&log),
+        &[
+            "columns = { time = \"Time\", gyro = [\"GYRX\", ",
+            "continuous = true  # no gap in time",
+        ],
+    );
+}
+
+#[test]
+fn a_time_is_judged_in_the_rows_of_the_instrument() {
+    let Some(log) = file("r07-microstrain-interleaved-rows", "ab_zplus.csv") else {
+        return;
+    };
+    let text = draft(&log);
+    has(
+        &text,
+        &[
+            "accel_unit = \"g\"",
+            "time_unit = \"ns\"",
+            "columns = { time = \"timestamp\", gyro = [\"scaledGyroX\"",
+        ],
+    );
+    assert!(text.contains("# sample_period_s = 0.00100"), "{text}");
+}
+
+#[test]
+fn a_log_of_one_triad_has_allan_figures_and_no_calibration() {
+    let Some(log) = file("r09-one-triad-only", "gyr_static.mat") else {
+        return;
+    };
+    let turncal = |command: &str| {
+        let mut turncal = Command::new(env!("CARGO_BIN_EXE_turncal"));
+        turncal
+            .arg(command)
+            .arg(&log)
+            .args(["--rate", "100", "--gyro-unit", "deg/s"])
+            .output()
+            .unwrap()
+    };
+    let figures = turncal("allan");
+    let text = String::from_utf8_lossy(&figures.stdout);
+    assert!(
+        figures.status.success() && text.contains("angle random walk") && !text.contains("µg"),
+        "{text}"
+    );
+    let refused = turncal("calibrate");
+    let message = String::from_utf8_lossy(&refused.stderr);
+    assert!(
+        refused.status.code() == Some(1) && message.contains("no columns of accel"),
+        "{message}"
+    );
+}
+
+#[test]
+fn rows_of_standard_input_are_called_so() {
+    let Some(log) = file("b21-formats-that-read", "bno.csv") else {
+        return;
+    };
+    let mut command = Command::new(env!("CARGO_BIN_EXE_turncal"));
+    let output = command
+        .args(["check", "-", "--json"])
+        .write_stdin(fs::read(log).unwrap())
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("\"stdin\""), "{text}");
+}
+
+#[test]
+fn lines_before_the_names_and_tags_behind_them_are_passed_over() {
+    for name in ["microstrain_mip.csv", "microstrain_without_preamble.csv"] {
+        let Some(log) = file("r10-microstrain-preamble", name) else {
+            continue;
+        };
+        has(
+            &draft(&log),
+            &[
+                "accel_unit = \"g\"",
+                "columns = { time = \"GPS TOW\", gyro = [\"X Gyro [x8005]\", \"Y Gyro [x8005]\", \"Z Gyro [x8005]\"], \
+                 accel = [\"X Accel [x8004]\", ",
+                "# sample_period_s = 0.01 ",
+            ],
+        );
+    }
+}
+
+#[test]
+fn formats_that_read_stay_as_they_are() {
+    for (name, time) in [
+        ("bno.csv", "time_ms"),
+        ("euroc.csv", "timestamp [ns]"),
+        ("sensorlog.csv", "accelerometerTimestamp_sinceReboot(s)"),
+        ("two.csv", "Timestamp"),
+    ] {
+        let Some(log) = file("b21-formats-that-read", name) else {
+            continue;
+        };
+        has(&draft(&log), &[&format!("columns = {{ time = \"{time}\"")]);
+        assert_rate(&opened(&log, &Stated::default()), 100.0);
+    }
+}
+
+/// Rows as they are, ended by these, in an encoding of two bytes or one.
+fn rewritten(log: &Path, end: &str, is_wide: bool) -> Vec<u8> {
+    let text = fs::read_to_string(log).unwrap().replace('\n', end);
+    match is_wide {
+        true => "\u{feff}"
+            .chars()
+            .chain(text.chars())
+            .flat_map(|c| (c as u16).to_le_bytes())
+            .collect(),
+        false => text.into_bytes(),
+    }
+}
+
+#[test]
+fn two_bytes_a_letter_and_returns_alone_are_read_and_a_log_is_called_by_its_stem() {
+    let Some(log) = file("b21-formats-that-read", "bno.csv") else {
+        return;
+    };
+    let place = tempfile::tempdir().unwrap();
+    let plain = opened(&log, &Stated::default());
+    assert_eq!(plain.recording.name, "bno");
+    for (end, is_wide) in [("\r", false), ("\r\n", true)] {
+        let copy = place.path().join("other.dat");
+        fs::write(&copy, rewritten(&log, end, is_wide)).unwrap();
+        let read = opened(&copy, &Stated::default());
+        assert_eq!(read.recording.name, "other");
+        assert_eq!(read.recording.imu.accel, plain.recording.imu.accel);
+    }
+}
+
+#[test]
+fn what_is_rebuilt_calibrates_to_its_truth_from_the_log_alone() {
+    for (case, name, further) in [
+        ("b01-openlog-artemis", "ola.txt", vec![]),
+        ("b01-openlog-artemis", "ola_banner.txt", vec![]),
+        ("b02-gyroflow-gcsv", "log.gcsv", vec![]),
+        ("b07-gyro-factor-2.5-mirror", "burst.csv", vec![]),
+        (
+            "b08-sample-period-factor-2",
+            "notime.csv",
+            vec!["--rate", "100"],
+        ),
+        ("b10-zed-repeated-stamps", "zed.csv", vec![]),
+        ("b18-rows-tagged-by-sensor", "gnsslogger.txt", vec![]),
+        ("b18-rows-tagged-by-sensor", "tagged.txt", vec![]),
+        ("b19-kalibr-bag-csv", "kalibr.csv", vec![]),
+    ] {
+        let Some(log) = file(case, name) else {
+            continue;
+        };
+        assert_calibrates(&log, &further);
+    }
+}
