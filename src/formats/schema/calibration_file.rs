@@ -133,8 +133,8 @@ impl Calibration {
             for name in names {
                 let expected = || {
                     let known = known.iter().map(String::as_str);
-                    let advice = suggestion(name, known, "This form does not have it.");
-                    format!("names of parameters of the {} form. {advice}", form.name())
+                    let advice = suggestion(name, known, "this form does not have it");
+                    format!("names of parameters of the {} form ({advice})", form.name())
                 };
                 expect!(known.contains(name), expected(), "`{name}` in {field}");
                 expect!(seen.insert(name), "every parameter once", "`{name}` twice");

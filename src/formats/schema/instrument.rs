@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::{Document, ImuFile, OneOrThree, PriorFile, RunFile, TermFile};
+use super::{Document, ImuFile, Names, OneOrThree, PriorFile, RunFile, TermFile};
 use crate::formats::clock::{Breaks, Clock};
 use crate::formats::error::{FileError, list, suggestion};
 use crate::formats::imu_log::ImuLog;
@@ -75,7 +75,7 @@ impl<'a> InstrumentFields<'a> {
         };
         let without_period = with_usual_period(document, run, &mut of_gyro)?;
         let columns = &imu.columns;
-        let names = |names: &'a [String; 3]| names.each_ref().map(String::as_str);
+        let names = |Names(names): &'a Names<3>| names.each_ref().map(String::as_str);
         let log = ImuLog {
             source,
             clock: of_gyro,
