@@ -37,7 +37,8 @@ type Checked = Result<(), Wrong>;
 /// Refuses what does not hold.
 macro_rules! expect {
     ($holds:expr, $expected:expr, $($found:tt)+) => {
-        if !$holds {
+        let holds: bool = $holds;
+        if !holds {
             return Err((format!($($found)+), $expected.to_string()));
         }
     };
