@@ -193,7 +193,7 @@ impl Parts {
     }
 
     /// Name and part of every unit of a lot, in its order.
-    pub fn units<'a>(&'a self) -> Vec<(&'a str, &'a Path)> {
+    pub fn units(&self) -> Vec<(&str, &Path)> {
         let mut all = self.held();
         all.sort();
         let unit = |(run, directory)| {

@@ -86,7 +86,7 @@ impl<'a> AttitudeColumns<&'a str> {
         };
         let quaternion = quaternion.as_ref();
         Ok(Self {
-            quaternion: quaternion.map(|names| names.each_ref().map(String::as_str)),
+            quaternion: quaternion.map(|names| names.0.each_ref().map(String::as_str)),
             angles,
         })
     }

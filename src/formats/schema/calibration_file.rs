@@ -37,7 +37,8 @@ type Checked = Result<(), Wrong>;
 /// Refuses what does not hold.
 macro_rules! expect {
     ($holds:expr, $expected:expr, $($found:tt)+) => {
-        if !$holds {
+        let holds: bool = $holds;
+        if !holds {
             return Err((format!($($found)+), $expected.to_string()));
         }
     };
@@ -133,8 +134,8 @@ impl Calibration {
             for name in names {
                 let expected = || {
                     let known = known.iter().map(String::as_str);
-                    let advice = suggestion(name, known, "This form does not have it.");
-                    format!("names of parameters of the {} form. {advice}", form.name())
+                    let advice = suggestion(name, known, "this form does not have it");
+                    format!("names of parameters of the {} form ({advice})", form.name())
                 };
                 expect!(known.contains(name), expected(), "`{name}` in {field}");
                 expect!(seen.insert(name), "every parameter once", "`{name}` twice");

@@ -20,7 +20,10 @@ const MEANINGS: [(&str, &str); 19] = [
     ("format", "the format of this file"),
     ("gyro", "the names of three columns, or of one"),
     ("gyro_unit", "the unit of a row"),
-    ("imu", "a table of the instrument and its record"),
+    (
+        "imu",
+        "a table of the instrument, its file and what that holds",
+    ),
     (
         "number",
         "what the column says of the instrument that is meant",
@@ -39,12 +42,11 @@ const MEANINGS: [(&str, &str); 19] = [
     ("uncertainty", "the expanded uncertainty, k = 2"),
 ];
 /// What serde expects, in words for users.
-const KINDS: [(&str, &str); 5] = [
+const KINDS: [(&str, &str); 4] = [
     ("f64", "a finite number"),
     ("a string", "a text in quotes"),
     ("a boolean", "true or false"),
     ("a map", "a table"),
-    ("an array of length 3", "three texts in quotes, in brackets"),
 ];
 
 /// The text that spans refer to.
@@ -159,6 +161,10 @@ impl<'a> Document<'a> {
             ("", None) => "a value",
             _ => meaning,
         };
+        if meaning.starts_with("a table") {
+            let found = format_args!("no [{name}]{}", within(table));
+            return self.error(span, found, meaning, format_args!("Add [{name}]."));
+        }
         let found = format_args!("no `{name}`{}", within(table));
         self.error(span, found, meaning, format_args!("Add `{name}`."))
     }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::{Document, ImuFile, OneOrThree, PriorFile, RunFile, TermFile};
+use super::{Document, ImuFile, Names, OneOrThree, PriorFile, RunFile, TermFile};
 use crate::formats::clock::{Breaks, Clock};
 use crate::formats::error::{FileError, list, suggestion};
 use crate::formats::imu_log::ImuLog;
@@ -76,7 +76,7 @@ impl<'a> InstrumentFields<'a> {
         let without_period = with_usual_period(document, run, &mut of_gyro)?;
         let columns = &imu.columns;
         let names = |sensor| match columns_of(imu, sensor) {
-            Some(names) => names.each_ref().map(String::as_str),
+            Some(Names(names)) => names.each_ref().map(String::as_str),
             None => [""; 3],
         };
         let log = ImuLog {
@@ -251,7 +251,7 @@ fn noise(
 }
 
 /// The columns of a triad, if it is there.
-fn columns_of(imu: &ImuFile, sensor: Sensor) -> Option<&[String; 3]> {
+fn columns_of(imu: &ImuFile, sensor: Sensor) -> Option<&Names<3>> {
     match sensor {
         Sensor::Gyro => imu.columns.gyro.as_ref(),
         Sensor::Accel => imu.columns.accel.as_ref(),

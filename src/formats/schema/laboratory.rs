@@ -6,7 +6,7 @@ use serde::Deserialize;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::{Document, Finite, NonNegative};
+use super::{Document, Finite, Names, NonNegative};
 use crate::certificate::{Condition, Contact, Day, DecisionRule, Equipment, Laboratory, Place};
 use crate::formats::error::{FileError, Place as At, list};
 use crate::formats::small_file;
@@ -116,7 +116,7 @@ struct TraceabilityFile {
     statement: String,
     /// Name, serial number and certificate of each.
     #[serde(default)]
-    equipment: Vec<[String; 3]>,
+    equipment: Vec<Names<3>>,
 }
 
 #[derive(Deserialize)]
@@ -155,7 +155,7 @@ impl Laboratory {
         }
         let file: Result<LaboratoryFile, FileError> = document.fill(table.clone());
         // All that is missing is named at once, unless another error comes first.
-        if !matches!(&file, Err(error) if !error.message.starts_with("found no `")) {
+        if !matches!(&file, Err(error) if !error.message.starts_with("found no ")) {
             check_complete(path, table.get_ref(), &of_item)?;
         }
         let file = file?;
@@ -245,7 +245,7 @@ impl LaboratoryFile {
             value: of.value.0,
             uncertainty: of.uncertainty.0,
         };
-        let equipment = |[name, serial, certificate]: [String; 3]| Equipment {
+        let equipment = |Names([name, serial, certificate])| Equipment {
             name,
             serial,
             certificate,

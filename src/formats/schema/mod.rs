@@ -19,6 +19,7 @@ pub use document::Document;
 pub use instrument::term_sigma;
 pub use run::*;
 pub use values::{
-    Angle, Celsius, Finite, Gravity, Height, Latitude, Longitude, NonNegative, OneOrThree, Positive,
+    Angle, Celsius, Finite, Gravity, Height, Latitude, Longitude, Milligals, Names, NonNegative,
+    OneOrThree, Positive,
 };
 pub use write::{write_rows, write_run};

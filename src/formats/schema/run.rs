@@ -7,7 +7,8 @@ use toml::Spanned;
 
 use super::axes::BodyAxes;
 use super::values::{
-    Angle, Finite, Gravity, Height, Latitude, Longitude, NonNegative, OneOrThree, Positive,
+    Angle, Finite, Gravity, Height, Latitude, Longitude, Milligals, Names, NonNegative, OneOrThree,
+    Positive,
 };
 use crate::formats::clock::TimeUnit;
 use crate::formats::imu_log::TimeStamp;
@@ -51,7 +52,7 @@ pub struct SiteFile {
     pub height_m: Option<Height>,
     /// Its digits are its accuracy where none is stated.
     pub gravity_m_s2: Option<Spanned<Gravity>>,
-    pub gravity_sigma_mgal: Option<NonNegative>,
+    pub gravity_sigma_mgal: Option<Milligals>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -108,8 +109,8 @@ pub struct InstanceFile {
 #[serde(deny_unknown_fields)]
 pub struct ImuColumns {
     pub time: Option<TimeColumn>,
-    pub gyro: Option<[String; 3]>,
-    pub accel: Option<[String; 3]>,
+    pub gyro: Option<Names<3>>,
+    pub accel: Option<Names<3>>,
     pub temperature: Option<TemperatureColumn>,
 }
 
@@ -216,7 +217,7 @@ impl TurntableFile {
 #[serde(deny_unknown_fields)]
 pub struct TableColumns {
     pub time: TimeColumn,
-    pub quaternion: Option<[String; 4]>,
+    pub quaternion: Option<Names<4>>,
     pub angles: Option<Vec<String>>,
     pub axes: Option<Vec<String>>,
 }

@@ -12,8 +12,12 @@ use crate::formats::imu_log::TimeStamp;
 use crate::formats::inputs::temperature::TemperatureUnit;
 
 /// Squares and quotients of such numbers are still numbers.
-fn has_size(value: f64) -> bool {
-    value == 0.0 || (1e-30..=1e30).contains(&value.abs())
+fn with_size(value: f64) -> Result<f64, &'static str> {
+    match value {
+        _ if !value.is_finite() => Err("a finite number"),
+        _ if value == 0.0 || (1e-30..=1e30).contains(&value.abs()) => Ok(value),
+        _ => Err("a number whose magnitude is from 1e-30 to 1e30"),
+    }
 }
 
 macro_rules! checked {
@@ -28,10 +32,9 @@ macro_rules! checked {
 
             fn try_from(value: f64) -> Result<Self, Self::Error> {
                 let holds: fn(f64) -> bool = $holds;
-                match has_size(value) {
-                    true if holds(value) => Ok(Self(value)),
-                    true => Err($says),
-                    false => Err("a finite number, 0 or of magnitude 1e-30 to 1e30"),
+                match holds(with_size(value)?) {
+                    true => Ok(Self(value)),
+                    false => Err($says),
                 }
             }
         }
@@ -63,6 +66,8 @@ checked!(
     Height, "a height from -500 to 9000", |v| (-500.0..=9000.0).contains(&v);
     /// m/s²
     Gravity, "a number from 9.7 to 9.9", |v| (9.7..=9.9).contains(&v);
+    /// 1σ of gravity, mGal.
+    Milligals, "a number from 0 to 100000", |v| (0.0..=1e5).contains(&v);
     /// A temperature that an instrument may have, °C.
     Celsius, "a number from -100 to 100", |v| v.abs() <= 100.0;
 );
@@ -87,6 +92,28 @@ impl OneOrThree {
 impl From<Vector3<f64>> for OneOrThree {
     fn from(v: Vector3<f64>) -> Self {
         Self::Three([Finite(v.x), Finite(v.y), Finite(v.z)])
+    }
+}
+
+/// So many names of columns.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(try_from = "Vec<String>", into = "Vec<String>")]
+pub struct Names<const N: usize>(pub [String; N]);
+
+impl<const N: usize> TryFrom<Vec<String>> for Names<N> {
+    type Error = &'static str;
+
+    fn try_from(names: Vec<String>) -> Result<Self, Self::Error> {
+        names.try_into().map(Self).map_err(|_| match N {
+            4 => "four columns, in the order w, x, y, z",
+            _ => "three texts in quotes",
+        })
+    }
+}
+
+impl<const N: usize> From<Names<N>> for Vec<String> {
+    fn from(names: Names<N>) -> Self {
+        names.0.into()
     }
 }
 

@@ -9,9 +9,9 @@ use nalgebra::Vector3;
 use toml::Spanned;
 
 use super::{
-    Angle, FORMAT, Gravity, Height, ImuColumns, ImuFile, Latitude, Longitude, META, NonNegative,
-    Positive, PriorFile, PriorsFile, RunFile, SegmentsFile, SiteFile, StandstillFile, TableColumns,
-    TemperatureColumn, TermFile, TimeColumn, TurntableFile,
+    Angle, FORMAT, Gravity, Height, ImuColumns, ImuFile, Latitude, Longitude, META, Milligals,
+    Names, NonNegative, Positive, PriorFile, PriorsFile, RunFile, SegmentsFile, SiteFile,
+    StandstillFile, TableColumns, TemperatureColumn, TermFile, TimeColumn, TurntableFile,
 };
 use crate::calibration::Calibration;
 use crate::earth::Site;
@@ -308,7 +308,7 @@ fn site_file(site: &Site) -> SiteFile {
         longitude_deg: known(short(site.longitude / DEGREE)).map(Longitude),
         height_m: known(site.height).map(Height),
         gravity_m_s2: Some(Spanned::new(0..0, Gravity(site.gravity))),
-        gravity_sigma_mgal: Some(NonNegative(short(site.gravity_sigma / MILLIGAL))),
+        gravity_sigma_mgal: Some(Milligals(short(site.gravity_sigma / MILLIGAL))),
     }
 }
 
@@ -340,8 +340,8 @@ fn imu_file(run: &Run, output: Output) -> ImuFile {
         body_axes: None,
         columns: ImuColumns {
             time: Some(TimeColumn::One(name("t"))),
-            gyro: Some(["gx", "gy", "gz"].map(name)),
-            accel: Some(["ax", "ay", "az"].map(name)),
+            gyro: Some(Names(["gx", "gy", "gz"].map(name))),
+            accel: Some(Names(["ax", "ay", "az"].map(name))),
             temperature: (imu.temperature.as_ref())
                 .map(|_| TemperatureColumn::One(name("temperature"))),
         },
@@ -417,7 +417,7 @@ fn turntable_file(run: &Run) -> TurntableFile {
         sample_period_s: None,
         columns: TableColumns {
             time: TimeColumn::One("t".to_owned()),
-            quaternion: Some(["qw", "qx", "qy", "qz"].map(str::to_owned)),
+            quaternion: Some(Names(["qw", "qx", "qy", "qz"].map(str::to_owned))),
             angles: letters
                 .as_ref()
                 .map(|letters| owned(&ANGLES[..letters.len()])),

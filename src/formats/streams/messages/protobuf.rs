@@ -44,7 +44,7 @@ impl Message {
                 return;
             }
             let name = format!("{prefix}{}", field.name());
-            let path = [path, &[field.clone()]].concat();
+            let path = [path, std::slice::from_ref(&field)].concat();
             let unit = match field.kind() {
                 Kind::String | Kind::Bytes => continue,
                 Kind::Message(inner) if is_time(&inner) => "s",
