@@ -31,6 +31,7 @@ use crate::formats::instrument::USUAL_PERIOD;
 use crate::formats::source::Source;
 use crate::formats::{FileError, Place, Sheet, write_rows};
 use crate::imu::{PerSensor, Sensor};
+use crate::noise::{Clusters, TriadNoise};
 use columns::Columns;
 pub use found::{Certainty, Found};
 use motion::Motion;
@@ -42,6 +43,8 @@ use units::Quantities;
 
 /// Fewer rows than a run may have show nothing.
 const FEWEST_ROWS: usize = 100;
+/// Fewer samples at rest show no noise.
+const FEWEST_AT_REST: usize = 64;
 
 /// What a log shows of the instrument and its record.
 #[derive(Debug, Clone, PartialEq)]
@@ -274,28 +277,23 @@ fn points_down(accel: &[Vector3<f64>], period: f64) -> Option<usize> {
     (0..3).find(|&axis| force[axis] < -0.9 * force.norm())
 }
 
-/// White noise of both triads in the longest rest, by how means of windows differ.
+/// White noise of both triads in the longest rest, as `turncal allan` finds it.
 fn white_noise(
     triads: &PerSensor<Vec<Vector3<f64>>>,
     motion: &Motion,
     quantities: &Quantities,
     period: Option<f64>,
 ) -> Option<PerSensor<Option<f64>>> {
-    let period = period?;
-    let length = ((motion::WINDOW / period).round() as usize).max(1);
-    let walk = |samples: &[Vector3<f64>], (times, fewest): (usize, usize)| {
-        let means = motion::means(samples, times * length);
-        let sigma = motion::noise(&means) * quantities.per_second(period);
-        let shows = means.len() >= fewest && sigma > 0.0;
-        shows.then_some(sigma * ((times * length) as f64 * period).sqrt())
+    let (period, rest) = (period?, motion.longest_rest.clone());
+    let clusters = Clusters::new(rest.len(), period);
+    let seconds = period * quantities.per_second(period);
+    let of = |sensor: Sensor| {
+        let rows = triads.get(sensor)[rest.clone()].iter();
+        let increments: Vec<Vector3<f64>> = rows.map(|row| row * seconds).collect();
+        let figures = TriadNoise::new(&increments, period, &clusters).figures();
+        figures.map(|figures| figures.noise.random_walk)
     };
-    Some(PerSensor::from_fn(|sensor| {
-        let samples = &triads.get(sensor)[motion.longest_rest.clone()];
-        // Steps of the output look like more noise in short windows.
-        let lengths = [(1, 8), (4, 24), (16, 24)];
-        let walks = lengths.into_iter().filter_map(|of| walk(samples, of));
-        walks.reduce(f64::min)
-    }))
+    (rest.len() >= FEWEST_AT_REST).then(|| PerSensor::from_fn(of))
 }
 
 /// Of the gyros, and of accelerometers in the same stream.

@@ -62,7 +62,7 @@ fn level<'a>(vectors: impl Iterator<Item = &'a Vector3<f64>> + Clone) -> Vector3
 }
 
 /// 1σ of the noise of means of windows, from how they differ from one to the next.
-pub(super) fn noise(means: &[Vector3<f64>]) -> f64 {
+fn noise(means: &[Vector3<f64>]) -> f64 {
     let differences = means.windows(2).map(|pair| pair[1] - pair[0]);
     let mut changes: Vec<f64> = differences
         .flat_map(|d| <[f64; 3]>::from(d.abs()))
