@@ -196,8 +196,8 @@ fn a_calibration_without_convergence_is_written_whole_and_fails() {
     let stated = |line: &str| {
         let wrong = [
             ("gravity_m_s2", "9.7"),
-            ("angle_random_walk_deg_per_sqrt_h", "1e-6"),
-            ("velocity_random_walk_ug_per_sqrt_hz", "1e-2"),
+            ("angle_random_walk_deg_per_sqrt_h", "1e-10"),
+            ("velocity_random_walk_ug_per_sqrt_hz", "1e-4"),
             ("position_sigma_arcsec", "1e-2"),
             ("reading_sigma_arcsec", "1e-2"),
         ];
@@ -230,7 +230,10 @@ fn a_calibration_without_convergence_is_written_whole_and_fails() {
 #[test]
 fn wrong_usage_is_status_two_and_names_the_way() {
     for (arguments, way) in [
-        (&["calibrate"][..], "Usage: turncal calibrate <RUN.toml>"),
+        (
+            &["calibrate"][..],
+            "Usage: turncal calibrate <RUN.toml|LOG>",
+        ),
         (
             &["calibrate", "run.toml", "--installation", "four-angle"],
             "general, six-angle, three-angle",

@@ -10,6 +10,7 @@
 mod contradiction;
 mod likelihood;
 mod motion;
+mod rivals;
 mod sensitivity;
 mod statement;
 
@@ -106,6 +107,7 @@ impl Hypotheses {
     }
 
     /// The mountings of some orders.
+    #[inline(never)]
     fn among(
         problem: &Problem,
         run: &Run,

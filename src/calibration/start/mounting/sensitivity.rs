@@ -2,10 +2,12 @@
 
 use std::fmt;
 
-use super::contradiction::NEXT_RANGE;
 use crate::imu::{AXES, Output, Sensor};
 use crate::run::Run;
 use crate::units::{DEGREE, STANDARD_GRAVITY};
+
+/// Half way to the sensitivity of the next range, which differs by two.
+pub const NEXT_RANGE: f64 = std::f64::consts::SQRT_2;
 
 /// A triad of another sensitivity than is stated, or one axis of it.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,0 +1,243 @@
+//! What `run.toml` states and the record contradicts, before any estimate: axes, the sensitivity of a triad, triads whose
+//! columns are exchanged.
+//!
+//! Each statement has rivals, and the likelihood of the motion under each is its weight, as for axes. Another
+//! sensitivity of the gyros is only looked for where they miss a turn.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::contradiction::Contradiction;
+use super::likelihood::TooSmall;
+use super::motion::Motion;
+use super::sensitivity::{Axes, NEXT_RANGE, Sensitivity};
+use super::{FALSE_ALARMS, Hypotheses, Mounting, Part, TOLD_APART};
+use crate::calibration::problem::Problem;
+use crate::imu::{AxisOrder, PerSensor, Sensor};
+use crate::run::Run;
+use crate::statistics::median;
+
+/// Sensitivities from a hundredth to a hundred times the stated one are tried …
+const WIDEST: f64 = 100.0;
+/// … each this many times the one before: what is left of a turn between two is linear.
+const STEP: f64 = 1.1;
+/// Within the widest tolerance of data sheets, 10 %, a stated sensitivity is right however small its prior, half way to
+/// the next range it is wrong however large. Between these it may be this many σ of its prior off.
+const CARELESS: f64 = 10.0;
+const WIDEST_TOLERANCE: f64 = 0.1;
+
+impl Contradiction {
+    /// The first run of a problem that contradicts what is stated of it, if there is one.
+    pub fn of<'a>(problem: &Problem<'a>) -> Option<(&'a Run, Self)> {
+        let mut runs = problem.runs().enumerate();
+        runs.find_map(|(recording, run)| Some((run, Self::of_run(problem, recording, run)?)))
+    }
+
+    fn of_run(problem: &Problem, recording: usize, run: &Run) -> Option<Self> {
+        if let Some(said) = run
+            .observed_table(problem.model.aiding)
+            .and_then(|_| run.table_quaternions())
+        {
+            return Some(Self::Quaternions(said));
+        }
+        let measured = Motion::of(problem, recording, run);
+        let stated = Weighed::of(problem, run, &measured);
+        let gain = |rival: &Run| {
+            let problem = Problem::new(rival, &problem.options);
+            Weighed::of(&problem, rival, &Motion::of(&problem, 0, rival)).above(&stated)
+        };
+        if let Some((axes, factor)) = by_magnitude(run, &measured) {
+            return Some(match gain(&exchanged(run)) > -FALSE_ALARMS.ln() {
+                true => Self::Exchanged,
+                false => Self::Sensitivity(Sensitivity::of(run, Sensor::Accel, axes, vec![factor])),
+            });
+        }
+        let mountings = Hypotheses::of(problem, run, measured);
+        let mounting = Mounting::likeliest(problem, run, &mountings);
+        let misses = mountings.motion.misses_a_turn(WIDEST_TOLERANCE / 2.0);
+        if mounting.is_none() && (stated.is_explained || !misses) {
+            return None;
+        }
+        let limit = mounting
+            .as_ref()
+            .map_or(-FALSE_ALARMS.ln(), |of| of.log_ratio);
+        let sensitivity = Axes::ALL.into_iter().find_map(|axes| {
+            let tried = factors(|factor| {
+                let rival = less_sensitive(run, axes, factor);
+                let motion = Motion::of(problem, recording, &rival);
+                sum(&parts(problem, &rival, &motion, TooSmall::ANY))
+            });
+            let (factor, _) = *tried.first()?;
+            let is_another = is_another(run, Sensor::Gyro, factor);
+            (is_another && gain(&less_sensitive(run, axes, factor)) > limit)
+                .then(|| Sensitivity::of(run, Sensor::Gyro, axes, told_apart(&tried)))
+        });
+        let sensitivity = sensitivity.map(Self::Sensitivity);
+        sensitivity
+            .or(mounting.map(Self::Axes))
+            .or(stated.is_nothing.then_some(Self::Unexplained))
+    }
+}
+
+/// Whether a triad this many times as sensitive as stated has another sensitivity, and not a prior stated too small.
+fn is_another(run: &Run, sensor: Sensor, factor: f64) -> bool {
+    let prior = run.instrument.prior.get(sensor);
+    let mut sigma = prior.scale_sigma.max();
+    if sensor == Sensor::Accel {
+        sigma = sigma.hypot(prior.bias_sigma.max() / run.site.gravity);
+    }
+    factor.ln().abs() > (CARELESS * sigma).clamp(WIDEST_TOLERANCE, NEXT_RANGE.ln())
+}
+
+/// The accelerometers whose specific force at rest is another than gravity, and how many times it is that.
+///
+/// Where the attitudes tell the axes apart, `Σ (f_i / s_i)² = 1` of all dwells gives the sensitivity of each; else the
+/// magnitude gives that of the triad.
+#[inline(never)]
+fn by_magnitude(run: &Run, motion: &Motion) -> Option<(Axes, f64)> {
+    let mut forces: Vec<Vector3<f64>> = motion.rests.iter().map(|rest| rest.accel.found).collect();
+    if forces.is_empty() {
+        let imu = &run.recording.imu;
+        let rates = imu.accel.iter().map(|sample| sample / imu.period);
+        forces = rates.map(|force| force / run.site.gravity).collect();
+    }
+    let is_another = |factor: &f64| is_another(run, Sensor::Accel, *factor);
+    let squares = forces.iter().map(|force| force.component_mul(force));
+    let (normal, right) = squares.clone().fold(
+        (Matrix3::zeros(), Vector3::zeros()),
+        |(normal, right), of| (normal + of * of.transpose(), right + of),
+    );
+    // Of dwells with each axis up and down each is as large as the others.
+    let eigen = normal.symmetric_eigenvalues();
+    let of_axes = (eigen.min() > eigen.max() / WIDEST.powi(2))
+        .then(|| normal.cholesky())
+        .flatten()
+        .map(|normal| {
+            normal
+                .solve(&right)
+                .map(|square| square.max(f64::MIN_POSITIVE).sqrt().recip())
+        });
+    if let Some(each) = of_axes {
+        let others: Vec<usize> = (0..3).filter(|&axis| is_another(&each[axis])).collect();
+        if let [axis] = others[..] {
+            return Some((Axes::One(axis), each[axis]));
+        }
+    }
+    let magnitude = median(&mut forces.iter().map(Vector3::norm).collect::<Vec<_>>())?;
+    is_another(&magnitude).then_some((Axes::All, magnitude))
+}
+
+/// The likeliest factor, and those that are hardly less likely and differ from all before.
+fn told_apart(tried: &[(f64, f64)]) -> Vec<f64> {
+    let mut chosen: Vec<f64> = Vec::new();
+    let hardly_less = tried
+        .iter()
+        .filter(|of| tried[0].1 - of.1 < TOLD_APART.ln());
+    for (factor, _) in hardly_less {
+        if chosen
+            .iter()
+            .all(|of| (of / factor).ln().abs() > NEXT_RANGE.ln())
+        {
+            chosen.push(*factor);
+        }
+    }
+    chosen
+}
+
+/// The gyros' sensitivities that are tried with the logarithm of the likelihood of each, the likeliest first; it is found
+/// to a thousandth.
+fn factors(log_likelihood: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
+    let reach = (WIDEST.ln() / STEP.ln()) as i32;
+    let weighed = |factor| (factor, log_likelihood(factor));
+    let mut tried: Vec<_> = (-reach..=reach).map(|k| weighed(STEP.powi(k))).collect();
+    let mut step = STEP.sqrt();
+    while step > 1.001 {
+        tried.sort_by(|a, b| b.1.total_cmp(&a.1));
+        tried.extend([tried[0].0 / step, tried[0].0 * step].map(weighed));
+        step = step.sqrt();
+    }
+    tried.sort_by(|a, b| b.1.total_cmp(&a.1));
+    tried
+}
+
+/// A run as it is if these gyros are so many times as sensitive as stated.
+#[inline(never)]
+fn less_sensitive(run: &Run, axes: Axes, factor: f64) -> Run {
+    let mut run = run.clone();
+    let by = Vector3::from_fn(|axis, _| match axes {
+        Axes::One(one) if one != axis => 1.0,
+        _ => factor.recip(),
+    });
+    let samples = run.recording.imu.gyro.to_mut();
+    samples
+        .iter_mut()
+        .for_each(|sample| sample.component_mul_assign(&by));
+    let prior = &mut run.instrument.prior.gyro;
+    prior.bias.component_mul_assign(&by);
+    prior.bias_sigma.component_mul_assign(&by);
+    run
+}
+
+/// A run with the columns of its triads exchanged.
+fn exchanged(run: &Run) -> Run {
+    let mut run = run.clone();
+    let nominal = &run.instrument.nominal;
+    let unit = nominal.gyro.0.component_div(&nominal.accel.0);
+    let imu = &mut run.recording.imu;
+    std::mem::swap(&mut imu.gyro, &mut imu.accel);
+    let scaled = |samples: &mut Vec<Vector3<f64>>, by: Vector3<f64>| {
+        samples
+            .iter_mut()
+            .for_each(|sample| sample.component_mul_assign(&by));
+    };
+    scaled(imu.accel.to_mut(), unit);
+    scaled(imu.gyro.to_mut(), unit.map(f64::recip));
+    run
+}
+
+/// What is stated, or a rival of it, weighed by the motion that it makes of a record.
+struct Weighed {
+    /// Logarithm of its likelihood, noise and prior being nearly as they are stated.
+    log_likelihood: f64,
+    /// Whether it is hardly more likely with any other noise and prior, and more than that nothing is as it should be.
+    is_explained: bool,
+    /// Whether no noise and no prior make it likelier than that.
+    is_nothing: bool,
+}
+
+impl Weighed {
+    #[inline(never)]
+    fn of(problem: &Problem, run: &Run, motion: &Motion) -> Self {
+        let parts = |too_small| parts(problem, run, motion, too_small);
+        let is_nothing = |parts: &[Part]| parts.iter().any(|part| part.of < part.none);
+        let (careless, any) = (parts(TooSmall::CARELESS), parts(TooSmall::ANY));
+        let log_likelihood = sum(&careless);
+        Self {
+            log_likelihood,
+            is_explained: !is_nothing(&careless) && sum(&any) - log_likelihood < -FALSE_ALARMS.ln(),
+            is_nothing: is_nothing(&any),
+        }
+    }
+
+    /// Logarithm of how much likelier than another it is, if it explains the motion.
+    fn above(&self, other: &Self) -> f64 {
+        match self.is_explained {
+            true => self.log_likelihood - other.log_likelihood,
+            false => f64::NEG_INFINITY,
+        }
+    }
+}
+
+/// How likely the motion is with the axes that are stated, by all that it is known from.
+#[inline(never)]
+fn parts(problem: &Problem, run: &Run, motion: &Motion, too_small: TooSmall) -> Vec<Part> {
+    // A rate at rest is as large as the factor that is tried makes it: it does not tell factors apart.
+    let mut motion = motion.clone();
+    motion.upward = None;
+    let stated = AxisOrder::IDENTITY;
+    let hypotheses = Hypotheses::among(problem, run, motion, &[stated], too_small);
+    hypotheses.parts(&PerSensor::from_fn(|_| stated))
+}
+
+fn sum(parts: &[Part]) -> f64 {
+    parts.iter().map(|part| part.of).sum()
+}
