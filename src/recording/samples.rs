@@ -250,7 +250,9 @@ impl ImuSamples {
         let faults = self.faults.iter();
         let bridged = faults.filter(|fault| fault.kind == FaultKind::Missing);
         let mut lost: Vec<_> = bridged.map(|fault| fault.samples.clone()).collect();
-        lost.extend(self.missing());
+        let is_new = |missing: &Range<usize>| !lost.contains(missing);
+        let others: Vec<_> = self.missing().filter(is_new).collect();
+        lost.extend(others);
         lost.sort_by_key(|lost| lost.start);
         lost
     }
