@@ -10,7 +10,7 @@ use super::contradiction::Contradiction;
 use super::likelihood::TooSmall;
 use super::motion::Motion;
 use super::sensitivity::{Axes, NEXT_RANGE, Sensitivity};
-use super::{FALSE_ALARMS, Hypotheses, Mounting, Part, TOLD_APART};
+use super::{FALSE_ALARMS, Hypotheses, Mounting, OTHERS, Part, TOLD_APART};
 use crate::calibration::problem::Problem;
 use crate::imu::{AxisOrder, PerSensor, Sensor};
 use crate::run::Run;
@@ -68,8 +68,10 @@ impl Contradiction {
             });
             let (factor, _) = *tried.first()?;
             let is_another = is_another(run, Sensor::Gyro, factor);
-            (is_another && gain(&less_sensitive(run, axes, factor)) > limit)
-                .then(|| Sensitivity::of(run, Sensor::Gyro, axes, told_apart(&tried)))
+            let factors = told_apart(&tried);
+            let is_told = is_another && factors.len() <= 1 + OTHERS;
+            (is_told && gain(&less_sensitive(run, axes, factor)) > limit)
+                .then(|| Sensitivity::of(run, Sensor::Gyro, axes, factors))
         });
         let sensitivity = sensitivity.map(Self::Sensitivity);
         sensitivity
