@@ -16,8 +16,8 @@ use crate::imu::{AxisOrder, PerSensor, Sensor};
 use crate::run::Run;
 use crate::statistics::median;
 
-/// Sensitivities from a hundredth to a hundred times the stated one are tried …
-const WIDEST: f64 = 100.0;
+/// Sensitivities from a tenth to ten times the stated one are tried: further off, samples are too far apart to follow …
+const WIDEST: f64 = 10.0;
 /// … each this many times the one before: what is left of a turn between two is linear.
 const STEP: f64 = 1.1;
 /// Within the widest tolerance of data sheets, 10 %, a stated sensitivity is right however small its prior, half way to
@@ -69,7 +69,8 @@ impl Contradiction {
             let (factor, _) = *tried.first()?;
             let is_another = is_another(run, Sensor::Gyro, factor);
             let factors = told_apart(&tried);
-            let is_told = is_another && factors.len() <= 1 + OTHERS;
+            let most = if mounting.is_some() { 1 } else { 1 + OTHERS };
+            let is_told = is_another && factors.len() <= most;
             (is_told && gain(&less_sensitive(run, axes, factor)) > limit)
                 .then(|| Sensitivity::of(run, Sensor::Gyro, axes, factors))
         });
