@@ -83,7 +83,15 @@ impl Look {
             }
             (fields.len() == count).then_some(fields)
         };
-        let own = || self.fields.clone().ok().and_then(fits);
+        // The words of a sentence are no fields.
+        let is_sentence = self.delimiter == Delimiter::Blanks;
+        let own = || {
+            self.fields
+                .clone()
+                .ok()
+                .filter(|_| !is_sentence)
+                .and_then(fits)
+        };
         delimiter
             .fields(&self.text)
             .ok()

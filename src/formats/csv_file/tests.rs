@@ -186,6 +186,7 @@ fn a_preamble_is_told_from_names_and_rows() {
     let rows = "0,1,2\n1,2,3\n2,3,4\n";
     for (above, names, units) in [
         ("sep=,\nt,gx,ax\n", "t|gx|ax", ""),
+        ("SD online\nNo device there\n", "1|2|3", ""),
         (
             "A LOG\nversion,1.3\ntscale,0.001\ngscale,0.02\nt,gx,ax\n",
             "t|gx|ax",

@@ -138,7 +138,7 @@ fn the_general_form_in_its_own_frame_keeps_its_covariance() {
     let nominal = own_nominal(&record);
     let own = record.covariance_by(&nominal).unwrap();
     let there = canonical(&record, BodyFrame::Table).covariance.unwrap();
-    assert!((there - own).amax() < 1e-10 * own.amax());
+    assert!((there - own).amax() < 1e-12 * own.amax());
 }
 
 /// Moves each own parameter and looks where the canonical ones go.
@@ -208,7 +208,7 @@ fn sigma_alone_stands_for_independent_parameters() {
     let there = canonical(&record, BodyFrame::Table);
     assert!(!there.correlated);
     let there = there.sigma().unwrap();
-    assert!((there[0] - 1.0).abs() < 1e-10 && (there[3] - 1e-6).abs() < 1e-15);
+    assert!((there[0] - 1.0).abs() < 1e-12 && (there[3] - 1e-6).abs() < 1e-15);
     let none = sigma_of_zero(record);
     assert_eq!(canonical(&none, BodyFrame::Table).covariance, None);
 }

@@ -16,7 +16,8 @@ use crate::imu::{AxisOrder, PerSensor, Sensor};
 use crate::run::Run;
 use crate::statistics::median;
 
-/// Sensitivities from a tenth to ten times the stated one are tried: further off, samples are too far apart to follow …
+/// Sensitivities from a tenth to ten times the stated one are tried, which is beyond the next two ranges of an
+/// instrument; units are told apart by their nominal scale as run.toml is read …
 const WIDEST: f64 = 10.0;
 /// … each this many times the one before: what is left of a turn between two is linear.
 const STEP: f64 = 1.1;
@@ -41,12 +42,14 @@ impl Contradiction {
         }
         let measured = Motion::of(problem, recording, run);
         let stated = Weighed::of(problem, run, &measured);
-        let gain = |rival: &Run| {
-            let problem = Problem::new(rival, &problem.options);
-            Weighed::of(&problem, rival, &Motion::of(&problem, 0, rival)).above(&stated)
-        };
         if let Some((axes, factor)) = by_magnitude(run, &measured) {
-            return Some(match gain(&exchanged(run)) > -FALSE_ALARMS.ln() {
+            let exchanged = exchanged(run);
+            let problem = Problem::new(&exchanged, &problem.options);
+            let motion = Motion::of(&problem, 0, &exchanged);
+            let gain = Weighed::of(&problem, &exchanged, &motion).above(&stated);
+            // Without moves there is nothing to explain.
+            let is_told = !motion.moves.is_empty() && motion.moves.len() >= measured.moves.len();
+            return Some(match is_told && gain > -FALSE_ALARMS.ln() {
                 true => Self::Exchanged,
                 false => Self::Sensitivity(Sensitivity::of(run, Sensor::Accel, axes, vec![factor])),
             });
@@ -71,8 +74,12 @@ impl Contradiction {
             let factors = told_apart(&tried);
             let most = if mounting.is_some() { 1 } else { 1 + OTHERS };
             let is_told = is_another && factors.len() <= most;
-            (is_told && gain(&less_sensitive(run, axes, factor)) > limit)
-                .then(|| Sensitivity::of(run, Sensor::Gyro, axes, factors))
+            let gain = || {
+                let rival = less_sensitive(run, axes, factor);
+                let motion = Motion::of(problem, recording, &rival);
+                Weighed::of(problem, &rival, &motion).above(&stated)
+            };
+            (is_told && gain() > limit).then(|| Sensitivity::of(run, Sensor::Gyro, axes, factors))
         });
         let sensitivity = sensitivity.map(Self::Sensitivity);
         sensitivity
