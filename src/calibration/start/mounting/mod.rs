@@ -34,8 +34,8 @@ const OTHERS: usize = 2;
 
 impl Mounting {
     /// The likeliest one, if it is not the one that is stated.
-    fn likeliest(problem: &Problem, run: &Run, hypotheses: &Hypotheses) -> Option<Self> {
-        let motion = &hypotheses.motion;
+    fn likeliest(problem: &Problem, run: &Run, motion: &Motion) -> Option<Self> {
+        let hypotheses = Hypotheses::of(problem, run, motion);
         let (likely, log_ratio) = hypotheses.likely()?;
         let orders = *likely.first()?;
         let is = |sensor| *orders.get(sensor) == AxisOrder::IDENTITY;
@@ -92,7 +92,6 @@ fn prior_sigma(run: &Run) -> ParameterVector {
 
 /// How likely each mounting is.
 struct Hypotheses {
-    motion: Motion,
     /// Of each triad by itself, against what is known of body axes.
     each: PerSensor<Likelihoods>,
     /// Of one triad against the other, as they are and with the gyros reversed.
@@ -101,7 +100,7 @@ struct Hypotheses {
 
 impl Hypotheses {
     /// All mountings of one run of a problem.
-    fn of(problem: &Problem, run: &Run, motion: Motion) -> Self {
+    fn of(problem: &Problem, run: &Run, motion: &Motion) -> Self {
         let orders: Vec<AxisOrder> = AxisOrder::all().collect();
         Self::among(problem, run, motion, &orders, TooSmall::ANY)
     }
@@ -111,7 +110,7 @@ impl Hypotheses {
     fn among(
         problem: &Problem,
         run: &Run,
-        motion: Motion,
+        motion: &Motion,
         orders: &[AxisOrder],
         too_small: TooSmall,
     ) -> Self {
@@ -124,18 +123,14 @@ impl Hypotheses {
             Some(_) => {
                 let base = model.geometry.base.xy().norm();
                 let position_sigma = model.position_sigma.hypot(base);
-                (by_table(&motion, &errors, position_sigma, orders), None)
+                (by_table(motion, &errors, position_sigma, orders), None)
             }
             None => (
-                by_labels(&motion, &errors, orders),
-                Some(by_gravity(&motion, &errors, orders)),
+                by_labels(motion, &errors, orders),
+                Some(by_gravity(motion, &errors, orders)),
             ),
         };
-        Self {
-            motion,
-            each,
-            together,
-        }
+        Self { each, together }
     }
 
     /// The mountings that are hardly less likely than the likeliest, the simplest first, if what is stated is not likely

@@ -42,44 +42,47 @@ impl Contradiction {
         }
         let measured = Motion::of(problem, recording, run);
         let stated = Weighed::of(problem, run, &measured);
+        let beyond_chance = stated.log_likelihood - FALSE_ALARMS.ln();
         if let Some((axes, factor)) = by_magnitude(run, &measured) {
             let exchanged = exchanged(run);
             let problem = Problem::new(&exchanged, &problem.options);
             let motion = Motion::of(&problem, 0, &exchanged);
-            let gain = Weighed::of(&problem, &exchanged, &motion).above(&stated);
             // Without moves there is nothing to explain.
             let is_told = !motion.moves.is_empty() && motion.moves.len() >= measured.moves.len();
-            return Some(match is_told && gain > -FALSE_ALARMS.ln() {
+            let is_likely = || Weighed::of(&problem, &exchanged, &motion).explains(beyond_chance);
+            return Some(match is_told && is_likely() {
                 true => Self::Exchanged,
                 false => Self::Sensitivity(Sensitivity::of(run, Sensor::Accel, axes, vec![factor])),
             });
         }
-        let mountings = Hypotheses::of(problem, run, measured);
-        let mounting = Mounting::likeliest(problem, run, &mountings);
-        let misses = mountings.motion.misses_a_turn(WIDEST_TOLERANCE / 2.0);
+        let mounting = Mounting::likeliest(problem, run, &measured);
+        let misses = measured.misses_a_turn(WIDEST_TOLERANCE / 2.0);
         if mounting.is_none() && (stated.is_explained || !misses) {
             return None;
         }
-        let limit = mounting
-            .as_ref()
-            .map_or(-FALSE_ALARMS.ln(), |of| of.log_ratio);
+        // Three quarters of a turn are a quarter the other way: of what is as likely, axes are named.
+        let least = mounting.as_ref().map_or(beyond_chance, |mounting| {
+            let axes = (TooSmall::CARELESS, mounting.orders);
+            sum(&parts(problem, run, &measured, axes)) + TOLD_APART.ln()
+        });
         let sensitivity = Axes::ALL.into_iter().find_map(|axes| {
-            let tried = factors(|factor| {
+            let rival = |factor| {
                 let rival = less_sensitive(run, axes, factor);
                 let motion = Motion::of(problem, recording, &rival);
-                sum(&parts(problem, &rival, &motion, TooSmall::ANY))
+                (rival, motion)
+            };
+            let tried = factors(|factor| {
+                let (rival, motion) = rival(factor);
+                sum(&parts(problem, &rival, &motion, (TooSmall::ANY, AS_STATED)))
             });
             let (factor, _) = *tried.first()?;
-            let is_another = is_another(run, Sensor::Gyro, factor);
             let factors = told_apart(&tried);
-            let most = if mounting.is_some() { 1 } else { 1 + OTHERS };
-            let is_told = is_another && factors.len() <= most;
-            let gain = || {
-                let rival = less_sensitive(run, axes, factor);
-                let motion = Motion::of(problem, recording, &rival);
-                Weighed::of(problem, &rival, &motion).above(&stated)
+            let is_likely = || {
+                let (rival, motion) = rival(factor);
+                Weighed::of(problem, &rival, &motion).explains(least)
             };
-            (is_told && gain() > limit).then(|| Sensitivity::of(run, Sensor::Gyro, axes, factors))
+            let is_told = factors.len() <= 1 + OTHERS && is_another(run, Sensor::Gyro, factor);
+            (is_told && is_likely()).then(|| Sensitivity::of(run, Sensor::Gyro, axes, factors))
         });
         let sensitivity = sensitivity.map(Self::Sensitivity);
         sensitivity
@@ -217,7 +220,7 @@ struct Weighed {
 impl Weighed {
     #[inline(never)]
     fn of(problem: &Problem, run: &Run, motion: &Motion) -> Self {
-        let parts = |too_small| parts(problem, run, motion, too_small);
+        let parts = |too_small| parts(problem, run, motion, (too_small, AS_STATED));
         let is_nothing = |parts: &[Part]| parts.iter().any(|part| part.of < part.none);
         let (careless, any) = (parts(TooSmall::CARELESS), parts(TooSmall::ANY));
         let log_likelihood = sum(&careless);
@@ -228,24 +231,32 @@ impl Weighed {
         }
     }
 
-    /// Logarithm of how much likelier than another it is, if it explains the motion.
-    fn above(&self, other: &Self) -> f64 {
-        match self.is_explained {
-            true => self.log_likelihood - other.log_likelihood,
-            false => f64::NEG_INFINITY,
-        }
+    /// Whether it explains the motion, and is likelier than this.
+    fn explains(&self, least: f64) -> bool {
+        self.is_explained && self.log_likelihood > least
     }
 }
 
-/// How likely the motion is with the axes that are stated, by all that it is known from.
+const AS_STATED: PerSensor<AxisOrder> = PerSensor {
+    gyro: AxisOrder::IDENTITY,
+    accel: AxisOrder::IDENTITY,
+};
+
+/// How likely the motion is with these axes, by all that it is known from.
 #[inline(never)]
-fn parts(problem: &Problem, run: &Run, motion: &Motion, too_small: TooSmall) -> Vec<Part> {
+fn parts(
+    problem: &Problem,
+    run: &Run,
+    motion: &Motion,
+    (too_small, orders): (TooSmall, PerSensor<AxisOrder>),
+) -> Vec<Part> {
     // A rate at rest is as large as the factor that is tried makes it: it does not tell factors apart.
     let mut motion = motion.clone();
     motion.upward = None;
-    let stated = AxisOrder::IDENTITY;
-    let hypotheses = Hypotheses::among(problem, run, motion, &[stated], too_small);
-    hypotheses.parts(&PerSensor::from_fn(|_| stated))
+    // The first order is as stated.
+    let tried = if orders == AS_STATED { 1 } else { usize::MAX };
+    let all: Vec<AxisOrder> = AxisOrder::all().take(tried).collect();
+    Hypotheses::among(problem, run, &motion, &all, too_small).parts(&orders)
 }
 
 fn sum(parts: &[Part]) -> f64 {
