@@ -109,7 +109,7 @@ impl WholeDirectory {
         self.commit_with(&list)
     }
 
-    /// The same for a directory that grows: see [`list_anew`].
+    /// The same for a directory that grows: see `list_anew`.
     pub fn commit_growing(self, names: &[&str]) -> Result<(), FileError> {
         let list = manifest::of_names(names.iter().copied());
         self.commit_with(&list)
