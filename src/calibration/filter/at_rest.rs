@@ -24,8 +24,9 @@ pub struct Map {
 }
 
 /// The moving states, of this many, that are in `g`: nothing in a dwell depends on the position.
-pub fn begins(moving: usize) -> impl Iterator<Item = usize> {
-    (0..moving).filter(|place| !(POSITION..POSITION + 3).contains(place))
+pub fn begins(moving: usize) -> Vec<usize> {
+    let is_position = |place: &usize| (POSITION..POSITION + 3).contains(place);
+    (0..moving).filter(|place| !is_position(place)).collect()
 }
 
 impl Filter {
@@ -44,7 +45,7 @@ impl Filter {
         let mut given = self.none(size);
         let table = self.table_map(rest);
         let moving = self.moving();
-        for (component, place) in begins(moving.len()).enumerate() {
+        for (component, place) in begins(moving.len()).into_iter().enumerate() {
             given.states[(component, moving[place])] = 1.0;
         }
         let first = size - CONSTANTS;

@@ -45,11 +45,12 @@ impl<const M: usize, const G: usize> DwellFilters for GainCache<M, G> {
 /// two of these, then all.
 pub fn dwell_filters(filter: &Filter) -> Box<dyn DwellFilters> {
     let moving = filter.moving().len();
+    let begins = begins(moving);
     match moving {
-        9 => Box::new(GainCache::<9, 12>::new(begins(moving))),
-        12 => Box::new(GainCache::<12, 15>::new(begins(moving))),
-        15 => Box::new(GainCache::<15, 18>::new(begins(moving))),
-        _ => Box::new(GainCache::<18, 21>::new(begins(moving))),
+        9 => Box::new(GainCache::<9, 12>::new(&begins)),
+        12 => Box::new(GainCache::<12, 15>::new(&begins)),
+        15 => Box::new(GainCache::<15, 18>::new(&begins)),
+        _ => Box::new(GainCache::<18, 21>::new(&begins)),
     }
 }
 

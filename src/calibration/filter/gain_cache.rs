@@ -72,13 +72,13 @@ impl<const M: usize, const G: usize> GainCache<M, G> {
     pub const BEGIN: usize = 0;
 
     /// Component `k` of `g` is the error of the moving state `begins[k]` where a part begins.
-    pub fn new(begins: impl Iterator<Item = usize>) -> Self {
+    pub fn new(begins: &[usize]) -> Self {
         let mut known = Known {
             of_given: [[0.0; G]; M],
             covariance: [[0.0; M]; M],
             information: [[0.0; G]; G],
         };
-        for (component, state) in begins.enumerate() {
+        for (component, &state) in begins.iter().enumerate() {
             known.of_given[state][component] = 1.0;
         }
         Self {
@@ -207,7 +207,7 @@ mod tests {
     }
 
     fn gains() -> GainCache<9, 12> {
-        GainCache::new(0..6)
+        GainCache::new(&[0, 1, 2, 3, 4, 5])
     }
 
     /// Through a step and an observation this many times; where the last one leads.

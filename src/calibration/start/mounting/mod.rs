@@ -106,7 +106,6 @@ impl Hypotheses {
     }
 
     /// The mountings of some orders.
-    #[inline(never)]
     fn among(
         problem: &Problem,
         run: &Run,

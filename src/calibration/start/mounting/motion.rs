@@ -70,7 +70,6 @@ pub struct Motion {
 
 impl Motion {
     /// Whether the gyros miss any turn by more than this part of their way.
-    #[inline(never)]
     pub fn misses_a_turn(&self, part: f64) -> bool {
         self.moves.iter().any(|of| {
             let turned = &of.turns[0].rotation;
@@ -87,7 +86,6 @@ impl Motion {
     }
 
     /// That of the recording with this number.
-    #[inline(never)]
     pub fn of(problem: &Problem, recording: usize, run: &Run) -> Self {
         let stretches = problem.stretches().iter();
         let stretches = stretches.filter(|stretch| stretch.recording == recording);

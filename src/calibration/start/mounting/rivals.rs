@@ -105,7 +105,6 @@ fn is_another(run: &Run, sensor: Sensor, factor: f64) -> bool {
 ///
 /// Where the attitudes tell the axes apart, `Σ (f_i / s_i)² = 1` of all dwells gives the sensitivity of each; else the
 /// magnitude gives that of the triad.
-#[inline(never)]
 fn by_magnitude(run: &Run, motion: &Motion) -> Option<(Axes, f64)> {
     let mut forces: Vec<Vector3<f64>> = motion.rests.iter().map(|rest| rest.accel.found).collect();
     if forces.is_empty() {
@@ -173,7 +172,6 @@ fn factors(log_likelihood: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
 }
 
 /// A run as it is if these gyros are so many times as sensitive as stated.
-#[inline(never)]
 fn less_sensitive(run: &Run, axes: Axes, factor: f64) -> Run {
     let mut run = run.clone();
     let by = Vector3::from_fn(|axis, _| match axes {
@@ -218,7 +216,6 @@ struct Weighed {
 }
 
 impl Weighed {
-    #[inline(never)]
     fn of(problem: &Problem, run: &Run, motion: &Motion) -> Self {
         let parts = |too_small| parts(problem, run, motion, (too_small, AS_STATED));
         let is_nothing = |parts: &[Part]| parts.iter().any(|part| part.of < part.none);
@@ -243,7 +240,6 @@ const AS_STATED: PerSensor<AxisOrder> = PerSensor {
 };
 
 /// How likely the motion is with these axes, by all that it is known from.
-#[inline(never)]
 fn parts(
     problem: &Problem,
     run: &Run,
