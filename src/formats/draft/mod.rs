@@ -328,7 +328,7 @@ fn rows_as_text(source: &Source, path: &Path) -> Result<(), FileError> {
                 }
             }
             let field = |k| match rows.number(k) {
-                Ok(number) => number.to_string(),
+                Ok(_) => rows.shown(k).into_owned(),
                 Err(_) => String::new(),
             };
             csv.write_record((0..columns).map(field))?;

@@ -1,124 +1,227 @@
-//! Arrays of a file, put together to streams.
+//! Arrays of a file, put together to streams and read row by row.
+//!
+//! Arrays of the same number of rows are one stream; an array of several columns gives `name[0]`, `name[1]`, …
 
-use super::bytes::Broken;
+use std::io::{self, Read};
+use std::rc::Rc;
+
+use super::bytes::{Broken, Kind};
 use super::{Column, Log, Stream};
 
-/// As many columns as a sheet has.
-const MOST_COLUMNS: usize = 16_384;
+/// What has more columns is a picture or a matrix, but no samples.
+const MOST_COLUMNS: usize = 256;
 
-/// One column of numbers.
+/// The bytes of an array from one of them on.
+pub(super) type Open = Box<dyn Fn(u64) -> io::Result<Box<dyn Read>>>;
+
+/// An array of items of the same size.
 pub(super) struct Array {
-    pub name: String,
-    pub values: Vec<f64>,
-    /// Where it begins in the file, and bytes from row to row.
+    pub shape: Vec<usize>,
+    /// Whether the first dimension varies fastest, or the last.
+    pub first_is_fastest: bool,
+    /// Bytes of an item, and the numbers in it.
+    pub size: usize,
+    pub fields: Vec<Field>,
+    pub open: Open,
+    /// Where it begins in the file.
     pub offset: u64,
 }
 
-/// The columns of an array of several dimensions; the longest one, of equal ones the first, counts rows.
-///
-/// `number` gives the value at an index into the array, whose first dimension varies fastest if `first_is_fastest`.
-pub(super) fn columns(
-    name: &str,
-    shape: &[usize],
-    first_is_fastest: bool,
-    offset: u64,
-    number: impl Fn(usize) -> Option<f64>,
-) -> Result<Vec<Array>, Broken> {
-    let rows = shape.iter().copied().max().unwrap_or(1);
-    let along = shape.iter().position(|&size| size == rows).unwrap_or(0);
-    let all = shape
-        .iter()
-        .try_fold(1usize, |all, &size| all.checked_mul(size));
-    let count = match (all, rows) {
-        (Some(all), 1..) => all / rows,
-        _ => 0,
-    };
-    if count > MOST_COLUMNS {
-        return Err(Broken::new(
-            offset,
-            format_args!("an array `{name}` of {count} columns"),
-            format_args!("at most {MOST_COLUMNS}"),
-        ));
+/// A number in each item of an array.
+#[derive(Clone)]
+pub(super) struct Field {
+    pub name: String,
+    pub kind: Kind,
+    pub big_endian: bool,
+    /// Bytes of the item before it.
+    pub place: usize,
+}
+
+impl Array {
+    /// Items, where they can be counted.
+    pub fn items(&self) -> Option<usize> {
+        let mut sizes = self.shape.iter();
+        sizes.try_fold(1usize, |all, &size| all.checked_mul(size))
     }
-    // Strides in items.
-    let mut strides = vec![1; shape.len()];
-    let order: Vec<usize> = match first_is_fastest {
-        true => (0..shape.len()).collect(),
-        false => (0..shape.len()).rev().collect(),
-    };
-    let mut stride = 1usize;
-    for &dimension in &order {
-        strides[dimension] = stride;
-        stride = stride.saturating_mul(shape[dimension]);
-    }
-    let across: Vec<usize> = (0..shape.len()).filter(|&k| k != along).collect();
-    let step = strides.get(along).copied().unwrap_or(1);
-    let column = |index: usize| {
-        let (mut rest, mut first) = (index, 0);
-        for &dimension in across.iter().rev() {
-            first += (rest % shape[dimension]) * strides[dimension];
-            rest /= shape[dimension];
+
+    /// Its columns, by how they are read: the longest dimension, of equal ones the first, counts rows.
+    fn cursors(self) -> Vec<Cursor> {
+        let rows = self.shape.iter().copied().max().unwrap_or(1);
+        let columns = self
+            .items()
+            .filter(|_| rows > 1)
+            .map_or(0, |all| all / rows);
+        if columns == 0 || columns.saturating_mul(self.fields.len()) > MOST_COLUMNS {
+            return Vec::new();
         }
-        let values = (0..rows).map(|row| number(first + row * step));
-        let values: Option<Vec<f64>> = values.collect();
-        values.map(|values| Array {
-            name: match count {
-                1 => name.to_owned(),
-                _ => format!("{name}[{index}]"),
+        let strides = self.strides();
+        let along = self
+            .shape
+            .iter()
+            .position(|&size| size == rows)
+            .unwrap_or(0);
+        let step = strides.get(along).copied().unwrap_or(1);
+        let across: Vec<usize> = (0..self.shape.len()).filter(|&k| k != along).collect();
+        let first = |mut index: usize| {
+            let mut item = 0;
+            for &dimension in across.iter().rev() {
+                item += (index % self.shape[dimension]) * strides[dimension];
+                index /= self.shape[dimension];
+            }
+            item
+        };
+        let cell = |field: &Field, index: usize, item: usize| Field {
+            name: match columns {
+                1 => field.name.clone(),
+                _ => format!("{}[{index}]", field.name),
             },
-            values,
-            offset,
-        })
-    };
-    let columns: Option<Vec<Array>> = (0..count).map(column).collect();
-    columns.ok_or_else(|| {
+            place: field.place + item * self.size,
+            ..field.clone()
+        };
+        let open = Rc::new(self.open);
+        let cursor = |skip: usize, items: usize, cells: Vec<Field>| Cursor {
+            open: open.clone(),
+            source: None,
+            begin: (skip * self.size) as u64,
+            row: vec![0; items * self.size],
+            stride: (step * self.size) as u64,
+            rows,
+            next: 0,
+            cells,
+            offset: self.offset,
+        };
+        if step == columns {
+            // A row's numbers lie side by side.
+            let of_field = |field| (0..columns).map(move |index| (field, index));
+            let cells = self.fields.iter().flat_map(of_field);
+            let cells = cells.map(|(field, index)| cell(field, index, first(index)));
+            return vec![cursor(0, columns, cells.collect())];
+        }
+        let each = (0..columns).map(|index| {
+            let cells = self.fields.iter().map(|field| cell(field, index, 0));
+            cursor(first(index), 1, cells.collect())
+        });
+        each.collect()
+    }
+
+    /// Items from one to the next along each dimension.
+    fn strides(&self) -> Vec<usize> {
+        let mut strides = vec![1; self.shape.len()];
+        let mut stride = 1;
+        for k in 0..self.shape.len() {
+            let dimension = match self.first_is_fastest {
+                true => k,
+                false => self.shape.len() - 1 - k,
+            };
+            strides[dimension] = stride;
+            stride *= self.shape[dimension];
+        }
+        strides
+    }
+}
+
+/// Columns that are read together, row by row.
+struct Cursor {
+    open: Rc<Open>,
+    source: Option<Box<dyn Read>>,
+    /// Bytes before the first row.
+    begin: u64,
+    /// The bytes of the last row that was read …
+    row: Vec<u8>,
+    /// … from row to row …
+    stride: u64,
+    rows: usize,
+    /// … and the row after it.
+    next: usize,
+    cells: Vec<Field>,
+    offset: u64,
+}
+
+impl Cursor {
+    fn read(&mut self, row: usize) -> io::Result<()> {
+        if row < self.next {
+            return Ok(());
+        }
+        if self.source.is_none() {
+            self.source = Some((self.open)(self.begin)?);
+        }
+        let Some(source) = &mut self.source else {
+            return Ok(());
+        };
+        let gap = match self.next {
+            0 => 0,
+            _ => self.stride - self.row.len() as u64,
+        };
+        let passed = (row - self.next) as u64 * self.stride + gap;
+        if io::copy(&mut source.take(passed), &mut io::sink())? < passed {
+            return Err(io::ErrorKind::UnexpectedEof.into());
+        }
+        source.read_exact(&mut self.row)?;
+        self.next = row + 1;
+        Ok(())
+    }
+
+    /// Reads what is left, so that damage there shows.
+    fn finish(&mut self) -> io::Result<()> {
+        if self.next < self.rows {
+            self.read(self.rows - 1)?;
+        }
+        match self.source.take() {
+            Some(mut source) => io::copy(&mut source, &mut io::sink()).map(|_| ()),
+            None => Ok(()),
+        }
+    }
+
+    fn broken(&self, error: io::Error) -> Broken {
+        let name = &self.cells[0].name;
         Broken::new(
-            offset,
-            format_args!("fewer numbers in the array `{name}` than its shape {shape:?} has"),
-            "all of them",
+            self.offset,
+            format_args!("`{name}`: {error}"),
+            format_args!("{} rows of an array", self.rows),
         )
-    })
+    }
 }
 
 /// Columns of a file; those of the same length are one stream, row by row.
 pub(super) struct Arrays {
     streams: Vec<Stream>,
-    arrays: Vec<Vec<Array>>,
+    groups: Vec<Vec<Cursor>>,
     at: Option<(usize, usize)>,
 }
 
 impl Arrays {
     pub fn new(arrays: Vec<Array>) -> Self {
-        let mut groups: Vec<Vec<Array>> = Vec::new();
-        // A single number is no row.
-        for array in arrays.into_iter().filter(|array| array.values.len() > 1) {
-            match groups
-                .iter_mut()
-                .find(|group| group[0].values.len() == array.values.len())
-            {
-                Some(group) => group.push(array),
-                None => groups.push(vec![array]),
+        let mut groups: Vec<Vec<Cursor>> = Vec::new();
+        for cursor in arrays.into_iter().flat_map(Array::cursors) {
+            match groups.iter_mut().find(|group| group[0].rows == cursor.rows) {
+                Some(group) => group.push(cursor),
+                None => groups.push(vec![cursor]),
             }
         }
-        let stream = |group: &Vec<Array>| {
-            let first = &group[0].name;
+        let stream = |group: &Vec<Cursor>| {
+            let cells = || group.iter().flat_map(|cursor| &cursor.cells);
+            let first = &group[0].cells[0].name;
             let end = first.rfind('[').filter(|_| first.ends_with(']'));
             Stream {
                 name: first[..end.unwrap_or(first.len())].to_owned(),
-                columns: group
-                    .iter()
-                    .map(|array| Column::new(&array.name, ""))
-                    .collect(),
-                remarks: Vec::new(),
+                columns: cells().map(|cell| Column::new(&cell.name, "")).collect(),
                 is_inertial: true,
-                axes: None,
+                ..Stream::default()
             }
         };
         Self {
             streams: groups.iter().map(stream).collect(),
-            arrays: groups,
+            groups,
             at: None,
         }
+    }
+
+    /// The streams with something to be known of each of them.
+    pub fn with_remarks(mut self, remarks: &[String]) -> Self {
+        for stream in &mut self.streams {
+            stream.remarks.extend_from_slice(remarks);
+        }
+        self
     }
 }
 
@@ -128,33 +231,50 @@ impl Log for Arrays {
     }
 
     fn advance(&mut self) -> Result<Option<usize>, Broken> {
-        let (mut stream, mut row) = match self.at {
-            None => (0, 0),
-            Some((stream, row)) => (stream, row + 1),
-        };
-        if self
-            .arrays
-            .get(stream)
-            .is_some_and(|group| row >= group[0].values.len())
-        {
-            (stream, row) = (stream + 1, 0);
-        }
+        let (stream, row) = self.at.map_or((0, 0), |(stream, row)| (stream, row + 1));
         self.at = Some((stream, row));
-        Ok((stream < self.arrays.len()).then_some(stream))
+        let Some(group) = self.groups.get_mut(stream) else {
+            return Ok(None);
+        };
+        if row < group[0].rows {
+            return Ok(Some(stream));
+        }
+        for cursor in group {
+            cursor.finish().map_err(|error| cursor.broken(error))?;
+        }
+        self.at = Some((stream + 1, 0));
+        Ok((stream + 1 < self.groups.len()).then_some(stream + 1))
     }
 
-    fn values(&mut self, row: &mut Vec<f64>) -> Result<(), Broken> {
-        row.clear();
-        if let Some((stream, at)) = self.at
-            && let Some(group) = self.arrays.get(stream)
-        {
-            row.extend(group.iter().map(|array| array.values[at]));
+    fn values(&mut self, values: &mut Vec<f64>) -> Result<(), Broken> {
+        values.clear();
+        let Some((stream, row)) = self.at else {
+            return Ok(());
+        };
+        for cursor in self.groups.get_mut(stream).into_iter().flatten() {
+            cursor.read(row).map_err(|error| cursor.broken(error))?;
+            let number =
+                |cell: &Field| cell.kind.number(&cursor.row[cell.place..], cell.big_endian);
+            values.extend(
+                cursor
+                    .cells
+                    .iter()
+                    .map(|cell| number(cell).unwrap_or(f64::NAN)),
+            );
         }
         Ok(())
     }
 
+    fn whole(&self, column: usize) -> Option<i128> {
+        let group = self.groups.get(self.at?.0)?;
+        let mut cells =
+            (group.iter()).flat_map(|cursor| cursor.cells.iter().map(move |cell| (cursor, cell)));
+        let (cursor, cell) = cells.nth(column)?;
+        cell.kind.whole(&cursor.row[cell.place..], cell.big_endian)
+    }
+
     fn offset(&self) -> u64 {
-        let group = self.at.and_then(|(stream, _)| self.arrays.get(stream));
+        let group = self.at.and_then(|(stream, _)| self.groups.get(stream));
         group.map_or(0, |group| group[0].offset)
     }
 }

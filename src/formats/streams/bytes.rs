@@ -237,25 +237,34 @@ impl Kind {
 
     /// The number in the first bytes; none if there are too few.
     pub fn number(self, bytes: &[u8], big_endian: bool) -> Option<f64> {
+        let bits = self.bits(bytes, big_endian)?;
+        Some(match self {
+            Self::F32 => f64::from(f32::from_bits(bits as u32)),
+            Self::F64 => f64::from_bits(bits),
+            _ => self.whole(bytes, big_endian)? as f64,
+        })
+    }
+
+    /// The whole number in the first bytes, with all digits; none if it is none.
+    pub fn whole(self, bytes: &[u8], big_endian: bool) -> Option<i128> {
+        let bits = self.bits(bytes, big_endian)?;
+        Some(match self {
+            Self::I8 => i128::from(bits as i8),
+            Self::I16 => i128::from(bits as i16),
+            Self::I32 => i128::from(bits as i32),
+            Self::I64 => i128::from(bits as i64),
+            Self::U8 | Self::U16 | Self::U32 | Self::U64 => i128::from(bits),
+            Self::F32 | Self::F64 => return None,
+        })
+    }
+
+    fn bits(self, bytes: &[u8], big_endian: bool) -> Option<u64> {
         let mut all = [0; 8];
-        let size = self.size();
-        let place = all.get_mut(..size)?;
-        place.copy_from_slice(bytes.get(..size)?);
+        let place = all.get_mut(..self.size())?;
+        place.copy_from_slice(bytes.get(..self.size())?);
         if big_endian {
             place.reverse();
         }
-        let whole = u64::from_le_bytes(all);
-        Some(match self {
-            Self::I8 => f64::from(whole as u8 as i8),
-            Self::U8 => f64::from(whole as u8),
-            Self::I16 => f64::from(whole as u16 as i16),
-            Self::U16 => f64::from(whole as u16),
-            Self::I32 => f64::from(whole as u32 as i32),
-            Self::U32 => f64::from(whole as u32),
-            Self::I64 => whole as i64 as f64,
-            Self::U64 => whole as f64,
-            Self::F32 => f64::from(f32::from_bits(whole as u32)),
-            Self::F64 => f64::from_bits(whole),
-        })
+        Some(u64::from_le_bytes(all))
     }
 }

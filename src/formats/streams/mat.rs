@@ -3,12 +3,13 @@
 //! Source: MathWorks, "MAT-File Format", 2023: a header of 128 bytes, then elements of a type, a size and content,
 //! padded to eight bytes.
 
-use std::io::Read;
+use std::io::{Cursor, Read};
+use std::rc::Rc;
 
 use flate2::read::ZlibDecoder;
 
 use super::Log;
-use super::arrays::{Array, Arrays, columns};
+use super::arrays::{Array, Arrays, Field};
 use super::bytes::{Broken, Input, Kind, Slice};
 use crate::room;
 
@@ -202,10 +203,42 @@ fn matrix(
         // Numbers, from double to uint64.
         6..=15 => {
             let data = Element::next(&mut slice, "numbers")?;
-            if let Some(kind) = data.kind() {
-                let number = |index| data.number(kind, index);
-                arrays.extend(columns(&name, &shape, true, data.offset, number)?);
+            let Some(kind) = data.kind() else {
+                return Ok(());
+            };
+            let bytes: Rc<[u8]> = data.bytes.into();
+            let left = bytes.len();
+            let open = move |skip: u64| {
+                let mut bytes = Cursor::new(bytes.clone());
+                bytes.set_position(skip);
+                Ok(Box::new(bytes) as Box<dyn Read>)
+            };
+            let field = Field {
+                name,
+                kind,
+                big_endian: data.big_endian,
+                place: 0,
+            };
+            let array = Array {
+                shape,
+                first_is_fastest: true,
+                size: kind.size(),
+                fields: vec![field],
+                open: Box::new(open),
+                offset: data.offset,
+            };
+            let needed = array.items().and_then(|all| all.checked_mul(array.size));
+            if needed.is_none_or(|needed| needed > left) {
+                return Err(Broken::new(
+                    data.offset,
+                    format_args!("{left} bytes of the array `{}`", array.fields[0].name),
+                    format_args!(
+                        "items of {} bytes by its shape {:?}",
+                        array.size, array.shape
+                    ),
+                ));
             }
+            arrays.push(array);
             Ok(())
         }
         _ => Ok(()),

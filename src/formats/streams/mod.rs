@@ -81,6 +81,11 @@ pub(super) trait Log {
     /// The values of the sample, one for each column of its stream; NaN where there is no number.
     fn values(&mut self, row: &mut Vec<f64>) -> Result<(), Broken>;
 
+    /// The whole number in a column of the sample whose values were asked for, where it has more digits than they.
+    fn whole(&self, _column: usize) -> Option<i128> {
+        None
+    }
+
     /// Where the sample is in the file, bytes.
     fn offset(&self) -> u64;
 }

@@ -6,63 +6,163 @@
 
 mod header;
 
-use std::io::Read;
+use std::cell::RefCell;
+use std::io::{self, BufReader, Read, Seek, SeekFrom};
+use std::rc::Rc;
 
-use zip::ZipArchive;
+use flate2::CrcReader;
+use flate2::read::DeflateDecoder;
 use zip::result::ZipError;
+use zip::{CompressionMethod, ZipArchive};
 
 use super::Log;
-use super::arrays::{Array, Arrays};
-use super::bytes::{Broken, Input};
-use crate::room;
+use super::arrays::{Array, Arrays, Open};
+use super::bytes::{Broken, Input, Source};
 use header::Header;
 
-/// Nothing deflated is shorter by more.
-const DEFLATE: u64 = 1040;
 /// A header is a few names.
 const LONGEST_HEADER: u64 = 1 << 20;
+/// What is read at a time, of each column that lies by itself.
+const AT_ONCE: usize = 1 << 14;
 
-pub(super) fn open_array(mut input: Input) -> Result<Box<dyn Log>, Broken> {
-    let mut bytes = Vec::new();
-    let left = input.left();
-    input.take(left, &mut bytes, "an array")?;
-    let arrays = array("array", &bytes, 0)?;
-    Ok(Box::new(Arrays::new(arrays)))
+pub(super) fn open_array(input: Input) -> Result<Box<dyn Log>, Broken> {
+    let member = Member {
+        name: "array".to_owned(),
+        begin: 0,
+        packed: input.left(),
+        size: input.left(),
+        sum: None,
+        offset: 0,
+        is_deflated: false,
+    };
+    let file: File = Rc::new(RefCell::new(input.into_source()));
+    let (array, dropped) = member.array(&file)?;
+    let arrays = Arrays::new(vec![array]);
+    Ok(Box::new(arrays.with_remarks(dropped.as_slice())))
 }
 
 pub(super) fn open_archive(input: Input) -> Result<Box<dyn Log>, Broken> {
     let end = input.left();
     let broken = |offset: u64| move |error: ZipError| Broken::new(offset, error, "a ZIP archive");
     let mut archive = ZipArchive::new(input.into_source()).map_err(broken(end))?;
-    let mut arrays = Vec::new();
+    let mut members = Vec::new();
     for member in 0..archive.len() {
         let member = archive.by_index(member).map_err(broken(end))?;
         let name = member.name().map_err(broken(end))?.into_owned();
         let Some(name) = name.strip_suffix(".npy") else {
             continue;
         };
-        let (offset, size) = (member.header_start(), member.size());
-        let most = member.compressed_size().saturating_mul(DEFLATE);
-        let room = usize::try_from(size).map_or(usize::MAX, |size| size.saturating_mul(2));
-        if size > most || !room::is_there(room) {
-            let found = format!("`{name}` of {size} bytes from {}", member.compressed_size());
-            return Err(Broken::new(offset, found, "an array that fits into memory"));
-        }
-        let mut bytes = Vec::new();
-        (member.take(size).read_to_end(&mut bytes)).map_err(|error| {
-            Broken::new(
-                offset,
-                format_args!("`{name}`: {error}"),
-                "a member of the archive",
-            )
-        })?;
-        arrays.extend(array(name, &bytes, offset)?);
+        members.push(Member {
+            name: name.to_owned(),
+            begin: member.data_start().unwrap_or(end),
+            packed: member.compressed_size(),
+            size: member.size(),
+            sum: Some(member.crc32()),
+            offset: member.header_start(),
+            is_deflated: member.compression() != CompressionMethod::Stored,
+        });
     }
-    Ok(Box::new(Arrays::new(arrays)))
+    let file: File = Rc::new(RefCell::new(archive.into_inner()));
+    let (mut arrays, mut remarks) = (Vec::new(), Vec::new());
+    for member in members {
+        let (array, dropped) = member.array(&file)?;
+        arrays.push(array);
+        remarks.extend(dropped);
+    }
+    Ok(Box::new(Arrays::new(arrays).with_remarks(&remarks)))
 }
 
-/// The columns of an array; none if its items are no numbers.
-fn array(name: &str, bytes: &[u8], offset: u64) -> Result<Vec<Array>, Broken> {
-    let header = Header::read(bytes, offset)?;
-    header.arrays(name, bytes, offset)
+/// A file that several read at their own places.
+type File = Rc<RefCell<Box<dyn Source>>>;
+
+struct At {
+    file: File,
+    place: u64,
+}
+
+impl Read for At {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let mut file = self.file.borrow_mut();
+        file.seek(SeekFrom::Start(self.place))?;
+        let count = file.read(into)?;
+        self.place += count as u64;
+        Ok(count)
+    }
+}
+
+/// A file of an array, by itself or in an archive.
+#[derive(Clone)]
+struct Member {
+    name: String,
+    /// Where its bytes are in the file, how many and how many unpacked.
+    begin: u64,
+    packed: u64,
+    size: u64,
+    /// What their check sum has to be.
+    sum: Option<u32>,
+    offset: u64,
+    is_deflated: bool,
+}
+
+impl Member {
+    fn open(&self, file: &File) -> Box<dyn Read> {
+        let place = self.begin;
+        let file = file.clone();
+        let packed = BufReader::with_capacity(AT_ONCE, At { file, place }).take(self.packed);
+        let bytes: Box<dyn Read> = match self.is_deflated {
+            true => Box::new(DeflateDecoder::new(packed)),
+            false => Box::new(packed),
+        };
+        match self.sum {
+            Some(sum) => Box::new(Checked {
+                bytes: CrcReader::new(bytes),
+                sum,
+            }),
+            None => bytes,
+        }
+    }
+
+    /// The array, and what of it is left out.
+    fn array(self, file: &File) -> Result<(Array, Option<String>), Broken> {
+        let header = Header::read(&mut self.open(file), self.offset)?;
+        let left_out = header.left_out(&self.name);
+        let (size, begin, offset) = (self.size, header.begin, self.offset);
+        let name = self.name.clone();
+        let file = file.clone();
+        let open: Open = Box::new(move |skip| {
+            let mut bytes = self.open(&file);
+            io::copy(&mut bytes.by_ref().take(begin + skip), &mut io::sink())?;
+            Ok(bytes)
+        });
+        let array = header.array(&name, open, offset);
+        let needed = array.items().and_then(|all| all.checked_mul(array.size));
+        if needed.is_none_or(|needed| needed as u64 > size.saturating_sub(begin)) {
+            return Err(Broken::new(
+                offset,
+                format_args!("{} bytes of the array `{name}`", size.saturating_sub(begin)),
+                format_args!(
+                    "items of {} bytes by its shape {:?}",
+                    array.size, array.shape
+                ),
+            ));
+        }
+        Ok((array, left_out))
+    }
+}
+
+/// Bytes whose check sum is looked at where they end.
+struct Checked {
+    bytes: CrcReader<Box<dyn Read>>,
+    sum: u32,
+}
+
+impl Read for Checked {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let count = self.bytes.read(into)?;
+        if count == 0 && !into.is_empty() && self.bytes.crc().sum() != self.sum {
+            let what = "its check sum is not that of the archive";
+            return Err(io::Error::new(io::ErrorKind::InvalidData, what));
+        }
+        Ok(count)
+    }
 }

@@ -1,5 +1,6 @@
 //! One stream of a log, row by row.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use super::bytes::Broken;
@@ -202,6 +203,13 @@ impl Rows for StreamRows {
 
     fn value(&self, column: usize) -> f64 {
         self.row.get(column).copied().unwrap_or(f64::NAN)
+    }
+
+    fn shown(&self, column: usize) -> Cow<'_, str> {
+        match self.log.whole(column) {
+            Some(whole) => whole.to_string().into(),
+            None => self.value(column).to_string().into(),
+        }
     }
 
     fn place(&self, column: Option<usize>) -> Place {

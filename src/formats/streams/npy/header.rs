@@ -1,24 +1,26 @@
 //! The head of an array: a Python dictionary of its type, order and shape.
 
+use std::io::Read;
+
 use serde::Deserialize;
 
-use super::super::arrays::{Array, columns};
+use super::super::arrays::{Array, Field, Open};
 use super::super::bytes::{Broken, Kind, Slice};
 use super::LONGEST_HEADER;
 
 pub(super) struct Header {
     /// Of each item of the array.
-    fields: Vec<Field>,
+    fields: Vec<Numbers>,
     /// Bytes of an item.
     size: usize,
     first_is_fastest: bool,
     shape: Vec<usize>,
     /// Bytes before the first item.
-    begin: usize,
+    pub begin: u64,
 }
 
 /// A number, or an array of numbers, in each item.
-struct Field {
+struct Numbers {
     name: Option<String>,
     /// None where it is no number.
     kind: Option<(Kind, bool)>,
@@ -27,28 +29,31 @@ struct Field {
 }
 
 impl Header {
-    pub fn read(bytes: &[u8], offset: u64) -> Result<Self, Broken> {
-        // A member of an archive may be packed; a file by itself is not.
-        let mut file = match offset {
-            0 => Slice::new(bytes, 0),
-            _ => Slice::packed(bytes, offset),
+    pub fn read(file: &mut dyn Read, offset: u64) -> Result<Self, Broken> {
+        let mut take = |count: u64, what: &str| {
+            let mut bytes = Vec::new();
+            match file.take(count).read_to_end(&mut bytes) {
+                Ok(read) if read as u64 == count => Ok(bytes),
+                Ok(read) => Err(Broken::new(
+                    offset,
+                    format_args!("{read} bytes to the end of an array"),
+                    format_args!("{count} bytes of {what}"),
+                )),
+                Err(error) => Err(Broken::new(offset, error, what)),
+            }
         };
-        file.take(6, "an array's first bytes")?;
-        let version = file.whole(1, "the version")?;
-        file.take(1, "the version")?;
-        let width = if version == 1 { 2 } else { 4 };
-        let length = file.length(width, "the length of the head")?;
-        let begins = file.offset();
-        if length as u64 > LONGEST_HEADER {
-            return Err(Broken::new(
-                begins,
-                format_args!("a head of {length} bytes"),
-                "a short one",
-            ));
+        let first = take(8, "an array's first bytes")?;
+        let width = if first[6] == 1 { 2 } else { 4 };
+        let length = take(width, "the length of the head")?;
+        let length = Slice::new(&length, offset).whole(width as usize, "a length")?;
+        if length > LONGEST_HEADER {
+            let found = format_args!("a head of {length} bytes");
+            return Err(Broken::new(offset, found, "a short one"));
         }
-        let text = String::from_utf8_lossy(file.take(length, "the head")?);
+        let bytes = take(length, "the head")?;
+        let text = String::from_utf8_lossy(&bytes);
         let wrong =
-            |what: &str| Broken::new(begins, format_args!("the head `{}`", text.trim()), what);
+            |what: &str| Broken::new(offset, format_args!("the head `{}`", text.trim()), what);
         let head = format!("head = {}", as_toml(text.trim()));
         let Ok(Document { head }) = toml::from_str(&head) else {
             return Err(wrong(
@@ -61,47 +66,46 @@ impl Header {
             size,
             first_is_fastest: head.fortran_order,
             shape: head.shape,
-            begin: file.position(),
+            begin: 8 + width + length,
         })
     }
 
-    /// The columns of the array.
-    pub fn arrays(&self, name: &str, bytes: &[u8], offset: u64) -> Result<Vec<Array>, Broken> {
-        let data = bytes.get(self.begin..).unwrap_or_default();
-        let all = self
-            .shape
-            .iter()
-            .try_fold(1usize, |all, &size| all.checked_mul(size));
-        let needed = all.and_then(|all| all.checked_mul(self.size));
-        if needed.is_none_or(|needed| needed > data.len()) {
-            return Err(Broken::new(
-                offset,
-                format_args!("{} bytes of the array `{name}`", data.len()),
-                format_args!("items of {} bytes by its shape {:?}", self.size, self.shape),
-            ));
+    /// The array of numbers that is read by `open`.
+    pub fn array(self, name: &str, open: Open, offset: u64) -> Array {
+        let fields = self.fields.iter().filter_map(|field| {
+            let (kind, big_endian) = field.kind?;
+            let own = field.name.as_deref().unwrap_or(name);
+            Some((0..field.count).map(move |index| Field {
+                name: match field.count {
+                    1 => own.to_owned(),
+                    _ => format!("{own}[{index}]"),
+                },
+                kind,
+                big_endian,
+                place: field.place + index * kind.size(),
+            }))
+        });
+        Array {
+            fields: fields.flatten().collect(),
+            shape: self.shape,
+            first_is_fastest: self.first_is_fastest,
+            size: self.size,
+            open,
+            offset,
         }
-        let mut arrays = Vec::new();
-        for field in &self.fields {
-            let Some((kind, big_endian)) = field.kind else {
-                continue;
-            };
-            for index in 0..field.count {
-                let place = field.place + index * kind.size();
-                let named = match (&field.name, field.count) {
-                    (None, 1) => name.to_owned(),
-                    (None, _) => format!("{name}[{index}]"),
-                    (Some(field), 1) => field.clone(),
-                    (Some(field), _) => format!("{field}[{index}]"),
-                };
-                let number = |item: usize| {
-                    let at = item.checked_mul(self.size)?.checked_add(place)?;
-                    kind.number(data.get(at..)?, big_endian)
-                };
-                let found = columns(&named, &self.shape, self.first_is_fastest, offset, number)?;
-                arrays.extend(found);
-            }
-        }
-        Ok(arrays)
+    }
+
+    /// What is no number and is left out, in a sentence.
+    pub fn left_out(&self, name: &str) -> Option<String> {
+        let no_numbers = self.fields.iter().filter(|field| field.kind.is_none());
+        let names = no_numbers.map(|field| format!("`{}`", field.name.as_deref().unwrap_or(name)));
+        let names: Vec<String> = names.collect();
+        let are = match names.len() {
+            0 => return None,
+            1 => "holds text and is",
+            _ => "hold text and are",
+        };
+        Some(format!("{} {are} left out.", names.join(", ")))
     }
 }
 
@@ -129,13 +133,13 @@ fn item_kind(text: &str) -> Option<(Option<(Kind, bool)>, usize)> {
 }
 
 /// The numbers of an item and its size in bytes.
-fn fields(descr: &Descr) -> Option<(Vec<Field>, usize)> {
+fn fields(descr: &Descr) -> Option<(Vec<Numbers>, usize)> {
     // The unit of a time follows in brackets.
     let item = |text: &str| item_kind(text.split_once('[').map_or(text, |(kind, _)| kind));
     let list = match descr {
         Descr::One(text) => {
             let (kind, size) = item(text)?;
-            let field = Field {
+            let field = Numbers {
                 name: None,
                 kind,
                 place: 0,
@@ -154,7 +158,7 @@ fn fields(descr: &Descr) -> Option<(Vec<Field>, usize)> {
         let (kind, size) = item(kind)?;
         let mut sizes = shape.iter();
         let count = sizes.try_fold(1usize, |all, size| all.checked_mul(*size))?;
-        fields.push(Field {
+        fields.push(Numbers {
             name: Some(name.clone()),
             kind,
             place,
