@@ -1,14 +1,14 @@
 //! The estimator: coarse start, and Gauss–Newton iterations with the linearisation held until nothing moves.
 
-use crate::calibration::checks::cause::{likeliest, settling};
+use crate::calibration::checks::cause::{Causes, settling};
 use crate::calibration::checks::form::form_test;
 use crate::calibration::checks::prior_distance::widened;
 use crate::calibration::checks::rounding::by_rounding;
 use crate::calibration::noise::learn;
 use crate::calibration::start::attempt::from_coarse_start;
 use crate::calibration::{
-    BudgetSource, CalibrationError, Cause, FormTest, Outcome, Problem, Progress, Solved, checks,
-    several,
+    BudgetSource, CalibrationError, Cause, FormTest, FoundCause, Outcome, Problem, Progress,
+    Solved, checks, several,
 };
 use crate::run::Aiding;
 
@@ -35,7 +35,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
         // Angles that are missing are neither a cause nor noise.
         _ if form_test.as_ref().is_some_and(FormTest::rejects) => solved,
         Aiding::Table => {
-            let solved = settled(with_causes(solved, progress)?, progress)?;
+            let solved = with_causes(settled(solved, progress)?, progress)?;
             with_noise(problem, solved, progress)?
         }
         // By hand only the record itself tells how much a move leaves.
@@ -66,7 +66,7 @@ fn outcome(
 fn settled<'a>(before: Solved<'a>, progress: Progress) -> Result<Solved<'a>, CalibrationError> {
     let mut solved = before.clone();
     loop {
-        let steps = settling::settling(&solved.problem, &solved.iterated.held.innovations);
+        let steps = settling::settling(&solved)?;
         if steps == 0 {
             return Ok(solved);
         }
@@ -85,22 +85,45 @@ fn with_causes<'a>(
     progress: Progress,
 ) -> Result<Solved<'a>, CalibrationError> {
     let most = solved.problem.dwells().count() / DWELLS_OF_ONE;
+    let auto_terms = solved.problem.options.auto_terms;
+    // Nothing else is to explain a term that is not asked for.
+    let is_asked = |of: &FoundCause| auto_terms || !matches!(of.cause, Cause::Term(_));
+    let mut causes = causes_of(&solved)?;
     while solved.causes.len() < most {
-        let found = likeliest(&solved.problem, &solved.priors, &solved.iterated)?;
-        // Nothing else is to explain a term that is not asked for.
-        let asked = |cause| solved.problem.options.auto_terms || !matches!(cause, Cause::Term(_));
-        let Some(found) = found.filter(|found| asked(found.cause)) else {
+        // What lasts throughout widens what all positions show; what it leaves tells whether it is chance.
+        let lasting = (causes.lasting.filter(is_asked))
+            .filter(|of| (causes.most).is_none_or(|most| of.explained() > most.explained()));
+        let mut next = None;
+        for found in [lasting, causes.most.filter(is_asked)]
+            .into_iter()
+            .flatten()
+        {
+            let problem = found.taken_into(&solved.problem);
+            // A cause with which nothing converges is none.
+            let Some(again) = solved.better(solved.clone().again(problem, progress))? else {
+                continue;
+            };
+            let left = causes_of(&again)?;
+            let found = match lasting {
+                Some(lasting) if lasting == found => found.beside_what_it_leaves(&left),
+                _ => found,
+            };
+            if found.is_beyond() {
+                next = Some((found, again, left));
+                break;
+            }
+        }
+        let Some((found, again, left)) = next else {
             break;
         };
-        let problem = found.taken_into(&solved.problem);
-        // A cause with which nothing converges is none.
-        let Some(again) = solved.better(solved.clone().again(problem, progress))? else {
-            break;
-        };
-        solved = again;
+        (solved, causes) = (again, left);
         solved.causes.push(found);
     }
     Ok(solved)
+}
+
+fn causes_of(solved: &Solved) -> Result<Causes, CalibrationError> {
+    Causes::of(&solved.problem, &solved.priors, &solved.iterated)
 }
 
 /// With the noise that the data show, where they contradict what is stated.

@@ -2,6 +2,7 @@
 
 mod allan;
 mod apply;
+mod attack;
 mod by_hand;
 mod calibration_file;
 mod campaign;

@@ -22,8 +22,8 @@ use cause::{FoundCause, settling};
 use error_term_test::{ErrorTermTest, biases_may_vary};
 use finding::Finding;
 
-/// What the checks find of a filter's outcome, and what was found on the way to it, in the order in which findings are
-/// read. The problem is the one with what is stated.
+/// What the checks find of a filter's outcome, and what was found on the way to it, causes before what they
+/// may have brought about. The problem is the one with what is stated.
 pub fn findings(problem: &Problem, outcome: &Outcome, others: Vec<Finding>) -> Vec<Finding> {
     let (estimate, innovations) = (&outcome.estimate, &outcome.innovations);
     let rounding = outcome.part(BudgetSource::Rounding);
@@ -43,6 +43,8 @@ pub fn findings(problem: &Problem, outcome: &Outcome, others: Vec<Finding>) -> V
     };
     notes
         .chain(unexplained::not_converged(outcome))
+        .chain(outcome.causes.iter().map(FoundCause::finding))
+        .chain(settling::finding(problem, outcome.settling))
         .chain(outcome.noise.finding(problem))
         .chain(rest_scatter::scatter_at_rest(problem, &estimate.triads))
         .chain(rounding::rounded(problem, &rounding, &estimate.covariance))
@@ -52,8 +54,6 @@ pub fn findings(problem: &Problem, outcome: &Outcome, others: Vec<Finding>) -> V
         .chain(innovation::outliers(innovations))
         .chain(unexplained)
         .chain(innovation::inconsistent(innovations))
-        .chain(settling::finding(problem, outcome.settling))
-        .chain(outcome.causes.iter().map(FoundCause::finding))
         .chain(others)
         .chain(scattered)
         .collect()

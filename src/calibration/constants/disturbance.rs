@@ -26,11 +26,12 @@ pub enum DisturbanceKind {
 }
 
 impl Disturbance {
-    /// What it may be before the data, 1σ of each component: anything that is linear still, or as `bias` says.
+    /// What it may be before the data, 1σ of each component: anything that is linear still or, of a bias, as `bias` says.
     pub fn sigma(self, bias: impl Fn(Sensor) -> f64) -> f64 {
         match self.kind {
             DisturbanceKind::Position | DisturbanceKind::Slip => LINEAR,
-            DisturbanceKind::EarthRate => LINEAR * ROTATION_RATE,
+            // The place may be anywhere, also on the other hemisphere.
+            DisturbanceKind::EarthRate => ROTATION_RATE,
             DisturbanceKind::BiasStep(sensor) => bias(sensor),
         }
     }

@@ -50,6 +50,15 @@ impl<'a> Script<'a> {
         })
     }
 
+    /// The parts of dwells of a stretch.
+    pub fn parts(&self, stretch: usize) -> impl Iterator<Item = &Rest> {
+        let events = self.events.get(stretch).into_iter().flatten();
+        events.filter_map(|event| match event {
+            Event::Rest(rest) => Some(&**rest),
+            Event::Move(_) => None,
+        })
+    }
+
     /// What noise of moves grows with.
     pub fn moves(&self) -> Moves {
         let mut moves = Moves::default();

@@ -25,7 +25,7 @@ use score::Scores;
 /// Components of a disturbance.
 const COMPONENTS: usize = 3;
 
-/// A cause that is beyond chance.
+/// A cause, with what shows it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FoundCause {
     /// Which.
@@ -34,78 +34,83 @@ pub struct FoundCause {
     time: f64,
     /// Its components; of an error term zero.
     value: Vector3<f64>,
-    /// −2 ln of the probability that as much is chance …
-    significance: f64,
-    /// … and what that stays below.
+    /// χ² if it is none, and its degrees of freedom …
+    square: f64,
+    degrees: f64,
+    /// … how many times as wide chance is as the noise says …
+    chance: f64,
+    /// … and what its significance stays below if it is chance.
     limit: f64,
 }
 
-/// Something that may be a cause, with what shows it.
-#[derive(Clone, Copy)]
-struct Candidate {
-    cause: Cause,
-    time: f64,
-    value: Vector3<f64>,
-    /// χ² if it is none, and its degrees of freedom.
-    square: f64,
-    degrees: f64,
+/// What may be the cause of what was solved.
+pub struct Causes {
+    /// The one that explains most of those beyond chance.
+    pub most: Option<FoundCause>,
+    /// The one that lasts throughout and would explain most, if chance is as the noise says.
+    pub lasting: Option<FoundCause>,
+    /// How many times as wide as the noise says half of all positions and half of all slips are, at least one.
+    pub chance: f64,
 }
 
-/// The cause in what was solved that explains most; none where none is beyond chance.
-///
-/// Chance is as wide as half of all positions and half of all slips show, or as the noise says if that is wider.
-///
-/// # Errors
-/// As of a pass.
-pub fn likeliest(
-    problem: &Problem,
-    priors: &[AttitudePrior],
-    iterated: &Iterated,
-) -> Result<Option<FoundCause>, CalibrationError> {
-    let read = of_readings(&iterated.held.innovations);
-    let scored = by_score(problem, priors, iterated)?;
-    let limit = -2.0 * (FALSE_ALARM / (read.len() + scored.len()).max(1) as f64).ln();
-    let of_kind = |kind| {
-        let is = |of: &&Candidate| matches!(of.cause, Cause::Disturbance(of) if of.kind == kind);
-        chance(scored.iter().filter(is))
-    };
-    let of_read = chance(read.iter());
-    let [of_positions, of_slips] = [DisturbanceKind::Position, DisturbanceKind::Slip].map(of_kind);
-    // By hand every move is another; that one is worst only tells how wide chance is.
-    let table = problem.model.aiding == Aiding::Table;
-    let scored = scored.iter().filter_map(|of| match of.cause {
-        Cause::Term(_) => Some((of, of_positions.max(of_slips))),
-        Cause::Disturbance(_) if !table => None,
-        Cause::Disturbance(disturbance) => Some(match disturbance.kind {
-            DisturbanceKind::Position => (of, of_positions),
-            DisturbanceKind::Slip => (of, of_slips),
-            _ => (of, of_positions.max(of_slips)),
-        }),
-    });
-    let each = read.iter().map(|of| (of, of_read)).chain(scored);
-    let each = each.map(|(of, chance)| {
-        let found = FoundCause {
-            cause: of.cause,
-            time: of.time,
-            value: of.value,
-            significance: -2.0 * ln_survival(of.degrees, of.square / chance),
-            limit,
+impl Causes {
+    /// Of what was solved.
+    ///
+    /// # Errors
+    /// As of a pass.
+    pub fn of(
+        problem: &Problem,
+        priors: &[AttitudePrior],
+        iterated: &Iterated,
+    ) -> Result<Self, CalibrationError> {
+        let read = of_readings(&iterated.held.innovations);
+        let scored = by_score(problem, priors, iterated)?;
+        let limit = -2.0 * (FALSE_ALARM / (read.len() + scored.len()).max(1) as f64).ln();
+        let of_kind = |kind| {
+            let is =
+                |of: &&FoundCause| matches!(of.cause, Cause::Disturbance(of) if of.kind == kind);
+            chance(scored.iter().filter(is))
         };
-        (of.square - chance * of.degrees, found)
-    });
-    let beyond = each.filter(|(_, found)| found.significance > limit);
-    let most = beyond.max_by(|a, b| a.0.total_cmp(&b.0));
-    Ok(most.map(|(_, found)| found))
+        let of_read = chance(read.iter());
+        let [of_positions, of_slips] =
+            [DisturbanceKind::Position, DisturbanceKind::Slip].map(of_kind);
+        let of_both = of_positions.max(of_slips);
+        // By hand every move is another; that one is worst only tells how wide chance is.
+        let table = problem.model.aiding == Aiding::Table;
+        let scored = scored.into_iter().filter_map(|of| match of.cause {
+            Cause::Disturbance(_) if !table => None,
+            Cause::Disturbance(disturbance) if disturbance.kind == DisturbanceKind::Position => {
+                Some(of.beside(of_positions, limit))
+            }
+            Cause::Disturbance(disturbance) if disturbance.kind == DisturbanceKind::Slip => {
+                Some(of.beside(of_slips, limit))
+            }
+            _ => Some(of.beside(of_both, limit)),
+        });
+        let read = read.iter().map(|of| of.beside(of_read, limit));
+        let all: Vec<FoundCause> = read.chain(scored).collect();
+        let lasting = all.iter().filter(|of| of.is_lasting());
+        Ok(Self {
+            most: explains_most(all.iter().copied()),
+            lasting: explains_most(lasting.map(|of| of.beside(1.0, limit))),
+            chance: of_both,
+        })
+    }
+}
+
+fn explains_most(causes: impl Iterator<Item = FoundCause>) -> Option<FoundCause> {
+    let beyond = causes.filter(FoundCause::is_beyond);
+    beyond.max_by(|a, b| a.explained().total_cmp(&b.explained()))
 }
 
 /// How wide chance is: as half of these show, if that is wider than the noise says.
-fn chance<'a>(all: impl Iterator<Item = &'a Candidate>) -> f64 {
+fn chance<'a>(all: impl Iterator<Item = &'a FoundCause>) -> f64 {
     let mut ratios: Vec<f64> = all.map(|of| of.square / of.degrees).collect();
     median(&mut ratios).unwrap_or(1.0).max(1.0)
 }
 
 /// Positions of the table, by the innovations of those of its readings that are no outliers.
-fn of_readings(innovations: &[Innovation]) -> Vec<Candidate> {
+fn of_readings(innovations: &[Innovation]) -> Vec<FoundCause> {
     let dwells = innovations.chunk_by(|one, other| one.dwell == other.dwell);
     let sound = chi_square_limit(COMPONENTS as f64, FALSE_ALARM);
     let of_dwell = |dwell: &[Innovation]| {
@@ -119,16 +124,17 @@ fn of_readings(innovations: &[Innovation]) -> Vec<Candidate> {
         let largest = read
             .iter()
             .max_by(|a, b| a.distance().total_cmp(&b.distance()))?;
-        Some(Candidate {
-            cause: Cause::Disturbance(Disturbance {
-                kind: DisturbanceKind::Position,
-                dwell: largest.dwell,
-            }),
-            time: largest.time,
-            value: Vector3::zeros(),
-            square: read.iter().map(|of| of.distance()).sum(),
-            degrees: (COMPONENTS * read.len()) as f64,
-        })
+        let cause = Cause::Disturbance(Disturbance {
+            kind: DisturbanceKind::Position,
+            dwell: largest.dwell,
+        });
+        let square = read.iter().map(|of| of.distance()).sum();
+        let degrees = (COMPONENTS * read.len()) as f64;
+        Some(FoundCause::new(
+            cause,
+            largest.time,
+            (square, degrees, Vector3::zeros()),
+        ))
     };
     dwells.filter_map(of_dwell).collect()
 }
@@ -138,7 +144,7 @@ fn by_score(
     problem: &Problem,
     priors: &[AttitudePrior],
     iterated: &Iterated,
-) -> Result<Vec<Candidate>, CalibrationError> {
+) -> Result<Vec<FoundCause>, CalibrationError> {
     let (disturbances, mut model) = (disturbances(problem), problem.model.clone());
     let terms = ErrorTerm::constant().filter(|&term| !model.has(term) && model.can_have(term));
     let terms: Vec<ErrorTerm> = terms.collect();
@@ -154,18 +160,12 @@ fn by_score(
         return Ok(Vec::new());
     };
     let candidates = causes.iter().filter_map(|&cause| {
-        let (square, degrees, value) = scores.explained_by(cause)?;
+        let explained = scores.explained_by(cause)?;
         let time = match cause {
             Cause::Disturbance(of) => time_of(problem, of),
             Cause::Term(_) => 0.0,
         };
-        Some(Candidate {
-            cause,
-            time,
-            value,
-            square,
-            degrees,
-        })
+        Some(FoundCause::new(cause, time, explained))
     });
     Ok(candidates.collect())
 }
@@ -207,6 +207,55 @@ fn time_of(problem: &Problem, disturbance: Disturbance) -> f64 {
 }
 
 impl FoundCause {
+    fn new(cause: Cause, time: f64, explained: (f64, f64, Vector3<f64>)) -> Self {
+        let (square, degrees, value) = explained;
+        Self {
+            cause,
+            time,
+            value,
+            square,
+            degrees,
+            chance: 1.0,
+            limit: f64::INFINITY,
+        }
+    }
+
+    fn beside(self, chance: f64, limit: f64) -> Self {
+        Self {
+            chance,
+            limit,
+            ..self
+        }
+    }
+
+    /// Where chance is as wide as what it leaves shows.
+    pub fn beside_what_it_leaves(self, left: &Causes) -> Self {
+        self.beside(left.chance, self.limit)
+    }
+
+    /// What it explains beyond what chance does, in squares of noise.
+    pub fn explained(&self) -> f64 {
+        self.square - self.chance * self.degrees
+    }
+
+    /// −2 ln of the probability that as much is chance.
+    fn significance(&self) -> f64 {
+        -2.0 * ln_survival(self.degrees, self.square / self.chance)
+    }
+
+    /// Whether it is beyond chance.
+    pub fn is_beyond(&self) -> bool {
+        self.significance() > self.limit
+    }
+
+    /// Whether it changes all positions.
+    fn is_lasting(&self) -> bool {
+        match self.cause {
+            Cause::Term(_) => true,
+            Cause::Disturbance(of) => of.kind == DisturbanceKind::EarthRate,
+        }
+    }
+
     /// The problem with it: readings of a wrong position are left out, all else is estimated.
     pub fn taken_into<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
         let mut model = problem.model.clone();
@@ -226,12 +275,8 @@ impl FoundCause {
 
     /// What it is, when, and what became of it.
     pub fn finding(&self) -> Finding {
-        let Self {
-            time,
-            significance,
-            limit,
-            ..
-        } = self;
+        let Self { time, limit, .. } = self;
+        let significance = self.significance();
         let tested = format!("(significance {significance:.0}; limit {limit:.0})");
         let mut figures = json!({ "significance": significance, "limit": limit });
         let (kind, text) = match self.cause {

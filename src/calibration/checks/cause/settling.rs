@@ -1,40 +1,80 @@
 //! How long the attitude settles after a stop, from the mean over all stops.
 
+use nalgebra::Vector3;
 use serde_json::json;
 
-use crate::calibration::{Finding, Innovation, Observation, Problem};
+use crate::calibration::record::Rest;
+use crate::calibration::{
+    CalibrationError, Finding, Observation, Problem, Script, Solved, Stretch,
+};
 use crate::run::Aiding;
 use crate::statistics::{FALSE_ALARM, chi_square_limit, median};
 
 /// A table settles within this time, s: what lasts longer is something else.
 const LONGEST: f64 = 3.0;
 
-/// Steps of a dwell in which the attitude of a table settles after a stop: how many observations after it are beyond
-/// chance, one after the other; as wide as half of all show. The first shows the move before it, too, and does not count
-/// alone. A hand never settles.
-pub fn settling(problem: &Problem, innovations: &[Innovation]) -> usize {
+/// Steps of a dwell in which the attitude of a table settles after a stop: so many of its readings are off those in the
+/// time after them beyond chance, which is as wide as half of all show. What the gyros sensed is taken off; whether a
+/// gate let the readings in does not count. A hand never settles.
+///
+/// # Errors
+/// As of navigation.
+pub fn settling(solved: &Solved) -> Result<usize, CalibrationError> {
+    let problem = &solved.problem;
     if problem.model.aiding == Aiding::Velocity {
-        return 0;
+        return Ok(0);
     }
-    // Squares and number of all by their place in the dwell.
+    let script = Script::new(problem, &solved.priors, &solved.iterated.estimate)?;
+    // Squares and number of all by the steps of a dwell before them.
     let mut squares: Vec<(f64, usize)> = Vec::new();
-    for dwell in innovations.chunk_by(|one, other| one.dwell == other.dwell) {
-        let of_table = |of: &&Innovation| of.observation == Observation::Table && of.after_move;
-        for (place, of) in dwell.iter().filter(of_table).enumerate() {
-            squares.resize(squares.len().max(place + 1), (0.0, 0));
-            squares[place].0 += of.distance();
-            squares[place].1 += 3;
+    for (number, stretch) in problem.stretches().iter().enumerate() {
+        let stops = script
+            .parts(number)
+            .filter(|part| part.first && part.new_position);
+        for (step, square) in stops.flat_map(|part| off_the_later_ones(problem, stretch, part)) {
+            squares.resize(squares.len().max(step + 1), (0.0, 0));
+            squares[step].0 += square;
+            squares[step].1 += 3;
         }
     }
-    let mut means: Vec<f64> = squares.iter().map(|of| of.0 / of.1 as f64).collect();
+    let read = squares.iter().filter(|of| of.1 > 0);
+    let mut means: Vec<f64> = read.map(|of| of.0 / of.1 as f64).collect();
+    let of_each = FALSE_ALARM / means.len().max(1) as f64;
     let chance = median(&mut means).unwrap_or(1.0).max(1.0);
-    let of_each = FALSE_ALARM / squares.len().max(1) as f64;
-    let limit = |count: usize| chi_square_limit(count as f64, of_each);
-    let beyond = |&&(square, count): &&(f64, usize)| square > chance * limit(count);
-    match squares.iter().skip(1).take_while(beyond).count() {
-        0 => 0,
-        beyond => beyond + 1,
+    let is_beyond = |&&(square, count): &&(f64, usize)| {
+        count == 0 || square > chance * chi_square_limit(count as f64, of_each)
+    };
+    Ok(squares.iter().take_while(is_beyond).count())
+}
+
+/// The squares, over their variance, of what a table's readings at the begin of a dwell are off the mean of those in the
+/// time after them, with the steps before each.
+fn off_the_later_ones(problem: &Problem, stretch: &Stretch, part: &Rest) -> Vec<(usize, f64)> {
+    let mut moved = Vector3::zeros();
+    let mut read: Vec<(usize, f64, Vector3<f64>, f64)> = Vec::new();
+    for (number, step) in part.steps.iter().enumerate() {
+        moved += step.referred[0];
+        let table = part.seen[step.seen.clone()]
+            .iter()
+            .find(|seen| seen.kind == Observation::Table);
+        read.extend(table.map(|seen| {
+            let variance = stretch.observation_variance(&problem.model, seen.kind, seen.readings);
+            (number, step.time, seen.residual - moved, variance)
+        }));
     }
+    let square = |(place, &(number, time, residual, variance)): (
+        usize,
+        &(usize, f64, Vector3<f64>, f64),
+    )| {
+        let later = read[place + 1..]
+            .iter()
+            .take_while(|of| of.1 <= time + LONGEST);
+        let count = later.clone().count();
+        let mean = later.map(|of| of.2).sum::<Vector3<f64>>() / count as f64;
+        let variance = variance * (1.0 + 1.0 / count as f64);
+        (count > 0 && variance > 0.0).then(|| (number, (residual - mean).norm_squared() / variance))
+    };
+    read.iter().enumerate().filter_map(square).collect()
 }
 
 /// Whether this many steps are longer than a table settles.

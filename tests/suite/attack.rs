@@ -1,0 +1,147 @@
+//! What an attack on the command line found: each case ends as it should, with the message that helps.
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+use crate::shared::shared;
+
+/// Exit status, standard output and standard error of a command on a copy of a case, unpacked.
+fn outcome(case: &str, arguments: &str) -> Option<(i32, String, String, tempfile::TempDir)> {
+    let from = shared(&format!("attack/{case}"))?;
+    let copy = tempfile::tempdir().unwrap();
+    copied(&from, copy.path());
+    let mut command = Command::new(env!("CARGO_BIN_EXE_turncal"));
+    let command = command.current_dir(copy.path()).args(arguments.split(' '));
+    let output = command.output().unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let status = output.status.code().expect("it was not killed");
+    Some((status, text(&output.stdout), text(&output.stderr), copy))
+}
+
+fn copied(from: &Path, to: &Path) {
+    for entry in std::fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        let name = to.join(entry.file_name());
+        if entry.path().is_dir() {
+            std::fs::create_dir(&name).unwrap();
+            copied(&entry.path(), &name);
+        } else {
+            std::fs::copy(entry.path(), &name).unwrap();
+        }
+        // Some cases name plain files.
+        if name.extension().is_some_and(|end| end == "gz") {
+            let packed = std::fs::File::open(&name).unwrap();
+            let mut plain = std::fs::File::create(name.with_extension("")).unwrap();
+            std::io::copy(&mut flate2::read::GzDecoder::new(packed), &mut plain).unwrap();
+        }
+    }
+}
+
+fn refused(case: &str, arguments: &str, says: &str) {
+    let Some((status, _, message, _)) = outcome(case, arguments) else {
+        return;
+    };
+    assert_eq!(status, 1, "{case}: {message}");
+    assert!(message.contains(says), "{case}: no `{says}` in\n{message}");
+}
+
+/// Kinds of the findings of a calibration.
+fn kinds(case: &str) -> Option<Vec<String>> {
+    let (status, output, message, _) = outcome(case, "calibrate run.toml --json")?;
+    assert_eq!(status, 0, "{case}: {message}");
+    let result: Value = serde_json::from_str(&output).unwrap();
+    let findings = result["findings"].as_array().unwrap().iter();
+    Some(
+        findings
+            .map(|of| of["kind"].as_str().unwrap().to_owned())
+            .collect(),
+    )
+}
+
+#[test]
+fn a_unit_that_was_edited_after_its_part_was_written_is_not_merged() {
+    refused(
+        "lot-part-edited",
+        "merge l1 l2d -o out",
+        "not the one that was written with it",
+    );
+}
+
+#[test]
+fn a_matrix_of_zeros_is_certified_for_nobody() {
+    let certificate = "certificate calibration.json --laboratory lab.toml -o c";
+    refused("certificate-singular", certificate, "has no inverse");
+    if let Some((status, _, message, _)) = outcome("certificate-long-word", certificate) {
+        assert_eq!(status, 0, "{message}");
+    }
+}
+
+#[test]
+fn rows_out_are_rows_in_and_a_hole_that_nothing_bridges_is_not_filled() {
+    let Some((status, _, message, copy)) =
+        outcome("apply-silent-gap", "apply h.json h/run.toml -o d.csv")
+    else {
+        return;
+    };
+    assert_eq!(status, 0, "{message}");
+    let rows = |name: &str| {
+        std::fs::read_to_string(copy.path().join(name))
+            .unwrap()
+            .lines()
+            .count()
+    };
+    assert_eq!(rows("d.csv"), rows("h/imu.csv"));
+    assert!(message.contains("4096"), "{message}");
+    let fill = "apply h.json h/run.toml -o d.csv --fill";
+    refused(
+        "apply-silent-gap",
+        fill,
+        "4096 rows are missing from 48.809 s on",
+    );
+}
+
+#[test]
+fn whole_numbers_beyond_two_to_the_53_keep_their_digits_and_text_that_is_left_out_is_named() {
+    let Some((status, _, message, copy)) = outcome("int64-digits", "convert k.npy -o c") else {
+        return;
+    };
+    assert_eq!(status, 0, "{message}");
+    let packed = std::fs::File::open(copy.path().join("c/imu.csv.gz")).unwrap();
+    let text = std::io::read_to_string(flate2::read::GzDecoder::new(packed)).unwrap();
+    let second = text.lines().nth(2).unwrap();
+    assert!(second.starts_with("1152921504616846977,"), "{second}");
+    let run = std::fs::read_to_string(copy.path().join("c/run.toml")).unwrap();
+    assert!(run.contains("`name` holds text and is left out"), "{run}");
+}
+
+#[test]
+fn a_time_in_another_unit_and_rows_that_are_left_out_are_told_by_gravity() {
+    let closed_form = "calibrate run.toml --method six-position --json";
+    for case in ["time_both_ms_noperiod", "every_second_row_noperiod"] {
+        let says = "sample_period_s or time_unit";
+        refused(&format!("wrong-input-{case}"), closed_form, says);
+    }
+}
+
+#[test]
+fn of_several_findings_the_cause_comes_first() {
+    for (case, cause) in [
+        ("lat_neg", "earth-rate-wrong"),
+        ("north_1", "earth-rate-wrong"),
+        ("slip_0_0.1", "position-wrong"),
+    ] {
+        if let Some(kinds) = kinds(&format!("wrong-input-{case}")) {
+            assert_eq!(kinds[0], cause, "{case}: {kinds:?}");
+        }
+    }
+}
+
+#[test]
+fn an_archive_of_a_gigabyte_unpacked_is_drafted() {
+    if let Some((status, output, message, _)) = outcome("npz-abort", "init n.npz") {
+        assert_eq!(status, 0, "{message}");
+        assert!(output.contains("20000000 samples"), "{output}");
+    }
+}
