@@ -145,3 +145,25 @@ fn an_archive_of_a_gigabyte_unpacked_is_drafted() {
         assert!(output.contains("20000000 samples"), "{output}");
     }
 }
+
+#[test]
+fn a_file_that_is_not_read_says_what_it_is_and_what_to_do() {
+    let directory = tempfile::tempdir().unwrap();
+    for (name, bytes, says) in [
+        ("a.parquet", &b"PAR1\x15\x04"[..], "to_csv"),
+        ("a.h5", b"\x89HDF\r\n\x1a\n\0", "numpy.savez"),
+        (
+            "a.xls",
+            b"\xd0\xcf\x11\xe0\xa1\xb1",
+            "Save the sheet as CSV",
+        ),
+    ] {
+        let file = directory.path().join(name);
+        std::fs::write(&file, bytes).unwrap();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_turncal"));
+        let output = command.arg("init").arg(&file).output().unwrap();
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{name}");
+        assert!(message.contains(says), "{name}: {message}");
+    }
+}

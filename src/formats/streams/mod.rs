@@ -163,6 +163,25 @@ fn formats() -> [Format; 8] {
     ]
 }
 
+/// What files begin with that turncal does not read, what they are, and what to do.
+const CLOSED: [(&[u8], &str, &str); 3] = [
+    (
+        b"PAR1",
+        "a Parquet file",
+        "Save it as CSV, in Python by pandas.read_parquet(file).to_csv('imu.csv', index=False).",
+    ),
+    (
+        b"\x89HDF\r\n\x1a\n",
+        "an HDF5 file",
+        "Save its arrays in Python by numpy.savez, or as CSV.",
+    ),
+    (
+        b"\xd0\xcf\x11\xe0",
+        "a workbook of Excel",
+        "Save the sheet as CSV.",
+    ),
+];
+
 /// Opens a log by its content; none if it is no such log, but perhaps rows of text.
 pub(super) fn open(path: &Path) -> Result<Option<Box<dyn Log>>, FileError> {
     let refused = |error: std::io::Error| {
@@ -183,6 +202,11 @@ pub(super) fn open(path: &Path) -> Result<Option<Box<dyn Log>>, FileError> {
         .take(128)
         .read_to_end(&mut begin)
         .map_err(refused)?;
+    let closed = CLOSED.iter().find(|(bytes, ..)| begin.starts_with(bytes));
+    if let Some((_, found, advice)) = closed {
+        let expected = "rows of text, or a log of a program that turncal knows";
+        return Err(FileError::new(path, Place::File, found, expected, advice));
+    }
     let Some(format) = formats().into_iter().find(|format| format.is_of(&begin)) else {
         return Ok(None);
     };

@@ -62,6 +62,10 @@ pub(super) fn open_archive(input: Input) -> Result<Box<dyn Log>, Broken> {
             is_deflated: member.compression() != CompressionMethod::Stored,
         });
     }
+    if members.is_empty() {
+        let expected = "arrays `NAME.npy`; save the sheet of a workbook as CSV";
+        return Err(Broken::new(0, "a ZIP archive without arrays", expected));
+    }
     let file: File = Rc::new(RefCell::new(archive.into_inner()));
     let (mut arrays, mut remarks) = (Vec::new(), Vec::new());
     for member in members {
