@@ -1,9 +1,14 @@
 //! The clock of a log: stamps in any unit, counters, or none.
 
+mod count;
+mod line;
 mod stamps;
-mod wraps;
+mod wander;
 
+pub(super) use count::REACH;
+pub(super) use line::{Line, Uniform};
 pub(super) use stamps::{Stamp, Stamps};
+pub(super) use wander::Wander;
 
 /// What the numbers of a time column are.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,12 +1,11 @@
 //! The rows of a file: those that are samples, in order of time, all of them held or packed as they come.
 
-use super::long::{LongLog, Sizes, Whole};
-use super::{ImuLog, Layout};
-use crate::formats::clock::{Stamp, Stamps};
+use super::parts::{Parts, Sizes};
+use super::{ImuLog, Layout, Read};
+use crate::formats::clock::{REACH, Stamp, Stamps, Wander};
 use crate::formats::error::FileError;
 use crate::formats::rows::LogRows;
 use crate::formats::temperature::Temperatures;
-use crate::formats::uniform::{REACH, Uniform};
 use crate::imu::Output;
 
 /// Fewer samples than this are no record of a turntable: not one dwell can be told from a turn.
@@ -19,15 +18,10 @@ const MOST_AT_ONCE: usize = 1 << 16;
 pub(super) struct Content {
     pub layout: Layout,
     pub stamps: Stamps,
-    pub samples: Samples,
+    pub read: Read,
     pub temperature: Option<Temperatures>,
     /// Of the integrals of the accelerometers' columns, in their unit times s.
     pub integral_error: [f64; 3],
-}
-
-pub(super) enum Samples {
-    Held(Box<(Held, Uniform)>),
-    Long(Box<Whole>),
 }
 
 /// Rows that are held, without duplicates.
@@ -232,6 +226,56 @@ impl<'a> Reading<'a> {
     }
 }
 
+impl Reading<'_> {
+    /// Reads all rows, and whether they are packed.
+    fn all(
+        &mut self,
+        csv: &mut LogRows,
+        layout: &Layout,
+        sizes: Sizes,
+        known: &mut Option<Wander>,
+    ) -> Result<(Read, bool), FileError> {
+        let mut parts: Option<Parts> = None;
+        while csv.advance()? && !csv.may_be_cut() {
+            self.take(csv)?;
+            if parts.is_none() && self.held.len() == sizes.long {
+                csv.pack();
+                parts = Some(self.parts(csv, layout, Some(sizes.part), known.take())?);
+            }
+            if let Some(parts) = parts.as_mut().filter(|parts| parts.is_full(&self.held)) {
+                let taken = parts.take(&mut self.held, &mut self.stamps, false);
+                taken.map_err(|error| csv.placed(error))?;
+            }
+        }
+        let is_long = parts.is_some();
+        if !is_long && self.held.len() < FEWEST_SAMPLES {
+            return Err(self.too_few(csv));
+        }
+        let mut parts = match parts {
+            Some(parts) => parts,
+            None => self.parts(csv, layout, None, None)?,
+        };
+        let taken = parts.take(&mut self.held, &mut self.stamps, true);
+        self.held = Held::default();
+        let read = taken.and_then(|()| parts.finish(self.duplicates));
+        Ok((read.map_err(|error| csv.placed(error))?, is_long))
+    }
+}
+
+impl<'a> Reading<'a> {
+    fn parts(
+        &self,
+        csv: &LogRows,
+        layout: &Layout,
+        size: Option<usize>,
+        known: Option<Wander>,
+    ) -> Result<Parts<'a>, FileError> {
+        let rows = (&self.held, &self.stamps);
+        let parts = Parts::new(self.log, layout.clone(), size, rows, known);
+        parts.map_err(|error| csv.placed(error))
+    }
+}
+
 impl ImuLog<'_> {
     /// Reads the file; one too long to be held, and whose clock wanders, a second time with the clock that it was
     /// found to have.
@@ -239,69 +283,30 @@ impl ImuLog<'_> {
         &self,
         sizes: Sizes,
         notes: &mut Vec<String>,
-        known: Option<&Uniform>,
+        mut known: Option<Wander>,
     ) -> Result<Content, FileError> {
         let mut csv = self.open()?;
         let layout = self.layout(&mut csv)?;
         let mut reading = Reading::begin(self, &mut csv, layout.places)?;
-        let mut long: Option<LongLog> = None;
-        while csv.advance()? && !csv.may_be_cut() {
-            reading.take(&csv)?;
-            let Reading { held, stamps, .. } = &mut reading;
-            match &mut long {
-                Some(long) if long.is_full(held) => long
-                    .take(held, stamps, false)
-                    .map_err(|error| csv.placed(error))?,
-                None if held.len() == sizes.long => {
-                    csv.pack();
-                    let begun = LongLog::new(self, (layout.clone(), sizes), held, stamps, known);
-                    long = Some(begun.map_err(|error| csv.placed(error))?);
-                }
-                _ => {}
-            }
+        let is_first = known.is_none();
+        let (read, is_long) = reading.all(&mut csv, &layout, sizes, &mut known)?;
+        if is_long && is_first && read.clock.wander.is_some() {
+            // What was read is let go of before it is read again.
+            drop((csv, reading));
+            let wander = read.clock.wander.clone();
+            drop(read);
+            return self.content(sizes, notes, wander);
         }
-        if long.is_none() && reading.held.len() < FEWEST_SAMPLES {
-            return Err(reading.too_few(&csv));
-        }
-        let of_rows = reading.notes().collect::<Vec<_>>();
-        let Reading {
-            mut held,
-            mut stamps,
-            temperature,
-            duplicates,
-            ..
-        } = reading;
-        let samples = match long {
-            Some(mut long) => long.take(&mut held, &mut stamps, true).and_then(|()| {
-                drop(held);
-                Ok(Samples::Long(Box::new(long.finish(duplicates)?)))
-            }),
-            None => Uniform::new(&self.source.file, &stamps.of_rows, self.clock.period)
-                .map(|clock| Samples::Held(Box::new((held, clock)))),
-        };
-        let samples = match samples.map_err(|error| csv.placed(error))? {
-            Samples::Long(whole) if known.is_none() && whole.read.clock.wander.is_some() => {
-                let clock = whole.read.clock;
-                // What was read is let go of before it is read again.
-                drop((csv, stamps, temperature));
-                return self.content(sizes, notes, Some(&clock));
-            }
-            samples => samples,
-        };
-        let clock = match &samples {
-            Samples::Long(whole) => &whole.read.clock,
-            Samples::Held(held) => &held.1,
-        };
-        notes.extend(clock.uneven());
+        notes.extend(read.clock.uneven());
         notes.extend(csv.cut_off("It is left out"));
         notes.extend_from_slice(csv.remarks());
-        notes.extend(of_rows);
+        notes.extend(reading.notes());
         Ok(Content {
-            samples,
+            read,
             integral_error: csv.integral_error(),
             layout,
-            stamps,
-            temperature,
+            stamps: reading.stamps,
+            temperature: reading.temperature,
         })
     }
 

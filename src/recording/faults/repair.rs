@@ -107,10 +107,7 @@ impl Rows<'_> {
         });
         let mut faults = self.missing();
         faults.extend(zero.chain(duplicates).chain(of_columns));
-        faults.sort_by_key(|fault| {
-            let axis = fault.axis.map(|(sensor, axis)| (sensor as usize, axis));
-            (fault.kind as usize, axis, fault.samples.start)
-        });
+        faults.sort_by_key(Fault::order);
         faults
     }
 
@@ -218,6 +215,12 @@ impl Rows<'_> {
 }
 
 impl Fault {
+    /// Kind, axis and time.
+    pub fn order(&self) -> (usize, Option<(usize, usize)>, usize) {
+        let axis = self.axis.map(|(sensor, axis)| (sensor as usize, axis));
+        (self.kind as usize, axis, self.samples.start)
+    }
+
     /// Whether it leaves samples of an axis unknown.
     fn concerns(&self, sensor: Sensor, axis: usize) -> bool {
         self.kind != FaultKind::Duplicate && self.axis.is_none_or(|of| of == (sensor, axis))
