@@ -11,9 +11,6 @@ use crate::imu::Output;
 /// Fewer samples than this are no record of a turntable: not one dwell can be told from a turn.
 const FEWEST_SAMPLES: usize = 100;
 
-/// So many rows at one time, a minute and more of any, are no burst: the time stands still.
-const MOST_AT_ONCE: usize = 1 << 16;
-
 /// What the file holds.
 pub(super) struct Content {
     pub layout: Layout,
@@ -79,10 +76,6 @@ struct Reading<'a> {
     blank: usize,
     /// Rows without some.
     lacking: usize,
-    /// Rows that have another's time but not its values, and the line of the first.
-    at_once: (usize, u64),
-    /// Rows that follow one another at one time.
-    standing: usize,
 }
 
 impl<'a> Reading<'a> {
@@ -107,8 +100,6 @@ impl<'a> Reading<'a> {
             duplicates: 0,
             blank: 0,
             lacking: 0,
-            at_once: (0, 0),
-            standing: 0,
         })
     }
 
@@ -139,62 +130,27 @@ impl<'a> Reading<'a> {
                 *value = self.log.value(csv, place)?;
             }
         }
-        if let Some(place) = self.place(csv, row)? {
-            self.held.insert(place, row);
-            if let (Some(temperature), Some(&(time, _))) =
-                (&mut self.temperature, self.stamps.of_rows.get(place))
-            {
-                temperature.take(csv, self.stamps.told(time));
+        let held = &mut self.held;
+        let place = match self.stamps.take(csv, |other| held.row(other) == row)? {
+            Stamp::New(place) => place,
+            Stamp::Again(place) => {
+                held.duplicates.push((place, csv.line()));
+                self.duplicates += 1;
+                return Ok(());
             }
+        };
+        held.insert(place, row);
+        if let (Some(temperature), Some(&(time, _))) =
+            (&mut self.temperature, self.stamps.of_rows.get(place))
+        {
+            temperature.take(csv, self.stamps.told(time));
         }
         Ok(())
     }
 
-    /// Behind how many of the rows that are held this one belongs; none where it is one of them again.
-    fn place(&mut self, csv: &LogRows, row: [f64; 6]) -> Result<Option<usize>, FileError> {
-        let place = match self.stamps.look(csv)? {
-            Stamp::New(place) => {
-                self.standing = 0;
-                return Ok(Some(place));
-            }
-            Stamp::Again(place) => place,
-        };
-        self.standing += 1;
-        if self.standing > MOST_AT_ONCE {
-            return Err(csv.error_here(
-                format_args!("the same time in more than {MOST_AT_ONCE} rows"),
-                "times that increase",
-                "Name another time column, or leave it out and give sample_period_s.",
-            ));
-        }
-        if self.held.row(place - 1) == row {
-            self.held.duplicates.push((place, csv.line()));
-            self.duplicates += 1;
-            return Ok(None);
-        }
-        if self.stamps.is_count() {
-            return Err(Stamps::same(csv));
-        }
-        let taken = self.stamps.again(place, csv)?;
-        if taken == place {
-            if self.at_once.0 == 0 {
-                self.at_once.1 = csv.line();
-            }
-            self.at_once.0 += 1;
-        }
-        Ok(Some(taken))
-    }
-
-    /// What was made of rows that are no samples, or too many, a sentence each.
+    /// What was made of rows that are no samples, a sentence each.
     fn notes(&self) -> impl Iterator<Item = String> {
         let file = self.log.source.file.display();
-        let (same, line) = self.at_once;
-        let at_once = (same > 0).then(|| {
-            format!(
-                "{same} row(s) of {file} have the time of the row before and other values, the first in line {line}: \
-                 each counts as a sample."
-            )
-        });
         let blank = (self.blank > 0).then(|| {
             format!(
                 "{} row(s) of {file} have nothing in the columns of both triads and are passed over.",
@@ -207,7 +163,7 @@ impl<'a> Reading<'a> {
                 self.lacking
             )
         });
-        [at_once, blank, lacking].into_iter().flatten()
+        [blank, lacking].into_iter().flatten()
     }
 
     fn too_few(&self, csv: &LogRows) -> FileError {

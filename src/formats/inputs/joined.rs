@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use super::course::{Course, Resampled};
 use super::source::Source;
-use crate::formats::clock::{Breaks, Clock, Stamp, Stamps, TimeUnit, Uniform};
+use crate::formats::clock::{Breaks, Clock, Stamp, TimeUnit, Uniform};
 use crate::formats::error::{FileError, Place};
 use crate::formats::rows::Rows;
 use crate::imu::{Output, PerSensor};
@@ -244,17 +244,9 @@ impl Track {
             for (value, &place) in row.iter_mut().zip(&places) {
                 *value = rows.number(place)?;
             }
-            let place = match stamps.look(&rows)? {
-                Stamp::New(place) => place,
-                Stamp::Again(place) => {
-                    if columns.each_ref().map(|column| column[place - 1]) == row {
-                        continue;
-                    }
-                    if stamps.is_count() {
-                        return Err(Stamps::same(&rows));
-                    }
-                    stamps.again(place, &rows)?
-                }
+            let is_same = |other: usize| columns.each_ref().map(|column| column[other]) == row;
+            let Stamp::New(place) = stamps.take(&rows, is_same)? else {
+                continue;
             };
             for (column, value) in columns.iter_mut().zip(row) {
                 column.insert(place, value);

@@ -1,15 +1,13 @@
 //! What is wrong with a log's rows, and what was done about it.
 
 mod chance;
-mod ends;
 mod impossible;
 mod interpolation;
 mod notes;
+mod pinned;
 mod repair;
 mod slower;
-mod sound;
 mod spikes;
-mod stuck;
 
 use std::ops::Range;
 
@@ -18,8 +16,8 @@ use rayon::prelude::*;
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::{ColumnFacts, ImuSamples};
 use chance::Limit;
-use ends::Ends;
 pub(crate) use notes::notes;
+use pinned::{Axis, saturated};
 pub(crate) use repair::{Repaired, Rows};
 pub use slower::Slower;
 use spikes::spikes;
@@ -176,18 +174,14 @@ fn find(
         &steps,
         limit,
     );
-    let judged: [stuck::Column; 6] = std::array::from_fn(|k| stuck::Column {
-        values: &columns[k],
-        facts: &facts[k],
-        step: steps[k],
-        pulses,
-        full_scale: full_scale[k],
-    });
+    let axis = |k: usize| Axis::of(&columns[k], &facts[k], steps[k], pulses);
+    let axes: Vec<Axis> = (0..columns.len()).into_par_iter().map(axis).collect();
     let of_column = |column: usize| {
         let spikes = &spikes[column];
-        let stuck = judged[column].stuck(limit);
-        let triad = std::array::from_fn(|axis| &judged[column - column % 3 + axis]);
-        let saturated = Ends::of(triad, column % 3, spikes, &stuck, limit).saturated();
+        let stuck = axes[column].stuck(limit);
+        let triad = [0, 1, 2].map(|axis| &axes[column - column % 3 + axis]);
+        let known = (spikes.as_slice(), stuck.as_slice());
+        let saturated = saturated(triad, column % 3, full_scale[column], known, limit);
         // The row before a run has its value.
         let free = |rows: &Range<usize>| {
             !saturated
@@ -222,6 +216,22 @@ fn last_digit(values: &[f64]) -> f64 {
         Some(least) => 10.0 * least * largest,
         None => 0.0,
     }
+}
+
+/// Mean of values, and slope of the line through them.
+fn mean_and_slope(values: &[f64]) -> (f64, f64) {
+    let count = values.len() as f64;
+    let middle = 0.5 * (count - 1.0);
+    let moments = values.iter().enumerate();
+    let moment: f64 = moments.map(|(k, value)| (k as f64 - middle) * value).sum();
+    (
+        mean(values),
+        moment * 12.0 / (count * (count * count - 1.0)),
+    )
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
 }
 
 /// Runs of rows or samples that are so.

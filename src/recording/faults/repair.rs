@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use super::impossible::Impossible;
 use super::interpolation::Hole;
-use super::sound::Sound;
 use super::{Bridge, Fault, FaultKind, Found, find, ranges};
 use crate::imu::Sensor;
 use crate::recording::ColumnFacts;
@@ -119,14 +118,14 @@ impl Rows<'_> {
         faults: &mut [Fault],
     ) -> Vec<Bridge> {
         let longest = (LONGEST / self.period) as usize;
-        let mut holes = ranges(sound.len(), |k| !sound.is(k));
+        let mut holes = ranges(sound.len(), |k| !sound[k]);
         holes.sort_by_key(Range::len);
         let mut filled = 0;
         let mut bridges = Vec::new();
         for (number, samples) in holes.iter().enumerate() {
             // Beside a long hole short ones, once filled, are as good as sound.
             while filled < number && SHORT * holes[filled].len() <= samples.len() {
-                sound.set(holes[filled].clone(), true);
+                sound[holes[filled].clone()].fill(true);
                 filled += 1;
             }
             let hole = Hole::new(&sound, samples.clone(), longest);
@@ -230,7 +229,8 @@ impl Fault {
 /// Columns with the same holes.
 struct Holes {
     of: Vec<usize>,
-    sound: Sound,
+    /// Which samples are what the instrument sensed.
+    sound: Vec<bool>,
 }
 
 /// Columns with holes, those with the same ones together: rows that are missing lack all of them.
@@ -241,9 +241,9 @@ fn holes_of_columns(faults: &[Fault], body_axes: &[usize; 6], samples: usize) ->
         if !faults.iter().any(|fault| concerned(&fault)) {
             continue;
         }
-        let mut sound = Sound::new(samples);
+        let mut sound = vec![true; samples];
         for fault in faults.iter().filter(concerned) {
-            sound.set(fault.samples.clone(), false);
+            sound[fault.samples.clone()].fill(false);
         }
         match all.iter_mut().find(|holes| holes.sound == sound) {
             Some(holes) => holes.of.push(k),

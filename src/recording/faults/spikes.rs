@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::chance::Limit;
+use super::mean_and_slope;
 
 /// Samples of a line that is carried on to the next one: few follow a motion, many average noise.
 const LINES: [usize; 5] = [2, 4, 8, 16, 32];
@@ -178,14 +179,8 @@ impl Line {
 
 /// Value of a line through these at the place before the first, and its slope towards there.
 fn carried_on(values: &[f64]) -> (f64, f64) {
-    let count = values.len() as f64;
-    let middle = 0.5 * (count - 1.0);
-    let mean = values.iter().sum::<f64>() / count;
-    let moment: f64 = (0..values.len())
-        .map(|k| (middle - k as f64) * values[k])
-        .sum();
-    let slope = moment * 12.0 / (count * (count * count - 1.0));
-    (mean + slope * (middle + 1.0), slope)
+    let (mean, slope) = mean_and_slope(values);
+    (mean - slope * 0.5 * (values.len() as f64 + 1.0), -slope)
 }
 
 #[cfg(test)]
