@@ -23,7 +23,7 @@ use parts::Sizes;
 
 /// Which moment of a sample its time stamp names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum TimeStamp {
+pub enum TimeStamp {
     Start,
     Middle,
     End,
@@ -48,7 +48,7 @@ impl TimeStamp {
 }
 
 /// What `run.toml` says of the file.
-pub(super) struct ImuLog<'a> {
+pub struct ImuLog<'a> {
     pub source: Source<'a>,
     pub clock: Clock<'a>,
     /// Where the accelerometers are, if not in the rows of the gyros.
@@ -70,7 +70,7 @@ pub(super) struct ImuLog<'a> {
 
 /// Where the values of a sample stand in a row.
 #[derive(Clone)]
-struct Layout {
+pub struct Layout {
     /// Gyro x, y, z and accelerometer x, y, z as they stand.
     names: [FileColumn; 6],
     /// None of a triad that is not there.
@@ -125,7 +125,7 @@ fn pulse_of(error: [f64; 3]) -> f64 {
 }
 
 /// What was read.
-struct Read {
+pub struct Read {
     clock: Uniform,
     facts: [ColumnFacts; 6],
     /// Rows of the file.

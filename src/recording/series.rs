@@ -57,7 +57,7 @@ impl Series {
         }
     }
 
-    /// Some that follow one another, in parts of so many; the last may be shorter.
+    /// Some that follow one another, in parts of this length; the last may be shorter.
     pub fn parts(
         &self,
         samples: Range<usize>,
@@ -98,7 +98,7 @@ impl Series {
         }
     }
 
-    /// The sums of some that follow one another, so many at a time; what is left over at the end is left out.
+    /// The sums of some that follow one another, `length` at a time; the rest at the end is left out.
     pub fn sums(&self, samples: Range<usize>, length: usize) -> impl Iterator<Item = Vector3<f64>> {
         let length = length.max(1);
         let whole = samples.len() / length * length;

@@ -37,9 +37,9 @@ impl Clock<'_> {
     }
 }
 
-/// Where a row belongs by its stamp: behind so many of those that are kept.
+/// Where a row belongs by its stamp: the number of kept rows that it is behind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::formats) enum Stamp {
+pub enum Stamp {
     /// It is taken.
     New(usize),
     /// The row before has it, too.
@@ -56,7 +56,7 @@ struct Pause {
 }
 
 /// The stamps of a file so far.
-pub(in crate::formats) struct Stamps {
+pub struct Stamps {
     column: Option<usize>,
     nanoseconds: Option<usize>,
     unit: TimeUnit,
@@ -342,7 +342,7 @@ impl Stamps {
         self.cut(step);
         self.set.push(format!(
             "line {}: time goes from {} to {}: the clock was set, and nobody knows how long nothing was \
-             recorded. What follows begins anew; its times are taken {} s later.",
+             recorded. What follows is a stretch of its own; its times are taken {} s later.",
             csv.line(),
             self.words(before),
             self.words(before + step),
@@ -391,7 +391,7 @@ impl Stamps {
         self.let_go += rows;
     }
 
-    /// What was made of numbers that step back, and what that leaves open where so many samples lack their rows.
+    /// What was made of numbers that step back, and what that leaves open where this number of samples lack their rows.
     pub fn notes(&self, file: &Path, missing: usize) -> Vec<String> {
         let file = file.display();
         let set = self.set.iter();
@@ -448,13 +448,13 @@ fn count((count, first): &mut (usize, u64), line: u64) {
 
 /// At one time, a minute and more of any rows are no burst: the time stands still.
 const MOST_AT_ONCE: usize = 1 << 16;
-/// How long nothing is taken to have been recorded where nobody knows, and what is left of a long pause, s: more than
+/// How long nothing is taken to have been recorded where nobody knows, and the rest of a long pause, s: more than
 /// is ever interpolated.
 const BREAK: f64 = 1.0;
 
 /// Sizes of counters of samples.
 const COUNTERS: [f64; 4] = [256.0, 65_536.0, 16_777_216.0, 4_294_967_296.0];
-/// After so many seconds clocks begin again: registers of milliseconds and microseconds, a day, a week of satellites.
+/// The seconds after which clocks start over: registers of milliseconds and microseconds, a day, a week of satellites.
 const CLOCKS: [f64; 7] = [
     65.536,
     16.777_216,

@@ -12,7 +12,7 @@ use crate::imu::Output;
 const FEWEST_SAMPLES: usize = 100;
 
 /// What the file holds.
-pub(super) struct Content {
+pub struct Content {
     pub layout: Layout,
     pub stamps: Stamps,
     pub read: Read,
@@ -23,7 +23,7 @@ pub(super) struct Content {
 
 /// Rows that are held, without duplicates.
 #[derive(Default)]
-pub(super) struct Held {
+pub struct Held {
     pub columns: [Vec<f64>; 6],
     /// Rows before each duplicate, and its line.
     pub duplicates: Vec<(usize, u64)>,
@@ -235,7 +235,7 @@ impl<'a> Reading<'a> {
 impl ImuLog<'_> {
     /// Reads the file; one too long to be held, and whose clock wanders, a second time with the clock that it was
     /// found to have.
-    pub(super) fn content(
+    pub fn content(
         &self,
         sizes: Sizes,
         notes: &mut Vec<String>,

@@ -13,7 +13,7 @@ use crate::recording::{Bridge, ColumnFacts, Fault, FaultKind, Packer, SeriesWrit
 
 /// How many rows are held.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sizes {
+pub struct Sizes {
     /// From this many on a log is packed: until then they take 50 MB at most.
     pub long: usize,
     /// Rows that are looked at for faults at once, as though they were a record.
@@ -34,10 +34,10 @@ impl Default for Sizes {
 const BESIDE: usize = 1 << 13;
 
 /// What a log has come to so far.
-pub(super) struct Parts<'a> {
+pub struct Parts<'a> {
     log: &'a ImuLog<'a>,
     layout: Layout,
-    /// Rows of a part; none where all rows are one.
+    /// Rows of a part; none if all rows are one.
     size: Option<usize>,
     clock: Line,
     /// The sample of each row that is held.
@@ -145,10 +145,9 @@ impl<'a> Parts<'a> {
             std::array::from_fn(of)
         };
         let facts = facts_of(&held.columns, 0..end);
-        let of_last = match self.taken {
+        let of_rest = match self.taken {
             0 => facts.clone(),
-            taken if is_last => facts_of(&held.columns, taken..end),
-            _ => std::array::from_fn(|_| ColumnFacts::default()),
+            taken => facts_of(&held.columns, taken..end),
         };
         let columns = match is_last {
             true => std::mem::take(&mut held.columns),
@@ -161,7 +160,7 @@ impl<'a> Parts<'a> {
         if is_last {
             let until = self.numbers[end - 1] + 1;
             self.keep(repaired, first, self.next..until, true);
-            self.add(of_last, self.taken..end);
+            self.add(of_rest, self.taken..end);
             self.next = until;
             return;
         }

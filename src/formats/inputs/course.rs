@@ -64,7 +64,7 @@ impl Course {
 
     /// Mean square error of the integral midway between two edges.
     ///
-    /// Every second edge is left out and interpolated from those beside it, and every fourth one from those two
+    /// Every second edge is left out and interpolated from its neighbours, and every fourth one from those two
     /// away. White noise alone, which the filter knows of, makes the square of what is missed grow as the distance
     /// of edges; a signal that the cubic does not follow as its eighth power. So both are told apart, and the
     /// signal's part at the distance that there is, is 2⁻⁸ of that at twice as much.
@@ -134,7 +134,7 @@ impl Resampled {
         }
     }
 
-    /// What a row would hold of the interval between two places; none where the course does not have it.
+    /// What a row would hold of the interval between two places; none if the course does not have it.
     pub fn sample(&mut self, course: &Course, begin: f64, end: f64) -> Option<[f64; 3]> {
         let (sums, weight) = course.between(begin, end)?;
         self.weights += weight;

@@ -2,7 +2,7 @@
 //!
 //! Gyros stand as they are. Accelerometers are integrated over each sample of the gyros: the integral is known at
 //! the edges of their own samples, and between those follows the cubic through four of them. What is passed on
-//! from sample to sample is exact, so errors do not add up; what is left is the error of the integral at an edge,
+//! from sample to sample is exact, so errors do not add up; there remains the error of the integral at an edge,
 //! which the record itself tells (see [`Course::edge_error`]).
 
 use std::path::{Path, PathBuf};
@@ -53,7 +53,7 @@ pub fn distinct(triads: &PerSensor<[&str; 3]>) -> PerSensor<[String; 3]> {
 }
 
 impl Joined {
-    /// Reads both streams, whose stamps come so many samples after a sample's begin.
+    /// Reads both streams, whose stamps come `lag` of a sample after its begin.
     pub fn read(parts: &PerSensor<Part>, output: Output, lag: f64) -> Result<Self, FileError> {
         let gyro = Track::read(&parts.gyro)?;
         let accel = Track::read(&parts.accel)?;

@@ -33,7 +33,7 @@ const REACH: usize = 4;
 const AGREE: f64 = 3.0;
 
 /// The ways to fill samples that are not sound, whatever axis they are of.
-pub(super) struct Hole<'a> {
+pub struct Hole<'a> {
     sound: &'a [bool],
     samples: Range<usize>,
     /// The nearest sound samples before and after, outwards.

@@ -16,9 +16,9 @@ use rayon::prelude::*;
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::{ColumnFacts, ImuSamples};
 use chance::Limit;
-pub(crate) use notes::notes;
+pub use notes::notes;
 use pinned::{Axis, saturated};
-pub(crate) use repair::{Repaired, Rows};
+pub use repair::{Repaired, Rows};
 pub use slower::Slower;
 use spikes::spikes;
 
@@ -27,7 +27,7 @@ use spikes::spikes;
 pub struct Fault {
     /// What is wrong.
     pub kind: FaultKind,
-    /// Triad and body axis (right, front, up); none where whole rows are concerned.
+    /// Triad and body axis (right, front, up); none if whole rows are concerned.
     pub axis: Option<(Sensor, usize)>,
     /// The samples; for a duplicate the one that the file has twice.
     pub samples: Range<usize>,
@@ -47,7 +47,7 @@ pub enum FaultKind {
     Duplicate,
     /// At the end of the axis' range, so that the truth may be beyond.
     Saturated,
-    /// The same value again and again, while the axis' noise or motion goes on.
+    /// The same value again and again, while the axis' noise or motion continues.
     Stuck,
     /// A single sample to which neither what is before nor what is after leads.
     Spike,
@@ -204,7 +204,7 @@ fn find(
     found.into_iter().flatten().collect()
 }
 
-/// What a column of numbers with so many digits resolves at its largest values, by the smallest change
+/// What a column of numbers with a fixed count of digits resolves at its largest values, by the smallest change
 /// relative to the value: a last digit is up to ten times that.
 fn last_digit(values: &[f64]) -> f64 {
     let changes = values.windows(2).filter(|pair| pair[0] != pair[1]);

@@ -2,7 +2,7 @@
 //!
 //! An axis that is alive repeats a value as long as its noise and its motion stay within a step of its grid. Equal
 //! values in a row are a fault where that is improbable: by the noise that the axis has at rest, by the level on either
-//! side, by the motion that crosses them, and at an end of the range by what goes on beside them.
+//! side, by the motion that crosses them, and at an end of the range by the motion on either side.
 
 mod ends;
 
@@ -15,7 +15,7 @@ use super::chance::Limit;
 use super::{mean, mean_and_slope};
 use crate::recording::ColumnFacts;
 use crate::statistics::median;
-pub(super) use ends::saturated;
+pub use ends::saturated;
 
 /// Rows in which noise is measured at one level.
 const BLOCK: usize = 64;
@@ -33,7 +33,7 @@ const CLOSE: usize = 16;
 const OF_SECOND_DIFFERENCES: f64 = 2.449_489_742_783_178 * 0.674_489_750_196_081_7;
 
 /// A column and what it is judged by.
-pub(super) struct Axis<'a> {
+pub struct Axis<'a> {
     values: &'a [f64],
     facts: &'a ColumnFacts,
     /// What values differ by at least; zero if they are all the same.

@@ -18,12 +18,12 @@ const WORST_ANGLE: f64 = 0.2 * DEGREE;
 
 /// The rows of a file without duplicates. Columns are gyro x, y, z and accelerometer x, y, z of the
 /// file.
-pub(crate) struct Rows<'a> {
+pub struct Rows<'a> {
     pub columns: [Vec<f64>; 6],
     pub facts: &'a [ColumnFacts; 6],
     /// In the file's quantity.
     pub full_scale: [Option<f64>; 6],
-    /// Whether rows are whole pulses, what is left over being carried into the next.
+    /// Whether rows are whole pulses, the remainder being carried into the next.
     pub pulses: bool,
     /// The body axis of each column.
     pub body_axes: [usize; 6],
@@ -40,7 +40,7 @@ pub(crate) struct Rows<'a> {
 }
 
 /// The samples, and what was done to have them all.
-pub(crate) struct Repaired {
+pub struct Repaired {
     /// As in [`Rows`], a value for each sample.
     pub columns: [Vec<f64>; 6],
     pub faults: Vec<Fault>,
@@ -158,7 +158,7 @@ impl Rows<'_> {
         bridges
     }
 
-    /// Variance of the rounding of so many samples' sum. It stays within a step: of the sum where what is left over
+    /// Variance of the rounding of a sum of samples. It stays within a step: of the sum where the remainder
     /// is carried, else of each sample.
     fn rounding(&self, column: usize, samples: usize) -> f64 {
         let step = self.facts[column].step.unwrap_or(0.0);

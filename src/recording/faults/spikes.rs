@@ -16,7 +16,7 @@ const FEWEST: usize = TRIALS / 4;
 /// Samples of a side that are looked at.
 const SIDE: usize = TRIALS + LINES[LINES.len() - 1];
 
-/// For each column the rows that a line from either side misses by more than a sound record's would.
+/// For each column the rows that a line from either side misses by more than that of a flawless record would.
 /// `steps` are what values of the columns differ by at least.
 ///
 /// A sample belongs to the motion if what lies before or what lies after leads to it, or to something
@@ -24,7 +24,7 @@ const SIDE: usize = TRIALS + LINES[LINES.len() - 1];
 /// around, so that it has in it noise, grid and motion. The limit follows the tail that second
 /// differences of the whole column have. A knock is motion as well: it lasts longer than a sample, or
 /// other axes have it.
-pub(super) fn spikes(columns: &[&[f64]; 6], steps: &[f64], limit: Limit) -> [Vec<usize>; 6] {
+pub fn spikes(columns: &[&[f64]; 6], steps: &[f64], limit: Limit) -> [Vec<usize>; 6] {
     if columns[0].len() < 2 * TRIALS {
         return [const { Vec::new() }; 6];
     }
@@ -144,7 +144,7 @@ fn stands_out(column: &[f64], row: usize, grid: f64) -> f64 {
     best
 }
 
-/// A line that comes within so many of its σ of a sample leads to it.
+/// A line leads to a sample if it comes within this many of its σ.
 const LEADS: f64 = 1.0;
 
 /// σ beyond which a tenth of normal variates lies.

@@ -13,7 +13,7 @@ const FEWEST_TRIALS: usize = 8;
 const UNTRIED: f64 = 2.0;
 
 /// A polynomial through neighbours by least squares.
-pub(super) struct Fill {
+pub struct Fill {
     hole: Range<usize>,
     /// Neighbours that follow one another, all those before the hole first.
     runs: Vec<Range<usize>>,
@@ -94,7 +94,7 @@ impl Fill {
         }
     }
 
-    /// By how much later the same samples are all sound, for so many places on either side as are tried.
+    /// By how much later the same samples are all sound, for as many places on either side as are tried.
     fn intact(&self, sound: &[bool]) -> Vec<isize> {
         let is_sound = |run: &Range<usize>, shift| {
             let start = run.start.checked_add_signed(shift);
