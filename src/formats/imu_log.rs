@@ -135,7 +135,7 @@ pub struct Read {
     faults: Vec<Fault>,
     bridges: Vec<Bridge>,
     series: PerSensor<Series>,
-    /// RMS errors of integrals that samples put on an even clock have, in the columns' quantity times samples.
+    /// RMS errors of integrals that samples put on another clock have, in the columns' quantity times samples.
     error: PerSensor<[f64; 3]>,
 }
 
@@ -160,7 +160,6 @@ impl ImuLog<'_> {
             stamps,
             read,
             temperature,
-            integral_error,
         } = self.content(sizes, notes, None)?;
         let missing = read.missing;
         let mut imu = self.samples(&layout, read);
@@ -168,11 +167,6 @@ impl ImuLog<'_> {
             stretch.start = stamps.told(stretch.start);
         }
         notes.extend(stamps.notes(&self.source.file, missing));
-        let error = self
-            .axes
-            .each(Vector3::from(integral_error))
-            .component_div(&self.nominal.accel.0);
-        imu.pulse.accel = imu.pulse.accel.hypot(pulse_of(error.into()));
         if let Some(temperature) = temperature {
             let read = temperature.read(&self.source.file.display().to_string());
             notes.extend(read.notes);

@@ -17,8 +17,6 @@ pub struct Content {
     pub stamps: Stamps,
     pub read: Read,
     pub temperature: Option<Temperatures>,
-    /// Of the integrals of the accelerometers' columns, in their unit times s.
-    pub integral_error: [f64; 3],
 }
 
 /// Rows that are held, without duplicates.
@@ -245,7 +243,7 @@ impl ImuLog<'_> {
         let layout = self.layout(&mut csv)?;
         let mut reading = Reading::begin(self, &mut csv, layout.places)?;
         let is_first = known.is_none();
-        let (read, is_long) = reading.all(&mut csv, &layout, sizes, &mut known)?;
+        let (mut read, is_long) = reading.all(&mut csv, &layout, sizes, &mut known)?;
         if is_long && is_first && read.clock.wander.is_some() {
             // What was read is let go of before it is read again.
             drop((csv, reading));
@@ -253,13 +251,16 @@ impl ImuLog<'_> {
             drop(read);
             return self.content(sizes, notes, wander);
         }
+        let seconds = self.seconds(read.clock.period);
+        for (error, of_both) in read.error.accel.iter_mut().zip(csv.integral_error()) {
+            *error = error.hypot(of_both / seconds);
+        }
         notes.extend(read.clock.uneven());
         notes.extend(csv.cut_off("It is left out"));
         notes.extend_from_slice(csv.remarks());
         notes.extend(reading.notes());
         Ok(Content {
             read,
-            integral_error: csv.integral_error(),
             layout,
             stamps: reading.stamps,
             temperature: reading.temperature,

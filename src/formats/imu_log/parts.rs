@@ -250,16 +250,17 @@ impl<'a> Parts<'a> {
     /// One that lasts from the part before into the one that begins here is one.
     fn keep_fault(&mut self, fault: Fault, begin: usize) {
         let is_whole = matches!(fault.kind, FaultKind::Duplicate | FaultKind::Missing);
-        let lasts = |before: &&mut Fault| {
+        let is_rest = fault.samples.start == begin && !is_whole;
+        let begun = |before: &&mut Fault| {
             (before.kind, before.axis) == (fault.kind, fault.axis) && before.samples.end == begin
         };
         let mut before = self.faults.iter_mut();
-        match before.find(lasts) {
-            Some(before) if fault.samples.start == begin && !is_whole => {
+        match is_rest.then(|| before.find(begun)).flatten() {
+            Some(before) => {
                 before.samples.end = fault.samples.end;
                 before.bridged &= fault.bridged;
             }
-            _ => self.faults.push(fault),
+            None => self.faults.push(fault),
         }
     }
 

@@ -228,17 +228,15 @@ impl<'a> Axis<'a> {
         if resumes.is_none_or(|off| off * run.len() as f64 <= 4.0 * self.step) {
             return false;
         }
-        let mut points = [8, 16, 32, 64].into_iter();
-        points.any(|points| {
-            run.len() <= points
-                && self.is_led_past(run, points, limit)
-                && self.is_crossed(run, points, limit) == Some(true)
-        })
+        let mut points = [8, 16, 32, 64]
+            .into_iter()
+            .filter(|points| run.len() <= *points);
+        points.any(|points| self.is_crossed(run, points, limit) == Some(true))
     }
 
-    /// Whether each side by itself leads away from a run's value, to the same side: few sides of an axis alive do, and a
-    /// line costs least.
-    fn is_led_past(&self, run: &Range<usize>, points: usize, limit: Limit) -> bool {
+    /// To which side of a run's value the rows before and those after lead, each by themselves: few of an axis alive do
+    /// lead away, and a line costs least.
+    fn led_past(&self, run: &Range<usize>, points: usize, limit: Limit) -> Option<f64> {
         let (count, length) = (points as f64, run.len() as f64);
         let apart = 0.5 * (count + length);
         let lost = |rows: Option<&[f64]>, forth: f64| {
@@ -256,13 +254,13 @@ impl<'a> Axis<'a> {
         let before = run.start.checked_sub(points);
         let before = before.and_then(|begin| self.values.get(begin..run.start));
         let after = self.values.get(run.end..run.end + points);
-        let to = lost(before, 1.0);
-        to.is_some() && to == lost(after, -1.0)
+        lost(before, 1.0).filter(|side| lost(after, -1.0) == Some(*side))
     }
 
     /// Whether a cubic through both sides of a run is likelier than two parabolas that stop at its value and start from
     /// it.
     fn is_crossed(&self, run: &Range<usize>, points: usize, limit: Limit) -> Option<bool> {
+        let side = self.led_past(run, points, limit)?;
         let before = run.start.checked_sub(points)?..run.start;
         let after = run.end..run.end + points;
         let value = self.values[run.start];
@@ -278,16 +276,23 @@ impl<'a> Axis<'a> {
             SVector::from([1.0, x, y, z])
         };
         let from = |from: usize| move |k| SVector::from(powers(k, from as f64));
-        let sides = before.clone().chain(after.clone());
-        let (factors, crossed) = fit(sides, cubic, in_steps)?;
-        let (_, stopped) = fit(before, from(run.start - 1), in_steps)?;
+        // The last sample before the run is sound, too.
+        let last = run.start - 1;
+        let others = (before.start..last).chain(after.clone());
+        let (factors, left_over) = fit(others, cubic, in_steps)?;
+        let off = factors.dot(&cubic(last));
+        let count = 2.0 * points as f64;
+        let rounding = self.of_grid() * count;
+        if off.abs() > limit.sigmas * (left_over.max(rounding) / (count - 1.0)).sqrt() {
+            return Some(false);
+        }
+        let crossed = (left_over + off * off).max(rounding);
+        let (_, stopped) = fit(before, from(last), in_steps)?;
         let (_, started) = fit(after, from(run.end - 1), in_steps)?;
-        let rounding = self.of_grid() * 2.0 * points as f64;
-        let crossed = crossed.max(rounding);
         let ratio = points as f64 * ((stopped + started).max(rounding) / crossed).ln();
         let lost: f64 = run.clone().map(|k| factors.dot(&cubic(k))).sum();
-        let noise = crossed / (2.0 * points as f64) * run.len() as f64;
-        Some(ratio > limit.nats && is_lost(lost.abs(), noise, limit))
+        let noise = crossed / count * run.len() as f64;
+        Some(ratio > limit.nats && is_lost(lost * side, noise, limit))
     }
 }
 
