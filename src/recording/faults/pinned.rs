@@ -244,12 +244,9 @@ impl<'a> Axis<'a> {
             let off = (mean - self.values[run.start] + forth * slope * apart) / self.step;
             let variance = (variance / self.step.powi(2)).max(self.of_grid());
             let spread = count.recip() + 12.0 * apart * apart / count.powi(3);
-            let is_lost = is_lost(
-                length * off.abs(),
-                variance * spread * length * length,
-                limit,
-            );
-            is_lost.then_some(off.signum())
+            // Of the line carried on, and of the rows.
+            let variance = variance * length * (spread * length + 1.0);
+            is_lost(length * off.abs(), variance, limit).then_some(off.signum())
         };
         let before = run.start.checked_sub(points);
         let before = before.and_then(|begin| self.values.get(begin..run.start));
