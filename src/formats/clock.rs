@@ -1,13 +1,18 @@
 //! The clock of a log: stamps in any unit, counters, or none.
 
+mod count;
+mod line;
 mod stamps;
-mod wraps;
+mod wander;
 
-pub(super) use stamps::{Stamp, Stamps};
+pub use count::REACH;
+pub use line::{Line, Uniform};
+pub use stamps::{Stamp, Stamps};
+pub use wander::Wander;
 
 /// What the numbers of a time column are.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum TimeUnit {
+pub enum TimeUnit {
     /// This many of them are a second.
     PerSecond(f64),
     /// Samples are counted.
@@ -27,18 +32,18 @@ impl TimeUnit {
 
 /// What times of rows may do but go on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Breaks {
+pub enum Breaks {
     /// Nothing: rows of another file are put beside these.
     None,
     /// Pause for as long as they like.
     Pauses,
-    /// Begin anew where the clock was set: nothing else is told by them.
+    /// Start over where the clock was set: nothing else goes by them.
     Settings,
 }
 
 /// What `run.toml` says of a log's time.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Clock<'a> {
+pub struct Clock<'a> {
     /// None where rows just follow one another.
     pub column: Option<&'a str>,
     /// A column of nanoseconds beside one of whole seconds.

@@ -1,32 +1,29 @@
 //! The instrument's samples.
 
 mod content;
-mod even;
-mod long;
+mod parts;
 
 use nalgebra::Vector3;
 
 use super::axes::BodyAxes;
-use super::clock::{Clock, Stamps};
+use super::clock::{Clock, Uniform};
+use super::course::place;
 use super::error::FileError;
 use super::joined::{self, Joined, Part};
 use super::rows::LogRows;
 use super::source::Source;
 use super::temperature::TemperatureColumns;
-use super::uniform::Uniform;
 use crate::imu::{Nominal, Output, PerSensor, Sensor};
-use crate::recording::faults::{Repaired, Rows};
 use crate::recording::{
     Bridge, ColumnFacts, Fault, FileColumn, ImuSamples, LogFacts, NamedColumns, Series,
     stretches_between,
 };
-use content::{Content, Held, Samples};
-use even::{evened, place};
-use long::{Sizes, Whole};
+use content::Content;
+use parts::Sizes;
 
 /// Which moment of a sample its time stamp names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum TimeStamp {
+pub enum TimeStamp {
     Start,
     Middle,
     End,
@@ -51,7 +48,7 @@ impl TimeStamp {
 }
 
 /// What `run.toml` says of the file.
-pub(super) struct ImuLog<'a> {
+pub struct ImuLog<'a> {
     pub source: Source<'a>,
     pub clock: Clock<'a>,
     /// Where the accelerometers are, if not in the rows of the gyros.
@@ -73,7 +70,7 @@ pub(super) struct ImuLog<'a> {
 
 /// Where the values of a sample stand in a row.
 #[derive(Clone)]
-struct Layout {
+pub struct Layout {
     /// Gyro x, y, z and accelerometer x, y, z as they stand.
     names: [FileColumn; 6],
     /// None of a triad that is not there.
@@ -104,13 +101,14 @@ impl Layout {
         [0, 1, 2].map(|axis| along(axis).unwrap_or(first + axis))
     }
 
-    /// Rad and m/s along right, front and up for one of the unit of the column that lies along it.
-    fn body_units(&self, log: &ImuLog, sensor: Sensor, period: f64) -> [f64; 3] {
-        let units = self.units(log, period);
-        self.columns(sensor).map(|k| {
+    /// One rad and m/s along right, front and up in the unit of the column that lies along it.
+    fn body_nominal(&self, log: &ImuLog, sensor: Sensor) -> Vector3<f64> {
+        let columns = self.columns(sensor);
+        Vector3::from_fn(|axis, _| {
+            let k = columns[axis];
             let sign = if self.names[k].reversed { -1.0 } else { 1.0 };
             let along = log.axes.vector(Vector3::ith(k % 3, sign));
-            units[k] * along[self.body_axes[k]]
+            log.nominal.get(sensor).0[axis] * along[axis]
         })
     }
 
@@ -126,15 +124,18 @@ fn pulse_of(error: [f64; 3]) -> f64 {
     12f64.sqrt() * Vector3::from(error).norm() / 3f64.sqrt()
 }
 
-/// What was read besides samples.
-struct Read {
+/// What was read.
+pub struct Read {
     clock: Uniform,
     facts: [ColumnFacts; 6],
     /// Rows of the file.
     rows: usize,
+    /// Samples without a row.
+    missing: usize,
     faults: Vec<Fault>,
     bridges: Vec<Bridge>,
-    /// RMS errors of integrals that samples put on an even clock have, in the columns' quantity times samples.
+    series: PerSensor<Series>,
+    /// RMS errors of integrals that samples put on another clock have, in the columns' quantity times samples.
     error: PerSensor<[f64; 3]>,
 }
 
@@ -157,29 +158,15 @@ impl ImuLog<'_> {
         let Content {
             layout,
             stamps,
-            samples,
+            read,
             temperature,
-            integral_error,
         } = self.content(sizes, notes, None)?;
-        let (mut imu, missing) = match samples {
-            Samples::Long(whole) => {
-                let missing = whole.missing;
-                (self.packed(&layout, *whole), missing)
-            }
-            Samples::Held(held) => {
-                let (held, clock) = *held;
-                self.whole(layout, &stamps, held, clock)
-            }
-        };
+        let missing = read.missing;
+        let mut imu = self.samples(&layout, read);
         for stretch in &mut imu.stretches {
             stretch.start = stamps.told(stretch.start);
         }
         notes.extend(stamps.notes(&self.source.file, missing));
-        let error = self
-            .axes
-            .each(Vector3::from(integral_error))
-            .component_div(&self.nominal.accel.0);
-        imu.pulse.accel = imu.pulse.accel.hypot(pulse_of(error.into()));
         if let Some(temperature) = temperature {
             let read = temperature.read(&self.source.file.display().to_string());
             notes.extend(read.notes);
@@ -191,119 +178,32 @@ impl ImuLog<'_> {
         Ok(imu)
     }
 
-    /// The samples of a log that was packed as it was read.
-    fn packed(&self, layout: &Layout, whole: Whole) -> ImuSamples {
-        let Whole {
-            read,
-            packed,
-            samples,
-            missing: _,
-        } = whole;
-        // Samples are then whole steps, as pulses are. Pulses are rounded a second time where some of them are
-        // interpolated: what is not whole there stays with the sum.
-        let roundings: f64 = match self.output {
-            Output::Pulse if !read.bridges.is_empty() => 2.0,
-            _ => 1.0,
-        };
-        let pulse = PerSensor::from_fn(|sensor| packed.get(sensor).step() * roundings.sqrt());
-        let series = PerSensor {
-            gyro: Series::packed(packed.gyro),
-            accel: Series::packed(packed.accel),
-        };
-        self.samples(layout, read, samples, series, pulse)
-    }
-
-    /// The samples of a log whose rows are all held.
-    fn whole(
-        &self,
-        layout: Layout,
-        stamps: &Stamps,
-        held: Held,
-        mut clock: Uniform,
-    ) -> (ImuSamples, usize) {
-        let missing = clock.numbers.last().map_or(0, |last| last + 1) - clock.numbers.len();
-        let lines = stamps.of_rows.iter().map(|&(_, line)| line);
-        let period = clock.period;
-        let units = layout.units(self, period);
-        let facts = std::array::from_fn(|k| {
-            ColumnFacts::of(&layout.names[k].name, &held.columns[k], units[k])
-        });
-        let count = held.len() + held.duplicates.len();
-        let rows = Rows {
-            columns: held.columns,
-            facts: &facts,
-            full_scale: layout.full_scale(self),
-            pulses: self.output == Output::Pulse,
-            body_axes: layout.body_axes,
-            units,
-            lines: lines.collect(),
-            numbers: std::mem::take(&mut clock.numbers),
-            period,
-            duplicates: held.duplicates,
-        };
-        let (repaired, error) = match &clock.wander {
-            Some(wander) => evened(rows.repair(), (wander, self.stamp.lag()), self.output),
-            None => (rows.repair(), PerSensor::default()),
-        };
-        let Repaired {
-            columns,
-            faults,
-            bridges,
-        } = repaired;
-        let samples = columns[0].len();
-
-        let seconds = self.seconds(period);
-        let series = PerSensor::from_fn(|sensor| {
-            let nominal = self.nominal.get(sensor).0;
-            let [x, y, z] = std::array::from_fn(|axis| &columns[3 * sensor as usize + axis]);
-            let signs = [0, 1, 2].map(|axis| &layout.names[3 * sensor as usize + axis]);
-            let signs = Vector3::from(signs.map(|column| if column.reversed { -1.0 } else { 1.0 }));
-            let rows = x.iter().zip(y).zip(z);
-            let sample = |((&x, &y), &z)| {
-                let row = self
-                    .axes
-                    .vector(Vector3::new(x, y, z).component_mul(&signs));
-                (row * seconds).component_div(&nominal)
-            };
-            rows.map(sample).collect::<Series>()
-        });
-        let pulse = PerSensor::from_fn(|sensor| match self.output {
-            Output::Pulse => self.nominal.get(sensor).0.map(|n| n.abs().recip()).mean(),
-            Output::Increment | Output::Rate => 0.0,
-        });
-        let read = Read {
-            clock,
-            facts,
-            rows: count,
-            faults,
-            bridges,
-            error,
-        };
-        let imu = self.samples(&layout, read, samples, series, pulse);
-        (imu, missing)
-    }
-
-    fn samples(
-        &self,
-        layout: &Layout,
-        read: Read,
-        samples: usize,
-        series: PerSensor<Series>,
-        pulse: PerSensor<f64>,
-    ) -> ImuSamples {
+    fn samples(&self, layout: &Layout, read: Read) -> ImuSamples {
         let Read {
             clock,
             facts,
             rows,
+            missing: _,
             faults,
             bridges,
+            series,
             error,
         } = read;
         let period = clock.period;
         let units = layout.units(self, period);
+        // Pulses are rounded a second time where packed ones are interpolated: what is not whole there stays with the
+        // sum.
+        let roundings: f64 = match self.output {
+            Output::Pulse if series.gyro.is_packed() && !bridges.is_empty() => 2.0,
+            _ => 1.0,
+        };
         let pulse = PerSensor::from_fn(|sensor| {
+            let step = match self.output {
+                Output::Pulse => self.nominal.get(sensor).0.map(|n| n.abs().recip()).mean(),
+                Output::Increment | Output::Rate => series.get(sensor).step(),
+            };
             let of_column = |k: usize| error.get(sensor)[k] * units[3 * sensor as usize + k];
-            pulse.get(sensor).hypot(pulse_of([0, 1, 2].map(of_column)))
+            (step * roundings.sqrt()).hypot(pulse_of([0, 1, 2].map(of_column)))
         });
         let lag = self.stamp.lag();
         let ahead = clock.wander.as_ref();
@@ -315,7 +215,7 @@ impl ImuLog<'_> {
         ImuSamples {
             period_sigma: 0.0,
             stretches: stretches_between(
-                samples,
+                series.gyro.len(),
                 clock.first + (ahead - lag) * period,
                 period,
                 &faults,

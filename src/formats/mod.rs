@@ -30,7 +30,7 @@ pub use directories::{
 pub use door::Opened;
 pub use error::{FileError, Place};
 // By these names the readers of rows know them.
-use inputs::{course, joined, source, temperature, uniform};
+use inputs::{course, joined, source, temperature};
 pub(crate) use quantity::unit_scale;
 pub use schema::{Campaign, campaign_text, write_run};
 pub(crate) use schema::{

@@ -9,7 +9,7 @@ use super::names;
 use crate::recording::FileColumn;
 
 /// A file that gives rows of numbers one after the other.
-pub(super) trait Rows {
+pub trait Rows {
     fn file(&self) -> &Path;
 
     /// The names of the columns.
@@ -79,7 +79,7 @@ pub(super) trait Rows {
 }
 
 /// A file at one of its rows, and the columns of it that are used.
-pub(super) struct LogRows {
+pub struct LogRows {
     rows: Box<dyn Rows>,
     used: Vec<usize>,
 }

@@ -134,18 +134,14 @@ impl ColumnFacts {
 impl ColumnFacts {
     /// The same of a column of which these are the rows that follow.
     pub(crate) fn and(self, later: &Self) -> Self {
-        let counts = |end: f64, of: &Self| {
-            [
-                (of.smallest == end).then_some(of.at_smallest),
-                (of.largest == end).then_some(of.at_largest),
-            ]
-        };
-        let count = |end: f64| {
-            let of = |of: &Self| counts(end, of).into_iter().flatten().max().unwrap_or(0);
-            of(&self) + of(later)
-        };
         let smallest = self.smallest.min(later.smallest);
         let largest = self.largest.max(later.largest);
+        let count = |of: [(f64, usize); 2], end: f64| {
+            let at_end = of.into_iter().filter(|(value, _)| *value == end);
+            at_end.map(|(_, count)| count).sum()
+        };
+        let at_smallest = [&self, later].map(|of| (of.smallest, of.at_smallest));
+        let at_largest = [&self, later].map(|of| (of.largest, of.at_largest));
         let constant = |of: &Self| of.smallest == of.largest;
         let step = match (self.step, later.step) {
             (step, _) if constant(later) => step,
@@ -158,8 +154,8 @@ impl ColumnFacts {
             _ => None,
         };
         Self {
-            at_smallest: count(smallest),
-            at_largest: count(largest),
+            at_smallest: count(at_smallest, smallest),
+            at_largest: count(at_largest, largest),
             name: self.name,
             smallest,
             largest,

@@ -17,7 +17,7 @@ pub(crate) use samples::stretches_between;
 pub use samples::{ImuSamples, SampleError, Stretch};
 pub use segment::{LabelledMotion, Segment};
 pub use series::Series;
-pub(crate) use series::{Packed, Packer, finest_step};
+pub(crate) use series::{Packer, SeriesWriter, finest_step};
 pub use temperature::{SPACING as TEMPERATURE_SPACING, Temperature};
 
 use std::collections::BTreeMap;

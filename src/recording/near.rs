@@ -13,7 +13,7 @@ const AHEAD: usize = 1024;
 
 /// Samples of a record about one place, which moves on; where the record is not packed, all of them.
 #[derive(Debug, Clone)]
-pub(crate) struct Near<'a> {
+pub struct Near<'a> {
     imu: &'a ImuSamples,
     first: usize,
     triads: PerSensor<Cow<'a, [Vector3<f64>]>>,

@@ -94,7 +94,7 @@ impl ImuSamples {
         }
     }
 
-    /// Whether there were so many that they are packed.
+    /// Whether they are packed, as those of long records are.
     pub fn is_packed(&self) -> bool {
         self.gyro.is_packed()
     }

@@ -7,7 +7,8 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
-pub(crate) use packed::{Packed, Packer, finest_step};
+use packed::Packed;
+pub(crate) use packed::{Packer, finest_step};
 
 /// Increments of a triad along right-front-up, rad or m/s a sample.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -21,14 +22,6 @@ pub struct Series {
 const AT_ONCE: usize = 4096;
 
 impl Series {
-    /// Packed ones.
-    pub(crate) fn packed(packed: Packed) -> Self {
-        Self {
-            whole: Vec::new(),
-            packed: Some(packed),
-        }
-    }
-
     /// Number of samples.
     pub fn len(&self) -> usize {
         self.packed.as_ref().map_or(self.whole.len(), Packed::len)
@@ -42,6 +35,11 @@ impl Series {
     /// Whether they are packed: then reading them takes longer, and to have many at once takes memory.
     pub fn is_packed(&self) -> bool {
         self.packed.is_some()
+    }
+
+    /// The step of packed ones, on average over the axes; else zero.
+    pub(crate) fn step(&self) -> f64 {
+        self.packed.as_ref().map_or(0.0, Packed::step)
     }
 
     /// One of them; zero where there is none.
@@ -59,7 +57,7 @@ impl Series {
         }
     }
 
-    /// Some that follow one another, in parts of so many; the last may be shorter.
+    /// Some that follow one another, in parts of this length; the last may be shorter.
     pub fn parts(
         &self,
         samples: Range<usize>,
@@ -100,7 +98,7 @@ impl Series {
         }
     }
 
-    /// The sums of some that follow one another, so many at a time; what is left over at the end is left out.
+    /// The sums of some that follow one another, `length` at a time; the rest at the end is left out.
     pub fn sums(&self, samples: Range<usize>, length: usize) -> impl Iterator<Item = Vector3<f64>> {
         let length = length.max(1);
         let whole = samples.len() / length * length;
@@ -120,6 +118,43 @@ impl Series {
             self.whole = packed.part(0..packed.len());
         }
         &mut self.whole
+    }
+}
+
+/// Takes samples as they come, in the quantity of a file: to keep them as they are, or packed.
+pub(crate) enum SeriesWriter {
+    Whole(Vec<Vector3<f64>>),
+    Packed(Packer),
+}
+
+impl Default for SeriesWriter {
+    fn default() -> Self {
+        Self::Whole(Vec::new())
+    }
+}
+
+impl SeriesWriter {
+    pub fn push(&mut self, sample: [f64; 3]) {
+        match self {
+            Self::Whole(samples) => samples.push(sample.into()),
+            Self::Packed(packer) => packer.push(sample),
+        }
+    }
+
+    /// The samples times `seconds`, one of the output being `nominal` in the quantity that came.
+    pub fn finish(self, seconds: f64, nominal: Vector3<f64>) -> Series {
+        match self {
+            Self::Whole(mut samples) => {
+                for sample in &mut samples {
+                    *sample = (*sample * seconds).component_div(&nominal);
+                }
+                samples.into()
+            }
+            Self::Packed(packer) => Series {
+                whole: Vec::new(),
+                packed: Some(packer.finish(nominal.map(|n| seconds / n).into())),
+            },
+        }
     }
 }
 

@@ -2,12 +2,11 @@
 
 use std::path::Path;
 
-use super::super::error::FileError;
-use super::super::rows::LogRows;
-use super::super::uniform::REACH;
-use super::wraps::{CLOCKS, COUNTERS, wrap};
-use super::{Breaks, Clock, TimeUnit};
+use super::{Breaks, Clock, REACH, TimeUnit};
+use crate::formats::error::FileError;
+use crate::formats::rows::LogRows;
 use crate::recording::nanoseconds;
+use crate::statistics::median;
 
 impl Clock<'_> {
     /// Begins to read a file.
@@ -18,7 +17,7 @@ impl Clock<'_> {
             unit: self.unit,
             period: self.period,
             breaks: self.breaks,
-            number: None,
+            time: None,
             first: None,
             longest: 0.0,
             without_rows: 0.0,
@@ -27,18 +26,21 @@ impl Clock<'_> {
             pauses: Vec::new(),
             set: Vec::new(),
             set_before: None,
-            out_of_order: None,
+            out_of_order: (0, 0),
             behind: 0,
+            bursts: self.unit != TimeUnit::Count,
+            standing: 0,
+            at_once: (0, 0),
             of_rows: Vec::new(),
             let_go: 0,
         })
     }
 }
 
-/// Where a row belongs by its stamp: behind so many of those that are kept.
+/// Where a row belongs by its stamp: the number of kept rows that it is behind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::formats) enum Stamp {
-    /// No other has it, and it is taken.
+pub enum Stamp {
+    /// It is taken.
     New(usize),
     /// The row before has it, too.
     Again(usize),
@@ -54,21 +56,21 @@ struct Pause {
 }
 
 /// The stamps of a file so far.
-pub(in crate::formats) struct Stamps {
+pub struct Stamps {
     column: Option<usize>,
     nanoseconds: Option<usize>,
     unit: TimeUnit,
     /// s from row to row, if it is stated; always of counts
     period: Option<f64>,
     breaks: Breaks,
-    /// The number in the row before.
-    number: Option<f64>,
+    /// The time of the row before by its own numbers, s, as all that follows.
+    time: Option<f64>,
     first: Option<f64>,
     /// The longest step forward.
     longest: f64,
-    /// How far numbers have gone on without rows, in steps longer than BREAK.
+    /// In all, in steps longer than BREAK.
     without_rows: f64,
-    /// By how much the time of a row is ahead of its number: counters wrap, clocks are set, pauses are cut short.
+    /// By how much a row is later than its numbers: counters wrap, clocks are set, pauses are cut short.
     ahead: f64,
     /// The size of a counter that wrapped.
     wraps_at: Option<f64>,
@@ -79,9 +81,15 @@ pub(in crate::formats) struct Stamps {
     /// Number of rows before the last such place.
     set_before: Option<usize>,
     /// Rows that were put before others, and the line of the first.
-    out_of_order: Option<(usize, u64)>,
+    out_of_order: (usize, u64),
     /// Rows since the latest one that come behind it.
     behind: usize,
+    /// Whether rows of one time may have different values.
+    bursts: bool,
+    /// Rows that follow one another at one time.
+    standing: usize,
+    /// Rows that have another's time but not its values, and the line of the first.
+    at_once: (usize, u64),
     /// Time in s and line of each row taken and not let go …
     pub of_rows: Vec<(f64, u64)>,
     /// … and how many were before them.
@@ -89,38 +97,81 @@ pub(in crate::formats) struct Stamps {
 }
 
 impl Stamps {
+    /// The same where no two rows may have one time.
+    pub fn without_bursts(self) -> Self {
+        Self {
+            bursts: false,
+            ..self
+        }
+    }
+
+    /// Takes the row unless it is one of those at its time again, of which `is_same` compares the values.
+    pub fn take(
+        &mut self,
+        csv: &LogRows,
+        is_same: impl Fn(usize) -> bool,
+    ) -> Result<Stamp, FileError> {
+        let place = match self.look(csv)? {
+            Stamp::New(place) => {
+                self.standing = 0;
+                return Ok(Stamp::New(place));
+            }
+            Stamp::Again(place) => place,
+        };
+        self.standing += 1;
+        if self.standing > MOST_AT_ONCE {
+            return Err(csv.error_here(
+                format_args!("the same time in more than {MOST_AT_ONCE} rows"),
+                "times that increase",
+                "Name another time column, or leave it out and give sample_period_s.",
+            ));
+        }
+        if is_same(place - 1) {
+            return Ok(Stamp::Again(place));
+        }
+        if !self.bursts {
+            return Err(csv.error_here(
+                "the time of the row before again, a duplicate with other values",
+                "a later time",
+                "Remove the wrong one of both rows, or print times with more digits.",
+            ));
+        }
+        if self.is_set_to(place, csv)? {
+            return Ok(Stamp::New(self.of_rows.len() - 1));
+        }
+        count(&mut self.at_once, csv.line());
+        let (time, _) = self.of_rows[place - 1];
+        self.of_rows.insert(place, (time, csv.line()));
+        Ok(Stamp::New(place))
+    }
+
     /// Looks at the stamp of the row, and takes it if it is new.
-    pub fn look(&mut self, csv: &LogRows) -> Result<Stamp, FileError> {
+    fn look(&mut self, csv: &LogRows) -> Result<Stamp, FileError> {
         let end = self.of_rows.len();
         let Some(column) = self.column else {
             let time = (self.let_go + end) as f64 * self.period();
             self.of_rows.push((time, csv.line()));
             return Ok(Stamp::New(end));
         };
-        let number = self.number_of(csv, column)?;
+        let number = csv.number(column)?;
         if self.unit == TimeUnit::Count && number.fract() != 0.0 {
             return Err(csv.not(column, "a whole number of samples"));
         }
-        if number + self.usual_step() == number {
+        let time = self.time_of(csv, column)?;
+        if time + self.usual_step() == time {
             return Err(csv.not(
                 column,
                 "a time, not a number so large that the next row would have the same",
             ));
         }
-        if let Some(before) = self.number {
-            let step = number - before;
-            if let Some(unit) = self.other_unit(step) {
-                return Err(csv.error_here(
-                    format_args!("times that go on by {step} from row to row"),
-                    format_args!("{} s, as sample_period_s says", self.period()),
-                    format!("Give time_unit = \"{unit}\", or correct sample_period_s."),
-                ));
-            }
+        if let Some(before) = self.time {
+            let step = time - before;
+            self.is_in_unit(csv, step)?;
             if step == 0.0 {
                 return Ok(Stamp::Again(end));
             }
             let is_back = step < 0.0 && !self.wraps(step);
-            if is_back && let Some(late) = self.late(self.time(number), csv.line()) {
+            if is_back && let Some(late) = self.late(time + self.ahead, csv.line()) {
                 self.behind += 1;
                 if self.behind > REACH {
                     return Err(self.goes_back(csv, before, step));
@@ -130,84 +181,82 @@ impl Stamps {
             if is_back {
                 self.is_set(csv, before, step)?;
             } else if self.is_pause(step) {
-                self.pause(csv, number, step);
+                self.pause(csv, time, step);
             } else {
                 self.longest = self.longest.max(step);
-                if step > self.cut_to() {
+                if step > BREAK {
                     self.without_rows += step;
                 }
             }
         }
-        self.go_on(number, csv.line());
+        self.go_on(time, csv.line());
         Ok(Stamp::New(end))
     }
 
-    /// The unit in which the first two steps are as long as is stated, if that is not the one of `run.toml`.
-    fn other_unit(&self, step: f64) -> Option<&'static str> {
-        let (TimeUnit::PerSecond(_), Some(period)) = (self.unit, self.period) else {
-            return None;
+    /// Refuses the first two steps if they are as long as is stated in another unit than that of `run.toml`.
+    fn is_in_unit(&self, csv: &LogRows, step: f64) -> Result<(), FileError> {
+        let (TimeUnit::PerSecond(own), Some(period)) = (self.unit, self.period) else {
+            return Ok(());
         };
-        let first = self
-            .first
-            .zip(self.number)
-            .map(|(first, last)| last - first);
-        let [second, first] = match self.let_go == 0 && self.of_rows.len() == 2 {
-            true => [step, first?],
-            false => return None,
+        let (Some(last), Some(first), 2, 0) =
+            (self.time, self.first, self.of_rows.len(), self.let_go)
+        else {
+            return Ok(());
         };
-        let fits = |&(_, unit): &(&str, TimeUnit)| match unit {
-            TimeUnit::PerSecond(many) if unit != self.unit => {
-                let is_period = |step: f64| (step / many - period).abs() < 0.5 * period;
-                is_period(first) && is_period(second)
+        let is_period = |step: f64| (step - period).abs() < 0.5 * period;
+        let fits = |&&(_, unit): &&(&str, TimeUnit)| match unit {
+            TimeUnit::PerSecond(many) if many != own => {
+                is_period((last - first) * own / many) && is_period(step * own / many)
             }
             _ => false,
         };
-        TimeUnit::WORDS
-            .iter()
-            .find(|word| fits(word))
-            .map(|word| word.0)
-    }
-
-    fn number_of(&self, csv: &LogRows, column: usize) -> Result<f64, FileError> {
-        let nanoseconds = self.nanoseconds.map(|column| csv.number(column));
-        Ok(csv.number(column)? + 1e-9 * nanoseconds.transpose()?.unwrap_or(0.0))
-    }
-
-    fn go_on(&mut self, number: f64, line: u64) {
-        self.behind = 0;
-        self.number = Some(number);
-        self.first.get_or_insert(number);
-        self.of_rows.push((self.time(number), line));
-    }
-
-    /// s
-    fn time(&self, number: f64) -> f64 {
-        match self.unit {
-            TimeUnit::PerSecond(many) => (number + self.ahead) / many,
-            TimeUnit::Count => (number + self.ahead) * self.period(),
+        match TimeUnit::WORDS.iter().find(fits) {
+            None => Ok(()),
+            Some((unit, _)) => Err(csv.error_here(
+                format_args!(
+                    "times that go on by {} from row to row",
+                    nanoseconds(step * own)
+                ),
+                format_args!("{period} s, as sample_period_s says"),
+                format!("Give time_unit = \"{unit}\", or correct sample_period_s."),
+            )),
         }
     }
 
-    /// Behind which row one of this time belongs that comes late, if that is one of the last.
-    fn place(&self, time: f64) -> Option<usize> {
-        let last = self.of_rows.len().saturating_sub(REACH);
-        let place = last + self.of_rows[last..].partition_point(|(other, _)| *other <= time);
-        (place > last).then_some(place)
+    /// The time of a row by its own numbers, s.
+    fn time_of(&self, csv: &LogRows, column: usize) -> Result<f64, FileError> {
+        let number = csv.number(column)?;
+        let nanoseconds = self.nanoseconds.map(|column| csv.number(column));
+        Ok(match self.unit {
+            TimeUnit::PerSecond(many) => {
+                (number + 1e-9 * nanoseconds.transpose()?.unwrap_or(0.0)) / many
+            }
+            TimeUnit::Count => number * self.period(),
+        })
     }
 
-    /// Puts a row that comes late in its place, if there is one: where a row is missing, or at the time of another.
-    /// Those of a clock that was set back find theirs taken.
+    fn go_on(&mut self, time: f64, line: u64) {
+        self.behind = 0;
+        self.time = Some(time);
+        self.first.get_or_insert(time);
+        self.of_rows.push((time + self.ahead, line));
+    }
+
+    /// Puts a row that comes late in its place, if there is one of the last: where a row is missing, or at the time of
+    /// another. Those of a clock that was set back find theirs taken.
     fn late(&mut self, time: f64, line: u64) -> Option<Stamp> {
-        let place = self.place(time)?;
+        let last = self.of_rows.len().saturating_sub(REACH);
+        let place = last + self.of_rows[last..].partition_point(|(other, _)| *other <= time);
+        if place == last {
+            return None;
+        }
         if self.of_rows[place - 1].0 == time {
             return Some(Stamp::Again(place));
         }
         if !self.misses_a_row(place) {
             return None;
         }
-        let first = self.out_of_order.map_or(line, |(_, first)| first);
-        let count = self.out_of_order.map_or(0, |(count, _)| count);
-        self.out_of_order = Some((count + 1, first));
+        count(&mut self.out_of_order, line);
         self.of_rows.insert(place, (time, line));
         Some(Stamp::New(place))
     }
@@ -218,11 +267,7 @@ impl Stamps {
         let step = |rows: &[(f64, u64)]| rows[1].0 - rows[0].0;
         let last = &self.of_rows[self.of_rows.len().saturating_sub(REACH)..];
         let mut steps: Vec<f64> = last.windows(2).map(step).collect();
-        let half = steps.len() / 2;
-        let usual = match steps.is_empty() {
-            true => 0.0,
-            false => *steps.select_nth_unstable_by(half, f64::total_cmp).1,
-        };
+        let usual = median(&mut steps).unwrap_or(0.0);
         let ends = self.of_rows.get(place - 1..=place);
         ends.is_some_and(|ends| step(ends) > 1.5 * usual)
     }
@@ -231,62 +276,47 @@ impl Stamps {
         self.period.unwrap_or(1.0)
     }
 
-    /// The step that is stated, or else the longest so far; before any, that of a second.
+    /// The step that is stated, or else the longest so far; before any, a second.
     fn usual_step(&self) -> f64 {
-        match self.period {
-            Some(period) => period * self.a_second(),
-            None if self.longest > 0.0 => self.longest,
-            None => self.a_second(),
-        }
-    }
-
-    /// What numbers go on by in a second.
-    fn a_second(&self) -> f64 {
-        match self.unit {
-            TimeUnit::PerSecond(many) => many,
-            TimeUnit::Count => self.period().recip(),
-        }
-    }
-
-    /// How far numbers have gone on so far.
-    fn lasted(&self) -> f64 {
-        let ends = self.first.zip(self.number);
-        ends.map_or(0.0, |(first, last)| last + self.ahead - first)
+        let longest = Some(self.longest).filter(|longest| *longest > 0.0);
+        self.period.or(longest).unwrap_or(1.0)
     }
 
     /// Whether a counter of a known size wrapped at a step back, which is then made good.
     fn wraps(&mut self, step: f64) -> bool {
         let size = match self.unit {
-            TimeUnit::Count => wrap(step, COUNTERS, |size| 0.25 * size),
-            TimeUnit::PerSecond(many) => wrap(step, CLOCKS.map(|seconds| seconds * many), |_| {
-                2.0 * self.longest
+            TimeUnit::Count => wrap(step, COUNTERS.map(|size| size * self.period()), |size| {
+                0.25 * size
             }),
+            TimeUnit::PerSecond(_) => wrap(step, CLOCKS, |_| 2.0 * self.longest),
         };
         self.ahead += size.unwrap_or(0.0);
         self.wraps_at = size.or(self.wraps_at);
         size.is_some()
     }
 
-    /// How long a pause is that was cut short, or of which nobody knows how long it was.
-    fn cut_to(&self) -> f64 {
-        BREAK * self.a_second()
-    }
-
     /// Whether with this step forward nothing was recorded for longer than something was.
     fn is_pause(&self, step: f64) -> bool {
         let rows = self.let_go + self.of_rows.len();
-        let pauses = self.breaks >= Breaks::Pauses && rows > REACH && step > self.cut_to();
-        pauses && step + 2.0 * self.without_rows > self.lasted()
+        let lasted = self.time.zip(self.first);
+        let lasted = lasted.map_or(0.0, |(last, first)| last + self.ahead - first);
+        let pauses = self.breaks >= Breaks::Pauses && rows > REACH && step > BREAK;
+        pauses && step + 2.0 * self.without_rows > lasted
+    }
+
+    /// Takes what follows this step for a little later.
+    fn cut(&mut self, step: f64) {
+        self.ahead += BREAK - step;
+        self.without_rows += BREAK;
     }
 
     /// Cuts a pause short: samples of nothing would take room.
-    fn pause(&mut self, csv: &LogRows, number: f64, step: f64) {
-        self.ahead += self.cut_to() - step;
-        self.without_rows += self.cut_to();
+    fn pause(&mut self, csv: &LogRows, time: f64, step: f64) {
+        self.cut(step);
         let before = self.pauses.last().map_or(0.0, |pause| pause.left_out);
         self.pauses.push(Pause {
-            until: self.time(number),
-            left_out: before + (step - self.cut_to()) / self.a_second(),
+            until: time + self.ahead,
+            left_out: before + step - BREAK,
             line: csv.line(),
         });
     }
@@ -309,14 +339,14 @@ impl Stamps {
             return Err(self.goes_back(csv, before, step));
         }
         self.set_before = Some(row);
-        let (from, to) = (self.words(before), self.words(before + step));
-        self.ahead += self.cut_to() - step;
-        self.without_rows += self.cut_to();
-        let later = nanoseconds(BREAK - step / self.a_second());
+        self.cut(step);
         self.set.push(format!(
-            "line {}: time goes from {from} to {to}: the clock was set, and nobody knows how long nothing was \
-             recorded. What follows begins anew; its times are taken {later} s later.",
+            "line {}: time goes from {} to {}: the clock was set, and nobody knows how long nothing was \
+             recorded. What follows is a stretch of its own; its times are taken {} s later.",
             csv.line(),
+            self.words(before),
+            self.words(before + step),
+            nanoseconds(BREAK - step),
         ));
         Ok(())
     }
@@ -330,37 +360,28 @@ impl Stamps {
         )
     }
 
-    fn words(&self, number: f64) -> String {
+    fn words(&self, time: f64) -> String {
         match self.unit {
-            TimeUnit::PerSecond(many) => format!("{} s", nanoseconds(number / many)),
-            TimeUnit::Count => format!("count {number}"),
+            TimeUnit::PerSecond(_) => format!("{} s", nanoseconds(time)),
+            TimeUnit::Count => format!("count {}", (time / self.period()).round()),
         }
     }
 
-    /// Takes the row for another one at the time of the row before this place; if that is one of many rows back and no
-    /// row is missing there, for the first one of a clock that was set. Behind how many of the rows it is then.
-    pub fn again(&mut self, place: usize, csv: &LogRows) -> Result<usize, FileError> {
-        let end = self.of_rows.len();
-        if place < end && !self.misses_a_row(place) {
-            let number = self.column.map(|column| self.number_of(csv, column));
-            if let (Some(number), Some(before)) = (number.transpose()?, self.number) {
-                // Those before it that a set clock put back may have had the same values.
-                self.behind = 0;
-                self.is_set(csv, before, number - before)?;
-                self.go_on(number, csv.line());
-                return Ok(end);
-            }
+    /// Whether the row at the time of another, many rows back and none missing there, is the first one of a clock that
+    /// was set; it is then taken.
+    fn is_set_to(&mut self, place: usize, csv: &LogRows) -> Result<bool, FileError> {
+        if place == self.of_rows.len() || self.misses_a_row(place) {
+            return Ok(false);
         }
-        let before = place.checked_sub(1).and_then(|row| self.of_rows.get(row));
-        if let Some(&(time, _)) = before {
-            self.of_rows.insert(place, (time, csv.line()));
-        }
-        Ok(place)
-    }
-
-    /// Whether rows are counted, each with a number of its own.
-    pub fn is_count(&self) -> bool {
-        self.unit == TimeUnit::Count
+        let time = self.column.map(|column| self.time_of(csv, column));
+        let (Some(time), Some(before)) = (time.transpose()?, self.time) else {
+            return Ok(false);
+        };
+        // Those before it that a set clock put back may have had the same values.
+        self.behind = 0;
+        self.is_set(csv, before, time - before)?;
+        self.go_on(time, csv.line());
+        Ok(true)
     }
 
     /// Lets go of the first rows' stamps.
@@ -370,7 +391,7 @@ impl Stamps {
         self.let_go += rows;
     }
 
-    /// What was made of numbers that step back, and what that leaves open where so many samples lack their rows.
+    /// What was made of numbers that step back, and what that leaves open where this number of samples lack their rows.
     pub fn notes(&self, file: &Path, missing: usize) -> Vec<String> {
         let file = file.display();
         let set = self.set.iter();
@@ -385,38 +406,84 @@ impl Stamps {
                 nanoseconds(last.left_out)
             )
         }));
-        notes.extend(self.out_of_order.map(|(count, line)| {
+        let (same, line) = self.at_once;
+        notes.extend((same > 0).then(|| {
             format!(
-                "{count} row(s) of {file} come behind later ones, the first in line {line}: they are put in their place."
+                "{same} row(s) of {file} have the time of the row before and other values, the first in line {line}: \
+                 each counts as a sample."
+            )
+        }));
+        let (late, line) = self.out_of_order;
+        notes.extend((late > 0).then(|| {
+            format!(
+                "{late} row(s) of {file} come behind later ones, the first in line {line}: they are put in their place."
             )
         }));
         notes.extend(self.wraps_at.and_then(|size| match self.unit {
-            TimeUnit::PerSecond(many) => Some(format!(
+            TimeUnit::PerSecond(_) => Some(format!(
                 "{file}: the time wraps every {} s and is taken to go on.",
-                nanoseconds(size / many)
+                nanoseconds(size)
             )),
             TimeUnit::Count => (missing > 0).then(|| {
                 format!(
-                    "Rows are missing, and the counter wraps every {size} samples, {} s: as many more may be missing \
+                    "Rows are missing, and the counter wraps every {} samples, {} s: as many more may be missing \
                      at each place, or several times as many, and all after it be as much too early. Give a time that \
                      does not wrap, or split the record there.",
-                    nanoseconds(size * self.period())
+                    (size / self.period()).round(),
+                    nanoseconds(size)
                 )
             }),
         }));
         notes
     }
+}
 
-    /// The error of a row that has the stamp of the row before, but other values.
-    pub fn same(csv: &LogRows) -> FileError {
-        csv.error_here(
-            "the time of the row before again, a duplicate with other values",
-            "a later time",
-            "Remove the wrong one of both rows, or print times with more digits.",
-        )
+/// Counts a row of its kind; the line of the first is kept.
+fn count((count, first): &mut (usize, u64), line: u64) {
+    *count += 1;
+    if *count == 1 {
+        *first = line;
     }
 }
 
-/// How long nothing is taken to have been recorded where nobody knows, and what is left of a long pause, s: more than
+/// At one time, a minute and more of any rows are no burst: the time stands still.
+const MOST_AT_ONCE: usize = 1 << 16;
+/// How long nothing is taken to have been recorded where nobody knows, and the rest of a long pause, s: more than
 /// is ever interpolated.
 const BREAK: f64 = 1.0;
+
+/// Sizes of counters of samples.
+const COUNTERS: [f64; 4] = [256.0, 65_536.0, 16_777_216.0, 4_294_967_296.0];
+/// The seconds after which clocks start over: registers of milliseconds and microseconds, a day, a week of satellites.
+const CLOCKS: [f64; 7] = [
+    65.536,
+    16.777_216,
+    16_777.216,
+    4_294.967_296,
+    4_294_967.296,
+    86_400.0,
+    604_800.0,
+];
+
+/// The first of these sizes of a counter that makes its step back one forward that is no longer than usual.
+fn wrap<const N: usize>(step: f64, sizes: [f64; N], longest: impl Fn(f64) -> f64) -> Option<f64> {
+    let forward = |size: &f64| step + size > 0.0 && step + size <= longest(*size);
+    sizes.into_iter().find(forward)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_counter_wraps_at_the_smallest_size_that_makes_a_small_step() {
+        let wrap = |step| wrap(step, COUNTERS, |size| 0.25 * size);
+        assert_eq!(wrap(-255.0), Some(256.0));
+        assert_eq!(wrap(-250.0), Some(256.0));
+        assert_eq!(wrap(-65535.0), Some(65536.0));
+        assert_eq!(wrap(-65530.0), Some(65536.0));
+        assert_eq!(wrap(3.0 - 4_294_967_295.0), Some(4_294_967_296.0));
+        assert_eq!(wrap(-256.0), None, "the same count");
+        assert_eq!(wrap(-50.0), None, "rows out of order");
+    }
+}

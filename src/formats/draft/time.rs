@@ -7,7 +7,7 @@ use super::name;
 use super::name::Name;
 use super::text::seven;
 use crate::formats::Sheet;
-use crate::formats::uniform::Uniform;
+use crate::formats::clock::Uniform;
 use crate::statistics::median;
 
 /// Units of time in s, with the words that `run.toml` has for them.

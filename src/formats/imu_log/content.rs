@@ -1,38 +1,27 @@
 //! The rows of a file: those that are samples, in order of time, all of them held or packed as they come.
 
-use super::long::{LongLog, Sizes, Whole};
-use super::{ImuLog, Layout};
-use crate::formats::clock::{Stamp, Stamps};
+use super::parts::{Parts, Sizes};
+use super::{ImuLog, Layout, Read};
+use crate::formats::clock::{REACH, Stamp, Stamps, Wander};
 use crate::formats::error::FileError;
 use crate::formats::rows::LogRows;
 use crate::formats::temperature::Temperatures;
-use crate::formats::uniform::{REACH, Uniform};
 use crate::imu::Output;
 
 /// Fewer samples than this are no record of a turntable: not one dwell can be told from a turn.
 const FEWEST_SAMPLES: usize = 100;
 
-/// So many rows at one time, a minute and more of any, are no burst: the time stands still.
-const MOST_AT_ONCE: usize = 1 << 16;
-
 /// What the file holds.
-pub(super) struct Content {
+pub struct Content {
     pub layout: Layout,
     pub stamps: Stamps,
-    pub samples: Samples,
+    pub read: Read,
     pub temperature: Option<Temperatures>,
-    /// Of the integrals of the accelerometers' columns, in their unit times s.
-    pub integral_error: [f64; 3],
-}
-
-pub(super) enum Samples {
-    Held(Box<(Held, Uniform)>),
-    Long(Box<Whole>),
 }
 
 /// Rows that are held, without duplicates.
 #[derive(Default)]
-pub(super) struct Held {
+pub struct Held {
     pub columns: [Vec<f64>; 6],
     /// Rows before each duplicate, and its line.
     pub duplicates: Vec<(usize, u64)>,
@@ -85,10 +74,6 @@ struct Reading<'a> {
     blank: usize,
     /// Rows without some.
     lacking: usize,
-    /// Rows that have another's time but not its values, and the line of the first.
-    at_once: (usize, u64),
-    /// Rows that follow one another at one time.
-    standing: usize,
 }
 
 impl<'a> Reading<'a> {
@@ -113,8 +98,6 @@ impl<'a> Reading<'a> {
             duplicates: 0,
             blank: 0,
             lacking: 0,
-            at_once: (0, 0),
-            standing: 0,
         })
     }
 
@@ -145,62 +128,27 @@ impl<'a> Reading<'a> {
                 *value = self.log.value(csv, place)?;
             }
         }
-        if let Some(place) = self.place(csv, row)? {
-            self.held.insert(place, row);
-            if let (Some(temperature), Some(&(time, _))) =
-                (&mut self.temperature, self.stamps.of_rows.get(place))
-            {
-                temperature.take(csv, self.stamps.told(time));
+        let held = &mut self.held;
+        let place = match self.stamps.take(csv, |other| held.row(other) == row)? {
+            Stamp::New(place) => place,
+            Stamp::Again(place) => {
+                held.duplicates.push((place, csv.line()));
+                self.duplicates += 1;
+                return Ok(());
             }
+        };
+        held.insert(place, row);
+        if let (Some(temperature), Some(&(time, _))) =
+            (&mut self.temperature, self.stamps.of_rows.get(place))
+        {
+            temperature.take(csv, self.stamps.told(time));
         }
         Ok(())
     }
 
-    /// Behind how many of the rows that are held this one belongs; none where it is one of them again.
-    fn place(&mut self, csv: &LogRows, row: [f64; 6]) -> Result<Option<usize>, FileError> {
-        let place = match self.stamps.look(csv)? {
-            Stamp::New(place) => {
-                self.standing = 0;
-                return Ok(Some(place));
-            }
-            Stamp::Again(place) => place,
-        };
-        self.standing += 1;
-        if self.standing > MOST_AT_ONCE {
-            return Err(csv.error_here(
-                format_args!("the same time in more than {MOST_AT_ONCE} rows"),
-                "times that increase",
-                "Name another time column, or leave it out and give sample_period_s.",
-            ));
-        }
-        if self.held.row(place - 1) == row {
-            self.held.duplicates.push((place, csv.line()));
-            self.duplicates += 1;
-            return Ok(None);
-        }
-        if self.stamps.is_count() {
-            return Err(Stamps::same(csv));
-        }
-        let taken = self.stamps.again(place, csv)?;
-        if taken == place {
-            if self.at_once.0 == 0 {
-                self.at_once.1 = csv.line();
-            }
-            self.at_once.0 += 1;
-        }
-        Ok(Some(taken))
-    }
-
-    /// What was made of rows that are no samples, or too many, a sentence each.
+    /// What was made of rows that are no samples, a sentence each.
     fn notes(&self) -> impl Iterator<Item = String> {
         let file = self.log.source.file.display();
-        let (same, line) = self.at_once;
-        let at_once = (same > 0).then(|| {
-            format!(
-                "{same} row(s) of {file} have the time of the row before and other values, the first in line {line}: \
-                 each counts as a sample."
-            )
-        });
         let blank = (self.blank > 0).then(|| {
             format!(
                 "{} row(s) of {file} have nothing in the columns of both triads and are passed over.",
@@ -213,7 +161,7 @@ impl<'a> Reading<'a> {
                 self.lacking
             )
         });
-        [at_once, blank, lacking].into_iter().flatten()
+        [blank, lacking].into_iter().flatten()
     }
 
     fn too_few(&self, csv: &LogRows) -> FileError {
@@ -232,76 +180,90 @@ impl<'a> Reading<'a> {
     }
 }
 
+impl Reading<'_> {
+    /// Reads all rows, and whether they are packed.
+    fn all(
+        &mut self,
+        csv: &mut LogRows,
+        layout: &Layout,
+        sizes: Sizes,
+        known: &mut Option<Wander>,
+    ) -> Result<(Read, bool), FileError> {
+        let mut parts: Option<Parts> = None;
+        while csv.advance()? && !csv.may_be_cut() {
+            self.take(csv)?;
+            if parts.is_none() && self.held.len() == sizes.long {
+                csv.pack();
+                parts = Some(self.parts(csv, layout, Some(sizes.part), known.take())?);
+            }
+            if let Some(parts) = parts.as_mut().filter(|parts| parts.is_full(&self.held)) {
+                let taken = parts.take(&mut self.held, &mut self.stamps, false);
+                taken.map_err(|error| csv.placed(error))?;
+            }
+        }
+        let is_long = parts.is_some();
+        if !is_long && self.held.len() < FEWEST_SAMPLES {
+            return Err(self.too_few(csv));
+        }
+        let mut parts = match parts {
+            Some(parts) => parts,
+            None => self.parts(csv, layout, None, None)?,
+        };
+        let taken = parts.take(&mut self.held, &mut self.stamps, true);
+        self.held = Held::default();
+        let read = taken.and_then(|()| parts.finish(self.duplicates));
+        Ok((read.map_err(|error| csv.placed(error))?, is_long))
+    }
+}
+
+impl<'a> Reading<'a> {
+    fn parts(
+        &self,
+        csv: &LogRows,
+        layout: &Layout,
+        size: Option<usize>,
+        known: Option<Wander>,
+    ) -> Result<Parts<'a>, FileError> {
+        let rows = (&self.held, &self.stamps);
+        let parts = Parts::new(self.log, layout.clone(), size, rows, known);
+        parts.map_err(|error| csv.placed(error))
+    }
+}
+
 impl ImuLog<'_> {
     /// Reads the file; one too long to be held, and whose clock wanders, a second time with the clock that it was
     /// found to have.
-    pub(super) fn content(
+    pub fn content(
         &self,
         sizes: Sizes,
         notes: &mut Vec<String>,
-        known: Option<&Uniform>,
+        mut known: Option<Wander>,
     ) -> Result<Content, FileError> {
         let mut csv = self.open()?;
         let layout = self.layout(&mut csv)?;
         let mut reading = Reading::begin(self, &mut csv, layout.places)?;
-        let mut long: Option<LongLog> = None;
-        while csv.advance()? && !csv.may_be_cut() {
-            reading.take(&csv)?;
-            let Reading { held, stamps, .. } = &mut reading;
-            match &mut long {
-                Some(long) if long.is_full(held) => long
-                    .take(held, stamps, false)
-                    .map_err(|error| csv.placed(error))?,
-                None if held.len() == sizes.long => {
-                    csv.pack();
-                    let begun = LongLog::new(self, (layout.clone(), sizes), held, stamps, known);
-                    long = Some(begun.map_err(|error| csv.placed(error))?);
-                }
-                _ => {}
-            }
+        let is_first = known.is_none();
+        let (mut read, is_long) = reading.all(&mut csv, &layout, sizes, &mut known)?;
+        if is_long && is_first && read.clock.wander.is_some() {
+            // What was read is let go of before it is read again.
+            drop((csv, reading));
+            let wander = read.clock.wander.clone();
+            drop(read);
+            return self.content(sizes, notes, wander);
         }
-        if long.is_none() && reading.held.len() < FEWEST_SAMPLES {
-            return Err(reading.too_few(&csv));
+        let seconds = self.seconds(read.clock.period);
+        for (error, of_both) in read.error.accel.iter_mut().zip(csv.integral_error()) {
+            *error = error.hypot(of_both / seconds);
         }
-        let of_rows = reading.notes().collect::<Vec<_>>();
-        let Reading {
-            mut held,
-            mut stamps,
-            temperature,
-            duplicates,
-            ..
-        } = reading;
-        let samples = match long {
-            Some(mut long) => long.take(&mut held, &mut stamps, true).and_then(|()| {
-                drop(held);
-                Ok(Samples::Long(Box::new(long.finish(duplicates)?)))
-            }),
-            None => Uniform::new(&self.source.file, &stamps.of_rows, self.clock.period)
-                .map(|clock| Samples::Held(Box::new((held, clock)))),
-        };
-        let samples = match samples.map_err(|error| csv.placed(error))? {
-            Samples::Long(whole) if known.is_none() && whole.read.clock.wander.is_some() => {
-                let clock = whole.read.clock;
-                // What was read is let go of before it is read again.
-                drop((csv, stamps, temperature));
-                return self.content(sizes, notes, Some(&clock));
-            }
-            samples => samples,
-        };
-        let clock = match &samples {
-            Samples::Long(whole) => &whole.read.clock,
-            Samples::Held(held) => &held.1,
-        };
-        notes.extend(clock.uneven());
+        notes.extend(read.clock.uneven());
         notes.extend(csv.cut_off("It is left out"));
         notes.extend_from_slice(csv.remarks());
-        notes.extend(of_rows);
+        notes.extend(reading.notes());
         Ok(Content {
-            samples,
-            integral_error: csv.integral_error(),
+            read,
             layout,
-            stamps,
-            temperature,
+            stamps: reading.stamps,
+            temperature: reading.temperature,
         })
     }
 

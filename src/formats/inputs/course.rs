@@ -1,4 +1,10 @@
-//! Integrals of the samples of a stream, between any times.
+//! Samples of a stream integrated over other intervals than its own: between any times, or over the samples of an even
+//! clock where its own wanders.
+
+use std::ops::Range;
+
+use crate::formats::clock::Wander;
+use crate::imu::Output;
 
 /// The product of the distances from the middle of two edges to the four of the cubic.
 const MIDWAY: f64 = 0.5625;
@@ -58,7 +64,7 @@ impl Course {
 
     /// Mean square error of the integral midway between two edges.
     ///
-    /// Every second edge is left out and interpolated from those beside it, and every fourth one from those two
+    /// Every second edge is left out and interpolated from its neighbours, and every fourth one from those two
     /// away. White noise alone, which the filter knows of, makes the square of what is missed grow as the distance
     /// of edges; a signal that the cubic does not follow as its eighth power. So both are told apart, and the
     /// signal's part at the distance that there is, is 2⁻⁸ of that at twice as much.
@@ -104,6 +110,134 @@ fn beyond(sums: &[f64], edge: usize, part: f64) -> f64 {
     };
     let from = (edge - first) as f64;
     cubic(from + part) - cubic(from)
+}
+
+/// Samples over other intervals than those of their stream, and the error that this leaves.
+pub struct Resampled {
+    output: Output,
+    /// Of the errors at the edges of all samples, squared.
+    weights: f64,
+    count: f64,
+    /// Mean square errors midway between edges, each times the samples that show it.
+    squares: [f64; 3],
+    samples: f64,
+}
+
+impl Resampled {
+    pub fn new(output: Output) -> Self {
+        Self {
+            output,
+            weights: 0.0,
+            count: 0.0,
+            squares: [0.0; 3],
+            samples: 0.0,
+        }
+    }
+
+    /// What a row would hold of the interval between two places; none if the course does not have it.
+    pub fn sample(&mut self, course: &Course, begin: f64, end: f64) -> Option<[f64; 3]> {
+        let (sums, weight) = course.between(begin, end)?;
+        self.weights += weight;
+        self.count += 1.0;
+        Some(match self.output {
+            // Clocks that are one give values as they stand, to the last bit.
+            Output::Rate if (end - begin - 1.0).abs() > 1e-9 => sums.map(|sum| sum / (end - begin)),
+            _ => sums,
+        })
+    }
+
+    /// Measures the error on a course.
+    pub fn measure(&mut self, course: &Course) {
+        let samples = course.len() as f64;
+        self.samples += samples;
+        for (squares, error) in self.squares.iter_mut().zip(course.edge_error()) {
+            *squares += error * samples;
+        }
+    }
+
+    /// RMS error of the integral at an edge, in values times samples.
+    pub fn error(&self) -> [f64; 3] {
+        let weight = self.weights / self.count.max(1.0);
+        let of = |square: f64| (weight * square / self.samples.max(1.0)).sqrt();
+        self.squares.map(of)
+    }
+}
+
+/// Samples that the cubic reaches beyond the one it ends in.
+const AHEAD: f64 = 2.0;
+/// Samples that it reaches back.
+const BACK: usize = 2;
+
+/// The even samples of a triad, given out as those that wander come in.
+pub struct Even {
+    wander: Wander,
+    lag: f64,
+    held: Course,
+    /// The next of them.
+    next: f64,
+    resampled: Resampled,
+}
+
+/// The edges of samples that wander among even samples, which begin with the first whole one; stamps come `lag` of a
+/// sample after its begin.
+pub fn place(wander: &Wander, lag: f64, edge: usize) -> f64 {
+    wander.time(edge as f64 - lag) + lag
+}
+
+/// The even samples that these reach into, counted from the first.
+pub fn reached(wander: &Wander, lag: f64, samples: &Range<usize>) -> Range<usize> {
+    let first = place(wander, lag, 0).ceil();
+    let of = |edge| place(wander, lag, edge) - first;
+    of(samples.start).floor() as usize..of(samples.end).ceil() as usize
+}
+
+impl Even {
+    pub fn new(wander: &Wander, lag: f64, output: Output) -> Self {
+        Self {
+            next: place(wander, lag, 0).ceil(),
+            wander: wander.clone(),
+            lag,
+            held: Course::default(),
+            resampled: Resampled::new(output),
+        }
+    }
+
+    pub fn push(&mut self, sample: [f64; 3]) {
+        for (sums, value) in self.held.sums.iter_mut().zip(sample) {
+            sums.push(value);
+        }
+    }
+
+    /// Gives out the samples that those which came in hold, all of them at the end, and lets go of what no later one
+    /// asks for.
+    pub fn give(&mut self, at_end: bool, mut take: impl FnMut([f64; 3])) {
+        let until = self.held.end() - if at_end { 0.0 } else { AHEAD };
+        let edge = |time: f64| self.wander.number(time - self.lag) + self.lag;
+        let mut begin = edge(self.next);
+        loop {
+            let end = edge(self.next + 1.0);
+            if end > until {
+                break;
+            }
+            let Some(sample) = self.resampled.sample(&self.held, begin, end) else {
+                break;
+            };
+            take(sample);
+            self.next += 1.0;
+            begin = end;
+        }
+        self.resampled.measure(&self.held);
+        let gone = ((begin - self.held.begin) as usize).saturating_sub(BACK);
+        for sums in &mut self.held.sums {
+            sums.drain(..gone.min(sums.len()));
+        }
+        self.held.begin += gone as f64;
+    }
+
+    /// RMS error of the integral at an edge, in values times samples.
+    pub fn error(&self) -> [f64; 3] {
+        self.resampled.error()
+    }
 }
 
 #[cfg(test)]

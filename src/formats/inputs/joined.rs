@@ -2,15 +2,14 @@
 //!
 //! Gyros stand as they are. Accelerometers are integrated over each sample of the gyros: the integral is known at
 //! the edges of their own samples, and between those follows the cubic through four of them. What is passed on
-//! from sample to sample is exact, so errors do not add up; what is left is the error of the integral at an edge,
+//! from sample to sample is exact, so errors do not add up; there remains the error of the integral at an edge,
 //! which the record itself tells (see [`Course::edge_error`]).
 
 use std::path::{Path, PathBuf};
 
-use super::course::Course;
+use super::course::{Course, Resampled};
 use super::source::Source;
-use super::uniform::Uniform;
-use crate::formats::clock::{Breaks, Clock, Stamp, Stamps, TimeUnit};
+use crate::formats::clock::{Breaks, Clock, Stamp, TimeUnit, Uniform};
 use crate::formats::error::{FileError, Place};
 use crate::formats::rows::Rows;
 use crate::imu::{Output, PerSensor};
@@ -54,22 +53,18 @@ pub fn distinct(triads: &PerSensor<[&str; 3]>) -> PerSensor<[String; 3]> {
 }
 
 impl Joined {
-    /// Reads both streams, whose stamps come so many samples after a sample's begin.
+    /// Reads both streams, whose stamps come `lag` of a sample after its begin.
     pub fn read(parts: &PerSensor<Part>, output: Output, lag: f64) -> Result<Self, FileError> {
         let gyro = Track::read(&parts.gyro)?;
         let accel = Track::read(&parts.accel)?;
         let courses = accel.courses();
-        let (rows, weights) = rows_of_both(&gyro, &accel, &courses, output, lag);
+        let mut resampled = Resampled::new(output);
+        courses.iter().for_each(|course| resampled.measure(course));
+        let rows = rows_of_both(&gyro, &accel, &courses, &mut resampled, lag);
         let file = parts.gyro.source.file.clone();
         if rows.is_empty() {
             return Err(apart(&parts.accel.source.file, &gyro, &accel));
         }
-        let squares = courses.iter().map(Course::edge_error);
-        let count = courses.len() as f64;
-        let mean = squares.fold([0.0; 3], |mean, of| {
-            [0, 1, 2].map(|k| mean[k] + of[k] / count)
-        });
-        let weight = weights / rows.len() as f64;
         let seconds = match output {
             Output::Rate => accel.clock.period,
             Output::Increment | Output::Pulse => 1.0,
@@ -88,7 +83,7 @@ impl Joined {
             units,
             remarks: remarks_of_both(gyro, accel),
             rows,
-            error: mean.map(|square| seconds * (weight * square).sqrt()),
+            error: resampled.error().map(|error| seconds * error),
             at: 0,
         })
     }
@@ -140,20 +135,19 @@ impl Rows for Joined {
     }
 }
 
-/// The rows at which both streams have samples, and the sum of the weights of their edges' errors.
+/// The rows at which both streams have samples.
 fn rows_of_both(
     gyro: &Track,
     accel: &Track,
     courses: &[Course],
-    output: Output,
+    resampled: &mut Resampled,
     lag: f64,
-) -> (Vec<Vec<f64>>, f64) {
+) -> Vec<Vec<f64>> {
     let mut rows = Vec::with_capacity(gyro.clock.numbers.len());
     // Against the accelerometers' first stamp: seconds since 1970 have no digits left for parts of samples.
     let ahead = gyro.clock.first - accel.clock.first;
     let place = |number: f64| accel.clock.number(ahead + gyro.clock.time(number)) + lag;
     let mut course = 0;
-    let mut weights = 0.0;
     for (k, &number) in gyro.clock.numbers.iter().enumerate() {
         let time = gyro.clock.first + gyro.clock.time(number as f64);
         let begin = place(number as f64 - lag);
@@ -166,22 +160,16 @@ fn rows_of_both(
         }
         let course = courses.get(course);
         // Where one of both lacks samples, the row does.
-        let Some((sums, weight)) = course.and_then(|course| course.between(begin, end)) else {
+        let Some(sample) = course.and_then(|course| resampled.sample(course, begin, end)) else {
             continue;
         };
-        let factor = match output {
-            // Clocks that are one give values as they stand, to the last bit.
-            Output::Rate if (end - begin - 1.0).abs() > 1e-9 => (end - begin).recip(),
-            _ => 1.0,
-        };
-        weights += weight;
         let mut row = vec![time];
         row.extend(gyro.columns.iter().map(|column| column[k]));
-        row.extend(sums.map(|sum| sum * factor));
+        row.extend(sample);
         row.extend(gyro.further.iter().map(|column| column[k]));
         rows.push(row);
     }
-    (rows, weights)
+    rows
 }
 
 /// Streams whose times do not overlap.
@@ -256,17 +244,9 @@ impl Track {
             for (value, &place) in row.iter_mut().zip(&places) {
                 *value = rows.number(place)?;
             }
-            let place = match stamps.look(&rows)? {
-                Stamp::New(place) => place,
-                Stamp::Again(place) => {
-                    if columns.each_ref().map(|column| column[place - 1]) == row {
-                        continue;
-                    }
-                    if stamps.is_count() {
-                        return Err(Stamps::same(&rows));
-                    }
-                    stamps.again(place, &rows)?
-                }
+            let is_same = |other: usize| columns.each_ref().map(|column| column[other]) == row;
+            let Stamp::New(place) = stamps.take(&rows, is_same)? else {
+                continue;
             };
             for (column, value) in columns.iter_mut().zip(row) {
                 column.insert(place, value);

@@ -6,4 +6,3 @@ pub mod segments;
 pub mod source;
 pub mod table_log;
 pub mod temperature;
-pub mod uniform;

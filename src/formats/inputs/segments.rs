@@ -10,7 +10,7 @@ use crate::formats::schema::axes::BodyAxes;
 use crate::recording::{ImuSamples, LabelledMotion, Segment};
 use crate::units::DEGREE;
 
-/// Reads the sections of a run with these samples, which are stamped so many samples after they begin; what
+/// Reads the sections of a run with these samples, which are stamped `lag` samples after they begin; what
 /// the file leaves open goes to `notes`.
 pub fn read(
     file: &Path,

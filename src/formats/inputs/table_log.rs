@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 use super::source::{Source, clock};
 use crate::attitude;
-use crate::formats::clock::{Clock, Stamp, Stamps};
+use crate::formats::clock::{Clock, Stamp};
 use crate::formats::error::FileError;
 use crate::formats::rows::LogRows;
 use crate::formats::schema::{Angle, Document, TableColumns, TurntableFile};
@@ -132,7 +132,7 @@ impl AttitudeColumns<usize> {
         Ok(UnitQuaternion::from_quaternion(quaternion))
     }
 
-    /// The angles of the axes; none where a quaternion stands alone.
+    /// The angles of the axes; none if there is only a quaternion.
     fn axes(&self, csv: &LogRows) -> Result<Option<AxisAngles>, FileError> {
         let axes: Result<Vec<_>, FileError> = self
             .angles
@@ -204,22 +204,18 @@ impl<'a> TableLogFile<'a> {
     /// Reads the log of a run with these samples; what the file leaves open goes to `notes`.
     pub fn read(&self, imu: &ImuSamples, notes: &mut Vec<String>) -> Result<TableLog, FileError> {
         let mut csv = self.source.open()?;
-        let mut stamps = self.clock.start(&mut csv)?;
+        let mut stamps = self.clock.start(&mut csv)?.without_bursts();
         let columns = self.attitude.find(&mut csv)?;
 
         let mut attitude: Vec<UnitQuaternion<f64>> = Vec::new();
         let mut axes = Vec::new();
         while csv.advance()? && !csv.may_be_cut() {
             let reading = columns.reading(&csv)?;
-            match stamps.look(&csv)? {
-                // A row twice says nothing new.
-                Stamp::Again(place) if attitude[place - 1] == reading => {}
-                Stamp::Again(_) => return Err(Stamps::same(&csv)),
-                Stamp::New(place) => {
-                    attitude.insert(place, reading);
-                    if let Some(angles) = columns.axes(&csv)? {
-                        axes.insert(place, angles);
-                    }
+            // A row twice says nothing new.
+            if let Stamp::New(place) = stamps.take(&csv, |other| attitude[other] == reading)? {
+                attitude.insert(place, reading);
+                if let Some(angles) = columns.axes(&csv)? {
+                    axes.insert(place, angles);
                 }
             }
         }

@@ -250,21 +250,16 @@ impl Channel {
             .filter(|(_, (_, count))| *count > 0)
             .map(|(k, (sum, count))| (k, sum / f64::from(*count)))
             .collect();
-        let Some(&(_, last)) = known.last() else {
-            return Vec::new();
-        };
-        let mut filled = Vec::with_capacity(self.spans.len());
-        let mut before: Option<(usize, f64)> = None;
-        for (k, value) in known {
-            let (from, start) = before.unwrap_or((k, value));
-            for j in filled.len()..k {
-                let part = (j as f64 - from as f64) / (k - from).max(1) as f64;
-                filled.push(start + (value - start) * part.max(0.0));
+        let filled = |k: usize| {
+            let behind = known.partition_point(|&(at, _)| at <= k);
+            let [before, after] = [behind.wrapping_sub(1), behind].map(|of| known.get(of));
+            match (before, after) {
+                (Some(&(from, start)), Some(&(to, end))) => {
+                    start + (end - start) * ((k - from) as f64 / (to - from) as f64)
+                }
+                (of, other) => of.or(other).map_or(0.0, |&(_, value)| value),
             }
-            filled.push(value);
-            before = Some((k, value));
-        }
-        filled.resize(self.spans.len(), last);
-        filled
+        };
+        (0..self.spans.len()).map(filled).collect()
     }
 }

@@ -1,4 +1,4 @@
-//! How improbable a sound record must make samples before they are called a fault.
+//! How improbable a flawless record must make samples before they are called a fault.
 
 use statrs::distribution::{ContinuousCDF, Normal};
 
@@ -7,7 +7,7 @@ const RECORDS: f64 = 1e4;
 
 /// The limit of one kind of fault in a record: Bonferroni over all samples of its six axes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Limit {
+pub struct Limit {
     /// −ln of the probability that a sound sample goes beyond it.
     pub nats: f64,
     /// The same in σ of a normal distribution, either sign.
@@ -15,7 +15,7 @@ pub(super) struct Limit {
 }
 
 impl Limit {
-    /// Of a record with so many rows.
+    /// Of a record with this number of rows.
     pub fn of_rows(rows: usize) -> Self {
         let probability = (6.0 * rows.max(1) as f64 * RECORDS).recip();
         Self {
@@ -24,7 +24,7 @@ impl Limit {
         }
     }
 
-    /// The limit in σ where σ is itself an estimate of so many degrees of freedom, by Wallace's
+    /// The limit in σ where σ is itself an estimate of few degrees of freedom, by Wallace's
     /// approximation of Student's distribution.
     pub fn of_student(&self, freedom: f64) -> f64 {
         let exponent = self.sigmas.powi(2) * (freedom - 1.5).max(0.0) / (freedom - 1.0).powi(2);
@@ -58,7 +58,7 @@ impl Limit {
 
 /// Parts of a record's samples that lie beyond the quantiles from which its tail is carried on.
 const TAIL: [f64; 2] = [5e-2, 5e-3];
-/// What few values of a sound record exceed.
+/// What few values of a flawless record exceed.
 const FEW: f64 = 1e-3;
 
 /// σ beyond which a normal variate lies with this probability, either sign.

@@ -1,4 +1,4 @@
-//! Values that no instrument at rest or on a turntable gives: what is left of a failed transfer or of a counter
+//! Values that no instrument at rest or on a turntable gives: remains of a failed transfer or of a counter
 //! below zero.
 
 use std::ops::Range;
@@ -14,7 +14,7 @@ const LARGEST_FORCE: f64 = 1e4;
 
 /// Rows whose values are impossible.
 #[derive(Default)]
-pub(super) struct Impossible {
+pub struct Impossible {
     /// By nominal scales beyond what any instrument measures, by column.
     pub beyond: [Vec<Range<usize>>; 6],
     /// Zero in all columns, though gravity does not fit between zero and the next value.

@@ -5,7 +5,6 @@ mod fill;
 use std::cell::OnceCell;
 use std::ops::Range;
 
-use super::sound::Sound;
 use fill::Fill;
 
 /// Samples taken from either side at most.
@@ -34,8 +33,8 @@ const REACH: usize = 4;
 const AGREE: f64 = 3.0;
 
 /// The ways to fill samples that are not sound, whatever axis they are of.
-pub(super) struct Hole<'a> {
-    sound: &'a Sound,
+pub struct Hole<'a> {
+    sound: &'a [bool],
     samples: Range<usize>,
     /// The nearest sound samples before and after, outwards.
     sides: [Vec<usize>; 2],
@@ -47,7 +46,7 @@ pub(super) struct Hole<'a> {
 
 impl<'a> Hole<'a> {
     /// These samples, `sound` telling it of all; a hole longer than `longest` is not to be vouched for.
-    pub fn new(sound: &'a Sound, samples: Range<usize>, longest: usize) -> Self {
+    pub fn new(sound: &'a [bool], samples: Range<usize>, longest: usize) -> Self {
         let sides = [
             neighbours(sound, (0..samples.start).rev(), samples.len()),
             neighbours(sound, samples.end..sound.len(), samples.len()),
@@ -174,10 +173,10 @@ impl<'a> Hole<'a> {
 }
 
 /// The nearest sound samples, outwards.
-fn neighbours(sound: &Sound, outwards: impl Iterator<Item = usize>, hole: usize) -> Vec<usize> {
+fn neighbours(sound: &[bool], outwards: impl Iterator<Item = usize>, hole: usize) -> Vec<usize> {
     outwards
         .take(REACH * (MOST + hole))
-        .filter(|&k| sound.is(k))
+        .filter(|&k| sound[k])
         .take(MOST)
         .collect()
 }

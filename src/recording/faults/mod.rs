@@ -1,15 +1,13 @@
 //! What is wrong with a log's rows, and what was done about it.
 
 mod chance;
-mod ends;
 mod impossible;
 mod interpolation;
 mod notes;
+mod pinned;
 mod repair;
 mod slower;
-mod sound;
 mod spikes;
-mod stuck;
 
 use std::ops::Range;
 
@@ -18,9 +16,9 @@ use rayon::prelude::*;
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::{ColumnFacts, ImuSamples};
 use chance::Limit;
-use ends::Ends;
-pub(crate) use notes::notes;
-pub(crate) use repair::{Repaired, Rows};
+pub use notes::notes;
+use pinned::{Axis, saturated};
+pub use repair::{Repaired, Rows};
 pub use slower::Slower;
 use spikes::spikes;
 
@@ -29,7 +27,7 @@ use spikes::spikes;
 pub struct Fault {
     /// What is wrong.
     pub kind: FaultKind,
-    /// Triad and body axis (right, front, up); none where whole rows are concerned.
+    /// Triad and body axis (right, front, up); none if whole rows are concerned.
     pub axis: Option<(Sensor, usize)>,
     /// The samples; for a duplicate the one that the file has twice.
     pub samples: Range<usize>,
@@ -49,7 +47,7 @@ pub enum FaultKind {
     Duplicate,
     /// At the end of the axis' range, so that the truth may be beyond.
     Saturated,
-    /// The same value again and again, while the axis' noise or motion goes on.
+    /// The same value again and again, while the axis' noise or motion continues.
     Stuck,
     /// A single sample to which neither what is before nor what is after leads.
     Spike,
@@ -176,18 +174,14 @@ fn find(
         &steps,
         limit,
     );
-    let judged: [stuck::Column; 6] = std::array::from_fn(|k| stuck::Column {
-        values: &columns[k],
-        facts: &facts[k],
-        step: steps[k],
-        pulses,
-        full_scale: full_scale[k],
-    });
+    let axis = |k: usize| Axis::of(&columns[k], &facts[k], steps[k], pulses);
+    let axes: Vec<Axis> = (0..columns.len()).into_par_iter().map(axis).collect();
     let of_column = |column: usize| {
         let spikes = &spikes[column];
-        let stuck = judged[column].stuck(limit);
-        let triad = std::array::from_fn(|axis| &judged[column - column % 3 + axis]);
-        let saturated = Ends::of(triad, column % 3, spikes, &stuck, limit).saturated();
+        let stuck = axes[column].stuck(limit);
+        let triad = [0, 1, 2].map(|axis| &axes[column - column % 3 + axis]);
+        let known = (spikes.as_slice(), stuck.as_slice());
+        let saturated = saturated(triad, column % 3, full_scale[column], known, limit);
         // The row before a run has its value.
         let free = |rows: &Range<usize>| {
             !saturated
@@ -210,7 +204,7 @@ fn find(
     found.into_iter().flatten().collect()
 }
 
-/// What a column of numbers with so many digits resolves at its largest values, by the smallest change
+/// What a column of numbers with a fixed count of digits resolves at its largest values, by the smallest change
 /// relative to the value: a last digit is up to ten times that.
 fn last_digit(values: &[f64]) -> f64 {
     let changes = values.windows(2).filter(|pair| pair[0] != pair[1]);
@@ -222,6 +216,22 @@ fn last_digit(values: &[f64]) -> f64 {
         Some(least) => 10.0 * least * largest,
         None => 0.0,
     }
+}
+
+/// Mean of values, and slope of the line through them.
+fn mean_and_slope(values: &[f64]) -> (f64, f64) {
+    let count = values.len() as f64;
+    let middle = 0.5 * (count - 1.0);
+    let moments = values.iter().enumerate();
+    let moment: f64 = moments.map(|(k, value)| (k as f64 - middle) * value).sum();
+    (
+        mean(values),
+        moment * 12.0 / (count * (count * count - 1.0)),
+    )
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
 }
 
 /// Runs of rows or samples that are so.

@@ -4,7 +4,7 @@ use super::{Fault, FaultKind, Slower};
 use crate::recording::ImuSamples;
 
 /// A sentence for each part of a lower rate and for each kind of fault that a record has beside.
-pub(crate) fn notes(imu: &ImuSamples) -> Vec<String> {
+pub fn notes(imu: &ImuSamples) -> Vec<String> {
     let slower = imu.slower();
     let is_beside = |fault: &&Fault| !slower.iter().any(|part| part.holds(fault));
     let note = |kind| {

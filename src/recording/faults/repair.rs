@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use super::impossible::Impossible;
 use super::interpolation::Hole;
-use super::sound::Sound;
 use super::{Bridge, Fault, FaultKind, Found, find, ranges};
 use crate::imu::Sensor;
 use crate::recording::ColumnFacts;
@@ -19,12 +18,12 @@ const WORST_ANGLE: f64 = 0.2 * DEGREE;
 
 /// The rows of a file without duplicates. Columns are gyro x, y, z and accelerometer x, y, z of the
 /// file.
-pub(crate) struct Rows<'a> {
+pub struct Rows<'a> {
     pub columns: [Vec<f64>; 6],
     pub facts: &'a [ColumnFacts; 6],
     /// In the file's quantity.
     pub full_scale: [Option<f64>; 6],
-    /// Whether rows are whole pulses, what is left over being carried into the next.
+    /// Whether rows are whole pulses, the remainder being carried into the next.
     pub pulses: bool,
     /// The body axis of each column.
     pub body_axes: [usize; 6],
@@ -41,7 +40,7 @@ pub(crate) struct Rows<'a> {
 }
 
 /// The samples, and what was done to have them all.
-pub(crate) struct Repaired {
+pub struct Repaired {
     /// As in [`Rows`], a value for each sample.
     pub columns: [Vec<f64>; 6],
     pub faults: Vec<Fault>,
@@ -107,10 +106,7 @@ impl Rows<'_> {
         });
         let mut faults = self.missing();
         faults.extend(zero.chain(duplicates).chain(of_columns));
-        faults.sort_by_key(|fault| {
-            let axis = fault.axis.map(|(sensor, axis)| (sensor as usize, axis));
-            (fault.kind as usize, axis, fault.samples.start)
-        });
+        faults.sort_by_key(Fault::order);
         faults
     }
 
@@ -122,14 +118,14 @@ impl Rows<'_> {
         faults: &mut [Fault],
     ) -> Vec<Bridge> {
         let longest = (LONGEST / self.period) as usize;
-        let mut holes = ranges(sound.len(), |k| !sound.is(k));
+        let mut holes = ranges(sound.len(), |k| !sound[k]);
         holes.sort_by_key(Range::len);
         let mut filled = 0;
         let mut bridges = Vec::new();
         for (number, samples) in holes.iter().enumerate() {
             // Beside a long hole short ones, once filled, are as good as sound.
             while filled < number && SHORT * holes[filled].len() <= samples.len() {
-                sound.set(holes[filled].clone(), true);
+                sound[holes[filled].clone()].fill(true);
                 filled += 1;
             }
             let hole = Hole::new(&sound, samples.clone(), longest);
@@ -162,7 +158,7 @@ impl Rows<'_> {
         bridges
     }
 
-    /// Variance of the rounding of so many samples' sum. It stays within a step: of the sum where what is left over
+    /// Variance of the rounding of a sum of samples. It stays within a step: of the sum where the remainder
     /// is carried, else of each sample.
     fn rounding(&self, column: usize, samples: usize) -> f64 {
         let step = self.facts[column].step.unwrap_or(0.0);
@@ -218,6 +214,12 @@ impl Rows<'_> {
 }
 
 impl Fault {
+    /// Kind, axis and time.
+    pub fn order(&self) -> (usize, Option<(usize, usize)>, usize) {
+        let axis = self.axis.map(|(sensor, axis)| (sensor as usize, axis));
+        (self.kind as usize, axis, self.samples.start)
+    }
+
     /// Whether it leaves samples of an axis unknown.
     fn concerns(&self, sensor: Sensor, axis: usize) -> bool {
         self.kind != FaultKind::Duplicate && self.axis.is_none_or(|of| of == (sensor, axis))
@@ -227,7 +229,8 @@ impl Fault {
 /// Columns with the same holes.
 struct Holes {
     of: Vec<usize>,
-    sound: Sound,
+    /// Which samples are what the instrument sensed.
+    sound: Vec<bool>,
 }
 
 /// Columns with holes, those with the same ones together: rows that are missing lack all of them.
@@ -238,9 +241,9 @@ fn holes_of_columns(faults: &[Fault], body_axes: &[usize; 6], samples: usize) ->
         if !faults.iter().any(|fault| concerned(&fault)) {
             continue;
         }
-        let mut sound = Sound::new(samples);
+        let mut sound = vec![true; samples];
         for fault in faults.iter().filter(concerned) {
-            sound.set(fault.samples.clone(), false);
+            sound[fault.samples.clone()].fill(false);
         }
         match all.iter_mut().find(|holes| holes.sound == sound) {
             Some(holes) => holes.of.push(k),

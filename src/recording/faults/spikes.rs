@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::chance::Limit;
+use super::mean_and_slope;
 
 /// Samples of a line that is carried on to the next one: few follow a motion, many average noise.
 const LINES: [usize; 5] = [2, 4, 8, 16, 32];
@@ -15,7 +16,7 @@ const FEWEST: usize = TRIALS / 4;
 /// Samples of a side that are looked at.
 const SIDE: usize = TRIALS + LINES[LINES.len() - 1];
 
-/// For each column the rows that a line from either side misses by more than a sound record's would.
+/// For each column the rows that a line from either side misses by more than that of a flawless record would.
 /// `steps` are what values of the columns differ by at least.
 ///
 /// A sample belongs to the motion if what lies before or what lies after leads to it, or to something
@@ -23,7 +24,7 @@ const SIDE: usize = TRIALS + LINES[LINES.len() - 1];
 /// around, so that it has in it noise, grid and motion. The limit follows the tail that second
 /// differences of the whole column have. A knock is motion as well: it lasts longer than a sample, or
 /// other axes have it.
-pub(super) fn spikes(columns: &[&[f64]; 6], steps: &[f64], limit: Limit) -> [Vec<usize>; 6] {
+pub fn spikes(columns: &[&[f64]; 6], steps: &[f64], limit: Limit) -> [Vec<usize>; 6] {
     if columns[0].len() < 2 * TRIALS {
         return [const { Vec::new() }; 6];
     }
@@ -143,7 +144,7 @@ fn stands_out(column: &[f64], row: usize, grid: f64) -> f64 {
     best
 }
 
-/// A line that comes within so many of its σ of a sample leads to it.
+/// A line leads to a sample if it comes within this many of its σ.
 const LEADS: f64 = 1.0;
 
 /// σ beyond which a tenth of normal variates lies.
@@ -178,14 +179,8 @@ impl Line {
 
 /// Value of a line through these at the place before the first, and its slope towards there.
 fn carried_on(values: &[f64]) -> (f64, f64) {
-    let count = values.len() as f64;
-    let middle = 0.5 * (count - 1.0);
-    let mean = values.iter().sum::<f64>() / count;
-    let moment: f64 = (0..values.len())
-        .map(|k| (middle - k as f64) * values[k])
-        .sum();
-    let slope = moment * 12.0 / (count * (count * count - 1.0));
-    (mean + slope * (middle + 1.0), slope)
+    let (mean, slope) = mean_and_slope(values);
+    (mean - slope * 0.5 * (values.len() as f64 + 1.0), -slope)
 }
 
 #[cfg(test)]

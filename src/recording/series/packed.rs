@@ -18,7 +18,7 @@ const PADDING: usize = 16;
 
 /// Samples of three axes, packed.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Packed {
+pub struct Packed {
     /// What a step of each axis is.
     steps: Vector3<f64>,
     frames: Vec<Box<[u8]>>,
@@ -62,7 +62,7 @@ impl Packed {
 
 /// Packs samples of three axes as they come.
 #[derive(Debug)]
-pub(crate) struct Packer {
+pub struct Packer {
     /// What a step of each axis is, in the quantity that comes.
     steps: [f64; 3],
     /// What the steps so far do not hold, in steps.
@@ -135,7 +135,7 @@ const STEPS_OF_GRID: f64 = 16.0;
 const STEPS_OF_RANGE: f64 = 4_294_967_296.0;
 
 /// What a step has to be for an axis that gives these values, so that packing costs nothing beside its noise.
-pub(crate) fn finest_step(values: &[f64]) -> f64 {
+pub fn finest_step(values: &[f64]) -> f64 {
     let bend = |three: &[f64]| (three[0] - 2.0 * three[1] + three[2]).powi(2);
     let of_frame = |frame: &[f64]| {
         let bends = frame.windows(3).map(bend);

@@ -4,8 +4,6 @@ use std::ops::Range;
 
 use nalgebra::{Matrix4, Vector4};
 
-use crate::recording::faults::sound::{Pattern, Sound};
-
 /// Intact stretches that are filled as the hole is, on either side at most …
 const TRIALS: usize = 16;
 /// … and on both together at least.
@@ -15,7 +13,7 @@ const FEWEST_TRIALS: usize = 8;
 const UNTRIED: f64 = 2.0;
 
 /// A polynomial through neighbours by least squares.
-pub(super) struct Fill {
+pub struct Fill {
     hole: Range<usize>,
     /// Neighbours that follow one another, all those before the hole first.
     runs: Vec<Range<usize>>,
@@ -36,7 +34,7 @@ impl Fill {
         degree: usize,
         sides: [&[usize]; 2],
         hole: Range<usize>,
-        sound: &Sound,
+        sound: &[bool],
     ) -> Option<Self> {
         let [before, after] = sides;
         let runs_before = runs(before.iter().rev());
@@ -96,11 +94,14 @@ impl Fill {
         }
     }
 
-    /// By how much later the same samples are all sound, for so many places on either side as are tried.
-    fn intact(&self, sound: &Sound) -> Vec<isize> {
-        let (before, after) = self.runs.split_at(self.before);
-        let hole = std::slice::from_ref(&self.hole);
-        let pattern = Pattern::new(&[before, hole, after].concat());
+    /// By how much later the same samples are all sound, for as many places on either side as are tried.
+    fn intact(&self, sound: &[bool]) -> Vec<isize> {
+        let is_sound = |run: &Range<usize>, shift| {
+            let start = run.start.checked_add_signed(shift);
+            let samples = start.and_then(|start| sound.get(start..start + run.len()));
+            samples.is_some_and(|samples| !samples.contains(&false))
+        };
+        let asked = || self.runs.iter().chain(std::iter::once(&self.hole));
         let length = self.hole.len();
         let used: usize = self.runs.iter().map(Range::len).sum();
         let stride = length.div_ceil(2);
@@ -109,7 +110,7 @@ impl Fill {
             let shifts = (1..).map(move |k: isize| k * stride as isize);
             let shifts = shifts.take_while(move |&shift| shift <= reach);
             let shifts = shifts.map(move |shift| direction * shift);
-            let intact = shifts.filter(|&shift| pattern.is_sound(sound, shift));
+            let intact = shifts.filter(|&shift| asked().all(|run| is_sound(run, shift)));
             intact.take(TRIALS)
         };
         of_side(-1).chain(of_side(1)).collect()

@@ -5,15 +5,11 @@ use rand_chacha::ChaCha8Rng;
 
 const HOLES: usize = 300;
 
-fn sound(each: impl ExactSizeIterator<Item = bool>) -> Sound {
-    let mut all = Sound::new(each.len());
-    for (k, is_sound) in each.enumerate() {
-        all.set(k..k + 1, is_sound);
-    }
-    all
+fn sound(each: impl Iterator<Item = bool>) -> Vec<bool> {
+    each.collect()
 }
 
-fn fill(axis: &mut [f64], sound: &Sound, hole: &Range<usize>) -> Option<f64> {
+fn fill(axis: &mut [f64], sound: &[bool], hole: &Range<usize>) -> Option<f64> {
     Hole::new(sound, hole.clone(), 1000).fill(axis, 0.0)
 }
 
@@ -109,7 +105,7 @@ fn pulses(rate: f64, sigma: f64) -> ([f64; 3], f64) {
         .collect();
     let sound = sound((0..ROWS).map(|_| random.random::<f64>() > 0.02));
     let mut axis = truth.clone();
-    let holes = ranges(ROWS, |k| !sound.is(k));
+    let holes = ranges(ROWS, |k| !sound[k]);
     let holes = holes
         .iter()
         .filter(|hole| hole.start > 0 && hole.end < ROWS);

@@ -32,14 +32,8 @@ fn pulses(values: &[f64]) -> Vec<f64> {
 }
 
 fn find(values: &[f64], pulses: bool) -> Vec<Range<usize>> {
-    let column = Column {
-        values,
-        facts: &ColumnFacts::of("", values, 1.0),
-        step: 1.0,
-        pulses,
-        full_scale: None,
-    };
-    column.stuck(Limit::of_rows(values.len()))
+    let facts = ColumnFacts::of("", values, 1.0);
+    Axis::of(values, &facts, 1.0, pulses).stuck(Limit::of_rows(values.len()))
 }
 
 fn hold(values: &mut [f64], rows: Range<usize>) {

@@ -7,17 +7,20 @@ const ROWS: usize = 64;
 /// Stamps nearer than this part of a sample to their due times need no other clock.
 const WITHIN: f64 = 0.5;
 
-/// Rows of about one time: the mean of their numbers, and the median of how far their stamps are off, s.
+/// Rows of about one time: the mean of their numbers, the median of how far their stamps are off, s, and the line of
+/// the one in the middle.
 #[derive(Debug, Clone, Copy)]
 struct Knot {
     number: f64,
     off: f64,
+    line: u64,
 }
 
 /// Stamps as they come, against a clock that they are referred to.
 #[derive(Debug, Clone, Default)]
 pub struct Knots {
-    rows: Vec<(usize, f64)>,
+    /// Number, how far it is off, and line.
+    rows: Vec<(usize, f64, u64)>,
     knots: Vec<Knot>,
     count: usize,
     squares: f64,
@@ -25,16 +28,8 @@ pub struct Knots {
 }
 
 impl Knots {
-    pub fn of(rows: impl IntoIterator<Item = (usize, f64)>) -> Self {
-        let mut knots = Self::default();
-        for (number, off) in rows {
-            knots.push(number, off);
-        }
-        knots.finish()
-    }
-
-    pub fn push(&mut self, number: usize, off: f64) {
-        self.rows.push((number, off));
+    pub fn push(&mut self, number: usize, off: f64, line: u64) {
+        self.rows.push((number, off, line));
         if self.rows.len() == ROWS {
             self.tie();
         }
@@ -49,14 +44,15 @@ impl Knots {
     }
 
     fn tie(&mut self) {
-        let mut offs: Vec<f64> = self.rows.iter().map(|&(_, off)| off).collect();
+        let mut offs: Vec<f64> = self.rows.iter().map(|&(_, off, _)| off).collect();
         let Some(off) = median(&mut offs) else {
             return;
         };
-        let numbers = self.rows.iter().map(|&(number, _)| number as f64);
+        let numbers = self.rows.iter().map(|&(number, ..)| number as f64);
         let number = numbers.sum::<f64>() / self.rows.len() as f64;
-        self.knots.push(Knot { number, off });
-        for (_, of_row) in self.rows.drain(..) {
+        let (.., line) = self.rows[self.rows.len() / 2];
+        self.knots.push(Knot { number, off, line });
+        for (_, of_row, _) in self.rows.drain(..) {
             let jitter = (of_row - off).abs();
             self.count += 1;
             self.squares += jitter * jitter;
@@ -70,16 +66,20 @@ impl Knots {
         (mean.sqrt(), self.largest)
     }
 
-    /// From a clock whose first sample is due so much later than that of the one that stamps are referred to, and
-    /// whose period is so much longer; none if stamps are as near to that one as makes no difference.
-    pub fn wander(&self, later: f64, longer: f64, period: f64) -> Option<Wander> {
+    /// From a clock of this period whose first sample is due later than that of the one that stamps are referred to, and
+    /// whose period is longer; none if stamps are near enough to that one. Err is the line where times do not increase.
+    pub fn wander(&self, later: f64, longer: f64, period: f64) -> Result<Option<Wander>, u64> {
         let knots = self.knots.iter().map(|knot| {
             let off = (knot.off - later - knot.number * longer) / period;
             (knot.number, off)
         });
         let knots: Vec<_> = knots.collect();
         let wanders = knots.iter().any(|(_, off)| off.abs() > WITHIN);
-        (wanders && knots.len() > 1).then_some(Wander { knots })
+        let wander = (wanders && knots.len() > 1).then_some(Wander { knots });
+        match wander.as_ref().and_then(Wander::stops) {
+            Some(knot) => Err(self.knots[knot].line),
+            None => Ok(wander),
+        }
     }
 }
 
@@ -105,12 +105,11 @@ impl Wander {
         self.between(behind, |(knot, off)| (knot + off, knot), time)
     }
 
-    /// The sample from which on the clock does not go forward any more; none of one that does.
-    pub fn stops(&self) -> Option<usize> {
+    /// The knot from which on the clock does not go forward any more.
+    fn stops(&self) -> Option<usize> {
         let time = |(number, off): (f64, f64)| number + off;
         let forward = |pair: &[(f64, f64)]| time(pair[1]) > time(pair[0]);
-        let stops = self.knots.windows(2).find(|pair| !forward(pair));
-        stops.map(|pair| pair[0].0 as usize)
+        self.knots.windows(2).position(|pair| !forward(pair))
     }
 
     /// The most by which a sample is off, in samples.
@@ -143,8 +142,8 @@ mod tests {
             wander.stops()
         };
         assert_eq!(stops([0.0, -60.0, 60.0]), None);
-        assert_eq!(stops([0.0, 60.0, -10.0]), Some(96));
-        assert_eq!(stops([0.0, -64.0, 0.0]), Some(32));
-        assert_eq!(stops([0.0, f64::NAN, 0.0]), Some(32));
+        assert_eq!(stops([0.0, 60.0, -10.0]), Some(1));
+        assert_eq!(stops([0.0, -64.0, 0.0]), Some(0));
+        assert_eq!(stops([0.0, f64::NAN, 0.0]), Some(0));
     }
 }

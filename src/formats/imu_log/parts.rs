@@ -1,0 +1,321 @@
+//! The samples of rows, a part of them at a time: all at once of a short log, packed part by part of a long one.
+
+use std::ops::Range;
+
+use super::content::Held;
+use super::{ImuLog, Layout, Read};
+use crate::formats::clock::{Line, REACH, Stamps, Wander};
+use crate::formats::course::{Even, reached};
+use crate::formats::error::FileError;
+use crate::imu::{Output, PerSensor, Sensor};
+use crate::recording::faults::{Repaired, Rows};
+use crate::recording::{Bridge, ColumnFacts, Fault, FaultKind, Packer, SeriesWriter, finest_step};
+
+/// How many rows are held.
+#[derive(Debug, Clone, Copy)]
+pub struct Sizes {
+    /// From this many on a log is packed: until then they take 50 MB at most.
+    pub long: usize,
+    /// Rows that are looked at for faults at once, as though they were a record.
+    pub part: usize,
+}
+
+impl Default for Sizes {
+    fn default() -> Self {
+        Self {
+            long: 1 << 20,
+            part: 1 << 18,
+        }
+    }
+}
+
+/// Rows on either side of a part that are looked at with it: more than what is bridged, and what tells of it, reach
+/// over.
+const BESIDE: usize = 1 << 13;
+
+/// What a log has come to so far.
+pub struct Parts<'a> {
+    log: &'a ImuLog<'a>,
+    layout: Layout,
+    /// Rows of a part; none if all rows are one.
+    size: Option<usize>,
+    clock: Line,
+    /// The sample of each row that is held.
+    numbers: Vec<usize>,
+    /// Rows held that were taken.
+    taken: usize,
+    /// The first sample that was not.
+    next: usize,
+    facts: Option<[ColumnFacts; 6]>,
+    series: PerSensor<SeriesWriter>,
+    /// Where it is known that samples wander.
+    even: Option<(Wander, PerSensor<Even>)>,
+    faults: Vec<Fault>,
+    bridges: Vec<Bridge>,
+    rows: usize,
+}
+
+impl<'a> Parts<'a> {
+    /// Begins with the first rows of a log, or all of them. How the samples of a log in parts wander may be known.
+    pub fn new(
+        log: &'a ImuLog<'a>,
+        layout: Layout,
+        size: Option<usize>,
+        (held, stamps): (&Held, &Stamps),
+        known: Option<Wander>,
+    ) -> Result<Self, FileError> {
+        // Rows further on may belong before the last ones.
+        let open = if size.is_some() { REACH } else { 0 };
+        let settled = &stamps.of_rows[..stamps.of_rows.len().saturating_sub(open)];
+        let (clock, numbers) = Line::new(&log.source.file, settled, log.clock.period)?;
+        let wander = match size {
+            Some(_) => known,
+            None => clock.clone().finish()?.wander,
+        };
+        let step = |column: usize| match log.output {
+            Output::Pulse => 1.0,
+            Output::Increment | Output::Rate => finest_step(&held.columns[column]),
+        };
+        let writer = |sensor| match size {
+            None => SeriesWriter::default(),
+            Some(_) => SeriesWriter::Packed(Packer::new(layout.columns(sensor).map(step))),
+        };
+        Ok(Self {
+            series: PerSensor::from_fn(writer),
+            even: wander.map(|wander| {
+                let even = |_| Even::new(&wander, log.stamp.lag(), log.output);
+                let even = PerSensor::from_fn(even);
+                (wander, even)
+            }),
+            log,
+            layout,
+            size,
+            clock,
+            numbers,
+            taken: 0,
+            next: 0,
+            facts: None,
+            faults: Vec::new(),
+            bridges: Vec::new(),
+            rows: 0,
+        })
+    }
+
+    /// The rows that have to be held for the next part.
+    fn end(&self) -> Option<usize> {
+        self.size.map(|size| self.taken + size + 2 * BESIDE)
+    }
+
+    /// Whether enough rows are held to take some.
+    pub fn is_full(&self, held: &Held) -> bool {
+        self.end().is_some_and(|end| held.len() >= end + REACH)
+    }
+
+    /// Takes rows that are held, all of them at the end of the file, and lets go of what no later row asks for.
+    pub fn take(
+        &mut self,
+        held: &mut Held,
+        stamps: &mut Stamps,
+        at_end: bool,
+    ) -> Result<(), FileError> {
+        // Rows further on tell whether one is late.
+        let new = &stamps.of_rows[self.numbers.len()..];
+        let count = new.len() - if at_end { 0 } else { REACH.min(new.len()) };
+        self.numbers.extend(self.clock.numbers(new, count)?);
+        while self.is_full(held)
+            && let Some(end) = self.end()
+        {
+            self.part(held, stamps, end);
+        }
+        if at_end {
+            self.part(held, stamps, held.len());
+        }
+        Ok(())
+    }
+
+    /// Takes rows up to about this one, to which faults are looked for.
+    fn part(&mut self, held: &mut Held, stamps: &mut Stamps, end: usize) {
+        let is_last = end == held.len();
+        let first = self.numbers[0];
+        let units = self.layout.units(self.log, self.clock.period());
+        let names = &self.layout.names;
+        let facts_of = |columns: &[Vec<f64>; 6], rows: Range<usize>| {
+            let of =
+                |k: usize| ColumnFacts::of(&names[k].name, &columns[k][rows.clone()], units[k]);
+            std::array::from_fn(of)
+        };
+        let facts = facts_of(&held.columns, 0..end);
+        let of_rest = match self.taken {
+            0 => facts.clone(),
+            taken => facts_of(&held.columns, taken..end),
+        };
+        let columns = match is_last {
+            true => std::mem::take(&mut held.columns),
+            false => held.columns.each_ref().map(|rows| rows[..end].to_vec()),
+        };
+        let mut repaired = self.rows(held, stamps, columns, &facts).repair();
+        for samples in repaired.samples_mut() {
+            *samples = first + samples.start..first + samples.end;
+        }
+        if is_last {
+            let until = self.numbers[end - 1] + 1;
+            self.keep(repaired, first, self.next..until, true);
+            self.add(of_rest, self.taken..end);
+            self.next = until;
+            return;
+        }
+        // A part ends before a sound sample, so that nothing is bridged across.
+        let wanted = end.saturating_sub(BESIDE).max(self.taken);
+        let sound = |row: &usize| repaired.is_sound(self.numbers[*row]);
+        let end = (wanted..end).find(sound).unwrap_or(wanted);
+        let until = self.numbers[end];
+        let facts = facts_of(&held.columns, self.taken..end);
+        self.keep(repaired, first, self.next..until, false);
+        self.add(facts, self.taken..end);
+        (self.next, self.taken) = (until, end);
+        self.let_go(held, stamps);
+    }
+
+    /// Rows to be looked at for faults.
+    fn rows<'b>(
+        &self,
+        held: &Held,
+        stamps: &Stamps,
+        columns: [Vec<f64>; 6],
+        facts: &'b [ColumnFacts; 6],
+    ) -> Rows<'b> {
+        let (end, first) = (columns[0].len(), self.numbers[0]);
+        let lines = stamps.of_rows[..end].iter().map(|&(_, line)| line);
+        let duplicates = held.duplicates.iter().copied();
+        let period = self.clock.period();
+        Rows {
+            facts,
+            full_scale: self.layout.full_scale(self.log),
+            pulses: self.log.output == Output::Pulse,
+            body_axes: self.layout.body_axes,
+            units: self.layout.units(self.log, period),
+            lines: lines.collect(),
+            numbers: self.numbers[..end].iter().map(|n| n - first).collect(),
+            period,
+            duplicates: duplicates.filter(|&(row, _)| row <= end).collect(),
+            columns,
+        }
+    }
+
+    fn add(&mut self, facts: [ColumnFacts; 6], rows: Range<usize>) {
+        self.rows += rows.len();
+        self.facts = Some(match self.facts.take() {
+            Some(before) => {
+                let mut of = before.into_iter().zip(&facts).map(|(a, b)| a.and(b));
+                std::array::from_fn(|_| of.next().unwrap_or_default())
+            }
+            None => facts,
+        });
+    }
+
+    /// Keeps what was found of these samples; repaired columns begin with sample `first`.
+    fn keep(&mut self, repaired: Repaired, first: usize, samples: Range<usize>, is_last: bool) {
+        let Repaired {
+            columns,
+            faults,
+            bridges,
+        } = repaired;
+        let within = |of: &Range<usize>| of.start.max(samples.start)..of.end.min(samples.end);
+        let kept = faults.into_iter().map(|fault| Fault {
+            samples: within(&fault.samples),
+            ..fault
+        });
+        for fault in kept.filter(|fault| !fault.samples.is_empty()) {
+            self.keep_fault(fault, samples.start);
+        }
+        let begin_within = |bridge: &Bridge| samples.contains(&bridge.samples.start);
+        self.bridges
+            .extend(bridges.into_iter().filter(begin_within));
+        for sensor in Sensor::ALL {
+            let of_axes = self.layout.columns(sensor).map(|column| &columns[column]);
+            let series = self.series.get_mut(sensor);
+            let samples = samples.start - first..samples.end - first;
+            let samples = samples.map(|k| of_axes.map(|column| column[k]));
+            match &mut self.even {
+                None => samples.for_each(|sample| series.push(sample)),
+                Some((_, even)) => {
+                    let even = even.get_mut(sensor);
+                    samples.for_each(|sample| even.push(sample));
+                    even.give(is_last, |sample| series.push(sample));
+                }
+            }
+        }
+    }
+
+    /// One that lasts from the part before into the one that begins here is one.
+    fn keep_fault(&mut self, fault: Fault, begin: usize) {
+        let is_whole = matches!(fault.kind, FaultKind::Duplicate | FaultKind::Missing);
+        let is_rest = fault.samples.start == begin && !is_whole;
+        let begun = |before: &&mut Fault| {
+            (before.kind, before.axis) == (fault.kind, fault.axis) && before.samples.end == begin
+        };
+        let mut before = self.faults.iter_mut();
+        match is_rest.then(|| before.find(begun)).flatten() {
+            Some(before) => {
+                before.samples.end = fault.samples.end;
+                before.bridged &= fault.bridged;
+            }
+            None => self.faults.push(fault),
+        }
+    }
+
+    fn let_go(&mut self, held: &mut Held, stamps: &mut Stamps) {
+        let rows = self.taken.saturating_sub(BESIDE);
+        held.let_go(rows);
+        stamps.let_go(rows);
+        self.numbers.drain(..rows);
+        self.numbers.shrink_to(2 * self.numbers.len());
+        self.taken -= rows;
+    }
+
+    /// What the log is, all of its rows being taken.
+    pub fn finish(mut self, duplicates: usize) -> Result<Read, FileError> {
+        let clock = self.clock.finish()?;
+        let mut facts = self.facts.unwrap_or_default();
+        for (facts, unit) in facts
+            .iter_mut()
+            .zip(self.layout.units(self.log, clock.period))
+        {
+            facts.unit = unit;
+        }
+        let seconds = self.log.seconds(clock.period);
+        let mut series = PerSensor::default();
+        for (sensor, writer) in Sensor::ALL
+            .into_iter()
+            .zip([self.series.gyro, self.series.accel])
+        {
+            let nominal = self.layout.body_nominal(self.log, sensor);
+            *series.get_mut(sensor) = writer.finish(seconds, nominal);
+        }
+        let mut error = PerSensor::default();
+        if let Some((wander, even)) = &self.even {
+            error = PerSensor::from_fn(|sensor| even.get(sensor).error());
+            let of_faults = self.faults.iter_mut().map(|fault| &mut fault.samples);
+            let of_bridges = self.bridges.iter_mut().map(|bridge| &mut bridge.samples);
+            let count = series.gyro.len();
+            for samples in of_faults.chain(of_bridges) {
+                let of = reached(wander, self.log.stamp.lag(), samples);
+                *samples = of.start.min(count)..of.end.min(count);
+            }
+        }
+        self.faults.sort_by_key(Fault::order);
+        self.faults.shrink_to_fit();
+        Bridge::sort(&mut self.bridges);
+        self.bridges.shrink_to_fit();
+        Ok(Read {
+            clock,
+            facts,
+            rows: self.rows + duplicates,
+            missing: self.next - self.rows,
+            faults: self.faults,
+            bridges: self.bridges,
+            series,
+            error,
+        })
+    }
+}

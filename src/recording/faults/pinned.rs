@@ -1,0 +1,373 @@
+//! Axes pinned to a value while the instrument lives: stuck within their range, or held at an end of it.
+//!
+//! An axis that is alive repeats a value as long as its noise and its motion stay within a step of its grid. Equal
+//! values in a row are a fault where that is improbable: by the noise that the axis has at rest, by the level on either
+//! side, by the motion that crosses them, and at an end of the range by the motion on either side.
+
+mod ends;
+
+use std::ops::Range;
+
+use nalgebra::{SMatrix, SVector};
+use statrs::function::erf::erf;
+
+use super::chance::Limit;
+use super::{mean, mean_and_slope};
+use crate::recording::ColumnFacts;
+use crate::statistics::median;
+pub use ends::saturated;
+
+/// Rows in which noise is measured at one level.
+const BLOCK: usize = 64;
+/// Part of the blocks that may be quieter than noise at rest: axes stuck for long.
+const STUCK_PART: f64 = 0.1;
+/// Rows whose sum is hardly rounded.
+const SUM: usize = 4;
+/// Rows next to a run.
+const NEXT: usize = 4 * SUM;
+/// Parts of the record in which repeats of repeats are counted.
+const PARTS: usize = 32;
+/// Rows on either side of a run that show how a motion continues.
+const CLOSE: usize = 16;
+/// Median magnitude of second differences of white noise over its σ: √6 times that of a normal variate.
+const OF_SECOND_DIFFERENCES: f64 = 2.449_489_742_783_178 * 0.674_489_750_196_081_7;
+
+/// A column and what it is judged by.
+pub struct Axis<'a> {
+    values: &'a [f64],
+    facts: &'a ColumnFacts,
+    /// What values differ by at least; zero if they are all the same.
+    step: f64,
+    /// Whether values are whole pulses, the remainder being carried into the next.
+    pulses: bool,
+    /// Stretches of rows each equal to the one before.
+    runs: Vec<Range<usize>>,
+    /// Variance of the noise at rest where the axis is not at an extreme, steps²: an axis that is clipped over whole
+    /// dwells has none there.
+    noise: f64,
+    /// Of all repeats those that are repeated: noise that is correlated.
+    repeated: f64,
+}
+
+impl<'a> Axis<'a> {
+    pub fn of(values: &'a [f64], facts: &'a ColumnFacts, step: f64, pulses: bool) -> Self {
+        let ends = [facts.smallest, facts.largest];
+        let is_free = |block: &&[f64]| !block.iter().any(|value| ends.contains(value));
+        let blocks = values.chunks_exact(BLOCK);
+        let free: Vec<f64> = blocks.filter(is_free).flatten().copied().collect();
+        // An axis of few values is at an extreme everywhere.
+        let is_enough = free.len() as f64 > STUCK_PART * values.len() as f64;
+        let free = if is_enough { &free } else { values };
+        let axis = Self {
+            values,
+            facts,
+            step,
+            pulses,
+            runs: runs(values),
+            noise: 0.0,
+            repeated: repeats_of_repeats(free),
+        };
+        match step > 0.0 {
+            true => Self {
+                noise: axis.noise_at_rest(free),
+                ..axis
+            },
+            false => axis,
+        }
+    }
+
+    /// The rows that repeat the one before them so long that an axis alive would not, the first of
+    /// equal values left out.
+    pub fn stuck(&self, limit: Limit) -> Vec<Range<usize>> {
+        if self.step <= 0.0 {
+            return Vec::new();
+        }
+        let by_noise = limit.nats / self.nats(self.noise);
+        let is_stuck = |run: &&Range<usize>| {
+            run.len() as f64 > by_noise
+                || self.leaves_its_level(run, limit)
+                || self.interrupts_a_motion(run, limit)
+        };
+        self.runs.iter().filter(is_stuck).cloned().collect()
+    }
+
+    /// −ln of the largest probability that a sample repeats the one before, wherever the true value lies, with white
+    /// noise of this variance, steps².
+    ///
+    /// By the noise at rest a value stays within its step most probably if the truth is in the middle
+    /// of it (Anderson's inequality). Noise that is correlated stays longer; it shows in how often
+    /// repeats are repeated.
+    fn nats(&self, variance: f64) -> f64 {
+        let white = repeats_at_best(variance);
+        // Pulses count an angle that walks: it stays between two edges of a step with the largest
+        // eigenvalue of such a walk (Siegmund's correction of the edges: 0.5826 σ each).
+        let walk = -0.5 * std::f64::consts::PI.powi(2) * variance
+            / (1.0 + 1.1652 * variance.sqrt()).powi(2);
+        let by_noise = match self.pulses && variance < 0.25 {
+            true => white.min(walk.exp()),
+            false => white,
+        };
+        by_noise.max(self.repeated).recip().ln()
+    }
+
+    /// Variance of white noise that the axis always has, steps², not more than it is: what the grid can
+    /// make of a slow motion without noise is taken off.
+    fn noise_at_rest(&self, values: &[f64]) -> f64 {
+        let origin = self.values[0];
+        let of_block = |block: &[f64]| {
+            let (mean, slope, variance) = line(block);
+            let level = (mean - origin) / self.step;
+            let passed = 0.5 * (slope * BLOCK as f64 / self.step).abs();
+            // The middle between two steps is where values change between them most.
+            let nearest = ((level - 0.5).round() + 0.5 - level).abs() - passed;
+            let fraction = 0.5 - nearest.max(0.0);
+            variance / self.step.powi(2) - self.of_grid().max(fraction * (1.0 - fraction))
+        };
+        let mut variances: Vec<f64> = values.chunks_exact(BLOCK).map(of_block).collect();
+        if variances.is_empty() {
+            return 0.0;
+        }
+        let rank = (STUCK_PART * variances.len() as f64) as usize;
+        let (_, variance, _) = variances.select_nth_unstable_by(rank, f64::total_cmp);
+        variance.max(0.0)
+    }
+
+    /// Variance of white noise whose second differences were as large as those of most of these rows, steps²: a few
+    /// are where a motion begins or ends.
+    fn unrest(&self, rows: Range<usize>) -> f64 {
+        let second = |three: &[f64]| (three[0] - 2.0 * three[1] + three[2]).abs();
+        let mut sizes: Vec<f64> = self.values[rows].windows(3).map(second).collect();
+        match median(&mut sizes) {
+            Some(size) if self.step > 0.0 => (size / (OF_SECOND_DIFFERENCES * self.step)).powi(2),
+            _ => 0.0,
+        }
+    }
+
+    /// The same of the quieter side of these rows, for the other may be where a motion begins or ends; zero at the begin
+    /// and the end of the record.
+    fn unrest_beside(&self, rows: &Range<usize>) -> f64 {
+        let Some(before) = rows.start.checked_sub(CLOSE) else {
+            return 0.0;
+        };
+        if rows.end + CLOSE > self.values.len() {
+            return 0.0;
+        }
+        let before = self.unrest(before..rows.start);
+        before.min(self.unrest(rows.end..rows.end + CLOSE))
+    }
+
+    /// Variance that rounding adds to noise, steps².
+    fn of_grid(&self) -> f64 {
+        if self.pulses { 1.0 / 6.0 } else { 1.0 / 12.0 }
+    }
+
+    /// Whether both sides of a run stay on a level on which that many equal values are improbable.
+    ///
+    /// The rate within may be off from that beside as much as that beside changes in the same time: one
+    /// that only touches the value, `a t²` off, is off by 0.6 of that.
+    fn leaves_its_level(&self, run: &Range<usize>, limit: Limit) -> bool {
+        let least = 8 * SUM;
+        let most = (run.len() / 2).max(least);
+        // A level may be short.
+        let shorter = [least, 2 * least].into_iter().filter(|&half| half < most);
+        let mut halves = shorter.chain([most]);
+        halves.any(|half| self.is_off_level(run, half, limit) == Some(true))
+    }
+
+    /// The same with two halves of this many rows on either side.
+    fn is_off_level(&self, run: &Range<usize>, half: usize, limit: Limit) -> Option<bool> {
+        let first = run.start - 1;
+        let before = &self.values[first.checked_sub(2 * half)?..first];
+        let after = self.values.get(run.end..run.end + 2 * half)?;
+        let value = self.values[first];
+        let halves = [
+            &before[..half],
+            &before[half..],
+            &after[..half],
+            &after[half..],
+        ];
+        let means = halves.map(mean);
+        let off = (value - 0.5 * (means[1] + means[2])).abs() / self.step;
+        let (length, beside) = (run.len() as f64, half as f64);
+        let least = 1.0 / length + 1.0 / beside;
+        // The value was sound when it came, so that it is one of the level's.
+        let has = |side: &[f64]| {
+            side.iter().any(|&other| other >= value) && side.iter().any(|&other| other <= value)
+        };
+        if off <= least || !has(halves[1]) || !has(halves[2]) {
+            return Some(false);
+        }
+        // Where a motion came to the value or left it, the rows next to the run are on their way.
+        let next = [&before[2 * half - NEXT..], &after[..NEXT]].map(mean);
+        let all = || means.into_iter().chain(next);
+        let spread = all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min);
+        // Sums of pulses are right to a step, so that means may differ by as much without a change.
+        let rounded = match self.pulses {
+            true => 1.0 / beside + 1.0 / NEXT as f64,
+            false => 0.0,
+        };
+        let change = (spread / self.step - rounded).max(0.0);
+        // Rounding averages out in sums, which leaves noise and the rest of the motion.
+        let sums = |side: &[f64]| {
+            let sums = side.chunks_exact(SUM).map(|rows| rows.iter().sum());
+            variance(&sums.collect::<Vec<f64>>())
+        };
+        let variance =
+            halves.map(sums).iter().sum::<f64>() / (4.0 * SUM as f64 * self.step.powi(2));
+        let variance = variance.max(self.of_grid() / SUM as f64);
+        let noise = (variance * (1.0 / length + 0.5 / beside)).sqrt();
+        let freedom = 4.0 * ((half / SUM) as f64 - 1.0);
+        Some(off > change + least + limit.of_student(freedom) * noise)
+    }
+
+    /// Whether a motion continues across a run as if the run were not there.
+    fn interrupts_a_motion(&self, run: &Range<usize>, limit: Limit) -> bool {
+        let value = self.values[run.start];
+        let resumes = self.values.get(run.end).map(|next| (next - value).abs());
+        // Otherwise at most two steps are lost.
+        if resumes.is_none_or(|off| off * run.len() as f64 <= 4.0 * self.step) {
+            return false;
+        }
+        let mut points = [8, 16, 32, 64]
+            .into_iter()
+            .filter(|points| run.len() <= *points);
+        points.any(|points| self.is_crossed(run, points, limit) == Some(true))
+    }
+
+    /// To which side of a run's value the rows before and those after lead, each by themselves: few of an axis alive do
+    /// lead away, and a line costs least.
+    fn led_past(&self, run: &Range<usize>, points: usize, limit: Limit) -> Option<f64> {
+        let (count, length) = (points as f64, run.len() as f64);
+        let apart = 0.5 * (count + length);
+        let lost = |rows: Option<&[f64]>, forth: f64| {
+            let (mean, slope, variance) = line(rows?);
+            let off = (mean - self.values[run.start] + forth * slope * apart) / self.step;
+            let variance = (variance / self.step.powi(2)).max(self.of_grid());
+            let spread = count.recip() + 12.0 * apart * apart / count.powi(3);
+            // Of the line carried on, and of the rows.
+            let variance = variance * length * (spread * length + 1.0);
+            is_lost(length * off.abs(), variance, limit).then_some(off.signum())
+        };
+        let before = run.start.checked_sub(points);
+        let before = before.and_then(|begin| self.values.get(begin..run.start));
+        let after = self.values.get(run.end..run.end + points);
+        lost(before, 1.0).filter(|side| lost(after, -1.0) == Some(*side))
+    }
+
+    /// Whether a cubic through both sides of a run is likelier than two parabolas that stop at its value and start from
+    /// it.
+    fn is_crossed(&self, run: &Range<usize>, points: usize, limit: Limit) -> Option<bool> {
+        let side = self.led_past(run, points, limit)?;
+        let before = run.start.checked_sub(points)?..run.start;
+        let after = run.end..run.end + points;
+        let value = self.values[run.start];
+        let in_steps = |k: usize| (self.values[k] - value) / self.step;
+        let middle = 0.5 * (run.start + run.end) as f64;
+        let scale = (points as f64 + 0.5 * run.len() as f64).recip();
+        let powers = |k: usize, from: f64| {
+            let t = (k as f64 - from) * scale;
+            [t, t * t, t * t * t]
+        };
+        let cubic = |k: usize| {
+            let [x, y, z] = powers(k, middle);
+            SVector::from([1.0, x, y, z])
+        };
+        let from = |from: usize| move |k| SVector::from(powers(k, from as f64));
+        // The last sample before the run is sound, too.
+        let last = run.start - 1;
+        let others = (before.start..last).chain(after.clone());
+        let (factors, left_over) = fit(others, cubic, in_steps)?;
+        let off = factors.dot(&cubic(last));
+        let count = 2.0 * points as f64;
+        let rounding = self.of_grid() * count;
+        if off.abs() > limit.sigmas * (left_over.max(rounding) / (count - 1.0)).sqrt() {
+            return Some(false);
+        }
+        let crossed = (left_over + off * off).max(rounding);
+        let (_, stopped) = fit(before, from(last), in_steps)?;
+        let (_, started) = fit(after, from(run.end - 1), in_steps)?;
+        let ratio = points as f64 * ((stopped + started).max(rounding) / crossed).ln();
+        let lost: f64 = run.clone().map(|k| factors.dot(&cubic(k))).sum();
+        let noise = crossed / count * run.len() as f64;
+        Some(ratio > limit.nats && is_lost(lost * side, noise, limit))
+    }
+}
+
+/// Whether more steps are lost than rounding and an error of this variance allow.
+fn is_lost(lost: f64, variance: f64, limit: Limit) -> bool {
+    lost > 2.0 + limit.sigmas * variance.sqrt()
+}
+
+/// Stretches of rows each equal to the one before.
+fn runs(column: &[f64]) -> Vec<Range<usize>> {
+    let mut runs = Vec::new();
+    let mut start = 1;
+    for k in 1..=column.len() {
+        if k == column.len() || column[k] != column[k - 1] {
+            if k > start {
+                runs.push(start..k);
+            }
+            start = k + 1;
+        }
+    }
+    runs
+}
+
+/// The probability that noise of this variance, steps², repeats a value in the middle of its step.
+fn repeats_at_best(variance: f64) -> f64 {
+    erf((8.0 * variance).sqrt().recip())
+}
+
+/// Of all repeats those that are repeated, in the parts of the record where most are; the longest run
+/// of each part is left out, for the axis may be stuck there.
+fn repeats_of_repeats(values: &[f64]) -> f64 {
+    let part = values.len().div_ceil(PARTS).max(BLOCK);
+    let of_part = |values: &[f64]| {
+        let lengths: Vec<usize> = runs(values).iter().map(Range::len).collect();
+        let repeats = lengths.iter().sum::<usize>() - lengths.iter().max().unwrap_or(&0);
+        let runs = lengths.len().saturating_sub(1);
+        if repeats > 0 {
+            (repeats - runs) as f64 / repeats as f64
+        } else {
+            0.0
+        }
+    };
+    let mut parts: Vec<f64> = values.chunks(part).map(of_part).collect();
+    let rank = ((1.0 - STUCK_PART) * parts.len() as f64) as usize;
+    *parts.select_nth_unstable_by(rank, f64::total_cmp).1
+}
+
+/// Factors of the terms by least squares and the sum of squares left over.
+fn fit<const N: usize>(
+    rows: impl Iterator<Item = usize> + Clone,
+    terms: impl Fn(usize) -> SVector<f64, N>,
+    value: impl Fn(usize) -> f64,
+) -> Option<(SVector<f64, N>, f64)> {
+    let (mut normal, mut right) = (SMatrix::<f64, N, N>::zeros(), SVector::<f64, N>::zeros());
+    for k in rows.clone() {
+        normal += terms(k) * terms(k).transpose();
+        right += terms(k) * value(k);
+    }
+    let factors = normal.cholesky()?.solve(&right);
+    let off = |k: usize| (value(k) - terms(k).dot(&factors)).powi(2);
+    Some((factors, rows.map(off).sum()))
+}
+
+/// Mean and slope of a line through values, and the variance about it.
+fn line(values: &[f64]) -> (f64, f64, f64) {
+    let (mean, slope) = mean_and_slope(values);
+    let middle = 0.5 * (values.len() as f64 - 1.0);
+    let off = |(k, value): (usize, &f64)| (value - mean - slope * (k as f64 - middle)).powi(2);
+    let squares: f64 = values.iter().enumerate().map(off).sum();
+    (mean, slope, squares / values.len() as f64)
+}
+
+/// About their own mean.
+fn variance(values: &[f64]) -> f64 {
+    let mean = mean(values);
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    squares / (values.len() as f64 - 1.0)
+}
+
+#[cfg(test)]
+mod tests;
