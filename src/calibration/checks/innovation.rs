@@ -137,16 +137,22 @@ fn over_dwells(innovations: &[&Innovation]) -> Vec<f64> {
     summed.collect()
 }
 
-/// Observations that the gate rejected, if there are any.
+/// Observations that the gate rejected, if there are any, and where most of them are.
 pub fn outliers(innovations: &[Innovation]) -> Option<Finding> {
     let observations = innovations.len();
-    let rejected = innovations.iter().filter(|i| !i.accepted).count();
+    let rejected: Vec<&Innovation> = innovations.iter().filter(|i| !i.accepted).collect();
+    let dwells = rejected.chunk_by(|one, other| one.dwell == other.dwell);
+    let most = dwells.rev().max_by_key(|of_dwell| of_dwell.len())?;
+    let (rejected, dwell, time) = (rejected.len(), most[0].dwell + 1, most[0].time);
     let text = format!(
-        "{rejected} of {observations} observations were rejected as outliers. Look for bumps at their times, which \
-         the figure of innovations shows."
+        "{rejected} of {observations} observations were rejected as outliers, {} of them in dwell {dwell} from {time:.1} s \
+         on. Look there for a bump.",
+        most.len()
     );
-    let figures = json!({ "rejected": rejected, "observations": observations });
-    (rejected > 0).then(|| Finding::new("outliers", text, figures))
+    let figures = json!({
+        "rejected": rejected, "observations": observations, "dwell": dwell, "time_s": time
+    });
+    Some(Finding::new("outliers", text, figures))
 }
 
 /// Innovations that are larger or smaller than their covariance makes them, if there are any.
