@@ -172,6 +172,13 @@ pub(super) fn have_rows_of_their_own(sheet: &Sheet) -> bool {
     Sensor::ALL.into_iter().all(has) && f64::from(one) > LACKING * f64::from(both + one)
 }
 
+/// Whether a column has two different numbers.
+pub(super) fn varies(values: &[f64]) -> bool {
+    let mut values = values.iter().filter(|value| value.is_finite());
+    let first = values.next();
+    first.is_some_and(|first| values.any(|value| value != first))
+}
+
 fn is_numeric(sheet: &Sheet, column: usize) -> bool {
     let values = &sheet.columns[column];
     let numbers = values.iter().filter(|value| value.is_finite()).count();
@@ -298,11 +305,7 @@ fn by_numbers(
     taken: &[usize],
     found: &mut PerSensor<Vec<[usize; 3]>>,
 ) {
-    let varies = |k: &usize| {
-        let mut values = sheet.columns[*k].iter().filter(|value| value.is_finite());
-        let first = values.next();
-        first.is_some_and(|first| values.any(|value| value != first))
-    };
+    let varies = |k: &usize| varies(&sheet.columns[*k]);
     let is_free = |k: &usize| {
         !taken.contains(k) && !names[*k].is_of_another_sensor() && is_numeric(sheet, *k)
     };
