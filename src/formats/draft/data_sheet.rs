@@ -57,7 +57,9 @@ impl Scale {
         }
         let often = likely_for_g((scale * per_second).mean());
         let often = if is_sure { String::new() } else { often + ": " };
-        let sheet = |figure: f64| [&[2f64.powf(figure.log2().round())], &PER_G[..]].concat();
+        // Zeros that are not known leave room for any figure.
+        let others = if is_sure { &PER_G[..] } else { &[] };
+        let sheet = |figure: f64| [&[2f64.powf(figure.log2().round())], others].concat();
         let axes = gravity.axes.times(per_second);
         let mut found = Self::measured(&axes, "one g", sheet, [&by, &often]);
         found.value /= STANDARD_GRAVITY;

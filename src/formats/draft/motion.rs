@@ -122,8 +122,8 @@ impl Motion {
             .map(|stretch| (stretch.start + 1) * length..(stretch.end - 1) * length)
             .collect();
         let cuts = cuts(samples, breaks);
-        let length = ((FOLLOWED / period).round() as usize).max(1);
-        let followed = Followed::new(samples, breaks, rest, usual, length);
+        let step = ((FOLLOWED / period).round() as usize).max(1);
+        let followed = Followed::new(samples, breaks, rest, usual, step);
         Self {
             longest_rest: longest.start * length..longest.end * length,
             gravity: median(&mut sizes).unwrap_or(usual),

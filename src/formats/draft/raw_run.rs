@@ -15,7 +15,7 @@ use crate::imu::{AxisOrder, GaussMarkov, Instrument, Noise, PARAMETERS, PerSenso
 use crate::noise::white_noise;
 use crate::recording::{Recording, Stretch};
 use crate::run::{Aiding, Dwell, Run};
-use crate::statistics::{FALSE_ALARM, chi_square_limit, median};
+use crate::statistics::{FALSE_ALARM, chi_square_limit, median, median_of_axes};
 use crate::units::{DEGREE, STANDARD_GRAVITY};
 
 /// Place of the biases among the parameters of a triad.
@@ -122,9 +122,9 @@ impl RawRun {
         let length = ((ROW / period).round() as usize).max(1);
         let rows = PerSensor::from_fn(|sensor| means(of_log.triads.get(sensor), length));
         // Where nothing shows how far gyros turn, they turn by a radian a second at most.
-        let largest = || rows.gyro.iter().map(Vector3::norm).fold(0.0, f64::max);
+        let largest = rows.gyro.iter().map(Vector3::norm).fold(0.0, f64::max);
         let size = Some(motion.size).filter(|size| size.is_finite() && *size > 0.0);
-        let size = size.unwrap_or_else(|| period / largest());
+        let size = size.unwrap_or(period / if largest > 0.0 { largest } else { 1.0 });
         Self {
             rows,
             period: length as f64 * period,
@@ -140,6 +140,16 @@ impl RawRun {
                 order: AxisOrder::IDENTITY,
             },
         }
+    }
+
+    /// The same where gyros have a zero of their own in each stretch.
+    pub fn of_sections(mut self) -> Self {
+        for stretch in stretches(self.rows.gyro.len(), &self.breaks, self.period) {
+            let rows = &mut self.rows.gyro[stretch.samples];
+            let zero = median_of_axes(rows).unwrap_or_default();
+            rows.iter_mut().for_each(|row| *row -= zero);
+        }
+        self
     }
 
     /// The run if the instrument is this one, and if moves are unknown where it breaks.
@@ -321,12 +331,13 @@ impl Axes {
             (found[axis] / common - 1.0).abs() > (2.0 * TOLERANCE).max(3.0 * sigma[axis])
         };
         let by_axis = (0..3).any(is_another);
+        let scatter = weight.dot(&found.map(|scale| (scale - common).powi(2))) / weight.sum();
         Self {
             scale: match by_axis {
                 true => found * guessed,
                 false => Vector3::repeat(common * guessed),
             },
-            sigma: linear.hypot(weight.sum().sqrt().recip()),
+            sigma: (linear.powi(2) + weight.sum().recip() + scatter / 3.0).sqrt(),
             by_axis,
         }
     }

@@ -102,8 +102,7 @@ pub(super) struct Registers {
 impl Registers {
     /// Of rows with what they show of their motion.
     pub fn find(rows: &Rows, motion: &Motion) -> Self {
-        let found = |breaks: &[usize]| {
-            let mut raw = RawRun::new(rows, breaks, motion);
+        let found = |mut raw: RawRun| {
             let (rests, exchanged) = (raw.rests(), raw.exchanged().rests());
             let swapped = exchanged >= FEWEST && exchanged > 2 * rests;
             let gravity = raw.gravity().filter(|_| !swapped);
@@ -114,12 +113,13 @@ impl Registers {
                 swapped,
             }
         };
-        let whole = found(&rows.breaks);
+        let whole = found(RawRun::new(rows, &rows.breaks, motion));
         // Where gyros carry gravity from rest to rest no sections were laid end to end.
-        match whole.turns.is_some() || motion.cuts.is_empty() {
-            true => whole,
-            false => found(&[&rows.breaks[..], &motion.cuts].concat()),
+        if whole.turns.is_some() || motion.cuts.is_empty() {
+            return whole;
         }
+        let breaks = [&rows.breaks[..], &motion.cuts].concat();
+        found(RawRun::new(rows, &breaks, motion).of_sections())
     }
 
     /// Takes the zero from the samples where it is the register's own, and puts the gyros' columns into the

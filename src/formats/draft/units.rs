@@ -50,6 +50,7 @@ pub(super) struct Quantities {
 struct Hypothesis {
     word: &'static str,
     output: Output,
+    per_si: f64,
     /// What one g or one rad in a row is in it.
     expected: f64,
     /// How many times as large as it says gravity is, or as far as it says its turns; none where nothing shows it.
@@ -73,6 +74,7 @@ impl Hypothesis {
         Self {
             word,
             output,
+            per_si,
             expected,
             factor: factor.filter(|factor| sensor == Sensor::Accel || factor.is_finite()),
             told_apart: *TOLD_APART.get(sensor),
@@ -267,7 +269,7 @@ impl Quantities {
         match angle {
             // Without a clock each unit needs a period of its own.
             Some(angle) if !row.is_finite() && is_bare => {
-                let Some((word, period)) = usual_period(all, rows.period, angle) else {
+                let Some((word, period)) = usual_period(all, angle) else {
                     return open("with no time from row to row turns do not show it");
                 };
                 let rate = short(period.recip());
@@ -406,8 +408,8 @@ fn why_count(rows: &Rows, unfit: &str) -> String {
 }
 
 /// The only unit with which rows that turn by this angle come at a usual period, and the period.
-fn usual_period(all: &[Hypothesis], period: f64, angle: f64) -> Option<(&'static str, f64)> {
-    let periods = all.iter().map(|of| (of.word, of.expected * period * angle));
+fn usual_period(all: &[Hypothesis], angle: f64) -> Option<(&'static str, f64)> {
+    let periods = all.iter().map(|of| (of.word, of.per_si * angle));
     let mut usual = periods.filter(|(_, period)| PERIODS.contains(period));
     usual.next().filter(|_| usual.next().is_none())
 }
