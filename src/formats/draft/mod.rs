@@ -58,12 +58,10 @@ pub struct Draft {
     blocked: Vec<String>,
     /// White noise in the file's quantity per second and root of one, where something is at rest.
     random_walk: PerSensor<Option<f64>>,
-    /// Output of the gyros at rest above that, the file's quantity a row.
-    rest: Option<Vector3<f64>>,
+    /// How rows move, above what their registers are made to say at zero.
+    motion: Option<Motion>,
     /// The column of the accelerometers that shows gravity with a minus at first.
     down: Option<usize>,
-    /// Sections laid end to end, as far as gravity shows.
-    cuts: usize,
     /// The rows that were looked at where the log has more.
     only: Option<usize>,
     /// What its user states.
@@ -110,77 +108,87 @@ impl Draft {
 
     fn of_sheet(mut sheet: Sheet, streams: Option<Streams>, stated: &Stated) -> Self {
         sheet.rate = stated.rate_hz.or(sheet.rate);
-        let count = sheet.columns.first().map_or(0, Vec::len);
-        let only = sheet.goes_on.then_some(count);
+        let only = sheet.goes_on.then(|| columns::rows_of(&sheet));
         let instance = match streams {
             Some(_) => None,
             None => retain_instance(&mut sheet),
         };
         let mut columns = Columns::find(&sheet);
         retain_samples(&mut sheet, &columns);
-        let mut clock = Clock::find(&sheet, &mut columns);
-        let mut rows = columns.samples(&sheet).map(|(numbers, triads)| {
+        let clock = Clock::find(&sheet, &mut columns);
+        let rows = columns.samples(&sheet).map(|(numbers, triads)| {
             let period = clock.period.unwrap_or(USUAL_PERIOD);
             let breaks = clock.breaks(&numbers, period, FOLLOWED);
             Rows::new(triads, breaks, period)
         });
-        let motion = rows.as_ref().map(Rows::motion);
-        let whole = rows.as_ref().map(|rows| rows.whole).unwrap_or_default();
-        let find = |columns: &Columns, clock: &Clock, motion: Option<&Motion>| {
-            Quantities::find(&sheet, columns, clock, whole, motion)
-        };
-        let mut quantities = find(&columns, &clock, motion.as_ref());
+        let whole = rows
+            .as_ref()
+            .map_or_else(Default::default, |rows| rows.whole);
         let down = rows.as_ref().and_then(Rows::points_down);
-        let down = down.and_then(|axis| Some(columns.triads.accel?[axis]));
-        let (mut registers, mut blocked) = (None, Vec::new());
-        let mut motion = motion;
-        let is_open = |motion: &Motion| motion.angle.is_none() && motion.is_turned;
-        if let Some((rows, first)) = rows.as_mut().zip(motion.as_mut())
-            && (quantities.has_counts() || is_open(first))
-        {
-            let found = Registers::find(rows, first);
-            let is_count = PerSensor::from_fn(|sensor| quantities.is_count(sensor));
-            found.apply(&mut rows.triads, &mut columns, &is_count);
-            *first = rows.motion();
-            if let Some(turns) = &found.turns {
-                first.cuts.clear();
-                first.angle = first.angle.or(turns.angle());
-            }
-            quantities = find(&columns, &clock, Some(first));
-            quantities.of_registers(&found, clock.period);
-            if quantities.has_counts() {
-                blocked = rows.unfit(&columns, &sheet, &found);
-                registers = Some(found);
-            }
-        }
-        quantities.state(stated);
-        let at_rest = rows.as_ref().zip(motion.as_ref());
-        let random_walk = at_rest
-            .and_then(|(rows, motion)| white_noise(rows, motion, &quantities, clock.period))
-            .unwrap_or_default();
-        if let Some(streams) = &streams {
-            columns.names.clone_from(&streams.names);
-            if let Some(time) = &streams.time {
-                clock.unit.clone_from(&time.gyro.1);
-                "as the file says".clone_into(&mut clock.why);
-            }
-        }
-        Self {
+        let motion = rows.as_ref().map(Rows::motion);
+        let mut draft = Self {
+            down: down.and_then(|axis| Some(columns.triads.accel?[axis])),
+            quantities: Quantities::find(&sheet, &columns, &clock, whole, motion.as_ref()),
             streams,
             instance,
             columns,
             clock,
-            quantities,
-            offset: rows.map(|rows| rows.offset).unwrap_or_default(),
-            registers,
-            blocked,
-            random_walk,
-            rest: motion.as_ref().map(|motion| motion.rest),
-            down,
-            cuts: motion.map_or(0, |motion| motion.cuts.len()),
+            offset: PerSensor::default(),
+            registers: None,
+            blocked: Vec::new(),
+            random_walk: PerSensor::default(),
+            motion,
             only,
             stated: stated.clone(),
+        };
+        draft.take_rows(rows, &sheet);
+        if let Some(streams) = &draft.streams {
+            draft.columns.names.clone_from(&streams.names);
+            if let Some(time) = &streams.time {
+                draft.clock.unit.clone_from(&time.gyro.1);
+                "as the file says".clone_into(&mut draft.clock.why);
+            }
         }
+        draft
+    }
+
+    /// Takes in what rows show of registers and noise.
+    fn take_rows(&mut self, rows: Option<Rows>, sheet: &Sheet) {
+        let looked = rows.zip(self.motion.take()).map(|(mut rows, motion)| {
+            let is_open = motion.angle.is_none() && motion.is_turned;
+            let motion = match self.quantities.has_counts() || is_open {
+                true => self.look_behind(&mut rows, &motion, sheet),
+                false => motion,
+            };
+            (rows, motion)
+        });
+        self.quantities.state(&self.stated);
+        if let Some((rows, motion)) = looked {
+            let random_walk = white_noise(&rows, &motion, &self.quantities, self.clock.period);
+            self.random_walk = random_walk.unwrap_or_default();
+            self.offset = rows.offset;
+            self.motion = Some(motion);
+        }
+    }
+
+    /// Takes in what rows show of the registers that they were read from, and says how they move then.
+    fn look_behind(&mut self, rows: &mut Rows, motion: &Motion, sheet: &Sheet) -> Motion {
+        let found = Registers::find(rows, motion);
+        let is_count = PerSensor::from_fn(|sensor| self.quantities.is_count(sensor));
+        found.apply(&mut rows.triads, &mut self.columns, &is_count);
+        let mut motion = rows.motion();
+        if let Some(turns) = &found.turns {
+            motion.cuts.clear();
+            motion.angle = motion.angle.or(turns.angle());
+        }
+        let (columns, clock) = (&self.columns, &self.clock);
+        self.quantities = Quantities::find(sheet, columns, clock, rows.whole, Some(&motion));
+        self.quantities.of_registers(&found, clock.period);
+        if self.quantities.has_counts() {
+            self.blocked = rows.unfit(columns, sheet, &found);
+            self.registers = Some(found);
+        }
+        motion
     }
 
     /// The triads that the log has; both where nothing shows any.

@@ -4,9 +4,10 @@
 use std::ops::Range;
 
 use nalgebra::Vector3;
+use statrs::statistics::Statistics;
 
 use crate::imu::PerSensor;
-use crate::statistics::{FALSE_ALARM, SIGMA_OF_MEDIAN, median, student_limit};
+use crate::statistics::{FALSE_ALARM, SIGMA_OF_MEDIAN, median, median_of_axes, student_limit};
 use crate::units::DEGREE;
 
 /// Length of the windows whose means are compared, s.
@@ -64,14 +65,6 @@ pub(super) fn means(samples: &[Vector3<f64>], length: usize) -> Vec<Vector3<f64>
     samples.chunks_exact(length).map(mean).collect()
 }
 
-/// Median of each axis.
-fn level<'a>(vectors: impl Iterator<Item = &'a Vector3<f64>> + Clone) -> Vector3<f64> {
-    Vector3::from_fn(|axis, _| {
-        let mut values: Vec<f64> = vectors.clone().map(|v| v[axis]).collect();
-        median(&mut values).unwrap_or(0.0)
-    })
-}
-
 /// 1σ of the noise of means of windows, from how they differ from one to the next.
 fn noise(means: &[Vector3<f64>]) -> f64 {
     let differences = means.windows(2).map(|pair| pair[1] - pair[0]);
@@ -95,8 +88,9 @@ impl Motion {
                 |other: Option<&Vector3<f64>>| other.is_none_or(|f| (f - accel[k]).norm() <= force);
             near(k.checked_sub(1).and_then(|k| accel.get(k))) && near(accel.get(k + 1))
         };
-        let standing: Vec<usize> = (0..accel.len()).filter(|&k| steady(k)).collect();
-        let rest = level(standing.iter().map(|&k| &gyro[k]));
+        let standing = (0..accel.len()).filter(|&k| steady(k));
+        let standing: Vec<Vector3<f64>> = standing.map(|k| gyro[k]).collect();
+        let rest = median_of_axes(&standing).unwrap_or_default();
         let fastest = gyro
             .iter()
             .map(|rate| (rate - rest).norm())
@@ -238,50 +232,36 @@ fn cuts(samples: &PerSensor<Vec<Vector3<f64>>>, breaks: &[usize]) -> Vec<usize> 
 /// scatter in the others: in a log of few rows a second a turn takes no longer than a cut, but gyros show it.
 fn turn_about(axis: &Vector3<f64>, gyro: &[Vector3<f64>]) -> bool {
     let rates: Vec<f64> = gyro.iter().map(|rate| rate.dot(axis)).collect();
-    let mean = |rates: &[f64]| rates.iter().sum::<f64>() / rates.len() as f64;
     let (before, others) = rates.split_at(BESIDE);
     let (between, after) = others.split_at(2 * BESIDE);
-    let squares = |rates: &[f64]| {
-        let mean = mean(rates);
-        rates.iter().map(|rate| (rate - mean).powi(2)).sum::<f64>()
-    };
-    let degrees = (2 * BESIDE - 2) as f64;
-    let variance = (squares(before) + squares(after)) / degrees;
+    let variance = 0.5 * (before.variance() + after.variance());
     // As many samples are between as beside.
     let sigma = (2.0 * variance / (2 * BESIDE) as f64).sqrt();
-    let change = mean(between) - 0.5 * (mean(before) + mean(after));
+    let change = between.mean() - 0.5 * (before.mean() + after.mean());
+    let degrees = (2 * BESIDE - 2) as f64;
     change.abs() > student_limit(degrees, 0.5 * FALSE_ALARM) * sigma
 }
 
+/// Variance of sums of samples at rest over that of as many independent ones, least of the axes.
 fn sum_variance(samples: &PerSensor<Vec<Vector3<f64>>>, settled: &[Range<usize>]) -> Option<f64> {
-    let mut least: Option<f64> = None;
-    for triad in [&samples.gyro, &samples.accel] {
-        for axis in 0..3 {
-            let (mut of_sums, mut of_one, mut count) = (0.0, 0.0, 0.0);
-            for stretch in settled {
-                let values: Vec<f64> = triad[stretch.clone()]
-                    .iter()
-                    .map(|sample| sample[axis])
-                    .collect();
-                // Differences of neighbours are free of what wanders.
-                let sums: Vec<f64> = values
-                    .chunks_exact(SUM)
-                    .map(|part| part.iter().sum())
-                    .collect();
-                of_sums += sums
-                    .windows(2)
-                    .map(|pair| (pair[1] - pair[0]).powi(2))
-                    .sum::<f64>();
-                count += sums.len().saturating_sub(1) as f64;
-                let middle = values.iter().sum::<f64>() / values.len().max(1) as f64;
-                let spread = values.iter().map(|v| (v - middle).powi(2)).sum::<f64>();
-                of_one += spread / values.len().max(1) as f64 * sums.len().saturating_sub(1) as f64;
-            }
-            if count > 0.0 && of_one > 0.0 {
-                let ratio = of_sums / (2.0 * SUM as f64 * of_one);
-                least = Some(least.map_or(ratio, |least| least.min(ratio)));
-            }
+    let ratio = |triad: &[Vector3<f64>], axis: usize| {
+        let (mut of_sums, mut of_one) = (0.0, 0.0);
+        for stretch in settled {
+            let values: Vec<f64> = triad[stretch.clone()].iter().map(|row| row[axis]).collect();
+            let sums: Vec<f64> = values
+                .chunks_exact(SUM)
+                .map(|part| part.iter().sum())
+                .collect();
+            // Differences of neighbours are free of what wanders.
+            let differences = sums.windows(2).map(|pair| pair[1] - pair[0]);
+            of_one += differences.len() as f64 * values.population_variance();
+            of_sums += differences
+                .map(|difference| difference.powi(2))
+                .sum::<f64>();
         }
-    }
-    least
+        of_sums / (2.0 * SUM as f64 * of_one)
+    };
+    let of_triad = |triad| (0..3).map(move |axis| ratio(triad, axis));
+    let ratios = of_triad(&samples.gyro).chain(of_triad(&samples.accel));
+    ratios.filter(|ratio| ratio.is_finite()).reduce(f64::min)
 }

@@ -12,23 +12,12 @@ pub(super) struct Unit {
 }
 
 /// What is within the names of a triad's columns, and what are whole names of such.
+#[rustfmt::skip]
 const TRIADS: [(Sensor, &[&str], &[&str]); 2] = [
     (
         Sensor::Gyro,
-        &[
-            "gyr",
-            "angvel",
-            "angularv",
-            "angularr",
-            "angrate",
-            "omega",
-            "deltaangle",
-            "dang",
-            "deltatheta",
-            "dtheta",
-            "wrs",
-            "rotationrate",
-        ],
+        &["gyr", "angvel", "angularv", "angularr", "angrate", "omega", "deltaangle", "dang", "deltatheta", "dtheta",
+          "wrs", "rotationrate"],
         &["g", "w", "wb", "om", "rate", "pqr"],
     ),
     (
@@ -38,17 +27,9 @@ const TRIADS: [(Sensor, &[&str], &[&str]); 2] = [
     ),
 ];
 /// What is within the names of other columns.
-const OTHERS: [&str; 9] = [
-    "mag",
-    "compass",
-    "quat",
-    "euler",
-    "cov",
-    "std",
-    "bias",
-    "orientation",
-    "useracc",
-];
+#[rustfmt::skip]
+const OTHERS: [&str; 9] =
+    ["mag", "compass", "quat", "euler", "cov", "std", "bias", "orientation", "useracc"];
 
 /// A name taken apart.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,7 +51,7 @@ pub(super) fn axes_of_program(columns: &[String]) -> Option<&'static str> {
 }
 
 /// The unit that a text names, of which a number before it says how many.
-pub(super) fn unit(text: &str) -> Option<Unit> {
+fn unit(text: &str) -> Option<Unit> {
     let text = text.trim_matches(['[', ']', ' ']);
     let text = text.strip_suffix("/LSB").unwrap_or(text);
     let number = match text.split_once(' ') {
@@ -104,6 +85,13 @@ fn words(name: &str) -> Vec<String> {
 }
 
 impl Name {
+    /// Of a column whose unit may stand in a row of its own.
+    pub fn of_column(name: &str, unit_below: &str) -> Self {
+        let mut of = Self::of(name);
+        of.unit = of.unit.or_else(|| unit(unit_below));
+        of
+    }
+
     pub fn of(name: &str) -> Self {
         let (mut rest, mut found) = (name.to_owned(), None);
         if let Some(open) = name.find(['[', '(']) {

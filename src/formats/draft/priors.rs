@@ -28,32 +28,22 @@ struct Class {
 /// A bias of more than so many σ of its class is none of its class.
 const BEYOND: f64 = 3.0;
 
+#[rustfmt::skip]
 const CLASSES: [Class; 3] = [
     Class {
         name: "a navigation-grade",
-        angle_random_walk: 0.01 * DEG_PER_SQRT_H,
-        velocity_random_walk: 20.0 * MICRO_G_PER_SQRT_HZ,
-        scale_ppm: 7_000.0,
-        installation: 600.0 * ARCSEC,
-        gyro_bias: 0.03 * DEGREE,
-        accel_bias: 0.05,
+        angle_random_walk: 0.01 * DEG_PER_SQRT_H, velocity_random_walk: 20.0 * MICRO_G_PER_SQRT_HZ,
+        scale_ppm: 7_000.0, installation: 600.0 * ARCSEC, gyro_bias: 0.03 * DEGREE, accel_bias: 0.05,
     },
     Class {
         name: "a tactical-grade",
-        angle_random_walk: 0.1 * DEG_PER_SQRT_H,
-        velocity_random_walk: 60.0 * MICRO_G_PER_SQRT_HZ,
-        scale_ppm: 10_000.0,
-        installation: 3_600.0 * ARCSEC,
-        gyro_bias: 0.2 * DEGREE,
-        accel_bias: 0.2,
+        angle_random_walk: 0.1 * DEG_PER_SQRT_H, velocity_random_walk: 60.0 * MICRO_G_PER_SQRT_HZ,
+        scale_ppm: 10_000.0, installation: 3_600.0 * ARCSEC, gyro_bias: 0.2 * DEGREE, accel_bias: 0.2,
     },
     Class {
         name: "a MEMS",
-        angle_random_walk: f64::INFINITY,
-        velocity_random_walk: f64::INFINITY,
-        scale_ppm: USUAL_SCALE / PPM,
-        installation: USUAL_INSTALLATION,
-        gyro_bias: USUAL_BIAS.gyro,
+        angle_random_walk: f64::INFINITY, velocity_random_walk: f64::INFINITY,
+        scale_ppm: USUAL_SCALE / PPM, installation: USUAL_INSTALLATION, gyro_bias: USUAL_BIAS.gyro,
         accel_bias: USUAL_BIAS.accel,
     },
 ];
@@ -131,7 +121,7 @@ impl Draft {
                     let bias = three(&Vector3::repeat(offset * per_second));
                     page.line("bias", bias, "what an unsigned register says at zero");
                 }
-                let rest = self.rest.filter(|_| sensor == Sensor::Gyro);
+                let rest = self.rest().filter(|_| sensor == Sensor::Gyro);
                 rest.map_or(0.0, |rest| rest.amax())
             }
         };
@@ -143,6 +133,11 @@ impl Draft {
                 "in the file's unit, per second",
             );
         }
+    }
+
+    /// Output of the gyros at rest, the file's quantity a row.
+    fn rest(&self) -> Option<Vector3<f64>> {
+        self.motion.as_ref().map(|motion| motion.rest)
     }
 
     /// What the record shows a register to say at zero, with its σ, where it is none that its class has: in the
@@ -163,7 +158,7 @@ impl Draft {
                 Some((gravity.own_zero?, gravity.zero_sigma, why))
             }
             Sensor::Gyro => {
-                let rest = self.rest.filter(|_| registers.has_rests)?;
+                let rest = self.rest().filter(|_| registers.has_rests)?;
                 (rest.amax() > BEYOND * usual?).then_some((rest, 0.0, "what it says at rest"))
             }
         }

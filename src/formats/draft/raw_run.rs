@@ -22,6 +22,8 @@ use crate::units::{DEGREE, STANDARD_GRAVITY};
 const BIAS: usize = PARAMETERS - 3;
 /// Length of the rows of the run, s, where those of the log are shorter.
 const ROW: f64 = 0.02;
+/// A run needs longer rests than a hand makes: its clock is this many times too fast, which nothing else depends on.
+const SLOWED: f64 = 2.0;
 /// 1σ of a scale that is as good as unknown, relative …
 const ANY_SCALE: f64 = 0.5;
 /// … and of axes of one chip, rad.
@@ -105,10 +107,12 @@ struct Guess {
 }
 
 /// Rows of both triads, and what does not follow from the row before.
+#[derive(Clone)]
 pub(super) struct RawRun {
     rows: PerSensor<Vec<Vector3<f64>>>,
+    /// By its clock, s.
     period: f64,
-    /// Of the log's own rows, s.
+    /// Of the log's own rows.
     period_of_log: f64,
     is_whole: PerSensor<bool>,
     breaks: Vec<usize>,
@@ -118,8 +122,8 @@ pub(super) struct RawRun {
 impl RawRun {
     /// Of the rows of a log some of which, `breaks`, do not follow from the one before.
     pub fn new(of_log: &Rows, breaks: &[usize], motion: &Motion) -> Self {
-        let period = of_log.period;
-        let length = ((ROW / period).round() as usize).max(1);
+        let length = ((ROW / of_log.period).round() as usize).max(1);
+        let period = SLOWED * of_log.period;
         let rows = PerSensor::from_fn(|sensor| means(of_log.triads.get(sensor), length));
         // Where nothing shows how far gyros turn, they turn by a radian a second at most.
         let largest = rows.gyro.iter().map(Vector3::norm).fold(0.0, f64::max);
@@ -291,31 +295,17 @@ impl RawRun {
 
     /// The same rows with the columns of its triads exchanged.
     pub fn exchanged(&self) -> Self {
-        let size =
-            |rows: &[Vector3<f64>]| median(&mut rows.iter().map(Vector3::norm).collect::<Vec<_>>());
-        let PerSensor {
-            gyro: accel,
-            accel: gyro,
-        } = self.rows.clone();
-        let PerSensor {
-            gyro: accel_is_whole,
-            accel: gyro_is_whole,
-        } = self.is_whole;
-        let mut guess = self.guess.clone();
-        guess.unit = PerSensor {
-            gyro: size(&gyro).unwrap_or(1.0).recip(),
-            accel: STANDARD_GRAVITY / size(&accel).unwrap_or(1.0),
+        let mut of = self.clone();
+        std::mem::swap(&mut of.rows.gyro, &mut of.rows.accel);
+        let size = |rows: &[Vector3<f64>]| {
+            let mut sizes: Vec<f64> = rows.iter().map(Vector3::norm).collect();
+            median(&mut sizes).unwrap_or(1.0)
         };
-        Self {
-            rows: PerSensor { gyro, accel },
-            is_whole: PerSensor {
-                gyro: gyro_is_whole,
-                accel: accel_is_whole,
-            },
-            breaks: self.breaks.clone(),
-            guess,
-            ..*self
-        }
+        of.guess.unit = PerSensor {
+            gyro: size(&of.rows.gyro).recip(),
+            accel: STANDARD_GRAVITY / size(&of.rows.accel),
+        };
+        of
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::FEWEST_ROWS;
 use super::columns::{self, Columns, by_stem};
-use super::name::{self, Name};
+use super::name::Name;
 use super::text::{Page, quoted, word_or_number};
 use super::time;
 use crate::formats::clock::{Breaks, Clock, TimeUnit};
@@ -411,8 +411,9 @@ fn tagged(file: &Path) -> Result<Vec<Member>, FileError> {
 /// Rows of a text as a stream.
 fn rows_as_stream(name: &str, sheet: &Sheet) -> Found {
     let column = |(name, unit): (&String, &String)| {
-        let unit = Name::of(name).unit.or_else(|| name::unit(unit));
-        let unit = unit.filter(|unit| unit.times == 1.0);
+        let unit = Name::of_column(name, unit)
+            .unit
+            .filter(|unit| unit.times == 1.0);
         Column {
             name: name.clone(),
             unit: unit.map_or("", |unit| unit.word),

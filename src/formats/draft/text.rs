@@ -166,7 +166,8 @@ impl Draft {
         }
         let why = "guessed: a row covers the time up to its stamp; else \"start\" or \"middle\"";
         page.line("time_stamp", quoted("end"), why);
-        let why = match (self.cuts, clock.gaps.len(), clock.repeated) {
+        let cuts = self.motion.as_ref().map_or(0, |motion| motion.cuts.len());
+        let why = match (cuts, clock.gaps.len(), clock.repeated) {
             (0, 0, 0) => "no gap in time".to_owned(),
             (0, 0, repeated) => {
                 format!(
@@ -180,7 +181,7 @@ impl Draft {
                 places(cuts)
             ),
         };
-        page.line("continuous", self.cuts == 0, why);
+        page.line("continuous", cuts == 0, why);
     }
 
     /// Whether rows without a time show how long they last: rates, whose sums are angles.

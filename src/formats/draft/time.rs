@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use super::columns::Columns;
-use super::name;
 use super::name::Name;
 use super::text::seven;
 use crate::formats::Sheet;
@@ -41,14 +40,15 @@ impl Clock {
             return Self::without(stated, "no column goes forward like a time");
         };
         let steps = Steps::of(&stamps);
-        let name = Name::of(&sheet.names[column]);
+        let name = Name::of_column(&sheet.names[column], &sheet.units[column]);
         if name.is_counter() && name.is_time() < 2 && !steps.is_count {
             columns.time = None;
             return Self::without(stated, "a counter that other packets share is no time");
         }
-        let named = name.unit.or_else(|| name::unit(&sheet.units[column]));
         let second = |word: &str| units_of_time().find(|of| of.0 == word);
-        let named = named.and_then(|unit| Some(unit.times * second(unit.word)?.1));
+        let named = name
+            .unit
+            .and_then(|unit| Some(unit.times * second(unit.word)?.1));
         let tick = name.tick().map(|tick| tick * steps.mean);
         let known = stated.or(tick.filter(|period| PERIODS.contains(period)));
         let seconds = || units_of_time().map(|(_, second)| second);

@@ -51,8 +51,6 @@ struct Hypothesis {
     word: &'static str,
     output: Output,
     per_si: f64,
-    /// What one g or one rad in a row is in it.
-    expected: f64,
     /// How many times as large as it says gravity is, or as far as it says its turns; none where nothing shows it.
     factor: Option<f64>,
     told_apart: f64,
@@ -61,21 +59,17 @@ struct Hypothesis {
 impl Hypothesis {
     /// A unit of which there are so many for one in SI, a second.
     fn new(sensor: Sensor, (word, per_si): (&'static str, f64), output: Output, of: &Rows) -> Self {
-        let (expected, factor) = match (sensor, output) {
-            (Sensor::Accel, Output::Rate) => (STANDARD_GRAVITY * per_si, None),
-            (Sensor::Accel, _) => (STANDARD_GRAVITY * per_si * of.period, None),
-            (Sensor::Gyro, Output::Rate) => (per_si / of.period, of.motion.angle),
-            (Sensor::Gyro, _) => (per_si, of.motion.angle),
-        };
-        let factor = match sensor {
-            Sensor::Accel => Some(of.motion.gravity / expected),
-            Sensor::Gyro => factor.map(|angle| angle.abs() * expected),
+        let (gravity, angle) = (of.motion.gravity / STANDARD_GRAVITY, of.motion.angle);
+        let factor = match (sensor, output) {
+            (Sensor::Accel, Output::Rate) => Some(gravity / per_si),
+            (Sensor::Accel, _) => Some(gravity / per_si / of.period),
+            (Sensor::Gyro, Output::Rate) => angle.map(|angle| angle.abs() * per_si / of.period),
+            (Sensor::Gyro, _) => angle.map(|angle| angle.abs() * per_si),
         };
         Self {
             word,
             output,
             per_si,
-            expected,
             factor: factor.filter(|factor| sensor == Sensor::Accel || factor.is_finite()),
             told_apart: *TOLD_APART.get(sensor),
         }
@@ -86,23 +80,31 @@ impl Hypothesis {
         self.factor.is_some_and(fits)
     }
 
-    /// Why rows have it that the file names.
-    fn why_named(&self, sensor: Sensor, gravity: &str) -> String {
+    fn is_contradicted(&self) -> bool {
+        self.factor.is_some() && !self.fits()
+    }
+
+    /// What motion says of it.
+    fn evidence(&self, sensor: Sensor, motion: &Motion) -> String {
         match (sensor, self.factor) {
-            (Sensor::Accel, _) if self.fits() => format!("as the file says; {gravity}"),
-            (Sensor::Accel, _) => {
-                let expected = short(self.expected);
-                format!("as the file says; {gravity}, but gravity should be {expected}")
+            (_, None) => String::new(),
+            (Sensor::Accel, _) if self.fits() => format!("{} at rest", short(motion.gravity)),
+            (Sensor::Accel, Some(factor)) => {
+                format!("at rest it is {} times gravity", short(factor))
             }
-            (Sensor::Gyro, None) => "as the file says".to_owned(),
-            (Sensor::Gyro, Some(_)) if self.fits() => {
-                "as the file says, and as gravity turns".to_owned()
-            }
-            (Sensor::Gyro, Some(factor)) => {
-                let factor = short(factor);
-                format!("as the file says, but gravity turns {factor} times as far")
-            }
+            (Sensor::Gyro, _) if self.fits() => "gravity turns as far".to_owned(),
+            (Sensor::Gyro, Some(factor)) => format!("gravity turns {} times as far", short(factor)),
         }
+    }
+
+    /// Why rows have it that the file names.
+    fn why_named(&self, sensor: Sensor, motion: &Motion) -> String {
+        let link = match self.factor {
+            None => "",
+            Some(_) if self.fits() => "; ",
+            Some(_) => ", but ",
+        };
+        format!("as the file says{link}{}", self.evidence(sensor, motion))
     }
 }
 
@@ -141,11 +143,7 @@ impl Quantities {
         // The accelerometers tell what rows hold.
         for sensor in [Sensor::Accel, Sensor::Gyro] {
             let first = columns.triads.get(sensor).map(|triad| triad[0]);
-            let named = |k: usize| {
-                Name::of(&sheet.names[k])
-                    .unit
-                    .or_else(|| name::unit(&sheet.units[k]))
-            };
+            let named = |k: usize| Name::of_column(&sheet.names[k], &sheet.units[k]).unit;
             let rows = Rows {
                 motion,
                 period: clock.period.unwrap_or(f64::NAN),
@@ -174,26 +172,22 @@ impl Quantities {
             known.map(move |unit| Hypothesis::new(sensor, unit, output, rows))
         };
         let all: Vec<Hypothesis> = outputs.iter().flat_map(of_output).collect();
-        let gravity = match sensor {
-            Sensor::Accel => format!("{} at rest", short(rows.motion.gravity)),
-            Sensor::Gyro => "gravity turns as far".to_owned(),
-        };
         let named = rows.named.map(|unit| unit.word);
         let by_name = all.iter().find(|of| Some(of.word) == named);
         let mut by_motion = all.iter().filter(|of| of.fits());
         let shown = by_motion.next();
-        let is_contradicted = by_name.is_some_and(|of| of.factor.is_some() && !of.fits());
+        let evidence = shown.map_or(String::new(), |of| of.evidence(sensor, rows.motion));
         let (chosen, why) = match (by_name, shown) {
-            (Some(name), Some(shown)) if is_contradicted => (
-                shown,
-                format!("{gravity}, although the file says {}", name.word),
-            ),
-            (Some(name), _) if !is_contradicted || sensor == Sensor::Accel => {
-                (name, name.why_named(sensor, &gravity))
+            (Some(name), Some(shown)) if name.is_contradicted() => {
+                let why = format!("{evidence}, although the file says {}", name.word);
+                (shown, why)
+            }
+            (Some(name), _) if !name.is_contradicted() || sensor == Sensor::Accel => {
+                (name, name.why_named(sensor, rows.motion))
             }
             (None, Some(shown)) if !rows.whole && (named.is_none() || sensor == Sensor::Gyro) => {
                 let others = by_motion.map(|of| format!("; it may as well be {}", of.word));
-                (shown, gravity + &others.collect::<String>())
+                (shown, evidence + &others.collect::<String>())
             }
             _ => {
                 return match sensor {
@@ -287,7 +281,11 @@ impl Quantities {
             _ => {}
         }
         let why = match by_name {
-            Some(name) => format!("{} {}", name.word, name.why_named(Sensor::Gyro, "")),
+            Some(name) => format!(
+                "{} {}",
+                name.word,
+                name.why_named(Sensor::Gyro, rows.motion)
+            ),
             None => why_count(rows, "no known unit fits the turns of gravity"),
         };
         // Rows add up to the angle.
