@@ -1,8 +1,6 @@
 //! Rows of an instrument of which hardly anything is known, as a run: its dwells, the likelihood of its axes and its closed
 //! form, which are those of any run, show zero, scale, signs and order of axes.
 
-use std::ops::Range;
-
 use nalgebra::{SMatrix, SVector, Vector3};
 
 use super::motion::{Motion, TOLERANCE, mean, means};
@@ -13,7 +11,7 @@ use crate::calibration::{
 use crate::earth::Site;
 use crate::imu::{AxisOrder, GaussMarkov, Instrument, Noise, PARAMETERS, PerSensor, Prior, Sensor};
 use crate::noise::white_noise;
-use crate::recording::{Recording, Stretch};
+use crate::recording::{Fault, FaultKind, Recording, Stretch, stretches_between};
 use crate::run::{Aiding, Dwell, Run};
 use crate::statistics::{FALSE_ALARM, chi_square_limit, median, median_of_axes};
 use crate::units::{DEGREE, STANDARD_GRAVITY};
@@ -341,21 +339,16 @@ fn calibrated(run: &Run) -> Option<Estimate> {
 
 /// Stretches of samples between breaks, each of which costs a sample.
 fn stretches(count: usize, breaks: &[usize], period: f64) -> Vec<Stretch> {
-    let mut breaks: Vec<usize> = breaks.iter().copied().filter(|&row| row < count).collect();
-    breaks.sort_unstable();
-    let ends = breaks.iter().copied().chain([count]);
-    let begins = std::iter::once(0).chain(breaks.iter().map(|row| row + 1));
-    let samples = begins
-        .zip(ends)
-        .map(|(begin, end)| Range { start: begin, end });
-    let stretch = |samples: Range<usize>| Stretch {
-        start: samples.start as f64 * period,
-        samples,
+    let lost = |&row: &usize| Fault {
+        kind: FaultKind::Missing,
+        axis: None,
+        samples: row..row + 1,
+        line: 0,
+        bridged: false,
     };
-    samples
-        .filter(|samples| !samples.is_empty())
-        .map(stretch)
-        .collect()
+    let within = breaks.iter().filter(|row| **row < count);
+    let lost: Vec<Fault> = within.map(lost).collect();
+    stretches_between(count, 0.0, period, &lost)
 }
 
 /// Centre of the sphere on which points lie, by `|a|² = 2 b·a + c`, with its largest σ; none if they lie in a plane.

@@ -115,7 +115,7 @@ impl Registers {
         };
         let whole = found(RawRun::new(rows, &rows.breaks, motion));
         // Where gyros carry gravity from rest to rest no sections were laid end to end.
-        if whole.turns.is_some() || motion.cuts.is_empty() {
+        if whole.swapped || whole.turns.is_some() || motion.cuts.is_empty() {
             return whole;
         }
         let breaks = [&rows.breaks[..], &motion.cuts].concat();

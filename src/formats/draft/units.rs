@@ -221,20 +221,13 @@ impl Quantities {
     }
 
     fn counts_of_accelerometers(&mut self, rows: &Rows) -> Unit {
-        let Motion {
-            gravity,
-            sum_variance,
-            ..
-        } = *rows.motion;
-        let is_pulse = rows.whole && sum_variance.is_some_and(|ratio| ratio < PULSE_SUMS);
-        self.hold(
-            if is_pulse {
-                Output::Pulse
-            } else {
-                Output::Rate
-            },
-            rows,
-        );
+        let gravity = rows.motion.gravity;
+        let is_carried = |ratio: f64| rows.whole && ratio < PULSE_SUMS;
+        let output = match rows.motion.sum_variance.is_some_and(is_carried) {
+            true => Output::Pulse,
+            false => Output::Rate,
+        };
+        self.hold(output, rows);
         let per_g = gravity * self.per_second(rows.period);
         Unit {
             word: Some("count"),
