@@ -5,7 +5,7 @@ mod columns;
 mod convert;
 mod data_sheet;
 mod found;
-pub(super) mod motion;
+mod motion;
 mod name;
 mod priors;
 mod raw_run;
@@ -198,6 +198,16 @@ impl Draft {
         let is_present = move |sensor: &Sensor| none || triads.get(*sensor).is_some();
         Sensor::ALL.into_iter().filter(is_present)
     }
+}
+
+/// Angle in rad of one unit of the gyros in one row, as gravity's direction turns; negative where the triads have opposite
+/// signs.
+pub(super) fn turned_angle(triads: PerSensor<Vec<Vector3<f64>>>, period: f64) -> Option<f64> {
+    let rows = Rows::new(triads, Vec::new(), period);
+    let motion = rows.motion();
+    motion
+        .angle
+        .or_else(|| Registers::find(&rows, &motion).turns?.angle())
 }
 
 /// Keeps the rows of one of several instruments, and says by which column and number.

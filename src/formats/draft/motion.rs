@@ -37,7 +37,7 @@ const SUM: usize = 16;
 
 /// What the samples show.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::formats) struct Motion {
+pub(super) struct Motion {
     /// The longest stretch at rest.
     pub longest_rest: Range<usize>,
     /// Specific force at rest, the file's quantity a row.
