@@ -92,5 +92,6 @@ pub use solved::SeparateEstimate;
 use solved::Solved;
 pub use start::closed_form::{ClosedForm, Reference, six_position, six_position_of};
 pub use start::coarse::{CoarseStart, coarse_start};
+pub(crate) use start::mounting::orders_of_gyros;
 pub use start::mounting::{Contradiction, Mounting, Sensitivity};
 pub use start::positions::{Position, six_position_triad};

@@ -316,21 +316,31 @@ fn dimension(unit: &str) -> Option<[i32; 3]> {
     Some(all)
 }
 
-/// The unit most like one that is not known, of the same dimension if that is clear.
+/// A normalised unit with one word for all that is of time.
+fn without_times(unit: &str) -> String {
+    let part = |part: &str| match part.strip_prefix("sqrt") {
+        Some("s" | "h" | "hz") => "sqrtt".to_owned(),
+        _ if ["s", "h", "hz"].contains(&part) => "t".to_owned(),
+        _ => part.to_owned(),
+    };
+    unit.split('/').map(part).collect::<Vec<_>>().join("/")
+}
+
+/// The unit most like one that is not known: of the same dimension if that is clear, else one with other words for its
+/// times.
 fn hint(unit: &str) -> String {
     let wanted = normalised(unit);
     let wanted_dimension = dimension(&wanted);
-    let fits =
-        |name: &String| wanted_dimension.is_none_or(|wanted| dimension(name) == Some(wanted));
-    let likeness = |name: String| strsim::normalized_damerau_levenshtein(&wanted, &name);
-    all()
-        .flat_map(|(_, row)| {
-            row.names()
-                .filter(fits)
-                .map(|name| (likeness(name), row.unit))
-        })
-        .filter(|(likeness, _)| *likeness >= 0.6)
-        .max_by(|a, b| a.0.total_cmp(&b.0))
+    let likeness = |name: &str| {
+        let is_of_it = wanted_dimension.is_none_or(|wanted| dimension(name) == Some(wanted));
+        let fits = is_of_it || without_times(name) == without_times(&wanted);
+        let likeness = strsim::normalized_damerau_levenshtein(&wanted, name);
+        (fits && likeness >= 0.6).then_some((is_of_it, likeness))
+    };
+    let names = all().flat_map(|(_, row)| row.names().map(|name| (name, row.unit)));
+    names
+        .filter_map(|(name, unit)| Some((likeness(&name)?, unit)))
+        .max_by(|a, b| a.0.0.cmp(&b.0.0).then(a.0.1.total_cmp(&b.0.1)))
         .map_or_else(String::new, |(_, unit)| format!(" Did you mean `{unit}`?"))
 }
 
@@ -467,6 +477,7 @@ mod tests {
             ("m/s/s/s/s/sqrt(Hz)", ""),
             ("deg/h/s/sqrt(Hz)", "Did you mean `°/s²/√Hz`"),
             ("deg/sqrt(Hs)", "Did you mean"),
+            ("m/h/sqrt(Hz)", "Did you mean `m/s/√h`"),
         ] {
             let error = convert(1.0, unit, None).unwrap_err().to_string();
             assert_eq!(

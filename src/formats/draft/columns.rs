@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::name::{self, Name};
+use super::name::Name;
 use super::units::offset;
 use crate::formats::Sheet;
 use crate::imu::{PerSensor, Sensor};
@@ -48,11 +48,14 @@ type Samples = PerSensor<Vec<Vector3<f64>>>;
 
 impl Columns {
     pub fn find(sheet: &Sheet) -> Self {
-        let names: Vec<Name> = sheet.names.iter().map(|name| Name::of(name)).collect();
-        let units = |k: usize| names[k].unit.or_else(|| name::unit(&sheet.units[k]));
+        let columns = sheet.names.iter().zip(&sheet.units);
+        let names: Vec<Name> = columns
+            .map(|(name, unit)| Name::of_column(name, unit))
+            .collect();
         let mut found = PerSensor::from_fn(|sensor| by_name(&names, sheet, sensor));
         // Of several the first with a unit, and that is gravity's in those of the accelerometers.
-        let is_bare = |triad: &[usize; 3]| units(triad[0]).is_none_or(|unit| unit.word == "count");
+        let is_bare =
+            |triad: &[usize; 3]| names[triad[0]].unit.is_none_or(|unit| unit.word == "count");
         found.gyro.sort_by_key(is_bare);
         found
             .accel
@@ -66,8 +69,7 @@ impl Columns {
                     .iter()
                     .any(|&k| sheet.columns[k][*row].is_finite())
         };
-        let count = sheet.columns.first().map_or(0, Vec::len);
-        let rows: Vec<usize> = (0..count).filter(is_sample).collect();
+        let rows: Vec<usize> = (0..rows_of(sheet)).filter(is_sample).collect();
         let forward = |k: usize| forward(rows.iter().map(|&row| sheet.columns[k][row]));
         let split = split_time(sheet, &names);
         let time = split
@@ -140,6 +142,10 @@ impl Columns {
     }
 }
 
+pub(super) fn rows_of(sheet: &Sheet) -> usize {
+    sheet.columns.first().map_or(0, Vec::len)
+}
+
 /// The name of a column, or its number where others are called so, too, or it has none.
 fn distinct(names: &[String], column: usize) -> String {
     let like = names.iter().filter(|name| **name == names[column]);
@@ -161,7 +167,7 @@ pub(super) fn have_rows_of_their_own(sheet: &Sheet) -> bool {
     let is_there =
         |places: &[usize], row: usize| places.iter().any(|&k| sheet.columns[k][row].is_finite());
     let (mut both, mut one) = (0, 0);
-    for row in 0..sheet.columns.first().map_or(0, Vec::len) {
+    for row in 0..rows_of(sheet) {
         match (is_there(&places.gyro, row), is_there(&places.accel, row)) {
             (true, true) => both += 1,
             (false, false) => {}
@@ -170,6 +176,13 @@ pub(super) fn have_rows_of_their_own(sheet: &Sheet) -> bool {
     }
     let has = |sensor: Sensor| !places.get(sensor).is_empty();
     Sensor::ALL.into_iter().all(has) && f64::from(one) > LACKING * f64::from(both + one)
+}
+
+/// Whether a column has two different numbers.
+pub(super) fn varies(values: &[f64]) -> bool {
+    let mut values = values.iter().filter(|value| value.is_finite());
+    let first = values.next();
+    first.is_some_and(|first| values.any(|value| value != first))
 }
 
 fn is_numeric(sheet: &Sheet, column: usize) -> bool {
@@ -210,18 +223,19 @@ fn split_time(sheet: &Sheet, names: &[Name]) -> Option<[usize; 2]> {
 
 /// The column that tells rows of several instruments apart, with what it says of the first.
 pub(super) fn instance(sheet: &Sheet) -> Option<(usize, f64)> {
-    let column = (0..sheet.names.len()).find(|&k| {
-        let values = &sheet.columns[k];
+    let tells = |k: &usize| {
         let mut known: Vec<f64> = Vec::new();
-        Name::of(&sheet.names[k]).is_instance()
-            && values.iter().all(|value| {
-                if !known.contains(value) {
-                    known.push(*value);
-                }
-                value.fract() == 0.0 && known.len() <= MOST_INSTANCES
-            })
+        let is_number = |value: &f64| {
+            if !known.contains(value) {
+                known.push(*value);
+            }
+            value.fract() == 0.0 && known.len() <= MOST_INSTANCES
+        };
+        Name::of(&sheet.names[*k]).is_instance()
+            && sheet.columns[*k].iter().all(is_number)
             && known.len() > 1
-    })?;
+    };
+    let column = (0..sheet.names.len()).find(tells)?;
     Some((column, *sheet.columns[column].first()?))
 }
 
@@ -248,11 +262,10 @@ fn time(sheet: &Sheet, names: &[Name], forward: impl Fn(usize) -> (f64, f64)) ->
     };
     let rank = |k: &usize| {
         let is_text = sheet.units[*k] == "h:m:s";
-        let is_of_time = names[*k].is_of_time() || name::unit(&sheet.units[*k]).is_some();
         // Raw ticks behind times that have a unit.
         let is_raw = names[*k].unit.is_some_and(|unit| unit.word == "count");
         let named = names[*k].is_time().saturating_sub(u8::from(is_raw));
-        (named, is_of_time && !is_text, names.len() - k)
+        (named, names[*k].is_of_time() && !is_text, names.len() - k)
     };
     let best = (0..names.len()).filter(goes_on).max_by_key(rank)?;
     // The angle of an integrating sensor goes forward, too.
@@ -298,11 +311,7 @@ fn by_numbers(
     taken: &[usize],
     found: &mut PerSensor<Vec<[usize; 3]>>,
 ) {
-    let varies = |k: &usize| {
-        let mut values = sheet.columns[*k].iter().filter(|value| value.is_finite());
-        let first = values.next();
-        first.is_some_and(|first| values.any(|value| value != first))
-    };
+    let varies = |k: &usize| varies(&sheet.columns[*k]);
     let is_free = |k: &usize| {
         !taken.contains(k) && !names[*k].is_of_another_sensor() && is_numeric(sheet, *k)
     };
@@ -355,49 +364,36 @@ fn by_numbers(
 /// Median departure of a triad's magnitude from its median, and its largest in all but a hundredth of the rows, over
 /// the median.
 fn magnitude(sheet: &Sheet, triad: &[usize; 3]) -> (f64, f64) {
-    let rows = 0..sheet.columns[triad[0]].len();
     let at = |row: usize| Vector3::from(triad.map(|k| sheet.columns[k][row]));
-    let samples: Vec<Vector3<f64>> = rows
-        .map(at)
-        .filter(|sample| sample.iter().all(|value| value.is_finite()))
-        .collect();
+    let samples = (0..rows_of(sheet)).map(at);
+    let samples: Vec<Vector3<f64>> = samples.filter(|sample| sample.sum().is_finite()).collect();
     let zero = offset(&samples).unwrap_or(0.0);
-    let mut sizes: Vec<f64> = samples
-        .iter()
-        .map(|sample| sample.add_scalar(-zero).norm())
-        .collect();
-    let middle = median(&mut sizes).unwrap_or(0.0);
+    let sizes = samples.iter().map(|sample| sample.add_scalar(-zero).norm());
+    let mut sizes: Vec<f64> = sizes.collect();
+    let Some(middle) = median(&mut sizes).filter(|middle| *middle > 0.0) else {
+        return (f64::INFINITY, f64::INFINITY);
+    };
     let mut off: Vec<f64> = sizes.iter().map(|size| (size - middle).abs()).collect();
     let off = median(&mut off).unwrap_or(0.0);
-    let hundredth = sizes.len().saturating_sub(1) / 100;
+    let hundredth = (sizes.len() - 1) / 100;
     sizes.sort_unstable_by(|a, b| b.total_cmp(a));
-    let largest = sizes.get(hundredth).copied().unwrap_or(0.0);
-    if middle > 0.0 {
-        (off / middle, largest / middle)
-    } else {
-        (f64::INFINITY, f64::INFINITY)
-    }
+    (off / middle, sizes[hundredth] / middle)
 }
 
 /// Four columns side by side with names that begin alike or say nothing, whose squares add up to one in every row.
 fn quaternion(sheet: &Sheet, time: Option<usize>) -> Option<[usize; 4]> {
     let begin = |k: usize| {
-        sheet.names[k]
-            .chars()
-            .next()
-            .filter(|_| sheet.names[k].len() > 2)
+        let name = &sheet.names[k];
+        name.chars().next().filter(|_| name.len() > 2)
     };
-    let rows = sheet.columns.first()?.len();
+    let is_one = |four: &[usize; 4], row: usize| {
+        let norm: f64 = four.iter().map(|&k| sheet.columns[k][row].powi(2)).sum();
+        (norm - 1.0).abs() < 1e-3
+    };
     let places = 0..sheet.names.len().saturating_sub(3);
-    places.map(|k| [k, k + 1, k + 2, k + 3]).find(|four| {
-        let norm = |row: usize| {
-            four.iter()
-                .map(|&k| sheet.columns[k][row].powi(2))
-                .sum::<f64>()
-        };
-        !four
-            .iter()
-            .any(|&k| Some(k) == time || begin(k) != begin(four[0]))
-            && (0..rows).all(|row| (norm(row) - 1.0).abs() < 1e-3)
+    let mut all = places.map(|k| [k, k + 1, k + 2, k + 3]);
+    all.find(|four| {
+        let fits = |&k: &usize| Some(k) != time && begin(k) == begin(four[0]);
+        four.iter().all(fits) && (0..rows_of(sheet)).all(|row| is_one(four, row))
     })
 }

@@ -2,10 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::axes::Axes;
-use super::gravity::Gravity;
+use super::motion::TOLERANCE;
 use super::name::Unit;
-use super::rests::TOLERANCE;
+use super::raw_run::{Axes, Gravity, Turns};
 use super::units::short;
 use crate::formats::unit_scale;
 use crate::imu::{Output, Sensor};
@@ -45,133 +44,103 @@ impl Scale {
         })
     }
 
-    /// Of the accelerometers' axes by gravity at rest, in the file's quantity per second for one m/s².
+    /// Of the accelerometers' axes by gravity at rest, of rows so many of which are a second.
     pub fn of_gravity(gravity: &Gravity, per_second: f64) -> Self {
-        let scale = gravity.scale * per_second;
-        let found = Chosen::new(scale, gravity.sigma, gravity.by_axis, powers_and(&PER_G));
-        let sure = gravity.sigma < TOLERANCE;
-        let mut why = match gravity.rests {
-            1 => format!("{} at rest", listed(&scale, gravity.by_axis)),
-            rests => format!(
-                "{} ± {} % by gravity at {rests} rests",
-                listed(&scale, gravity.by_axis),
-                percent(gravity.sigma)
-            ),
+        let Axes { scale, sigma, .. } = gravity.axes;
+        let is_sure = sigma < TOLERANCE;
+        let mut by = match gravity.rests {
+            1 => " at rest".to_owned(),
+            rests => format!(" ± {} % by gravity at {rests} rests", percent(sigma)),
         };
-        if !sure {
-            why += ", if it says nothing at zero: gravity lies in too few directions to show that";
+        if !is_sure {
+            by += ", if it says nothing at zero: gravity lies in too few directions to show that";
         }
-        if found.of_sheet {
-            why = format!("{} counts for one g; {why}", found.words());
-        } else if sure {
-            why = format!("for one g {why}; the data sheet knows better");
-        } else {
-            let often = likely_for_g(scale.mean());
-            why = format!("for one g {why}; {often}: the data sheet knows better");
-        }
-        Self {
-            value: found.value / STANDARD_GRAVITY,
-            off: found.off,
-            is_named: false,
-            why,
-        }
+        let often = likely_for_g((scale * per_second).mean());
+        let often = if is_sure { String::new() } else { often + ": " };
+        // Zeros that are not known leave room for any figure.
+        let others = if is_sure { &PER_G[..] } else { &[] };
+        let sheet = |figure: f64| [&[2f64.powf(figure.log2().round())], others].concat();
+        let axes = gravity.axes.times(per_second);
+        let mut found = Self::measured(&axes, "one g", sheet, [&by, &often]);
+        found.value /= STANDARD_GRAVITY;
+        found
     }
 
-    /// Of the gyros' axes by what they turn, in the file's quantity per second for one rad/s.
-    pub fn of_axes(axes: &Axes, row: f64, output: Output) -> Self {
-        let by = format!(
-            " ± {} % by the turns of gravity over {} moves",
-            percent(axes.sigma),
-            axes.moves
-        );
-        Self::of_turns(axes.scale * row, axes.sigma, axes.by_axis, output, &by)
+    /// Of the gyros' axes by what they turn, of rows of this length in s or, of increments, one.
+    pub fn of_turns(turns: &Turns, row: f64, output: Output) -> Self {
+        let (sigma, moves) = (percent(turns.axes.sigma), turns.moves);
+        let by = format!(" ± {sigma} % by the turns of gravity over {moves} moves");
+        Self::by_turns(&turns.axes.times(row), output, &by)
     }
 
     /// Of one scale that gravity's direction shows from step to step.
     pub fn of_steps(scale: f64, output: Output) -> Self {
-        let by = " by the turns of gravity";
-        Self::of_turns(Vector3::repeat(scale), TOLERANCE, false, output, by)
+        let axes = Axes {
+            scale: Vector3::repeat(scale),
+            sigma: TOLERANCE,
+            by_axis: false,
+        };
+        Self::by_turns(&axes, output, " by the turns of gravity")
     }
 
-    fn of_turns(scale: Vector3<f64>, sigma: f64, by_axis: bool, output: Output, by: &str) -> Self {
-        let per_degree = scale * DEGREE;
+    fn by_turns(axes: &Axes, output: Output, by: &str) -> Self {
         // Pulses are made as each instrument makes them.
-        let sheet = if output == Output::Rate {
-            &PER_DEGREE[..]
-        } else {
-            &[]
+        let sheet = |_| match output {
+            Output::Rate => PER_DEGREE.to_vec(),
+            Output::Pulse | Output::Increment => Vec::new(),
         };
-        let found = Chosen::new(per_degree, sigma, by_axis, |_| sheet.to_vec());
-        let measured = listed(&per_degree.abs(), by_axis);
-        let why = if found.of_sheet {
-            format!("{} counts for 1 deg/s; {measured}{by}", found.words())
-        } else {
-            format!("for 1 deg/s {measured}{by}; the data sheet knows better")
-        };
-        Self {
-            value: found.value / DEGREE,
-            off: found.off,
-            is_named: false,
-            why,
-        }
+        let mut found = Self::measured(&axes.times(DEGREE), "1 deg/s", sheet, [by, ""]);
+        found.value /= DEGREE;
+        found
     }
-}
 
-/// The figures of data sheets where they are as near as sheets allow, else those of the record.
-struct Chosen {
-    value: Vector3<f64>,
-    of_sheet: bool,
-    off: f64,
-    by_axis: bool,
-}
-
-impl Chosen {
-    fn new(
-        measured: Vector3<f64>,
-        sigma: f64,
-        by_axis: bool,
+    /// The figures of data sheets where they are as near as sheets allow, else those of the record.
+    fn measured(
+        axes: &Axes,
+        of: &str,
         sheet: impl Fn(f64) -> Vec<f64>,
+        [by, often]: [&str; 2],
     ) -> Self {
-        let common = measured.abs().map(f64::ln).mean().exp();
-        let figure = |axis: usize| {
-            if by_axis {
-                measured[axis].abs()
-            } else {
-                common
-            }
+        let sizes = match axes.by_axis {
+            true => axes.scale.abs(),
+            false => Vector3::repeat(axes.scale.abs().map(f64::ln).mean().exp()),
         };
-        let stated = |axis: usize| nearest(&sheet(figure(axis)), figure(axis));
-        let of_sheet = (0..3).all(|axis| stated(axis).is_some());
-        let value = Vector3::from_fn(|axis, _| {
-            let size = stated(axis).filter(|_| of_sheet);
-            size.unwrap_or_else(|| short(figure(axis)))
-                .copysign(measured[axis])
-        });
-        let off = (0..3).map(|axis| (value[axis].abs() / figure(axis) - 1.0).abs());
-        let off = off.fold(0.0, f64::max);
+        let stated = sizes.map(|size| nearest(&sheet(size), size).unwrap_or(f64::NAN));
+        let is_stated = !stated.iter().any(|stated| stated.is_nan());
+        let value = if is_stated { stated } else { sizes.map(short) };
+        let off = value.component_div(&sizes).add_scalar(-1.0).amax();
+        let measured = axes.words(&sizes.map(short));
         Self {
-            value,
-            of_sheet,
-            off: if of_sheet { off } else { off.max(2.0 * sigma) },
-            by_axis,
+            off: if is_stated {
+                off
+            } else {
+                off.max(2.0 * axes.sigma)
+            },
+            is_named: false,
+            why: match is_stated {
+                true => format!("{} counts for {of}; {measured}{by}", axes.words(&stated)),
+                false => format!("for {of} {measured}{by}; {often}the data sheet knows better"),
+            },
+            value: value.zip_map(&axes.scale, f64::copysign),
         }
-    }
-
-    fn words(&self) -> String {
-        let sizes = self.value.abs();
-        if self.by_axis {
-            return listed(&sizes, true);
-        }
-        sizes.x.to_string()
     }
 }
 
-fn listed(figures: &Vector3<f64>, by_axis: bool) -> String {
-    if by_axis {
-        let [x, y, z] = <[f64; 3]>::from(*figures).map(short);
-        format!("{x}, {y} and {z}")
-    } else {
-        short(figures.map(f64::ln).mean().exp()).to_string()
+impl Axes {
+    fn times(&self, factor: f64) -> Self {
+        Self {
+            scale: self.scale * factor,
+            ..*self
+        }
+    }
+
+    /// One figure where all axes have the same.
+    fn words(&self, figures: &Vector3<f64>) -> String {
+        let [x, y, z] = <[f64; 3]>::from(*figures);
+        match self.by_axis {
+            true => format!("{x}, {y} and {z}"),
+            false => x.to_string(),
+        }
     }
 }
 
@@ -184,16 +153,6 @@ fn nearest(sheet: &[f64], measured: f64) -> Option<f64> {
     let off = |stated: &f64| (stated / measured - 1.0).abs();
     let nearest = sheet.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
     nearest.copied().filter(|stated| off(stated) < TOLERANCE)
-}
-
-/// Powers of two about a figure, then others.
-fn powers_and(others: &[f64]) -> impl Fn(f64) -> Vec<f64> {
-    move |figure| {
-        let power = 2f64.powf(figure.log2().round());
-        std::iter::once(power)
-            .chain(others.iter().copied())
-            .collect()
-    }
 }
 
 /// What registers often say for one g that say this with a zero that is not known.

@@ -1,7 +1,7 @@
 //! What a log shows, and how sure that is.
 
 use super::units::short;
-use super::{Draft, Stated};
+use super::{Draft, NO_COLUMNS};
 use crate::imu::Sensor;
 
 /// How sure something is.
@@ -63,14 +63,8 @@ impl Draft {
 
     /// The first thing that stands between the draft and a run: what the log has, what is needed, what to do.
     pub(in crate::formats) fn open_question(&self) -> Option<[String; 3]> {
-        let text = self.to_toml("log");
-        let mut open = text
-            .lines()
-            .filter_map(|line| line.strip_prefix("# ")?.split_once("TODO: "));
-        let (field, why) = open.next()?;
-        let field = field.split('=').next().unwrap_or_default().trim();
-        let field = field.trim_end_matches("  #");
-        let (expected, advice) = match field {
+        let (field, why) = self.page("log").open.into_iter().next()?;
+        let (expected, advice) = match &*field {
             "gyro_unit" => ("the unit of the gyros", "State it with --gyro-unit."),
             "accel_unit" => (
                 "the unit of the accelerometers",
@@ -90,21 +84,19 @@ impl Draft {
         let clock = &self.clock;
         let name = self.columns.time.map(|k| self.columns.names[k].as_str());
         let hertz = |rate: f64| format!("{} Hz", short(rate));
+        if let Some(rate) = self.stated.rate_hz {
+            return (hertz(rate), Certainty::Certain, "as stated".to_owned());
+        }
+        let certainty = match clock.why.starts_with("as the file") {
+            true if name.is_some() => Certainty::Certain,
+            _ => Certainty::Guess,
+        };
         let (value, certainty) = match (name, clock.period.map(f64::recip)) {
-            _ if let Some(rate) = self.stated.rate_hz => {
-                return (hertz(rate), Certainty::Certain, "as stated".to_owned());
-            }
-            (Some(name), Some(rate)) => {
-                let certainty = match clock.why.starts_with("as the file") {
-                    true => Certainty::Certain,
-                    false => Certainty::Guess,
-                };
-                (
-                    format!("{name}, {}, {}", clock.unit, hertz(rate)),
-                    certainty,
-                )
-            }
-            (None, Some(rate)) => (hertz(rate), Certainty::Guess),
+            (Some(name), Some(rate)) => (
+                format!("{name}, {}, {}", clock.unit, hertz(rate)),
+                certainty,
+            ),
+            (None, Some(rate)) => (hertz(rate), certainty),
             (_, None) => ("period of the rows".to_owned(), Certainty::Unknown),
         };
         (value, certainty, clock.why.clone())
@@ -113,8 +105,11 @@ impl Draft {
     fn triad_found(&self, sensor: Sensor) -> Evidence {
         let unit = self.quantities.units.get(sensor);
         let Some(triad) = self.columns.triads.get(sensor) else {
-            let why = "no names or numbers showed them";
-            return ("no columns".to_owned(), Certainty::Unknown, why.to_owned());
+            return (
+                "no columns".to_owned(),
+                Certainty::Unknown,
+                NO_COLUMNS.to_owned(),
+            );
         };
         let names = triad.map(|k| self.columns.names[k].as_str()).join(" ");
         let certainty = match unit.word {
@@ -147,26 +142,19 @@ impl Draft {
     }
 
     fn place_found(&self) -> Evidence {
-        let Stated {
-            latitude_deg,
-            height_m,
-            gravity_m_s2,
-            ..
-        } = self.stated;
-        let place = [
-            latitude_deg.map(|degrees| format!("latitude {degrees}°")),
-            height_m.map(|height| format!("height {height} m")),
-            gravity_m_s2.map(|gravity| format!("gravity {gravity} m/s²")),
-        ];
-        let place: Vec<String> = place.into_iter().flatten().collect();
-        if !place.is_empty() {
-            return (place.join(", "), Certainty::Certain, "as stated".to_owned());
-        }
-        let why = "state --latitude and --height for smaller σ";
-        (
-            "gravity 9.806 ± 0.015 m/s²".to_owned(),
-            Certainty::Unknown,
-            why.to_owned(),
-        )
+        let stated = &self.stated;
+        let latitude = stated.latitude_deg.map(|of| format!("latitude {of}°"));
+        let height = stated.height_m.map(|of| format!("height {of} m"));
+        let gravity = stated.gravity_m_s2.map(|of| format!("gravity {of} m/s²"));
+        let place: Vec<String> = [latitude, height, gravity].into_iter().flatten().collect();
+        let (value, certainty, why) = match place.is_empty() {
+            false => (place.join(", "), Certainty::Certain, "as stated"),
+            true => (
+                "gravity 9.806 ± 0.015 m/s²".to_owned(),
+                Certainty::Unknown,
+                "state --latitude and --height for smaller σ",
+            ),
+        };
+        (value, certainty, why.to_owned())
     }
 }

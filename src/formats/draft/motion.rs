@@ -4,30 +4,40 @@
 use std::ops::Range;
 
 use nalgebra::Vector3;
+use statrs::statistics::Statistics;
 
-use super::turns;
 use crate::imu::PerSensor;
-use crate::statistics::{FALSE_ALARM, SIGMA_OF_MEDIAN, median, student_limit};
+use crate::statistics::{FALSE_ALARM, SIGMA_OF_MEDIAN, median, median_of_axes, student_limit};
 use crate::units::DEGREE;
 
 /// Length of the windows whose means are compared, s.
 pub(super) const WINDOW: f64 = 0.25;
 /// Windows at rest differ by less than this many σ of their noise …
-pub(super) const SIGMAS: f64 = 6.0;
+const SIGMAS: f64 = 6.0;
 /// … and this part of gravity or of the fastest turn.
-pub(super) const PART: f64 = 1e-3;
+const PART: f64 = 1e-3;
 /// Samples on either side of a cut …
 const BESIDE: usize = 8;
 /// … between which gravity's direction changes by this much at once, rad …
 const CUT: f64 = 30.0 * DEGREE;
 /// … though it stays within this on each side.
 const STEADY: f64 = 5.0 * DEGREE;
+/// Length of the steps over which gravity's direction is followed, s.
+pub(super) const FOLLOWED: f64 = 0.08;
+/// Specific force within this part of gravity shows its direction.
+const NEAR_GRAVITY: f64 = 0.1;
+/// Changes of direction below this tell nothing, rad.
+const ENOUGH: f64 = 20.0 * DEGREE;
+/// How well gravity's direction must follow the gyros.
+const CORRELATION: f64 = 0.98;
+/// What data sheets allow a scale.
+pub(super) const TOLERANCE: f64 = 0.03;
 /// Samples that are added up to tell pulses, whose fractions are carried, from readings.
 const SUM: usize = 16;
 
 /// What the samples show.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::formats) struct Motion {
+pub(super) struct Motion {
     /// The longest stretch at rest.
     pub longest_rest: Range<usize>,
     /// Specific force at rest, the file's quantity a row.
@@ -39,8 +49,10 @@ pub(in crate::formats) struct Motion {
     /// Angle in rad of one unit of the gyros in one row, where turns show it; negative where the triads have
     /// opposite signs.
     pub angle: Option<f64>,
-    /// Places where gravity's direction jumps: sections laid end to end.
-    pub cuts: usize,
+    /// A first guess of its size.
+    pub size: f64,
+    /// Samples before which gravity's direction jumps: sections laid end to end.
+    pub cuts: Vec<usize>,
     /// Variance of sums of samples at rest over that of as many independent ones, least of the axes.
     pub sum_variance: Option<f64>,
 }
@@ -51,14 +63,6 @@ pub(super) fn mean(samples: &[Vector3<f64>]) -> Vector3<f64> {
 
 pub(super) fn means(samples: &[Vector3<f64>], length: usize) -> Vec<Vector3<f64>> {
     samples.chunks_exact(length).map(mean).collect()
-}
-
-/// Median of each axis.
-fn level<'a>(vectors: impl Iterator<Item = &'a Vector3<f64>> + Clone) -> Vector3<f64> {
-    Vector3::from_fn(|axis, _| {
-        let mut values: Vec<f64> = vectors.clone().map(|v| v[axis]).collect();
-        median(&mut values).unwrap_or(0.0)
-    })
 }
 
 /// 1σ of the noise of means of windows, from how they differ from one to the next.
@@ -84,8 +88,9 @@ impl Motion {
                 |other: Option<&Vector3<f64>>| other.is_none_or(|f| (f - accel[k]).norm() <= force);
             near(k.checked_sub(1).and_then(|k| accel.get(k))) && near(accel.get(k + 1))
         };
-        let standing: Vec<usize> = (0..accel.len()).filter(|&k| steady(k)).collect();
-        let rest = level(standing.iter().map(|&k| &gyro[k]));
+        let standing = (0..accel.len()).filter(|&k| steady(k));
+        let standing: Vec<Vector3<f64>> = standing.map(|k| gyro[k]).collect();
+        let rest = median_of_axes(&standing).unwrap_or_default();
         let fastest = gyro
             .iter()
             .map(|rate| (rate - rest).norm())
@@ -111,22 +116,80 @@ impl Motion {
             .map(|stretch| (stretch.start + 1) * length..(stretch.end - 1) * length)
             .collect();
         let cuts = cuts(samples, breaks);
+        let step = ((FOLLOWED / period).round() as usize).max(1);
+        let followed = Followed::new(samples, breaks, rest, usual, step);
         Self {
             longest_rest: longest.start * length..longest.end * length,
             gravity: median(&mut sizes).unwrap_or(usual),
             rest,
-            is_turned: turns::is_turned(&accel, usual),
-            angle: (cuts == 0)
-                .then(|| turns::angle(samples, breaks, &settled, rest, usual, period))
-                .flatten(),
+            is_turned: is_turned(&accel, usual),
+            angle: followed.angle.filter(|_| cuts.is_empty()),
+            size: followed.size,
             cuts,
             sum_variance: sum_variance(samples, &settled),
         }
     }
 }
 
+fn is_near(force: &Vector3<f64>, gravity: f64) -> bool {
+    (force.norm() / gravity - 1.0).abs() < NEAR_GRAVITY
+}
+
+/// Whether gravity's direction changes by enough to tell something.
+fn is_turned(forces: &[Vector3<f64>], gravity: f64) -> bool {
+    let mut shown = forces.iter().filter(|force| is_near(force, gravity));
+    let first = shown.next();
+    first.is_some_and(|first| shown.any(|force| force.angle(first) > ENOUGH))
+}
+
+pub(super) fn is_whole(samples: &[Vector3<f64>]) -> bool {
+    let mut values = samples.iter().flat_map(|sample| sample.iter());
+    values.all(|value| value.fract() == 0.0)
+}
+
+/// How far one unit of the gyros in one row turns, rad, as gravity's direction follows them from step to step.
+struct Followed {
+    angle: Option<f64>,
+    size: f64,
+}
+
+impl Followed {
+    /// By least squares of `ḟ = f × ω`, wherever |f| is that of gravity.
+    fn new(
+        samples: &PerSensor<Vec<Vector3<f64>>>,
+        breaks: &[usize],
+        zero: Vector3<f64>,
+        gravity: f64,
+        length: usize,
+    ) -> Self {
+        let gyro = means(&samples.gyro, length);
+        let accel = means(&samples.accel, length);
+        let (mut both, mut turned, mut seen, mut way) = (0.0, 0.0, 0.0, 0.0);
+        for (k, (rate, force)) in gyro.windows(3).zip(accel.windows(3)).enumerate() {
+            let at = k * length..(k + 3) * length;
+            if !force.iter().all(|f| is_near(f, gravity)) || is_broken(breaks, &at) {
+                continue;
+            }
+            let angle = (0.5 * (rate[0] + rate[2]) + rate[1] - 2.0 * zero) * length as f64;
+            let expected = force[1].normalize().cross(&angle);
+            let change = force[2].normalize() - force[0].normalize();
+            both += expected.dot(&change);
+            turned += expected.norm_squared();
+            seen += change.norm_squared();
+            way += angle.norm_squared();
+        }
+        let correlation: f64 = both / (turned * seen).sqrt();
+        let is_shown = correlation.abs() > CORRELATION && seen.sqrt() > 0.1 * ENOUGH;
+        Self {
+            angle: is_shown.then(|| both / turned),
+            // Of turns about any axis gravity's direction shows two thirds.
+            size: (1.5 * seen / way).sqrt(),
+        }
+    }
+}
+
 /// Runs of windows at rest.
-pub(super) fn stretches(at_rest: &[bool]) -> Vec<Range<usize>> {
+fn stretches(at_rest: &[bool]) -> Vec<Range<usize>> {
     let mut found = Vec::new();
     let mut begin = 0;
     for stretch in at_rest.chunk_by(|a, b| a == b) {
@@ -139,15 +202,15 @@ pub(super) fn stretches(at_rest: &[bool]) -> Vec<Range<usize>> {
 }
 
 /// Whether samples are missing between these.
-pub(super) fn is_broken(breaks: &[usize], samples: &Range<usize>) -> bool {
+fn is_broken(breaks: &[usize], samples: &Range<usize>) -> bool {
     let after = breaks.partition_point(|&next| next <= samples.start);
     breaks.get(after).is_some_and(|&next| next < samples.end)
 }
 
 /// Places where gravity's direction jumps, though no sample is missing there and the gyros do not turn it.
-fn cuts(samples: &PerSensor<Vec<Vector3<f64>>>, breaks: &[usize]) -> usize {
+fn cuts(samples: &PerSensor<Vec<Vector3<f64>>>, breaks: &[usize]) -> Vec<usize> {
     let accel = &samples.accel;
-    let (mut cuts, mut next) = (0, 2 * BESIDE);
+    let (mut cuts, mut next) = (Vec::new(), 2 * BESIDE);
     while next + 2 * BESIDE <= accel.len() {
         let part = |from: usize| mean(&accel[from..from + BESIDE]);
         let (before, after) = (part(next - BESIDE), part(next));
@@ -159,7 +222,7 @@ fn cuts(samples: &PerSensor<Vec<Vector3<f64>>>, breaks: &[usize]) -> usize {
                 &before.cross(&after).normalize(),
                 &samples.gyro[next - 2 * BESIDE..next + 2 * BESIDE],
             );
-        cuts += usize::from(cut);
+        cuts.extend(cut.then_some(next));
         next += if cut { 2 * BESIDE } else { 1 };
     }
     cuts
@@ -169,50 +232,36 @@ fn cuts(samples: &PerSensor<Vec<Vector3<f64>>>, breaks: &[usize]) -> usize {
 /// scatter in the others: in a log of few rows a second a turn takes no longer than a cut, but gyros show it.
 fn turn_about(axis: &Vector3<f64>, gyro: &[Vector3<f64>]) -> bool {
     let rates: Vec<f64> = gyro.iter().map(|rate| rate.dot(axis)).collect();
-    let mean = |rates: &[f64]| rates.iter().sum::<f64>() / rates.len() as f64;
     let (before, others) = rates.split_at(BESIDE);
     let (between, after) = others.split_at(2 * BESIDE);
-    let squares = |rates: &[f64]| {
-        let mean = mean(rates);
-        rates.iter().map(|rate| (rate - mean).powi(2)).sum::<f64>()
-    };
-    let degrees = (2 * BESIDE - 2) as f64;
-    let variance = (squares(before) + squares(after)) / degrees;
+    let variance = 0.5 * (before.variance() + after.variance());
     // As many samples are between as beside.
     let sigma = (2.0 * variance / (2 * BESIDE) as f64).sqrt();
-    let change = mean(between) - 0.5 * (mean(before) + mean(after));
+    let change = between.mean() - 0.5 * (before.mean() + after.mean());
+    let degrees = (2 * BESIDE - 2) as f64;
     change.abs() > student_limit(degrees, 0.5 * FALSE_ALARM) * sigma
 }
 
+/// Variance of sums of samples at rest over that of as many independent ones, least of the axes.
 fn sum_variance(samples: &PerSensor<Vec<Vector3<f64>>>, settled: &[Range<usize>]) -> Option<f64> {
-    let mut least: Option<f64> = None;
-    for triad in [&samples.gyro, &samples.accel] {
-        for axis in 0..3 {
-            let (mut of_sums, mut of_one, mut count) = (0.0, 0.0, 0.0);
-            for stretch in settled {
-                let values: Vec<f64> = triad[stretch.clone()]
-                    .iter()
-                    .map(|sample| sample[axis])
-                    .collect();
-                // Differences of neighbours are free of what wanders.
-                let sums: Vec<f64> = values
-                    .chunks_exact(SUM)
-                    .map(|part| part.iter().sum())
-                    .collect();
-                of_sums += sums
-                    .windows(2)
-                    .map(|pair| (pair[1] - pair[0]).powi(2))
-                    .sum::<f64>();
-                count += sums.len().saturating_sub(1) as f64;
-                let middle = values.iter().sum::<f64>() / values.len().max(1) as f64;
-                let spread = values.iter().map(|v| (v - middle).powi(2)).sum::<f64>();
-                of_one += spread / values.len().max(1) as f64 * sums.len().saturating_sub(1) as f64;
-            }
-            if count > 0.0 && of_one > 0.0 {
-                let ratio = of_sums / (2.0 * SUM as f64 * of_one);
-                least = Some(least.map_or(ratio, |least| least.min(ratio)));
-            }
+    let ratio = |triad: &[Vector3<f64>], axis: usize| {
+        let (mut of_sums, mut of_one) = (0.0, 0.0);
+        for stretch in settled {
+            let values: Vec<f64> = triad[stretch.clone()].iter().map(|row| row[axis]).collect();
+            let sums: Vec<f64> = values
+                .chunks_exact(SUM)
+                .map(|part| part.iter().sum())
+                .collect();
+            // Differences of neighbours are free of what wanders.
+            let differences = sums.windows(2).map(|pair| pair[1] - pair[0]);
+            of_one += differences.len() as f64 * values.population_variance();
+            of_sums += differences
+                .map(|difference| difference.powi(2))
+                .sum::<f64>();
         }
-    }
-    least
+        of_sums / (2.0 * SUM as f64 * of_one)
+    };
+    let of_triad = |triad| (0..3).map(move |axis| ratio(triad, axis));
+    let ratios = of_triad(&samples.gyro).chain(of_triad(&samples.accel));
+    ratios.filter(|ratio| ratio.is_finite()).reduce(f64::min)
 }

@@ -1,64 +1,35 @@
 //! What the name of a column says: a quantity, an axis, a unit.
 
+use crate::formats::quantity::{Of, spelled};
 use crate::imu::Sensor;
-use crate::noise::normalised;
-
-/// Units as `run.toml` writes them, how many of them one of the file's is, and its normalised spellings.
-const UNITS: [(&str, f64, &[&str]); 26] = [
-    ("m/s^2", 1.0, &["m/s2", "ms-2", "mps2", "ms2"]),
-    ("m/s^2", 1e-2, &["cm/s2", "gal"]),
-    ("m/s^2", 1e-3, &["mm/s2"]),
-    (
-        "rad/s",
-        1.0,
-        &["rad/s", "rads-1", "rads", "radps", "rps", "radpersec"],
-    ),
-    ("rad/s", 1e-3, &["mrad/s"]),
-    (
-        "deg/s",
-        1.0,
-        &["deg/s", "degs-1", "degs", "degps", "degpersec"],
-    ),
-    ("deg/s", 6.0, &["rpm"]),
-    ("deg/h", 1.0, &["deg/h", "dph"]),
-    ("mdps", 1.0, &["mdeg/s"]),
-    ("m/s", 1.0, &["m/s", "mps"]),
-    ("g*s", 1.0, &["g*s", "gs"]),
-    ("mg", 1.0, &["mg"]),
-    ("g", 1.0, &["g"]),
-    ("g", 1e-6, &["ug"]),
-    ("count", 1.0, &["count", "counts", "lsb", "raw", "cnt"]),
-    ("arcsec", 1.0, &["arcsec", "\""]),
-    ("rad", 1.0, &["rad"]),
-    ("deg", 1.0, &["deg"]),
-    ("s", 1.0, &["s", "sec", "secs", "seconds", "h:m:s"]),
-    (
-        "ms",
-        1.0,
-        &["ms", "msec", "msecs", "millis", "milliseconds"],
-    ),
-    (
-        "us",
-        1.0,
-        &["us", "usec", "usecs", "micros", "microseconds"],
-    ),
-    (
-        "ns",
-        1.0,
-        &["ns", "nsec", "nsecs", "nanos", "nanosec", "nanoseconds"],
-    ),
-    ("degC", 1.0, &["degc", "celsius"]),
-    ("uT", 1.0, &["ut", "microtesla"]),
-    ("gauss", 1.0, &["gauss"]),
-    ("hPa", 1.0, &["hpa", "pa", "mbar"]),
-];
 
 /// A unit as `run.toml` writes it, and how many of it one of a file's is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Unit {
     pub word: &'static str,
     pub times: f64,
+    pub of: Of,
 }
+
+/// What is within the names of a triad's columns, and what are whole names of such.
+#[rustfmt::skip]
+const TRIADS: [(Sensor, &[&str], &[&str]); 2] = [
+    (
+        Sensor::Gyro,
+        &["gyr", "angvel", "angularv", "angularr", "angrate", "omega", "deltaangle", "dang", "deltatheta", "dtheta",
+          "wrs", "rotationrate"],
+        &["g", "w", "wb", "om", "rate", "pqr"],
+    ),
+    (
+        Sensor::Accel,
+        &["acc", "specificforce", "deltav", "dvel", "velinc", "ars"],
+        &["a", "f", "fb", "sf", "dv", "force", "gf"],
+    ),
+];
+/// What is within the names of other columns.
+#[rustfmt::skip]
+const OTHERS: [&str; 9] =
+    ["mag", "compass", "quat", "euler", "cov", "std", "bias", "orientation", "useracc"];
 
 /// A name taken apart.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,7 +51,7 @@ pub(super) fn axes_of_program(columns: &[String]) -> Option<&'static str> {
 }
 
 /// The unit that a text names, of which a number before it says how many.
-pub(super) fn unit(text: &str) -> Option<Unit> {
+fn unit(text: &str) -> Option<Unit> {
     let text = text.trim_matches(['[', ']', ' ']);
     let text = text.strip_suffix("/LSB").unwrap_or(text);
     let number = match text.split_once(' ') {
@@ -88,13 +59,9 @@ pub(super) fn unit(text: &str) -> Option<Unit> {
         None => None,
     };
     let (times, text) = number.unwrap_or((1.0, text));
-    let text = normalised(text);
-    let spells = |(_, _, spellings): &&(_, _, &[&str])| spellings.contains(&text.as_str());
-    let &(word, of, _) = UNITS.iter().find(spells)?;
-    (times > 0.0).then_some(Unit {
-        word,
-        times: times * of,
-    })
+    let (word, of_it, of) = spelled(text)?;
+    let times = times * of_it;
+    (times > 0.0).then_some(Unit { word, times, of })
 }
 
 /// The words of a name in lower case: what blanks, marks or capitals part.
@@ -118,6 +85,13 @@ fn words(name: &str) -> Vec<String> {
 }
 
 impl Name {
+    /// Of a column whose unit may stand in a row of its own.
+    pub fn of_column(name: &str, unit_below: &str) -> Self {
+        let mut of = Self::of(name);
+        of.unit = of.unit.or_else(|| unit(unit_below));
+        of
+    }
+
     pub fn of(name: &str) -> Self {
         let (mut rest, mut found) = (name.to_owned(), None);
         if let Some(open) = name.find(['[', '(']) {
@@ -153,10 +127,10 @@ impl Name {
             _ => None,
         };
         let whole = words.concat();
-        let (stem, axis) = match (axis, axis_at_end(&whole), axis_at_start(&whole)) {
-            (Some(axis), ..) => (whole.as_str(), Some(axis)),
-            (_, Some((stem, axis)), _) | (_, None, Some((stem, axis))) => (stem, Some(axis)),
-            (_, None, None) => (whole.as_str(), None),
+        let apart = || axis_at_end(&whole).or(axis_at_start(&whole));
+        let (stem, axis) = match axis {
+            Some(axis) => (&*whole, Some(axis)),
+            None => apart().map_or((&*whole, None), |(stem, axis)| (stem, Some(axis))),
         };
         Self {
             stem: stem.to_owned(),
@@ -167,74 +141,41 @@ impl Name {
 
     /// The triad that the stem names.
     pub fn sensor(&self) -> Option<Sensor> {
-        let has = |parts: &[&str]| parts.iter().any(|part| self.stem.contains(part));
-        let is = |all: &[&str]| all.contains(&self.stem.as_str());
-        if self.is_of_another_sensor() {
-            None
-        } else if has(&[
-            "gyr",
-            "angvel",
-            "angularv",
-            "angularr",
-            "angrate",
-            "omega",
-            "deltaangle",
-            "dang",
-            "deltatheta",
-            "dtheta",
-            "wrs",
-            "rotationrate",
-        ]) || is(&["g", "w", "wb", "om", "rate", "pqr"])
-        {
-            Some(Sensor::Gyro)
-        } else if has(&["acc", "specificforce", "deltav", "dvel", "velinc", "ars"])
-            || is(&["a", "f", "fb", "sf", "dv", "force", "gf"])
-        {
-            Some(Sensor::Accel)
-        } else {
-            None
-        }
+        let names = |(_, parts, all): &&(Sensor, &[&str], &[&str])| {
+            parts.iter().any(|part| self.stem.contains(part)) || all.contains(&&*self.stem)
+        };
+        let triad = TRIADS
+            .iter()
+            .find(names)
+            .filter(|_| !self.is_of_another_sensor());
+        triad.map(|(sensor, ..)| *sensor)
     }
 
     /// Whether it is neither a gyro's nor an accelerometer's, by its name.
     pub fn is_of_another_sensor(&self) -> bool {
-        let others = [
-            "mag",
-            "compass",
-            "quat",
-            "euler",
-            "cov",
-            "std",
-            "bias",
-            "orientation",
-            "useracc",
-        ];
         let is_magnetic = self
             .unit
             .is_some_and(|unit| ["uT", "gauss"].contains(&unit.word));
-        is_magnetic || others.iter().any(|other| self.stem.contains(other))
+        is_magnetic || OTHERS.iter().any(|other| self.stem.contains(other))
     }
 
     /// How much like a column of time it is, more is more.
     pub fn is_time(&self) -> u8 {
         let whole = self.whole();
-        let is = |all: &[&str]| all.contains(&whole.as_str());
+        let has = |parts: &[&str]| parts.iter().any(|part| whole.contains(part));
+        let is = |all: &[&str]| all.contains(&&*whole);
         // The instrument's own time before that of whoever received it.
         let ends = ["headerstamp", "timestampsample"];
         if ends.iter().any(|end| whole.ends_with(end)) || whole == "sample" && self.is_of_time() {
             4
         } else if is(&["t", "time", "timestamp", "tow", "gpstime", "stamp"]) {
             3
-        } else if ["time", "tow", "clock", "stamp", "elapsed"]
-            .iter()
-            .any(|part| whole.contains(part))
+        } else if has(&["time", "tow", "clock", "stamp", "elapsed"])
             || is(&["sec", "seconds", "secs", "ms", "us", "ns"])
         {
             2
-        } else if self.is_counter() {
-            1
         } else {
-            0
+            u8::from(self.is_counter())
         }
     }
 
@@ -246,8 +187,7 @@ impl Name {
 
     /// Whether its unit is one of time.
     pub fn is_of_time(&self) -> bool {
-        self.unit
-            .is_some_and(|unit| ["s", "ms", "us", "ns"].contains(&unit.word))
+        self.unit.is_some_and(|unit| unit.of == Of::Time)
     }
 
     /// Whole seconds of a time that goes on in another column, or what goes on there.
@@ -259,11 +199,10 @@ impl Name {
 
     /// Whether it tells several instruments apart.
     pub fn is_instance(&self) -> bool {
-        let whole = self.whole();
-        [
+        let names = [
             "i", "id", "instance", "imu", "imuid", "device", "deviceid", "sensorid",
-        ]
-        .contains(&whole.as_str())
+        ];
+        names.contains(&&*self.whole())
     }
 
     /// Ticks in s, where a maker's name for a time says what they are.
@@ -283,22 +222,15 @@ impl Name {
     }
 }
 
-fn is_axis(c: char) -> bool {
-    matches!(c, 'x' | 'y' | 'z' | '0'..='3')
-}
-
 fn axis_at_end(word: &str) -> Option<(&str, char)> {
-    let axis = word.chars().next_back().filter(|&c| is_axis(c))?;
-    let stem = &word[..word.len() - axis.len_utf8()];
+    let axis = word.chars().next_back()?;
+    let stem = word.strip_suffix(['x', 'y', 'z', '0', '1', '2', '3'])?;
     (!stem.is_empty()).then_some((stem, axis))
 }
 
 fn axis_at_start(word: &str) -> Option<(&str, char)> {
-    let axis = word
-        .chars()
-        .next()
-        .filter(|&c| matches!(c, 'x' | 'y' | 'z'))?;
-    let stem = &word[axis.len_utf8()..];
+    let axis = word.chars().next()?;
+    let stem = word.strip_prefix(['x', 'y', 'z'])?;
     (!stem.is_empty()).then_some((stem, axis))
 }
 

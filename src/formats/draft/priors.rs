@@ -1,12 +1,10 @@
 //! What is known before calibration: scale and bias as the record shows them, the rest as is usual in the class
 //! of its noise.
 
-use std::fmt::Write;
-
 use nalgebra::Vector3;
 
 use super::Draft;
-use super::text::{line, seven, todo};
+use super::text::{Page, seven};
 use super::units::short;
 use crate::formats::instrument::{USUAL_BIAS, USUAL_INSTALLATION, USUAL_SCALE};
 use crate::imu::Sensor;
@@ -30,32 +28,22 @@ struct Class {
 /// A bias of more than so many σ of its class is none of its class.
 const BEYOND: f64 = 3.0;
 
+#[rustfmt::skip]
 const CLASSES: [Class; 3] = [
     Class {
         name: "a navigation-grade",
-        angle_random_walk: 0.01 * DEG_PER_SQRT_H,
-        velocity_random_walk: 20.0 * MICRO_G_PER_SQRT_HZ,
-        scale_ppm: 7_000.0,
-        installation: 600.0 * ARCSEC,
-        gyro_bias: 0.03 * DEGREE,
-        accel_bias: 0.05,
+        angle_random_walk: 0.01 * DEG_PER_SQRT_H, velocity_random_walk: 20.0 * MICRO_G_PER_SQRT_HZ,
+        scale_ppm: 7_000.0, installation: 600.0 * ARCSEC, gyro_bias: 0.03 * DEGREE, accel_bias: 0.05,
     },
     Class {
         name: "a tactical-grade",
-        angle_random_walk: 0.1 * DEG_PER_SQRT_H,
-        velocity_random_walk: 60.0 * MICRO_G_PER_SQRT_HZ,
-        scale_ppm: 10_000.0,
-        installation: 3_600.0 * ARCSEC,
-        gyro_bias: 0.2 * DEGREE,
-        accel_bias: 0.2,
+        angle_random_walk: 0.1 * DEG_PER_SQRT_H, velocity_random_walk: 60.0 * MICRO_G_PER_SQRT_HZ,
+        scale_ppm: 10_000.0, installation: 3_600.0 * ARCSEC, gyro_bias: 0.2 * DEGREE, accel_bias: 0.2,
     },
     Class {
         name: "a MEMS",
-        angle_random_walk: f64::INFINITY,
-        velocity_random_walk: f64::INFINITY,
-        scale_ppm: USUAL_SCALE / PPM,
-        installation: USUAL_INSTALLATION,
-        gyro_bias: USUAL_BIAS.gyro,
+        angle_random_walk: f64::INFINITY, velocity_random_walk: f64::INFINITY,
+        scale_ppm: USUAL_SCALE / PPM, installation: USUAL_INSTALLATION, gyro_bias: USUAL_BIAS.gyro,
         accel_bias: USUAL_BIAS.accel,
     },
 ];
@@ -73,50 +61,34 @@ impl Draft {
         CLASSES.iter().find(is_of).unwrap_or(widest)
     }
 
-    pub(super) fn prior(&self, text: &mut String, sensor: Sensor) {
+    pub(super) fn prior(&self, page: &mut Page, sensor: Sensor) {
         let (class, unit) = (self.class(), self.quantities.units.get(sensor));
-        let _ = writeln!(
-            text,
-            "\n# usual of {} instrument: check them against the data sheet; N = scale * installation * u + bias\n\
-             [imu.prior.{}]",
-            class.name,
-            sensor.name()
+        let remark = format!(
+            "usual of {} instrument: check them against the data sheet; N = scale * installation * u + bias",
+            class.name
         );
-        let is_count = unit.word.is_none_or(|word| word == "count");
-        let scale = self.quantities.scale(sensor);
-        match (&unit.scale, is_count) {
-            (Some(scale), _) => line(text, "scale", &three(&scale.value), &scale.why),
-            (None, true) => {
-                let plain = match sensor {
-                    Sensor::Gyro => {
-                        "counts for one rad/s by the data sheet: 57.29578 times those for 1 deg/s, often 131, 65.5, \
-                         32.8, 16.4"
-                    }
-                    Sensor::Accel => {
-                        "counts for one m/s² by the data sheet: those for one g over 9.80665"
-                    }
-                };
-                todo(text, "scale", &self.open_scale(plain, sensor));
-            }
-            (None, false) => {}
+        page.table(&format!("imu.prior.{}", sensor.name()), &remark);
+        if let Some(scale) = &unit.scale {
+            page.line("scale", three(&scale.value), &scale.why);
+        } else if unit.word.is_none_or(|word| word == "count") {
+            page.open("scale =", self.open_scale(sensor));
         }
         let off = unit.scale.as_ref().map_or(0.0, |scale| 1e6 * scale.off);
-        let _ = writeln!(
-            text,
-            "scale_sigma_ppm = {:?}",
-            class.scale_ppm.max(short(off))
-        );
-        let _ = writeln!(
-            text,
-            "installation_sigma_arcsec = {:?}",
-            class.installation / ARCSEC
-        );
-        self.bias(text, sensor, scale.map(f64::abs), class);
+        let sigma = class.scale_ppm.max(short(off));
+        page.plain("scale_sigma_ppm", format_args!("{sigma:?}"));
+        let sigma = class.installation / ARCSEC;
+        page.plain("installation_sigma_arcsec", format_args!("{sigma:?}"));
+        self.bias(page, sensor, class);
     }
 
-    fn open_scale(&self, plain: &str, sensor: Sensor) -> String {
-        let registers = self.registers.as_ref();
-        let why = match registers {
+    fn open_scale(&self, sensor: Sensor) -> String {
+        let plain = match sensor {
+            Sensor::Gyro => {
+                "counts for one rad/s by the data sheet: 57.29578 times those for 1 deg/s, often 131, 65.5, 32.8, 16.4"
+            }
+            Sensor::Accel => "counts for one m/s² by the data sheet: those for one g over 9.80665",
+        };
+        let why = match &self.registers {
             Some(found) if !found.has_rests => "; nothing is at rest, so nothing shows it",
             Some(_) if sensor == Sensor::Accel => "; gravity at rest does not show it",
             Some(_) => "; gravity's directions at rest do not show it",
@@ -127,38 +99,45 @@ impl Draft {
         format!("{plain}{why}{likely}")
     }
 
-    fn bias(&self, text: &mut String, sensor: Sensor, scale: Option<f64>, class: &Class) {
+    fn bias(&self, page: &mut Page, sensor: Sensor, class: &Class) {
         let offset = *self.offset.get(sensor);
         let per_second = self.quantities.per_second(self.clock.period.unwrap_or(1.0));
         let usual = match sensor {
             Sensor::Gyro => class.gyro_bias,
             Sensor::Accel => class.accel_bias,
         };
-        let mut sigma = scale.map(|scale| usual * scale);
-        match self.own_zero(sensor, sigma.map(|sigma| sigma / per_second)) {
+        let usual = self
+            .quantities
+            .scale(sensor)
+            .map(|scale| usual * scale.abs());
+        let own = self.own_zero(sensor, usual.map(|usual| usual / per_second));
+        let off = match own {
             Some((zero, off, why)) => {
-                let bias = zero.add_scalar(offset) * per_second;
-                line(text, "bias", &three(&bias), why);
-                sigma = sigma.map(|sigma| sigma.max(2.0 * off * per_second));
+                page.line("bias", three(&(zero.add_scalar(offset) * per_second)), why);
+                off
             }
             None => {
                 if offset != 0.0 {
-                    line(
-                        text,
-                        "bias",
-                        &format!("{:?}", offset * per_second),
-                        "what an unsigned register says at zero",
-                    );
+                    let bias = three(&Vector3::repeat(offset * per_second));
+                    page.line("bias", bias, "what an unsigned register says at zero");
                 }
-                let rest = self.rest.filter(|_| sensor == Sensor::Gyro);
-                let rest = rest.map_or(0.0, |rest| rest.amax()) * per_second;
-                sigma = sigma.map(|sigma| sigma.max(2.0 * rest));
+                let rest = self.rest().filter(|_| sensor == Sensor::Gyro);
+                rest.map_or(0.0, |rest| rest.amax())
             }
+        };
+        if let Some(usual) = usual {
+            let sigma = short(usual.max(2.0 * off * per_second));
+            page.line(
+                "bias_sigma",
+                format_args!("{sigma:?}"),
+                "in the file's unit, per second",
+            );
         }
-        if let Some(sigma) = sigma {
-            let value = format!("{:?}", short(sigma));
-            line(text, "bias_sigma", &value, "in the file's unit, per second");
-        }
+    }
+
+    /// Output of the gyros at rest, the file's quantity a row.
+    fn rest(&self) -> Option<Vector3<f64>> {
+        self.motion.as_ref().map(|motion| motion.rest)
     }
 
     /// What the record shows a register to say at zero, with its σ, where it is none that its class has: in the
@@ -179,7 +158,7 @@ impl Draft {
                 Some((gravity.own_zero?, gravity.zero_sigma, why))
             }
             Sensor::Gyro => {
-                let rest = self.rest.filter(|_| registers.has_rests)?;
+                let rest = self.rest().filter(|_| registers.has_rests)?;
                 (rest.amax() > BEYOND * usual?).then_some((rest, 0.0, "what it says at rest"))
             }
         }

@@ -1,52 +1,125 @@
-//! What rows of counts show of the registers they were read from: zero, scale, signs and order of axes.
+//! What rows show of the registers that they were read from: zero, range, and what they must not be taken for.
 
 use nalgebra::Vector3;
 
-use super::axes::Axes;
-use super::columns::Columns;
-use super::gravity::Gravity;
-use super::rests::{Rests, is_whole};
+use super::columns::{Columns, varies};
+use super::motion::{Motion, WINDOW, is_whole, mean};
+use super::raw_run::{Gravity, RawRun, Turns};
+use super::units::offset;
 use crate::formats::Sheet;
 use crate::imu::{PerSensor, Sensor};
 
 /// Codes of a register of 16 bits.
 const CODES: f64 = 65_536.0;
-/// Rests of an accelerometer that is turned lie apart by this part at least of all it says …
-const APART: f64 = 0.3;
-/// … those of a gyro by less than this.
-const TOGETHER: f64 = 0.1;
-/// So many rests at least tell one from the other.
+/// So many rests at least tell an accelerometer that is turned from a gyro.
 const FEWEST: usize = 4;
+
+/// Rows of both triads above what registers are made to say at zero.
+pub(super) struct Rows {
+    pub triads: PerSensor<Vec<Vector3<f64>>>,
+    /// Those that come after a gap.
+    pub breaks: Vec<usize>,
+    /// s
+    pub period: f64,
+    /// Whether they are whole numbers.
+    pub whole: PerSensor<bool>,
+    /// Whether signed numbers of 16 bits were written as unsigned ones.
+    wrapped: PerSensor<bool>,
+    /// What registers are made to say at zero.
+    pub offset: PerSensor<f64>,
+}
+
+impl Rows {
+    pub fn new(mut triads: PerSensor<Vec<Vector3<f64>>>, breaks: Vec<usize>, period: f64) -> Self {
+        let wrapped = PerSensor::from_fn(|sensor| unwrap(triads.get_mut(sensor)));
+        let whole = PerSensor::from_fn(|sensor| is_whole(triads.get(sensor)));
+        let offset = PerSensor::from_fn(|sensor| {
+            let samples = triads.get_mut(sensor);
+            let zero = offset(samples).unwrap_or(0.0);
+            samples
+                .iter_mut()
+                .for_each(|sample| sample.add_scalar_mut(-zero));
+            zero
+        });
+        Self {
+            triads,
+            breaks,
+            period,
+            whole,
+            wrapped,
+            offset,
+        }
+    }
+
+    pub fn motion(&self) -> Motion {
+        Motion::find(&self.triads, &self.breaks, self.period)
+    }
+
+    /// The axis along which specific force points backwards, and hardly any other way, in the first rows.
+    pub fn points_down(&self) -> Option<usize> {
+        let accel = &self.triads.accel;
+        let rows = ((WINDOW / self.period).round() as usize).clamp(1, accel.len().max(1));
+        let force = mean(accel.get(..rows)?);
+        (0..3).find(|&axis| force[axis] < -0.9 * force.norm())
+    }
+
+    /// Why columns of counts cannot be taken as they are.
+    pub fn unfit(&self, columns: &Columns, sheet: &Sheet, found: &Registers) -> Vec<String> {
+        let wrapped = Sensor::ALL
+            .into_iter()
+            .filter(|&sensor| *self.wrapped.get(sensor));
+        let mut why: Vec<String> = wrapped
+            .map(|sensor| {
+                format!(
+                    "signed numbers of 16 bits are written as unsigned ones in those of {}: take 65536 from what is \
+                     32768 or more, and draft again",
+                    sensor.name()
+                )
+            })
+            .collect();
+        why.extend(constant(columns, sheet).map(|column| {
+            let name = &columns.names[column];
+            format!("{name:?} says the same in all rows, so that no axis is read there")
+        }));
+        why.extend(found.swapped.then(|| {
+            "gravity is in those of gyro, and those of accel are the same at every rest: their names are swapped"
+                .to_owned()
+        }));
+        why
+    }
+}
 
 /// What counts show.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Registers {
     pub has_rests: bool,
     pub gravity: Option<Gravity>,
-    pub axes: Option<Axes>,
+    pub turns: Option<Turns>,
     /// Whether what is called gyro is at rest where gravity is, and the other way round.
     pub swapped: bool,
 }
 
 impl Registers {
-    /// Of samples above what registers are made to say at zero.
-    pub fn find(samples: &PerSensor<Vec<Vector3<f64>>>, period: f64) -> Self {
-        let Some(rests) = Rests::find(samples, period) else {
-            return Self::default();
+    /// Of rows with what they show of their motion.
+    pub fn find(rows: &Rows, motion: &Motion) -> Self {
+        let found = |mut raw: RawRun| {
+            let (rests, exchanged) = (raw.rests(), raw.exchanged().rests());
+            let swapped = exchanged >= FEWEST && exchanged > 2 * rests;
+            let gravity = raw.gravity().filter(|_| !swapped);
+            Self {
+                has_rests: rests > 0,
+                turns: gravity.as_ref().and_then(|_| raw.turns()),
+                gravity,
+                swapped,
+            }
         };
-        let swapped = rests.rows.len() >= FEWEST
-            && rests.apart(Sensor::Gyro) > APART
-            && rests.apart(Sensor::Accel) < TOGETHER;
-        let gravity = Gravity::find(&rests.means.accel).filter(|_| !swapped);
-        let axes = gravity
-            .as_ref()
-            .and_then(|gravity| Axes::find(samples, &rests, gravity, period));
-        Self {
-            has_rests: true,
-            gravity,
-            axes,
-            swapped,
+        let whole = found(RawRun::new(rows, &rows.breaks, motion));
+        // Where gyros carry gravity from rest to rest no sections were laid end to end.
+        if whole.swapped || whole.turns.is_some() || motion.cuts.is_empty() {
+            return whole;
         }
+        let breaks = [&rows.breaks[..], &motion.cuts].concat();
+        found(RawRun::new(rows, &breaks, motion).of_sections())
     }
 
     /// Takes the zero from the samples where it is the register's own, and puts the gyros' columns into the
@@ -61,99 +134,48 @@ impl Registers {
         if let Some(zero) = zero.filter(|_| is_count.accel) {
             samples.accel.iter_mut().for_each(|sample| *sample -= zero);
         }
-        if let Some(axes) = self.axes.as_ref().filter(|_| is_count.gyro) {
+        if let Some(turns) = self.turns.as_ref().filter(|_| is_count.gyro) {
             for sample in &mut samples.gyro {
-                *sample = Vector3::from(axes.columns.map(|k| sample[k]));
+                *sample = Vector3::from(turns.columns.map(|k| sample[k]));
             }
             if let Some(triad) = &mut columns.triads.gyro {
-                *triad = axes.columns.map(|k| triad[k]);
+                *triad = turns.columns.map(|k| triad[k]);
             }
         }
     }
 }
 
-/// Whether signed numbers of 16 bits were written as unsigned ones: small negative ones are then just below
-/// 65536, and the record is smoother with them below zero.
-fn is_wrapped(samples: &[Vector3<f64>]) -> bool {
+/// Whether signed numbers of 16 bits were written as unsigned ones, which are taken for what they were: small negative
+/// ones are then just below 65536, and the record is smoother with them below zero.
+fn unwrap(samples: &mut [Vector3<f64>]) -> bool {
     let mut values = samples.iter().flat_map(|sample| sample.iter());
     if !is_whole(samples) || !values.all(|value| (0.0..CODES).contains(value)) {
         return false;
     }
-    let changes = |samples: &mut dyn Iterator<Item = Vector3<f64>>| {
-        let mut before = None;
-        let mut changes = 0.0;
-        for sample in samples {
-            changes += before.map_or(0.0, |before: Vector3<f64>| (sample - before).abs().sum());
-            before = Some(sample);
-        }
-        changes
+    let changes = |of: fn(&Vector3<f64>) -> Vector3<f64>| -> f64 {
+        let pairs = samples.windows(2);
+        pairs
+            .map(|pair| (of(&pair[1]) - of(&pair[0])).abs().sum())
+            .sum()
     };
-    let plain = changes(&mut samples.iter().copied());
-    let signed = changes(&mut samples.iter().map(signed));
-    2.0 * signed < plain
-}
-
-/// Takes unsigned numbers for the signed ones that they were; of which triads.
-pub(super) fn unwrap(samples: &mut PerSensor<Vec<Vector3<f64>>>) -> PerSensor<bool> {
-    PerSensor::from_fn(|sensor| {
-        let samples = samples.get_mut(sensor);
-        let wrapped = is_wrapped(samples);
-        if wrapped {
-            samples
-                .iter_mut()
-                .for_each(|sample| *sample = signed(sample));
-        }
-        wrapped
-    })
-}
-
-/// The signed number that an unsigned one of 16 bits was.
-fn signed(sample: &Vector3<f64>) -> Vector3<f64> {
-    sample.map(|value| value - if value >= 0.5 * CODES { CODES } else { 0.0 })
+    let signed = |sample: &Vector3<f64>| {
+        sample.map(|value| value - if value >= 0.5 * CODES { CODES } else { 0.0 })
+    };
+    let wrapped = 2.0 * changes(signed) < changes(|sample| *sample);
+    if wrapped {
+        samples
+            .iter_mut()
+            .for_each(|sample| *sample = signed(sample));
+    }
+    wrapped
 }
 
 /// A column of a triad that says the same in all rows, though another of its triad does not.
 fn constant(columns: &Columns, sheet: &Sheet) -> Option<usize> {
-    let says_the_same = |k: &usize| {
-        let values = sheet.columns[*k].iter().filter(|value| value.is_finite());
-        let mut steps = values.clone().zip(values.skip(1));
-        steps.all(|(one, next)| one == next)
-    };
+    let says_the_same = |k: &usize| !varies(&sheet.columns[*k]);
     Sensor::ALL.iter().find_map(|&sensor| {
         let triad = (*columns.triads.get(sensor))?;
-        let constant = triad.iter().copied().find(says_the_same)?;
+        let constant = triad.into_iter().find(says_the_same)?;
         (!triad.iter().all(says_the_same)).then_some(constant)
     })
-}
-
-/// Why columns of counts cannot be taken as they are.
-pub(super) fn unfit(
-    columns: &Columns,
-    sheet: &Sheet,
-    wrapped: &PerSensor<bool>,
-    registers: &Registers,
-) -> Vec<String> {
-    let mut why = Vec::new();
-    for sensor in Sensor::ALL {
-        if *wrapped.get(sensor) {
-            why.push(format!(
-                "signed numbers of 16 bits are written as unsigned ones in those of {}: take 65536 from what is 32768 \
-                 or more, and draft again",
-                sensor.name()
-            ));
-        }
-    }
-    if let Some(column) = constant(columns, sheet) {
-        why.push(format!(
-            "{:?} says the same in all rows, so that no axis is read there",
-            columns.names[column]
-        ));
-    }
-    if registers.swapped {
-        why.push(
-            "gravity is in those of gyro, and those of accel are the same at every rest: their names are swapped"
-                .to_owned(),
-        );
-    }
-    why
 }

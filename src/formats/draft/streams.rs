@@ -1,35 +1,40 @@
-//! Which streams of a log hold the instrument.
+//! Which streams of a log, or which files of rows, hold the instrument.
 
-use std::fmt::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use super::columns::{Columns, by_stem};
-use super::name::{self, Name};
-use super::text::{line, quoted, word_or_number};
-use super::{FEWEST_ROWS, time};
+use super::FEWEST_ROWS;
+use super::columns::{self, Columns, by_stem};
+use super::name::Name;
+use super::text::{Page, quoted, word_or_number};
+use super::time;
 use crate::formats::clock::{Breaks, Clock, TimeUnit};
 use crate::formats::csv_file::CsvFile;
+use crate::formats::error::list;
 use crate::formats::joined::{Joined, Part};
 use crate::formats::rows::LogRows;
 use crate::formats::source::Source;
 use crate::formats::streams::{self, Column, Found, Stream};
-use crate::formats::{FileError, Sheet};
+use crate::formats::{FileError, Place, Sheet};
 use crate::imu::{Output, PerSensor, Sensor};
 
-/// A log's streams, and those that hold gyros and accelerometers.
+/// The streams that hold gyros and accelerometers.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Streams {
-    pub found: Vec<(Found, Places)>,
+    /// What the log holds, a line a stream.
+    listed: Vec<String>,
     /// The stream of the gyros, and of the accelerometers if that is another.
     pub gyro: String,
     pub accel: Option<String>,
     /// The time of both where there are two, and its unit.
-    pub time: PerSensor<(String, String)>,
+    pub time: Option<PerSensor<(String, String)>>,
+    /// The columns that are looked at, as the log names them.
+    pub names: Vec<String>,
+    remarks: Vec<String>,
     /// The body axes that programs of this kind have.
     pub axes: Option<&'static str>,
     /// Where and why the file is damaged.
-    pub damage: Option<String>,
-    /// The file of the accelerometers, where both triads were written as rows of text.
+    damage: Option<String>,
+    /// The file of the accelerometers, where both triads are rows of text.
     pub written: Option<Written>,
 }
 
@@ -47,396 +52,380 @@ fn one_line(text: &str) -> String {
     text.replace(char::is_control, " ")
 }
 
-/// The place of each triad and of time in a stream.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct Places {
-    pub triads: PerSensor<Option<[usize; 3]>>,
-    pub time: Option<usize>,
+/// A stream of a log, or a file of rows.
+struct Member {
+    file: PathBuf,
+    is_stream: bool,
+    found: Found,
+    triads: PerSensor<Option<[usize; 3]>>,
+    /// The column of time, and the word for its unit if that is known.
+    time: Option<(String, String)>,
 }
 
 impl Streams {
     /// Looks at a log; none if it is a text whose rows are one stream.
     pub fn of_file(file: &Path, wanted: Option<&str>) -> Result<Option<(Self, Sheet)>, FileError> {
-        let (found, damage) = match streams::open(file)? {
+        let (members, damage) = match streams::open(file)? {
             Some(log) => {
                 let (found, damage) = streams::survey(file, log);
-                let with_places = |found: Found| {
-                    let places = Places::of(&found);
-                    (found, places)
-                };
-                (found.into_iter().map(with_places).collect(), damage)
+                let members = found
+                    .into_iter()
+                    .map(|found| Member::of_stream(file, found));
+                (members.collect(), damage)
             }
             None => (tagged(file)?, None),
         };
-        match damage {
-            Some(damage) if found.is_empty() => return Err(damage),
-            None if found.is_empty() => return Ok(None),
-            _ => {}
+        if members.is_empty() {
+            return damage.map_or(Ok(None), Err);
         }
-        let Some((gyro, accel)) = chosen(&found, wanted) else {
-            return Err(no_samples(file));
+        let Some((gyro, accel)) = chosen(&members, wanted) else {
+            let advice = "Record the file again.";
+            let expected = "streams of samples";
+            return Err(FileError::new(
+                file,
+                Place::File,
+                "no samples",
+                expected,
+                advice,
+            ));
         };
         let salvage = damage.is_some();
-        let source = |k: usize| Source {
-            file: file.to_owned(),
-            stream: Some(&found[k].0.stream.name),
-            salvage,
+        let gyro = &members[gyro];
+        let (mut streams, sheet) = match accel.map(|accel| &members[accel]) {
+            Some(accel) => Self::of_pair(&PerSensor { gyro, accel }, salvage)?,
+            None => {
+                let mut sheet = Sheet::of(gyro.source(salvage).open()?, FEWEST_ROWS)?;
+                sheet.names = names(&gyro.found);
+                (Self::of(gyro, None), sheet)
+            }
         };
-        let numbers = PerSensor {
-            gyro,
-            accel: accel.unwrap_or(gyro),
-        };
-        let mut time = PerSensor::from_fn(|sensor| {
-            let k = *numbers.get(sensor);
-            let (found, places) = &found[k];
-            let column = &found.stream.columns[places.time.unwrap_or(0)];
-            (column.name.clone(), column.unit.to_owned())
-        });
-        let sheet = if accel.is_some() {
-            let sources = PerSensor::from_fn(|sensor| source(*numbers.get(sensor)));
-            find_units(&mut time, &sources)?;
-            joined(&PerSensor::from_fn(|sensor| {
-                let k = *numbers.get(sensor);
-                Member {
-                    source: sources.get(sensor),
-                    found: &found[k].0,
-                    triad: found[k].1.triads.get(sensor).unwrap_or_default(),
-                    time: time.get(sensor).clone(),
-                }
-            }))?
-        } else {
-            let mut sheet = Sheet::of(source(gyro).open()?, FEWEST_ROWS)?;
-            sheet.names = names(&found[gyro].0);
-            sheet
-        };
-        let name = |k: usize| found[k].0.stream.name.clone();
-        let streams = Self {
-            gyro: name(gyro),
-            accel: accel.map(name),
-            time,
-            axes: found[gyro].0.stream.axes,
-            damage: damage.map(|damage| damage.to_string()),
-            written: None,
-            found,
-        };
+        streams.listed = listed(&members);
+        streams.damage = damage.map(|damage| one_line(&damage.to_string()));
         Ok(Some((streams, sheet)))
     }
 
-    /// The columns of a stream as the log names them.
-    pub fn columns(&self, sensor: Sensor) -> Vec<String> {
-        let name = match sensor {
-            Sensor::Gyro => &self.gyro,
-            Sensor::Accel => self.accel.as_ref().unwrap_or(&self.gyro),
+    /// Looks at the files of both triads, as phones and `ulog2csv` write them, which may be one with rows of either; the
+    /// accelerometers' is called so in the draft if it is another.
+    pub fn of_two_files(
+        gyro: &Path,
+        accel: &Path,
+        accel_name: Option<&str>,
+    ) -> Result<(Self, Sheet), FileError> {
+        let gyro = Member::of_rows(gyro, Sensor::Gyro)?;
+        let accel = Member::of_rows(accel, Sensor::Accel)?;
+        let pair = PerSensor {
+            gyro: &gyro,
+            accel: &accel,
         };
-        let found = self
-            .found
-            .iter()
-            .find(|(found, _)| found.stream.name == *name);
-        let columns = found.iter().flat_map(|(found, _)| &found.stream.columns);
-        columns.map(|column| column.name.clone()).collect()
+        let (mut streams, sheet) = Self::of_pair(&pair, false)?;
+        streams.written = Some(Written {
+            accel: accel_name.map(str::to_owned),
+        });
+        Ok((streams, sheet))
+    }
+
+    /// Both triads of two members on one clock, as columns whose names say what they are.
+    fn of_pair(pair: &PerSensor<&Member>, salvage: bool) -> Result<(Self, Sheet), FileError> {
+        let sources = PerSensor::from_fn(|sensor| pair.get(sensor).source(salvage));
+        let triads = PerSensor::try_from_fn(|sensor| pair.get(sensor).triad(sensor))?;
+        let time = PerSensor::try_from_fn(|sensor| pair.get(sensor).time_by(sources.get(sensor)))?;
+        let part = |sensor: Sensor| {
+            let (name, unit) = time.get(sensor);
+            let word = TimeUnit::WORDS.iter().find(|(word, _)| word == unit);
+            let tick = unit.parse().map_or(1.0, f64::recip);
+            Part {
+                source: sources.get(sensor),
+                clock: Clock {
+                    column: Some(name),
+                    nanoseconds: None,
+                    unit: word.map_or(TimeUnit::PerSecond(tick), |&(_, unit)| unit),
+                    period: None,
+                    breaks: Breaks::None,
+                },
+                columns: *triads.get(sensor),
+                further: &[],
+            }
+        };
+        let joined = Joined::read(&PerSensor::from_fn(part), Output::Rate, 1.0)?;
+        let mut sheet = Sheet::of(LogRows::new(joined), FEWEST_ROWS)?;
+        let plain =
+            |sensor: Sensor| ["x", "y", "z"].map(|axis| format!("{}_{axis}", sensor.name()));
+        let columns = |time: &str, of: [[String; 3]; 2]| -> Vec<String> {
+            std::iter::once(time.to_owned())
+                .chain(of.into_iter().flatten())
+                .collect()
+        };
+        sheet.names = columns("time", Sensor::ALL.map(plain));
+        let own = [triads.gyro, triads.accel].map(|triad| triad.map(str::to_owned));
+        let mut streams = Self::of(pair.gyro, Some(pair.accel));
+        streams.names = columns(&time.gyro.0, own);
+        streams.time = Some(time);
+        Ok((streams, sheet))
+    }
+
+    fn of(gyro: &Member, accel: Option<&Member>) -> Self {
+        let columns = gyro.found.stream.columns.iter();
+        let taken = std::iter::once(gyro).chain(accel);
+        let remarks = taken.flat_map(|member| &member.found.stream.remarks);
+        Self {
+            listed: Vec::new(),
+            gyro: gyro.found.stream.name.clone(),
+            accel: accel.map(|accel| accel.found.stream.name.clone()),
+            time: None,
+            names: columns.map(|column| column.name.clone()).collect(),
+            remarks: remarks.map(|remark| one_line(remark)).collect(),
+            axes: gyro.found.stream.axes,
+            damage: None,
+            written: None,
+        }
     }
 
     /// What the log holds, and the keys that name what is taken of it.
-    pub fn write(&self, text: &mut String) {
-        // Writing to a string cannot fail.
+    pub fn write(&self, page: &mut Page) {
         if self.written.is_none() {
-            self.list(text);
-            let _ = writeln!(text, "stream = {}", quoted(&self.gyro));
+            self.listed.iter().for_each(|line| page.remark(line));
+            page.plain("stream", quoted(&self.gyro));
         }
-        if let Some(accel) = &self.accel {
-            let (time, unit) = &self.time.accel;
+        if let Some((accel, time)) = self.accel.as_ref().zip(self.time.as_ref()) {
+            let (time, unit) = &time.accel;
             let place = match &self.written {
                 None => format!("stream = {}, ", quoted(accel)),
                 Some(Written { accel: Some(file) }) => format!("file = {}, ", quoted(file)),
                 Some(Written { accel: None }) => String::new(),
             };
-            let mut keys = format!("{place}time = {}", quoted(time));
-            if !unit.is_empty() {
-                let _ = write!(keys, ", time_unit = {}", word_or_number(unit));
-            }
+            let (time, unit) = (quoted(time), word_or_number(unit));
+            let keys = format!("{{ {place}time = {time}, time_unit = {unit} }}");
             let why = "accelerometers have a clock of their own; --with time-offset finds how far they are apart";
-            line(text, "accel_from", &format!("{{ {keys} }}"), why);
+            page.line("accel_from", keys, why);
         }
-        for (found, _) in &self.found {
-            let is_taken =
-                found.stream.name == self.gyro || self.accel.as_ref() == Some(&found.stream.name);
-            for remark in found.stream.remarks.iter().filter(|_| is_taken) {
-                let _ = writeln!(text, "# {}", one_line(remark));
-            }
-        }
+        self.remarks.iter().for_each(|remark| page.remark(remark));
         if let Some(damage) = self.damage.as_ref().filter(|_| self.written.is_none()) {
-            let damage = one_line(damage);
-            let _ = writeln!(
-                text,
-                "# salvage = true  # TODO: take the # away to use what is whole. {damage}"
-            );
-        }
-    }
-
-    /// What the log holds, a comment a stream.
-    fn list(&self, text: &mut String) {
-        let mut others = Vec::new();
-        for (Found { stream, samples }, Places { triads, .. }) in &self.found {
-            if triads.gyro.is_none() && triads.accel.is_none() {
-                others.push(format!("{} ({samples})", one_line(&stream.name)));
-                continue;
-            }
-            let columns: Vec<&str> = stream.columns.iter().map(|column| &*column.name).collect();
-            let shown = &columns[..columns.len().min(MOST_SHOWN)];
-            let more = if columns.len() > MOST_SHOWN {
-                ", …"
-            } else {
-                ""
-            };
-            let (name, shown) = (one_line(&stream.name), one_line(&shown.join(", ")));
-            let _ = writeln!(text, "# {name}: {samples} samples of {shown}{more}");
-        }
-        if !others.is_empty() {
-            let _ = writeln!(text, "# and samples of other kinds: {}", others.join(", "));
-        }
-    }
-
-    /// The columns of both streams.
-    pub fn write_columns(&self, text: &mut String) {
-        let mut fields = vec![format!("time = {}", quoted(&self.time.gyro.0))];
-        for sensor in Sensor::ALL {
-            if let Some(triad) = self.triad(sensor) {
-                let names = triad.map(|name| quoted(&name));
-                fields.push(format!("{} = [{}]", sensor.name(), names.join(", ")));
-            }
-        }
-        let _ = writeln!(text, "columns = {{ {} }}", fields.join(", "));
-    }
-
-    /// The three columns of a triad in its stream.
-    pub fn triad(&self, sensor: Sensor) -> Option<[String; 3]> {
-        let name = match sensor {
-            Sensor::Gyro => &self.gyro,
-            Sensor::Accel => self.accel.as_ref()?,
-        };
-        let (found, places) = self
-            .found
-            .iter()
-            .find(|(found, _)| found.stream.name == *name)?;
-        let triad = (*places.triads.get(sensor))?;
-        Some(triad.map(|k| found.stream.columns[k].name.clone()))
-    }
-}
-
-/// The stream of the gyros, and of the accelerometers if that is another; where no stream that is meant has them,
-/// the longest.
-fn chosen(found: &[(Found, Places)], wanted: Option<&str>) -> Option<(usize, Option<usize>)> {
-    let samples = |k: Option<usize>| k.map_or(0, |k| found[k].0.samples);
-    let is_meant = |k: &usize| match wanted {
-        Some(name) => found[*k].0.stream.name == name,
-        None => found[*k].0.stream.is_inertial && samples(Some(*k)) >= FEWEST_ROWS as u64,
-    };
-    let with = |sensor: Sensor, other: bool| {
-        let of = (0..found.len()).filter(is_meant).filter(|&k| {
-            // Streams are put together by their times.
-            let Places { triads, time } = &found[k].1;
-            if !other && time.is_none() {
-                return false;
-            }
-            let has_both = triads.gyro.is_some() && triads.accel.is_some();
-            triads.get(sensor).is_some() && (!other || has_both)
-        });
-        // Of equal ones the first.
-        of.rev().max_by_key(|&k| samples(Some(k)))
-    };
-    let (both, gyro, accel) = (
-        with(Sensor::Gyro, true),
-        with(Sensor::Gyro, false),
-        with(Sensor::Accel, false),
-    );
-    let apart = samples(gyro).min(samples(accel));
-    match (both, gyro, accel) {
-        (Some(both), ..) if samples(Some(both)) >= apart => Some((both, None)),
-        (_, Some(gyro), Some(accel)) => Some((gyro, Some(accel))),
-        _ => {
-            let most = (0..found.len())
-                .filter(is_meant)
-                .max_by_key(|&k| samples(Some(k)));
-            let any = most.or((0..found.len()).max_by_key(|&k| samples(Some(k))))?;
-            Some((any, None))
+            let why = format_args!("take the # away to use what is whole. {damage}");
+            page.open("salvage = true", why);
         }
     }
 }
 
-fn no_samples(file: &Path) -> FileError {
-    FileError::new(
-        file,
-        crate::formats::Place::File,
-        "no samples",
-        "streams of samples",
-        "Record the file again.",
-    )
-}
-
-/// Finds the units of times by their steps where the log does not say them.
-fn find_units(
-    time: &mut PerSensor<(String, String)>,
-    sources: &PerSensor<Source>,
-) -> Result<(), FileError> {
-    for sensor in Sensor::ALL {
-        let (name, unit) = time.get_mut(sensor);
-        if unit.is_empty() {
-            *unit = unit_of(sources.get(sensor), name)?;
-        }
-    }
-    Ok(())
-}
-
-/// The word for the unit of a column of time, by its steps.
-fn unit_of(source: &Source, name: &str) -> Result<String, FileError> {
-    let sheet = Sheet::of(source.open()?, FEWEST_ROWS)?;
-    let mut columns = Columns::find(&sheet);
-    columns.time = sheet.names.iter().position(|known| known == name);
-    Ok(time::Clock::find(&sheet, &mut columns).unit)
-}
-
-/// One of two streams that are one record.
-pub(super) struct Member<'a> {
-    pub source: &'a Source<'a>,
-    pub found: &'a Found,
-    pub triad: [usize; 3],
-    /// The column of its time and the word for its unit.
-    pub time: (String, String),
-}
-
-/// Both triads on one clock, as columns whose names say what they are.
-pub(super) fn joined(members: &PerSensor<Member>) -> Result<Sheet, FileError> {
-    let part = |sensor: Sensor| {
-        let Member {
-            source,
-            found,
-            triad,
-            time: (name, unit),
-        } = members.get(sensor);
-        let word = TimeUnit::WORDS.iter().find(|(word, _)| word == unit);
-        let ticks = || {
-            unit.parse()
-                .ok()
-                .map(|tick: f64| TimeUnit::PerSecond(tick.recip()))
-        };
-        Part {
-            source,
-            clock: Clock {
-                column: Some(name),
-                nanoseconds: None,
-                unit: word
-                    .map(|&(_, unit)| unit)
-                    .or_else(ticks)
-                    .unwrap_or(TimeUnit::PerSecond(1.0)),
-                period: None,
-                breaks: Breaks::None,
-            },
-            columns: triad.map(|column| &*found.stream.columns[column].name),
-            further: &[],
-        }
-    };
-    let joined = Joined::read(&PerSensor::from_fn(part), Output::Rate, 1.0)?;
-    let mut sheet = Sheet::of(LogRows::new(joined), FEWEST_ROWS)?;
-    let of = |sensor: Sensor| ["x", "y", "z"].map(|axis| format!("{}_{axis}", sensor.name()));
-    let triads = Sensor::ALL.map(of);
-    sheet.names = std::iter::once("time".to_owned())
-        .chain(triads.as_flattened().iter().cloned())
-        .collect();
-    Ok(sheet)
-}
-
-/// The names of a stream's columns, with the stream's before them where they do not say what they are.
-fn names(found: &Found) -> Vec<String> {
-    let bare = || {
-        found
-            .stream
-            .columns
-            .iter()
-            .map(|column| column.name.clone())
-    };
-    if bare().any(|name| Name::of(&name).sensor().is_some()) {
-        return bare().collect();
-    }
-    let stream = &found.stream.name;
-    let stream = stream.split_once('[').map_or(&**stream, |(name, _)| name);
-    bare().map(|name| format!("{stream}.{name}")).collect()
-}
-
-/// The streams of a text whose rows tags tell apart; none of another.
-fn tagged(file: &Path) -> Result<Vec<(Found, Places)>, FileError> {
-    let tags = CsvFile::tags(file)?;
-    let of_tag = |tag: String| {
-        let source = Source {
-            file: file.to_owned(),
-            stream: Some(&tag),
-            salvage: false,
-        };
-        let sheet = Sheet::of(source.open()?, 1)?;
-        let found = of_rows(tag, &sheet);
-        let sheet = Sheet {
-            names: names(&found),
-            ..sheet
-        };
-        let Columns {
-            mut triads,
-            time,
-            by_size,
-            ..
-        } = Columns::find(&sheet);
-        // The tag may say what names do not.
-        if by_size
-            && let Some(sensor) = Name::of(&found.stream.name).sensor()
-            && let (Some(triad), None) | (None, Some(triad)) = (triads.gyro, triads.accel)
-        {
-            triads = PerSensor::default();
-            *triads.get_mut(sensor) = Some(triad);
-        }
-        Ok((found, Places { triads, time }))
-    };
-    tags.into_iter().map(of_tag).collect()
-}
-
-/// Rows of a text as a stream.
-pub(super) fn of_rows(name: String, sheet: &Sheet) -> Found {
-    let column = |(name, unit): (&String, &String)| {
-        let unit = Name::of(name).unit.or_else(|| name::unit(unit));
-        Column {
-            name: name.clone(),
-            unit: unit
-                .filter(|unit| unit.times == 1.0)
-                .map_or("", |unit| unit.word),
-        }
-    };
-    Found {
-        stream: Stream {
-            name,
-            columns: sheet.names.iter().zip(&sheet.units).map(column).collect(),
-            remarks: Vec::new(),
-            is_inertial: true,
-            axes: None,
-        },
-        samples: sheet.columns.first().map_or(0, Vec::len) as u64,
-    }
-}
-
-impl Places {
-    pub fn of(found: &Found) -> Self {
-        let all: Vec<Name> = names(found).iter().map(|name| Name::of(name)).collect();
+impl Member {
+    fn of_stream(file: &Path, found: Found) -> Self {
+        let all: Vec<Name> = names(&found).iter().map(|name| Name::of(name)).collect();
         let triads = PerSensor::from_fn(|sensor| {
             let of = |k: &usize| all[*k].sensor() == Some(sensor);
             let candidates: Vec<usize> = (0..all.len()).filter(of).collect();
             by_stem(&all, &candidates).into_iter().next()
         });
         let best = (0..all.len()).rev().max_by_key(|&k| all[k].is_time());
-        let named = best.filter(|&k| all[k].is_time() > 1);
+        let columns = &found.stream.columns;
         // `t_gyro`, `imu.t`
-        let has_word = |column: &Column| {
+        let has_word = |column: &&Column| {
             let mut words = column.name.split(|c: char| !c.is_alphanumeric());
             words.any(|word| ["t", "ts"].contains(&word))
         };
+        let named = best.filter(|&k| all[k].is_time() > 1).map(|k| &columns[k]);
+        let time = named.or_else(|| columns.iter().find(has_word));
         Self {
+            file: file.to_owned(),
+            is_stream: true,
             triads,
-            time: named.or_else(|| found.stream.columns.iter().position(has_word)),
+            time: time.map(|column| (column.name.clone(), column.unit.to_owned())),
+            found,
         }
+    }
+
+    /// The rows of a file in which a sensor has a value.
+    fn of_rows(file: &Path, sensor: Sensor) -> Result<Self, FileError> {
+        let mut sheet = Sheet::read(file, FEWEST_ROWS)?;
+        let of_sensor = columns::named(&sheet, sensor);
+        if !of_sensor.is_empty() {
+            sheet.retain(|columns, row| of_sensor.iter().any(|&k| columns[k][row].is_finite()));
+        }
+        let mut columns = Columns::find(&sheet);
+        let unit = time::Clock::find(&sheet, &mut columns).unit;
+        let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+        let mut found = rows_as_stream(&stem, &sheet);
+        // As PX4's ulog2csv calls its files.
+        let topics = ["sensor_gyro_", "sensor_accel_"];
+        let is_of_px4 = topics.iter().any(|topic| stem.contains(topic));
+        found.stream.axes = is_of_px4.then_some("frd");
+        Ok(Self {
+            is_stream: false,
+            time: columns.time.map(|k| (sheet.names[k].clone(), unit)),
+            ..Self::of_stream(file, found)
+        })
+    }
+
+    fn source(&self, salvage: bool) -> Source<'_> {
+        Source {
+            stream: self.is_stream.then_some(&*self.found.stream.name),
+            salvage,
+            ..Source::of_file(&self.file)
+        }
+    }
+
+    fn is_of_both(&self) -> bool {
+        self.triads.gyro.is_some() && self.triads.accel.is_some()
+    }
+
+    fn missing(&self, expected: &str) -> FileError {
+        let columns = self.found.stream.columns.iter();
+        let columns = list(columns.map(|column| &*column.name));
+        let found = format_args!("the columns {columns}");
+        let advice = "Rename the columns or the file, or complete the fields by hand.";
+        FileError::new(&self.file, Place::File, found, expected, advice)
+    }
+
+    /// The names of a triad's columns.
+    fn triad(&self, sensor: Sensor) -> Result<[&str; 3], FileError> {
+        let expected = match sensor {
+            Sensor::Gyro => "three columns of the gyros",
+            Sensor::Accel => "three columns of the accelerometers",
+        };
+        let triad = self
+            .triads
+            .get(sensor)
+            .ok_or_else(|| self.missing(expected))?;
+        Ok(triad.map(|k| &*self.found.stream.columns[k].name))
+    }
+
+    /// The column of time and its unit, by its steps where the log does not say it.
+    fn time_by(&self, source: &Source) -> Result<(String, String), FileError> {
+        let missing = || self.missing("a column of time");
+        let (name, mut unit) = self.time.clone().ok_or_else(missing)?;
+        if unit.is_empty() {
+            let sheet = Sheet::of(source.open()?, FEWEST_ROWS)?;
+            let mut columns = Columns::find(&sheet);
+            columns.time = sheet.names.iter().position(|known| *known == name);
+            unit = time::Clock::find(&sheet, &mut columns).unit;
+        }
+        Ok((name, unit))
+    }
+}
+
+/// What a log holds, a line a stream.
+fn listed(members: &[Member]) -> Vec<String> {
+    let mut others = Vec::new();
+    let mut lines = Vec::new();
+    for Member { found, triads, .. } in members {
+        let (name, samples) = (one_line(&found.stream.name), found.samples);
+        if triads.gyro.is_none() && triads.accel.is_none() {
+            others.push(format!("{name} ({samples})"));
+            continue;
+        }
+        let columns = &found.stream.columns;
+        let more = if columns.len() > MOST_SHOWN {
+            ", …"
+        } else {
+            ""
+        };
+        let shown: Vec<&str> = columns
+            .iter()
+            .take(MOST_SHOWN)
+            .map(|of| &*of.name)
+            .collect();
+        let shown = one_line(&shown.join(", "));
+        lines.push(format!("{name}: {samples} samples of {shown}{more}"));
+    }
+    if !others.is_empty() {
+        lines.push(format!("and samples of other kinds: {}", others.join(", ")));
+    }
+    lines
+}
+
+/// The stream of the gyros, and of the accelerometers if that is another; where no stream that is meant has them,
+/// the longest.
+fn chosen(members: &[Member], wanted: Option<&str>) -> Option<(usize, Option<usize>)> {
+    let samples = |k: Option<usize>| k.map_or(0, |k| members[k].found.samples);
+    let is_meant = |k: usize| match wanted {
+        Some(name) => members[k].found.stream.name == name,
+        None => members[k].found.stream.is_inertial && samples(Some(k)) >= FEWEST_ROWS as u64,
+    };
+    // Of equal ones the first.
+    let longest = |is: &dyn Fn(usize) -> bool| {
+        let all = (0..members.len()).rev().filter(|&k| is(k));
+        all.max_by_key(|&k| samples(Some(k)))
+    };
+    // Streams are put together by their times.
+    let with = |sensor: Sensor| {
+        longest(&|k| {
+            is_meant(k) && members[k].time.is_some() && members[k].triads.get(sensor).is_some()
+        })
+    };
+    let both = longest(&|k| is_meant(k) && members[k].is_of_both());
+    let (gyro, accel) = (with(Sensor::Gyro), with(Sensor::Accel));
+    match (both, gyro, accel) {
+        (Some(_), ..) if samples(both) >= samples(gyro).min(samples(accel)) => {
+            both.map(|both| (both, None))
+        }
+        (_, Some(gyro), Some(accel)) => Some((gyro, Some(accel))),
+        _ => {
+            let any = longest(&is_meant).or_else(|| longest(&|_| true))?;
+            Some((any, None))
+        }
+    }
+}
+
+/// The names of a stream's columns, with the stream's before them where they do not say what they are.
+fn names(found: &Found) -> Vec<String> {
+    let bare = found
+        .stream
+        .columns
+        .iter()
+        .map(|column| column.name.clone());
+    let bare: Vec<String> = bare.collect();
+    if bare.iter().any(|name| Name::of(name).sensor().is_some()) {
+        return bare;
+    }
+    let stream = &found.stream.name;
+    let stream = stream.split_once('[').map_or(&**stream, |(name, _)| name);
+    bare.iter().map(|name| format!("{stream}.{name}")).collect()
+}
+
+/// The streams of a text whose rows tags tell apart; none of another.
+fn tagged(file: &Path) -> Result<Vec<Member>, FileError> {
+    let of_tag = |tag: String| {
+        let source = Source {
+            stream: Some(&tag),
+            ..Source::of_file(file)
+        };
+        let mut sheet = Sheet::of(source.open()?, 1)?;
+        let mut member = Member::of_stream(file, rows_as_stream(&tag, &sheet));
+        sheet.names = names(&member.found);
+        let columns = Columns::find(&sheet);
+        let time = columns.time.map(|k| &member.found.stream.columns[k]);
+        member.time = time.map(|column| (column.name.clone(), column.unit.to_owned()));
+        member.triads = columns.triads;
+        // The tag may say what names do not.
+        if columns.by_size
+            && !member.is_of_both()
+            && let Some(sensor) = Name::of(&tag).sensor()
+        {
+            let triad = columns.triads.gyro.or(columns.triads.accel);
+            member.triads = PerSensor::default();
+            *member.triads.get_mut(sensor) = triad;
+        }
+        Ok(member)
+    };
+    CsvFile::tags(file)?.into_iter().map(of_tag).collect()
+}
+
+/// Rows of a text as a stream.
+fn rows_as_stream(name: &str, sheet: &Sheet) -> Found {
+    let column = |(name, unit): (&String, &String)| {
+        let unit = Name::of_column(name, unit)
+            .unit
+            .filter(|unit| unit.times == 1.0);
+        Column {
+            name: name.clone(),
+            unit: unit.map_or("", |unit| unit.word),
+        }
+    };
+    Found {
+        stream: Stream {
+            name: name.to_owned(),
+            columns: sheet.names.iter().zip(&sheet.units).map(column).collect(),
+            is_inertial: true,
+            ..Stream::default()
+        },
+        samples: sheet.columns.first().map_or(0, Vec::len) as u64,
     }
 }

@@ -1,140 +1,187 @@
-//! The draft as TOML.
+//! The draft as TOML: its lines, each with the reason, and what they leave open.
 
-use std::fmt::Write;
+use std::fmt::Display;
 
-use super::Draft;
 use super::name::axes_of_program;
 use super::units::short;
+use super::{Draft, NO_COLUMNS};
 use crate::imu::{NoiseKeys, Output, Sensor};
+
+/// Lines of a `run.toml`.
+#[derive(Debug, Default)]
+pub(super) struct Page {
+    pub text: String,
+    /// The fields that a person must complete, each with the reason.
+    pub open: Vec<(String, String)>,
+}
+
+impl Page {
+    /// The header of a table below a remark.
+    pub fn table(&mut self, name: &str, remark: &str) {
+        self.text.push('\n');
+        if !remark.is_empty() {
+            self.remark(remark);
+        }
+        self.text += &format!("[{name}]\n");
+    }
+
+    pub fn line(&mut self, key: &str, value: impl Display, why: impl Display) {
+        self.text += &format!("{key} = {value}  # {why}\n");
+    }
+
+    /// A field that needs no reason.
+    pub fn plain(&mut self, key: &str, value: impl Display) {
+        self.text += &format!("{key} = {value}\n");
+    }
+
+    /// A field that may be left out.
+    pub fn optional(&mut self, key: &str, why: &str) {
+        self.remark(format_args!("{key} =  # {why}"));
+    }
+
+    /// A field, as far as it is known, that must be completed.
+    pub fn open(&mut self, field: &str, why: impl Display) {
+        let gap = if field.is_empty() { "" } else { "  # " };
+        self.remark(format_args!("{field}{gap}TODO: {why}"));
+        let key = field.split('=').next().unwrap_or_default().trim();
+        self.open.push((key.to_owned(), why.to_string()));
+    }
+
+    pub fn remark(&mut self, remark: impl Display) {
+        self.text += &format!("# {remark}\n");
+    }
+}
 
 impl Draft {
     /// The draft as a `run.toml` in which the log is named so. Lines with `TODO` must be completed before it
     /// can be read; the others are guesses, each with its reason.
     pub fn to_toml(&self, file: &str) -> String {
+        self.page(file).text
+    }
+
+    pub(super) fn page(&self, file: &str) -> Page {
+        let mut page = Page::default();
         let of_it = match self.only {
             Some(rows) => format!("the first {rows} rows of the log"),
             None => "the log alone".to_owned(),
         };
-        let mut text = format!(
-            "# Made from {of_it}. Check what is guessed and complete what is open; `turncal check` then says what the run \
-             holds.\nformat = \"turncal-run/1\"\n"
-        );
-        self.stated.site(&mut text);
-        // Writing to a string cannot fail.
-        let _ = write!(text, "\n[imu]\nfile = {}\n", quoted(file));
+        page.remark(format_args!(
+            "Made from {of_it}. Check what is guessed and complete what is open; `turncal check` then says what the run \
+             holds."
+        ));
+        page.plain("format", quoted("turncal-run/1"));
+        self.site(&mut page);
+        page.table("imu", "");
+        page.plain("file", quoted(file));
         if let Some(streams) = &self.streams {
-            streams.write(&mut text);
+            streams.write(&mut page);
         }
-        self.rows(&mut text);
-        self.noise_table(&mut text);
-        for sensor in self.present() {
-            self.prior(&mut text, sensor);
-        }
-        self.table(&mut text);
-        text
-    }
-
-    fn rows(&self, text: &mut String) {
-        self.output_and_units(text);
-        self.time_unit(text);
-        self.sample_period(text);
-        line(
-            text,
-            "time_stamp",
-            "\"end\"",
-            "guessed: a row covers the time up to its stamp; else \"start\" or \"middle\"",
-        );
-        if self.cuts > 0 {
-            let why = format!(
-                "gravity changes its direction at once in {}: sections laid end to end; if not, true",
-                places(self.cuts)
-            );
-            line(text, "continuous", "false", &why);
-        } else {
-            line(text, "continuous", "true", &self.gaps());
-        }
-        self.body_axes(text);
+        self.output_and_units(&mut page);
+        self.clock(&mut page);
+        self.body_axes(&mut page);
         if let Some((column, number)) = self.instance {
-            let of = format!(
-                "{{ column = {}, number = {number} }}",
-                quoted(&self.columns.names[column])
-            );
-            line(
-                text,
-                "instance",
-                &of,
-                "rows of several instruments: those of the first",
-            );
+            let of = format!("{{ column = {}, number = {number} }}", self.name(column));
+            let why = "rows of several instruments: those of the first";
+            page.line("instance", of, why);
         }
-        self.columns(text);
+        self.columns(&mut page);
+        self.noise_table(&mut page);
+        for sensor in self.present() {
+            self.prior(&mut page, sensor);
+        }
+        self.table(&mut page);
+        page
     }
 
-    fn output_and_units(&self, text: &mut String) {
+    fn site(&self, page: &mut Page) {
+        page.table(
+            "site",
+            "the place of the instrument; what is not stated is wide",
+        );
+        let stated = &self.stated;
+        for (key, value, why) in [
+            (
+                "latitude_deg",
+                stated.latitude_deg,
+                "north positive; to 0.1° it is good enough",
+            ),
+            ("height_m", stated.height_m, "above the ellipsoid"),
+            (
+                "gravity_m_s2",
+                stated.gravity_m_s2,
+                "if it was measured; else normal gravity is taken",
+            ),
+        ] {
+            match value {
+                Some(value) => page.line(key, format_args!("{value:?}"), "as stated"),
+                None => page.optional(key, why),
+            }
+        }
+    }
+
+    fn output_and_units(&self, page: &mut Page) {
         let found = &self.quantities;
         let output = match found.output {
             Output::Pulse => "pulse",
             Output::Increment => "increment",
             Output::Rate => "rate",
         };
-        line(text, "output", &quoted(output), &found.output_why);
+        page.line("output", quoted(output), &found.output_why);
         for sensor in self.present() {
             let (key, unit) = (format!("{}_unit", sensor.name()), found.units.get(sensor));
             match unit.word {
-                Some(word) => line(text, &key, &quoted(word), &unit.why),
-                None => todo(
-                    text,
-                    &key,
-                    &format!("{}; the data sheet or the logger says", unit.why),
-                ),
+                Some(word) => page.line(&key, quoted(word), &unit.why),
+                None => {
+                    let why = format!("{}; the data sheet or the logger says", unit.why);
+                    page.open(&format!("{key} ="), why);
+                }
             }
         }
         if found.opposed {
-            text.push_str(
-                "# Gravity turns against the gyros: one triad has the opposite sign. Reverse its columns or give it a \
-                 negative scale.\n",
+            page.remark(
+                "Gravity turns against the gyros: one triad has the opposite sign. Reverse its columns or give it a \
+                 negative scale.",
             );
         }
     }
 
-    fn time_unit(&self, text: &mut String) {
+    fn clock(&self, page: &mut Page) {
         let clock = &self.clock;
-        let unit = self
-            .streams
-            .as_ref()
-            .filter(|streams| streams.accel.is_some());
-        let unit = unit
-            .map(|streams| &streams.time.gyro.1)
-            .filter(|unit| !unit.is_empty());
-        if let Some(unit) = unit {
-            line(text, "time_unit", &word_or_number(unit), "as the file says");
-        } else if clock.unit != "s" {
-            line(text, "time_unit", &word_or_number(&clock.unit), &clock.why);
+        if clock.unit != "s" {
+            page.line("time_unit", word_or_number(&clock.unit), &clock.why);
         }
-    }
-
-    fn sample_period(&self, text: &mut String) {
-        let clock = &self.clock;
-        match clock.period {
+        let rate = clock.period.map_or(0.0, |period| short(period.recip()));
+        match clock.period.map(seven) {
             Some(period) if clock.is_stated => {
-                let rate = short(period.recip());
-                let why = format!("{rate} Hz, as the file says");
-                line(text, "sample_period_s", &seven(period).to_string(), &why);
+                page.line("sample_period_s", period, format_args!("{rate} Hz, as the file says"));
             }
-            Some(period) => {
-                let rate = short(period.recip());
-                let _ = writeln!(
-                    text,
-                    "# sample_period_s = {}  # {rate} Hz, found from the times when this is left out",
-                    seven(period)
-                );
-            }
+            Some(period) => page.remark(format_args!(
+                "sample_period_s = {period}  # {rate} Hz, found from the times when this is left out"
+            )),
             None if self.rows_show_period() => {}
-            None => todo(
-                text,
-                "sample_period_s",
-                "s from row to row, which a counter does not tell",
-            ),
+            None => {
+                let why = "s from row to row, which a counter does not tell";
+                page.open("sample_period_s =", why);
+            }
         }
+        let why = "guessed: a row covers the time up to its stamp; else \"start\" or \"middle\"";
+        page.line("time_stamp", quoted("end"), why);
+        let cuts = self.motion.as_ref().map_or(0, |motion| motion.cuts.len());
+        let why = match (cuts, clock.gaps.len(), clock.repeated) {
+            (0, 0, 0) => "no gap in time".to_owned(),
+            (0, 0, repeated) => {
+                format!(
+                    "no gap in time, but it stays or goes back in {}",
+                    places(repeated)
+                )
+            }
+            (0, gaps, _) => format!("but rows are missing in {}", places(gaps)),
+            (cuts, ..) => format!(
+                "gravity changes its direction at once in {}: sections laid end to end; if not, true",
+                places(cuts)
+            ),
+        };
+        page.line("continuous", cuts == 0, why);
     }
 
     /// Whether rows without a time show how long they last: rates, whose sums are angles.
@@ -145,149 +192,111 @@ impl Draft {
             && gyro.word.is_some_and(|word| word != "count")
     }
 
-    fn body_axes(&self, text: &mut String) {
-        let of_streams = self.streams.as_ref().and_then(|streams| streams.axes);
-        match of_streams {
-            Some(axes) => line(
-                text,
+    fn body_axes(&self, page: &mut Page) {
+        if let Some(axes) = self.streams.as_ref().and_then(|streams| streams.axes) {
+            page.line(
                 "body_axes",
-                &quoted(axes),
+                quoted(axes),
                 "as the program that wrote the log has them",
-            ),
-            None => {
-                let mut why = "guessed: x right, y front, z up; else \"frd\" or \"flu\"".to_owned();
-                if let Some(axes) = axes_of_program(&self.columns.names) {
-                    why += &format!(
-                        "; columns are called so by PX4 or ArduPilot, whose axes are \"{axes}\""
-                    );
-                }
-                line(text, "body_axes", "\"rfu\"", &why);
-            }
-        }
-    }
-
-    fn gaps(&self) -> String {
-        match (self.clock.gaps.len(), self.clock.repeated) {
-            (0, 0) => "no gap in time".to_owned(),
-            (0, repeated) => format!(
-                "no gap in time, but it stays or goes back in {}",
-                places(repeated)
-            ),
-            (gaps, _) => format!("but rows are missing in {}", places(gaps)),
-        }
-    }
-
-    fn columns(&self, text: &mut String) {
-        if let Some(streams) = self
-            .streams
-            .as_ref()
-            .filter(|streams| streams.accel.is_some())
-        {
-            streams.write_columns(text);
+            );
             return;
         }
-        self.doubts_of_triads(text);
-        let columns = &self.columns;
-        let mut fields: Vec<String> = self.time_column(text).into_iter().collect();
-        let mut missing = Vec::new();
-        for sensor in Sensor::ALL {
-            match columns.triads.get(sensor) {
-                Some(triad) => fields.push(format!("{} = {}", sensor.name(), self.named(triad))),
-                None => missing.push(sensor.name()),
-            }
+        let mut why = "guessed: x right, y front, z up; else \"frd\" or \"flu\"".to_owned();
+        if let Some(axes) = axes_of_program(&self.columns.names) {
+            why +=
+                &format!("; columns are called so by PX4 or ArduPilot, whose axes are \"{axes}\"");
         }
-        if let Some(temperature) = columns.temperature {
-            fields.push(format!(
-                "temperature = {}",
-                quoted(&columns.names[temperature])
-            ));
-        }
-        let names: Vec<String> = columns.names.iter().map(|name| quoted(name)).collect();
-        for sensor in missing {
-            let why = "no names or numbers showed them";
-            let names = names.join(", ");
-            let _ = match columns.triads.gyro.or(columns.triads.accel) {
-                None => writeln!(text, "# TODO: {sensor} = three of {names}; {why}"),
-                Some(_) => writeln!(
-                    text,
-                    "# {sensor} = three of {names}; {why}, and without them `turncal allan` alone takes the log"
-                ),
-            };
-        }
-        let fields = fields.join(", ");
-        if let Some(axes) = self.turned_axes() {
-            text.push_str(&axes);
-        }
-        if self.blocked.is_empty() {
-            let _ = writeln!(text, "columns = {{ {fields} }}");
-        } else {
-            let why = self.blocked.join("; ");
-            let _ = writeln!(text, "# columns = {{ {fields} }}  # TODO: {why}");
-        }
+        page.line("body_axes", quoted("rfu"), why);
     }
 
-    /// The names of a triad's columns, as a list.
-    fn named(&self, triad: &[usize; 3]) -> String {
-        let names = triad.map(|k| quoted(&self.columns.names[k]));
-        format!("[{}]", names.join(", "))
+    /// The name of a column in quotes.
+    fn name(&self, column: usize) -> String {
+        quoted(&self.columns.names[column])
+    }
+
+    /// The names of some columns.
+    fn names(&self, columns: &[usize]) -> String {
+        let names: Vec<String> = columns.iter().map(|&k| self.name(k)).collect();
+        names.join(", ")
+    }
+
+    fn columns(&self, page: &mut Page) {
+        self.doubts_of_triads(page);
+        let columns = &self.columns;
+        let mut fields: Vec<String> = match (columns.time, columns.nanoseconds) {
+            (Some(time), Some(further)) => {
+                vec![format!("time = [{}]", self.names(&[time, further]))]
+            }
+            (Some(time), None) => vec![format!("time = {}", self.name(time))],
+            (None, _) => {
+                self.without_time(page);
+                Vec::new()
+            }
+        };
+        let known = columns.triads.gyro.or(columns.triads.accel);
+        for sensor in Sensor::ALL {
+            let name = sensor.name();
+            if let Some(triad) = columns.triads.get(sensor) {
+                fields.push(format!("{name} = [{}]", self.names(triad)));
+                continue;
+            }
+            let all: Vec<usize> = (0..columns.names.len()).collect();
+            let why = format!("three of {}; {NO_COLUMNS}", self.names(&all));
+            match known {
+                None => page.open("", format_args!("{name} = {why}")),
+                Some(_) => page.remark(format_args!(
+                    "{name} = {why}, and without them `turncal allan` alone takes the log"
+                )),
+            }
+        }
+        let temperature = columns.temperature;
+        fields.extend(temperature.map(|k| format!("temperature = {}", self.name(k))));
+        self.turned_axes(page);
+        let fields = format!("{{ {} }}", fields.join(", "));
+        match self.blocked.is_empty() {
+            true => page.plain("columns", fields),
+            false => page.open(&format!("columns = {fields}"), self.blocked.join("; ")),
+        }
     }
 
     /// Which other columns could be a triad, and whether only numbers told the triads.
-    fn doubts_of_triads(&self, text: &mut String) {
+    fn doubts_of_triads(&self, page: &mut Page) {
         let columns = &self.columns;
         for sensor in Sensor::ALL {
             for other in columns.others.get(sensor) {
-                let _ = writeln!(
-                    text,
-                    "# {} could be {}, too",
-                    sensor.name(),
-                    self.named(other)
-                );
+                let names = self.names(other);
+                page.remark(format_args!("{} could be [{names}], too", sensor.name()));
             }
         }
         if columns.by_size && columns.triads.gyro.is_some() {
-            text.push_str("# The triads were told by their numbers: gravity keeps the magnitude of the accelerometers'.\n");
+            page.remark(
+                "The triads were told by their numbers: gravity keeps the magnitude of the accelerometers'.",
+            );
         }
         if let Some((down, accel)) = self.down.zip(columns.triads.accel) {
             let reversed = accel.map(|k| quoted(&format!("-{}", columns.names[k])));
-            let _ = writeln!(
-                text,
-                "# At the beginning {}. If the sensor lay that side up, write accel = [{}].",
+            page.remark(format_args!(
+                "At the beginning {}. If the sensor lay that side up, write accel = [{}].",
                 self.down_words(down),
                 reversed.join(", ")
-            );
+            ));
         }
     }
 
-    /// The field of the columns of time; where there is none, a remark instead.
-    fn time_column(&self, text: &mut String) -> Option<String> {
-        let columns = &self.columns;
-        let name = |k: usize| quoted(&columns.names[k]);
-        match (columns.time, columns.nanoseconds) {
-            (Some(time), Some(further)) => {
-                Some(format!("time = [{}, {}]", name(time), name(further)))
-            }
-            (Some(time), None) => Some(format!("time = {}", name(time))),
-            (None, _) if self.clock.is_stated => {
-                let _ = writeln!(text, "# {}: rows follow one another.", self.clock.why);
-                None
-            }
-            (None, _) if self.rows_show_period() => {
-                let why = &self.clock.why;
-                let _ = writeln!(
-                    text,
-                    "# {why}: the period of the rows is found from the turns, unless sample_period_s states it."
-                );
-                None
-            }
-            (None, _) => {
-                let why = &self.clock.why;
-                let _ = writeln!(
-                    text,
-                    "# TODO: {why}: name one that is, or give sample_period_s."
-                );
-                None
-            }
+    /// What stands for a column of time.
+    fn without_time(&self, page: &mut Page) {
+        let why = &self.clock.why;
+        if self.clock.is_stated {
+            page.remark(format_args!("{why}: rows follow one another."));
+        } else if self.rows_show_period() {
+            page.remark(format_args!(
+                "{why}: the period of the rows is found from the turns, unless sample_period_s states it."
+            ));
+        } else {
+            page.open(
+                "",
+                format_args!("{why}: name one that is, or give sample_period_s."),
+            );
         }
     }
 
@@ -300,37 +309,41 @@ impl Draft {
     }
 
     /// Where gyros do not turn as the accelerometers' columns lie.
-    fn turned_axes(&self) -> Option<String> {
-        let axes = self.registers.as_ref()?.axes.as_ref();
-        let axes = axes.filter(|axes| !axes.agree() && self.quantities.is_count(Sensor::Gyro))?;
-        let triad = self.columns.triads.gyro?;
-        let name = |k: usize| {
-            let sign = if axes.scale[k] < 0.0 { "−" } else { "" };
-            format!("{sign}{}", self.columns.names[triad[k]])
+    fn turned_axes(&self, page: &mut Page) {
+        let turns = self
+            .registers
+            .as_ref()
+            .and_then(|found| found.turns.as_ref());
+        let turns = turns.filter(|of| !of.agree() && self.quantities.is_count(Sensor::Gyro));
+        let Some((turns, triad)) = turns.zip(self.columns.triads.gyro) else {
+            return;
         };
-        Some(format!(
-            "# By gravity's directions over {} moves the gyros that turn about the accelerometers' axes are {}, {} and \
-             {}:\n# hence the order of their columns and the signs of their scale.\n",
-            axes.moves,
-            name(0),
-            name(1),
-            name(2)
-        ))
+        let [x, y, z] = [0, 1, 2].map(|k| {
+            let sign = if turns.axes.scale[k] < 0.0 { "−" } else { "" };
+            format!("{sign}{}", self.columns.names[triad[k]])
+        });
+        page.remark(format_args!(
+            "By gravity's directions over {} moves the gyros that turn about the accelerometers' axes are {x}, {y} and \
+             {z}:",
+            turns.moves
+        ));
+        page.remark("hence the order of their columns and the signs of their scale.");
     }
 
-    fn noise_table(&self, text: &mut String) {
-        text.push_str(
-            "\n# white noise at rest; better from hours at rest, by turncal allan\n[imu.noise]\n",
+    fn noise_table(&self, page: &mut Page) {
+        page.table(
+            "imu.noise",
+            "white noise at rest; better from hours at rest, by turncal allan",
         );
         for sensor in self.present() {
             let (key, unit) = NoiseKeys::of(sensor).random_walk;
-            let _ = match self.white_noise(sensor) {
-                Some(walk) => writeln!(text, "{key} = {:?}", short(walk / unit)),
-                None => writeln!(
-                    text,
-                    "# {key} =  # the data sheet's figure; without it, that of the quieter part of the record"
+            match self.white_noise(sensor) {
+                Some(walk) => page.plain(key, format_args!("{:?}", short(walk / unit))),
+                None => page.optional(
+                    key,
+                    "the data sheet's figure; without it, that of the quieter part of the record",
                 ),
-            };
+            }
         }
     }
 
@@ -340,38 +353,25 @@ impl Draft {
         Some((*self.random_walk.get(sensor))? / scale.abs())
     }
 
-    fn table(&self, text: &mut String) {
-        if let Some(four) = self.columns.quaternion {
-            let names = four.map(|k| quoted(&self.columns.names[k]));
-            let _ = writeln!(
-                text,
-                "\n# {} are a quaternion. If it is a turntable's, body right-front-up to East-North-Up in the order w, \
-                 x, y, z, give it as [turntable] from the same file; what the instrument itself makes of its attitude \
-                 is none.",
-                names.join(", ")
-            );
-        } else {
-            text.push_str(
-                "\n# With a turntable's log: [turntable] with file, columns, position_sigma_arcsec and \
-                 reading_sigma_arcsec.\n",
-            );
+    fn table(&self, page: &mut Page) {
+        page.text.push('\n');
+        match &self.columns.quaternion {
+            Some(four) => page.remark(format_args!(
+                "{} are a quaternion. If it is a turntable's, body right-front-up to East-North-Up in the order w, x, y, \
+                 z, give it as [turntable] from the same file; what the instrument itself makes of its attitude is none.",
+                self.names(four)
+            )),
+            None => page.remark(
+                "With a turntable's log: [turntable] with file, columns, position_sigma_arcsec and reading_sigma_arcsec.",
+            ),
         }
     }
 }
 
-pub(super) fn line(text: &mut String, key: &str, value: &str, why: &str) {
-    let _ = writeln!(text, "{key} = {value}  # {why}");
-}
-
-pub(super) fn todo(text: &mut String, key: &str, why: &str) {
-    let _ = writeln!(text, "# {key} =  # TODO: {why}");
-}
-
 fn places(count: usize) -> String {
-    if count == 1 {
-        "one place".to_owned()
-    } else {
-        format!("{count} places")
+    match count {
+        1 => "one place".to_owned(),
+        count => format!("{count} places"),
     }
 }
 

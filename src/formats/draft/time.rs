@@ -3,15 +3,13 @@
 use std::path::Path;
 
 use super::columns::Columns;
-use super::name;
 use super::name::Name;
 use super::text::seven;
 use crate::formats::Sheet;
 use crate::formats::clock::Uniform;
+use crate::formats::quantity::units_of_time;
 use crate::statistics::median;
 
-/// Units of time in s, with the words that `run.toml` has for them.
-const UNITS: [(&str, f64); 4] = [("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)];
 /// No unit of three orders is right at two of these periods, s: 5 kHz to 5 Hz.
 pub(super) const PERIODS: std::ops::Range<f64> = 2e-4..0.2;
 /// Steps within this factor are those of a stated rate.
@@ -42,53 +40,43 @@ impl Clock {
             return Self::without(stated, "no column goes forward like a time");
         };
         let steps = Steps::of(&stamps);
-        let name = Name::of(&sheet.names[column]);
+        let name = Name::of_column(&sheet.names[column], &sheet.units[column]);
         if name.is_counter() && name.is_time() < 2 && !steps.is_count {
             columns.time = None;
             return Self::without(stated, "a counter that other packets share is no time");
         }
-        let named = name.unit.or_else(|| name::unit(&sheet.units[column]));
-        let named = named.and_then(|unit| Some(unit.times * second(unit.word)?));
+        let second = |word: &str| units_of_time().find(|of| of.0 == word);
+        let named = name
+            .unit
+            .and_then(|unit| Some(unit.times * second(unit.word)?.1));
         let tick = name.tick().map(|tick| tick * steps.mean);
         let known = stated.or(tick.filter(|period| PERIODS.contains(period)));
-        let rate = |period: f64| short(period.recip());
+        let seconds = || units_of_time().map(|(_, second)| second);
         let usual = short(steps.mean);
-        let (second, why) = match (named, known) {
-            _ if columns.nanoseconds.is_some() => (Some(1.0), "seconds and nanoseconds".to_owned()),
-            (Some(second), _) => (Some(second), "as the file says".to_owned()),
-            _ if (steps.is_count || name.is_counter()) && name.is_time() < 2 => {
-                (None, "steps of one: a counter of samples".to_owned())
-            }
-            (None, Some(period)) => {
-                let is_near =
-                    |second: &f64| (steps.mean * second / period).ln().abs() < STATED.ln();
-                let of_unit = UNITS.iter().map(|(_, second)| *second).find(is_near);
-                // Ticks of a clock of its own.
-                let second = of_unit
-                    .or(name.tick().filter(is_near))
-                    .unwrap_or(period / steps.mean);
-                (
-                    Some(second),
-                    format!("steps of {usual} at {} Hz", rate(period)),
-                )
-            }
-            (None, None) => {
-                let is_usual = |second: &f64| PERIODS.contains(&(steps.mean * second));
-                let likely = UNITS.iter().map(|(_, second)| *second).find(is_usual);
-                (Some(likely.unwrap_or(1.0)), format!("steps of {usual}"))
-            }
+        let (second, why) = if columns.nanoseconds.is_some() {
+            (Some(1.0), "seconds and nanoseconds".to_owned())
+        } else if named.is_some() {
+            (named, "as the file says".to_owned())
+        } else if (steps.is_count || name.is_counter()) && name.is_time() < 2 {
+            (None, "steps of one: a counter of samples".to_owned())
+        } else if let Some(period) = known {
+            let is_near = |second: &f64| (steps.mean * second / period).ln().abs() < STATED.ln();
+            // Ticks of a clock of its own.
+            let tick = name.tick().filter(is_near).unwrap_or(period / steps.mean);
+            let second = seconds().find(is_near).unwrap_or(tick);
+            let rate = short(period.recip());
+            (Some(second), format!("steps of {usual} at {rate} Hz"))
+        } else {
+            let is_usual = |second: &f64| PERIODS.contains(&(steps.mean * second));
+            let likely = seconds().find(is_usual).unwrap_or(1.0);
+            (Some(likely), format!("steps of {usual}"))
         };
-        let is_unit =
-            |(_, of): &&(&str, f64)| second.is_some_and(|second| (second / of - 1.0).abs() < 1e-9);
-        let word = UNITS
-            .iter()
-            .find(is_unit)
-            .map(|(word, _)| (*word).to_owned());
+        let word = |second: f64| units_of_time().find(|of| (second / of.1 - 1.0).abs() < 1e-9);
         Self {
-            unit: match second {
-                Some(second) => word.unwrap_or_else(|| format!("{:?}", seven(second))),
-                None => "count".to_owned(),
-            },
+            unit: second.map_or("count".to_owned(), |second| match word(second) {
+                Some((word, _)) => word.to_owned(),
+                None => format!("{:?}", seven(second)),
+            }),
             why,
             period: second.map(|second| steps.mean * second).or(stated),
             is_stated: second.is_none() && stated.is_some(),
@@ -171,14 +159,6 @@ impl Steps {
             repeated,
         }
     }
-}
-
-/// How long one of a unit of time is.
-fn second(word: &str) -> Option<f64> {
-    UNITS
-        .iter()
-        .find(|(unit, _)| *unit == word)
-        .map(|(_, second)| *second)
 }
 
 /// A number to six digits.

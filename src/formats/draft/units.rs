@@ -1,4 +1,4 @@
-//! What a row holds, and in which units.
+//! What a row holds, and in which units: each that `run.toml` has is held against gravity at rest or its turns.
 
 use nalgebra::Vector3;
 
@@ -9,17 +9,19 @@ use super::name::{self, Name};
 use super::registers::Registers;
 use super::stated::Stated;
 use super::time::{Clock, PERIODS};
-use crate::formats::Sheet;
 use crate::formats::quantity::{OUTPUTS, units};
+use crate::formats::{Sheet, unit_scale};
 use crate::imu::{Output, PerSensor, Sensor};
-use crate::units::{ARCSEC, DEG_PER_H, DEGREE, STANDARD_GRAVITY};
+use crate::units::STANDARD_GRAVITY;
 
-/// Gravity at rest tells units that differ by more than this factor: raw sensors are off by tenths.
-const GRAVITY_FACTOR: f64 = 1.25;
-/// So do turns.
-const TURN_FACTOR: f64 = 1.3;
+/// Gravity at rest tells units that differ by more than this factor, for raw sensors are off by tenths; and so do turns.
+const TOLD_APART: PerSensor<f64> = PerSensor {
+    gyro: 1.3,
+    accel: 1.25,
+};
 /// Sums of pulses vary less than sums of readings by more than this factor.
 const PULSE_SUMS: f64 = 0.5;
+
 /// What is known of the unit of a triad.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Unit {
@@ -44,6 +46,79 @@ pub(super) struct Quantities {
     pub opposed: bool,
 }
 
+/// A unit that rows may have.
+struct Hypothesis {
+    word: &'static str,
+    output: Output,
+    per_si: f64,
+    /// How many times as large as it says gravity is, or as far as it says its turns; none where nothing shows it.
+    factor: Option<f64>,
+    told_apart: f64,
+}
+
+impl Hypothesis {
+    /// A unit of which there are so many for one in SI, a second.
+    fn new(sensor: Sensor, (word, per_si): (&'static str, f64), output: Output, of: &Rows) -> Self {
+        let (gravity, angle) = (of.motion.gravity / STANDARD_GRAVITY, of.motion.angle);
+        let factor = match (sensor, output) {
+            (Sensor::Accel, Output::Rate) => Some(gravity / per_si),
+            (Sensor::Accel, _) => Some(gravity / per_si / of.period),
+            (Sensor::Gyro, Output::Rate) => angle.map(|angle| angle.abs() * per_si / of.period),
+            (Sensor::Gyro, _) => angle.map(|angle| angle.abs() * per_si),
+        };
+        Self {
+            word,
+            output,
+            per_si,
+            factor: factor.filter(|factor| sensor == Sensor::Accel || factor.is_finite()),
+            told_apart: *TOLD_APART.get(sensor),
+        }
+    }
+
+    fn fits(&self) -> bool {
+        let fits = |factor: f64| factor < self.told_apart && factor > self.told_apart.recip();
+        self.factor.is_some_and(fits)
+    }
+
+    fn is_contradicted(&self) -> bool {
+        self.factor.is_some() && !self.fits()
+    }
+
+    /// What motion says of it.
+    fn evidence(&self, sensor: Sensor, motion: &Motion) -> String {
+        match (sensor, self.factor) {
+            (_, None) => String::new(),
+            (Sensor::Accel, _) if self.fits() => format!("{} at rest", short(motion.gravity)),
+            (Sensor::Accel, Some(factor)) => {
+                format!("at rest it is {} times gravity", short(factor))
+            }
+            (Sensor::Gyro, _) if self.fits() => "gravity turns as far".to_owned(),
+            (Sensor::Gyro, Some(factor)) => format!("gravity turns {} times as far", short(factor)),
+        }
+    }
+
+    /// Why rows have it that the file names.
+    fn why_named(&self, sensor: Sensor, motion: &Motion) -> String {
+        let link = match self.factor {
+            None => "",
+            Some(_) if self.fits() => "; ",
+            Some(_) => ", but ",
+        };
+        format!("as the file says{link}{}", self.evidence(sensor, motion))
+    }
+}
+
+/// The rows of a triad.
+struct Rows<'a> {
+    motion: &'a Motion,
+    /// s, not a number where nothing tells it.
+    period: f64,
+    /// The unit that the file names.
+    named: Option<name::Unit>,
+    /// Whether they are whole numbers.
+    whole: bool,
+}
+
 impl Quantities {
     pub fn find(
         sheet: &Sheet,
@@ -55,60 +130,190 @@ impl Quantities {
         let mut found = Self {
             output: Output::Rate,
             output_why: "as most logs have it".to_owned(),
-            units: PerSensor::default(),
+            units: PerSensor::from_fn(|_| Unit {
+                why: "too few rows hold numbers to show it".to_owned(),
+                ..Unit::default()
+            }),
             opposed: false,
         };
-        let named = PerSensor::from_fn(|sensor| {
-            let first = columns.triads.get(sensor).map(|triad| triad[0])?;
-            Name::of(&sheet.names[first])
-                .unit
-                .or_else(|| name::unit(&sheet.units[first]))
-        });
         let Some(motion) = motion else {
-            "too few rows hold numbers to show it".clone_into(&mut found.units.gyro.why);
-            found.units.accel.why.clone_from(&found.units.gyro.why);
             return found;
         };
         found.opposed = motion.angle.is_some_and(|angle| angle < 0.0);
-        let period = clock.period;
-        let words = PerSensor::from_fn(|sensor| named.get(sensor).map(|unit| unit.word));
-        if !found.scaled(Sensor::Accel, named.accel, motion, period) {
-            found.accelerometers(words.accel, whole.accel, motion, period);
-        }
-        if !found.scaled(Sensor::Gyro, named.gyro, motion, period) {
-            found.gyros(words.gyro, whole.gyro, motion, period);
-        }
-        for sensor in Sensor::ALL {
-            if columns.triads.get(sensor).is_none() {
-                *found.units.get_mut(sensor) = Unit::default();
-            }
+        // The accelerometers tell what rows hold.
+        for sensor in [Sensor::Accel, Sensor::Gyro] {
+            let first = columns.triads.get(sensor).map(|triad| triad[0]);
+            let named = |k: usize| Name::of_column(&sheet.names[k], &sheet.units[k]).unit;
+            let rows = Rows {
+                motion,
+                period: clock.period.unwrap_or(f64::NAN),
+                named: first.and_then(named),
+                whole: *whole.get(sensor),
+            };
+            let unit = found.unit(sensor, &rows);
+            *found.units.get_mut(sensor) = match first {
+                Some(_) => unit,
+                None => Unit::default(),
+            };
         }
         found
     }
 
+    fn unit(&mut self, sensor: Sensor, rows: &Rows) -> Unit {
+        if let Some(unit) = scaled(sensor, rows) {
+            return unit;
+        }
+        let outputs = match sensor {
+            Sensor::Accel => &[Output::Rate, Output::Increment][..],
+            Sensor::Gyro => &[self.output],
+        };
+        let of_output = |&output: &Output| {
+            let known = units(sensor, output).filter_map(|(word, per_si)| Some((word, per_si?)));
+            known.map(move |unit| Hypothesis::new(sensor, unit, output, rows))
+        };
+        let all: Vec<Hypothesis> = outputs.iter().flat_map(of_output).collect();
+        let named = rows.named.map(|unit| unit.word);
+        let by_name = all.iter().find(|of| Some(of.word) == named);
+        let mut by_motion = all.iter().filter(|of| of.fits());
+        let shown = by_motion.next();
+        let evidence = shown.map_or(String::new(), |of| of.evidence(sensor, rows.motion));
+        let (chosen, why) = match (by_name, shown) {
+            (Some(name), Some(shown)) if name.is_contradicted() => {
+                let why = format!("{evidence}, although the file says {}", name.word);
+                (shown, why)
+            }
+            (Some(name), _) if !name.is_contradicted() || sensor == Sensor::Accel => {
+                (name, name.why_named(sensor, rows.motion))
+            }
+            (None, Some(shown)) if !rows.whole && (named.is_none() || sensor == Sensor::Gyro) => {
+                let others = by_motion.map(|of| format!("; it may as well be {}", of.word));
+                (shown, evidence + &others.collect::<String>())
+            }
+            _ => {
+                return match sensor {
+                    Sensor::Accel => self.counts_of_accelerometers(rows),
+                    Sensor::Gyro => self.counts_of_gyros(rows, by_name, &all),
+                };
+            }
+        };
+        if sensor == Sensor::Accel {
+            self.hold(chosen.output, rows);
+        }
+        Unit {
+            word: Some(chosen.word),
+            why,
+            is_shown: chosen.fits(),
+            ..Unit::default()
+        }
+    }
+
+    /// Takes what rows hold by the accelerometers.
+    fn hold(&mut self, output: Output, rows: &Rows) {
+        self.output = output;
+        self.output_why = match output {
+            Output::Pulse => {
+                "whole numbers whose sums vary less than they would if fractions were not carried over"
+                    .to_owned()
+            }
+            Output::Increment => format!("gravity times {} s a row", short(rows.period)),
+            Output::Rate => "gravity has the same magnitude whatever the rate of rows".to_owned(),
+        };
+    }
+
+    fn counts_of_accelerometers(&mut self, rows: &Rows) -> Unit {
+        let gravity = rows.motion.gravity;
+        let is_carried = |ratio: f64| rows.whole && ratio < PULSE_SUMS;
+        let output = match rows.motion.sum_variance.is_some_and(is_carried) {
+            true => Output::Pulse,
+            false => Output::Rate,
+        };
+        self.hold(output, rows);
+        let per_g = gravity * self.per_second(rows.period);
+        Unit {
+            word: Some("count"),
+            why: why_count(
+                rows,
+                &format!("no known unit makes {} at rest", short(gravity)),
+            ),
+            likely: per_g.is_finite().then(|| likely_for_g(per_g)),
+            ..Unit::default()
+        }
+    }
+
+    fn counts_of_gyros(
+        &self,
+        rows: &Rows,
+        by_name: Option<&Hypothesis>,
+        all: &[Hypothesis],
+    ) -> Unit {
+        let angle = rows.motion.angle.map(f64::abs);
+        let row = self.row(rows.period);
+        let open = |why: &str| Unit {
+            why: why.to_owned(),
+            ..Unit::default()
+        };
+        let is_bare = !rows.whole && rows.named.is_none();
+        match angle {
+            // Without a clock each unit needs a period of its own.
+            Some(angle) if !row.is_finite() && is_bare => {
+                let Some((word, period)) = usual_period(all, angle) else {
+                    return open("with no time from row to row turns do not show it");
+                };
+                let rate = short(period.recip());
+                return Unit {
+                    word: Some(word),
+                    ..open(&format!("gravity turns as far at about {rate} Hz"))
+                };
+            }
+            None if is_bare && self.output != Output::Pulse => {
+                return open(match rows.motion.is_turned {
+                    true => "gravity turns too seldom or too roughly to show it",
+                    false => "gravity does not turn, so nothing shows it",
+                });
+            }
+            _ => {}
+        }
+        let why = match by_name {
+            Some(name) => format!(
+                "{} {}",
+                name.word,
+                name.why_named(Sensor::Gyro, rows.motion)
+            ),
+            None => why_count(rows, "no known unit fits the turns of gravity"),
+        };
+        // Rows add up to the angle.
+        let measured = angle.map(|angle| row / angle);
+        let measured = measured.filter(|scale| scale.is_finite());
+        Unit {
+            word: Some("count"),
+            is_shown: measured.is_some(),
+            scale: measured.map(|value| Scale::of_steps(value, self.output)),
+            ..open(&why)
+        }
+    }
+
     /// Takes the units that the user states.
     pub fn state(&mut self, stated: &Stated) {
-        let of = |sensor: &Sensor| match sensor {
-            Sensor::Gyro => &stated.gyro_unit,
-            Sensor::Accel => &stated.accel_unit,
-        };
         for sensor in Sensor::ALL {
-            let Some(word) = of(&sensor) else { continue };
-            let known = OUTPUTS.into_iter().find_map(|(_, output)| {
-                let mut words = units(sensor, output).iter();
-                let (word, _) = words.find(|(known, _)| known == word)?;
-                Some((*word, output))
+            let word = match sensor {
+                Sensor::Gyro => &stated.gyro_unit,
+                Sensor::Accel => &stated.accel_unit,
+            };
+            let all = OUTPUTS.into_iter().flat_map(|(_, output)| {
+                units(sensor, output).map(move |(known, _)| (known, output))
             });
-            if let Some((word, output)) = known {
-                if word != "count" {
-                    self.output = output;
-                }
-                let unit = self.units.get_mut(sensor);
-                unit.word = Some(word);
-                unit.is_shown = true;
-                unit.why = "as stated".to_owned();
-                unit.scale = unit.scale.take().filter(|_| word == "count");
+            let is_stated = |(known, _): &(&str, Output)| Some(*known) == word.as_deref();
+            let Some((word, output)) = { all }.find(is_stated) else {
+                continue;
+            };
+            if word != "count" {
+                self.output = output;
             }
+            let unit = self.units.get_mut(sensor);
+            unit.word = Some(word);
+            unit.is_shown = true;
+            unit.why = "as stated".to_owned();
+            unit.scale = unit.scale.take().filter(|_| word == "count");
         }
     }
 
@@ -123,31 +328,24 @@ impl Quantities {
 
     /// Takes in what the record shows of the registers behind its counts.
     pub fn of_registers(&mut self, found: &Registers, period: Option<f64>) {
-        let per_second = self.per_second(period.unwrap_or(f64::NAN));
+        let period = period.unwrap_or(f64::NAN);
+        let (per_second, row) = (self.per_second(period), self.row(period));
+        let is_open = |unit: &Unit| unit.scale.as_ref().is_none_or(|of| !of.is_named);
         let accel = &mut self.units.accel;
-        if accel.word == Some("count") && accel.scale.as_ref().is_none_or(|of| !of.is_named) {
-            accel.scale = found
-                .gravity
-                .as_ref()
-                .filter(|_| per_second.is_finite())
-                .map(|gravity| Scale::of_gravity(gravity, per_second));
+        if accel.word == Some("count") && is_open(accel) {
+            let gravity = found.gravity.as_ref().filter(|_| per_second.is_finite());
+            accel.scale = gravity.map(|gravity| Scale::of_gravity(gravity, per_second));
         }
-        let row = match self.output {
-            Output::Rate => period.unwrap_or(f64::NAN),
-            Output::Pulse | Output::Increment => 1.0,
-        };
         let gyro = &mut self.units.gyro;
-        let Some(axes) = found.axes.as_ref().filter(|_| row.is_finite()) else {
+        let Some(turns) = found.turns.as_ref().filter(|_| row.is_finite()) else {
             return;
         };
-        let is_named = gyro.scale.as_ref().is_some_and(|of| of.is_named);
-        if gyro.word.is_none_or(|word| word == "count") && !is_named {
+        if gyro.word.is_none_or(|word| word == "count") && is_open(gyro) {
             if gyro.word.is_none() {
                 gyro.word = Some("count");
                 gyro.why = "no known unit fits the turns of gravity".to_owned();
             }
-            let scale = Scale::of_axes(axes, row, self.output);
-            gyro.scale = Some(scale);
+            gyro.scale = Some(Scale::of_turns(turns, row, self.output));
             self.opposed = false;
         }
     }
@@ -160,247 +358,49 @@ impl Quantities {
         }
     }
 
+    /// What a row of gyros is summed over to make an angle.
+    fn row(&self, period: f64) -> f64 {
+        period * self.per_second(period)
+    }
+
     /// The file's quantity per second for one rad/s or m/s², if it is known.
     pub fn scale(&self, sensor: Sensor) -> Option<f64> {
         let unit = self.units.get(sensor);
-        unit.scale
-            .as_ref()
-            .map(|scale| scale.value.abs().mean())
-            .or_else(|| crate::formats::unit_scale(sensor, unit.word?))
+        let measured = unit.scale.as_ref().map(|scale| scale.value.abs().mean());
+        measured.or_else(|| unit_scale(sensor, unit.word?))
     }
+}
 
-    /// Takes a unit of which the file states how many of `run.toml`'s one is, unless motion contradicts it.
-    fn scaled(
-        &mut self,
-        sensor: Sensor,
-        named: Option<name::Unit>,
-        motion: &Motion,
-        period: Option<f64>,
-    ) -> bool {
-        let Some(scale) = named.and_then(|unit| Scale::of_unit(sensor, unit)) else {
-            return false;
-        };
-        let of_one = scale.value.x;
-        let factor = match sensor {
-            Sensor::Accel => motion.gravity / (of_one * STANDARD_GRAVITY),
-            Sensor::Gyro => {
-                let turned = motion.angle.zip(period);
-                turned.map_or(1.0, |(angle, period)| angle.abs() * of_one / period)
-            }
-        };
-        if turns_fit(factor) {
-            *self.units.get_mut(sensor) = Unit {
-                word: Some("count"),
-                why: "as the file says".to_owned(),
-                is_shown: true,
-                scale: Some(scale),
-                likely: None,
-            };
-        }
-        turns_fit(factor)
-    }
-
-    fn accelerometers(
-        &mut self,
-        named: Option<&'static str>,
-        whole: bool,
-        motion: &Motion,
-        period: Option<f64>,
-    ) {
-        let Motion {
-            gravity,
-            sum_variance,
-            ..
-        } = *motion;
-        let size = format!("{} at rest", short(gravity));
-        let seconds = period.unwrap_or(f64::NAN);
-        let known = [
-            ("m/s^2", Output::Rate, STANDARD_GRAVITY),
-            ("g", Output::Rate, 1.0),
-            ("mg", Output::Rate, 1e3),
-            ("m/s", Output::Increment, STANDARD_GRAVITY * seconds),
-            ("g*s", Output::Increment, seconds),
-        ];
-        let fits = |expected: f64| {
-            let factor = gravity / expected;
-            factor < GRAVITY_FACTOR && factor > GRAVITY_FACTOR.recip()
-        };
-        let by_name = known.iter().find(|(unit, ..)| Some(*unit) == named);
-        let by_size: Vec<_> = known
-            .iter()
-            .filter(|&&(.., expected)| fits(expected))
-            .collect();
-        let mut unit = Unit::default();
-        match (by_name, by_size.first()) {
-            (Some(&(name, _, expected)), Some(&&(word, output, _))) if !fits(expected) => {
-                self.output = output;
-                unit.word = Some(word);
-                unit.why = format!("{size}, although the file says {name}");
-            }
-            (Some(&(word, output, expected)), _) => {
-                self.output = output;
-                unit.word = Some(word);
-                unit.why = format!("as the file says; {size}");
-                if !fits(expected) {
-                    unit.why += &format!(", but gravity should be {}", short(expected));
-                }
-            }
-            (None, Some(&&(word, output, _))) if !whole && named.is_none() => {
-                self.output = output;
-                unit.word = Some(word);
-                unit.why = size;
-                for (other, ..) in &by_size[1..] {
-                    unit.why += &format!("; it may as well be {other}");
-                }
-            }
-            _ => {
-                let pulses = whole && sum_variance.is_some_and(|ratio| ratio < PULSE_SUMS);
-                self.output = if pulses { Output::Pulse } else { Output::Rate };
-                unit.word = Some("count");
-                unit.why = why_count(whole, named, &format!("no known unit makes {size}"));
-                let per_g = gravity * self.per_second(seconds);
-                unit.likely = per_g.is_finite().then(|| likely_for_g(per_g));
-            }
-        }
-        let shown = known.iter().find(|(word, ..)| Some(*word) == unit.word);
-        unit.is_shown = shown.is_some_and(|&(.., expected)| fits(expected));
-        self.units.accel = unit;
-        self.output_why = output_why(self.output, seconds);
-    }
-
-    fn gyros(
-        &mut self,
-        named: Option<&'static str>,
-        whole: bool,
-        motion: &Motion,
-        period: Option<f64>,
-    ) {
-        let (angle, is_turned) = (motion.angle.map(f64::abs), motion.is_turned);
-        let seconds = period.unwrap_or(f64::NAN);
-        let known = angle_units(self.output);
-        let row = if self.output == Output::Rate {
-            seconds
-        } else {
-            1.0
-        };
-        let turns = |unit: f64| {
-            angle
-                .map(|angle| angle / (unit * row))
-                .filter(|f| f.is_finite())
-        };
-        let fits = |unit: f64| turns(unit).is_some_and(turns_fit);
-        let by_name = known.iter().find(|(word, _)| Some(*word) == named);
-        let by_turn = known.iter().find(|&&(_, unit)| fits(unit));
-        // Without a clock each unit needs a period of its own.
-        let unknown = angle.filter(|_| !row.is_finite() && !whole && named.is_none());
-        // Counts per second for one rad/s: rows add up to the angle.
-        let measured = angle
-            .map(|angle| row / angle)
-            .filter(|scale| scale.is_finite());
-        let mut unit = Unit::default();
-        match (by_name, by_turn) {
-            (Some(&(name, value)), _) if turns(value).is_some_and(|factor| !turns_fit(factor)) => {
-                let why = why_named(turns(value));
-                match by_turn {
-                    Some(&(word, _)) => {
-                        unit.word = Some(word);
-                        unit.why = format!("gravity turns as far, although the file says {name}");
-                    }
-                    None => {
-                        unit.word = Some("count");
-                        unit.why = format!("{name} {why}");
-                        unit.scale = measured.map(|value| Scale::of_steps(value, self.output));
-                    }
-                }
-            }
-            (Some(&(word, value)), _) => {
-                unit.word = Some(word);
-                unit.why = why_named(turns(value));
-            }
-            (None, Some(&(word, _))) if !whole => {
-                unit.word = Some(word);
-                unit.why = "gravity turns as far".to_owned();
-            }
-            _ if let Some(angle) = unknown => match usual_period(known, angle) {
-                Some((word, period)) => {
-                    unit.word = Some(word);
-                    let rate = short(period.recip());
-                    unit.why = format!("gravity turns as far at about {rate} Hz");
-                }
-                None => unit.why = "with no time from row to row turns do not show it".to_owned(),
-            },
-            _ if whole || self.output == Output::Pulse || angle.is_some() || named.is_some() => {
-                unit.word = Some("count");
-                unit.why = why_count(whole, named, "no known unit fits the turns of gravity");
-                unit.scale = measured.map(|value| Scale::of_steps(value, self.output));
-            }
-            _ if is_turned => {
-                unit.why = "gravity turns too seldom or too roughly to show it".to_owned();
-            }
-            _ => unit.why = "gravity does not turn, so nothing shows it".to_owned(),
-        }
-        let shown = known.iter().find(|(word, _)| Some(*word) == unit.word);
-        unit.is_shown = shown.is_some_and(|&(_, value)| fits(value)) || unit.scale.is_some();
-        self.units.gyro = unit;
-    }
+/// A unit of which the file states how many of `run.toml`'s one is, unless motion contradicts it.
+fn scaled(sensor: Sensor, rows: &Rows) -> Option<Unit> {
+    let unit = rows.named?;
+    let scale = Scale::of_unit(sensor, unit)?;
+    let per_si = scale.value.x;
+    let of_it = Hypothesis::new(sensor, (unit.word, per_si), Output::Rate, rows);
+    (of_it.factor.is_none() || of_it.fits()).then(|| Unit {
+        word: Some("count"),
+        why: "as the file says".to_owned(),
+        is_shown: true,
+        scale: Some(scale),
+        likely: None,
+    })
 }
 
 /// Why a triad is taken to hold counts.
-fn why_count(whole: bool, named: Option<&str>, unfit: &str) -> String {
-    match (whole, named) {
-        (true, _) => "whole numbers".to_owned(),
-        (false, Some(named)) => {
-            format!("{named} has no word of its own here: a count with a scale")
-        }
-        (false, None) => unfit.to_owned(),
-    }
-}
-
-/// Why rows are taken to hold that, by the accelerometers.
-fn output_why(output: Output, seconds: f64) -> String {
-    match output {
-        Output::Pulse => {
-            "whole numbers whose sums vary less than they would if fractions were not carried over"
-                .to_owned()
-        }
-        Output::Increment => format!("gravity times {} s a row", short(seconds)),
-        Output::Rate => "gravity has the same magnitude whatever the rate of rows".to_owned(),
-    }
-}
-
-/// Units of gyros, with the angle in one row of a unit of it.
-fn angle_units(output: Output) -> &'static [(&'static str, f64)] {
-    match output {
-        Output::Rate => &[
-            ("rad/s", 1.0),
-            ("deg/s", DEGREE),
-            ("deg/h", DEG_PER_H),
-            ("mdps", 1e-3 * DEGREE),
-        ],
-        Output::Increment => &[("rad", 1.0), ("deg", DEGREE), ("arcsec", ARCSEC)],
-        Output::Pulse => &[],
-    }
-}
-
-fn turns_fit(factor: f64) -> bool {
-    factor < TURN_FACTOR && factor > TURN_FACTOR.recip()
-}
-
-/// Why gyros have the unit that the file names, with what the turns of gravity say of it.
-fn why_named(factor: Option<f64>) -> String {
-    match factor {
-        Some(factor) if !turns_fit(factor) => format!(
-            "as the file says, but gravity turns {} times as far",
-            short(factor)
+fn why_count(rows: &Rows, unfit: &str) -> String {
+    match rows.named {
+        _ if rows.whole => "whole numbers".to_owned(),
+        Some(unit) => format!(
+            "{} has no word of its own here: a count with a scale",
+            unit.word
         ),
-        Some(_) => "as the file says, and as gravity turns".to_owned(),
-        None => "as the file says".to_owned(),
+        None => unfit.to_owned(),
     }
 }
 
 /// The only unit with which rows that turn by this angle come at a usual period, and the period.
-fn usual_period(known: &[(&'static str, f64)], angle: f64) -> Option<(&'static str, f64)> {
-    let periods = known.iter().map(|&(word, unit)| (word, angle / unit));
+fn usual_period(all: &[Hypothesis], angle: f64) -> Option<(&'static str, f64)> {
+    let periods = all.iter().map(|of| (of.word, of.per_si * angle));
     let mut usual = periods.filter(|(_, period)| PERIODS.contains(period));
     usual.next().filter(|_| usual.next().is_none())
 }
@@ -414,30 +414,12 @@ pub(super) fn offset(samples: &[Vector3<f64>]) -> Option<f64> {
     let (low, high) = values().fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), v| {
         (low.min(v), high.max(v))
     });
-    let half = [
-        2048.0,
-        8192.0,
-        32_768.0,
-        524_288.0,
-        8_388_608.0,
-        2_147_483_648.0,
-    ]
-    .into_iter()
-    .find(|&half| low >= 0.0 && low < half && high > half && high < 2.0 * half)?;
+    // Of 12, 14, 16, 20, 24 and 32 bits.
+    let halves = [11, 13, 15, 19, 23, 31].map(|bits| 2f64.powi(bits));
+    let lies_about = |half: &f64| low >= 0.0 && low < *half && high > *half && high < 2.0 * half;
+    let half = halves.into_iter().find(lies_about)?;
     let mean = values().sum::<f64>() / (3 * samples.len()) as f64;
     ((mean / half - 1.0).abs() < 0.5).then_some(half)
-}
-
-/// Takes the zero of registers from their samples, and says what it is.
-pub(super) fn centre(triads: &mut PerSensor<Vec<Vector3<f64>>>) -> PerSensor<f64> {
-    PerSensor::from_fn(|sensor| {
-        let samples = triads.get_mut(sensor);
-        let zero = offset(samples).unwrap_or(0.0);
-        samples
-            .iter_mut()
-            .for_each(|sample| sample.add_scalar_mut(-zero));
-        zero
-    })
 }
 
 /// A number to four digits.

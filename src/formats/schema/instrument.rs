@@ -302,9 +302,9 @@ fn nominal(
     if columns_of(imu, sensor).is_none() {
         return Ok(Vector3::repeat(1.0));
     }
-    let known = units(sensor, imu.output);
-    let names = || known.iter().map(|&(name, _)| name);
-    let Some(&(_, of_unit)) = known.iter().find(|(name, _)| *name == unit) else {
+    let known = || units(sensor, imu.output);
+    let names = || known().map(|(name, _)| name);
+    let Some((_, of_unit)) = known().find(|(name, _)| *name == unit) else {
         return Err(document.wrong(
             &format!("imu.{}_unit", sensor.name()),
             format_args!("one of {}", list(names())),

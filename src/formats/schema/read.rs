@@ -10,7 +10,7 @@ use toml::de::DeTable;
 use super::instrument::InstrumentFields;
 use super::{Document, FORMAT, META, Positive, RunFile, StandstillFile};
 use crate::earth::Site;
-use crate::formats::draft::motion::Motion;
+use crate::formats::draft::turned_angle;
 use crate::formats::error::{FileError, Place};
 use crate::formats::inputs::segments;
 use crate::formats::inputs::table_log::TableLogFile;
@@ -179,8 +179,8 @@ fn with_found_period(
             .map(|sample| sample / imu.period)
             .collect()
     };
-    let motion = Motion::find(&PerSensor::from_fn(rates), &[], imu.period);
-    let Some(period) = motion.angle.filter(|&period| period > 0.0) else {
+    let angle = turned_angle(PerSensor::from_fn(rates), imu.period);
+    let Some(period) = angle.filter(|&period| period > 0.0) else {
         return Err(FileError::new(
             &instrument.log.source.file,
             Place::File,

@@ -86,7 +86,7 @@ pub fn write_run(
 fn check_words(configuration: &Path, run: &Run, output: Output) -> Result<(), FileError> {
     for sensor in Sensor::ALL {
         let unit = run.instrument.unit.get(sensor);
-        let names = || units(sensor, output).iter().map(|&(name, _)| name);
+        let names = || units(sensor, output).map(|(name, _)| name);
         if !names().any(|name| name == unit) {
             return Err(FileError::new(
                 configuration,

@@ -211,5 +211,18 @@ impl Part {
     }
 }
 
+/// Each order of the gyros' axes with the logarithm of its likelihood by the motion that a run, with the dwells of a problem,
+/// makes, and that of nothing being explained; the accelerometers' axes are as stated.
+pub fn orders_of_gyros(problem: &Problem, run: &Run) -> Vec<(AxisOrder, f64, f64)> {
+    let hypotheses = Hypotheses::of(problem, run, &Motion::of(problem, 0, run));
+    let weighed = |gyro| {
+        let accel = AxisOrder::IDENTITY;
+        let parts = hypotheses.parts(&PerSensor { gyro, accel });
+        let sum = |of: fn(&Part) -> f64| parts.iter().map(of).sum();
+        (gyro, sum(|part| part.of), sum(|part| part.none))
+    };
+    AxisOrder::all().map(weighed).collect()
+}
+
 #[cfg(test)]
 mod tests;

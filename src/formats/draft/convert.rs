@@ -1,0 +1,87 @@
+//! A log of another program as rows of text, with a draft for them.
+
+use std::cell::RefCell;
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::Path;
+
+use super::Draft;
+use super::streams::{Streams, Written};
+use crate::formats::source::Source;
+use crate::formats::{FileError, Place, write_rows};
+
+/// Of gyros, and of accelerometers in the same stream.
+const GYRO_FILE: &str = "imu.csv.gz";
+const ACCEL_FILE: &str = "accelerometers.csv.gz";
+
+impl Draft {
+    /// Writes the streams that hold the instrument as rows of text, with this draft for them, into a directory
+    /// that is there; a damaged log only if what is whole of it is to be used.
+    ///
+    /// # Errors
+    /// [`FileError`] if the log is text already, is damaged, or cannot be read or written.
+    pub fn convert(mut self, log: &Path, directory: &Path, salvage: bool) -> Result<(), FileError> {
+        let of_text = |streams: &Streams| streams.written.is_some();
+        let streams = self.streams.as_mut().filter(|streams| !of_text(streams));
+        let Some(streams) = streams else {
+            let advice = "`turncal init` drafts a run.toml for it as it is.";
+            let expected = "a log of another program";
+            return Err(FileError::new(
+                log,
+                Place::File,
+                "rows of text",
+                expected,
+                advice,
+            ));
+        };
+        let source = |stream| Source {
+            stream: Some(stream),
+            salvage,
+            ..Source::of_file(log)
+        };
+        rows_as_text(&source(&streams.gyro), &directory.join(GYRO_FILE))?;
+        if let Some(accel) = &streams.accel {
+            rows_as_text(&source(accel), &directory.join(ACCEL_FILE))?;
+        }
+        let accel = streams.accel.is_some().then(|| ACCEL_FILE.to_owned());
+        streams.written = Some(Written { accel });
+        let path = directory.join("run.toml");
+        fs::write(&path, self.to_toml(GYRO_FILE)).map_err(|error| unwritten(&path, &error))
+    }
+}
+
+fn unwritten(path: &Path, error: &io::Error) -> FileError {
+    let advice = "Make room or choose another place.";
+    FileError::io(path, "write the file", error, advice)
+}
+
+/// Every column of a stream, with all digits.
+fn rows_as_text(source: &Source, path: &Path) -> Result<(), FileError> {
+    let rows = RefCell::new(source.open()?);
+    let stopped = RefCell::new(None);
+    let content = |file: &mut dyn Write| -> io::Result<()> {
+        let mut rows = rows.borrow_mut();
+        let mut csv = csv::Writer::from_writer(file);
+        csv.write_record(rows.header())?;
+        let columns = rows.header().len();
+        loop {
+            match rows.advance() {
+                Ok(true) => {}
+                Ok(false) => break,
+                Err(error) => {
+                    *stopped.borrow_mut() = Some(error);
+                    break;
+                }
+            }
+            let field = |k| match rows.number(k) {
+                Ok(_) => rows.shown(k).into_owned(),
+                Err(_) => String::new(),
+            };
+            csv.write_record((0..columns).map(field))?;
+        }
+        csv.flush()
+    };
+    let written = File::create(path).and_then(|file| write_rows(path, file, &content));
+    written.map_err(|error| unwritten(path, &error))?;
+    stopped.into_inner().map_or(Ok(()), Err)
+}
