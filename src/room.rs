@@ -7,7 +7,7 @@ use std::hint::black_box;
 /// An allocation that fails within a calculation ends the program, and safe code cannot catch that. What a
 /// step will take is therefore asked for as a whole before it begins, where an error can still be given, and
 /// let go again; memory that is never touched costs nothing.
-pub(crate) fn is_there(bytes: usize) -> bool {
+pub fn is_there(bytes: usize) -> bool {
     let mut room: Vec<u8> = Vec::new();
     let granted = room.try_reserve_exact(bytes).is_ok();
     // What is never used need never be asked for.

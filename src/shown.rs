@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 /// A message shows so many characters of one input, no more.
-pub(crate) const LONGEST: usize = 200;
+pub const LONGEST: usize = 200;
 
 /// An input short enough for a message.
-pub(crate) fn excerpt(text: &str) -> String {
+pub fn excerpt(text: &str) -> String {
     match text.char_indices().nth(LONGEST) {
         Some((end, _)) => format!("{} …", &text[..end]),
         None => text.to_owned(),
@@ -17,7 +17,7 @@ pub(crate) fn excerpt(text: &str) -> String {
 const LONGEST_NAME: usize = 255;
 
 /// A path as it is, but for names that no file has: these are cut.
-pub(crate) fn path(path: &Path) -> String {
+pub fn path(path: &Path) -> String {
     let names = || {
         path.components()
             .map(|name| name.as_os_str().to_string_lossy())

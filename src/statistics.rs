@@ -7,19 +7,19 @@ use statrs::function::gamma::ln_gamma;
 use statrs::statistics::{Data, OrderStatistics};
 
 /// Rate of false alarms of a whole list of checks; each check has its share of it.
-pub(crate) const FALSE_ALARM: f64 = 1e-3;
+pub const FALSE_ALARM: f64 = 1e-3;
 
 /// σ of a normal distribution over the median of its absolute deviations.
-pub(crate) const SIGMA_OF_MEDIAN: f64 = 1.482_602;
+pub const SIGMA_OF_MEDIAN: f64 = 1.482_602;
 
 /// What χ² of so many degrees of freedom stays below but for this chance; infinite without a degree of
 /// freedom, for then nothing is beyond chance.
-pub(crate) fn chi_square_limit(degrees: f64, chance: f64) -> f64 {
+pub fn chi_square_limit(degrees: f64, chance: f64) -> f64 {
     ChiSquared::new(degrees).map_or(f64::INFINITY, |chi2| chi2.inverse_cdf(1.0 - chance))
 }
 
 /// ln of the chance that χ² with this many degrees of freedom is above `x`, however small it is.
-pub(crate) fn ln_survival(freedom: f64, x: f64) -> f64 {
+pub fn ln_survival(freedom: f64, x: f64) -> f64 {
     let (a, z) = (0.5 * freedom, 0.5 * x);
     if z < a + 1.0 {
         return ChiSquared::new(freedom).map_or(0.0, |chi2| chi2.sf(x.max(0.0)).ln());
@@ -55,7 +55,7 @@ const MANY: f64 = 1e4;
 ///
 /// The tail is halved in, for Newton's method on it goes in circles for some degrees of freedom. Source:
 /// Abramowitz and Stegun, *Handbook of Mathematical Functions*, 26.7.1 and 26.7.5.
-pub(crate) fn student_limit(degrees: f64, chance: f64) -> f64 {
+pub fn student_limit(degrees: f64, chance: f64) -> f64 {
     if degrees > MANY {
         let z = -Normal::standard().inverse_cdf(chance);
         return z + (z.powi(3) + z) / (4.0 * degrees);
@@ -79,12 +79,12 @@ pub(crate) fn student_limit(degrees: f64, chance: f64) -> f64 {
 }
 
 /// The median of some numbers, which lose their order; none of none.
-pub(crate) fn median(values: &mut [f64]) -> Option<f64> {
+pub fn median(values: &mut [f64]) -> Option<f64> {
     (!values.is_empty()).then(|| Data::new(values).median())
 }
 
 /// Median of each axis; `None` of no vectors.
-pub(crate) fn median_of_axes(vectors: &[Vector3<f64>]) -> Option<Vector3<f64>> {
+pub fn median_of_axes(vectors: &[Vector3<f64>]) -> Option<Vector3<f64>> {
     let of = |axis: usize| median(&mut vectors.iter().map(|v| v[axis]).collect::<Vec<_>>());
     Some(Vector3::new(of(0)?, of(1)?, of(2)?))
 }

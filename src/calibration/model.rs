@@ -19,9 +19,9 @@ use crate::turntable::{AxisError, TableGeometry};
 use crate::units::ARCSEC;
 
 /// 1σ of a table's level where nothing better is known, rad.
-pub(crate) const USUAL_LEVEL: f64 = 10.0 * ARCSEC;
+pub const USUAL_LEVEL: f64 = 10.0 * ARCSEC;
 /// 1σ of its north.
-pub(crate) const USUAL_NORTH: f64 = 60.0 * ARCSEC;
+pub const USUAL_NORTH: f64 = 60.0 * ARCSEC;
 /// 1σ of each tilt of its axes.
 const USUAL_TILT: f64 = 10.0 * ARCSEC;
 /// Correlation time of a varying bias where nothing better is known, s.
@@ -240,7 +240,7 @@ impl Model {
 
 /// 1σ of each error of a table's axes where nothing better is known, rad, on a table with this position
 /// error: what of a table's accuracy repeats with angle may be as large as what does not.
-pub(crate) fn usual_axis_error(kind: AxisError, position_sigma: f64) -> f64 {
+pub fn usual_axis_error(kind: AxisError, position_sigma: f64) -> f64 {
     match kind {
         AxisError::Tilt => USUAL_TILT,
         AxisError::Wobble | AxisError::Encoder => position_sigma.max(ARCSEC),
@@ -248,7 +248,7 @@ pub(crate) fn usual_axis_error(kind: AxisError, position_sigma: f64) -> f64 {
 }
 
 /// How a bias may vary where nothing better is known than the white noise.
-pub(crate) fn usual_variation(noise: &Noise) -> GaussMarkov {
+pub fn usual_variation(noise: &Noise) -> GaussMarkov {
     GaussMarkov {
         sigma: USUAL_VARIATION * noise.random_walk / USUAL_CORRELATION.sqrt(),
         correlation_time: USUAL_CORRELATION,

@@ -32,7 +32,7 @@ pub struct Change {
     pub sigma: Option<f64>,
 }
 
-pub(super) fn as_found(
+pub fn as_found(
     name: &str,
     earlier: &Calibration,
     now: &Calibration,

@@ -84,7 +84,7 @@ impl Conformity {
 }
 
 /// A parameter so far from the middle of a limit.
-pub(super) fn decide(off: f64, sigma: f64, within: f64, rule: DecisionRule) -> (Decision, f64) {
+pub fn decide(off: f64, sigma: f64, within: f64, rule: DecisionRule) -> (Decision, f64) {
     let outside = probability_outside(off, sigma, within);
     let guard = match rule {
         DecisionRule::GuardBand => GUARD * sigma,
@@ -103,7 +103,7 @@ pub(super) fn decide(off: f64, sigma: f64, within: f64, rule: DecisionRule) -> (
     (decision, risk)
 }
 
-pub(super) fn conformity(
+pub fn conformity(
     calibration: &Calibration,
     provenance: &Provenance,
     specification: &Specification,

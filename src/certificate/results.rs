@@ -65,12 +65,12 @@ pub struct Measured {
 }
 
 /// The nominal scales that a calibration was made with.
-pub(super) fn nominal(provenance: &Provenance) -> PerSensor<Nominal> {
+pub fn nominal(provenance: &Provenance) -> PerSensor<Nominal> {
     PerSensor::from_fn(|sensor| Nominal((*provenance.nominal.get(sensor)).into()))
 }
 
 /// Every estimated parameter, and their covariance in SI; none if the record has no covariance.
-pub(super) fn results(
+pub fn results(
     calibration: &Calibration,
     provenance: &Provenance,
 ) -> Option<(Vec<Measured>, Vec<Vec<f64>>)> {
@@ -125,7 +125,7 @@ pub(super) fn results(
 }
 
 /// Every estimated parameter of the instrument's error terms; those of the table are no results of the instrument.
-pub(super) fn terms(calibration: &Calibration) -> Vec<Measured> {
+pub fn terms(calibration: &Calibration) -> Vec<Measured> {
     let measured = |k: usize| {
         let name = Term::parameter_name(k)?;
         let record = calibration.terms.get(&name)?;

@@ -39,7 +39,7 @@ const FEW_ROWS: usize = 1 << 12;
 /// Commas, semicolons, tabs or blanks part the fields, as most rows show. Lines that begin with `#`, `%` or `//` are
 /// comments; those above the names, or above rows of numbers without names, are a preamble. Columns without names are
 /// called `1`, `2`, …. Numbers may have a decimal comma where commas do not part them; a time may be that of a clock.
-pub(super) struct CsvFile {
+pub struct CsvFile {
     file: PathBuf,
     lines: Lines,
     heading: Heading,

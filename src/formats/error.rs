@@ -112,10 +112,7 @@ impl FileError {
 }
 
 /// The candidate most like a misspelt name, if one is like it at all.
-pub(super) fn nearest<'a>(
-    name: &str,
-    candidates: impl IntoIterator<Item = &'a str>,
-) -> Option<&'a str> {
+pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     candidates
         .into_iter()
         .map(|candidate| (likeness(name, candidate), candidate))
@@ -134,7 +131,7 @@ fn likeness(name: &str, other: &str) -> f64 {
 }
 
 /// `Did you mean … ?`, or else the advice given.
-pub(super) fn suggestion<'a>(
+pub fn suggestion<'a>(
     name: &str,
     candidates: impl IntoIterator<Item = &'a str>,
     otherwise: &str,
@@ -150,7 +147,7 @@ const ROOM: usize = 2 * LONGEST;
 
 /// All names that could be meant, where there is room for them; else those most like the one that is wanted first,
 /// and how many others there are.
-pub(super) fn choice<'a>(wanted: &str, names: impl IntoIterator<Item = &'a str>) -> String {
+pub fn choice<'a>(wanted: &str, names: impl IntoIterator<Item = &'a str>) -> String {
     let names: Vec<&str> = names.into_iter().collect();
     let all = list(names.iter().copied());
     if all.chars().count() <= ROOM {
@@ -172,7 +169,7 @@ pub(super) fn choice<'a>(wanted: &str, names: impl IntoIterator<Item = &'a str>)
 }
 
 /// Names in backquotes, separated by commas.
-pub(super) fn list<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
+pub fn list<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     let quoted: Vec<String> = names
         .into_iter()
         .map(|name| format!("`{}`", excerpt(name)))

@@ -5,7 +5,7 @@ use crate::shown::excerpt;
 
 /// The place of a column by its name, or by its number where none is called so; none of those that are taken. Else
 /// what was found and expected, and what to do.
-pub(super) fn find(all: &[String], taken: &[usize], name: &str) -> Result<usize, [String; 3]> {
+pub fn find(all: &[String], taken: &[usize], name: &str) -> Result<usize, [String; 3]> {
     let mut places: Vec<usize> = (0..all.len()).filter(|&place| all[place] == name).collect();
     if let Ok(number) = name.parse::<usize>()
         && (1..=all.len()).contains(&number)

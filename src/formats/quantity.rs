@@ -9,7 +9,7 @@ use crate::noise::normalised;
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, STANDARD_GRAVITY};
 
 /// The words for what a row holds.
-pub(super) const OUTPUTS: [(&str, Output); 3] = [
+pub const OUTPUTS: [(&str, Output); 3] = [
     ("pulse", Output::Pulse),
     ("increment", Output::Increment),
     ("rate", Output::Rate),
@@ -17,7 +17,7 @@ pub(super) const OUTPUTS: [(&str, Output); 3] = [
 
 /// What a unit is of.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Of {
+pub enum Of {
     /// A triad's rows.
     Rows(Sensor, Output),
     /// Anything.
@@ -66,23 +66,20 @@ const MULTIPLES: [(&str, f64, &[&str]); 5] = [
 
 /// Units of a triad's rows: the file's quantity per second for one rad/s or m/s². A count has no
 /// nominal scale of its own.
-pub(super) fn units(
-    sensor: Sensor,
-    output: Output,
-) -> impl Iterator<Item = (&'static str, Option<f64>)> {
+pub fn units(sensor: Sensor, output: Output) -> impl Iterator<Item = (&'static str, Option<f64>)> {
     let usable = move |row: &&Row| row.1 == Count || row.1 == Rows(sensor, output);
     let scaled = |&(word, of, per_si, _): &Row| (word, (of != Count).then_some(per_si));
     UNITS.iter().filter(usable).map(scaled)
 }
 
 /// Units of time in s.
-pub(super) fn units_of_time() -> impl Iterator<Item = (&'static str, f64)> {
+pub fn units_of_time() -> impl Iterator<Item = (&'static str, f64)> {
     let of_time = UNITS.iter().filter(|row| row.1 == Time);
     of_time.map(|&(word, _, per_si, _)| (word, per_si.recip()))
 }
 
 /// The unit that a text spells: its word in `run.toml`, how many of that it is, and what of.
-pub(super) fn spelled(text: &str) -> Option<(&'static str, f64, Of)> {
+pub fn spelled(text: &str) -> Option<(&'static str, f64, Of)> {
     let text = normalised(text);
     let has = |spellings: &[&str]| spellings.contains(&text.as_str());
     let multiple = MULTIPLES.iter().find(|(.., spellings)| has(spellings));
@@ -93,7 +90,7 @@ pub(super) fn spelled(text: &str) -> Option<(&'static str, f64, Of)> {
 
 /// What a unit of rows says of the nominal scale of a triad: the file's quantity per second for one
 /// rad/s or m/s²; none for counts and for what is no unit.
-pub(crate) fn unit_scale(sensor: Sensor, unit: &str) -> Option<f64> {
+pub fn unit_scale(sensor: Sensor, unit: &str) -> Option<f64> {
     let mut all = OUTPUTS
         .iter()
         .flat_map(|&(_, output)| units(sensor, output));

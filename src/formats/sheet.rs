@@ -8,7 +8,7 @@ use super::source::Source;
 
 /// The columns of a file of which nothing is known yet.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Sheet {
+pub struct Sheet {
     pub names: Vec<String>,
     /// What the row below the names says of each, empty without such a row.
     pub units: Vec<String>,

@@ -7,7 +7,7 @@ use super::{ANGLES, AXES, InstallationForm, Sensor};
 /// Parameters of a triad: three scale factors, room for six angles, three biases.
 pub const PARAMETERS: usize = 3 + ANGLES + 3;
 const SCALE: usize = 0;
-pub(super) const INSTALLATION: usize = 3;
+pub const INSTALLATION: usize = 3;
 const BIAS: usize = INSTALLATION + ANGLES;
 
 /// A triad's parameters in their order: `K_x K_y K_z`, the angles of

@@ -14,7 +14,7 @@ use crate::units::PPM;
 
 /// How units are drawn: 1σ of scale factors from unit to unit, and of each calibration.
 #[derive(Clone, Copy)]
-pub(crate) struct Draw {
+pub struct Draw {
     pub(crate) spread: f64,
     pub(crate) sigma: f64,
     /// 1σ of an error of gravity that all share, in that of each calibration.
@@ -23,7 +23,7 @@ pub(crate) struct Draw {
 
 const SCALE: f64 = 2e6;
 
-pub(crate) fn drawn(count: usize, draw: Draw, seed: u64) -> Vec<Unit> {
+pub fn drawn(count: usize, draw: Draw, seed: u64) -> Vec<Unit> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut normal = |sigma: f64| {
         let white: f64 = StandardNormal.sample(&mut rng);

@@ -44,7 +44,7 @@ impl ThermalVariation {
 /// `[gyro.temperature]` of an instrument's file: 1σ of each.
 #[derive(Clone, Copy, Deserialize, Default)]
 #[serde(deny_unknown_fields, default)]
-pub(super) struct GyroThermalFile {
+pub struct GyroThermalFile {
     scale_ppm_per_k: NonNegative,
     scale_ppm_per_k2: NonNegative,
     installation_arcsec_per_k: NonNegative,
@@ -56,7 +56,7 @@ pub(super) struct GyroThermalFile {
 /// `[accel.temperature]`.
 #[derive(Clone, Copy, Deserialize, Default)]
 #[serde(deny_unknown_fields, default)]
-pub(super) struct AccelThermalFile {
+pub struct AccelThermalFile {
     scale_ppm_per_k: NonNegative,
     scale_ppm_per_k2: NonNegative,
     installation_arcsec_per_k: NonNegative,

@@ -24,7 +24,7 @@ const PART: f64 = 0.1;
 const ROUNDS: usize = 4;
 
 /// The whole number of samples nearest to a time, at least one.
-pub(crate) fn samples_of(time: f64, period: f64) -> usize {
+pub fn samples_of(time: f64, period: f64) -> usize {
     ((time / period).round() as usize).max(1)
 }
 

@@ -251,7 +251,7 @@ impl Solution {
 }
 
 /// Whether East-North-Up has a heading at a latitude, rad.
-pub(crate) fn within_reach(latitude: f64) -> Result<(), NearPole> {
+pub fn within_reach(latitude: f64) -> Result<(), NearPole> {
     // Written so that not-a-number is refused as well.
     if latitude.abs() <= LARGEST_LATITUDE {
         Ok(())

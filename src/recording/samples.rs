@@ -264,12 +264,7 @@ impl ImuSamples {
 }
 
 /// The stretches of this many samples of a uniform clock between faults that no interpolation bridges.
-pub(crate) fn stretches_between(
-    count: usize,
-    start: f64,
-    period: f64,
-    faults: &[Fault],
-) -> Vec<Stretch> {
+pub fn stretches_between(count: usize, start: f64, period: f64, faults: &[Fault]) -> Vec<Stretch> {
     let unbridged = faults.iter().filter(|fault| !fault.bridged);
     let mut lost: Vec<Range<usize>> = unbridged.map(|fault| fault.samples.clone()).collect();
     lost.sort_by_key(|samples| samples.start);

@@ -122,7 +122,7 @@ impl Series {
 }
 
 /// Takes samples as they come, in the quantity of a file: to keep them as they are, or packed.
-pub(crate) enum SeriesWriter {
+pub enum SeriesWriter {
     Whole(Vec<Vector3<f64>>),
     Packed(Packer),
 }

@@ -63,14 +63,14 @@ impl Group {
 }
 
 /// The end of a parameter's name, such as `x` or `xy`.
-pub(super) fn axis_name(form: InstallationForm, index: usize) -> String {
+pub fn axis_name(form: InstallationForm, index: usize) -> String {
     parameter_name(form, index)
         .and_then(|name| name.rsplit('.').next().map(str::to_owned))
         .unwrap_or_default()
 }
 
 /// Which function of temperature a coefficient is of; none: a parameter at the reference.
-pub(super) fn function_name(function: Option<usize>) -> String {
+pub fn function_name(function: Option<usize>) -> String {
     match function {
         None => "at the reference".to_owned(),
         Some(RATE) => "by rate".to_owned(),
@@ -82,7 +82,7 @@ pub(super) fn function_name(function: Option<usize>) -> String {
 }
 
 /// A short name for a figure's margin, such as `gyro E xy`.
-pub(super) fn short_name(form: InstallationForm, index: usize) -> String {
+pub fn short_name(form: InstallationForm, index: usize) -> String {
     format!("{} {}", Group::of(index).short(), axis_name(form, index))
 }
 

@@ -14,7 +14,7 @@ fn decimals(sigma: f64) -> usize {
 }
 
 /// A value with the digits that its σ leaves meaning to; a dash if it is not a number.
-pub(super) fn value(value: f64, sigma: f64) -> String {
+pub fn value(value: f64, sigma: f64) -> String {
     if !value.is_finite() {
         return "–".to_owned();
     }
@@ -27,12 +27,12 @@ pub(super) fn value(value: f64, sigma: f64) -> String {
 }
 
 /// A quantity that is its own measure of accuracy, to two digits.
-pub(super) fn sigma(sigma: f64) -> String {
+pub fn sigma(sigma: f64) -> String {
     value(sigma, sigma)
 }
 
 /// A quantity to three digits.
-pub(super) fn three_digits(x: f64) -> String {
+pub fn three_digits(x: f64) -> String {
     if x.is_finite() && x.abs() >= 999.5 {
         let last = 10f64.powf(x.abs().log10().floor() - 2.0);
         return whole((x / last).round() * last);
@@ -41,7 +41,7 @@ pub(super) fn three_digits(x: f64) -> String {
 }
 
 /// A quantity rounded to a whole number, in groups of three digits.
-pub(super) fn whole(x: f64) -> String {
+pub fn whole(x: f64) -> String {
     if !x.is_finite() {
         return value(x, x);
     }
@@ -54,7 +54,7 @@ pub(super) fn whole(x: f64) -> String {
 }
 
 /// A number with all its digits.
-pub(super) fn plain(x: f64) -> String {
+pub fn plain(x: f64) -> String {
     match x.fract() == 0.0 {
         true => whole(x),
         false => x.to_string().replace('-', "−"),
@@ -62,7 +62,7 @@ pub(super) fn plain(x: f64) -> String {
 }
 
 /// A whole number in groups of three digits.
-pub(super) fn count(n: usize) -> String {
+pub fn count(n: usize) -> String {
     let digits = n.to_string();
     let mut text = String::new();
     for (i, digit) in digits.chars().enumerate() {
@@ -76,33 +76,33 @@ pub(super) fn count(n: usize) -> String {
 }
 
 /// An interval with the digits that its width leaves meaning to.
-pub(super) fn interval((low, high): (f64, f64)) -> String {
+pub fn interval((low, high): (f64, f64)) -> String {
     let fine = 0.5 * (high - low);
     format!("{}…{}", value(low, fine), value(high, fine))
 }
 
 /// A value with the digits that its interval leaves meaning to, and the interval.
-pub(super) fn with_interval(of: f64, (low, high): (f64, f64)) -> [String; 2] {
+pub fn with_interval(of: f64, (low, high): (f64, f64)) -> [String; 2] {
     [value(of, 0.5 * (high - low)), interval((low, high))]
 }
 
 /// A value with its 1σ.
-pub(super) fn plus_minus(of: f64, own: f64) -> String {
+pub fn plus_minus(of: f64, own: f64) -> String {
     format!("{} ± {}", value(of, own), sigma(own))
 }
 
 /// A number or a dash.
-pub(super) fn or_dash(of: Option<f64>, shown: impl FnOnce(f64) -> String) -> String {
+pub fn or_dash(of: Option<f64>, shown: impl FnOnce(f64) -> String) -> String {
     of.map_or_else(|| "–".to_owned(), shown)
 }
 
 /// A time in minutes with its unit.
-pub(super) fn minutes(seconds: f64) -> String {
+pub fn minutes(seconds: f64) -> String {
     format!("{} min", three_digits(seconds / MINUTE))
 }
 
 /// A tick of an axis whose ticks are `step` apart.
-pub(super) fn tick(x: f64, step: f64) -> String {
+pub fn tick(x: f64, step: f64) -> String {
     if x == 0.0 {
         return "0".to_owned();
     }
@@ -111,7 +111,7 @@ pub(super) fn tick(x: f64, step: f64) -> String {
 }
 
 /// A power of ten, written out while that is short.
-pub(super) fn power_of_ten(exponent: i32) -> String {
+pub fn power_of_ten(exponent: i32) -> String {
     if (-3..=4).contains(&exponent) {
         let step = 10f64.powi(exponent);
         return tick(step, step);

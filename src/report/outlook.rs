@@ -17,20 +17,14 @@ pub struct Navigated {
 }
 
 /// Adds the position error at the end in a line.
-pub(super) fn in_a_line(
-    document: &mut Document,
-    navigation: Result<&[Navigated], &NavigationStudyError>,
-) {
+pub fn in_a_line(document: &mut Document, navigation: Result<&[Navigated], &NavigationStudyError>) {
     if let Ok(navigated @ [_, ..]) = navigation {
         document.both(Block::Text(String::new(), line(navigated)));
     }
 }
 
 /// Adds the table.
-pub(super) fn add(
-    document: &mut Document,
-    navigation: Result<&[Navigated], &NavigationStudyError>,
-) {
+pub fn add(document: &mut Document, navigation: Result<&[Navigated], &NavigationStudyError>) {
     match navigation {
         Err(reason) => {
             let text = format!("Not navigated from the site of the run: {reason}.");
@@ -183,7 +177,7 @@ fn row(navigated: &[Navigated], quantity: Quantity, of: Of) -> Vec<String> {
 }
 
 /// Position error east and north against time; none if nothing was navigated.
-pub(super) fn figure(navigated: &[Navigated]) -> Option<Plot> {
+pub fn figure(navigated: &[Navigated]) -> Option<Plot> {
     let last = navigated.last()?;
     let (heading, mut caption) = match is_known(navigated) {
         true => (

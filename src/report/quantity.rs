@@ -18,7 +18,7 @@ const LENGTHS: Units = &[("nmile", NAUTICAL_MILE), ("m", 1.0)];
 
 /// A component of the error, or the horizontal length of two.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Quantity {
+pub struct Quantity {
     /// Such as `pitch`.
     pub(super) name: &'static str,
     /// Its name in documents, with its unit.

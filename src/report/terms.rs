@@ -10,7 +10,7 @@ use crate::report::prelude::*;
 use crate::turntable::AxisError;
 
 /// An error term in words.
-pub(super) fn title(block: ErrorTerm) -> &'static str {
+pub fn title(block: ErrorTerm) -> &'static str {
     match block {
         ErrorTerm::GaussMarkovBias => "Gauss–Markov biases",
         ErrorTerm::TableBase => "table level and north",
@@ -22,7 +22,7 @@ pub(super) fn title(block: ErrorTerm) -> &'static str {
 }
 
 /// Symbol and SI value of the unit that its parameters are shown in.
-pub(super) fn unit(block: ErrorTerm) -> (&'static str, f64) {
+pub fn unit(block: ErrorTerm) -> (&'static str, f64) {
     match block {
         ErrorTerm::Instrument(term) => term.entry().unit,
         ErrorTerm::TableBase | ErrorTerm::TableAxes(_) | ErrorTerm::GaussMarkovBias => {
@@ -32,7 +32,7 @@ pub(super) fn unit(block: ErrorTerm) -> (&'static str, f64) {
 }
 
 /// Rows of the table of parameters; errors where `errors` asks for them and the truth states them.
-pub(super) fn rows(
+pub fn rows(
     auxiliary: &Auxiliary,
     truth: &BTreeMap<String, TermRecord>,
     errors: bool,
@@ -60,7 +60,7 @@ pub(super) fn rows(
 }
 
 /// Prior over posterior σ, with words where the data did not observe the parameter.
-pub(super) fn improvement(prior: f64, posterior: f64) -> String {
+pub fn improvement(prior: f64, posterior: f64) -> String {
     let ratio = prior / posterior;
     if !ratio.is_finite() {
         NONE.to_owned()
@@ -72,7 +72,7 @@ pub(super) fn improvement(prior: f64, posterior: f64) -> String {
 }
 
 /// Costs of the error terms that were on.
-pub(super) fn costs(effects: &[ErrorTermTest]) -> Table {
+pub fn costs(effects: &[ErrorTermTest]) -> Table {
     let row = |effect: &ErrorTermTest| {
         let cells = effect.sigma_factors.iter();
         let cells = cells.map(|cost| cost.map_or(NONE.to_owned(), |cost| value(cost, 0.1)));
@@ -89,7 +89,7 @@ pub(super) fn costs(effects: &[ErrorTermTest]) -> Table {
 }
 
 /// What those explain that were on or that the data show.
-pub(super) fn explained(effects: &[ErrorTermTest]) -> Table {
+pub fn explained(effects: &[ErrorTermTest]) -> Table {
     let row = |effect: &ErrorTermTest| {
         let yes_no = |yes: bool, words: [&str; 2]| words[usize::from(!yes)].to_owned();
         cells![

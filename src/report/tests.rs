@@ -23,7 +23,7 @@ use crate::units::ARCSEC;
 
 static NO_TERMS: BTreeMap<String, TermRecord> = BTreeMap::new();
 
-pub(super) struct Synthetic {
+pub struct Synthetic {
     pub(super) run: Run,
     pub(super) outcome: Outcome,
     pub(super) closed: Estimate,
@@ -247,7 +247,7 @@ fn outcome(
 }
 
 /// σ that fall to a thousandth of the prior's, and errors of that size.
-pub(super) fn synthetic(form: InstallationForm) -> Synthetic {
+pub fn synthetic(form: InstallationForm) -> Synthetic {
     let rng = &mut ChaCha8Rng::seed_from_u64(7);
     let Simulated { run, truth, .. } = simulated();
     let seconds = |dwell: crate::run::Dwell| {

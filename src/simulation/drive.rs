@@ -9,7 +9,7 @@ use crate::turntable::{AxisAngles, Imperfection, Motion, Moves, TableError, axis
 
 /// How a table moves, and what an ideal instrument on it senses.
 #[derive(Debug, Clone)]
-pub(super) struct Drive {
+pub struct Drive {
     imperfection: Imperfection,
     terms: TermVector,
     /// How long it takes, s.

@@ -318,7 +318,7 @@ fn ten_hertz() -> Positive {
 /// A climatic chamber.
 #[derive(Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct ChamberFile {
+pub struct ChamberFile {
     /// Time in s and temperature in °C.
     profile: Vec<(Finite, Finite)>,
     #[serde(default)]

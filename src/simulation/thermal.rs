@@ -70,7 +70,7 @@ impl Chamber {
 
 /// Temperature of an instrument every second.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Warming {
+pub struct Warming {
     values: Vec<f64>,
 }
 

@@ -43,10 +43,7 @@ impl Ratio {
 
 /// A statistic of all runs, which are given by their numbers, with its 99 % interval; `None` without
 /// runs.
-pub(super) fn bootstrap(
-    runs: usize,
-    statistic: impl Fn(&[usize]) -> f64,
-) -> Option<(f64, (f64, f64))> {
+pub fn bootstrap(runs: usize, statistic: impl Fn(&[usize]) -> f64) -> Option<(f64, (f64, f64))> {
     if runs == 0 {
         return None;
     }
@@ -67,7 +64,7 @@ pub(super) fn bootstrap(
 }
 
 /// The median of some of the values, which are given by their numbers.
-pub(super) fn median(of: &[f64], chosen: &[usize]) -> f64 {
+pub fn median(of: &[f64], chosen: &[usize]) -> f64 {
     let mut values: Vec<f64> = chosen.iter().map(|&k| of[k]).collect();
     values.sort_by(f64::total_cmp);
     quantile(&values, 0.5)
@@ -75,7 +72,7 @@ pub(super) fn median(of: &[f64], chosen: &[usize]) -> f64 {
 
 /// The value below which this share of sorted values lies, between two of them by proportion; NaN of
 /// none.
-pub(super) fn quantile(sorted: &[f64], share: f64) -> f64 {
+pub fn quantile(sorted: &[f64], share: f64) -> f64 {
     let place = share * sorted.len().saturating_sub(1) as f64;
     let (below, part) = (place as usize, place.fract());
     match (sorted.get(below), sorted.get(below + 1)) {

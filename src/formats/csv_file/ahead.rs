@@ -10,7 +10,7 @@ const BLOCK: usize = 1 << 16;
 const WAITING: usize = 2;
 
 /// What a source holds, read on a thread of its own a few blocks ahead; dropped, it ends the thread.
-pub(super) struct Ahead {
+pub struct Ahead {
     blocks: Receiver<io::Result<Vec<u8>>>,
     block: Vec<u8>,
     /// Bytes of it that are read.

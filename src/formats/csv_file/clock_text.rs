@@ -2,7 +2,7 @@
 
 /// How the texts of a column are read as times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct ClockText {
+pub struct ClockText {
     /// Digits of the fractions where these are whole numbers without the zeros before them.
     unpadded: Option<usize>,
 }

@@ -23,7 +23,7 @@ const SCALES: [(&str, char, &str); 3] = [
 
 /// What a text holds.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Heading {
+pub struct Heading {
     pub delimiter: Delimiter,
     /// Names of the columns: `1`, `2`, … where the file gives none.
     pub names: Vec<String>,
@@ -43,13 +43,13 @@ pub(super) struct Heading {
 
 /// Rows of several kinds, by the word or number in one of their columns.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Tags {
+pub struct Tags {
     pub column: usize,
     pub names: Vec<String>,
 }
 
 /// The first lines of a text, taken apart.
-pub(super) struct Looks(Vec<Look>);
+pub struct Looks(Vec<Look>);
 
 struct Look {
     number: u64,
@@ -468,7 +468,7 @@ fn is_number(field: &str) -> bool {
 
 /// What parts a row's fields.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Delimiter {
+pub enum Delimiter {
     /// This byte, each time.
     Byte(u8),
     /// Spaces and tabs, however many.

@@ -7,14 +7,14 @@ use std::io::{self, BufRead, BufReader, ErrorKind, Read};
 use super::row::Malformed;
 
 /// Within so many bytes a row ends, comments and empty lines before it counted; what does not is no log.
-pub(super) const LONGEST: u64 = 1 << 20;
+pub const LONGEST: u64 = 1 << 20;
 /// So many lines and bytes at most are looked at to see what the others are.
 const MOST_AHEAD: usize = 1 << 11;
 const BYTES_AHEAD: usize = 1 << 18;
 
 /// A line that is not empty, without what ends it.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Line {
+pub struct Line {
     pub text: Vec<u8>,
     /// Its number in the file.
     pub number: u64,
@@ -39,7 +39,7 @@ impl Line {
 
 /// Why lines cannot be read on.
 #[derive(Debug)]
-pub(super) enum Stop {
+pub enum Stop {
     /// The system or the decompression says so.
     System(io::Error),
     /// From this line on no row ends within [`LONGEST`].
@@ -57,7 +57,7 @@ impl From<io::Error> for Stop {
 }
 
 /// The lines of a file, the first of them looked at before their turn.
-pub(super) struct Lines {
+pub struct Lines {
     source: Box<dyn BufRead>,
     /// What ends a line.
     end: u8,

@@ -3,13 +3,13 @@
 use csv_core::{ReadRecordResult, Reader, ReaderBuilder, Terminator};
 
 /// As many columns as a spreadsheet has.
-pub(super) const MOST_COLUMNS: usize = 16_384;
+pub const MOST_COLUMNS: usize = 16_384;
 /// No number and no name is longer, bytes.
-pub(super) const LONGEST_FIELD: usize = 1 << 16;
+pub const LONGEST_FIELD: usize = 1 << 16;
 
 /// Why a line is no row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Malformed {
+pub enum Malformed {
     /// A field begins with a quote that nothing in its line closes.
     Quote,
     /// More columns than [`MOST_COLUMNS`].
@@ -19,7 +19,7 @@ pub(super) enum Malformed {
 }
 
 /// The fields of a line, which may stand in quotes; no field goes beyond its line.
-pub(super) struct Row {
+pub struct Row {
     parser: Reader,
     text: Vec<u8>,
     /// End of each field in the text, and room for more.

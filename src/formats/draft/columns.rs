@@ -10,7 +10,7 @@ use crate::statistics::median;
 
 /// Columns by their place in the file.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Columns {
+pub struct Columns {
     pub names: Vec<String>,
     pub time: Option<usize>,
     /// Nanoseconds beside a time in whole seconds.
@@ -142,7 +142,7 @@ impl Columns {
     }
 }
 
-pub(super) fn rows_of(sheet: &Sheet) -> usize {
+pub fn rows_of(sheet: &Sheet) -> usize {
     sheet.columns.first().map_or(0, Vec::len)
 }
 
@@ -156,13 +156,13 @@ fn distinct(names: &[String], column: usize) -> String {
 }
 
 /// The columns whose names say that they are of this sensor.
-pub(super) fn named(sheet: &Sheet, sensor: Sensor) -> Vec<usize> {
+pub fn named(sheet: &Sheet, sensor: Sensor) -> Vec<usize> {
     let is = |k: &usize| Name::of(&sheet.names[*k]).sensor() == Some(sensor);
     (0..sheet.names.len()).filter(is).collect()
 }
 
 /// Whether gyros and accelerometers have rows of their own, as their names tell.
-pub(super) fn have_rows_of_their_own(sheet: &Sheet) -> bool {
+pub fn have_rows_of_their_own(sheet: &Sheet) -> bool {
     let places = PerSensor::from_fn(|sensor| named(sheet, sensor));
     let is_there =
         |places: &[usize], row: usize| places.iter().any(|&k| sheet.columns[k][row].is_finite());
@@ -179,7 +179,7 @@ pub(super) fn have_rows_of_their_own(sheet: &Sheet) -> bool {
 }
 
 /// Whether a column has two different numbers.
-pub(super) fn varies(values: &[f64]) -> bool {
+pub fn varies(values: &[f64]) -> bool {
     let mut values = values.iter().filter(|value| value.is_finite());
     let first = values.next();
     first.is_some_and(|first| values.any(|value| value != first))
@@ -222,7 +222,7 @@ fn split_time(sheet: &Sheet, names: &[Name]) -> Option<[usize; 2]> {
 }
 
 /// The column that tells rows of several instruments apart, with what it says of the first.
-pub(super) fn instance(sheet: &Sheet) -> Option<(usize, f64)> {
+pub fn instance(sheet: &Sheet) -> Option<(usize, f64)> {
     let tells = |k: &usize| {
         let mut known: Vec<f64> = Vec::new();
         let is_number = |value: &f64| {
@@ -283,7 +283,7 @@ fn by_name(names: &[Name], sheet: &Sheet, sensor: Sensor) -> Vec<[usize; 3]> {
 }
 
 /// Three columns each whose names differ by the axis alone.
-pub(super) fn by_stem(names: &[Name], candidates: &[usize]) -> Vec<[usize; 3]> {
+pub fn by_stem(names: &[Name], candidates: &[usize]) -> Vec<[usize; 3]> {
     let mut triads = Vec::new();
     for &first in candidates {
         let axes = match names[first].axis {

@@ -22,7 +22,7 @@ const PER_G: [f64; 11] = [
 
 /// Counts for one of `run.toml`'s units, with the reason.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Scale {
+pub struct Scale {
     /// The file's quantity per second for one rad/s or m/s².
     pub value: Vector3<f64>,
     /// What it may be off by, relative, as far as the record shows.
@@ -156,7 +156,7 @@ fn nearest(sheet: &[f64], measured: f64) -> Option<f64> {
 }
 
 /// What registers often say for one g that say this with a zero that is not known.
-pub(super) fn likely_for_g(per_g: f64) -> String {
+pub fn likely_for_g(per_g: f64) -> String {
     let power = 2f64.powf(per_g.log2().floor());
     format!("often {power} or {} counts for one g", 2.0 * power)
 }

@@ -11,7 +11,7 @@ use crate::statistics::{FALSE_ALARM, SIGMA_OF_MEDIAN, median, median_of_axes, st
 use crate::units::DEGREE;
 
 /// Length of the windows whose means are compared, s.
-pub(super) const WINDOW: f64 = 0.25;
+pub const WINDOW: f64 = 0.25;
 /// Windows at rest differ by less than this many σ of their noise …
 const SIGMAS: f64 = 6.0;
 /// … and this part of gravity or of the fastest turn.
@@ -23,7 +23,7 @@ const CUT: f64 = 30.0 * DEGREE;
 /// … though it stays within this on each side.
 const STEADY: f64 = 5.0 * DEGREE;
 /// Length of the steps over which gravity's direction is followed, s.
-pub(super) const FOLLOWED: f64 = 0.08;
+pub const FOLLOWED: f64 = 0.08;
 /// Specific force within this part of gravity shows its direction.
 const NEAR_GRAVITY: f64 = 0.1;
 /// Changes of direction below this tell nothing, rad.
@@ -31,13 +31,13 @@ const ENOUGH: f64 = 20.0 * DEGREE;
 /// How well gravity's direction must follow the gyros.
 const CORRELATION: f64 = 0.98;
 /// What data sheets allow a scale.
-pub(super) const TOLERANCE: f64 = 0.03;
+pub const TOLERANCE: f64 = 0.03;
 /// Samples that are added up to tell pulses, whose fractions are carried, from readings.
 const SUM: usize = 16;
 
 /// What the samples show.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Motion {
+pub struct Motion {
     /// The longest stretch at rest.
     pub longest_rest: Range<usize>,
     /// Specific force at rest, the file's quantity a row.
@@ -57,11 +57,11 @@ pub(super) struct Motion {
     pub sum_variance: Option<f64>,
 }
 
-pub(super) fn mean(samples: &[Vector3<f64>]) -> Vector3<f64> {
+pub fn mean(samples: &[Vector3<f64>]) -> Vector3<f64> {
     samples.iter().sum::<Vector3<f64>>() / samples.len().max(1) as f64
 }
 
-pub(super) fn means(samples: &[Vector3<f64>], length: usize) -> Vec<Vector3<f64>> {
+pub fn means(samples: &[Vector3<f64>], length: usize) -> Vec<Vector3<f64>> {
     samples.chunks_exact(length).map(mean).collect()
 }
 
@@ -142,7 +142,7 @@ fn is_turned(forces: &[Vector3<f64>], gravity: f64) -> bool {
     first.is_some_and(|first| shown.any(|force| force.angle(first) > ENOUGH))
 }
 
-pub(super) fn is_whole(samples: &[Vector3<f64>]) -> bool {
+pub fn is_whole(samples: &[Vector3<f64>]) -> bool {
     let mut values = samples.iter().flat_map(|sample| sample.iter());
     values.all(|value| value.fract() == 0.0)
 }

@@ -5,7 +5,7 @@ use crate::imu::Sensor;
 
 /// A unit as `run.toml` writes it, and how many of it one of a file's is.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Unit {
+pub struct Unit {
     pub word: &'static str,
     pub times: f64,
     pub of: Of,
@@ -33,7 +33,7 @@ const OTHERS: [&str; 9] =
 
 /// A name taken apart.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Name {
+pub struct Name {
     /// Letters and digits in lower case, without axis and unit.
     pub stem: String,
     /// What stands for the axis.
@@ -42,7 +42,7 @@ pub(super) struct Name {
 }
 
 /// The body axes of the program whose columns have such names; none if it is not known.
-pub(super) fn axes_of_program(columns: &[String]) -> Option<&'static str> {
+pub fn axes_of_program(columns: &[String]) -> Option<&'static str> {
     let has = |name: &str| columns.iter().any(|column| column == name);
     // PX4's sensor_combined and ArduPilot's IMU: front, right, down.
     let is_autopilot =

@@ -48,7 +48,7 @@ const TOLD_APART: f64 = 1e3;
 
 /// How the axes of a triad follow rotation or gravity.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Axes {
+pub struct Axes {
     /// The file's quantity a row for one rad a row, negative where it turns the other way, or for one g.
     pub scale: Vector3<f64>,
     /// Of what is common to them, relative.
@@ -59,7 +59,7 @@ pub(super) struct Axes {
 
 /// What gravity at rest shows of accelerometers.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Gravity {
+pub struct Gravity {
     /// What the axes say at zero, the file's quantity a row, where it is not what they are made to say.
     pub own_zero: Option<Vector3<f64>>,
     /// Its largest σ.
@@ -71,7 +71,7 @@ pub(super) struct Gravity {
 
 /// How the gyros' columns lie to the accelerometers'.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Turns {
+pub struct Turns {
     /// Of each axis of the accelerometers the column that turns about it.
     pub columns: [usize; 3],
     pub axes: Axes,
@@ -106,7 +106,7 @@ struct Guess {
 
 /// Rows of both triads, and what does not follow from the row before.
 #[derive(Clone)]
-pub(super) struct RawRun {
+pub struct RawRun {
     rows: PerSensor<Vec<Vector3<f64>>>,
     /// By its clock, s.
     period: f64,

@@ -15,7 +15,7 @@ const CODES: f64 = 65_536.0;
 const FEWEST: usize = 4;
 
 /// Rows of both triads above what registers are made to say at zero.
-pub(super) struct Rows {
+pub struct Rows {
     pub triads: PerSensor<Vec<Vector3<f64>>>,
     /// Those that come after a gap.
     pub breaks: Vec<usize>,
@@ -91,7 +91,7 @@ impl Rows {
 
 /// What counts show.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Registers {
+pub struct Registers {
     pub has_rests: bool,
     pub gravity: Option<Gravity>,
     pub turns: Option<Turns>,

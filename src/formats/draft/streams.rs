@@ -19,7 +19,7 @@ use crate::imu::{Output, PerSensor, Sensor};
 
 /// The streams that hold gyros and accelerometers.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Streams {
+pub struct Streams {
     /// What the log holds, a line a stream.
     listed: Vec<String>,
     /// The stream of the gyros, and of the accelerometers if that is another.
@@ -40,7 +40,7 @@ pub(super) struct Streams {
 
 /// What rows of text a log was written as.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Written {
+pub struct Written {
     pub accel: Option<String>,
 }
 

@@ -9,7 +9,7 @@ use crate::imu::{NoiseKeys, Output, Sensor};
 
 /// Lines of a `run.toml`.
 #[derive(Debug, Default)]
-pub(super) struct Page {
+pub struct Page {
     pub text: String,
     /// The fields that a person must complete, each with the reason.
     pub open: Vec<(String, String)>,
@@ -376,18 +376,18 @@ fn places(count: usize) -> String {
 }
 
 /// A number to seven digits.
-pub(super) fn seven(value: f64) -> f64 {
+pub fn seven(value: f64) -> f64 {
     format!("{value:.6e}").parse().unwrap_or(value)
 }
 
 /// A word in quotes, or a number as it is.
-pub(super) fn word_or_number(text: &str) -> String {
+pub fn word_or_number(text: &str) -> String {
     match text.parse::<f64>() {
         Ok(_) => text.to_owned(),
         Err(_) => quoted(text),
     }
 }
 
-pub(super) fn quoted(text: &str) -> String {
+pub fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }

@@ -11,13 +11,13 @@ use crate::formats::quantity::units_of_time;
 use crate::statistics::median;
 
 /// No unit of three orders is right at two of these periods, s: 5 kHz to 5 Hz.
-pub(super) const PERIODS: std::ops::Range<f64> = 2e-4..0.2;
+pub const PERIODS: std::ops::Range<f64> = 2e-4..0.2;
 /// Steps within this factor are those of a stated rate.
 const STATED: f64 = 1.2;
 
 /// What the column of time shows.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Clock {
+pub struct Clock {
     /// The word or number for `time_unit`.
     pub unit: String,
     /// Why it is that.
@@ -106,7 +106,7 @@ impl Clock {
 
 /// A step longer than the usual one.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Gap {
+pub struct Gap {
     /// The row after it.
     before: usize,
     /// The rows that are missing.

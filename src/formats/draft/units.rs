@@ -24,7 +24,7 @@ const PULSE_SUMS: f64 = 0.5;
 
 /// What is known of the unit of a triad.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Unit {
+pub struct Unit {
     /// The word for `run.toml`, if it is known.
     pub word: Option<&'static str>,
     pub why: String,
@@ -38,7 +38,7 @@ pub(super) struct Unit {
 
 /// What rows hold.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Quantities {
+pub struct Quantities {
     pub output: Output,
     pub output_why: String,
     pub units: PerSensor<Unit>,
@@ -406,7 +406,7 @@ fn usual_period(all: &[Hypothesis], angle: f64) -> Option<(&'static str, f64)> {
 }
 
 /// Half the range of a register of whole numbers whose zero is in its middle, where all values lie about that.
-pub(super) fn offset(samples: &[Vector3<f64>]) -> Option<f64> {
+pub fn offset(samples: &[Vector3<f64>]) -> Option<f64> {
     let values = || samples.iter().flat_map(|sample| sample.iter().copied());
     if values().any(|value| value.fract() != 0.0) {
         return None;
@@ -423,6 +423,6 @@ pub(super) fn offset(samples: &[Vector3<f64>]) -> Option<f64> {
 }
 
 /// A number to four digits.
-pub(super) fn short(value: f64) -> f64 {
+pub fn short(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }

@@ -86,7 +86,7 @@ fn px4_line(name: &str, value: f32) -> String {
 }
 
 /// PX4's temperature: `n − (X0 + X1 d + X2 d² + X3 d³)`, d = T − TREF, before `CAL_*` are applied.
-pub(super) fn px4(source: &Source) -> Exported {
+pub fn px4(source: &Source) -> Exported {
     let axes = Axes::front_right_down(source);
     let held = held(&axes);
     let id = "which device it is: PX4 takes the parameters whose CAL_ACC0_ID and CAL_GYRO0_ID are the device's; where \
@@ -125,7 +125,7 @@ pub(super) fn px4(source: &Source) -> Exported {
 
 /// ArduPilot's temperature: `n − p(T) + p(T_cal)` before the offsets are taken off, with
 /// `p(T) = (c₁ d + c₂ d² + c₃ d³) 10⁻⁶`, d = T − 35 °C.
-pub(super) fn ardupilot(source: &Source) -> Exported {
+pub fn ardupilot(source: &Source) -> Exported {
     let axes = Axes::front_right_down(source);
     let held = held(&axes);
     let notes = [
@@ -169,7 +169,7 @@ pub(super) fn ardupilot(source: &Source) -> Exported {
 }
 
 /// What autopilots leave off of a change with temperature.
-pub(super) fn thermal_note(source: &Source) -> Option<String> {
+pub fn thermal_note(source: &Source) -> Option<String> {
     source.record.temperature.as_ref()?;
     Some(
         "change of scale factors and installation with temperature, of biases with its rate and of orders above three; \
@@ -190,7 +190,7 @@ fn of_counts(what: &str, counts: f64, unit: &str) -> String {
 }
 
 /// Betaflight takes `acc_calibration` from the counts of each axis and zeroes the gyros at every start.
-pub(super) fn betaflight(source: &Source) -> Exported {
+pub fn betaflight(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let per_unit = COUNTS_PER_G / STANDARD_GRAVITY;
     let zero = counts(&axes.triads.accel.bias, per_unit);
@@ -209,7 +209,7 @@ pub(super) fn betaflight(source: &Source) -> Exported {
 
 /// INAV makes `(counts − acczero) accgain / 4096` of accelerometers; zeros of gyros are used where it does not find them
 /// itself.
-pub(super) fn inav(source: &Source) -> Exported {
+pub fn inav(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let PerSensor { gyro, accel } = &axes.triads;
     let per_unit = COUNTS_PER_G / STANDARD_GRAVITY;

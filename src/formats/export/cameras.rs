@@ -31,7 +31,7 @@ fn table([major, minor]: [u8; 2], kind: u16, content: &[u8]) -> Vec<u8> {
 /// The 520 bytes of the memory of the motion module, as `rs-imu-calibration` writes them.
 ///
 /// librealsense makes `matrix n − bias`, its matrices column by column. Bytes without a use are 0xff.
-pub(super) fn realsense(source: &Source) -> Exported {
+pub fn realsense(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let held = held(&axes);
     let notes = [
@@ -63,7 +63,7 @@ pub(super) fn realsense(source: &Source) -> Exported {
 }
 
 /// For `CalibrationHandler`: `u = matrix (n, 1)`, three rows of four, and noise.
-pub(super) fn depthai(source: &Source) -> Exported {
+pub fn depthai(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let held = held(&axes);
     let document = Document::correcting(source, &axes, ("#", "DepthAI"), &held, &[]);

@@ -10,7 +10,7 @@ use super::source::Source;
 use crate::imu::{AXES, InstallationForm, Sensor};
 
 /// A C99 header: constants and functions.
-pub(super) fn c(source: &Source) -> Exported {
+pub fn c(source: &Source) -> Exported {
     let mut file = Document::of_code(source, "//");
     file.line("\n#ifndef TURNCAL_CALIBRATION_H\n#define TURNCAL_CALIBRATION_H\n");
     for sensor in Sensor::ALL {
@@ -74,7 +74,7 @@ fn rows(matrix: &Matrix3<f64>) -> [String; 3] {
 }
 
 /// An Octave (and MATLAB) function file.
-pub(super) fn octave(source: &Source) -> Exported {
+pub fn octave(source: &Source) -> Exported {
     let mut file = Document::of_code(source, "%");
     file.comment("");
     file.comment("save as turncal_calibrate.m; a row of raw is N, a row of u is u:");

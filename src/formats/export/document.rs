@@ -5,11 +5,10 @@ use super::source::{Axes, Held, Remainder, Source};
 use crate::imu::{PerSensor, Sensor, Term};
 
 /// What hardly any format holds.
-pub(super) const SIGMA: &str =
-    "sigma and covariance of the parameters; they are in calibration.json";
+pub const SIGMA: &str = "sigma and covariance of the parameters; they are in calibration.json";
 
 /// A file in the making.
-pub(super) struct Document {
+pub struct Document {
     mark: &'static str,
     text: String,
     notes: Vec<String>,
@@ -125,7 +124,7 @@ impl Document {
 }
 
 /// A number that YAML 1.1 takes for one: with a point, and a sign in its exponent.
-pub(super) fn yaml_number(value: f64) -> String {
+pub fn yaml_number(value: f64) -> String {
     let text = format!("{:e}", value + 0.0);
     let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
     let point = if mantissa.contains('.') { "" } else { ".0" };
@@ -134,7 +133,7 @@ pub(super) fn yaml_number(value: f64) -> String {
 }
 
 /// Three numbers as a YAML list.
-pub(super) fn yaml_list<'a>(values: impl IntoIterator<Item = &'a f64>) -> String {
+pub fn yaml_list<'a>(values: impl IntoIterator<Item = &'a f64>) -> String {
     let values: Vec<String> = values.into_iter().map(|&v| yaml_number(v)).collect();
     format!("[{}]", values.join(", "))
 }

@@ -13,7 +13,7 @@ use super::document::Document;
 use super::source::{Axes, Held, Source};
 use crate::imu::{PerSensor, Sensor};
 
-pub(super) fn write(source: &Source) -> Exported {
+pub fn write(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let held = PerSensor::from_fn(|sensor| Held::offset(axes.triads.get(sensor).bias));
     let notes = [

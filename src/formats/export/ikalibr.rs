@@ -13,7 +13,7 @@ use super::source::{Axes, Source, upper};
 use crate::imu::{PerSensor, Sensor};
 use crate::units::ARCSEC;
 
-pub(super) fn write(source: &Source) -> Exported {
+pub fn write(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let (accel, own) = upper(&axes.triads.accel.sensitivity);
     let (gyro, of_gyro) = upper(&axes.triads.gyro.sensitivity);

@@ -31,7 +31,7 @@ fn biases(file: &mut Document, axes: &Axes) {
     }
 }
 
-pub(super) fn write(source: &Source) -> Exported {
+pub fn write(source: &Source) -> Exported {
     let axes = Axes::right_front_up(source);
     let triads = &axes.triads;
     let imu_b = accelerometer_frame(&triads.accel.sensitivity);
@@ -124,7 +124,7 @@ fn noise(file: &mut Document, source: &Source) {
 
 /// Which triangle intrinsics are kept in.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Model {
+pub enum Model {
     Kalibr,
     Rpng,
 }
@@ -137,7 +137,7 @@ pub(super) enum Model {
 /// calls `A C_gyro_i`; the comment in OpenVINS' example files says otherwise.
 ///
 /// Source: OpenVINS, `VioManagerOptions::print_and_load_state` and `Propagator::predict_and_compute`.
-pub(super) fn open_vins(source: &Source, model: Model) -> Exported {
+pub fn open_vins(source: &Source, model: Model) -> Exported {
     let axes = Axes::log(source);
     let parts = PerSensor::from_fn(|sensor| {
         let a = axes.triads.get(sensor).sensitivity;

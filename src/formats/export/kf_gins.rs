@@ -21,7 +21,7 @@ const MILLIGAL: f64 = 1e-5;
 const M_PER_S_PER_SQRT_H: f64 = 1.0 / 60.0;
 const HOUR: f64 = 3600.0;
 
-pub(super) fn write(source: &Source) -> Exported {
+pub fn write(source: &Source) -> Exported {
     let axes = Axes::front_right_down(source);
     // `A_ij / A_ii`, the part of another axis' input that stays in the output.
     let misalignment = PerSensor::from_fn(|sensor| {

@@ -22,7 +22,7 @@ const NUMBERS: u32 = 6;
 /// Longest name of a field, with its end.
 const NAME: usize = 32;
 
-pub(super) fn write(source: &Source) -> Exported {
+pub fn write(source: &Source) -> Exported {
     let terms = source.terms_note(|_| false);
     let mut fields = vec![
         ("equation", text("", EQUATION)),

@@ -9,7 +9,7 @@ use super::source::{Axes, Held, Source};
 use crate::imu::{PerSensor, Sensor};
 
 /// Row-major about x, y, z: the variance of a sample, density² × rate.
-pub(super) fn covariance(source: &Source) -> Exported {
+pub fn covariance(source: &Source) -> Exported {
     let notes = [
         "scale, misalignment and bias; publish what `turncal apply` writes, whose errors they are not".to_owned(),
         "wander of biases, which is not white; `turncal allan` finds it".to_owned(),
@@ -44,7 +44,7 @@ fn held(axes: &Axes) -> PerSensor<Held> {
 }
 
 /// `SM n − bias` of the accelerometers, so the bias is in corrected units.
-pub(super) fn imu_calib(source: &Source) -> Exported {
+pub fn imu_calib(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let held = held(&axes);
     let notes = [
@@ -60,7 +60,7 @@ pub(super) fn imu_calib(source: &Source) -> Exported {
 }
 
 /// `sm n − bias` of the accelerometers and `n − bias` of the gyros, along the axes of `baselink`.
-pub(super) fn dlio(source: &Source) -> Exported {
+pub fn dlio(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let held = held(&axes);
     let notes = [

@@ -12,7 +12,7 @@ use super::document::Document;
 use super::source::{Axes, Held, Source};
 use crate::imu::PerSensor;
 
-pub(super) fn write(source: &Source) -> Exported {
+pub fn write(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let PerSensor { gyro, accel } = &axes.triads;
     let held = PerSensor {

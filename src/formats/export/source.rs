@@ -14,14 +14,14 @@ use crate::run::Run;
 use crate::units::{ARCSEC, DEGREE, PPM, STANDARD_GRAVITY};
 
 /// A calibration and, perhaps, a run of its instrument.
-pub(super) struct Source<'a> {
+pub struct Source<'a> {
     pub record: &'a Calibration,
     pub run: Option<&'a Run>,
     pub correction: Correction,
 }
 
 /// A triad in rad/s or m/s²: `n = A u + b`, with `n = N / nominal`, along right, front, up.
-pub(super) struct Normalised {
+pub struct Normalised {
     /// What the file's quantity per second is divided by, axis by axis.
     pub nominal: Vector3<f64>,
     pub sensitivity: Matrix3<f64>,
@@ -164,7 +164,7 @@ impl<'a> Source<'a> {
 }
 
 /// Both triads along other axes than right, front, up.
-pub(super) struct Axes {
+pub struct Axes {
     pub triads: PerSensor<Normalised>,
     /// What of specific force the gyros add to their rate.
     pub g_sensitivity: Matrix3<f64>,
@@ -245,7 +245,7 @@ impl Axes {
 }
 
 /// What a program makes of the output n of a triad: `matrix (n − offset)`.
-pub(super) struct Held {
+pub struct Held {
     pub matrix: Matrix3<f64>,
     pub offset: Vector3<f64>,
 }
@@ -275,7 +275,7 @@ impl Held {
 }
 
 /// What a reader that makes `matrix (n − offset)` of a triad's output leaves of its input u: `errors u + constant`.
-pub(super) struct Remainder {
+pub struct Remainder {
     sensor: Sensor,
     errors: Matrix3<f64>,
     constant: Vector3<f64>,
@@ -339,7 +339,7 @@ impl Remainder {
 }
 
 /// The rotation R and the upper triangular U with positive diagonal of `A = U R`.
-pub(super) fn upper(a: &Matrix3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
+pub fn upper(a: &Matrix3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
     let reverse = Matrix3::new(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0);
     let reversed = reverse * a * reverse;
     let rotation = crate::calibration::result::frame::accelerometer_frame(&reversed);

@@ -8,7 +8,7 @@ use super::source::Source;
 use crate::calibration::result::TriadRecord;
 use crate::imu::{AXES, Sensor, Term};
 
-pub(super) fn write(source: &Source) -> Exported {
+pub fn write(source: &Source) -> Exported {
     let covariance = "covariance of the parameters; it is in calibration.json".to_owned();
     let mut file = Document::new(source, "#", [covariance]);
     file.line(&format!(

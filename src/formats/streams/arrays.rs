@@ -12,10 +12,10 @@ use super::{Column, Log, Stream};
 const MOST_COLUMNS: usize = 256;
 
 /// The bytes of an array from one of them on.
-pub(super) type Open = Box<dyn Fn(u64) -> io::Result<Box<dyn Read>>>;
+pub type Open = Box<dyn Fn(u64) -> io::Result<Box<dyn Read>>>;
 
 /// An array of items of the same size.
-pub(super) struct Array {
+pub struct Array {
     pub shape: Vec<usize>,
     /// Whether the first dimension varies fastest, or the last.
     pub first_is_fastest: bool,
@@ -29,7 +29,7 @@ pub(super) struct Array {
 
 /// A number in each item of an array.
 #[derive(Clone)]
-pub(super) struct Field {
+pub struct Field {
     pub name: String,
     pub kind: Kind,
     pub big_endian: bool,
@@ -183,7 +183,7 @@ impl Cursor {
 }
 
 /// Columns of a file; those of the same length are one stream, row by row.
-pub(super) struct Arrays {
+pub struct Arrays {
     streams: Vec<Stream>,
     groups: Vec<Vec<Cursor>>,
     at: Option<(usize, usize)>,

@@ -3,12 +3,12 @@
 use std::io::{self, Read, Seek, SeekFrom};
 
 /// What a log's bytes come from.
-pub(super) trait Source: Read + Seek {}
+pub trait Source: Read + Seek {}
 impl<T: Read + Seek> Source for T {}
 
 /// Why a file cannot be read on, and where.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(in crate::formats) struct Broken {
+pub struct Broken {
     /// Bytes from the begin of the file.
     pub offset: u64,
     pub found: String,
@@ -26,7 +26,7 @@ impl Broken {
 }
 
 /// A file read from its begin on.
-pub(super) struct Input {
+pub struct Input {
     source: Box<dyn Source>,
     offset: u64,
     length: u64,
@@ -110,7 +110,7 @@ impl Input {
 
 /// Bytes in memory, read in order.
 #[derive(Clone, Copy)]
-pub(super) struct Slice<'a> {
+pub struct Slice<'a> {
     bytes: &'a [u8],
     at: usize,
     /// Where the first of them is in the file …
@@ -211,7 +211,7 @@ impl<'a> Slice<'a> {
 
 /// How a number is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub enum Kind {
     I8,
     U8,
     I16,

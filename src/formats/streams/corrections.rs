@@ -11,7 +11,7 @@ use crate::imu::{PerSensor, Sensor};
 
 /// What was applied to a triad.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Applied {
+pub struct Applied {
     /// The parameters, in words.
     pub name: String,
     pub offset: [f64; 3],
@@ -22,7 +22,7 @@ pub(super) struct Applied {
 
 /// Columns of corrected values, of the time in µs that they were summed over, and of the device's number.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Corrected {
+pub struct Corrected {
     pub values: [usize; 3],
     pub interval: Option<usize>,
     pub device: Option<usize>,
@@ -60,7 +60,7 @@ struct Done {
 }
 
 /// What is taken out of the samples of a stream.
-pub(super) struct Undo {
+pub struct Undo {
     /// Who applied it.
     pub program: &'static str,
     pub corrected: PerSensor<Option<Corrected>>,

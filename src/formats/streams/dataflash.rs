@@ -17,7 +17,7 @@ const FMT: u8 = 0x80;
 /// The column that tells instances apart.
 const INSTANCE: &str = "I";
 
-pub(super) fn open(input: Input) -> Result<Box<dyn Log>, Broken> {
+pub fn open(input: Input) -> Result<Box<dyn Log>, Broken> {
     let mut formats = BTreeMap::new();
     formats.insert(
         FMT,

@@ -22,7 +22,7 @@ const DEEPEST: usize = 8;
 /// Nothing deflated is shorter by more.
 const DEFLATE: u64 = 1040;
 
-pub(super) fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
+pub fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
     let mut bytes = Vec::new();
     input.take(HEADER, &mut bytes, "the header")?;
     let (version, mark) = ([bytes[124], bytes[125]], [bytes[126], bytes[127]]);
@@ -162,6 +162,46 @@ impl<'a> Element<'a> {
         kind.number(self.bytes.get(at..)?, self.big_endian)
     }
 
+    /// An array of its numbers; none if it has none.
+    fn array(&self, name: String, shape: Vec<usize>) -> Result<Option<Array>, Broken> {
+        let Some(kind) = self.kind() else {
+            return Ok(None);
+        };
+        let bytes: Rc<[u8]> = self.bytes.into();
+        let left = bytes.len();
+        let open = move |skip: u64| {
+            let mut bytes = Cursor::new(bytes.clone());
+            bytes.set_position(skip);
+            Ok(Box::new(bytes) as Box<dyn Read>)
+        };
+        let field = Field {
+            name,
+            kind,
+            big_endian: self.big_endian,
+            place: 0,
+        };
+        let array = Array {
+            shape,
+            first_is_fastest: true,
+            size: kind.size(),
+            fields: vec![field],
+            open: Box::new(open),
+            offset: self.offset,
+        };
+        let needed = array.items().and_then(|all| all.checked_mul(array.size));
+        if needed.is_none_or(|needed| needed > left) {
+            return Err(Broken::new(
+                self.offset,
+                format_args!("{left} bytes of the array `{}`", array.fields[0].name),
+                format_args!(
+                    "items of {} bytes by its shape {:?}",
+                    array.size, array.shape
+                ),
+            ));
+        }
+        Ok(Some(array))
+    }
+
     /// A number from zero on; zero if there is none.
     fn count(&self, index: usize) -> usize {
         self.number(Kind::I32, index).unwrap_or(0.0).max(0.0) as usize
@@ -203,42 +243,7 @@ fn matrix(
         // Numbers, from double to uint64.
         6..=15 => {
             let data = Element::next(&mut slice, "numbers")?;
-            let Some(kind) = data.kind() else {
-                return Ok(());
-            };
-            let bytes: Rc<[u8]> = data.bytes.into();
-            let left = bytes.len();
-            let open = move |skip: u64| {
-                let mut bytes = Cursor::new(bytes.clone());
-                bytes.set_position(skip);
-                Ok(Box::new(bytes) as Box<dyn Read>)
-            };
-            let field = Field {
-                name,
-                kind,
-                big_endian: data.big_endian,
-                place: 0,
-            };
-            let array = Array {
-                shape,
-                first_is_fastest: true,
-                size: kind.size(),
-                fields: vec![field],
-                open: Box::new(open),
-                offset: data.offset,
-            };
-            let needed = array.items().and_then(|all| all.checked_mul(array.size));
-            if needed.is_none_or(|needed| needed > left) {
-                return Err(Broken::new(
-                    data.offset,
-                    format_args!("{left} bytes of the array `{}`", array.fields[0].name),
-                    format_args!(
-                        "items of {} bytes by its shape {:?}",
-                        array.size, array.shape
-                    ),
-                ));
-            }
-            arrays.push(array);
+            arrays.extend(data.array(name, shape)?);
             Ok(())
         }
         _ => Ok(()),

@@ -18,7 +18,7 @@ const MESSAGE: u8 = 5;
 const CHUNK: u8 = 6;
 const DATA_END: u8 = 15;
 
-pub(super) fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
+pub fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
     input.skip(MAGIC, "the first bytes")?;
     Ok(Box::new(Mcap {
         input,

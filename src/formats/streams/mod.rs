@@ -39,7 +39,7 @@ pub(super) use rows::{Found, StreamRows, survey};
 
 /// A column of a stream.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Column {
+pub struct Column {
     pub name: String,
     /// As `run.toml` writes it, empty where the file does not say it.
     pub unit: &'static str,
@@ -57,7 +57,7 @@ impl Column {
 
 /// Samples of one kind from one source.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub(super) struct Stream {
+pub struct Stream {
     /// As `run.toml` names it.
     pub name: String,
     /// Empty until its first sample where only that shows them.
@@ -71,7 +71,7 @@ pub(super) struct Stream {
 }
 
 /// A file that gives streams of samples, read from its begin to its end.
-pub(super) trait Log {
+pub trait Log {
     /// The streams found up to here.
     fn streams(&self) -> &[Stream];
 
@@ -183,7 +183,7 @@ const CLOSED: [(&[u8], &str, &str); 3] = [
 ];
 
 /// Opens a log by its content; none if it is no such log, but perhaps rows of text.
-pub(super) fn open(path: &Path) -> Result<Option<Box<dyn Log>>, FileError> {
+pub fn open(path: &Path) -> Result<Option<Box<dyn Log>>, FileError> {
     let refused = |error: std::io::Error| {
         FileError::io(
             path,

@@ -25,7 +25,7 @@ const LONGEST_HEADER: u64 = 1 << 20;
 /// What is read at a time, of each column that lies by itself.
 const AT_ONCE: usize = 1 << 14;
 
-pub(super) fn open_array(input: Input) -> Result<Box<dyn Log>, Broken> {
+pub fn open_array(input: Input) -> Result<Box<dyn Log>, Broken> {
     let member = Member {
         name: "array".to_owned(),
         begin: 0,
@@ -41,7 +41,7 @@ pub(super) fn open_array(input: Input) -> Result<Box<dyn Log>, Broken> {
     Ok(Box::new(arrays.with_remarks(dropped.as_slice())))
 }
 
-pub(super) fn open_archive(input: Input) -> Result<Box<dyn Log>, Broken> {
+pub fn open_archive(input: Input) -> Result<Box<dyn Log>, Broken> {
     let end = input.left();
     let broken = |offset: u64| move |error: ZipError| Broken::new(offset, error, "a ZIP archive");
     let mut archive = ZipArchive::new(input.into_source()).map_err(broken(end))?;

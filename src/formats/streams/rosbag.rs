@@ -14,7 +14,7 @@ const MESSAGE: u8 = 2;
 const CHUNK: u8 = 5;
 const CONNECTION: u8 = 7;
 
-pub(super) fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
+pub fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
     input.skip(FIRST_LINE, "the first line")?;
     Ok(Box::new(Bag {
         input,

@@ -42,7 +42,7 @@ struct Bag {
     current: Option<(usize, Row)>,
 }
 
-pub(super) fn open(input: Input) -> Result<Box<dyn Log>, Broken> {
+pub fn open(input: Input) -> Result<Box<dyn Log>, Broken> {
     let mut database = Database::open(input)?;
     let mut definitions = BTreeMap::from([("sensor_msgs/msg/Imu".to_owned(), IMU.to_owned())]);
     if let Some(mut table) = database.table("message_definitions")? {

@@ -9,7 +9,7 @@ use crate::formats::error::{FileError, Place, list, suggestion};
 use crate::formats::rows::Rows;
 
 /// A log at one sample of one of its streams.
-pub(in crate::formats) struct StreamRows {
+pub struct StreamRows {
     file: PathBuf,
     log: Box<dyn Log>,
     stream: usize,
@@ -28,16 +28,13 @@ pub(in crate::formats) struct StreamRows {
 
 /// A stream with what a look over the whole file shows of it.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::formats) struct Found {
+pub struct Found {
     pub stream: Stream,
     pub samples: u64,
 }
 
 /// All streams of a log that have samples, and the error of the place where it is damaged.
-pub(in crate::formats) fn survey(
-    file: &Path,
-    mut log: Box<dyn Log>,
-) -> (Vec<Found>, Option<FileError>) {
+pub fn survey(file: &Path, mut log: Box<dyn Log>) -> (Vec<Found>, Option<FileError>) {
     let mut samples: Vec<u64> = Vec::new();
     let mut row = Vec::new();
     let damage = loop {

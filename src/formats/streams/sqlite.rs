@@ -10,7 +10,7 @@ const LEAF: u64 = 13;
 /// Pages within pages: a tree of 2³² pages is less deep.
 const DEEPEST: usize = 32;
 
-pub(super) enum Value {
+pub enum Value {
     /// Or a number that is not whole, which is in none of the columns that are read.
     Null,
     Whole(i64),
@@ -38,7 +38,7 @@ impl Value {
 }
 
 /// Values by the names of the table's columns.
-pub(super) struct Row {
+pub struct Row {
     columns: Vec<String>,
     values: Vec<Value>,
     /// Where it is in the file.
@@ -55,7 +55,7 @@ impl Row {
 }
 
 /// A place in a table.
-pub(super) struct Table {
+pub struct Table {
     columns: Vec<String>,
     /// Pages on the way to it, each with the next of its cells.
     pages: Vec<(Page, usize)>,
@@ -72,7 +72,7 @@ struct Page {
     cells: usize,
 }
 
-pub(super) struct Database {
+pub struct Database {
     input: Input,
     page: usize,
     /// Bytes of a page that are used.

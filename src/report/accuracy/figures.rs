@@ -16,7 +16,7 @@ const FAR: f64 = 2.0;
 /// Lines that end nearer than this factor have one name.
 const TOGETHER: f64 = 2.0;
 
-pub(super) fn figures(accuracy: &Accuracy) -> Vec<Plot> {
+pub fn figures(accuracy: &Accuracy) -> Vec<Plot> {
     let mut plots = vec![
         errors(accuracy),
         ratio(accuracy),
@@ -183,7 +183,7 @@ const FAR_NEES: f64 = 4.0;
 const POSITION_REACH: f64 = 4.0;
 
 /// Normalised errors of each group over the density that the claimed σ promise.
-pub(super) fn errors(accuracy: &Accuracy) -> Plot {
+pub fn errors(accuracy: &Accuracy) -> Plot {
     let panels = Group::all().map(|group| {
         let values = normalised(accuracy, group);
         let reach = reach(&values);
@@ -262,7 +262,7 @@ fn histogram(values: &[f64], reach: f64) -> Vec<Point> {
 }
 
 /// NEES/n of every run with the intervals of one run and of the average.
-pub(super) fn nees(accuracy: &Accuracy) -> Plot {
+pub fn nees(accuracy: &Accuracy) -> Plot {
     let points = |converged: bool| -> Vec<Point> {
         let trials = accuracy.trials.iter();
         let trials = trials.filter(|trial| trial.failure.is_none() == converged);
@@ -317,7 +317,7 @@ pub(super) fn nees(accuracy: &Accuracy) -> Plot {
 }
 
 /// Position errors after each mission over the σ that were predicted of them.
-pub(super) fn positions(accuracy: &Accuracy) -> Plot {
+pub fn positions(accuracy: &Accuracy) -> Plot {
     let clouds: Vec<Vec<Point>> = accuracy
         .navigation
         .iter()

@@ -10,7 +10,7 @@ use crate::study::{Accuracy, Figures, Ratio};
 const AGAINST_BOUND: &str = "| unit | RMS error | RMS σ | RMS bound | error/bound | 99 % interval";
 
 /// What ought to be one, with the digits that the width of its interval leaves meaning to.
-pub(super) fn mean(mean: f64, (low, high): (f64, f64)) -> String {
+pub fn mean(mean: f64, (low, high): (f64, f64)) -> String {
     if mean < 10.0 {
         value(mean, 0.5 * (high - low))
     } else {
@@ -19,12 +19,12 @@ pub(super) fn mean(mean: f64, (low, high): (f64, f64)) -> String {
 }
 
 /// A factor that ought to be one.
-pub(super) fn factor(factor: f64) -> String {
+pub fn factor(factor: f64) -> String {
     mean(factor, (0.99, 1.01))
 }
 
 /// A share in per cent.
-pub(super) fn percent(share: f64) -> String {
+pub fn percent(share: f64) -> String {
     value(100.0 * share, 1.0)
 }
 
@@ -53,7 +53,7 @@ fn against_bound(of: &Figures, unit: f64) -> Vec<String> {
         .collect()
 }
 
-pub(super) fn bound(accuracy: &Accuracy) -> Table {
+pub fn bound(accuracy: &Accuracy) -> Table {
     let cells = |of: &Compared| against_bound(of.figures, of.unit_value);
     Table::new("EKF against the Cramér–Rao bound", columns(AGAINST_BOUND))
         .sections(sections(accuracy, cells))
@@ -63,7 +63,7 @@ pub(super) fn bound(accuracy: &Accuracy) -> Table {
 }
 
 /// Auxiliary parameters, term by term.
-pub(super) fn auxiliary(accuracy: &Accuracy) -> Table {
+pub fn auxiliary(accuracy: &Accuracy) -> Table {
     let row = |(term, of): &(ErrorTerm, Figures)| {
         let (unit, in_si) = unit(*term);
         [cells![title(*term), unit], against_bound(of, in_si)].concat()
@@ -73,7 +73,7 @@ pub(super) fn auxiliary(accuracy: &Accuracy) -> Table {
         .note("RMS over all runs and the parameters of a term.")
 }
 
-pub(super) fn gain(accuracy: &Accuracy) -> Table {
+pub fn gain(accuracy: &Accuracy) -> Table {
     let baseline = &accuracy.baseline;
     let columns = cells![
         "",
@@ -103,7 +103,7 @@ pub(super) fn gain(accuracy: &Accuracy) -> Table {
         .note("Gain: error of the closed form over error of the EKF, above 1 where the EKF is better.")
 }
 
-pub(super) fn consistency(accuracy: &Accuracy) -> Table {
+pub fn consistency(accuracy: &Accuracy) -> Table {
     let directions = accuracy
         .filtered()
         .filter_map(|f| Some(f.nees?.count))
@@ -146,7 +146,7 @@ fn nis_row(name: &str, nis: &Nis) -> Vec<String> {
 }
 
 /// Whether position errors lie within their predicted σ.
-pub(super) fn containment(accuracy: &Accuracy) -> Table {
+pub fn containment(accuracy: &Accuracy) -> Table {
     let sections = accuracy.navigation.iter().map(|of| {
         of.containment.iter().map(|held: &Containment| {
             let share = |hits: usize| percent(hits as f64 / held.runs as f64);
@@ -171,7 +171,7 @@ pub(super) fn containment(accuracy: &Accuracy) -> Table {
 const SIGMAS_99: f64 = 2.576;
 
 /// Something whose error is compared, with how it is shown.
-pub(super) struct Compared<'a> {
+pub struct Compared<'a> {
     pub(super) title: String,
     /// The triad; none of a position.
     pub(super) sensor: Option<Sensor>,
@@ -183,7 +183,7 @@ pub(super) struct Compared<'a> {
 }
 
 /// The parameters group by group, then the position after each mission.
-pub(super) fn compared(accuracy: &Accuracy) -> Vec<Compared<'_>> {
+pub fn compared(accuracy: &Accuracy) -> Vec<Compared<'_>> {
     let groups = accuracy.groups.iter().map(|of| Compared {
         title: of.group.title(),
         sensor: Some(of.group.sensor()),
@@ -202,7 +202,7 @@ pub(super) fn compared(accuracy: &Accuracy) -> Vec<Compared<'_>> {
 }
 
 /// A mission in a word.
-pub(super) fn journey_name(journey: Journey) -> &'static str {
+pub fn journey_name(journey: Journey) -> &'static str {
     match journey {
         Journey::Standing => "stationary",
         Journey::Flight => "flight",
@@ -210,7 +210,7 @@ pub(super) fn journey_name(journey: Journey) -> &'static str {
 }
 
 /// A region in words.
-pub(super) fn region_name(region: Region) -> String {
+pub fn region_name(region: Region) -> String {
     match region {
         Region::East => "east within 1σ".to_owned(),
         Region::North => "north within 1σ".to_owned(),
@@ -219,6 +219,6 @@ pub(super) fn region_name(region: Region) -> String {
 }
 
 /// What the lag-one correlation of white innovations stays within in 99 of 100 studies.
-pub(super) fn white_within(nis: &Nis) -> f64 {
+pub fn white_within(nis: &Nis) -> f64 {
     SIGMAS_99 / (nis.count as f64).sqrt()
 }

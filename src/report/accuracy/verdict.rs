@@ -16,7 +16,7 @@ const FEW: usize = 30;
 const PULSES: (f64, f64) = (0.9, 1.1);
 
 /// Every sentence, the most important first.
-pub(super) fn say(document: &mut Document, accuracy: &Accuracy) {
+pub fn say(document: &mut Document, accuracy: &Accuracy) {
     let mut say = |(good, text): (bool, String)| document.say(good, text);
     say(convergence(accuracy));
     say(against_bound(accuracy));

@@ -9,7 +9,7 @@ use crate::report::prelude::*;
 
 const PROBABILITY: f64 = 0.95;
 
-pub(super) fn data(run: &str, analysis: &NoiseAnalysis) -> Value {
+pub fn data(run: &str, analysis: &NoiseAnalysis) -> Value {
     let triad = |sensor: Sensor| {
         let triad = analysis.triads.get(sensor);
         let [x, y, z] = triad.axes.each_ref().map(|of| axis(of, sensor));
@@ -98,7 +98,7 @@ struct Field {
 }
 
 /// `[imu.noise]` with all that was found, ready to be pasted.
-pub(super) fn noise_table(analysis: &NoiseAnalysis) -> String {
+pub fn noise_table(analysis: &NoiseAnalysis) -> String {
     let mut text = "[imu.noise]\n".to_owned();
     for &sensor in &analysis.sensors {
         let fields = of_triad(analysis, sensor);
@@ -124,7 +124,7 @@ pub(super) fn noise_table(analysis: &NoiseAnalysis) -> String {
 }
 
 /// The same fields to all digits.
-pub(super) fn fields(analysis: &NoiseAnalysis) -> Map<String, Value> {
+pub fn fields(analysis: &NoiseAnalysis) -> Map<String, Value> {
     let fields = Sensor::ALL
         .into_iter()
         .flat_map(|sensor| of_triad(analysis, sensor));

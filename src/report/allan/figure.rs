@@ -10,7 +10,7 @@ const SEEN: f64 = 0.02;
 /// Points in a decade of a drawn line.
 const POINTS: f64 = 24.0;
 
-pub(super) fn figure(analysis: &NoiseAnalysis, sensor: Sensor) -> Plot {
+pub fn figure(analysis: &NoiseAnalysis, sensor: Sensor) -> Plot {
     let (file, heading) = match sensor {
         Sensor::Gyro => ("gyro.svg", "Gyros: Allan deviation"),
         Sensor::Accel => ("accel.svg", "Accelerometers: Allan deviation"),

@@ -9,7 +9,7 @@ use crate::units::{
 const SQRT_HOUR: f64 = 60.0;
 
 /// How the strength of a process is shown.
-pub(super) struct Quantity {
+pub struct Quantity {
     /// Such as `angle random walk N`.
     pub name: &'static str,
     /// Symbol of the unit.
@@ -29,7 +29,7 @@ impl Quantity {
 
 /// Of a process in one triad.
 #[rustfmt::skip]
-pub(super) fn quantity(process: Process, sensor: Sensor) -> Quantity {
+pub fn quantity(process: Process, sensor: Sensor) -> Quantity {
     use Process::*;
     let (name, unit, value, key) = match (process, sensor) {
         (Quantisation, Sensor::Gyro) => ("quantisation Q", "″", ARCSEC, "quantisation_arcsec"),
@@ -49,7 +49,7 @@ pub(super) fn quantity(process: Process, sensor: Sensor) -> Quantity {
 }
 
 /// Unit of the Allan deviation: symbol, the unit in SI, the unit in ASCII.
-pub(super) fn deviation_unit(sensor: Sensor) -> (&'static str, f64, &'static str) {
+pub fn deviation_unit(sensor: Sensor) -> (&'static str, f64, &'static str) {
     match sensor {
         Sensor::Gyro => ("°/h", DEG_PER_H, "deg/h"),
         Sensor::Accel => ("µg", MICRO_G, "ug"),

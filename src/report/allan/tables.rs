@@ -7,7 +7,7 @@ use crate::noise::{AxisNoise, Found, NoiseAnalysis, Process, TriadNoise, of_kind
 use crate::report::prelude::*;
 
 /// What was found in a triad: a row for each process, a column for each axis and one for their mean.
-pub(super) fn coefficients(analysis: &NoiseAnalysis, sensor: Sensor) -> Table {
+pub fn coefficients(analysis: &NoiseAnalysis, sensor: Sensor) -> Table {
     let triad = analysis.triads.get(sensor);
     let columns: Vec<&AxisNoise> = triad.axes.iter().chain([&triad.mean]).collect();
     let row = |name: &str, unit: &str, cell: &dyn Fn(&AxisNoise) -> String| {
@@ -105,7 +105,7 @@ fn correlation_time(found: Found) -> String {
 }
 
 /// Allan deviations of all axes at every so-manieth cluster time.
-pub(super) fn deviations(analysis: &NoiseAnalysis, every: usize) -> Table {
+pub fn deviations(analysis: &NoiseAnalysis, every: usize) -> Table {
     let freedom = |triad: &TriadNoise, point: usize| {
         let of = |axis: &AxisNoise| Some(*axis.identified.as_ref()?.freedom.get(point)?);
         triad.axes.iter().filter_map(of).fold(f64::NAN, f64::min)

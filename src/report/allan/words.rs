@@ -10,7 +10,7 @@ const UNLIKE: f64 = 1.5;
 /// Departures of the variance from all models that are not worth a word.
 const SMALL: f64 = 0.02;
 
-pub(super) const INTERVALS: &str = "A deviation s with ν degrees of freedom lies with 95 % probability \
+pub const INTERVALS: &str = "A deviation s with ν degrees of freedom lies with 95 % probability \
     between s √(ν/χ²₀.₉₇₅) and s √(ν/χ²₀.₀₂₅) (NIST SP 1065, 5.3).";
 
 /// What is left out at the short end, in a sentence.
@@ -23,7 +23,7 @@ fn left_out(of: &Identified, taus: &[f64]) -> Option<String> {
     ))
 }
 
-pub(super) const METHOD: &str = "Overlapping Allan variance of the rate (NIST SP 1065, 5.2.4) at two \
+pub const METHOD: &str = "Overlapping Allan variance of the rate (NIST SP 1065, 5.2.4) at two \
     cluster times in an octave. Coefficients: generalised least squares of the variances as a sum of \
     processes (IEEE Std 952, annex C; El-Sheimy, Hou, Niu 2008), none of them negative, weighted by the \
     covariance that the points have under those very processes, from their generalised \
@@ -34,7 +34,7 @@ pub(super) const METHOD: &str = "Overlapping Allan variance of the rate (NIST SP
     the sensor show, are left out. Bias instability B is the coefficient of flicker noise, whose floor is 0.664 B.";
 
 /// What forbids to trust the figures, or to use them without thought.
-pub(super) fn warnings(analysis: &NoiseAnalysis) -> Vec<String> {
+pub fn warnings(analysis: &NoiseAnalysis) -> Vec<String> {
     let mut warnings = Vec::new();
     if !analysis.stretch.stands {
         warnings.push(format!(
@@ -116,7 +116,7 @@ fn unlike(triad: &TriadNoise, sensor: Sensor) -> Option<String> {
 }
 
 /// Of each slope that a triad does not show: what it is below, and how it could be seen.
-pub(super) fn advice(analysis: &NoiseAnalysis) -> Vec<String> {
+pub fn advice(analysis: &NoiseAnalysis) -> Vec<String> {
     let mut sentences = Vec::new();
     for &sensor in &analysis.sensors {
         let mean = &analysis.triads.get(sensor).mean;
@@ -161,7 +161,7 @@ pub(super) fn advice(analysis: &NoiseAnalysis) -> Vec<String> {
 }
 
 /// A time in a readable unit.
-pub(super) fn duration(seconds: f64) -> String {
+pub fn duration(seconds: f64) -> String {
     if seconds < 600.0 {
         format!("{} s", three_digits(seconds))
     } else if seconds < 3.0 * 3600.0 {

@@ -17,7 +17,7 @@ const NAMED_TERMS: usize = 3;
 const NAMED: f64 = 1e-3;
 
 /// RMS of a group's standard uncertainties by source, and together.
-pub(super) fn table(budget: &Budget, estimate: &Estimate) -> Table {
+pub fn table(budget: &Budget, estimate: &Estimate) -> Table {
     let columns = Group::all().map(|group| format!("{}, {}", group.short(), group.unit()));
     let columns = std::iter::once("source".to_owned()).chain(columns);
     let row = |name: &str, u: ParameterVector, freedom: &str| {
@@ -89,7 +89,7 @@ fn share(part: &BudgetPart, estimate: &Estimate, index: usize) -> f64 {
 }
 
 /// Shares of every variance, one bar a parameter.
-pub(super) fn figure(budget: &Budget, estimate: &Estimate) -> Plot {
+pub fn figure(budget: &Budget, estimate: &Estimate) -> Plot {
     let parts = shown(budget, estimate);
     let own = &parts[..parts.len().min(SHOWN)];
     let form = estimate.form();
@@ -142,7 +142,7 @@ pub(super) fn figure(budget: &Budget, estimate: &Estimate) -> Plot {
 }
 
 /// What σ do not hold: error terms that the record would not show and that change a group by more than its σ.
-pub(super) fn unseen(report: &Report, estimate: &Estimate) -> Option<String> {
+pub fn unseen(report: &Report, estimate: &Estimate) -> Option<String> {
     let claimed = estimate.sigma();
     let worst = |test: &ErrorTermTest| {
         let left_off = test.left_off.filter(|_| !test.significant())?;
@@ -179,7 +179,7 @@ pub(super) fn unseen(report: &Report, estimate: &Estimate) -> Option<String> {
 }
 
 /// What is in no sum: error terms that are not estimated.
-pub(super) fn left_off(report: &Report, estimate: &Estimate) -> Table {
+pub fn left_off(report: &Report, estimate: &Estimate) -> Table {
     let columns = Group::all().map(|group| format!("{}, {}", group.short(), group.unit()));
     let cell = |group: Group, of: &ParameterVector| {
         let spread = group.spread(of, &group.estimated(estimate));

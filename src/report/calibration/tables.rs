@@ -123,7 +123,7 @@ impl Report<'_> {
 }
 
 /// The directions that the data observed least: all that were not observed, and some that were.
-pub(super) fn weakest(outcome: &Outcome) -> Table {
+pub fn weakest(outcome: &Outcome) -> Table {
     let (form, observability) = (outcome.estimate.form(), &outcome.observability);
     let shown = observability.unobserved().count() + WEAKEST;
     let rows = observability.directions.iter().take(shown);
@@ -136,7 +136,7 @@ pub(super) fn weakest(outcome: &Outcome) -> Table {
 }
 
 /// The passes of the filter.
-pub(super) fn passes(outcome: &Outcome) -> Table {
+pub fn passes(outcome: &Outcome) -> Table {
     let rows = outcome.passes.iter().enumerate().map(|(n, pass)| {
         cells![
             (n + 1).to_string(),
@@ -160,7 +160,7 @@ fn observed(outcome: &Outcome) -> impl Iterator<Item = (&'static str, Nis)> {
 }
 
 /// NIS of each kind of observation with its interval.
-pub(super) fn nis(outcome: &Outcome) -> Vec<String> {
+pub fn nis(outcome: &Outcome) -> Vec<String> {
     let shown = |(name, nis): (&str, Nis)| {
         let (low, high) = nis.interval;
         let [mean, low, high] = [nis.mean, low, high].map(|x| value(x, 0.01));
@@ -170,7 +170,7 @@ pub(super) fn nis(outcome: &Outcome) -> Vec<String> {
 }
 
 /// How the innovations agree with their covariance.
-pub(super) fn consistency(outcome: &Outcome) -> Table {
+pub fn consistency(outcome: &Outcome) -> Table {
     let rows = observed(outcome).map(|(name, nis)| {
         let (low, high) = nis.interval;
         let verdict = match nis.mean {
@@ -193,7 +193,7 @@ pub(super) fn consistency(outcome: &Outcome) -> Table {
 }
 
 /// Each residual over the whole record and over what was held out; empty where there is nothing to measure.
-pub(super) fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
+pub fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
     let turns = match table {
         Some(_) => "attitude after a turn, gyros minus table",
         None => "labelled turns, gyros minus label",

@@ -11,7 +11,7 @@ use crate::report::prelude::*;
 const POINTS: usize = 81;
 
 /// Adds tables and figures, where anything changes or differs.
-pub(super) fn add(document: &mut Document, outcome: &Outcome) {
+pub fn add(document: &mut Document, outcome: &Outcome) {
     if let Some(thermal) = &outcome.thermal {
         document.both(orders(outcome, thermal));
         document.both(hysteresis(outcome, thermal));

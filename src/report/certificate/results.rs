@@ -6,7 +6,7 @@ use crate::imu::{Sensor, Term};
 use crate::report::prelude::*;
 
 /// A parameter's name with the model's letter.
-pub(super) fn name(measured: &str) -> String {
+pub fn name(measured: &str) -> String {
     measured
         .replace("installation", "E")
         .replace("scale", "K")
@@ -14,7 +14,7 @@ pub(super) fn name(measured: &str) -> String {
 }
 
 /// Every parameter with its expanded uncertainty, and what both are.
-pub(super) fn results(certificate: &Certificate) -> Table {
+pub fn results(certificate: &Certificate) -> Table {
     let has_budget = certificate.calibration.budget.is_some();
     let row = |of: &Measured| {
         // Only a budget evaluates them, and it is one of the triads' parameters.

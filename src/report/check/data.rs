@@ -11,7 +11,7 @@ use crate::run::Run;
 use crate::run::motion::{LabelCheck, Rest, Turn, Verdict};
 use crate::survey::{Expected, Path, Survey};
 
-pub(super) fn data(run: &Run, survey: &Survey) -> Value {
+pub fn data(run: &Run, survey: &Survey) -> Value {
     let imu = &run.recording.imu;
     let mut fault_samples: BTreeMap<&str, usize> = BTreeMap::new();
     for fault in &imu.faults {

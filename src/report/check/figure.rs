@@ -7,7 +7,7 @@ use crate::run::Run;
 use crate::run::motion::{Rest, Turn};
 use crate::survey::Survey;
 
-pub(super) fn figure(run: &Run, survey: &Survey) -> Plot {
+pub fn figure(run: &Run, survey: &Survey) -> Plot {
     let mut caption = "Gyro rates and specific force along body axes by nominal scales, as they stand in the file. \
                        Grey: dwells, numbered as in the table and with the axis that is up; above the rates: \
                        turns, by axis and angle, or angle alone if about several axes, where there is room."

@@ -12,7 +12,7 @@ use crate::survey::Survey;
 /// Faults beyond so many are not listed one by one.
 const LISTED: usize = 20;
 
-pub(super) fn log_columns(run: &Run) -> Table {
+pub fn log_columns(run: &Run) -> Table {
     let rows = run.recording.imu.log.iter().flat_map(|log| {
         Sensor::ALL.into_iter().flat_map(|sensor| {
             let columns = log.columns.get(sensor).iter().zip(AXES);
@@ -57,7 +57,7 @@ fn exactly(x: f64) -> String {
     }
 }
 
-pub(super) fn faults(run: &Run) -> Table {
+pub fn faults(run: &Run) -> Table {
     let imu = &run.recording.imu;
     let slower = imu.slower();
     let row = |fault: &Fault| {
@@ -99,12 +99,12 @@ pub(super) fn faults(run: &Run) -> Table {
 }
 
 /// The file's column in which a fault is; none if it is in whole rows.
-pub(super) fn column_of<'r>(run: &'r Run, fault: &Fault) -> Option<&'r str> {
+pub fn column_of<'r>(run: &'r Run, fault: &Fault) -> Option<&'r str> {
     let (sensor, axis) = fault.axis?;
     Some(&run.recording.imu.log.as_ref()?.columns.get(sensor)[axis].name)
 }
 
-pub(super) fn dwells(run: &Run, survey: &Survey) -> Table {
+pub fn dwells(run: &Run, survey: &Survey) -> Table {
     let after = |k: usize| survey.turns.iter().find(|turn| turn.from == Some(k));
     let row = |(k, rest): (usize, &Rest)| {
         let [begin, end] = rest.dwell.times(run);
@@ -157,7 +157,7 @@ fn moved(turn: &Turn) -> [String; 4] {
     [about, by, value(turn.fastest / DEGREE, 1.0), off]
 }
 
-pub(super) fn labels(survey: &Survey) -> Table {
+pub fn labels(survey: &Survey) -> Table {
     let row = |check: &LabelCheck| {
         let found = match (&check.verdict, check.segment.motion) {
             (Verdict::Position { off, moving, .. }, _) if *moving > 0.0 => {
@@ -196,7 +196,7 @@ pub(super) fn labels(survey: &Survey) -> Table {
     .section(survey.labels.iter().map(row))
 }
 
-pub(super) fn methods(survey: &Survey) -> Table {
+pub fn methods(survey: &Survey) -> Table {
     let groups = Group::all().map(|group| format!("{}, {}", group.short(), group.unit()));
     let columns = std::iter::once(String::new()).chain(groups);
     let mut table = Table::new("What each method could observe, 1σ", columns).note(

@@ -24,17 +24,17 @@ const MICROSECOND: f64 = 1e-6;
 const NAMED: usize = 4;
 
 /// A degree sign behind a number.
-pub(super) fn degrees(angle: f64) -> String {
+pub fn degrees(angle: f64) -> String {
     value(angle / DEGREE, 1.0)
 }
 
 /// Such as `x up`.
-pub(super) fn way_up(axis: usize, down: bool) -> String {
+pub fn way_up(axis: usize, down: bool) -> String {
     format!("{} {}", AXES[axis], if down { "down" } else { "up" })
 }
 
 /// Such as `x +360.0°`; about several axes only how far.
-pub(super) fn turn(turn: &Turn) -> String {
+pub fn turn(turn: &Turn) -> String {
     match turn.body_axis() {
         Some(axis) => format!("{} {}°", AXES[axis], signed(turn.angle)),
         None if turn.single => format!("{} {}°", direction(turn), signed(turn.angle)),
@@ -43,18 +43,18 @@ pub(super) fn turn(turn: &Turn) -> String {
 }
 
 /// Components of a turn's axis.
-pub(super) fn direction(turn: &Turn) -> String {
+pub fn direction(turn: &Turn) -> String {
     let parts: Vec<String> = turn.axis.iter().map(|&part| value(part, 0.1)).collect();
     format!("({})", parts.join(", "))
 }
 
-pub(super) fn signed(angle: f64) -> String {
+pub fn signed(angle: f64) -> String {
     let plus = if angle > 0.0 { "+" } else { "" };
     format!("{plus}{}", degrees(angle))
 }
 
 /// The log in a sentence or two.
-pub(super) fn log(run: &Run, survey: &Survey) -> String {
+pub fn log(run: &Run, survey: &Survey) -> String {
     let mut text = format!(
         "Stationary for {} s in all, at most {} s at a time; {}.",
         three_digits(survey.standing),
@@ -111,7 +111,7 @@ fn warming(run: &Run) -> String {
 }
 
 /// What to look at and what to change, a sentence or two each.
-pub(super) fn findings(run: &Run, survey: &Survey) -> Vec<String> {
+pub fn findings(run: &Run, survey: &Survey) -> Vec<String> {
     let mut findings = run.recording.notes.clone();
     findings.extend(survey.contradiction.iter().map(of_contradiction));
     findings.extend(of_units(run, survey));
@@ -203,7 +203,7 @@ fn dwells(places: &[usize]) -> String {
 }
 
 /// What a label and the record disagree in.
-pub(super) fn of_label(check: &LabelCheck) -> Option<String> {
+pub fn of_label(check: &LabelCheck) -> Option<String> {
     let said = check.disagreement.as_ref()?;
     let at = value(check.segment.start, 1.0);
     Some(format!(

@@ -14,7 +14,7 @@ const APART: f64 = 0.28;
 /// Below this nothing is worth a place on the axis of time, nmile.
 const LEAST: f64 = 0.01;
 
-pub(super) fn figures(experiment: &Experiment) -> [Plot; 3] {
+pub fn figures(experiment: &Experiment) -> [Plot; 3] {
     [
         distribution(experiment),
         against_time(experiment),

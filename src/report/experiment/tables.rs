@@ -8,14 +8,14 @@ use crate::study::experiment::{Estimator, Method, Navigated, Situation, Worth};
 use crate::study::navigation::INTERVAL;
 
 /// The paper's position errors by one triad's errors after 40 h, nmile (Zhao, Jiang, Li 2016, §3.3, Figure 10).
-pub(super) const PAPER: [(Sensor, InstallationForm, f64); 4] = [
+pub const PAPER: [(Sensor, InstallationForm, f64); 4] = [
     (Sensor::Gyro, InstallationForm::SixAngle, 6.10),
     (Sensor::Accel, InstallationForm::SixAngle, 4.16),
     (Sensor::Gyro, InstallationForm::ThreeAngle, 29.37),
     (Sensor::Accel, InstallationForm::ThreeAngle, 21.55),
 ];
 
-pub(super) fn tables(experiment: &Experiment) -> Vec<Table> {
+pub fn tables(experiment: &Experiment) -> Vec<Table> {
     use Situation::{Aligned, Moving, SelfAligned};
     let with = |table: fn(&Experiment, &Navigated) -> Table, situation| {
         Some(table(experiment, navigated(experiment, situation)?))
@@ -33,7 +33,7 @@ pub(super) fn tables(experiment: &Experiment) -> Vec<Table> {
     errors.chain(others.into_iter().flatten()).collect()
 }
 
-pub(super) fn nmile(metres: f64) -> String {
+pub fn nmile(metres: f64) -> String {
     three_digits(miles(metres))
 }
 
@@ -158,24 +158,24 @@ fn budget(experiment: &Experiment, navigated: &Navigated) -> Table {
 }
 
 /// Hours of the paper's experiment.
-pub(super) const PAPER_HOURS: f64 = 40.0;
+pub const PAPER_HOURS: f64 = 40.0;
 
-pub(super) fn hours(experiment: &Experiment) -> f64 {
+pub fn hours(experiment: &Experiment) -> f64 {
     f64::from(experiment.study.intervals) * INTERVAL / HOUR
 }
 
 /// Every method with its table time, s.
-pub(super) fn timed(experiment: &Experiment) -> impl Iterator<Item = (Method, f64)> {
+pub fn timed(experiment: &Experiment) -> impl Iterator<Item = (Method, f64)> {
     Method::all().zip(experiment.table_times.iter().copied())
 }
 
 /// Such as `EKF 10 min, six-angle`.
-pub(super) fn method_name(experiment: &Experiment, method: Method) -> String {
+pub fn method_name(experiment: &Experiment, method: Method) -> String {
     let estimator = estimator_name(experiment, method.estimator);
     format!("{estimator}, {}", method.form.name())
 }
 
-pub(super) fn method_kind(estimator: Estimator) -> &'static str {
+pub fn method_kind(estimator: Estimator) -> &'static str {
     match estimator {
         Estimator::ClosedForm => "closed form",
         Estimator::Filter | Estimator::LongFilter => "EKF",
@@ -183,13 +183,13 @@ pub(super) fn method_kind(estimator: Estimator) -> &'static str {
 }
 
 /// Such as `EKF 10 min`, to the minute: the facts hold the rest.
-pub(super) fn estimator_name(experiment: &Experiment, estimator: Estimator) -> String {
+pub fn estimator_name(experiment: &Experiment, estimator: Estimator) -> String {
     let time = timed(experiment).find(|(method, _)| method.estimator == estimator);
     let minutes = time.map_or(f64::NAN, |(_, time)| time / 60.0);
     format!("{} {minutes:.0} min", method_kind(estimator))
 }
 
-pub(super) fn situation_name(situation: Situation) -> &'static str {
+pub fn situation_name(situation: Situation) -> &'static str {
     match situation {
         Situation::SelfAligned => "stationary, self-aligned",
         Situation::Aligned => "stationary, alignment given",
@@ -197,12 +197,12 @@ pub(super) fn situation_name(situation: Situation) -> &'static str {
     }
 }
 
-pub(super) fn miles(metres: f64) -> f64 {
+pub fn miles(metres: f64) -> f64 {
     metres / NAUTICAL_MILE
 }
 
 /// What a method is worth in the general form.
-pub(super) fn in_general(navigated: &Navigated, estimator: Estimator) -> Option<&Worth> {
+pub fn in_general(navigated: &Navigated, estimator: Estimator) -> Option<&Worth> {
     let general = Method {
         estimator,
         form: InstallationForm::General,
@@ -210,7 +210,7 @@ pub(super) fn in_general(navigated: &Navigated, estimator: Estimator) -> Option<
     navigated.methods.iter().find(|w| w.method == general)
 }
 
-pub(super) fn navigated(experiment: &Experiment, situation: Situation) -> Option<&Navigated> {
+pub fn navigated(experiment: &Experiment, situation: Situation) -> Option<&Navigated> {
     experiment
         .navigations
         .iter()

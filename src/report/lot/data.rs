@@ -4,7 +4,7 @@ use crate::lot::{Against, FALSE_ALARM, FALSE_TREND, Lot, Row, Sample, Statistics
 use crate::report::lot::shown::{shown, shown_spread, spread_symbol, unit_key, verdict};
 use crate::report::prelude::*;
 
-pub(super) fn data(lot: &Lot) -> Value {
+pub fn data(lot: &Lot) -> Value {
     json!({
         "format": "turncal-lot/1",
         "body_frame": lot.body_frame,
@@ -100,7 +100,7 @@ const HEADER: [&str; 9] = [
 ];
 
 /// As CSV. A unit without a calibration has one row without values.
-pub(super) fn csv(lot: &Lot) -> String {
+pub fn csv(lot: &Lot) -> String {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let mut write = |cells: &[String]| {
         // Memory takes it all.

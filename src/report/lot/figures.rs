@@ -4,7 +4,7 @@ use super::shown::{shown, together};
 use crate::lot::{Lot, Quantity, Sample};
 use crate::report::prelude::*;
 
-pub(super) fn parameters(lot: &Lot) -> Plot {
+pub fn parameters(lot: &Lot) -> Plot {
     let panels = together(lot).into_iter().take(Group::all().count());
     let panels = panels.map(|(title, names, quantities)| {
         let limits = limits(lot, &quantities);
@@ -18,7 +18,7 @@ pub(super) fn parameters(lot: &Lot) -> Plot {
     )
 }
 
-pub(super) fn noise(lot: &Lot) -> Plot {
+pub fn noise(lot: &Lot) -> Plot {
     let panels = together(lot).into_iter().skip(Group::all().count());
     let panels = panels.map(|(title, names, quantities)| Panel {
         y: Axis::log("").room(0.1, 0.1),

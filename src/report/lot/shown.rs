@@ -5,7 +5,7 @@ use crate::lot::{Against, Check, Lot, Quantity, Row, Sample, Spread, Trend, Verd
 use crate::report::prelude::*;
 
 /// Such as `gyro K x` or `gyro noise x`.
-pub(super) fn title(quantity: Quantity) -> String {
+pub fn title(quantity: Quantity) -> String {
     match quantity {
         Quantity::Parameter(index) => short_name(InstallationForm::General, index),
         Quantity::Noise(sensor, axis) => format!("{} noise {}", sensor.name(), AXES[axis]),
@@ -26,17 +26,17 @@ fn unit(quantity: Quantity) -> (&'static str, &'static str, f64) {
 }
 
 /// Symbol of its unit.
-pub(super) fn symbol(quantity: Quantity) -> &'static str {
+pub fn symbol(quantity: Quantity) -> &'static str {
     unit(quantity).0
 }
 
 /// Its unit as a name in files.
-pub(super) fn unit_key(quantity: Quantity) -> &'static str {
+pub fn unit_key(quantity: Quantity) -> &'static str {
     unit(quantity).1
 }
 
 /// Value and σ in that unit.
-pub(super) fn shown(quantity: Quantity, of: Sample) -> (f64, f64) {
+pub fn shown(quantity: Quantity, of: Sample) -> (f64, f64) {
     let (.., unit) = unit(quantity);
     match quantity {
         Quantity::Parameter(index) => (Group::of(index).shown(of.value), of.sigma / unit),
@@ -48,7 +48,7 @@ pub(super) fn shown(quantity: Quantity, of: Sample) -> (f64, f64) {
 }
 
 /// A difference of values in the unit of [`spread_symbol`].
-pub(super) fn shown_spread(quantity: Quantity, spread: f64) -> f64 {
+pub fn shown_spread(quantity: Quantity, spread: f64) -> f64 {
     match quantity {
         Quantity::Parameter(index) => spread / Group::of(index).unit_value(),
         // Of a logarithm.
@@ -57,7 +57,7 @@ pub(super) fn shown_spread(quantity: Quantity, spread: f64) -> f64 {
 }
 
 /// Unit of differences between units.
-pub(super) fn spread_symbol(quantity: Quantity) -> &'static str {
+pub fn spread_symbol(quantity: Quantity) -> &'static str {
     match quantity {
         Quantity::Parameter(_) => symbol(quantity),
         Quantity::Noise(..) => "%",
@@ -65,7 +65,7 @@ pub(super) fn spread_symbol(quantity: Quantity) -> &'static str {
 }
 
 /// A value with its σ, or with three digits where it has none.
-pub(super) fn with_sigma((of, own): (f64, f64)) -> String {
+pub fn with_sigma((of, own): (f64, f64)) -> String {
     match own > 0.0 {
         true => plus_minus(of, own),
         false => three_digits(of),
@@ -73,7 +73,7 @@ pub(super) fn with_sigma((of, own): (f64, f64)) -> String {
 }
 
 /// A trend in a sentence.
-pub(super) fn change(quantity: Quantity, trend: &Trend) -> String {
+pub fn change(quantity: Quantity, trend: &Trend) -> String {
     let (what, unit) = match trend.against {
         Against::Serial => ("the serial number", "for each number"),
         Against::Date => ("the date", "a day"),
@@ -89,7 +89,7 @@ pub(super) fn change(quantity: Quantity, trend: &Trend) -> String {
 }
 
 /// A probability.
-pub(super) fn chance(p: f64) -> String {
+pub fn chance(p: f64) -> String {
     match p < 1e-4 {
         true => "< 0.0001".to_owned(),
         false => value(p, 0.1 * p.max(0.01)),
@@ -97,7 +97,7 @@ pub(super) fn chance(p: f64) -> String {
 }
 
 /// A spread with its own σ, or what it stays below.
-pub(super) fn spread(quantity: Quantity, of: &Spread) -> String {
+pub fn spread(quantity: Quantity, of: &Spread) -> String {
     let shown = |x: f64| shown_spread(quantity, x);
     match of.sigma {
         Some(own) if of.interval.0 > 0.0 => plus_minus(shown(of.value), shown(own)),
@@ -109,7 +109,7 @@ pub(super) fn spread(quantity: Quantity, of: &Spread) -> String {
 
 /// Quantities that are shown together: the heading, the name of each, and which they are. First the groups of
 /// parameters, then the noise of each triad.
-pub(super) fn together(lot: &Lot) -> Vec<(String, Vec<String>, Vec<Quantity>)> {
+pub fn together(lot: &Lot) -> Vec<(String, Vec<String>, Vec<Quantity>)> {
     let those = |is: &dyn Fn(Quantity) -> bool| -> Vec<Quantity> {
         let all = lot.statistics.iter().map(|of| of.quantity);
         all.filter(|&quantity| is(quantity)).collect()
@@ -133,7 +133,7 @@ pub(super) fn together(lot: &Lot) -> Vec<(String, Vec<String>, Vec<Quantity>)> {
 }
 
 /// The verdict of the limit of a quantity.
-pub(super) fn verdict(row: &Row, quantity: Quantity) -> Option<Verdict> {
+pub fn verdict(row: &Row, quantity: Quantity) -> Option<Verdict> {
     let is_of = |check: &&Check| Quantity::Parameter(check.limit.parameter) == quantity;
     row.checks.iter().find(is_of).map(|check| check.verdict)
 }

@@ -9,7 +9,7 @@ use crate::lot::{Calibrated, Check, FALSE_ALARM, Lot, Quantity, Row, Sample, Sta
 use crate::report::prelude::*;
 
 /// One row a unit.
-pub(super) fn units(lot: &Lot) -> Table {
+pub fn units(lot: &Lot) -> Table {
     let mut columns = cells!["unit", "serial", "date"];
     if lot.specification.is_some() {
         columns.push("verdict".to_owned());
@@ -81,7 +81,7 @@ fn verdict(of: Option<Verdict>, check: Option<&Check>) -> String {
 }
 
 /// Mean and spread of every parameter.
-pub(super) fn parameters(lot: &Lot) -> Table {
+pub fn parameters(lot: &Lot) -> Table {
     let is_parameter = |of: &Statistics| matches!(of.quantity, Quantity::Parameter(_));
     let sections = Sensor::ALL.map(|sensor| {
         let of_sensor = move |of: &&Statistics| match of.quantity {
@@ -103,7 +103,7 @@ pub(super) fn parameters(lot: &Lot) -> Table {
 }
 
 /// Noise at rest.
-pub(super) fn noise(lot: &Lot) -> Table {
+pub fn noise(lot: &Lot) -> Table {
     let of_noise = |of: &&Statistics| matches!(of.quantity, Quantity::Noise(..));
     let rows = lot.statistics.iter().filter(of_noise).map(row);
     statistics("Noise at rest")
@@ -158,7 +158,7 @@ fn ratio(of: f64) -> String {
 }
 
 /// Every parameter of every unit, a table for each group, and one of noise for each triad.
-pub(super) fn values(lot: &Lot) -> Vec<Table> {
+pub fn values(lot: &Lot) -> Vec<Table> {
     let tables = together(lot).into_iter();
     let tables = tables.filter(|(.., quantities)| !quantities.is_empty());
     let table = |(heading, axes, quantities): (String, Vec<String>, Vec<Quantity>)| {
@@ -183,7 +183,7 @@ pub(super) fn values(lot: &Lot) -> Vec<Table> {
 }
 
 /// Limits that are not kept, or of which that cannot be said.
-pub(super) fn undecided(lot: &Lot) -> Table {
+pub fn undecided(lot: &Lot) -> Table {
     let row = |row: &Row, check: &Check| {
         let quantity = Quantity::Parameter(check.limit.parameter);
         let in_unit = |x: f64| shown_spread(quantity, x);

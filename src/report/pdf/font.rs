@@ -10,13 +10,13 @@ const REGULAR: &[u8] = include_bytes!("../../certificate/fonts/NotoSans-Regular.
 const BOLD: &[u8] = include_bytes!("../../certificate/fonts/NotoSans-Bold.ttf");
 
 /// A font.
-pub(super) struct Typeface {
+pub struct Typeface {
     face: Face<'static>,
     pub font: Font,
 }
 
 /// Regular and bold.
-pub(super) struct Fonts {
+pub struct Fonts {
     pub regular: Typeface,
     pub bold: Typeface,
 }

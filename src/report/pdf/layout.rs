@@ -4,8 +4,8 @@ use crate::report::document::{Block, Document, Facts, List, Medium, Table};
 use crate::report::pdf::font::Fonts;
 
 /// A4, pt.
-pub(super) const WIDTH: f32 = 595.28;
-pub(super) const HEIGHT: f32 = 841.89;
+pub const WIDTH: f32 = 595.28;
+pub const HEIGHT: f32 = 841.89;
 const MARGIN: f32 = 54.0;
 const TOP: f32 = 74.0;
 const BOTTOM: f32 = HEIGHT - 62.0;
@@ -24,7 +24,7 @@ const GAP: f32 = 14.0;
 
 /// What is drawn on a page.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Drawn {
+pub enum Drawn {
     Text {
         at: (f32, f32),
         text: String,
@@ -39,7 +39,7 @@ pub(super) enum Drawn {
 
 /// How letters are.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Style {
+pub struct Style {
     pub size: f32,
     pub bold: bool,
     pub grey: u8,
@@ -61,7 +61,7 @@ const REMARK: Style = Style {
 };
 
 /// Pages in the making.
-pub(super) struct Layout<'a> {
+pub struct Layout<'a> {
     fonts: &'a Fonts,
     frame: &'a Frame,
     pages: Vec<Vec<Drawn>>,

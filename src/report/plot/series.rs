@@ -262,7 +262,7 @@ const MOST: usize = 1 << 17;
 
 /// A line of at most as many points as are of use: where there are more, of so many that follow one another the
 /// lowest and the highest.
-pub(in crate::report) fn thinned(points: impl IntoIterator<Item = Point>) -> Vec<Point> {
+pub fn thinned(points: impl IntoIterator<Item = Point>) -> Vec<Point> {
     let mut line = Vec::new();
     // Of these, from this place of the line on, two will stay.
     let (mut together, mut begin, mut since) = (1, 0, 0);

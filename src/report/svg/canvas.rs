@@ -14,26 +14,26 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use crate::report::plot::{Color, Dash, Panel, Pen, Point, Scale};
 
 /// Width of every figure.
-pub(super) const WIDTH: u32 = 1200;
+pub const WIDTH: u32 = 1200;
 /// Drawn pixels in one shown pixel.
 const FINE: f64 = 8.0;
 /// Size of the letters.
-pub(super) const LETTER: f64 = 14.0;
+pub const LETTER: f64 = 14.0;
 /// Of ticks, labels and notes.
-pub(super) const SMALL: f64 = 0.95;
+pub const SMALL: f64 = 0.95;
 /// What plotters divides a font's size by when it writes SVG.
 const FONT_RATIO: f64 = 1.24;
 
 /// Text and axes.
-pub(super) const INK: RGBColor = RGBColor(34, 34, 34);
+pub const INK: RGBColor = RGBColor(34, 34, 34);
 /// What must not distract.
-pub(super) const QUIET: RGBColor = RGBColor(110, 110, 110);
+pub const QUIET: RGBColor = RGBColor(110, 110, 110);
 /// Grid lines.
-pub(super) const GRID: RGBColor = RGBColor(218, 218, 214);
+pub const GRID: RGBColor = RGBColor(218, 218, 214);
 /// The time of a dwell.
-pub(super) const SHADE: RGBColor = RGBColor(243, 243, 238);
+pub const SHADE: RGBColor = RGBColor(243, 243, 238);
 /// Bands and filled bars.
-pub(super) const BAND: RGBColor = RGBColor(196, 214, 228);
+pub const BAND: RGBColor = RGBColor(196, 214, 228);
 
 const COLORS: [RGBColor; 6] = [
     RGBColor(0, 84, 147),
@@ -45,10 +45,10 @@ const COLORS: [RGBColor; 6] = [
 ];
 
 /// What can go wrong while drawing.
-pub(super) type DrawError = DrawingAreaErrorKind<std::io::Error>;
+pub type DrawError = DrawingAreaErrorKind<std::io::Error>;
 
 /// The colour of a pen.
-pub(super) fn rgb(color: Color) -> RGBColor {
+pub fn rgb(color: Color) -> RGBColor {
     match color {
         Color::Ink => INK,
         Color::Quiet => QUIET,
@@ -57,7 +57,7 @@ pub(super) fn rgb(color: Color) -> RGBColor {
 }
 
 /// About how wide a text is in shown pixels; fonts differ, this is one of the wide ones.
-pub(super) fn width(text: &str, scale: f64) -> f64 {
+pub fn width(text: &str, scale: f64) -> f64 {
     let of = |letter: char| match letter {
         'i' | 'j' | 'l' | '\'' | '|' | 'I' => 0.29,
         ' ' | '.' | ',' | ':' | ';' | '\u{202f}' => 0.32,
@@ -71,7 +71,7 @@ pub(super) fn width(text: &str, scale: f64) -> f64 {
 }
 
 /// A text cut to a width.
-pub(super) fn shortened(text: &str, room: f64) -> String {
+pub fn shortened(text: &str, room: f64) -> String {
     if width(text, SMALL) <= room {
         return text.to_owned();
     }
@@ -91,14 +91,14 @@ fn place((x, y): Point) -> (i32, i32) {
 }
 
 /// What a figure is drawn on.
-pub(super) struct Canvas<'a> {
+pub struct Canvas<'a> {
     area: DrawingArea<SVGBackend<'a>, Shift>,
     /// The first error, which is that of the figure.
     failed: RefCell<Option<DrawError>>,
 }
 
 /// An SVG document of this size.
-pub(super) fn draw(
+pub fn draw(
     (width, height): (u32, u32),
     content: impl FnOnce(&Canvas),
 ) -> Result<String, DrawError> {
@@ -199,7 +199,7 @@ fn font(scale: f64) -> FontDesc<'static> {
 }
 
 /// A panel laid out: where its axes are.
-pub(super) struct Frame<'p> {
+pub struct Frame<'p> {
     /// The panel.
     pub(super) panel: &'p Panel,
     /// Horizontal scale.

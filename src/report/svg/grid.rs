@@ -21,11 +21,11 @@ fn rows(grid: &Grid) -> usize {
     grid.panels.len().div_ceil(grid.columns).max(1)
 }
 
-pub(super) fn height(grid: &Grid) -> u32 {
+pub fn height(grid: &Grid) -> u32 {
     grid.height * rows(grid) as u32
 }
 
-pub(super) fn draw(on: &Canvas, grid: &Grid) {
+pub fn draw(on: &Canvas, grid: &Grid) {
     let panel_width = f64::from(WIDTH) / grid.columns as f64;
     for column in 0..grid.columns {
         let panels = grid.panels.iter().skip(column).step_by(grid.columns);

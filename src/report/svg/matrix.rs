@@ -19,11 +19,11 @@ fn margin(matrix: &Matrix) -> f64 {
     widths.fold(0.0, f64::max) + 16.0
 }
 
-pub(super) fn height(matrix: &Matrix) -> u32 {
+pub fn height(matrix: &Matrix) -> u32 {
     (margin(matrix) + SIDE + 20.0) as u32
 }
 
-pub(super) fn draw(on: &Canvas, matrix: &Matrix) {
+pub fn draw(on: &Canvas, matrix: &Matrix) {
     let (margin, count) = (margin(matrix), matrix.names.len());
     let cell = SIDE / count.max(1) as f64;
     let at = |n: usize| margin + cell * n as f64;

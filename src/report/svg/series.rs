@@ -10,7 +10,7 @@ const CAP: f64 = 4.0;
 /// Points of a line for each pixel of its panel; more would not show.
 const POINTS: f64 = 1.5;
 
-pub(super) fn draw(on: &Canvas, frame: &Frame, series: &Series) {
+pub fn draw(on: &Canvas, frame: &Frame, series: &Series) {
     let (pen, color) = (series.pen, rgb(series.pen.color));
     let ((left, right), (top, bottom)) = (frame.across, frame.down);
     match &series.shape {
@@ -143,7 +143,7 @@ fn marked(on: &Canvas, at: Point, mark: Mark, pen: Pen) {
 }
 
 /// About `limit` points of a line, the lowest and the highest of each stretch.
-pub(super) fn thinned(points: &[Point], limit: usize) -> Vec<Point> {
+pub fn thinned(points: &[Point], limit: usize) -> Vec<Point> {
     if points.len() <= limit.max(2) {
         return points.to_vec();
     }

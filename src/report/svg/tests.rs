@@ -45,7 +45,7 @@ fn texts(svg: &str) -> Vec<(String, [f64; 4])> {
 }
 
 /// What must hold of any figure: whole, of numbers, with its labels inside.
-pub(in crate::report) fn assert_sound(figures: &[String]) {
+pub fn assert_sound(figures: &[String]) {
     for svg in figures {
         let head = &svg[..svg.find('>').unwrap()];
         assert_eq!(number(head, "width"), 1200.0);
@@ -73,7 +73,7 @@ pub(in crate::report) fn assert_sound(figures: &[String]) {
 }
 
 /// Figures that were drawn and found sound.
-pub(in crate::report) fn drawn<'a>(plots: impl Iterator<Item = &'a Plot>) -> Vec<String> {
+pub fn drawn<'a>(plots: impl Iterator<Item = &'a Plot>) -> Vec<String> {
     let figures: Vec<String> = plots.map(|plot| draw(plot).unwrap()).collect();
     assert_sound(&figures);
     figures

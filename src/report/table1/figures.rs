@@ -12,7 +12,7 @@ const FLAT: f64 = 1e-4;
 const ATTITUDE: [Quantity; 3] = [Quantity::Pitch, Quantity::Roll, Quantity::Heading];
 const MOTION: [Quantity; 2] = [Quantity::Velocity, Quantity::Position];
 
-pub(super) fn figures(table: &Table1) -> Vec<Plot> {
+pub fn figures(table: &Table1) -> Vec<Plot> {
     let of_column = |column: &Column| {
         let figures = column
             .published

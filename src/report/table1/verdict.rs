@@ -6,7 +6,7 @@ use crate::study::table1::paper::Published;
 use crate::study::table1::{Column, Kind, Quantity, Row, Verdict};
 
 /// A verdict in a few words.
-pub(super) fn short(verdict: &Verdict) -> &'static str {
+pub fn short(verdict: &Verdict) -> &'static str {
     match verdict {
         Verdict::Reproduced => "reproduced",
         Verdict::Zero => "zero; the paper's are rounding",
@@ -17,7 +17,7 @@ pub(super) fn short(verdict: &Verdict) -> &'static str {
 
 /// The last column of the table: the verdict where the reading is as stated, otherwise whether it gives
 /// the paper's figures.
-pub(super) fn of_row(column: &Column, row: &Row) -> String {
+pub fn of_row(column: &Column, row: &Row) -> String {
     match row.reading.kind {
         Kind::Stated => short(&column.verdict).to_owned(),
         Kind::Assumption | Kind::Slip => of_reading(row),
@@ -43,7 +43,7 @@ fn split(row: &Row) -> (Vec<&'static str>, Vec<&'static str>) {
 }
 
 /// A sentence for each of the paper's columns.
-pub(super) fn sentences(table: &Table1) -> Vec<String> {
+pub fn sentences(table: &Table1) -> Vec<String> {
     let columns = table.columns.iter();
     columns
         .map(|column| format!("{}: {}", title(column.published), sentence(column)))
@@ -51,7 +51,7 @@ pub(super) fn sentences(table: &Table1) -> Vec<String> {
 }
 
 /// A verdict with what it rests on.
-pub(super) fn sentence(column: &Column) -> String {
+pub fn sentence(column: &Column) -> String {
     match &column.verdict {
         Verdict::Reproduced => "reproduced as stated.".to_owned(),
         Verdict::Zero => {
@@ -91,7 +91,7 @@ pub(super) fn sentence(column: &Column) -> String {
 }
 
 /// A column of the paper's in words.
-pub(super) fn title(published: &Published) -> &'static str {
+pub fn title(published: &Published) -> &'static str {
     match (published.sensor, published.form) {
         (Sensor::Gyro, InstallationForm::ThreeAngle) => "Gyros, three-angle form (Eq. 10)",
         (Sensor::Gyro, _) => "Gyros, six-angle form (Eq. 8)",

@@ -67,7 +67,7 @@ impl Figures {
 }
 
 /// Of each term that has a bound in any run and that the filter estimated.
-pub(super) fn of_error_terms(trials: &[Trial]) -> Vec<(ErrorTerm, Figures)> {
+pub fn of_error_terms(trials: &[Trial]) -> Vec<(ErrorTerm, Figures)> {
     let has_sigma = |&k: &usize| trials.iter().any(|trial| trial.auxiliary_bound[k] > 0.0);
     let of_term = |term: ErrorTerm| {
         let is_of = |&k: &usize| AuxiliaryKind::of(k).is_some_and(|of| of.error_term() == term);
@@ -93,6 +93,6 @@ pub(super) fn of_error_terms(trials: &[Trial]) -> Vec<(ErrorTerm, Figures)> {
 }
 
 /// Root of the mean; NaN of none.
-pub(super) fn rms(squares: &[f64]) -> f64 {
+pub fn rms(squares: &[f64]) -> f64 {
     (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }

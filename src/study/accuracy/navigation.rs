@@ -79,7 +79,7 @@ pub struct Containment {
 }
 
 /// A mission, followed once: what the linear model says of one instrument of the grade holds for all.
-pub(super) struct Way {
+pub struct Way {
     journey: Journey,
     by_parameter: SMatrix<f64, 2, PARAMETERS>,
 }

@@ -69,7 +69,7 @@ pub struct Filtered {
 const MOMENTS: usize = 40;
 
 /// Times at which errors are kept, s; the last is the end of a run of this duration.
-pub(super) fn moments(duration: f64) -> impl Iterator<Item = f64> {
+pub fn moments(duration: f64) -> impl Iterator<Item = f64> {
     (1..=MOMENTS).map(move |k| duration * k as f64 / MOMENTS as f64)
 }
 

@@ -76,7 +76,7 @@ pub struct Calibrated {
 }
 
 /// What is simulated for each estimator.
-pub(super) struct Scenarios(Vec<(Estimator, Scenario)>);
+pub struct Scenarios(Vec<(Estimator, Scenario)>);
 
 impl Scenarios {
     pub(super) fn new(scenario: &Scenario) -> Result<Self, ModelError> {

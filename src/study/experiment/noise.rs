@@ -58,7 +58,7 @@ impl Variances {
 
 /// Covariance of the horizontal position error at the end, east and north, m². Where the instrument
 /// aligned itself, `aligned` is the errors at the start by those of the sensed rate and force.
-pub(super) fn position(
+pub fn position(
     mission: &Mission,
     aligned: Option<InputMatrix>,
     noise: &PerSensor<Noise>,
@@ -139,7 +139,7 @@ impl Covariance {
 }
 
 /// How the length of a normal vector with this covariance is distributed.
-pub(super) fn spread(covariance: &Matrix2<f64>) -> Spread {
+pub fn spread(covariance: &Matrix2<f64>) -> Spread {
     let eigen = covariance.symmetric_eigen();
     let sigma = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
     let mut rng = ChaCha8Rng::seed_from_u64(0);
@@ -159,7 +159,7 @@ pub(super) fn spread(covariance: &Matrix2<f64>) -> Spread {
 /// ```
 ///
 /// (Groves, 2nd ed., §5.6.2 has the same in North-East-Down.)
-pub(super) fn by_itself(at: &Solution) -> InputMatrix {
+pub fn by_itself(at: &Solution) -> InputMatrix {
     let gravity = normal_gravity(at.latitude, at.height);
     let (sin, cos) = at.latitude.sin_cos();
     let mut by_axes = InputMatrix::zeros();

@@ -38,7 +38,7 @@ impl Moments {
 }
 
 /// A standing body at the ellipsoid, level and heading north.
-pub(super) fn standing(latitude: f64) -> Solution {
+pub fn standing(latitude: f64) -> Solution {
     Solution {
         attitude: Matrix3::identity(),
         velocity: Vector3::zeros(),
@@ -53,7 +53,7 @@ pub(super) fn standing(latitude: f64) -> Solution {
 /// Standing still under constant sensor errors the linear error model has constant coefficients: its
 /// response to each unit error is found once, exactly at each output, and every sample is a linear
 /// combination of the responses.
-pub(super) struct Response {
+pub struct Response {
     step: f64,
     by_sensor: PerSensor<Vec<SMatrix<f64, OUTPUTS, 3>>>,
 }

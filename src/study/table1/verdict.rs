@@ -27,7 +27,7 @@ pub enum Verdict {
 /// Difference of the paper's mean from that of a population of `n`, in standard errors of the
 /// difference: `(m_paper − m) / (s √(1/50 + 1/n))`, with the standard deviation of the population for
 /// both samples.
-pub(super) fn difference(paper: &Moments, population: &Moments, n: usize) -> f64 {
+pub fn difference(paper: &Moments, population: &Moments, n: usize) -> f64 {
     let error = population.std * (1.0 / SAMPLES as f64 + 1.0 / n as f64).sqrt();
     (paper.mean - population.mean) / error
 }
@@ -35,7 +35,7 @@ pub(super) fn difference(paper: &Moments, population: &Moments, n: usize) -> f64
 /// The verdict on a column of the table: from its figures as stated with their differences, and from the
 /// differences under its other readings. `three_angle` is the column of the three-angle form of the same
 /// triad.
-pub(super) fn verdict(
+pub fn verdict(
     published: &Published,
     three_angle: &Published,
     (stated, differences): (&ByQuantity<Moments>, &ByQuantity<f64>),

@@ -138,7 +138,7 @@ pub fn in_body_frame(triads: &PerSensor<Triad>, body_frame: BodyFrame) -> PerSen
 }
 
 /// Indices of the parameters that a body frame leaves free, in the general form.
-pub(crate) fn free_parameters(body_frame: BodyFrame) -> Vec<usize> {
+pub fn free_parameters(body_frame: BodyFrame) -> Vec<usize> {
     let mut free: Vec<usize> = (0..PARAMETERS).collect();
     if body_frame == BodyFrame::Accelerometer {
         let fixed: Vec<usize> = Triad::above_the_diagonal(InstallationForm::General)
@@ -162,7 +162,7 @@ pub fn own_nominal(record: &Calibration) -> PerSensor<Nominal> {
 
 /// `R` from the given body frame to the accelerometer frame: `a Rᵀ` is lower triangular. Its rows are
 /// those of `a`, made orthonormal one after the other; NaN where `a` does not span the space.
-pub(crate) fn accelerometer_frame(a: &Matrix3<f64>) -> Matrix3<f64> {
+pub fn accelerometer_frame(a: &Matrix3<f64>) -> Matrix3<f64> {
     let rows: [Vector3<f64>; 2] = [0, 1].map(|i| a.row(i).transpose());
     let x = rows[0].normalize();
     let z = x.cross(&rows[1]).normalize();

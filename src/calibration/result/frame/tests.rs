@@ -11,7 +11,7 @@ use crate::calibration::{parameter_name, sensor_and_parameter};
 use crate::imu::{Instrument, Prior};
 
 /// Scale factors in counts, installation of hundredths, biases; no σ.
-pub(crate) fn record() -> Calibration {
+pub fn record() -> Calibration {
     let rows = |v: [f64; 6]| {
         let c = InstallationForm::General.matrix(&v.into());
         [0, 1, 2].map(|i| [c[(i, 0)], c[(i, 1)], c[(i, 2)]])
@@ -33,7 +33,7 @@ pub(crate) fn record() -> Calibration {
 }
 
 /// σ of a good calibration, with correlations.
-pub(crate) fn with_covariance(mut record: Calibration, form: InstallationForm) -> Calibration {
+pub fn with_covariance(mut record: Calibration, form: InstallationForm) -> Calibration {
     let indices: Vec<usize> = (0..PARAMETERS)
         .filter(|&i| parameter_name(form, i).is_some())
         .collect();

@@ -8,7 +8,7 @@ use super::super::arrays::{Array, Field, Open};
 use super::super::bytes::{Broken, Kind, Slice};
 use super::LONGEST_HEADER;
 
-pub(super) struct Header {
+pub struct Header {
     /// Of each item of the array.
     fields: Vec<Numbers>,
     /// Bytes of an item.

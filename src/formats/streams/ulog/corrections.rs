@@ -13,7 +13,7 @@ const CALIBRATIONS: usize = 4;
 
 /// `P` messages, and the devices that PX4 says it has selected.
 #[derive(Default)]
-pub(super) struct Parameters {
+pub struct Parameters {
     values: BTreeMap<String, f64>,
     pub selected: PerSensor<Option<f64>>,
     /// How often one of them was set.
@@ -99,7 +99,7 @@ impl Parameters {
 }
 
 /// Columns of the devices that a topic says are selected; one says so when that changes, the other at intervals.
-pub(super) fn selects(topic: &str, columns: &[Column]) -> PerSensor<Option<usize>> {
+pub fn selects(topic: &str, columns: &[Column]) -> PerSensor<Option<usize>> {
     PerSensor::from_fn(|sensor| {
         let name = match topic {
             "sensor_selection" => format!("{}_device_id", sensor.name()),
@@ -111,7 +111,7 @@ pub(super) fn selects(topic: &str, columns: &[Column]) -> PerSensor<Option<usize
 }
 
 /// What of a topic is corrected.
-pub(super) fn of_topic(topic: &str, columns: &[Column]) -> Undo {
+pub fn of_topic(topic: &str, columns: &[Column]) -> Undo {
     let place = |name: &str| columns.iter().position(|column| column.name == name);
     let corrected = PerSensor::from_fn(|sensor| {
         let [increments, interval, device, rates, of_driver] = match sensor {

@@ -10,7 +10,7 @@ const MOST: usize = 1 << 16;
 /// Topics within topics: those of PX4 go one deep.
 const DEEPEST: usize = 8;
 
-pub(super) struct Layout {
+pub struct Layout {
     pub columns: Vec<Column>,
     places: Vec<(usize, Kind)>,
     length: usize,

@@ -27,7 +27,7 @@ const INERTIAL: [&str; 4] = [
     "sensor_combined",
 ];
 
-pub(super) fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
+pub fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
     input.skip(HEADER, "the header")?;
     let mut ahead = Ulog::begin(input, PerSensor::default());
     let selected = ahead.first_selected();

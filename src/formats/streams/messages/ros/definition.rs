@@ -10,7 +10,7 @@ const DEEPEST: usize = 16;
 const MOST_FIELDS: usize = 4096;
 
 /// Definitions on their way to a type.
-pub(super) struct Parser {
+pub struct Parser {
     /// Names and texts; the first is the message's.
     definitions: Vec<(String, String)>,
     encoding: Encoding,
