@@ -91,8 +91,10 @@ fn with_causes<'a>(
     let mut causes = causes_of(&solved)?;
     while solved.causes.len() < most {
         // What lasts throughout widens what all positions show; what it leaves tells whether it is chance.
-        let lasting = (causes.lasting.filter(is_asked))
-            .filter(|of| (causes.most).is_none_or(|most| of.explained() > most.explained()));
+        let lasting = causes.lasting.filter(|of| {
+            let most = causes.most.map(|most| most.explained());
+            most.is_none_or(|most| of.explained() > most)
+        });
         let mut next = None;
         for found in [lasting, causes.most.filter(is_asked)]
             .into_iter()

@@ -47,7 +47,7 @@ pub struct FoundCause {
 pub struct Causes {
     /// The one that explains most of those beyond chance.
     pub most: Option<FoundCause>,
-    /// The one that lasts throughout and would explain most, if chance is as the noise says.
+    /// Earth rate, which lasts throughout, if it is beyond chance as the noise says.
     pub lasting: Option<FoundCause>,
     /// How many times as wide as the noise says half of all positions and half of all slips are, at least one.
     pub chance: f64,
@@ -248,12 +248,10 @@ impl FoundCause {
         self.significance() > self.limit
     }
 
-    /// Whether it changes all positions.
+    /// Whether it is what all positions show, by no more numbers than one of them has: Earth rate.
     fn is_lasting(&self) -> bool {
-        match self.cause {
-            Cause::Term(_) => true,
-            Cause::Disturbance(of) => of.kind == DisturbanceKind::EarthRate,
-        }
+        let is = |of: Disturbance| of.kind == DisturbanceKind::EarthRate;
+        matches!(self.cause, Cause::Disturbance(of) if is(of))
     }
 
     /// The problem with it: readings of a wrong position are left out, all else is estimated.

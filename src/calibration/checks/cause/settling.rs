@@ -47,34 +47,42 @@ pub fn settling(solved: &Solved) -> Result<usize, CalibrationError> {
     Ok(squares.iter().take_while(is_beyond).count())
 }
 
-/// The squares, over their variance, of what a table's readings at the begin of a dwell are off the mean of those in the
-/// time after them, with the steps before each.
+/// The squares, over their variance, of what a table's readings at the begin of a dwell are off the mean of those in a
+/// time after them that is the same for all, with the steps before each.
 fn off_the_later_ones(problem: &Problem, stretch: &Stretch, part: &Rest) -> Vec<(usize, f64)> {
     let mut moved = Vector3::zeros();
     let mut read: Vec<(usize, f64, Vector3<f64>, f64)> = Vec::new();
     for (number, step) in part.steps.iter().enumerate() {
         moved += step.referred[0];
-        let table = part.seen[step.seen.clone()]
-            .iter()
-            .find(|seen| seen.kind == Observation::Table);
+        let of_step = part.seen[step.seen.clone()].iter();
+        let table = of_step.filter(|seen| seen.kind == Observation::Table);
         read.extend(table.map(|seen| {
             let variance = stretch.observation_variance(&problem.model, seen.kind, seen.readings);
             (number, step.time, seen.residual - moved, variance)
         }));
     }
+    let (Some(first), Some(last)) = (read.first(), read.last()) else {
+        return Vec::new();
+    };
+    let (end, after) = (last.1, LONGEST.min(0.5 * (last.1 - first.1)));
+    let with_all = read
+        .iter()
+        .enumerate()
+        .take_while(|(_, of)| of.1 + after <= end);
     let square = |(place, &(number, time, residual, variance)): (
         usize,
         &(usize, f64, Vector3<f64>, f64),
     )| {
         let later = read[place + 1..]
             .iter()
-            .take_while(|of| of.1 <= time + LONGEST);
-        let count = later.clone().count();
-        let mean = later.map(|of| of.2).sum::<Vector3<f64>>() / count as f64;
-        let variance = variance * (1.0 + 1.0 / count as f64);
-        (count > 0 && variance > 0.0).then(|| (number, (residual - mean).norm_squared() / variance))
+            .take_while(|of| of.1 <= time + after);
+        let count = later.clone().count() as f64;
+        let mean = later.map(|of| of.2).sum::<Vector3<f64>>() / count;
+        let variance = variance * (1.0 + 1.0 / count);
+        (count > 0.0 && variance > 0.0)
+            .then(|| (number, (residual - mean).norm_squared() / variance))
     };
-    read.iter().enumerate().filter_map(square).collect()
+    with_all.filter_map(square).collect()
 }
 
 /// Whether this many steps are longer than a table settles.
