@@ -8,8 +8,9 @@ use std::rc::Rc;
 use super::bytes::{Broken, Kind};
 use super::{Column, Log, Stream};
 
-/// What has more columns is a picture or a matrix, but no samples.
+/// What has more columns or more bytes in a row is a picture or a matrix, but no samples.
 const MOST_COLUMNS: usize = 256;
+const LONGEST_ROW: usize = 1 << 16;
 
 /// The bytes of an array from one of them on.
 pub type Open = Box<dyn Fn(u64) -> io::Result<Box<dyn Read>>>;
@@ -51,7 +52,9 @@ impl Array {
             .items()
             .filter(|_| rows > 1)
             .map_or(0, |all| all / rows);
-        if columns == 0 || columns.saturating_mul(self.fields.len()) > MOST_COLUMNS {
+        let numbers = columns.saturating_mul(self.fields.len());
+        let length = columns.saturating_mul(self.size);
+        if numbers == 0 || numbers > MOST_COLUMNS || length > LONGEST_ROW {
             return Vec::new();
         }
         let strides = self.strides();
@@ -161,6 +164,11 @@ impl Cursor {
         Ok(())
     }
 
+    /// From the begin of a number of the last row on.
+    fn bytes(&self, cell: &Field) -> &[u8] {
+        self.row.get(cell.place..).unwrap_or_default()
+    }
+
     /// Reads what is left, so that damage there shows.
     fn finish(&mut self) -> io::Result<()> {
         if self.next < self.rows {
@@ -253,8 +261,7 @@ impl Log for Arrays {
         };
         for cursor in self.groups.get_mut(stream).into_iter().flatten() {
             cursor.read(row).map_err(|error| cursor.broken(error))?;
-            let number =
-                |cell: &Field| cell.kind.number(&cursor.row[cell.place..], cell.big_endian);
+            let number = |cell: &Field| cell.kind.number(cursor.bytes(cell), cell.big_endian);
             values.extend(
                 cursor
                     .cells
@@ -270,7 +277,7 @@ impl Log for Arrays {
         let mut cells =
             (group.iter()).flat_map(|cursor| cursor.cells.iter().map(move |cell| (cursor, cell)));
         let (cursor, cell) = cells.nth(column)?;
-        cell.kind.whole(&cursor.row[cell.place..], cell.big_endian)
+        cell.kind.whole(cursor.bytes(cell), cell.big_endian)
     }
 
     fn offset(&self) -> u64 {
