@@ -65,6 +65,7 @@ pub enum Noise {
     /// As run.toml and models state it
     Stated,
     /// As stated unless the data contradict that, which right figures do once in a thousand runs
+    #[value(alias = "estimate")]
     Auto,
     /// As the data show it, around what is stated
     Learnt,

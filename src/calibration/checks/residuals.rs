@@ -143,16 +143,22 @@ impl Residuals {
                  level_sigma_arcsec and north_sigma_arcsec in [turntable].",
                 base / ARCSEC
             ),
-            None => "If that is small, look there for a bump, a wrong label or attitude; if not, check noise figures \
-                     in [imu.noise], the level and north of the table, the direction of gravity, and whether the \
-                     sensor was really still."
+            None => "Look there for a bump, a wrong label or attitude. Check noise figures in [imu.noise], the level \
+                     and north of the table, the direction of gravity, and whether the sensor was really still."
                 .to_owned(),
+        };
+        let place = match times.len() {
+            // Several that are alike, and none of them stands out.
+            3.. => "No single interval stands out".to_owned(),
+            _ => format!(
+                "The worst interval is {}; without it χ² is {without:.0}",
+                times.join(" or ")
+            ),
         };
         let text = format!(
             "The static fit of {of} is poor (χ² {chi_square:.0} with {degrees} degrees of freedom; limit \
-             {limit:.0}). turncal widened σ {}. The worst interval is {}; without it χ² is {without:.0}. {cause}",
-            widened_by(growth),
-            times.join(" or ")
+             {limit:.0}). turncal widened σ {}. {place}. {cause}",
+            widened_by(growth)
         );
         let figures = json!({
             "of": of, "chi_square": chi_square, "degrees": degrees, "limit": limit, "growth": growth,

@@ -65,8 +65,8 @@ impl Uniform {
         }
         (self.jitter_max > self.period).then(|| {
             format!(
-                "Stamps are late or early by up to {}, more than a sample of {sample}: later ones tell when it was \
-                 taken.",
+                "Time stamps are early or late by up to {}, and a sample lasts {sample}. turncal took an even clock \
+                 through all of them.",
                 ms(self.jitter_max),
             )
         })

@@ -64,7 +64,13 @@ impl Draft {
     /// The first thing that stands between the draft and a run: what the log has, what is needed, what to do.
     pub(in crate::formats) fn open_question(&self) -> Option<[String; 3]> {
         let (field, why) = self.page("log").open.into_iter().next()?;
+        let has_accels = self.columns.triads.accel.is_some();
         let (expected, advice) = match &*field {
+            "gyro_unit" if !has_accels => (
+                "gyros of a known unit, and accelerometers",
+                "Give both files to `turncal init GYROS ACCELS -o run.toml`. For the Allan figures of gyros alone, state \
+                 --gyro-unit.",
+            ),
             "gyro_unit" => ("the unit of the gyros", "State it with --gyro-unit."),
             "accel_unit" => (
                 "the unit of the accelerometers",

@@ -130,7 +130,10 @@ impl Draft {
             page.line(
                 "bias_sigma",
                 format_args!("{sigma:?}"),
-                "in the file's unit, per second",
+                match per_second {
+                    1.0 => "in the file's unit",
+                    _ => "in the file's unit, per second",
+                },
             );
         }
     }

@@ -287,15 +287,15 @@ fn site(document: Document, run: &RunFile, notes: &mut Vec<String>) -> Result<Si
     }
     if !site.is_known {
         notes.push(
-            "run.toml does not state latitude_deg in [site]. turncal estimates Earth rate as an unknown vector, which \
-             widens the σ of the gyro biases."
+            "The latitude is not stated. turncal estimates Earth rate as an unknown vector, which widens the σ of the gyro \
+             biases. State latitude_deg in [site], or --latitude."
                 .to_owned(),
         );
     }
     if file.gravity_m_s2.is_none() && (!site.is_known || height.is_none()) {
         notes.push(format!(
-            "run.toml does not state the place in [site]. turncal assumed a gravity of {:.4} ± {:.4} m/s², which widens \
-             the σ of the accelerometer scale factors by as much. State latitude_deg and height_m, or gravity_m_s2.",
+            "The place is not stated. turncal assumed a gravity of {:.4} ± {:.4} m/s², which widens the σ of the accelerometer \
+             scale factors by as much. State latitude_deg and height_m in [site], or gravity_m_s2 (--gravity).",
             site.gravity, site.gravity_sigma
         ));
     }

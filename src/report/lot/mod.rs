@@ -130,7 +130,7 @@ fn say_outliers(lot: &Lot, document: &mut Document) {
             document.say(false, words);
         }
     }
-    if !any {
+    if !any && lot.rows.len() > 1 {
         let percent = 100.0 * FALSE_ALARM;
         let words = format!(
             "No unit is apart from the others; a sound lot has one named in {percent} % of all cases."

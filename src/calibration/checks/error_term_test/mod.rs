@@ -101,7 +101,9 @@ impl ErrorTermTest {
     /// from it and those that are also significant with it on. `growth` is that of σ by leaving them off;
     /// none where σ do not include it.
     pub fn most_significant(tests: &[Self], growth: Option<f64>) -> Option<Finding> {
-        let likeliest = tests.iter().find(|test| test.role == Role::Likeliest)?;
+        // What lowers the cost by less than one is worth less than 1σ.
+        let is_shown = |test: &&Self| test.role == Role::Likeliest && test.gain > 1.0;
+        let likeliest = tests.iter().find(is_shown)?;
         let names = |role: Role| -> Vec<&str> {
             let of_role = tests.iter().filter(|test| test.role == role);
             of_role.map(|test| test.term.name()).collect()
