@@ -79,49 +79,45 @@ fn settled<'a>(before: Solved<'a>, progress: Progress) -> Result<Solved<'a>, Cal
     }
 }
 
-/// With the causes that the record shows: the one that explains most first, as long as one is beyond chance.
+/// With the causes that the record shows, the likeliest first, as long as one is beyond chance.
 fn with_causes<'a>(
     mut solved: Solved<'a>,
     progress: Progress,
 ) -> Result<Solved<'a>, CalibrationError> {
     let most = solved.problem.dwells().count() / DWELLS_OF_ONE;
-    let auto_terms = solved.problem.options.auto_terms;
-    // Nothing else is to explain a term that is not asked for.
-    let is_asked = |of: &FoundCause| auto_terms || !matches!(of.cause, Cause::Term(_));
     let mut causes = causes_of(&solved)?;
     while solved.causes.len() < most {
-        // What lasts throughout widens what all positions show; what it leaves tells whether it is chance.
-        let lasting = causes.lasting.filter(|of| {
-            let most = causes.most.map(|most| most.explained());
-            most.is_none_or(|most| of.explained() > most)
-        });
-        let mut next = None;
-        for found in [lasting, causes.most.filter(is_asked)]
-            .into_iter()
-            .flatten()
-        {
-            let problem = found.taken_into(&solved.problem);
-            // A cause with which nothing converges is none.
-            let Some(again) = solved.better(solved.clone().again(problem, progress))? else {
-                continue;
-            };
-            let left = causes_of(&again)?;
-            let found = match lasting {
-                Some(lasting) if lasting == found => found.beside_what_it_leaves(&left),
-                _ => found,
-            };
-            if found.is_beyond() {
-                next = Some((found, again, left));
-                break;
-            }
-        }
-        let Some((found, again, left)) = next else {
+        let Some((with, left)) = with_one(&solved, &causes, progress)? else {
             break;
         };
-        (solved, causes) = (again, left);
-        solved.causes.push(found);
+        (solved, causes) = (with, left);
     }
     Ok(solved)
+}
+
+/// With the likeliest cause that is beyond chance beside what it leaves, and what may be a cause then.
+fn with_one<'a>(
+    solved: &Solved<'a>,
+    causes: &Causes,
+    progress: Progress,
+) -> Result<Option<(Solved<'a>, Causes)>, CalibrationError> {
+    let auto_terms = solved.problem.options.auto_terms;
+    // Nothing else is to explain a term that is not asked for.
+    let is_asked = |of: &&FoundCause| auto_terms || !matches!(of.cause, Cause::Term(_));
+    for found in causes.likeliest.iter().filter(is_asked) {
+        let problem = found.taken_into(&solved.problem);
+        // A cause with which nothing converges is none.
+        let Some(mut with) = solved.better(solved.clone().again(problem, progress))? else {
+            continue;
+        };
+        let left = causes_of(&with)?;
+        let found = found.beside_what_it_leaves(&left);
+        if found.is_beyond() {
+            with.causes.push(found);
+            return Ok(Some((with, left)));
+        }
+    }
+    Ok(None)
 }
 
 fn causes_of(solved: &Solved) -> Result<Causes, CalibrationError> {

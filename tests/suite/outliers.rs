@@ -12,6 +12,7 @@ use turncal::calibration::{
 use turncal::imu::Sensor;
 use turncal::run::Run;
 use turncal::simulation::{Scenario, Simulated};
+use turncal::units::ARCSEC;
 
 /// With the noise that the run states, which is that of its data.
 fn stated() -> Options {
@@ -161,6 +162,51 @@ fn an_outlier_as_the_first_observation_after_a_turn_does_not_lock_the_filter_out
     // each turn is skipped as one in which the table settles.
     assert!(outcome.settling > 0 || velocity == dwells.len() - 1);
     assert!(table < dwells.len());
+}
+
+#[test]
+fn a_table_that_settles_after_each_stop_is_said_and_costs_no_accuracy() {
+    let mut simulated = Scenario::load("demo").unwrap().simulate(SEED, 0).unwrap();
+    let (outcome, clean) = error(&simulated);
+    assert_eq!(outcome.settling, 0);
+    let dwells = simulated.run.dwells(simulated.run.aiding());
+    let still = simulated.run.recording.imu.clone();
+    for size in [10.0, 60.0] {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        simulated.run.recording.imu = still.clone();
+        let imu = &mut simulated.run.recording.imu;
+        for dwell in &dwells[1..] {
+            // The body is turned by this as it stops, and comes back.
+            let about = direction(&mut rng) * (size * ARCSEC);
+            let stop = dwell.samples.start;
+            let off = |sample: usize| about * (-((sample - stop) as f64) * imu.period / 0.3).exp();
+            let gyro = imu.gyro.to_mut();
+            gyro[stop - 1] += about;
+            for sample in dwell.samples.clone() {
+                gyro[sample] += off(sample + 1) - off(sample);
+                let force = still.accel.at(sample);
+                imu.accel.to_mut()[sample] -= off(sample).cross(&force);
+            }
+        }
+        let (outcome, settling) = error(&simulated);
+        let said = |finding: &&Finding| finding.kind == "settling";
+        assert_eq!(outcome.findings.iter().filter(said).count(), 1, "{size}″");
+        let shift = (settling - clean).amax();
+        println!("{size}″: {} steps, shift {shift:.3} σ", outcome.settling);
+        assert!(shift < 1.0, "{size}″: {shift} σ");
+    }
+}
+
+#[test]
+fn a_table_that_is_read_once_a_second_is_not_said_to_settle() {
+    let mut simulated = Scenario::load("demo").unwrap().simulate(SEED, 0).unwrap();
+    let table = simulated.run.recording.table.as_mut().unwrap();
+    table.axes = table.axes.iter().copied().step_by(10).collect();
+    table.time = table.time.iter().copied().step_by(10).collect();
+    table.attitude = table.attitude.iter().copied().step_by(10).collect();
+    assert!(table.time[1] - table.time[0] > 0.99);
+    let (outcome, _) = error(&simulated);
+    assert_eq!(outcome.settling, 0);
 }
 
 #[test]

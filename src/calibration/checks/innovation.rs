@@ -185,7 +185,7 @@ pub fn inconsistent(innovations: &[Innovation]) -> Option<Finding> {
     }
     let text = format!(
         "The filter is inconsistent: NIS is outside its 99.9 % interval for {}. Where to look: only after moves – \
-         table position, scale factor or timing; during dwells – bias drift, by temperature with --temperature; everywhere – the white noise stated in \
+         table position, scale factor or timing; during dwells – bias drift (add --temperature if it follows the temperature); everywhere – the white noise stated in \
          [imu.noise].",
         each.join("; ")
     );

@@ -20,7 +20,7 @@ use crate::units::{DEGREE, STANDARD_GRAVITY};
 const BIAS: usize = PARAMETERS - 3;
 /// Length of the rows of the run, s, where those of the log are shorter.
 const ROW: f64 = 0.02;
-/// A run needs longer rests than a hand makes: its clock is this many times too fast, which nothing else depends on.
+/// A run needs longer rests than a hand makes: all is taken to happen this many times slower, on which nothing else depends.
 const SLOWED: f64 = 2.0;
 /// 1σ of a scale that is as good as unknown, relative …
 const ANY_SCALE: f64 = 0.5;

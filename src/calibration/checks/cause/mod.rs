@@ -45,10 +45,9 @@ pub struct FoundCause {
 
 /// What may be the cause of what was solved.
 pub struct Causes {
-    /// The one that explains most of those beyond chance.
-    pub most: Option<FoundCause>,
-    /// Earth rate, which lasts throughout, if it is beyond chance as the noise says.
-    pub lasting: Option<FoundCause>,
+    /// The likeliest first: the one that explains most of those beyond chance; before it Earth rate, which widens what all
+    /// positions show, if it explains more where chance is as the noise says.
+    pub likeliest: Vec<FoundCause>,
     /// How many times as wide as the noise says half of all positions and half of all slips are, at least one.
     pub chance: f64,
 }
@@ -89,10 +88,12 @@ impl Causes {
         });
         let read = read.iter().map(|of| of.beside(of_read, limit));
         let all: Vec<FoundCause> = read.chain(scored).collect();
+        let most = explains_most(all.iter().copied());
         let lasting = all.iter().filter(|of| of.is_lasting());
+        let lasting = explains_most(lasting.map(|of| of.beside(1.0, limit)));
+        let before = |of: &FoundCause| most.is_none_or(|most| of.explained() > most.explained());
         Ok(Self {
-            most: explains_most(all.iter().copied()),
-            lasting: explains_most(lasting.map(|of| of.beside(1.0, limit))),
+            likeliest: lasting.filter(before).into_iter().chain(most).collect(),
             chance: of_both,
         })
     }
@@ -228,13 +229,16 @@ impl FoundCause {
         }
     }
 
-    /// Where chance is as wide as what it leaves shows.
+    /// As what is left with it taken in shows: chance is as wide as that beside what lasts throughout.
     pub fn beside_what_it_leaves(self, left: &Causes) -> Self {
-        self.beside(left.chance, self.limit)
+        match self.is_lasting() {
+            true => self.beside(left.chance, self.limit),
+            false => self,
+        }
     }
 
     /// What it explains beyond what chance does, in squares of noise.
-    pub fn explained(&self) -> f64 {
+    fn explained(&self) -> f64 {
         self.square - self.chance * self.degrees
     }
 

@@ -31,7 +31,9 @@ pub fn settling(solved: &Solved) -> Result<usize, CalibrationError> {
         let stops = script
             .parts(number)
             .filter(|part| part.first && part.new_position);
-        for (step, square) in stops.flat_map(|part| off_the_later_ones(problem, stretch, part)) {
+        for (step, square) in
+            stops.flat_map(|part| off_the_later_ones(&readings(problem, stretch, part)))
+        {
             squares.resize(squares.len().max(step + 1), (0.0, 0));
             squares[step].0 += square;
             squares[step].1 += 3;
@@ -41,47 +43,58 @@ pub fn settling(solved: &Solved) -> Result<usize, CalibrationError> {
     let mut means: Vec<f64> = read.map(|of| of.0 / of.1 as f64).collect();
     let of_each = FALSE_ALARM / means.len().max(1) as f64;
     let chance = median(&mut means).unwrap_or(1.0).max(1.0);
-    let is_beyond = |&&(square, count): &&(f64, usize)| {
-        count == 0 || square > chance * chi_square_limit(count as f64, of_each)
-    };
-    Ok(squares.iter().take_while(is_beyond).count())
+    // Not every step has a reading.
+    let read = squares.iter().enumerate().filter(|(_, of)| of.1 > 0);
+    let beyond = read.take_while(|(_, (square, count))| {
+        *square > chance * chi_square_limit(*count as f64, of_each)
+    });
+    Ok(beyond.last().map_or(0, |(step, _)| step + 1))
 }
 
-/// The squares, over their variance, of what a table's readings at the begin of a dwell are off the mean of those in a
-/// time after them that is the same for all, with the steps before each.
-fn off_the_later_ones(problem: &Problem, stretch: &Stretch, part: &Rest) -> Vec<(usize, f64)> {
-    let mut moved = Vector3::zeros();
-    let mut read: Vec<(usize, f64, Vector3<f64>, f64)> = Vec::new();
+/// A reading of the table less what the gyros sensed since the dwell began.
+struct Reading {
+    /// Steps of the dwell before it.
+    step: usize,
+    time: f64,
+    residual: Vector3<f64>,
+    variance: f64,
+}
+
+fn readings(problem: &Problem, stretch: &Stretch, part: &Rest) -> Vec<Reading> {
+    let mut sensed = Vector3::zeros();
+    let mut readings = Vec::new();
     for (number, step) in part.steps.iter().enumerate() {
-        moved += step.referred[0];
+        sensed += step.referred[0];
         let of_step = part.seen[step.seen.clone()].iter();
         let table = of_step.filter(|seen| seen.kind == Observation::Table);
-        read.extend(table.map(|seen| {
+        readings.extend(table.map(|seen| Reading {
+            step: number,
+            time: step.time,
+            residual: seen.residual - sensed,
             // As of one: what the gyros add is the same for a mean of several.
-            let variance = stretch.observation_variance(&problem.model, seen.kind, 1);
-            (number, step.time, seen.residual - moved, variance)
+            variance: stretch.observation_variance(&problem.model, seen.kind, 1),
         }));
     }
-    let (Some(first), Some(last)) = (read.first(), read.last()) else {
+    readings
+}
+
+/// The squares, over their variance, of what readings at the begin of a dwell are off the mean of those in a time after
+/// them that is the same for all, with the steps before each.
+fn off_the_later_ones(readings: &[Reading]) -> Vec<(usize, f64)> {
+    let (Some(first), Some(last)) = (readings.first(), readings.last()) else {
         return Vec::new();
     };
-    let (end, after) = (last.1, LONGEST.min(0.5 * (last.1 - first.1)));
-    let with_all = read
-        .iter()
-        .enumerate()
-        .take_while(|(_, of)| of.1 + after <= end);
-    let square = |(place, &(number, time, residual, variance)): (
-        usize,
-        &(usize, f64, Vector3<f64>, f64),
-    )| {
-        let later = read[place + 1..]
-            .iter()
-            .take_while(|of| of.1 <= time + after);
+    let after = LONGEST.min(0.5 * (last.time - first.time));
+    let with_all = readings.iter().enumerate();
+    let with_all = with_all.take_while(|(_, of)| of.time + after <= last.time);
+    let square = |(place, of): (usize, &Reading)| {
+        let later = readings[place + 1..].iter();
+        let later = later.take_while(|other| other.time <= of.time + after);
         let count = later.clone().count() as f64;
-        let mean = later.map(|of| of.2).sum::<Vector3<f64>>() / count;
-        let variance = variance * (1.0 + 1.0 / count);
-        (count > 0.0 && variance > 0.0)
-            .then(|| (number, (residual - mean).norm_squared() / variance))
+        let mean = later.map(|other| other.residual).sum::<Vector3<f64>>() / count;
+        let variance = of.variance * (1.0 + 1.0 / count);
+        let is_known = count > 0.0 && variance > 0.0;
+        is_known.then(|| (of.step, (of.residual - mean).norm_squared() / variance))
     };
     with_all.filter_map(square).collect()
 }
