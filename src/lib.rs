@@ -64,6 +64,7 @@ pub mod lot;
 pub mod models;
 pub mod navigation;
 pub mod noise;
+pub mod number;
 pub mod recording;
 #[cfg(feature = "report")]
 pub mod report;

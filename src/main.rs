@@ -1,5 +1,12 @@
 //! The `turncal` command.
 
+/// A line on standard error. A reader that has seen enough, such as `head`, is no failure.
+macro_rules! tell {
+    ($($words:tt)*) => {
+        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("{}\n", format_args!($($words)*)));
+    };
+}
+
 mod cli;
 
 use std::process::ExitCode;
@@ -14,8 +21,11 @@ fn main() -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("turncal: {}", printable(&format!("{error:#}")));
-            ExitCode::FAILURE
+            tell!("turncal: {}", printable(&format!("{error:#}")));
+            match error.is::<cli::NotMet>() {
+                true => ExitCode::from(3),
+                false => ExitCode::FAILURE,
+            }
         }
     }
 }

@@ -7,7 +7,7 @@
 //! | velocity | 3 | δV = computed − true, East-North-Up, m/s |
 //! | position | 3 | δp = computed − true, East-North-Up, m |
 //! | gravity | 1 | true − stated magnitude of gravity, m/s²; where recordings are of several sites and it has a σ |
-//! | Earth rate | 2 | true − computed Earth rate along East and North, rad/s; without a table, where it is drawn for each stretch whose heading is not known |
+//! | Earth rate | 3 | true − computed Earth rate along East, North and Up, rad/s; without a table, where it is drawn for each stretch whose heading is not known |
 //! | Gauss–Markov bias | 3 a triad | what its biases are off D now, rad/s or m/s²; where noise figures state one |
 //! | of the recording | one for each parameter that is not common to all, and 3 of its mounting, rad | by how much it differs in this recording, see [`crate::calibration::several::day_to_day::Difference`] |
 //! | table position | 3 | τ, error of the current table position, `C_table = (I − [τ×]) C_true`, rad; with a table |

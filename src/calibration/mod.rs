@@ -40,9 +40,11 @@ pub use checks::error_term_test::{ErrorTermTest, Role, UnmodelledEffect, test_er
 pub use checks::finding::Finding;
 pub use checks::form::FormTest;
 pub use checks::innovation::{Consistency, Innovation, Nis, Observation, mean_square_interval};
+pub use checks::kind::{Kind as FindingKind, Level};
 pub use checks::observability::{AttitudePart, Direction, Observability, Part};
 pub use checks::quality::{Measures, Quality, Spread};
 pub use checks::recordings::RecordingDifference;
+pub use checks::verdict::{Verdict, Word};
 use constants::{Constant, Known, Posterior, Prior};
 pub use constants::{Disturbance, DisturbanceKind};
 pub use error::{CalibrationError, ComparisonError};

@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 
 use crate::calibration::checks::dwell_scatter::DwellScores;
 use crate::calibration::checks::innovation::consistency;
+use crate::calibration::checks::kind::Kind;
 use crate::calibration::estimate::largest_growth;
 use crate::calibration::linearisation::{UNKNOWN_HEADING, not_invertible};
 use crate::calibration::{
@@ -144,7 +145,11 @@ impl Outcome {
 
     /// Whether it may be used: it converged, and noise explains what it leaves.
     pub fn is_usable(&self) -> bool {
-        self.converged && !self.findings.iter().any(Finding::is_unexplained)
+        self.converged
+            && !self
+                .findings
+                .iter()
+                .any(|finding| finding.is(Kind::Unexplained))
     }
 
     /// Whether the run observed the heading: two that are opposite differ by more than 6 in χ² by what

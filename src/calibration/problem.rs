@@ -6,12 +6,13 @@ use nalgebra::Matrix3;
 
 use crate::attitude::{self, to_tilt_and_heading};
 use crate::calibration::budget::source::BudgetSource;
+use crate::calibration::checks::finding::Finding;
 use crate::calibration::linearisation::Start;
 use crate::calibration::record::schedule::{Step, first_reading, step_length, steps};
 use crate::calibration::record::standstill::{FLOOR, standstill_sigma};
 use crate::calibration::{AttitudePrior, Model, Observation, Options};
 use crate::imu::{PerSensor, Sensor};
-use crate::recording::TableLog;
+use crate::recording::{Recording, TableLog};
 use crate::run::{Aiding, Dwell, LONG_ENOUGH, Position, Run};
 use crate::statistics::chi_square_limit;
 
@@ -232,12 +233,27 @@ impl<'a> Problem<'a> {
         std::iter::once(self.run).chain(self.others.iter().copied())
     }
 
-    /// What the readers of the runs' files found, once, with the name of the run where it is not of all; and which
-    /// recordings are left out.
-    pub(in crate::calibration) fn notes(&self) -> Vec<String> {
+    /// What hardly fits the recordings of what is stated of them, what their reader found, and which of them are left out.
+    pub(in crate::calibration) fn remarks(&self) -> Vec<Finding> {
+        let left_out = self.left_out.iter().map(|name| {
+            format!(
+                "{name}: left out, since no dwell was found in it; the instrument must stand for {LONG_ENOUGH} s or more \
+                 between turns."
+            )
+        });
+        let doubts = self
+            .of_recordings(|recording| &recording.doubts)
+            .into_iter();
+        let notes = self.of_recordings(|recording| &recording.notes).into_iter();
+        let notes = notes.chain(left_out).map(Finding::of_recording);
+        doubts.map(Finding::of_statement).chain(notes).collect()
+    }
+
+    /// Sentences on recordings, each once, with the names of those that it is about unless it is about all.
+    fn of_recordings(&self, of: impl Fn(&Recording) -> &Vec<String>) -> Vec<String> {
         let mut found: Vec<(&String, Vec<&str>)> = Vec::new();
         for run in self.runs() {
-            for note in &run.recording.notes {
+            for note in of(&run.recording) {
                 match found.iter_mut().find(|(other, _)| *other == note) {
                     Some((_, names)) => names.push(&run.recording.name),
                     None => found.push((note, vec![&run.recording.name])),
@@ -245,19 +261,11 @@ impl<'a> Problem<'a> {
             }
         }
         let count = self.runs().count();
-        let found = found
-            .into_iter()
-            .map(|(note, names)| match names.len() == count {
-                true => note.clone(),
-                false => format!("{}: {note}", names.join(", ")),
-            });
-        let left_out = self.left_out.iter().map(|name| {
-            format!(
-                "{name}: left out, since no dwell was found in it; the instrument must stand for {LONG_ENOUGH} s or more \
-                 between turns."
-            )
-        });
-        found.chain(left_out).collect()
+        let named = |(note, names): (&String, Vec<&str>)| match names.len() == count {
+            true => note.clone(),
+            false => format!("{}: {note}", names.join(", ")),
+        };
+        found.into_iter().map(named).collect()
     }
 
     /// What is observed at the end of a step, in order.

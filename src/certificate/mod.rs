@@ -7,6 +7,7 @@ pub mod dcc;
 mod laboratory;
 mod results;
 
+use crate::calibration::FindingKind;
 use crate::calibration::result::{Calibration, Provenance};
 use crate::calibration::{ComparisonError, Correction, CorrectionError};
 use crate::imu::BodyFrame;
@@ -88,7 +89,11 @@ impl Certificate {
         if calibration.converged == Some(false) {
             return not_usable("did not converge");
         }
-        if calibration.findings.iter().any(|f| f.kind == "unexplained") {
+        if calibration
+            .findings
+            .iter()
+            .any(|f| f.is(FindingKind::Unexplained))
+        {
             return not_usable("leaves more than noise explains");
         }
         Correction::of_record(&calibration)?;

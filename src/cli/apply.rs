@@ -89,7 +89,7 @@ impl Apply {
             None => stream(|rows| sample_rows(rows, &correction, &run, self.fill))?,
         }
         drop(activity);
-        eprintln!(
+        tell!(
             "{} rows of {} s{}; x right, y front, z up, along: {}",
             run.recording.imu.len() - if self.fill { 0 } else { lost },
             run.recording.imu.period,
@@ -103,7 +103,7 @@ impl Apply {
             record.body_frame.words()
         );
         for note in notes(&record, &correction, &run) {
-            eprintln!("note: {}", printable(&note));
+            tell!("note: {}", printable(&note));
         }
         Ok(())
     }

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::error::ErrorKind;
-use turncal::calibration::{self, AtRest, Problem, Solution, Together};
+use turncal::calibration::{self, AtRest, Finding, Problem, Solution, Together};
 use turncal::formats::{Campaign, Opened};
-use turncal::report;
+use turncal::recording::Recording;
 use turncal::report::terminal::printable;
+use turncal::report::{self, Facts};
 use turncal::run::Run;
 use turncal::study::Shard;
 
@@ -16,7 +17,7 @@ use super::calibrated::{Calibrated, read_truth, write_report};
 use super::estimation::{Estimation, Method};
 use super::input::shard;
 use super::lot;
-use super::output::{Overwrite, print, show};
+use super::output::{Overwrite, print, show, show_brief};
 use super::progress::Activity;
 use super::source::{OfLog, run_or_log};
 
@@ -78,6 +79,9 @@ pub struct Calibrate {
     /// Print the calibration, or what is said of the lot, as one JSON document and nothing else
     #[arg(long)]
     json: bool,
+    /// Print all parameters, tests and findings
+    #[arg(short, long, conflicts_with = "json")]
+    verbose: bool,
     #[command(flatten)]
     overwrite: Overwrite,
 }
@@ -124,7 +128,7 @@ impl Calibrate {
             true => {
                 let together = Together::default();
                 let problem = self.estimation.together(&[run], &together);
-                let problem = problem.inspect_err(|_| say(&run.recording.notes))?;
+                let problem = problem.inspect_err(|_| say(&run.recording))?;
                 // Without a turn, only what is at rest against temperature can be had.
                 if problem.dwells().nth(1).is_none()
                     && let Some(at_rest) = AtRest::new(run, HIGHEST_ORDER_AT_REST)
@@ -160,7 +164,7 @@ impl Calibrate {
             true => print(&calibration.to_json(Path::new("standard output"))?),
             false => show(&document, false),
         }?;
-        say(&run.recording.notes);
+        say(&run.recording);
         Ok(())
     }
 
@@ -170,7 +174,7 @@ impl Calibrate {
         let runs: Vec<&Run> = campaign.runs.iter().collect();
         let problem = self.estimation.together(&runs, &campaign.together);
         let problem = problem.inspect_err(|_| {
-            runs.iter().for_each(|run| say(&run.recording.notes));
+            runs.iter().for_each(|run| say(&run.recording));
         });
         let problem = problem.with_context(|| path.display().to_string())?;
         self.solved(&problem, &campaign.name, (path, None), activity)
@@ -211,7 +215,7 @@ impl Calibrate {
 
         // What was found in the files may be why.
         let mut solution = solve(problem, self.estimation.method.into(), &activity)
-            .inspect_err(|_| say(&run.recording.notes))?;
+            .inspect_err(|_| say(&run.recording))?;
         let calibrated = Calibrated::new(problem, &mut solution)?.of_files(path);
         activity.next("writing");
         // Standard output alone, as JSON, takes no report.
@@ -227,13 +231,15 @@ impl Calibrate {
             directory.commit()?;
         }
         drop(activity);
-        match &document {
-            Some(document) if !self.json => show(document, false)?,
+        match document {
+            Some(document) if self.verbose => show(&document, false)?,
+            Some(mut document) if !self.json => {
+                document
+                    .brief
+                    .push(files(target.as_deref(), path, &document.findings).into());
+                show_brief(&document)?;
+            }
             _ => print(&calibration.to_json(Path::new("standard output"))?)?,
-        }
-        if let Some(target) = target.filter(|_| !self.json) {
-            let page = target.join("report").join("index.html");
-            eprintln!("\nreport: {}", printable(&page.display().to_string()));
         }
         if !solution.converged() {
             bail!("{name}: not converged; values and σ may not be used, see the findings");
@@ -247,9 +253,29 @@ impl Calibrate {
     }
 }
 
-fn say(notes: &[String]) {
-    for note in notes {
-        eprintln!("note: {}", printable(note));
+/// What was written, and what to do with it.
+fn files(target: Option<&Path>, run: &Path, findings: &[Finding]) -> Facts {
+    let mut facts = Facts::default();
+    let shown = |path: PathBuf| path.display().to_string();
+    if let Some(target) = target {
+        let calibration = shown(target.join("calibration.json"));
+        facts.push("calibration", calibration.clone());
+        facts.push("report", shown(target.join("report").join("index.html")));
+        facts.push(
+            "use it",
+            format!("turncal apply {calibration} {}", run.display()),
+        );
+    }
+    let explain = findings
+        .first()
+        .map(|finding| format!(", or turncal explain {}", finding.code));
+    facts.push("more", format!("--verbose{}", explain.unwrap_or_default()));
+    facts
+}
+
+fn say(recording: &Recording) {
+    for note in recording.doubts.iter().chain(&recording.notes) {
+        tell!("note: {}", printable(note));
     }
 }
 

@@ -15,8 +15,9 @@ use turncal::formats::input_digests;
 use turncal::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
 use turncal::report::Document;
 use turncal::report::calibration::{self as of_calibration, Navigated, Report};
-use turncal::run::Run;
+use turncal::run::{Aiding, Run};
 use turncal::study::navigation::{Mission, NavigationStudyError};
+use turncal::survey::{self, Expected};
 
 use super::estimation::Method;
 
@@ -70,6 +71,7 @@ impl Calibrated {
         let form = solution.estimate().form();
         let in_form =
             triads.map(|truth| PerSensor::from_fn(|sensor| truth.get(sensor).in_form(form)));
+        let predicted = predicted(problem, solution);
         let no_terms = BTreeMap::new();
         let report = Report {
             title: name,
@@ -80,6 +82,7 @@ impl Calibrated {
             findings: &findings,
             effects: &assessment.error_terms,
             budget: assessment.budget.as_ref(),
+            predicted: predicted.as_ref(),
             quality: Some(&assessment.quality),
             true_terms: truth.map_or(&no_terms, |truth| &truth.terms),
             closed_form: solution
@@ -94,6 +97,19 @@ impl Calibrated {
         };
         report.document()
     }
+}
+
+/// What was to be expected of a record alone; of several nothing is predicted.
+fn predicted(problem: &Problem, solution: &Solution) -> Option<Expected> {
+    let path = match (solution.closed_form(), problem.model.aiding) {
+        (Some(_), _) => return None,
+        (None, Aiding::Table) => survey::Path::TableAiding,
+        (None, Aiding::Velocity) => survey::Path::VelocityAiding,
+    };
+    let outcome = solution.outcome()?;
+    (outcome.alone.len() < 2)
+        .then(|| Expected::of(problem.run(), path).ok())
+        .flatten()
 }
 
 /// Says in a calibration of which files it was made.

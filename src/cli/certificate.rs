@@ -96,7 +96,7 @@ impl Certificate {
                 .with_context(|| format!("cannot write {}", target.display()))?;
         }
         whole.commit()?;
-        eprintln!(
+        tell!(
             "certificate: {}",
             self.output.join("certificate.pdf").display()
         );

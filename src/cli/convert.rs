@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
-use turncal::formats::draft::{Draft, Stated};
+use turncal::formats::draft::Draft;
 
 use super::output::Overwrite;
 use super::progress::Activity;
+use super::source::OfLog;
 
 /// Writes the log of another program as a plain run directory
 ///
@@ -22,9 +23,8 @@ pub struct Convert {
     /// Directory to write
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// The stream that holds the instrument [default: the one with the most samples]
-    #[arg(long, value_name = "NAME")]
-    stream: Option<String>,
+    #[command(flatten)]
+    of_log: OfLog,
     /// Use what is whole before the first damage
     #[arg(long)]
     salvage: bool,
@@ -36,13 +36,14 @@ impl Convert {
     pub fn run(&self) -> anyhow::Result<()> {
         let directory = self.overwrite.directory(&self.output, &[&self.log])?;
         let activity = Activity::new("reading");
-        let draft = Draft::of_stream(&self.log, self.stream.as_deref(), &Stated::default())?;
+        let (stream, stated) = self.of_log.stated();
+        let draft = Draft::of_stream(&self.log, stream, &stated)?;
         activity.next("writing");
         draft.convert(&self.log, &directory.path(), self.salvage)?;
         directory.commit()?;
         drop(activity);
         let run = self.output.join("run.toml");
-        eprintln!("{}: complete the fields marked TODO", run.display());
+        tell!("{}: complete the fields marked TODO", run.display());
         Ok(())
     }
 }

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use turncal::calibration::{self, ClosedForm, Estimate, Options, Problem};
 use turncal::imu::{PerSensor, Triad};
 use turncal::models::{self, Place};
+use turncal::report::Facts;
 use turncal::report::calibration::{self as of_calibration, Report};
 use turncal::report::demo::{self, Flown};
 use turncal::run::{Dwell, Run};
@@ -17,7 +18,7 @@ use turncal::study::navigation::{FORTY_HOURS, Mission, Motion};
 use super::calibrate::solve;
 use super::calibrated::{dwell_times, navigate, note, stamp, write_report};
 use super::input::seed;
-use super::output::{Overwrite, show};
+use super::output::{Overwrite, show_brief};
 use super::progress::Activity;
 use super::simulate::{simulated, write};
 
@@ -83,11 +84,7 @@ impl Demo {
             format!("EKF, {table_time:.0} min"),
             format!("closed form, {whole_time:.0} min"),
         ];
-        let mut findings = closed_form.findings.clone();
-        let of_filter = solution.findings(&assessment).into_iter();
-        // What was found in the files is said of both.
-        let of_filter: Vec<_> = of_filter.filter(|f| !findings.contains(f)).collect();
-        findings.extend(of_filter);
+        let findings = solution.findings(&assessment);
         let report = Report {
             title: "turncal demo",
             run,
@@ -97,6 +94,7 @@ impl Demo {
             findings: &findings,
             effects: &assessment.error_terms,
             budget: assessment.budget.as_ref(),
+            predicted: None,
             quality: Some(&assessment.quality),
             true_terms: &BTreeMap::new(),
             closed_form: Some(of_calibration::ClosedForm {
@@ -130,10 +128,12 @@ impl Demo {
         directory.commit()?;
         drop(activity);
 
-        show(&document, false)?;
         let page = self.output.join("report").join("index.html");
-        eprintln!("\nreport: {}", page.display());
-        Ok(())
+        let mut files = Facts::default();
+        files.push("report", page.display().to_string());
+        files.push("with a log of your own", "turncal calibrate LOG");
+        document.brief.push(files.into());
+        show_brief(&document)
     }
 }
 

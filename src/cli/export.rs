@@ -58,7 +58,7 @@ impl Export {
             None => print(text)?,
         }
         for note in exported.notes {
-            eprintln!("not held: {note}");
+            tell!("not held: {note}");
         }
         Ok(())
     }

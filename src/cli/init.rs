@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use turncal::formats::draft::{Draft, Stated};
+use turncal::formats::draft::Draft;
 use turncal::formats::write_whole;
 
 use super::output::{keep, print};
 use super::progress::Activity;
+use super::source::{OfLog, show_found};
 
 /// Writes a draft of run.toml for a log that has none
 ///
@@ -27,9 +28,8 @@ pub struct Init {
     /// Rows of the accelerometers, where the other file has those of the gyros alone
     #[arg(value_name = "ACCEL.csv", conflicts_with = "stream")]
     accel: Option<PathBuf>,
-    /// The stream that holds the instrument [default: the one with the most samples]
-    #[arg(long, value_name = "NAME")]
-    stream: Option<String>,
+    #[command(flatten)]
+    of_log: OfLog,
     /// File to write [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -41,9 +41,10 @@ pub struct Init {
 impl Init {
     pub fn run(&self) -> anyhow::Result<()> {
         let activity = Activity::new("reading");
+        let (stream, stated) = self.of_log.stated();
         let draft = match &self.accel {
-            Some(accel) => Draft::of_two_files(&self.log, accel, &self.name(accel))?,
-            None => Draft::of_stream(&self.log, self.stream.as_deref(), &Stated::default())?,
+            Some(accel) => Draft::of_two_files(&self.log, accel, &self.name(accel), &stated)?,
+            None => Draft::of_stream(&self.log, stream, &stated)?,
         };
         drop(activity);
         let text = draft.to_toml(&self.name(&self.log));
@@ -52,11 +53,13 @@ impl Init {
         };
         keep(output, [&self.log].into_iter().chain(&self.accel))?;
         write_whole(output, text.as_bytes(), self.force)?;
-        let open = text.matches("TODO:").count();
-        eprintln!(
-            "{}: {open} fields to complete, each marked TODO",
-            output.display()
-        );
+        show_found(&self.log, &draft.found());
+        tell!("written: {}", output.display());
+        let lines = text.lines().zip(1..);
+        for (line, number) in lines.filter(|(line, _)| line.contains("TODO:")) {
+            tell!("to do:   line {number} {}", line.trim_start_matches("# "));
+        }
+        tell!("next:    turncal check {}", output.display());
         Ok(())
     }
 

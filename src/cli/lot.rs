@@ -2,9 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use turncal::calibration::UNWATCHED;
 
 use anyhow::bail;
+use turncal::calibration::{UNWATCHED, Word};
 use turncal::formats::{Job, JobKind, LotDirectory, Part, unit_key};
 use turncal::imu::PerSensor;
 use turncal::lot::{self, Lot, Specification, Unit};
@@ -69,7 +69,7 @@ impl Request<'_> {
                 directory.finish(&[])?;
             }
             let failed = units.iter().filter(|unit| unit.calibrated.is_err()).count();
-            eprintln!(
+            tell!(
                 "part {shard}: {} of {} units, {failed} of them without a calibration; merge all parts with \
                  turncal merge",
                 units.len(),
@@ -85,7 +85,7 @@ impl Request<'_> {
         let inputs: Vec<&Path> = self.runs.iter().map(PathBuf::as_path).collect();
         let waiting = || {
             let name = printable(&target.display().to_string());
-            eprintln!("note: another turncal works in {name}; waiting until it is done");
+            tell!("note: another turncal works in {name}; waiting until it is done");
         };
         Ok(LotDirectory::open(
             target, part, self.force, &inputs, &waiting,
@@ -174,7 +174,7 @@ pub fn deliver(
     show(&document, json)?;
     if let Some((_, target)) = directory.filter(|_| !json) {
         let page = target.join("index.html");
-        eprintln!("\nreport: {}", printable(&page.display().to_string()));
+        tell!("\nreport: {}", printable(&page.display().to_string()));
     }
     let failed: Vec<&str> = lot.failures().map(|(unit, _)| unit.name.as_str()).collect();
     if !failed.is_empty() {
@@ -185,8 +185,16 @@ pub fn deliver(
             failed.join(", ")
         );
     }
-    Ok(())
+    match document.verdict {
+        Some((Word::Fail, words)) => Err(NotMet(words).into()),
+        _ => Ok(()),
+    }
 }
+
+/// All is done, but units do not meet their specification.
+#[derive(Debug, thiserror::Error)]
+#[error("the specification is not met: {0}")]
+pub struct NotMet(String);
 
 /// A name for each unit: of its run's directory, or of its file where that is not called run.toml, with as many
 /// directories above as it takes to tell all apart.

@@ -38,7 +38,7 @@ impl Manual {
         for (path, text) in &pages {
             write_whole(path, text, self.force)?;
         }
-        eprintln!("{} pages written to {}", pages.len(), directory.display());
+        tell!("{} pages written to {}", pages.len(), directory.display());
         Ok(())
     }
 }

@@ -66,7 +66,7 @@ impl Merge {
         let part = Part::new(parts.job.clone(), None);
         let waiting = || {
             let name = printable(&target.unwrap_or(Path::new("")).display().to_string());
-            eprintln!("note: another turncal works in {name}; waiting until it is done");
+            tell!("note: another turncal works in {name}; waiting until it is done");
         };
         let open =
             |target| LotDirectory::open(target, &part, self.delivery.force(), inputs, &waiting);

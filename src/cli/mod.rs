@@ -13,6 +13,7 @@ mod convert;
 mod demo;
 mod error_term;
 mod estimation;
+mod explain;
 mod export;
 mod init;
 mod input;
@@ -34,6 +35,7 @@ mod study;
 mod tests;
 mod threads;
 
+pub use lot::NotMet;
 pub use signals::leave_nothing_behind;
 pub use threads::with_threads;
 
@@ -49,6 +51,9 @@ Begin with:
   turncal demo
 
 With a log of your own:
+  turncal calibrate imu.csv
+
+With a turntable:
   turncal init imu.csv -o run.toml
   turncal check run.toml
   turncal calibrate run.toml"
@@ -74,6 +79,7 @@ enum Command {
     Init(init::Init),
     Convert(convert::Convert),
     Check(check::Check),
+    Explain(explain::Explain),
     Allan(allan::Allan),
     Noise(noise::Noise),
     List(list::List),
@@ -99,6 +105,7 @@ impl Cli {
             Command::Init(init) => init.run(),
             Command::Convert(convert) => convert.run(),
             Command::Check(check) => check.run(),
+            Command::Explain(explain) => explain.run(),
             Command::Allan(allan) => allan.run(),
             Command::Noise(noise) => noise.run(),
             Command::List(list) => list.run(),

@@ -1,9 +1,10 @@
 //! Where output goes, alike in every command.
 
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
+use turncal::calibration::Word;
 use turncal::formats::{FileError, WholeDirectory};
 use turncal::report::{self, Document, terminal};
 
@@ -93,7 +94,7 @@ impl Begun<'_> {
         }
         show(document, self.json)?;
         if let Some(page) = page.filter(|_| !self.json) {
-            eprintln!("\nreport: {}", page.display());
+            tell!("\nreport: {}", page.display());
         }
         Ok(())
     }
@@ -106,6 +107,28 @@ pub fn show(document: &Document, json: bool) -> anyhow::Result<()> {
         false => terminal::text(document, columns().map(usize::from)),
     };
     print(text.as_bytes())
+}
+
+/// Prints what one screen has room for of a document.
+pub fn show_brief(document: &Document) -> anyhow::Result<()> {
+    let text = terminal::brief(document, columns().map(usize::from));
+    let is_plain = !io::stdout().is_terminal() || std::env::var_os("NO_COLOR").is_some();
+    let coloured = document.verdict.as_ref().filter(|_| !is_plain);
+    let text = match coloured {
+        Some((word, _)) => text.replacen(&word.to_string(), &in_colour(*word), 1),
+        None => text,
+    };
+    print(text.as_bytes())
+}
+
+/// A verdict as a terminal shows it in its colour.
+fn in_colour(word: Word) -> String {
+    let colour = match word {
+        Word::Good | Word::Pass => 32,
+        Word::UseWithCare | Word::Undecided => 33,
+        Word::Failed | Word::Fail => 31,
+    };
+    format!("\u{1b}[1;{colour}m{word}\u{1b}[0m")
 }
 
 /// Refuses an output file that is one of the inputs: not even force replaces those.

@@ -36,7 +36,7 @@ impl Sharding {
             Some(shard),
         );
         if !delivery.force() && part_is_there(target, &part) {
-            eprintln!("part {shard} is there already");
+            tell!("part {shard} is there already");
             return Ok(true);
         }
         let begun = delivery.begin(inputs)?;
@@ -50,7 +50,7 @@ impl Sharding {
             Err(_) if part_is_there(target, &part) => {}
             written => written?,
         }
-        eprintln!(
+        tell!(
             "part {shard}: {} of {runs} runs; merge all parts with turncal merge",
             held.len()
         );

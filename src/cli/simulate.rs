@@ -53,13 +53,13 @@ impl Simulate {
         directory.commit()?;
         drop(activity);
         if simulated.geometry.rows_range(3..).amax() > 0.0 {
-            eprintln!(
+            tell!(
                 "note: the axes of the simulated table have errors of their own (non-orthogonality, wobble, \
                  encoders), which the quaternions of its log cannot tell: a calibration from these files \
                  will claim too small σ of installation. turncal study accuracy estimates them."
             );
         }
-        eprintln!(
+        tell!(
             "{}: {:.0} s written to {}",
             scenario.name,
             simulated.run.recording.imu.duration(),
@@ -98,7 +98,7 @@ impl Simulate {
         std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
         directory.commit()?;
         drop(activity);
-        eprintln!(
+        tell!(
             "{}: {} recording(s) written to {}",
             campaign.name,
             simulated.len(),

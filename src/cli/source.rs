@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use turncal::formats::Opened;
-use turncal::formats::draft::Stated;
+use turncal::formats::draft::{Found, Stated, StatedUnit};
+use turncal::imu::Sensor;
 use turncal::report::terminal::printable;
 
 use super::input::{latitude, positive};
@@ -24,49 +25,48 @@ pub struct OfLog {
     /// Gravity at the place, m/s²
     #[arg(long, value_name = "M/S2", value_parser = positive)]
     gravity: Option<f64>,
-    /// Unit of the gyros: rad/s, deg/s, deg/h, count; of increments rad, deg, arcsec
-    #[arg(long, value_name = "UNIT")]
-    gyro_unit: Option<String>,
-    /// Unit of the accelerometers: m/s^2, g, count; of increments m/s, g*s
-    #[arg(long, value_name = "UNIT")]
-    accel_unit: Option<String>,
+    /// Unit of the gyros: rad/s, deg/s, deg/h, or what one count is, such as '1/131 deg/s'; of increments rad, deg,
+    /// arcsec
+    #[arg(long, value_name = "UNIT", value_parser = |text: &str| StatedUnit::parse(Sensor::Gyro, text))]
+    gyro_unit: Option<StatedUnit>,
+    /// Unit of the accelerometers: m/s^2, g, or what one count is, such as '1/16384 g'; of increments m/s, g*s
+    #[arg(long, value_name = "UNIT", value_parser = |text: &str| StatedUnit::parse(Sensor::Accel, text))]
+    accel_unit: Option<StatedUnit>,
     /// The stream that holds the instrument [default: the one with the most samples]
     #[arg(long, value_name = "NAME")]
     stream: Option<String>,
 }
 
 impl OfLog {
-    /// Reads a run, or a log with what is stated of it; what was found in a log is shown.
-    pub fn open(&self, path: &Path) -> anyhow::Result<Opened> {
+    /// The name of the stream, and what is stated.
+    pub fn stated(&self) -> (Option<&str>, Stated) {
         let stated = Stated {
             rate_hz: self.rate,
             latitude_deg: self.latitude,
             height_m: self.height,
             gravity_m_s2: self.gravity,
-            gyro_unit: self.gyro_unit.clone(),
-            accel_unit: self.accel_unit.clone(),
+            gyro_unit: self.gyro_unit,
+            accel_unit: self.accel_unit,
         };
-        let opened = Opened::new(path, self.stream.as_deref(), &stated)?;
-        show_found(path, &opened);
-        Ok(opened)
+        (self.stream.as_deref(), stated)
+    }
+
+    /// Reads a run, or a log with what is stated of it; what was found in a log is shown.
+    pub fn open(&self, path: &Path) -> anyhow::Result<Opened> {
+        let (stream, stated) = self.stated();
+        Ok(Opened::new(path, stream, &stated, |found| {
+            show_found(path, found);
+        })?)
     }
 }
 
 /// Shows on standard error what was found in a log.
-fn show_found(path: &Path, opened: &Opened) {
-    let found = opened.found();
-    if found.is_empty() {
-        return;
-    }
-    eprintln!("Found in {}:", printable(&path.display().to_string()));
+pub fn show_found(path: &Path, found: &[Found]) {
+    tell!("Found in {}:", printable(&path.display().to_string()));
     for of in found {
         let value = printable(&of.value).to_string();
-        let why = printable(&of.why).to_string();
-        eprintln!(
-            "  {:<7} {value:<34} {}: {why}",
-            of.what,
-            of.certainty.word()
-        );
+        let (why, word) = (printable(&of.why), of.certainty.word());
+        tell!("  {:<7} {value:<34} {word}: {why}", of.what);
     }
 }
 

@@ -33,11 +33,17 @@ struct Log {
 }
 
 impl Opened {
-    /// Reads a `run.toml`, told by its ending, a log, or rows of text on standard input (`-`).
+    /// Reads a `run.toml`, told by its ending, a log, or rows of text on standard input (`-`). What is found in a log is
+    /// shown before anything can be wrong with it.
     ///
     /// # Errors
     /// [`FileError`] if it cannot be read, or if what must be known of a log is neither found nor stated.
-    pub fn new(path: &Path, stream: Option<&str>, stated: &Stated) -> Result<Self, FileError> {
+    pub fn new(
+        path: &Path,
+        stream: Option<&str>,
+        stated: &Stated,
+        show: impl FnOnce(&[Found]),
+    ) -> Result<Self, FileError> {
         if path.extension() == Some(OsStr::new("toml")) {
             let run = Run::read(path)?;
             return Ok(Self { run, log: None });
@@ -51,6 +57,7 @@ impl Opened {
             None => path.to_owned(),
         };
         let draft = Draft::of_stream(&file, stream, stated)?;
+        show(&draft.found());
         if let Some([found, expected, advice]) = draft.open_question() {
             return Err(FileError::new(path, Place::File, found, expected, advice));
         }
@@ -65,13 +72,6 @@ impl Opened {
             run,
             log: Some(log),
         })
-    }
-
-    /// What was found in a log; nothing of a `run.toml`, which states it.
-    pub fn found(&self) -> Vec<Found> {
-        self.log
-            .as_ref()
-            .map_or_else(Vec::new, |log| log.draft.found())
     }
 
     /// Writes the `run.toml` by which a log was read into the directory of a result.

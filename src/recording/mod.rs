@@ -44,6 +44,8 @@ pub struct Recording {
     pub files: Vec<PathBuf>,
     /// What is wrong with the files and was mended, and what they say without effect, a sentence each.
     pub notes: Vec<String>,
+    /// What hardly fits the record of what is stated of it, a few sentences each.
+    pub doubts: Vec<String>,
 }
 
 impl Recording {
@@ -74,6 +76,7 @@ impl Recording {
             segments: Vec::new(),
             files: Vec::new(),
             notes: Vec::new(),
+            doubts: Vec::new(),
         })
     }
 }

@@ -35,13 +35,5 @@ pub fn add(document: &mut Document, methods: &[String], missions: &[Flown]) {
         .section(missions.iter().map(row));
     let shows = missions.iter().map(|flown| flown.shows);
     let table = shows.fold(table, Table::note);
-    document
-        .blocks
-        .retain(|(_, block)| !is_position_line(block));
-    document.before_folds(table);
-}
-
-/// The table says more than the line that it takes the place of.
-fn is_position_line(block: &Block) -> bool {
-    matches!(block, Block::Text(heading, _) if heading.is_empty())
+    document.brief.insert(1, table.into());
 }

@@ -4,14 +4,21 @@
 use serde_json::Value;
 
 use super::plot::Plot;
+use crate::calibration::{Finding, Word};
 
 /// Everything that is said about one result.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Document {
     /// Heading of the whole.
     pub title: String,
+    /// Whether the result may be used, and what it amounts to in a line.
+    pub verdict: Option<(Word, String)>,
     /// What was done on what, a paragraph each.
     pub lead: Vec<String>,
+    /// What was found in a calibration, the most severe first.
+    pub findings: Vec<Finding>,
+    /// What one screen shows in place of the blocks; they are all there is where it is empty.
+    pub brief: Vec<Block>,
     /// What must be known before the figures are used.
     pub warnings: List,
     /// What the figures show, the most important first.
@@ -131,14 +138,6 @@ impl Document {
     /// Begins a part that a page folds away.
     pub fn fold(&mut self, heading: &str) {
         self.page(Block::Fold(heading.to_owned()));
-    }
-
-    /// Adds what page and terminal show before all that is folded away.
-    pub fn before_folds(&mut self, block: impl Into<Block>) {
-        let is_fold = |(_, block): &(Medium, Block)| matches!(block, Block::Fold(_));
-        let place = self.blocks.iter().position(is_fold);
-        let place = place.unwrap_or(self.blocks.len());
-        self.blocks.insert(place, (Medium::Both, block.into()));
     }
 
     fn add(&mut self, medium: Medium, block: Block) {

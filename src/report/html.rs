@@ -4,6 +4,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::document::{Block, Document, Facts, List, Medium, Table};
 use super::plot::Plot;
+use crate::calibration::{Finding, FindingKind as Kind};
 
 /// The style of every page.
 const STYLE: &str = include_str!("style.css");
@@ -26,7 +27,20 @@ pub fn page(document: &Document, drawn: &[String]) -> String {
                 style { (PreEscaped(STYLE)) }
             }
             body {
-                header { h1 { (document.title) } @for p in &document.lead { p { (p) } } }
+                header {
+                    h1 { (document.title) }
+                    @if let Some((word, of_it)) = &document.verdict {
+                        p.verdict { strong class=(word.class()) { (word) } " " (of_it) }
+                    }
+                    @for p in &document.lead { p { (p) } }
+                }
+                @if !document.findings.is_empty() {
+                    section.findings {
+                        h2 { "What to look at" }
+                        @for finding in &document.findings { (of_finding(finding)) }
+                    }
+                }
+                @for block in &document.brief { (of_block(block, &mut drawn)) }
                 @if !document.warnings.items.is_empty() {
                     section.warnings { (list(&document.warnings)) }
                 }
@@ -39,6 +53,22 @@ pub fn page(document: &Document, drawn: &[String]) -> String {
         }
     };
     page.into_string()
+}
+
+/// What is wrong and what to do; all else about it folded away.
+fn of_finding(finding: &Finding) -> Markup {
+    let (what, next) = finding.headline();
+    let explanation = Kind::named(&finding.kind).map(Kind::explanation);
+    html! {
+        details {
+            summary {
+                code { (finding.code) } " " (what)
+                @if let Some(next) = next { br; span.next { "→ " (next) } }
+            }
+            p { (finding) }
+            @if let Some(explanation) = explanation { p.note { (explanation) } }
+        }
+    }
 }
 
 /// Blocks below a fold's heading; those before the first fold have none.

@@ -25,7 +25,6 @@
 pub mod document;
 mod files;
 mod html;
-mod number;
 #[cfg(feature = "certificate")]
 pub mod pdf;
 pub mod plot;
@@ -55,8 +54,9 @@ mod terms;
 #[cfg(test)]
 mod tests;
 
-pub use document::Document;
+pub use document::{Document, Facts};
 pub use files::{ReportError, files, write};
+pub use terminal::wrapped;
 
 /// The figures of a document by name as JSON.
 pub fn json(document: &Document) -> String {

@@ -16,13 +16,6 @@ pub struct Navigated {
     pub outlook: Vec<Outlook>,
 }
 
-/// Adds the position error at the end in a line.
-pub fn in_a_line(document: &mut Document, navigation: Result<&[Navigated], &NavigationStudyError>) {
-    if let Ok(navigated @ [_, ..]) = navigation {
-        document.both(Block::Text(String::new(), line(navigated)));
-    }
-}
-
 /// Adds the table.
 pub fn add(document: &mut Document, navigation: Result<&[Navigated], &NavigationStudyError>) {
     match navigation {
@@ -68,7 +61,7 @@ fn both(quantity: Quantity, moment: &Outlook) -> (Option<f64>, f64) {
 }
 
 /// The position at the end in one line.
-fn line(navigated: &[Navigated]) -> String {
+pub fn line(navigated: &[Navigated]) -> String {
     let [.., horizontal] = Quantity::ALL;
     let ends = navigated.iter().filter_map(|of| {
         let (error, sigma) = both(horizontal, of.outlook.last()?);
@@ -83,7 +76,7 @@ fn line(navigated: &[Navigated]) -> String {
         })
     });
     format!(
-        "Position error after {} of navigation, stationary and level: {}",
+        "position error after {}, stationary and level: {}",
         long(navigated),
         ends.collect::<Vec<_>>().join(", ")
     )

@@ -1,14 +1,88 @@
 //! A document as text for a terminal of any width.
 
 use comfy_table::{CellAlignment, ContentArrangement, presets};
-use textwrap::Options;
+use textwrap::{Options, WordSplitter};
 
 use super::document::{Block, Document, Facts, List, Medium, Table};
+use crate::calibration::{Finding, Level};
 
 /// A heading of a column is broken into lines of at least so many letters.
 const HEADING: usize = 9;
 /// Between two columns.
 const GAP: usize = 2;
+
+/// So many lines of findings fit on one screen.
+const FINDINGS: usize = 16;
+/// The width of a screen that is not known.
+const USUAL_WIDTH: usize = 80;
+/// What stands before the words of a finding: its code.
+const CODE: &str = "       ";
+
+/// What one screen has room for: the verdict, findings in a line or two each, and a few figures.
+pub fn brief(document: &Document, width: Option<usize>) -> String {
+    let width = width.unwrap_or(USUAL_WIDTH);
+    let mut head = vec![cut(&titled(document), width)];
+    if let Some((word, of_it)) = &document.verdict {
+        head.extend(wrapped(&format!("{word}   {of_it}"), "", Some(width)));
+    }
+    let mut parts = vec![head, findings(&document.findings, width)];
+    for block in &document.brief {
+        parts.push(match block {
+            Block::Facts(of) => facts(of, Some(width)),
+            Block::Table(of) => table(of, Some(width)),
+            _ => continue,
+        });
+    }
+    laid(parts)
+}
+
+/// The title with what was done on what.
+fn titled(document: &Document) -> String {
+    let first = document.lead.first().map_or("", String::as_str);
+    format!("{}: {first}", document.title)
+}
+
+/// What is wrong and what to do about it, as far as there is room; what needs nothing done is named in a line.
+fn findings(all: &[Finding], width: usize) -> Vec<String> {
+    let of_one = |finding: &Finding| {
+        let (what, next) = finding.headline();
+        let code = format!("  {}  ", finding.code);
+        if finding.level() == Level::Note {
+            return vec![cut(&format!("{code}{what}"), width)];
+        }
+        let next = next.map(|next| format!("{CODE}→ {next}"));
+        let next = next
+            .iter()
+            .flat_map(|next| wrapped(next, "         ", Some(width)));
+        let what = wrapped(&format!("{code}{what}"), CODE, Some(width)).into_iter();
+        what.chain(next).collect()
+    };
+    let mut lines = Vec::new();
+    for (place, finding) in all.iter().enumerate() {
+        let more = of_one(finding);
+        if lines.len() + more.len() > FINDINGS {
+            lines.push(format!("{CODE}{} more: --verbose", all.len() - place));
+            break;
+        }
+        lines.extend(more);
+    }
+    lines
+}
+
+/// As much of a line as has room.
+fn cut(text: &str, width: usize) -> String {
+    if textwrap::core::display_width(text) <= width {
+        return text.to_owned();
+    }
+    let mut room = width.saturating_sub(1);
+    let fits = |letter: &char| {
+        let wide = textwrap::core::display_width(letter.encode_utf8(&mut [0; 4]));
+        let is_room = wide <= room;
+        room = room.saturating_sub(wide);
+        is_room
+    };
+    text.chars().take_while(fits).chain(['…']).collect()
+}
 
 /// The document as text: what was done, tables, and last, where a reader looks first, conclusions and warnings.
 /// Lines are at most `width` letters long; without a width, as for a file or a pipe, they are as long as they
@@ -19,7 +93,10 @@ pub fn text(document: &Document, width: Option<usize>) -> String {
         texts.flat_map(|text| wrapped(text, "", width)).collect()
     };
     let lead = document.lead.iter().map(String::as_str);
+    let verdict = document.verdict.as_ref();
+    let verdict = verdict.map(|(word, of_it)| format!("{word}   {of_it}"));
     let lead: Vec<&str> = std::iter::once(document.title.as_str())
+        .chain(verdict.as_deref())
         .chain(lead)
         .collect();
     let mut parts = vec![paragraphs(&lead)];
@@ -38,6 +115,14 @@ pub fn text(document: &Document, width: Option<usize>) -> String {
     }
     parts.push(list(&document.conclusions, "  ", width));
     parts.push(list(&document.warnings, "! ", width));
+    let findings = document.findings.iter();
+    let findings = findings.map(|finding| format!("{}  {finding}", finding.code));
+    parts.push(list(&List::new("Findings", findings), "  ", width));
+    laid(parts)
+}
+
+/// Parts with a line between them.
+fn laid(parts: Vec<Vec<String>>) -> String {
     let parts = parts.into_iter().filter(|part| !part.is_empty());
     let parts: Vec<String> = parts.map(|part| part.join("\n")).collect();
     let text = parts.join("\n\n");
@@ -46,13 +131,14 @@ pub fn text(document: &Document, width: Option<usize>) -> String {
 }
 
 /// Lines of at most `width` letters, all but the first behind an indent; what is laid out is left as it is.
-fn wrapped(text: &str, indent: &str, width: Option<usize>) -> Vec<String> {
+pub fn wrapped(text: &str, indent: &str, width: Option<usize>) -> Vec<String> {
     let fits = |width: &usize| textwrap::core::display_width(text) > *width;
     let Some(width) = width.filter(fits) else {
         return vec![text.to_owned()];
     };
     let options = Options::new(width)
         .subsequent_indent(indent)
+        .word_splitter(WordSplitter::NoHyphenation)
         .break_words(false);
     let lines = textwrap::wrap(text, options).into_iter();
     lines.map(|line| line.into_owned()).collect()

@@ -43,6 +43,7 @@ impl Synthetic {
             findings: &self.outcome.findings,
             effects: &[],
             budget: None,
+            predicted: None,
             quality: None,
             true_terms: &NO_TERMS,
             closed_form: Some(ClosedForm {

@@ -237,6 +237,7 @@ impl Scenario {
                 segments: Vec::new(),
                 files: Vec::new(),
                 notes: Vec::new(),
+                doubts: Vec::new(),
             },
             instrument: self.known_instrument(),
             site: self.site,

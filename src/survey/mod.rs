@@ -81,7 +81,12 @@ impl Survey {
                 .iter()
                 .map(|rest| rest.dwell.duration(&run.recording.imu))
         };
-        let expected = |path| (path, expected(run, path).map_err(|error| error.to_string()));
+        let expected = |path| {
+            (
+                path,
+                Expected::of(run, path).map_err(|error| error.to_string()),
+            )
+        };
         Self {
             turns: motion::turns(run, &rests),
             labels: motion::checks(run, &rests),
@@ -117,24 +122,30 @@ fn directions(rests: &[Rest]) -> usize {
     known.len()
 }
 
-fn expected(run: &Run, path: Path) -> Result<Expected, CalibrationError> {
-    let aiding = match path {
-        Path::SixPosition => {
-            let closed = six_position(&Problem::new(run, &Options::default()))?;
-            let body_frame = closed.reference.body_frame();
-            return Ok(summary(run, body_frame, &closed.estimate));
-        }
-        Path::TableAiding if run.recording.table.is_none() => {
-            return Err(CalibrationError::NoTable);
-        }
-        Path::TableAiding => Aiding::Table,
-        Path::VelocityAiding => Aiding::Velocity,
-    };
-    // What the filter ends with, linearised where it would begin.
-    let problem = Problem::new(run, &Options::default().aiding(aiding));
-    let start = coarse_start(&problem)?;
-    let bound = bound(&problem, &start.at.triads, &TermVector::zeros())?;
-    Ok(summary(run, aiding.body_frame(), &bound.estimate))
+impl Expected {
+    /// By a method.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] if the method cannot calibrate by this run.
+    pub fn of(run: &Run, path: Path) -> Result<Self, CalibrationError> {
+        let aiding = match path {
+            Path::SixPosition => {
+                let closed = six_position(&Problem::new(run, &Options::default()))?;
+                let body_frame = closed.reference.body_frame();
+                return Ok(summary(run, body_frame, &closed.estimate));
+            }
+            Path::TableAiding if run.recording.table.is_none() => {
+                return Err(CalibrationError::NoTable);
+            }
+            Path::TableAiding => Aiding::Table,
+            Path::VelocityAiding => Aiding::Velocity,
+        };
+        // What the filter ends with, linearised where it would begin.
+        let problem = Problem::new(run, &Options::default().aiding(aiding));
+        let start = coarse_start(&problem)?;
+        let bound = bound(&problem, &start.at.triads, &TermVector::zeros())?;
+        Ok(summary(run, aiding.body_frame(), &bound.estimate))
+    }
 }
 
 fn summary(run: &Run, body_frame: BodyFrame, estimate: &Estimate) -> Expected {

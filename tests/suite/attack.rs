@@ -12,12 +12,17 @@ fn outcome(case: &str, arguments: &str) -> Option<(i32, String, String, tempfile
     let from = shared(&format!("attack/{case}"))?;
     let copy = tempfile::tempdir().unwrap();
     copied(&from, copy.path());
+    let (status, output, message) = turncal(copy.path(), arguments);
+    Some((status, output, message, copy))
+}
+
+fn turncal(directory: &Path, arguments: &str) -> (i32, String, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_turncal"));
-    let command = command.current_dir(copy.path()).args(arguments.split(' '));
+    let command = command.current_dir(directory).args(arguments.split(' '));
     let output = command.output().unwrap();
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let status = output.status.code().expect("it was not killed");
-    Some((status, text(&output.stdout), text(&output.stderr), copy))
+    (status, text(&output.stdout), text(&output.stderr))
 }
 
 fn copied(from: &Path, to: &Path) {
@@ -99,6 +104,40 @@ fn rows_out_are_rows_in_and_a_hole_that_nothing_bridges_is_not_filled() {
         "apply-silent-gap",
         fill,
         "4096 rows are missing from 48.809 s on",
+    );
+}
+
+#[test]
+fn rows_that_were_lost_in_a_turn_are_left_out_and_too_many_to_fill() {
+    let Some((from, table)) = shared("attack/apply-silent-gap").zip(shared("three-axis-counts"))
+    else {
+        return;
+    };
+    let copy = tempfile::tempdir().unwrap();
+    copied(&from, copy.path());
+    let run = copy.path().join("g/run.toml");
+    let text = std::fs::read_to_string(&run).unwrap();
+    let table = table.to_string_lossy();
+    std::fs::write(&run, text.replace("../../../three-axis-counts", &table)).unwrap();
+    let (status, _, message) = turncal(copy.path(), "apply calibration.json g/run.toml -o d.csv");
+    assert!(
+        status == 0 && message.contains("300 that the log has lost"),
+        "{message}"
+    );
+    let rows = |name: &str| {
+        std::fs::read_to_string(copy.path().join(name))
+            .unwrap()
+            .lines()
+            .count()
+    };
+    assert_eq!(rows("d.csv"), rows("g/imu.csv"));
+    let (status, _, message) = turncal(
+        copy.path(),
+        "apply calibration.json g/run.toml -o e.csv --fill",
+    );
+    assert!(
+        status == 1 && message.contains("from 60.670 s on, too many to fill"),
+        "{message}"
     );
 }
 

@@ -1,7 +1,9 @@
 //! What no noise explains is no calibration by the closed form either, and a prior that data contradict is said
 //! where it holds the estimate.
 
-use turncal::calibration::{ClosedForm, Finding, Method, Options, Problem, Solution, UNWATCHED};
+use turncal::calibration::{
+    ClosedForm, Finding, FindingKind, Method, Options, Problem, Solution, UNWATCHED,
+};
 use turncal::run::Run;
 use turncal::simulation::Scenario;
 use turncal::units::{ARCSEC, PPM};
@@ -28,7 +30,7 @@ fn a_site_on_the_other_hemisphere_is_no_calibration_by_the_closed_form() {
     run.site.latitude = -run.site.latitude;
     let (usable, closed_form) = solved(&run);
     assert!(!usable);
-    let unexplained = |finding: &&Finding| finding.is_unexplained();
+    let unexplained = |finding: &&Finding| finding.is(FindingKind::Unexplained);
     let figures = &closed_form
         .findings
         .iter()

@@ -31,7 +31,7 @@ fn draft(log: &Path) -> String {
 }
 
 fn opened(log: &Path, stated: &Stated) -> Run {
-    let opened = Opened::new(log, None, stated);
+    let opened = Opened::new(log, None, stated, |_| {});
     opened.unwrap_or_else(|error| panic!("{error}")).run
 }
 
@@ -322,6 +322,51 @@ fn a_time_is_judged_in_the_rows_of_the_instrument() {
         ],
     );
     assert!(text.contains("# sample_period_s = 0.00100"), "{text}");
+}
+
+#[test]
+fn accelerometers_that_are_zero_throughout_are_looked_for_in_another_file() {
+    let Some(log) = file("b04-ros1-echo-two-files", "ros_gyro.csv") else {
+        return;
+    };
+    let mut turncal = Command::new(env!("CARGO_BIN_EXE_turncal"));
+    let refused = turncal.arg("calibrate").arg(&log).output().unwrap();
+    let message = String::from_utf8_lossy(&refused.stderr);
+    assert!(
+        refused.status.code() == Some(1) && message.contains("turncal init GYROS ACCELS"),
+        "{message}"
+    );
+    let found = message.find("Found in").zip(message.find("turncal:"));
+    assert!(
+        found.is_some_and(|(found, error)| found < error),
+        "{message}"
+    );
+}
+
+#[test]
+fn the_size_of_a_count_may_be_stated_and_a_unit_that_is_none_is_refused() {
+    let Some(log) = file("r08-mpu-hand-tumble-counts", "mg_log_raw_newnew2.txt") else {
+        return;
+    };
+    let run = |unit: &str| {
+        let mut turncal = Command::new(env!("CARGO_BIN_EXE_turncal"));
+        turncal.arg("init").arg(&log).args(["--gyro-unit", unit]);
+        turncal.output().unwrap()
+    };
+    let draft = run("1/131 deg/s");
+    let text = String::from_utf8_lossy(&draft.stdout);
+    has(
+        &text,
+        &["gyro_unit = \"count\"  # as stated", "scale = 7505.747"],
+    );
+    let refused = run("bananas");
+    let message = String::from_utf8_lossy(&refused.stderr);
+    assert!(
+        refused.status.code() == Some(2)
+            && message.contains("deg/s, mdps, rad")
+            && message.contains("1/131 deg/s"),
+        "{message}"
+    );
 }
 
 #[test]

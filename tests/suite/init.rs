@@ -136,8 +136,10 @@ fn noise_at_rest_is_near_what_was_identified() {
         let draft = init(&[log.to_str().unwrap()]).success();
         let draft = text(&draft.get_output().stdout);
         let value = |key: &str| -> Option<f64> {
-            let line = draft.lines().find(|line| line.starts_with(key))?;
-            line.split('=').nth(1)?.trim().parse().ok()
+            let lines = draft.lines().filter_map(|line| line.strip_prefix("# "));
+            let line = { lines }.find(|line| line.starts_with(key))?;
+            let value = line.split('=').nth(1)?.split('#').next()?;
+            value.trim().parse().ok()
         };
         let near = |found: f64, known: f64| (found / known).ln().abs() < 1.5f64.ln();
         let walk = value("angle_random_walk_deg_per_sqrt_h");

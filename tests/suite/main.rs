@@ -49,3 +49,4 @@ mod threads;
 mod two_clocks;
 mod unstated;
 mod velocity;
+mod verdict;

@@ -4,6 +4,7 @@ use nalgebra::DMatrix;
 use serde_json::json;
 
 use super::finding::triad_name;
+use super::kind::Kind;
 use super::residuals::Residuals;
 use crate::calibration::Finding;
 use crate::imu::{AXES, ParameterKind, Sensor};
@@ -76,7 +77,7 @@ pub fn drift(
         "of": changing.sensor.name(), "parameters": parameters, "unit": unit, "changes": changes,
         "times": [first, last], "fall": fall, "limit": limit
     });
-    Some(Finding::new("changes-in-time", text, figures))
+    Some(Finding::new(Kind::ChangesInTime, text, figures))
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::finding::widened_by;
+use super::kind::Kind;
 use crate::calibration::{Finding, Posterior, Prior, Reduction, mean_square_interval};
 use crate::statistics::FALSE_ALARM;
 
@@ -41,7 +42,7 @@ impl DwellScatter {
             widened_by(growth)
         );
         let figures = json!({ "mean": mean, "limit": limit, "growth": growth });
-        Finding::new("dwells-scatter", text, figures)
+        Finding::new(Kind::DwellsScatter, text, figures)
     }
 }
 

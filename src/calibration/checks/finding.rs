@@ -5,14 +5,15 @@ use std::fmt;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::kind::{Kind, Level};
 use crate::imu::Sensor;
-
-/// The kind of a finding after which values may not be used.
-const UNEXPLAINED: &str = "unexplained";
 
 /// What a check found: what is wrong, what it means for the result and what to do, with its figures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
+    /// The code of its kind, such as `W04`.
+    #[serde(default)]
+    pub code: String,
     /// What kind of finding, such as `not-observed`.
     pub kind: String,
     /// In words.
@@ -24,10 +25,10 @@ pub struct Finding {
 
 impl Finding {
     /// Of a kind, in these words and with these figures.
-    pub fn new(kind: &str, text: String, figures: Value) -> Self {
-        let kind = kind.to_owned();
+    pub fn new(kind: Kind, text: String, figures: Value) -> Self {
         Self {
-            kind,
+            code: kind.code().to_owned(),
+            kind: kind.name().to_owned(),
             text,
             figures,
         }
@@ -36,17 +37,31 @@ impl Finding {
     /// What the reader of the files found and mended, or what they state without effect.
     pub fn of_recording(note: String) -> Self {
         let figures = serde_json::json!({ "note": note });
-        Self::new("recording", note, figures)
+        Self::new(Kind::Recording, note, figures)
     }
 
-    /// No noise explains what a calibration leaves, so that it is none.
-    pub fn unexplained(text: String, figures: Value) -> Self {
-        Self::new(UNEXPLAINED, text, figures)
+    /// What hardly fits a record of what is stated of it.
+    pub fn of_statement(doubt: String) -> Self {
+        let figures = serde_json::json!({ "doubt": doubt });
+        Self::new(Kind::StatementDoubted, doubt, figures)
     }
 
-    /// Whether no noise explains what a calibration leaves, so that it is none.
-    pub fn is_unexplained(&self) -> bool {
-        self.kind == UNEXPLAINED
+    /// How much it weighs. Kinds of another version are read with care.
+    pub fn level(&self) -> Level {
+        Kind::named(&self.kind).map_or(Level::Care, Kind::level)
+    }
+
+    /// Whether it is of this kind.
+    pub fn is(&self, kind: Kind) -> bool {
+        self.kind == kind.name()
+    }
+
+    /// What is wrong, in the first sentence of its words, and what to do, in the last.
+    pub fn headline(&self) -> (&str, Option<&str>) {
+        match self.text.split_once(". ") {
+            Some((first, rest)) => (first, rest.rsplit(". ").next()),
+            None => (&self.text, None),
+        }
     }
 }
 
@@ -80,9 +95,22 @@ mod tests {
     fn a_finding_is_a_kind_words_and_figures_in_json() {
         let finding = Finding::of_recording("a gap".to_owned());
         let json = serde_json::to_value(&finding).unwrap();
+        assert_eq!(json["code"], "W01");
         assert_eq!(json["kind"], "recording");
         assert_eq!(json["text"], finding.to_string());
         assert_eq!(json["figures"]["note"], "a gap");
+    }
+
+    #[test]
+    fn a_headline_is_what_is_wrong_and_what_to_do() {
+        let of = |text: &str| Finding::of_recording(text.to_owned());
+        let long = of("Noise is 0.5 too high. All σ include it. Run turncal allan.");
+        assert_eq!(
+            long.headline(),
+            ("Noise is 0.5 too high", Some("Run turncal allan."))
+        );
+        assert_eq!(of("A gap.").headline(), ("A gap.", None));
+        assert_eq!(Level::Note, long.level());
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
+use super::kind::Kind;
 use crate::calibration::{
     AttitudePrior, CalibrationError, Finding, Iterated, Linearisation, Prior, Problem, Script,
     in_general_form,
@@ -41,7 +42,7 @@ impl FormTest {
         );
         let figures = json!({ "form": form, "angles": angles, "gain": gain, "limit": limit });
         self.rejects()
-            .then(|| Finding::new("form-rejected", text, figures))
+            .then(|| Finding::new(Kind::FormRejected, text, figures))
     }
 }
 

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::kind::Kind;
 use crate::calibration::Finding;
 use crate::statistics::FALSE_ALARM;
 
@@ -152,7 +153,7 @@ pub fn outliers(innovations: &[Innovation]) -> Option<Finding> {
     let figures = json!({
         "rejected": rejected, "observations": observations, "dwell": dwell, "time_s": time
     });
-    Some(Finding::new("outliers", text, figures))
+    Some(Finding::new(Kind::Outliers, text, figures))
 }
 
 /// Innovations that are larger or smaller than their covariance makes them, if there are any.
@@ -189,7 +190,7 @@ pub fn inconsistent(innovations: &[Innovation]) -> Option<Finding> {
          [imu.noise].",
         each.join("; ")
     );
-    (!looks.is_empty()).then(|| Finding::new("inconsistent", text, json!({ "looks": looks })))
+    (!looks.is_empty()).then(|| Finding::new(Kind::Inconsistent, text, json!({ "looks": looks })))
 }
 
 /// Two-sided probability outside the intervals.

@@ -2,6 +2,7 @@
 
 use serde_json::{Value, json};
 
+use super::kind::Kind;
 use crate::calibration::Finding;
 use crate::run::motion::LabelCheck;
 
@@ -21,7 +22,7 @@ pub fn contradicted(contradicted: &[LabelCheck]) -> Option<Finding> {
         })
     };
     let figures = json!({ "contradicted": contradicted.iter().map(figure).collect::<Value>() });
-    (!contradicted.is_empty()).then(|| Finding::new("labels-contradicted", text, figures))
+    (!contradicted.is_empty()).then(|| Finding::new(Kind::LabelsContradicted, text, figures))
 }
 
 /// Labelled sections a part of which is missing, if there are any.
@@ -32,5 +33,5 @@ pub fn lost(labels: &[String]) -> Option<Finding> {
         labels.join(", ")
     );
     let figures = json!({ "labels": labels });
-    (!labels.is_empty()).then(|| Finding::new("sections-lost", text, figures))
+    (!labels.is_empty()).then(|| Finding::new(Kind::SectionsLost, text, figures))
 }

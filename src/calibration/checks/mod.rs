@@ -7,6 +7,7 @@ pub mod error_term_test;
 pub mod finding;
 pub mod form;
 pub mod innovation;
+pub mod kind;
 pub mod labels;
 pub mod observability;
 pub mod prior_distance;
@@ -16,6 +17,7 @@ pub mod residuals;
 pub mod rest_scatter;
 pub mod rounding;
 pub mod unexplained;
+pub mod verdict;
 
 use crate::calibration::{BudgetSource, Outcome, Problem};
 use cause::{FoundCause, settling};
@@ -27,7 +29,6 @@ use finding::Finding;
 pub fn findings(problem: &Problem, outcome: &Outcome, others: Vec<Finding>) -> Vec<Finding> {
     let (estimate, innovations) = (&outcome.estimate, &outcome.innovations);
     let rounding = outcome.part(BudgetSource::Rounding);
-    let notes = problem.notes().into_iter().map(Finding::of_recording);
     let form = outcome
         .form_test
         .and_then(|test| test.finding(estimate.form()));
@@ -41,7 +42,8 @@ pub fn findings(problem: &Problem, outcome: &Outcome, others: Vec<Finding>) -> V
         Some(_) => None,
         None => unexplained::unexplained(&outcome.consistency.all, innovations),
     };
-    notes
+    let remarks = problem.remarks().into_iter();
+    remarks
         .chain(unexplained::not_converged(outcome))
         .chain(outcome.causes.iter().map(FoundCause::finding))
         .chain(settling::finding(problem, outcome.settling))

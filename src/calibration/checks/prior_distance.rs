@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 
+use super::kind::Kind;
 use crate::calibration::{
     Estimate, Finding, Model, ParameterMatrix, from_vector, parameter, parameter_name,
     sensor_and_parameter,
@@ -41,7 +42,7 @@ pub fn far_from_prior(model: &Model, estimate: &Estimate) -> Option<Finding> {
     let figures = json!({
         "sigmas": CONTRADICTS, "parameters": names, "distances": distances, "causes": causes
     });
-    (!far.is_empty()).then(|| Finding::new("far-from-prior", text, figures))
+    (!far.is_empty()).then(|| Finding::new(Kind::FarFromPrior, text, figures))
 }
 
 /// Parameters of which the data alone say other than their prior does, where that is in the estimate; by the

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
+use super::kind::Kind;
 use crate::calibration::Finding;
 
 /// By how much recordings differ in a group of parameters.
@@ -32,7 +33,7 @@ pub fn recordings_differ(differences: &[RecordingDifference]) -> Finding {
         each.join(", ")
     );
     Finding::new(
-        "recordings-differ",
+        Kind::RecordingsDiffer,
         text,
         json!({ "differences": differences }),
     )

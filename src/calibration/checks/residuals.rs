@@ -4,12 +4,11 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde_json::json;
 
 use super::finding::widened_by;
+use super::kind::Kind;
 use crate::calibration::Finding;
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 use crate::units::ARCSEC;
 
-/// The kind of the finding that residuals are large.
-pub const LARGE: &str = "residuals-large";
 /// Triads whose residuals are tested.
 const TRIADS: f64 = 2.0;
 /// Directions of unit columns that are shorter than this beside all others are rounding.
@@ -164,7 +163,7 @@ impl Residuals {
             "of": of, "chi_square": chi_square, "degrees": degrees, "limit": limit, "growth": growth,
             "worst": worst, "without": without, "base": base
         });
-        Finding::new(LARGE, text, figures)
+        Finding::new(Kind::ResidualsLarge, text, figures)
     }
 
     /// By how much χ² falls if these equations may be off by anything.

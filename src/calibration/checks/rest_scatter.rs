@@ -4,9 +4,11 @@ use nalgebra::Matrix3;
 use serde_json::json;
 
 use super::finding::triad_name;
+use super::kind::Kind;
 use crate::calibration::record::schedule::step_length;
 use crate::calibration::{Finding, Problem, mean_square_interval};
 use crate::imu::{AXES, NoiseKeys, PerSensor, Sensor, Triad};
+use crate::number::three_digits;
 use crate::run::{Dwell, Run};
 use crate::statistics::FALSE_ALARM;
 
@@ -75,18 +77,24 @@ fn of_triad<'a>(
     };
     let beyond = variance > high * most || variance < low * least;
     let [low, high] = [low.sqrt(), high.sqrt()];
+    let symbol = match sensor {
+        Sensor::Gyro => "°/√h",
+        Sensor::Accel => "µg/√Hz",
+    };
     let text = format!(
-        "{} noise at rest is {compared} the stated value: {figure} = {found:.4} instead of {stated:.4} (tolerance \
-         {:+.1} % to {:+.1} %). The estimate uses 0.1 s averages, so vibration of the mount raises it too. Run \
-         turncal allan on a long static record to separate the two.",
+        "{} noise at rest is {compared} the stated value: {} instead of {} {symbol} (tolerance {:+.1} % to {:+.1} %). The \
+         estimate uses 0.1 s averages, so vibration of the mount raises it too. Run turncal allan on a long static record \
+         to separate the two, and correct {figure}.",
         triad_name(sensor),
+        three_digits(found),
+        three_digits(stated),
         100.0 * (low - 1.0),
         100.0 * (high - 1.0)
     );
     let figures = json!({
         "of": sensor.name(), "figure": figure, "found": found, "stated": stated, "limits": [low, high]
     });
-    beyond.then(|| Finding::new("scatter-at-rest", text, figures))
+    beyond.then(|| Finding::new(Kind::ScatterAtRest, text, figures))
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 use serde_json::json;
 
 use super::finding::{triad_name, widened_by};
+use super::kind::Kind;
 use crate::calibration::estimate::largest_growth;
 use crate::calibration::{Finding, ParameterMatrix, Problem, parameter};
 use crate::imu::{Output, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector};
@@ -64,7 +65,7 @@ pub fn rounded(
         );
         let of = sensor.name();
         let figures = json!({ "of": of, "step": step, "unit": unit, "growth": growth });
-        (growth >= SAID).then(|| Finding::new("rounded", text, figures))
+        (growth >= SAID).then(|| Finding::new(Kind::Rounded, text, figures))
     };
     Sensor::ALL.into_iter().filter_map(of).collect()
 }

@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use super::residuals::LARGE;
+use super::kind::Kind;
 use crate::calibration::noise::LOG_SIGMA;
 use crate::calibration::{Finding, Innovation, Nis, Outcome};
 use crate::statistics::chi_square_limit;
@@ -31,7 +31,7 @@ pub fn not_converged(outcome: &Outcome) -> Option<Finding> {
          σ. Check scale, units and axes in run.toml with turncal check."
     );
     let figures = json!({ "passes": passes, "largest_step_sigma": step });
-    (!outcome.converged).then(|| Finding::new("not-converged", text, figures))
+    (!outcome.converged).then(|| Finding::new(Kind::NotConverged, text, figures))
 }
 
 /// The finding where innovations are larger than a data sheet's figures can be wrong by.
@@ -44,7 +44,9 @@ pub fn unexplained(all: &Nis, innovations: &[Innovation]) -> Option<Finding> {
 /// The same of a closed form, by the findings of its residuals: no noise explains the residuals even without the
 /// worst position, nor does the table's base.
 pub fn unexplained_residuals(findings: &[Finding]) -> Option<Finding> {
-    let large = findings.iter().filter(|finding| finding.kind == LARGE);
+    let large = findings
+        .iter()
+        .filter(|finding| finding.is(Kind::ResidualsLarge));
     let without_base = large.filter(|finding| finding.figures["base"].is_null());
     without_base.into_iter().find_map(|finding| {
         let figure = |name: &str| finding.figures[name].as_f64();
@@ -63,7 +65,7 @@ fn rejected(name: &str, nis: f64, worst: f64) -> Option<Finding> {
          or another table position. If it is noise after all, rerun with --noise auto."
     );
     let figures = json!({ "nis": nis, "limit": limit, "worst": worst });
-    (nis > limit).then(|| Finding::unexplained(text, figures))
+    (nis > limit).then(|| Finding::new(Kind::Unexplained, text, figures))
 }
 
 #[cfg(test)]

@@ -139,11 +139,12 @@ fn regate(accepted: &mut [bool], distances: impl Iterator<Item = f64>, gate: f64
 }
 
 impl Likelihood<'_> {
-    /// The test of what is stated against a fit.
+    /// The test of what is stated against a fit, whose sources were chosen from all that are present: chance is that of
+    /// all of them.
     fn test(&self, fit: &Fit) -> Result<NoiseTest, CalibrationError> {
         let stated = self.scale.initial;
-        let free = fit.sources.iter();
-        let (bounded, free): (Vec<usize>, Vec<usize>) = free.partition(|&&k| stated[k] == 0.0);
+        let present = self.scale.present().into_iter();
+        let (bounded, free): (Vec<usize>, Vec<usize>) = present.partition(|&k| stated[k] == 0.0);
         let ratio = match fit.sources.is_empty() {
             true => 0.0,
             false => self.replay(&stated)?.deviance() - fit.deviance,

@@ -7,7 +7,9 @@ use serde_json::json;
 
 use super::policy::NoisePolicy;
 use super::source::Source;
+use crate::calibration::checks::kind::Kind;
 use crate::calibration::{Finding, Problem};
+use crate::number::three_digits;
 
 /// What noise a calibration used, and how it came to that.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -121,16 +123,31 @@ impl fmt::Display for SourceFigures {
         let Self {
             name, unit, used, ..
         } = self;
-        write!(f, "{name} {used:.3e}")?;
-        if let Some([low, high]) = self.interval {
-            write!(f, " ({low:.2e} to {high:.2e})")?;
+        let unit = symbol(unit);
+        write!(f, "{name} {}", three_digits(*used))?;
+        if let Some([low, high]) = self.interval.map(|ends| ends.map(three_digits)) {
+            write!(f, " ({low} to {high})")?;
         }
         write!(f, " {unit}")?;
         if let Some(stated) = self.stated {
-            write!(f, ", stated {stated:.3e}")?;
+            write!(f, ", stated {}", three_digits(stated))?;
         }
         Ok(())
     }
+}
+
+/// A unit of noise as tables have it, such as °/√h.
+fn symbol(unit: &str) -> String {
+    let marks = [
+        ("deg", "°"),
+        ("arcsec", "″"),
+        ("ug", "µg"),
+        ("sqrt(", "√"),
+        (")", ""),
+    ];
+    marks.iter().fold(unit.to_owned(), |unit, (word, mark)| {
+        unit.replace(word, mark)
+    })
 }
 
 /// Noise that was learnt: −2 ln of the likelihood ratio of stated to learnt noise, its limit, and the sources.
@@ -153,5 +170,5 @@ pub fn noise_learnt(
         used.join("; ")
     );
     let figures = json!({ "ratio": ratio, "limit": limit, "sources": sources });
-    Some(Finding::new("noise-learnt", text, figures))
+    Some(Finding::new(Kind::NoiseLearnt, text, figures))
 }

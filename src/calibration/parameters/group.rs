@@ -57,7 +57,7 @@ impl Group {
         let (title, key, unit, value) = match (self.kind, self.sensor) {
             (ParameterKind::Scale, _) => ("scale factor K", "scale_ppm", "ppm", PPM),
             (ParameterKind::Installation, _) => {
-                ("installation E", "installation_arcsec", "″", ARCSEC)
+                ("misalignment E", "installation_arcsec", "″", ARCSEC)
             }
             (ParameterKind::Bias, Sensor::Gyro) => ("bias D", "bias_deg_per_h", "°/h", DEG_PER_H),
             (ParameterKind::Bias, Sensor::Accel) => ("bias D", "bias_ug", "µg", MICRO_G),

@@ -23,7 +23,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use super::budget::BudgetRecord;
 use super::noise::NoiseReport;
 use crate::calibration::result::thermal_record::{RecordingRecord, ThermalRecord};
-use crate::calibration::{DwellScatter, Finding, Quality};
+use crate::calibration::{DwellScatter, Finding, Quality, Verdict};
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
 
@@ -115,6 +115,9 @@ pub struct Calibration {
         skip_serializing_if = "Option::is_none"
     )]
     pub noise: Option<NoiseRecord>,
+    /// Whether the values may be used; none of what was not estimated, such as a truth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<Verdict>,
     /// What must be known before using the values.
     #[serde(default)]
     pub warnings: Vec<String>,

@@ -14,7 +14,7 @@ use super::{
 use crate::calibration::parameters::factor;
 use crate::calibration::{
     Auxiliary, Budget, ClosedForm, ErrorTermTest, Estimate, Finding, Nis, Outcome, PARAMETERS,
-    ParameterMatrix, ParameterVector, Problem, Quality, auxiliary_name, from_vector,
+    ParameterMatrix, ParameterVector, Problem, Quality, Verdict, auxiliary_name, from_vector,
     parameter_name,
 };
 use crate::imu::{
@@ -127,6 +127,7 @@ impl Calibration {
 
     fn with_findings(self, findings: Vec<Finding>) -> Self {
         Self {
+            verdict: Some(Verdict::of(&findings)),
             warnings: findings
                 .iter()
                 .map(|finding| finding.text.clone())

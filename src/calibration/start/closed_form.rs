@@ -8,6 +8,7 @@ use super::gravity::AtRest;
 use super::labels::{Section, Used};
 use super::positions::{Observed, Position};
 use super::{labels, table};
+use crate::calibration::checks::kind::Kind;
 use crate::calibration::checks::observability::not_observed;
 use crate::calibration::checks::prior_distance::far_by_data;
 use crate::calibration::checks::rest_scatter::scatter_at_rest;
@@ -69,7 +70,10 @@ pub struct ClosedForm {
 impl ClosedForm {
     /// Whether it may be used: noise explains what it leaves.
     pub fn is_usable(&self) -> bool {
-        !self.findings.iter().any(Finding::is_unexplained)
+        !self
+            .findings
+            .iter()
+            .any(|finding| finding.is(Kind::Unexplained))
     }
 }
 
@@ -110,8 +114,7 @@ pub fn six_position_by(
     let ClosedForm {
         estimate, findings, ..
     } = &mut closed_form;
-    let notes = problem.notes().into_iter();
-    findings.splice(0..0, notes.map(Finding::of_recording));
+    findings.splice(0..0, problem.remarks());
     findings.extend(unexplained_residuals(findings));
     findings.extend(scatter_at_rest(problem, &estimate.triads));
     let rounding = by_rounding(problem, &estimate.triads);

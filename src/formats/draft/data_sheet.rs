@@ -33,14 +33,14 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Of a unit that the file names and that is another number of one of `run.toml`'s.
+    /// Of a unit that is named and is another number of one of `run.toml`'s.
     pub fn of_unit(sensor: Sensor, unit: Unit) -> Option<Self> {
         let of_one = unit_scale(sensor, unit.word).filter(|_| unit.times != 1.0)?;
         Some(Self {
             value: Vector3::repeat(of_one / unit.times),
             off: 0.0,
             is_named: true,
-            why: format!("one is {} {}, as the file says", unit.times, unit.word),
+            why: format!("one is {} {}", short(unit.times), unit.word),
         })
     }
 

@@ -1,5 +1,6 @@
 //! What a log shows, and how sure that is.
 
+use super::motion::Motion;
 use super::units::short;
 use super::{Draft, NO_COLUMNS};
 use crate::imu::Sensor;
@@ -64,7 +65,9 @@ impl Draft {
     /// The first thing that stands between the draft and a run: what the log has, what is needed, what to do.
     pub(in crate::formats) fn open_question(&self) -> Option<[String; 3]> {
         let (field, why) = self.page("log").open.into_iter().next()?;
-        let has_accels = self.columns.triads.accel.is_some();
+        let is_zero = |motion: &Motion| motion.gravity == 0.0;
+        let has_accels =
+            self.columns.triads.accel.is_some() && !self.motion.as_ref().is_some_and(is_zero);
         let (expected, advice) = match &*field {
             "gyro_unit" if !has_accels => (
                 "gyros of a known unit, and accelerometers",
@@ -75,6 +78,10 @@ impl Draft {
             "accel_unit" => (
                 "the unit of the accelerometers",
                 "State it with --accel-unit.",
+            ),
+            "scale" => (
+                "what one count is",
+                "State it by the data sheet, such as --gyro-unit '1/131 deg/s' or --accel-unit '1/16384 g'.",
             ),
             "sample_period_s" => ("the rate of the rows", "State it with --rate."),
             _ => (

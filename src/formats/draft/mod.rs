@@ -28,7 +28,7 @@ use columns::Columns;
 pub use found::{Certainty, Found};
 use motion::{FOLLOWED, Motion};
 use registers::{Registers, Rows};
-pub use stated::Stated;
+pub use stated::{Stated, StatedUnit};
 use streams::Streams;
 use time::Clock;
 use units::Quantities;
@@ -101,9 +101,14 @@ impl Draft {
     ///
     /// # Errors
     /// [`FileError`] if one cannot be read, has hardly any rows or lacks its triad or its time.
-    pub fn of_two_files(gyro: &Path, accel: &Path, accel_name: &str) -> Result<Self, FileError> {
+    pub fn of_two_files(
+        gyro: &Path,
+        accel: &Path,
+        accel_name: &str,
+        stated: &Stated,
+    ) -> Result<Self, FileError> {
         let (streams, sheet) = Streams::of_two_files(gyro, accel, Some(accel_name))?;
-        Ok(Self::of_sheet(sheet, Some(streams), &Stated::default()))
+        Ok(Self::of_sheet(sheet, Some(streams), stated))
     }
 
     fn of_sheet(mut sheet: Sheet, streams: Option<Streams>, stated: &Stated) -> Self {

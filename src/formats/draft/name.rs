@@ -51,17 +51,19 @@ pub fn axes_of_program(columns: &[String]) -> Option<&'static str> {
 }
 
 /// The unit that a text names, of which a number before it says how many.
-fn unit(text: &str) -> Option<Unit> {
+pub fn unit(text: &str) -> Option<Unit> {
     let text = text.trim_matches(['[', ']', ' ']);
     let text = text.strip_suffix("/LSB").unwrap_or(text);
-    let number = match text.split_once(' ') {
-        Some((number, rest)) => number.parse::<f64>().ok().map(|number| (number, rest)),
-        None => None,
+    let number = |text: &str| match text.strip_prefix("1/") {
+        Some(of_one) => of_one.parse::<f64>().map(f64::recip),
+        None => text.parse(),
     };
-    let (times, text) = number.unwrap_or((1.0, text));
+    let parts = text.split_once(' ');
+    let counted = parts.and_then(|(times, rest)| Some((number(times).ok()?, rest)));
+    let (times, text) = counted.unwrap_or((1.0, text));
     let (word, of_it, of) = spelled(text)?;
     let times = times * of_it;
-    (times > 0.0).then_some(Unit { word, times, of })
+    (times > 0.0 && times.is_finite()).then_some(Unit { word, times, of })
 }
 
 /// The words of a name in lower case: what blanks, marks or capitals part.

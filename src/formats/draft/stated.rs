@@ -1,5 +1,9 @@
 //! What a user states of a log beside it.
 
+use super::name::{self, Unit};
+use crate::formats::quantity::{OUTPUTS, Of, units};
+use crate::imu::Sensor;
+
 /// What a user states of a log that has no `run.toml`; what is not stated is found, or wide.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Stated {
@@ -11,8 +15,43 @@ pub struct Stated {
     pub height_m: Option<f64>,
     /// Gravity at the place.
     pub gravity_m_s2: Option<f64>,
-    /// Units in the words of `run.toml`.
-    pub gyro_unit: Option<String>,
-    /// The same of the accelerometers.
-    pub accel_unit: Option<String>,
+    /// Unit of the gyros.
+    pub gyro_unit: Option<StatedUnit>,
+    /// Unit of the accelerometers.
+    pub accel_unit: Option<StatedUnit>,
+}
+
+/// A unit in a word of `run.toml` or as files spell it, or so many of it: `deg/s`, `1/131 deg/s`, `0.061 mg`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StatedUnit(pub(super) Unit);
+
+impl StatedUnit {
+    /// Of the triad of this sensor.
+    ///
+    /// # Errors
+    /// What may be stated, if this cannot.
+    pub fn parse(sensor: Sensor, text: &str) -> Result<Self, String> {
+        let is_of_it = |unit: &Unit| match unit.of {
+            Of::Rows(of, _) => of == sensor,
+            Of::Count => unit.times == 1.0,
+            Of::Time | Of::Other => false,
+        };
+        let unit = name::unit(text).filter(is_of_it);
+        unit.map(Self).ok_or_else(|| {
+            let outputs = OUTPUTS.into_iter().skip(1);
+            let mut words: Vec<_> = outputs
+                .flat_map(|(_, output)| units(sensor, output))
+                .collect();
+            words.dedup_by_key(|(word, _)| *word);
+            let mut words: Vec<&str> = words.into_iter().map(|(word, _)| word).collect();
+            words.sort_unstable();
+            words.dedup();
+            let example = match sensor {
+                Sensor::Gyro => "1/131 deg/s",
+                Sensor::Accel => "1/16384 g",
+            };
+            let words = words.join(", ");
+            format!("expected one of {words}, or what one count is, such as '{example}'")
+        })
+    }
 }

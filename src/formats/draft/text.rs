@@ -333,16 +333,16 @@ impl Draft {
     fn noise_table(&self, page: &mut Page) {
         page.table(
             "imu.noise",
-            "white noise at rest; better from hours at rest, by turncal allan",
+            "white noise; turncal estimates it from the record unless it is stated",
         );
         for sensor in self.present() {
             let (key, unit) = NoiseKeys::of(sensor).random_walk;
             match self.white_noise(sensor) {
-                Some(walk) => page.plain(key, format_args!("{:?}", short(walk / unit))),
-                None => page.optional(
-                    key,
-                    "the data sheet's figure; without it, that of the quieter part of the record",
-                ),
+                Some(walk) => page.remark(format_args!(
+                    "{key} = {:?}  # at rest in this log; a data sheet or turncal allan knows better",
+                    short(walk / unit)
+                )),
+                None => page.optional(key, "the data sheet's figure"),
             }
         }
     }

@@ -7,9 +7,9 @@ use super::data_sheet::{Scale, likely_for_g};
 use super::motion::Motion;
 use super::name::{self, Name};
 use super::registers::Registers;
-use super::stated::Stated;
+use super::stated::{Stated, StatedUnit};
 use super::time::{Clock, PERIODS};
-use crate::formats::quantity::{OUTPUTS, units};
+use crate::formats::quantity::{Of, units};
 use crate::formats::{Sheet, unit_scale};
 use crate::imu::{Output, PerSensor, Sensor};
 use crate::units::STANDARD_GRAVITY;
@@ -294,26 +294,21 @@ impl Quantities {
 
     /// Takes the units that the user states.
     pub fn state(&mut self, stated: &Stated) {
-        for sensor in Sensor::ALL {
-            let word = match sensor {
-                Sensor::Gyro => &stated.gyro_unit,
-                Sensor::Accel => &stated.accel_unit,
-            };
-            let all = OUTPUTS.into_iter().flat_map(|(_, output)| {
-                units(sensor, output).map(move |(known, _)| (known, output))
-            });
-            let is_stated = |(known, _): &(&str, Output)| Some(*known) == word.as_deref();
-            let Some((word, output)) = { all }.find(is_stated) else {
-                continue;
-            };
-            if word != "count" {
+        let of_triads = [
+            (Sensor::Gyro, stated.gyro_unit),
+            (Sensor::Accel, stated.accel_unit),
+        ];
+        for (sensor, StatedUnit(of)) in of_triads.into_iter().filter_map(|(k, of)| Some((k, of?))) {
+            if let Of::Rows(_, output) = of.of {
                 self.output = output;
+                "as the stated unit is of it".clone_into(&mut self.output_why);
             }
             let unit = self.units.get_mut(sensor);
-            unit.word = Some(word);
+            let found = unit.scale.take().filter(|_| of.word == "count");
+            unit.scale = Scale::of_unit(sensor, of).or(found);
+            unit.word = Some(unit.scale.as_ref().map_or(of.word, |_| "count"));
             unit.is_shown = true;
             unit.why = "as stated".to_owned();
-            unit.scale = unit.scale.take().filter(|_| word == "count");
         }
     }
 

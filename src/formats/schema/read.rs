@@ -70,6 +70,7 @@ impl Run {
                 segments,
                 files,
                 notes,
+                doubts: Vec::new(),
             },
             instrument: known,
             site,
@@ -77,8 +78,7 @@ impl Run {
             standstill: standstill(&file.standstill),
             segment_sigma: position_sigma.map_or(SET_BY_HAND, |sigma| sigma.0 * DEGREE),
         };
-        let doubts = run.doubts();
-        run.recording.notes.extend(doubts);
+        run.recording.doubts = run.doubts();
         Ok(run)
     }
 
@@ -145,12 +145,24 @@ fn with_noise(
     notes: &mut Vec<String>,
 ) -> Instrument {
     let mut known = instrument.known.clone();
+    let mut found = Vec::new();
     for sensor in Sensor::ALL {
         if !known.noise_is_stated.get(sensor) && imu.has(sensor) {
             let random_walk = noise::white_noise(imu, sensor);
             known.noise.get_mut(sensor).random_walk = random_walk;
-            notes.push(noise_note(sensor, random_walk));
+            let (key, unit) = NoiseKeys::of(sensor).random_walk;
+            found.push(format!(
+                "{key} = {}",
+                format_args!("{:.3}", random_walk / unit)
+            ));
         }
+    }
+    if !found.is_empty() {
+        notes.push(format!(
+            "You stated no white noise. turncal starts with that of the quieter part of the record ({}) and estimates the \
+             noise from there. State the data sheet's figures in [imu.noise] if you know them.",
+            found.join(", ")
+        ));
     }
     known
 }
@@ -246,16 +258,6 @@ pub fn name(path: &Path) -> String {
     )
 }
 
-/// That white noise is not stated, and what is taken for it.
-fn noise_note(sensor: Sensor, random_walk: f64) -> String {
-    let (key, unit) = NoiseKeys::of(sensor).random_walk;
-    format!(
-        "run.toml does not state {key}. turncal starts with {:.3}, which the quieter part of the record shows, and \
-         estimates the noise from there.",
-        random_walk / unit
-    )
-}
-
 /// 1σ of a height that is not stated, m.
 const USUAL_HEIGHT: f64 = 500.0;
 /// How much gravity falls with height, (m/s²)/m.
@@ -285,21 +287,50 @@ fn site(document: Document, run: &RunFile, notes: &mut Vec<String>) -> Result<Si
     if let Some(sigma) = file.gravity_sigma_mgal {
         site.gravity_sigma = sigma.0 * MILLIGAL;
     }
-    if !site.is_known {
-        notes.push(
-            "The latitude is not stated. turncal estimates Earth rate as an unknown vector, which widens the σ of the gyro \
-             biases. State latitude_deg in [site], or --latitude."
-                .to_owned(),
-        );
-    }
-    if file.gravity_m_s2.is_none() && (!site.is_known || height.is_none()) {
-        notes.push(format!(
-            "The place is not stated. turncal assumed a gravity of {:.4} ± {:.4} m/s², which widens the σ of the accelerometer \
-             scale factors by as much. State latitude_deg and height_m in [site], or gravity_m_s2 (--gravity).",
-            site.gravity, site.gravity_sigma
-        ));
-    }
+    notes.extend(place_note(
+        &site,
+        file.gravity_m_s2.is_some(),
+        height.is_some(),
+    ));
     Ok(site)
+}
+
+/// What it costs that latitude, height or gravity are not stated.
+fn place_note(site: &Site, has_gravity: bool, has_height: bool) -> Option<String> {
+    let has_gravity = has_gravity || (site.is_known && has_height);
+    let (missing, fields) = match (site.is_known, has_height) {
+        (false, false) => (
+            "latitude and no height",
+            "latitude_deg and height_m (--latitude, --height)",
+        ),
+        (false, true) => ("latitude", "latitude_deg (--latitude)"),
+        (true, false) => ("height", "height_m (--height)"),
+        (true, true) => return None,
+    };
+    let earth_rate =
+        "estimated Earth rate as an unknown vector, which widens the σ of the gyro biases"
+            .to_owned();
+    let gravity = format!(
+        "assumed a gravity of {:.4} ± {:.4} m/s², which widens the σ of the accelerometer scale factors",
+        site.gravity, site.gravity_sigma
+    );
+    let costs = [
+        (!site.is_known).then_some(earth_rate),
+        (!has_gravity).then_some(gravity),
+    ];
+    let costs = costs
+        .into_iter()
+        .flatten()
+        .collect::<Vec<_>>()
+        .join("; it ");
+    let or_gravity = if has_gravity {
+        ""
+    } else {
+        ", or gravity_m_s2 (--gravity)"
+    };
+    (!costs.is_empty()).then(|| {
+        format!("You stated no {missing}. turncal {costs}. State {fields} in [site]{or_gravity}.")
+    })
 }
 
 /// 1σ of a gravity that is stated without one, m/s²: of its last digit, and no less than a milligal.

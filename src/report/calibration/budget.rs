@@ -88,6 +88,18 @@ fn share(part: &BudgetPart, estimate: &Estimate, index: usize) -> f64 {
     part.covariance[(index, index)] / estimate.covariance[(index, index)]
 }
 
+/// The source of most of the variances of a group, with its share.
+pub fn largest(budget: &Budget, group: &[usize]) -> Option<String> {
+    let sum = |part: &BudgetPart| group.iter().map(|&i| part.covariance[(i, i)]).sum::<f64>();
+    let all: f64 = budget.parts.iter().map(sum).sum();
+    let part = budget
+        .parts
+        .iter()
+        .max_by(|a, b| sum(a).total_cmp(&sum(b)))?;
+    let percent = 100.0 * sum(part) / all;
+    (all > 0.0).then(|| format!("{} {percent:.0} %", part.source.name()))
+}
+
 /// Shares of every variance, one bar a parameter.
 pub fn figure(budget: &Budget, estimate: &Estimate) -> Plot {
     let parts = shown(budget, estimate);
@@ -163,7 +175,7 @@ pub fn unseen(report: &Report, estimate: &Estimate) -> Option<String> {
     let mut named: Vec<String> = named
         .map(|(term, group, times)| {
             let (name, group, times) = (term.name(), group.short(), three_digits(*times));
-            format!("{name} ({group} by {times} σ)")
+            format!("{name} (may change {group} by {times} σ)")
         })
         .collect();
     named.extend(match unseen.len() - named.len() {
@@ -172,7 +184,7 @@ pub fn unseen(report: &Report, estimate: &Estimate) -> Option<String> {
     });
     (!named.is_empty()).then(|| {
         format!(
-            "σ are those of this model. What is not estimated and would not be seen in this record may change more: {}.",
+            "{}: not visible in this record, so not in σ",
             named.join(", ")
         )
     })

@@ -29,18 +29,20 @@ impl Report<'_> {
             (None, &[(_, closed), (_, filter)]) => Some(differences(closed, filter)),
             _ => None,
         });
-        // Recordings have each their own time.
-        let one = |outcome: &&Outcome| outcome.alone.len() < 2;
-        if let Some(outcome) = self.outcome.filter(one) {
-            plots.extend(self.sigma(outcome));
+        if let Some(outcome) = self.against_time() {
             plots.extend(self.estimates(outcome));
             plots.extend(self.innovations(outcome));
         }
-        if self.outcome.as_ref().is_none_or(one) {
+        if self.outcome.is_none() || self.against_time().is_some() {
             plots.push(path(self));
         }
         plots.extend(self.estimate().and_then(correlation));
         plots
+    }
+
+    /// The filter's result where it has one time: several recordings have each their own.
+    pub(super) fn against_time(&self) -> Option<&Outcome> {
+        self.outcome.filter(|outcome| outcome.alone.len() < 2)
     }
 
     fn time(&self) -> Axis {
@@ -49,7 +51,7 @@ impl Report<'_> {
     }
 
     /// σ of each parameter against time, with the largest true error where the truth is known.
-    fn sigma(&self, outcome: &Outcome) -> Option<Plot> {
+    pub(super) fn sigma(&self, outcome: &Outcome) -> Option<Plot> {
         let (history, form) = (&outcome.history, outcome.estimate.form());
         let truth = self.truth_vector();
         let panel = |group: Group| {

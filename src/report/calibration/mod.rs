@@ -1,5 +1,6 @@
 //! The report of a calibration, and of both methods side by side.
 
+mod brief;
 mod budget;
 mod figures;
 mod report;
@@ -8,7 +9,7 @@ mod temperature;
 #[cfg(test)]
 mod tests;
 
-use crate::calibration::{Estimate, Finding, ParameterVector};
+use crate::calibration::{Estimate, Finding, ParameterVector, Verdict, Word};
 use crate::imu::{Noise, Sensor};
 use crate::report::prelude::*;
 use crate::report::{outlook, terms};
@@ -20,16 +21,15 @@ impl Report<'_> {
     /// Everything that is said of the calibration. Its figures by name are in the calibration's own file.
     pub fn document(&self) -> Document {
         let mut document = Document::new(self.title);
-        document.lead = vec![self.verdict()];
-        document.lead.extend(self.lead());
-        let estimate = self.estimate();
-        let unseen = estimate.and_then(|estimate| budget::unseen(self, estimate));
-        document.lead.extend(unseen);
-        document.warnings.items = self.warnings();
+        document.verdict = self.verdict();
+        document.lead = self.lead();
+        document.findings = self.findings.to_vec();
+        document.findings.sort_by_key(Finding::level);
+        brief::add(&mut document, self);
         document.page(item(self));
-        document.both(self.groups());
-        outlook::in_a_line(&mut document, self.navigation);
+        document.pages(self.against_time().and_then(|outcome| self.sigma(outcome)));
         document.fold("Every parameter");
+        document.both(self.groups());
         if let Some(estimate) = self.estimate() {
             document.both(self.parameters(estimate));
         }
@@ -67,33 +67,27 @@ impl Report<'_> {
         document
     }
 
-    /// What must be known before the figures are used.
-    fn warnings(&self) -> Vec<String> {
-        self.findings.iter().map(ToString::to_string).collect()
-    }
-
     /// What ran on what.
     fn lead(&self) -> Vec<String> {
         let imu = &self.run.recording.imu;
-        let mut run = match self.outcome.map_or(0, |outcome| outcome.alone.len()) {
-            0 | 1 => format!(
-                "Run {}: {} s, {} samples at {} Hz",
-                self.run.recording.name,
-                value(imu.duration(), 10.0),
-                count(imu.len()),
-                three_digits(1.0 / imu.period),
-            ),
-            recordings => format!("Campaign of {recordings} recordings of one instrument"),
+        let how = match self.table() {
+            Some(_) => "with a table",
+            None => "without a table",
         };
-        run += &format!(
-            ", {} dwells; body frame: {}",
-            self.dwells.len(),
-            self.body_frame.words(),
-        );
-        if let Some(estimate) = self.estimate() {
-            run += &format!("; installation: {}", estimate.form().name());
-        }
-        let mut lead = vec![run + "."];
+        let dwells = match self.dwells.len() {
+            1 => "one dwell".to_owned(),
+            n => format!("{n} dwells"),
+        };
+        let mut lead = vec![
+            match self.outcome.map_or(0, |outcome| outcome.alone.len()) {
+                0 | 1 => format!(
+                    "{} s at {} Hz, {dwells}, {how}",
+                    value(imu.duration(), 10.0),
+                    three_digits(1.0 / imu.period),
+                ),
+                recordings => format!("{recordings} recordings of one instrument, {dwells}, {how}"),
+            },
+        ];
         lead.extend(self.outcome.map(|outcome| {
             format!(
                 "EKF {} after {} passes; NIS with its 95 % interval: {}.",
@@ -106,59 +100,32 @@ impl Report<'_> {
                 tables::nis(outcome).join(", "),
             )
         }));
-        lead.extend(
-            self.closed_form
-                .map(|closed| format!("Closed form: {}.", closed.note)),
-        );
+        let closed_form = self.closed_form;
+        lead.extend(closed_form.map(|closed| format!("Closed form: {}.", closed.note)));
         lead
     }
 }
 
 impl Report<'_> {
-    /// Whether the calibration may be used, and what is weakest of it.
-    pub(super) fn verdict(&self) -> String {
-        if self.outcome.is_some_and(|outcome| !outcome.converged) {
-            return "Not calibrated: the filter did not converge; values and σ may not be used."
-                .to_owned();
-        }
-        if self.findings.iter().any(Finding::is_unexplained) {
-            return "Not calibrated: no noise explains what the calibration leaves; values may not be used."
-                .to_owned();
-        }
-        let Some(estimate) = self.estimate() else {
-            return "Not calibrated.".to_owned();
-        };
+    /// Whether the calibration may be used, and how much of it was determined.
+    pub(super) fn verdict(&self) -> Option<(Word, String)> {
+        let word = Verdict::of(self.findings).word;
+        let estimate = self.estimate()?;
         let estimated = estimate.estimated().count();
         let hidden = self.outcome.map_or(0, |outcome| outcome.unobserved().len());
-        let parameters = match hidden {
-            0 => format!("{} parameters", count(estimated)),
+        let of_it = match word {
+            Word::Failed => "values and σ may not be used".to_owned(),
             _ => format!(
-                "{} of {} parameters; the data do not show the others",
-                count(estimated - hidden),
-                count(estimated)
+                "{} of {estimated} parameters determined",
+                estimated - hidden
             ),
         };
-        let warnings = match self.findings.len() {
-            0 => "no warnings".to_owned(),
-            1 => "one warning, to be read first".to_owned(),
-            n => format!("{n} warnings, to be read first"),
+        let findings = match self.findings.len() {
+            0 => "no findings".to_owned(),
+            1 => "one finding".to_owned(),
+            n => format!("{n} findings"),
         };
-        let weakest = self.outcome.and_then(|outcome| {
-            let prior = &outcome.prior_sigma;
-            let index = weakest(estimate, prior)?;
-            let group = Group::of(index);
-            let own = estimate.sigma()[index] / group.unit_value();
-            let (title, axis) = (group.title(), axis_name(estimate.form(), index));
-            Some(format!(
-                "; least determined: {title} {axis}, {} {} (1σ)",
-                sigma(own),
-                group.unit()
-            ))
-        });
-        format!(
-            "Calibrated: {parameters}; {warnings}{}.",
-            weakest.unwrap_or_default()
-        )
+        Some((word, format!("{of_it}, {findings}")))
     }
 }
 

@@ -12,6 +12,7 @@ use crate::imu::{BodyFrame, PerSensor, Triad};
 use crate::recording::TableLog;
 use crate::run::{Aiding, Run};
 use crate::study::navigation::NavigationStudyError;
+use crate::survey::Expected;
 
 /// What a report is made of. Every estimate and the truth have the same installation form and the same body
 /// frame.
@@ -39,6 +40,8 @@ pub struct Report<'a> {
     pub truth: Option<&'a PerSensor<Triad>>,
     /// True auxiliary parameters by name, as far as they are known.
     pub true_terms: &'a BTreeMap<String, TermRecord>,
+    /// What was to be expected of such a record, where that is known.
+    pub predicted: Option<&'a Expected>,
     /// Residuals at rest and after turns.
     pub quality: Option<&'a Quality>,
     /// Dwells, s.

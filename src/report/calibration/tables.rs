@@ -192,6 +192,23 @@ pub fn consistency(outcome: &Outcome) -> Table {
     )
 }
 
+/// Residuals in dwells that were left out of the fit, in a line.
+pub fn cross_validation(report: &Report) -> Option<String> {
+    let held_out = report.quality?.held_out.as_ref()?;
+    let of = |name: &str, spread: &Spread, units: &[(&str, f64)]| {
+        let fits = units.iter().find(|(_, size)| spread.rms < 1000.0 * size);
+        let &(unit, size) = fits.or(units.last()).filter(|_| spread.count > 0)?;
+        let [rms, largest] = [spread.rms, spread.largest].map(|x| three_digits(x / size));
+        Some(format!("{name} {rms} {unit} RMS, largest {largest}"))
+    };
+    let parts = [
+        of("|f| − g", &held_out.gravity, &FORCE),
+        of("up after a turn", &held_out.direction, &ANGLE),
+    ];
+    let parts: Vec<String> = parts.into_iter().flatten().collect();
+    (!parts.is_empty()).then(|| format!("{} ({} dwells)", parts.join("; "), held_out.gravity.count))
+}
+
 /// Each residual over the whole record and over what was held out; empty where there is nothing to measure.
 pub fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
     let turns = match table {

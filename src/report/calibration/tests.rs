@@ -236,7 +236,7 @@ fn a_run_without_a_table_is_reported() {
 fn a_group_of_fixed_parameters_has_neither_error_nor_axes() {
     let mut made_up = synthetic(InstallationForm::ThreeAngle);
     let mut groups = Group::all();
-    let installation = groups.find(|group| group.title() == "accel installation E");
+    let installation = groups.find(|group| group.title() == "accel misalignment E");
     let fixed = installation
         .unwrap()
         .parameters(InstallationForm::ThreeAngle);
@@ -254,12 +254,12 @@ fn a_group_of_fixed_parameters_has_neither_error_nor_axes() {
     assert_sound(&files);
     for name in ["sigma.svg", "comparison.svg"] {
         let (_, text) = files.iter().find(|(file, _)| file == name).unwrap();
-        assert!(text.contains("accel installation E: all fixed"), "{name}");
+        assert!(text.contains("accel misalignment E: all fixed"), "{name}");
     }
     let row = summary(&report);
     let row = row
         .lines()
-        .rfind(|line| line.contains("accel installation E"));
+        .rfind(|line| line.contains("accel misalignment E"));
     assert!(row.unwrap().contains("–"), "{row:?}");
 }
 

@@ -112,7 +112,7 @@ fn warming(run: &Run) -> String {
 
 /// What to look at and what to change, a sentence or two each.
 pub fn findings(run: &Run, survey: &Survey) -> Vec<String> {
-    let mut findings = run.recording.notes.clone();
+    let mut findings = [&run.recording.doubts[..], &run.recording.notes].concat();
     findings.extend(survey.contradiction.iter().map(of_contradiction));
     findings.extend(of_units(run, survey));
     findings.extend(survey.labels.iter().filter_map(of_label));

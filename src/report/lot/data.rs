@@ -1,6 +1,8 @@
 //! The figures of a lot by name; the unit of each is in its `unit`.
 
-use crate::lot::{Against, FALSE_ALARM, FALSE_TREND, Lot, Row, Sample, Statistics, Verdict};
+use crate::lot::{
+    Against, Check, FALSE_ALARM, FALSE_TREND, Lot, Quantity, Row, Sample, Statistics, Verdict,
+};
 use crate::report::lot::shown::{shown, shown_spread, spread_symbol, unit_key, verdict};
 use crate::report::prelude::*;
 
@@ -9,12 +11,32 @@ pub fn data(lot: &Lot) -> Value {
         "format": "turncal-lot/1",
         "body_frame": lot.body_frame,
         "nominal_scale": { "gyro": lot.nominal.gyro.0.as_slice(), "accel": lot.nominal.accel.0.as_slice() },
+        "verdict": super::verdict(lot).map(|(word, _)| json!({ "word": word, "reasons": reasons(lot) })),
         "false_alarm": FALSE_ALARM,
         "false_trend": FALSE_TREND,
         "confidence": lot.specification.as_ref().map(|s| s.confidence),
         "units": lot.rows.iter().enumerate().map(|(place, row)| unit(lot, place, row)).collect::<Value>(),
         "quantities": lot.statistics.iter().map(|of| quantity(lot, of)).collect::<Value>(),
     })
+}
+
+/// The limits that are not kept for certain, by unit and parameter.
+fn reasons(lot: &Lot) -> Vec<String> {
+    let rows = lot
+        .rows
+        .iter()
+        .flat_map(|row| row.checks.iter().map(move |check| (row, check)));
+    let open = rows.filter(|(_, check)| check.verdict != Verdict::Pass);
+    let name = |(row, check): (&Row, &Check)| {
+        let parameter = Quantity::Parameter(check.limit.parameter);
+        format!(
+            "{} {} {}",
+            row.unit.name,
+            parameter.name(),
+            check.verdict.name()
+        )
+    };
+    open.map(name).collect()
 }
 
 fn unit(lot: &Lot, place: usize, row: &Row) -> Value {

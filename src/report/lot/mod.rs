@@ -11,6 +11,7 @@ use std::collections::BTreeMap;
 
 use shown::{change, title};
 
+use crate::calibration::Word;
 use crate::imu::AXES;
 use crate::lot::{FALSE_ALARM, FALSE_TREND, Lot, Row, Verdict};
 use crate::report::prelude::*;
@@ -18,7 +19,11 @@ use crate::report::prelude::*;
 /// Everything that is said of a lot.
 pub fn document(lot: &Lot) -> Document {
     let units = lot.rows.len();
-    let mut document = Document::new(format!("Lot of {} units", count(units)));
+    let mut document = Document::new(match &lot.rows[..] {
+        [row] => row.unit.name.clone(),
+        _ => format!("Lot of {} units", count(units)),
+    });
+    document.verdict = verdict(lot);
     document.lead = vec![format!(
         "General form, body frame: {}. Scale factors are departures from the lot's nominal ones. Every σ is 1σ.",
         lot.body_frame.words()
@@ -29,6 +34,7 @@ pub fn document(lot: &Lot) -> Document {
     say_nominal(lot, &mut document);
     say_findings(lot, &mut document);
     say_trends(lot, &mut document);
+    document.both(tables::undecided(lot));
     document.both(facts(lot));
     document.both(tables::units(lot));
     document.page(figures::parameters(lot));
@@ -36,10 +42,30 @@ pub fn document(lot: &Lot) -> Document {
     document.page(figures::noise(lot));
     document.both(tables::noise(lot));
     document.pages(tables::values(lot));
-    document.page(tables::undecided(lot));
     document.data = data::data(lot);
     document.files = vec![("lot.csv".to_owned(), data::csv(lot))];
     document
+}
+
+/// Of all limits of all units, how many are exceeded, kept or neither for certain.
+pub fn verdict(lot: &Lot) -> Option<(Word, String)> {
+    let specification = lot.specification.as_ref()?;
+    let all: Vec<Verdict> = { lot.rows.iter() }
+        .flat_map(|row| row.checks.iter().map(|check| check.verdict))
+        .collect();
+    let of = |verdict| all.iter().filter(|of| **of == verdict).count();
+    let [passed, open, failed] = [Verdict::Pass, Verdict::NotDecided, Verdict::Fail].map(of);
+    let word = match (failed, open + lot.failures().count()) {
+        (0, 0) => Word::Pass,
+        (0, _) => Word::Undecided,
+        _ => Word::Fail,
+    };
+    let percent = 100.0 * specification.confidence;
+    let words = format!(
+        "{failed} of {} limits exceeded, {passed} kept, {open} undecided ({percent} % each)",
+        all.len()
+    );
+    Some((word, words))
 }
 
 fn facts(lot: &Lot) -> Facts {

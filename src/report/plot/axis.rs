@@ -1,6 +1,6 @@
 //! Axes: what is asked of them, and the scale with ticks that comes of it and of the data.
 
-use super::super::number;
+use crate::number;
 
 /// The most decades of a logarithmic axis; what lies lower is drawn at its foot.
 const DECADES: i32 = 10;

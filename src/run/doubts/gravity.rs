@@ -13,8 +13,9 @@ pub fn anomaly(run: &Run) -> Option<String> {
     let limit = chi_square_limit(1.0, FALSE_ALARM).sqrt() * sigma;
     (site.is_known && off.abs() > limit).then(|| {
         format!(
-            "gravity_m_s2 = {} is {:.0} mGal {} normal gravity at latitude {:.4}°, height {:.0} m; 999 of 1000 \
-             places are within {:.0} mGal of it. Accelerometer scale factors follow gravity. Check gravity_m_s2, latitude and height.",
+            "gravity_m_s2 = {} is {:.0} mGal {} normal gravity at latitude {:.4}°, height {:.0} m (limit {:.0} mGal, \
+             false-alarm rate 0.1 %). Accelerometer scale factors follow gravity. Check gravity_m_s2, latitude_deg and \
+             height_m.",
             site.gravity,
             off.abs() / MILLIGAL,
             if off > 0.0 { "above" } else { "below" },

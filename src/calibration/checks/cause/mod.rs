@@ -11,6 +11,7 @@ pub mod settling;
 use nalgebra::Vector3;
 use serde_json::json;
 
+use crate::calibration::checks::kind::Kind;
 use crate::calibration::{
     AttitudePrior, CalibrationError, Constant, Disturbance, DisturbanceKind, ErrorTerm, Finding,
     Innovation, Iterated, Observation, Prior, Problem, Script,
@@ -289,7 +290,7 @@ impl FoundCause {
                     "The data show an error that scale factors, misalignments and biases cannot explain: {name}. turncal \
                      estimated it with them, as --with {name} does. Apply the values together with this term"
                 );
-                ("error-term-estimated", text)
+                (Kind::ErrorTermEstimated, text)
             }
             Cause::Disturbance(disturbance) => {
                 figures["dwell"] = json!(disturbance.dwell + 1);
@@ -301,7 +302,7 @@ impl FoundCause {
     }
 
     /// Kind and words of the finding of a disturbance.
-    fn of_disturbance(&self, disturbance: Disturbance) -> (&'static str, String) {
+    fn of_disturbance(&self, disturbance: Disturbance) -> (Kind, String) {
         let time = self.time;
         let number = disturbance.dwell + 1;
         let seconds = self.value.norm() / ARCSEC;
@@ -320,14 +321,14 @@ impl FoundCause {
                     "The table's readings in dwell {number} are wrong{by} (at {time:.1} s). turncal left them out. Look \
                      there for a bump or a wrong reading"
                 );
-                ("position-wrong", text)
+                (Kind::PositionWrong, text)
             }
             DisturbanceKind::Slip => {
                 let text = format!(
                     "In the move before dwell {number} (at {time:.1} s) the gyros missed a turn of {angle}. turncal \
                      estimated it. Look there for lost samples, an exceeded range or a loose mount"
                 );
-                ("move-wrong", text)
+                (Kind::MoveWrong, text)
             }
             DisturbanceKind::EarthRate => {
                 let value = self.value / DEG_PER_H;
@@ -336,7 +337,7 @@ impl FoundCause {
                      (East, North, Up). turncal estimated it. Check latitude_deg, and the table's north and level",
                     value.x, value.y, value.z
                 );
-                ("earth-rate-wrong", text)
+                (Kind::EarthRateWrong, text)
             }
             DisturbanceKind::BiasStep(sensor) => {
                 let (unit, name) = match sensor {
@@ -350,7 +351,7 @@ impl FoundCause {
                     sensor.name(),
                     self.value.norm() / unit,
                 );
-                ("bias-step", text)
+                (Kind::BiasStep, text)
             }
         }
     }

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use serde_json::json;
 
+use crate::calibration::checks::kind::Kind;
 use crate::calibration::record::Rest;
 use crate::calibration::{
     CalibrationError, Finding, Observation, Problem, Script, Solved, Stretch,
@@ -111,5 +112,5 @@ pub fn finding(problem: &Problem, steps: usize) -> Option<Finding> {
         "The attitude settles for {seconds:.1} s after each stop. turncal skips that time after each move. Wait longer \
          after each stop, or stiffen the mount."
     );
-    (steps > 0).then(|| Finding::new("settling", text, json!({ "skipped_s": seconds })))
+    (steps > 0).then(|| Finding::new(Kind::Settling, text, json!({ "skipped_s": seconds })))
 }

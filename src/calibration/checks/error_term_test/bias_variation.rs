@@ -4,6 +4,7 @@ use rayon::prelude::*;
 use serde_json::json;
 
 use crate::calibration::checks::finding::widened_by;
+use crate::calibration::checks::kind::Kind;
 use crate::calibration::model::usual_variation;
 use crate::calibration::noise::LOG_SIGMA;
 use crate::calibration::{
@@ -67,7 +68,7 @@ pub fn biases_may_vary(growth: f64) -> Option<Finding> {
         widened_by(growth)
     );
     let figures = json!({ "growth": growth });
-    (growth >= SAID).then(|| Finding::new("biases-may-vary", text, figures))
+    (growth >= SAID).then(|| Finding::new(Kind::BiasesMayVary, text, figures))
 }
 
 /// The same of biases of one triad.

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::finding::widened_by;
+use crate::calibration::checks::kind::Kind;
 use crate::calibration::{
     CalibrationError, ErrorTerm, Finding, Group, Outcome, PARAMETERS, ParameterMatrix, Posterior,
     Problem,
@@ -92,18 +93,16 @@ impl ErrorTermTest {
         }
     }
 
-    /// Whether the data show it.
+    /// Whether the data show it. What lowers the cost by less than one is worth less than 1σ.
     pub fn significant(&self) -> bool {
-        self.gain > self.limit
+        self.gain > self.limit.max(1.0)
     }
 
     /// Of error terms that are off and that the data show, the likeliest, with those that cannot be told
     /// from it and those that are also significant with it on. `growth` is that of σ by leaving them off;
     /// none where σ do not include it.
     pub fn most_significant(tests: &[Self], growth: Option<f64>) -> Option<Finding> {
-        // What lowers the cost by less than one is worth less than 1σ.
-        let is_shown = |test: &&Self| test.role == Role::Likeliest && test.gain > 1.0;
-        let likeliest = tests.iter().find(is_shown)?;
+        let likeliest = tests.iter().find(|test| test.role == Role::Likeliest)?;
         let names = |role: Role| -> Vec<&str> {
             let of_role = tests.iter().filter(|test| test.role == role);
             of_role.map(|test| test.term.name()).collect()
@@ -132,7 +131,7 @@ impl ErrorTermTest {
             "term": term, "alternatives": alternatives, "further": further, "gain": gain, "limit": limit,
             "nis_without": likeliest.without, "nis_with": likeliest.with, "growth": growth
         });
-        Some(Finding::new("error-term-significant", text, figures))
+        Some(Finding::new(Kind::ErrorTermSignificant, text, figures))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use serde_json::json;
 
+use crate::calibration::checks::kind::Kind;
 use crate::calibration::{Finding, Outcome, auxiliary_name, parameter_name};
 use crate::units::DEGREE;
 
@@ -29,7 +30,7 @@ pub fn not_observed(by: &str, parameters: Vec<String>) -> Option<Finding> {
         listed(&parameters)
     );
     let figures = json!({ "by": by, "parameters": parameters });
-    (!parameters.is_empty()).then(|| Finding::new("not-observed", text, figures))
+    (!parameters.is_empty()).then(|| Finding::new(Kind::NotObserved, text, figures))
 }
 
 /// Parameters whose change with temperature the recordings do not show, if there are any.
@@ -40,7 +41,7 @@ pub fn temperature_not_seen(parameters: Vec<String>) -> Option<Finding> {
         listed(&parameters)
     );
     let figures = json!({ "parameters": parameters });
-    (!parameters.is_empty()).then(|| Finding::new("temperature-not-seen", text, figures))
+    (!parameters.is_empty()).then(|| Finding::new(Kind::TemperatureNotSeen, text, figures))
 }
 
 /// Combinations of parameters that were not observed though each of them was, if there are any.
@@ -52,7 +53,7 @@ fn combinations(combinations: Vec<String>) -> Option<Finding> {
     );
     let figures = json!({ "combinations": combinations });
     let any = !combinations.is_empty();
-    any.then(|| Finding::new("combinations-not-observed", text, figures))
+    any.then(|| Finding::new(Kind::CombinationsNotObserved, text, figures))
 }
 
 /// The heading with its 1σ after the run, rad.
@@ -64,14 +65,14 @@ fn heading(sigma_rad: f64) -> Finding {
         sigma_rad / DEGREE
     );
     let figures = json!({ "sigma_rad": sigma_rad });
-    Finding::new("heading-not-observed", text, figures)
+    Finding::new(Kind::HeadingNotObserved, text, figures)
 }
 
 /// Second order and asymmetry of the accelerometers cannot be told apart.
 fn even_terms() -> Finding {
     let text = "Second order and asymmetry of the accelerometers have the same effect in dwells with an axis up or \
                 down. Add dwells between them, such as at 45°, or leave one of the two terms off.";
-    Finding::new("even-terms-inseparable", text.to_owned(), json!(null))
+    Finding::new(Kind::EvenTermsInseparable, text.to_owned(), json!(null))
 }
 
 /// Parameters by sensor and kind, such as `gyro scale x, y; accel bias z`.

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use crate::imu::{AXES, Output, Sensor};
+use crate::number::three_digits;
 use crate::run::Run;
 use crate::units::{DEGREE, STANDARD_GRAVITY};
 
@@ -153,9 +154,4 @@ const fn confused(
         true_unit,
         factor,
     }
-}
-
-fn three_digits(value: f64) -> String {
-    let digits = (2.0 - value.abs().log10().floor()).clamp(0.0, 9.0) as usize;
-    format!("{value:.digits$}")
 }

@@ -1,0 +1,118 @@
+//! Whether a calibration may be used, by its findings or by a specification.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use super::finding::Finding;
+use super::kind::Level;
+
+/// Whether a calibration may be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Word {
+    /// It converged, its σ agree with its residuals, and all that was asked for is determined.
+    #[serde(rename = "good")]
+    Good,
+    /// The same, but for what its reasons say.
+    #[serde(rename = "use with care")]
+    UseWithCare,
+    /// Its values may not be used.
+    #[serde(rename = "failed")]
+    Failed,
+    /// Every limit of a specification is kept.
+    #[serde(rename = "pass")]
+    Pass,
+    /// No limit is certainly exceeded, and some may be.
+    #[serde(rename = "undecided")]
+    Undecided,
+    /// A limit is exceeded.
+    #[serde(rename = "fail")]
+    Fail,
+}
+
+impl Word {
+    /// As a class of a page's style.
+    pub fn class(self) -> &'static str {
+        match self {
+            Self::Good | Self::Pass => "good",
+            Self::UseWithCare | Self::Undecided => "care",
+            Self::Failed | Self::Fail => "failed",
+        }
+    }
+}
+
+impl fmt::Display for Word {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Good => "GOOD",
+            Self::UseWithCare => "USE WITH CARE",
+            Self::Failed => "FAILED",
+            Self::Pass => "PASS",
+            Self::Undecided => "UNDECIDED",
+            Self::Fail => "FAIL",
+        })
+    }
+}
+
+/// A word, and the codes of the findings that are the reason for it.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// The word.
+    pub word: Word,
+    /// Codes such as `W07`; none of what is good.
+    pub reasons: Vec<String>,
+}
+
+impl Verdict {
+    /// As severe as the most severe finding.
+    pub fn of(findings: &[Finding]) -> Self {
+        let worst = findings.iter().map(Finding::level).min();
+        let worst = worst.unwrap_or(Level::Note);
+        let word = match worst {
+            Level::Failed => Word::Failed,
+            Level::Care => Word::UseWithCare,
+            Level::Note => Word::Good,
+        };
+        let is_reason = |finding: &&Finding| finding.level() == worst && word != Word::Good;
+        let mut reasons: Vec<String> = Vec::new();
+        for finding in findings.iter().filter(is_reason) {
+            if !reasons.contains(&finding.code) {
+                reasons.push(finding.code.clone());
+            }
+        }
+        Self { word, reasons }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::kind::Kind;
+    use super::*;
+
+    #[test]
+    fn the_most_severe_findings_are_the_reasons() {
+        let of = |kinds: &[Kind]| {
+            let finding = |&kind: &Kind| Finding::new(kind, String::new(), serde_json::Value::Null);
+            Verdict::of(&kinds.iter().map(finding).collect::<Vec<_>>())
+        };
+        assert_eq!(of(&[]).word, Word::Good);
+        assert_eq!(of(&[Kind::Recording, Kind::Outliers]), of(&[]));
+        let care = of(&[
+            Kind::Recording,
+            Kind::NoiseLearnt,
+            Kind::Rounded,
+            Kind::NoiseLearnt,
+        ]);
+        assert_eq!(
+            (care.word, care.reasons.join(" ").as_str()),
+            (Word::UseWithCare, "W07 W22")
+        );
+        let failed = of(&[Kind::NoiseLearnt, Kind::NotConverged]);
+        assert_eq!(
+            (failed.word, failed.reasons.join(" ").as_str()),
+            (Word::Failed, "W02")
+        );
+        let json = serde_json::to_string(&care).unwrap();
+        assert_eq!(json, r#"{"word":"use with care","reasons":["W07","W22"]}"#);
+    }
+}

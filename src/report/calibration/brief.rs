@@ -1,0 +1,88 @@
+//! What one screen has room for: accuracy and where it comes from, the independent check, what the calibration is worth.
+
+use super::super::outlook;
+use super::report::Report;
+use super::{budget, tables};
+use crate::calibration::Estimate;
+use crate::report::prelude::*;
+
+/// Adds what one screen has room for.
+pub fn add(document: &mut Document, report: &Report) {
+    let Some(estimate) = report.estimate() else {
+        return;
+    };
+    document.brief.push(accuracy(report, estimate).into());
+    let mut facts = Facts::default();
+    for (name, value) in [
+        ("weakest", weakest(report)),
+        ("left out of the fit", tables::cross_validation(report)),
+        ("navigation", navigation(report)),
+        ("not covered", budget::unseen(report, estimate)),
+    ] {
+        if let Some(value) = value {
+            facts.push(name, value);
+        }
+    }
+    document.brief.push(facts.into());
+}
+
+/// RMS σ of each group, beside what was to be expected and what makes most of it.
+fn accuracy(report: &Report, estimate: &Estimate) -> Table {
+    let both = match report.methods()[..] {
+        [(_, closed), (_, _)] => Some(closed),
+        _ => None,
+    };
+    let truth = report.truth_vector();
+    let mut columns = vec!["Accuracy (RMS of a group)", "1σ"];
+    columns.extend(truth.map(|_| "error"));
+    columns.extend(both.map(|_| "closed form 1σ"));
+    columns.extend(report.predicted.map(|_| "predicted 1σ"));
+    columns.extend(report.budget.map(|_| "mostly from"));
+    let row = |group: Group| {
+        let with_unit = |value: Option<f64>| match value {
+            Some(value) => format!("{} {}", sigma(value), group.unit()),
+            None => NONE.to_owned(),
+        };
+        let indices = group.estimated(estimate);
+        let of =
+            |of: &Estimate| with_unit(group.spread(&of.sigma(), &group.estimated(of)).map(|x| x.1));
+        let mut row = vec![group.title(), of(estimate)];
+        row.extend(truth.as_ref().map(|truth| {
+            let error = group.spread(&(estimate.vector() - truth), &indices);
+            with_unit(error.map(|x| x.1))
+        }));
+        row.extend(both.map(of));
+        row.extend(report.predicted.map(|predicted| {
+            let of_group = predicted.sigma.iter().find(|(of, _)| *of == group);
+            with_unit(of_group.and_then(|(_, sigma)| Some((*sigma)? / group.unit_value())))
+        }));
+        let source = |of| budget::largest(of, &indices).unwrap_or(NONE.to_owned());
+        row.extend(report.budget.map(source));
+        row
+    };
+    let mut table = Table::new("", columns).section(Group::all().map(row));
+    // A narrow terminal does without the last columns.
+    table.optional = (2..table.columns.len()).collect();
+    table
+}
+
+/// The parameter of which the data left most of what was uncertain before.
+fn weakest(report: &Report) -> Option<String> {
+    let (estimate, outcome) = (report.estimate()?, report.outcome?);
+    let index = super::weakest(estimate, &outcome.prior_sigma)?;
+    let group = Group::of(index);
+    let own = sigma(estimate.sigma()[index] / group.unit_value());
+    let axis = axis_name(estimate.form(), index);
+    Some(format!(
+        "{} {axis}, ±{own} {} (1σ)",
+        group.title(),
+        group.unit()
+    ))
+}
+
+fn navigation(report: &Report) -> Option<String> {
+    match report.navigation {
+        Ok(navigated @ [_, ..]) => Some(outlook::line(navigated)),
+        _ => None,
+    }
+}

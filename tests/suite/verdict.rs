@@ -1,0 +1,121 @@
+//! What a user reads first: a verdict, on one screen, that says what to do next.
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+use crate::shared::shared;
+
+fn turncal(arguments: &[&str]) -> (i32, String, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_turncal"));
+    let output = command
+        .env("COLUMNS", "80")
+        .args(arguments)
+        .output()
+        .unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let status = output.status.code().expect("it was not killed");
+    (status, text(&output.stdout), text(&output.stderr))
+}
+
+fn simulated(scenario: &str, place: &Path) -> String {
+    let run = place.join(scenario);
+    let run = run.to_string_lossy();
+    let (status, _, message) = turncal(&["simulate", scenario, "-o", &run]);
+    assert_eq!(status, 0, "{message}");
+    format!("{run}/run.toml")
+}
+
+/// A calibration on one screen: at most 40 lines of 80 columns, the verdict in the second, the next step last.
+fn one_screen(run: &str, word: &str) {
+    let place = tempfile::tempdir().unwrap();
+    let output = place.path().join("result");
+    let (_, text, _) = turncal(&["calibrate", run, "-o", &output.to_string_lossy()]);
+    let lines: Vec<&str> = text.lines().collect();
+    let wide =
+        |line: &&&str| line.chars().count() > 80 && !line.contains(&*output.to_string_lossy());
+    assert!(lines.len() <= 40, "{} lines:\n{text}", lines.len());
+    assert_eq!(lines.iter().find(wide), None, "{text}");
+    assert!(lines[1].starts_with(word), "{text}");
+    assert!(lines.last().unwrap().contains("--verbose"), "{text}");
+    assert!(
+        text.contains("gyro scale factor K") && text.contains("calibration.json"),
+        "{text}"
+    );
+}
+
+#[test]
+fn real_records_fit_on_one_screen() {
+    for name in [
+        "real-mems-lot-0",
+        "real-mems-six-position",
+        "nineteen-position-velocity",
+    ] {
+        if let Some(directory) = shared(name) {
+            let run = directory.join("run.toml");
+            let word = if name.starts_with("real") {
+                "USE WITH CARE"
+            } else {
+                ""
+            };
+            one_screen(&run.to_string_lossy(), word);
+        }
+    }
+}
+
+#[test]
+fn a_sound_record_is_good_and_one_with_another_unit_fails_with_its_reason() {
+    let place = tempfile::tempdir().unwrap();
+    let run = simulated("demo", place.path());
+    one_screen(&run, "GOOD   24 of 24 parameters determined");
+    let verdict = |run: &str, noise: &str| {
+        let (_, json, message) = turncal(&["calibrate", run, "--json", "--noise", noise]);
+        let result: Value = serde_json::from_str(&json).unwrap_or_else(|_| panic!("{message}"));
+        result["verdict"].clone()
+    };
+    assert_eq!(
+        verdict(&run, "auto"),
+        serde_json::json!({ "word": "good", "reasons": [] })
+    );
+    let text = std::fs::read_to_string(&run).unwrap();
+    let quiet = text.replace(
+        "velocity_random_walk_ug_per_sqrt_hz = 5.0",
+        "velocity_random_walk_ug_per_sqrt_hz = 0.1",
+    );
+    assert_ne!(text, quiet);
+    std::fs::write(&run, quiet).unwrap();
+    let failed = verdict(&run, "stated");
+    assert_eq!(
+        failed,
+        serde_json::json!({ "word": "failed", "reasons": ["W03"] })
+    );
+    let care = verdict(&run, "auto");
+    assert_eq!(care["word"], "use with care");
+    assert!(
+        care["reasons"]
+            .as_array()
+            .unwrap()
+            .contains(&Value::from("W07")),
+        "{care}"
+    );
+}
+
+#[test]
+fn every_finding_is_explained() {
+    let (status, list, _) = turncal(&["explain"]);
+    assert_eq!(status, 0);
+    for line in list.lines() {
+        let code = line.split_whitespace().next().unwrap();
+        let (status, text, message) = turncal(&["explain", code]);
+        assert!(
+            status == 0 && text.starts_with(line) && text.contains("verdict"),
+            "{message}"
+        );
+    }
+    let (status, _, message) = turncal(&["explain", "W99"]);
+    assert!(
+        status == 1 && message.contains("turncal explain"),
+        "{message}"
+    );
+}
