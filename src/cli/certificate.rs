@@ -52,7 +52,7 @@ pub struct Certificate {
 impl Certificate {
     pub fn run(&self) -> anyhow::Result<()> {
         let (Some(path), Some(laboratory)) = (&self.calibration, &self.laboratory) else {
-            return print(include_bytes!("../../examples/lab.toml"));
+            return print(include_bytes!("../certificate/draft.toml"));
         };
         let read = |path: &Path| -> anyhow::Result<Vec<u8>> {
             std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))

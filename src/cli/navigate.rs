@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 use clap::ValueEnum;
 use nalgebra::Vector3;
 use turncal::attitude::from_pitch_roll_heading;
-use turncal::calibration::Named;
+use turncal::calibration::{Calibration, Named};
 use turncal::imu::Sensor;
 use turncal::models::{self, Place};
 use turncal::navigation::Solution;
@@ -46,12 +46,12 @@ pub struct Navigate {
     /// What the instrument truly is: a truth.json or another calibration
     #[arg(long, value_name = "FILE")]
     truth: PathBuf,
-    /// Latitude in degrees, north positive [default: the trajectory's]
+    /// Latitude in degrees, north positive [default: the trajectory's, else the calibration's]
     #[arg(
         long,
+        alias = "latitude",
         value_name = "L",
         allow_negative_numbers = true,
-        required_unless_present = "trajectory",
         value_parser = latitude
     )]
     latitude_deg: Option<f64>,
@@ -133,7 +133,7 @@ impl Navigate {
         if let Some(sensor) = only {
             pair = pair.with_errors_of(sensor);
         }
-        let (motion, trajectory) = self.motion()?;
+        let (motion, trajectory) = self.motion(&calibration)?;
         let mission = Mission {
             motion,
             intervals: (self.hours * HOUR / INTERVAL).round() as u32,
@@ -178,7 +178,7 @@ impl Navigate {
     }
 
     /// How the body moves, and the name of its trajectory.
-    fn motion(&self) -> anyhow::Result<(Motion, Option<String>)> {
+    fn motion(&self, calibration: &Calibration) -> anyhow::Result<(Motion, Option<String>)> {
         let latitude = self.latitude_deg.map(|latitude| latitude * DEGREE);
         if let Some(name) = &self.trajectory {
             let (mut trajectory, name) = models::trajectory(name, &Place::CommandLine)?;
@@ -190,7 +190,9 @@ impl Navigate {
             }
             return Ok((Motion::Moving(trajectory), Some(name)));
         }
-        let Some(latitude) = latitude else {
+        let of_run = calibration.provenance.as_ref();
+        let of_run = of_run.map(|of| of.latitude_deg * DEGREE);
+        let Some(latitude) = latitude.or(of_run) else {
             bail!("no latitude: give --latitude-deg, or --trajectory");
         };
         let [pitch, roll, heading] = self.attitude_deg.0.map(|angle| angle * DEGREE);

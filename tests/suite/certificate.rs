@@ -66,6 +66,26 @@ fn both_calibrations_of_the_demo_get_a_certificate_that_names_their_files() {
 }
 
 #[test]
+fn a_draft_that_nobody_completed_is_no_statement() {
+    let directory = tempfile::tempdir().unwrap();
+    let lab = directory.path().join("lab.toml");
+    let turncal = || Command::new(env!("CARGO_BIN_EXE_turncal"));
+    let draft = turncal().args(["certificate", "--draft"]).output().unwrap();
+    std::fs::write(&lab, &draft.stdout).unwrap();
+    let demo = directory.path().join("demo");
+    let demonstration = turncal().args(["demo", "-o"]).arg(&demo).output().unwrap();
+    assert!(demonstration.status.success());
+    let mut certificate = turncal();
+    certificate.arg("certificate").arg(demo.join("ekf/calibration.json"));
+    let refused = certificate.arg("--laboratory").arg(&lab).output().unwrap();
+    let message = String::from_utf8_lossy(&refused.stderr);
+    assert!(
+        refused.status.code() == Some(1) && message.contains("Complete this value"),
+        "{message}"
+    );
+}
+
+#[test]
 fn a_certificate_is_a_pdf_a_3_with_its_files_in_it_and_valid_xml() {
     let Some(shared) = shared("three-axis-counts") else {
         return;
