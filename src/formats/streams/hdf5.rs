@@ -8,7 +8,7 @@ use std::io::{self, Cursor, Read};
 
 use hdf5_pure::{
     Chunk, Dataset, Datatype, DatatypeByteOrder, Error, File, FixedPointLayout,
-    FloatingPointLayout, Group, Layout, ReadSeekSource,
+    FloatingPointLayout, FormatError, Group, Layout, ReadSeekSource,
 };
 
 use super::Log;
@@ -52,6 +52,9 @@ fn broken(error: Error) -> Broken {
     let found = match error {
         // The crate's own words advise its callers.
         Error::FileMarkedInUse { .. } => "a file that its writer has not closed".to_owned(),
+        Error::Format(FormatError::OffsetOverflow {
+            offset: u64::MAX, ..
+        }) => "an address that is not defined, as that of a soft link".to_owned(),
         error => error.to_string(),
     };
     Broken::new(0, found, "an HDF5 file of version 1.14 or before")
@@ -252,12 +255,15 @@ impl Stored {
         Ok(Box::new(rows))
     }
 
-    /// Rows of whole chunks: to read a part of one unpacks all of it.
+    /// One long row, or short ones of whole chunks: to read a part of a chunk unpacks all of it.
     fn rows_at_once(&self) -> io::Result<u64> {
+        let row = self.row.max(1);
+        if row >= AT_ONCE {
+            return Ok(1);
+        }
         let sizes = self.dataset.chunk_shape().map_err(io::Error::other)?;
         let chunk = sizes.and_then(|sizes| sizes.first().copied());
         let chunk = chunk.unwrap_or(1).max(1);
-        let row = self.row.max(1);
         let chunks = (AT_ONCE / row.saturating_mul(chunk)).max(1);
         Ok(chunk.saturating_mul(chunks).min(self.all / row + 1))
     }
