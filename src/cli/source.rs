@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use turncal::formats::Opened;
-use turncal::formats::draft::Stated;
+use turncal::formats::draft::{KalibrImu, Stated};
 use turncal::report::terminal::printable;
 
 use super::input::{latitude, positive};
@@ -30,6 +30,9 @@ pub struct OfLog {
     /// Unit of the accelerometers: m/s^2, g, count; of increments m/s, g*s
     #[arg(long, value_name = "UNIT")]
     accel_unit: Option<String>,
+    /// Noise figures and, without --rate, rows a second, as Kalibr's imu.yaml states them
+    #[arg(long, value_name = "YAML")]
+    noise_file: Option<PathBuf>,
     /// The stream that holds the instrument [default: the one with the most samples]
     #[arg(long, value_name = "NAME")]
     stream: Option<String>,
@@ -38,13 +41,19 @@ pub struct OfLog {
 impl OfLog {
     /// Reads a run, or a log with what is stated of it; what was found in a log is shown.
     pub fn open(&self, path: &Path) -> anyhow::Result<Opened> {
+        let kalibr = self
+            .noise_file
+            .as_deref()
+            .map(KalibrImu::read)
+            .transpose()?;
         let stated = Stated {
-            rate_hz: self.rate,
+            rate_hz: self.rate.or(kalibr.and_then(|imu| imu.rate_hz)),
             latitude_deg: self.latitude,
             height_m: self.height,
             gravity_m_s2: self.gravity,
             gyro_unit: self.gyro_unit.clone(),
             accel_unit: self.accel_unit.clone(),
+            noise: kalibr.map(|imu| imu.noise),
         };
         let opened = Opened::new(path, self.stream.as_deref(), &stated)?;
         show_found(path, &opened);

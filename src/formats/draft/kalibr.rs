@@ -118,6 +118,8 @@ fn missing(path: &Path, key: &str, others: &[&str]) -> FileError {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::formats::draft::{Draft, Stated};
+    use crate::run::Run;
 
     fn read(text: &str) -> Result<KalibrImu, String> {
         KalibrImu::of_text(Path::new("imu.yaml"), text).map_err(|error| error.to_string())
@@ -197,6 +199,40 @@ update_rate:                 200.0      #Hz (for discretization of the values ab
             for word in words {
                 assert!(error.contains(word), "{text:?}: {error}");
             }
+        }
+    }
+
+    #[test]
+    fn stated_noise_is_that_of_the_run() {
+        let directory = tempfile::tempdir().unwrap();
+        let log = directory.path().join("log.csv");
+        let row = |k: usize| {
+            format!(
+                "{},{},0,0,0,0,9.8\n",
+                k as f64 * 0.005,
+                (k % 2) as f64 * 1e-3
+            )
+        };
+        let rows: String = (0..400).map(row).collect();
+        std::fs::write(&log, "t,gx,gy,gz,ax,ay,az\n".to_owned() + &rows).unwrap();
+        let imu = read(FILE).unwrap();
+        let stated = Stated {
+            rate_hz: imu.rate_hz,
+            gyro_unit: Some("rad/s".to_owned()),
+            noise: Some(imu.noise),
+            ..Stated::default()
+        };
+        let draft = Draft::of_stream(&log, None, &stated)
+            .unwrap()
+            .to_toml("log.csv");
+        let run = Run::of_text(&log, &draft, None).unwrap();
+        for sensor in Sensor::ALL {
+            let (found, expected) = (run.instrument.noise.get(sensor), imu.noise.get(sensor));
+            let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-6, "{a} {b}");
+            near(found.random_walk, expected.random_walk);
+            let (found, expected) = (found.gauss_markov.unwrap(), expected.gauss_markov.unwrap());
+            near(found.sigma, expected.sigma);
+            near(found.correlation_time, expected.correlation_time);
         }
     }
 }

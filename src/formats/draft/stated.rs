@@ -1,5 +1,7 @@
 //! What a user states of a log beside it.
 
+use crate::imu::{Noise, PerSensor};
+
 /// What a user states of a log that has no `run.toml`; what is not stated is found, or wide.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Stated {
@@ -15,4 +17,6 @@ pub struct Stated {
     pub gyro_unit: Option<String>,
     /// The same of the accelerometers.
     pub accel_unit: Option<String>,
+    /// Noise in SI, such as that of [`KalibrImu`](super::KalibrImu).
+    pub noise: Option<PerSensor<Noise>>,
 }
