@@ -36,7 +36,7 @@ impl Convert {
     pub fn run(&self) -> anyhow::Result<()> {
         let directory = self.overwrite.directory(&self.output, &[&self.log])?;
         let activity = Activity::new("reading");
-        let (stream, stated) = self.of_log.stated();
+        let (stream, stated) = self.of_log.stated()?;
         let draft = Draft::of_stream(&self.log, stream, &stated)?;
         activity.next("writing");
         draft.convert(&self.log, &directory.path(), self.salvage)?;

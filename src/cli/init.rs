@@ -41,7 +41,7 @@ pub struct Init {
 impl Init {
     pub fn run(&self) -> anyhow::Result<()> {
         let activity = Activity::new("reading");
-        let (stream, stated) = self.of_log.stated();
+        let (stream, stated) = self.of_log.stated()?;
         let draft = match &self.accel {
             Some(accel) => Draft::of_two_files(&self.log, accel, &self.name(accel), &stated)?,
             None => Draft::of_stream(&self.log, stream, &stated)?,

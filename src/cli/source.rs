@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use turncal::formats::Opened;
-use turncal::formats::draft::{Found, Stated, StatedUnit};
+use turncal::formats::draft::{Found, KalibrImu, Stated, StatedUnit};
 use turncal::imu::Sensor;
 use turncal::report::terminal::printable;
 
@@ -32,6 +32,9 @@ pub struct OfLog {
     /// Unit of the accelerometers: m/s^2, g, or what one count is, such as '1/16384 g'; of increments m/s, g*s
     #[arg(long, value_name = "UNIT", value_parser = |text: &str| StatedUnit::parse(Sensor::Accel, text))]
     accel_unit: Option<StatedUnit>,
+    /// Noise figures and, without --rate, rows a second, as Kalibr's imu.yaml states them
+    #[arg(long, value_name = "YAML")]
+    noise_file: Option<PathBuf>,
     /// The stream that holds the instrument [default: the one with the most samples]
     #[arg(long, value_name = "NAME")]
     stream: Option<String>,
@@ -39,21 +42,24 @@ pub struct OfLog {
 
 impl OfLog {
     /// The name of the stream, and what is stated.
-    pub fn stated(&self) -> (Option<&str>, Stated) {
+    pub fn stated(&self) -> anyhow::Result<(Option<&str>, Stated)> {
+        let kalibr = self.noise_file.as_deref();
+        let kalibr = kalibr.map(KalibrImu::read).transpose()?;
         let stated = Stated {
-            rate_hz: self.rate,
+            rate_hz: self.rate.or(kalibr.and_then(|imu| imu.rate_hz)),
             latitude_deg: self.latitude,
             height_m: self.height,
             gravity_m_s2: self.gravity,
             gyro_unit: self.gyro_unit,
             accel_unit: self.accel_unit,
+            noise: kalibr.map(|imu| imu.noise),
         };
-        (self.stream.as_deref(), stated)
+        Ok((self.stream.as_deref(), stated))
     }
 
     /// Reads a run, or a log with what is stated of it; what was found in a log is shown.
     pub fn open(&self, path: &Path) -> anyhow::Result<Opened> {
-        let (stream, stated) = self.stated();
+        let (stream, stated) = self.stated()?;
         Ok(Opened::new(path, stream, &stated, |found| {
             show_found(path, found);
         })?)

@@ -100,6 +100,10 @@ pub fn text(document: &Document, width: Option<usize>) -> String {
         .chain(lead)
         .collect();
     let mut parts = vec![paragraphs(&lead)];
+    parts.extend(document.brief.iter().filter_map(|block| match block {
+        Block::Facts(of) => Some(facts(of, width)),
+        _ => None,
+    }));
     for (medium, block) in &document.blocks {
         if *medium == Medium::Page {
             continue;

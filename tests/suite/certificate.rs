@@ -76,7 +76,9 @@ fn a_draft_that_nobody_completed_is_no_statement() {
     let demonstration = turncal().args(["demo", "-o"]).arg(&demo).output().unwrap();
     assert!(demonstration.status.success());
     let mut certificate = turncal();
-    certificate.arg("certificate").arg(demo.join("ekf/calibration.json"));
+    certificate
+        .arg("certificate")
+        .arg(demo.join("ekf/calibration.json"));
     let refused = certificate.arg("--laboratory").arg(&lab).output().unwrap();
     let message = String::from_utf8_lossy(&refused.stderr);
     assert!(

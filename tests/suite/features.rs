@@ -16,7 +16,14 @@ fn without_default_features_no_crate_of_a_user_interface_is_compiled() {
         "signal-hook",
         "terminal_size",
     ];
-    let of_logs = ["bzip2-rs", "lz4_flex", "prost-reflect", "ruzstd", "zip"];
+    let of_logs = [
+        "bzip2-rs",
+        "hdf5-pure",
+        "lz4_flex",
+        "prost-reflect",
+        "ruzstd",
+        "zip",
+    ];
     let of_certificates = ["krilla", "ttf-parser"];
     let tree = |features: &[&str]| {
         let output = Command::new(env!("CARGO"))

@@ -81,7 +81,7 @@ fn a_sound_record_is_good_and_one_with_another_unit_fails_with_its_reason() {
     let text = std::fs::read_to_string(&run).unwrap();
     let quiet = text.replace(
         "velocity_random_walk_ug_per_sqrt_hz = 5.0",
-        "velocity_random_walk_ug_per_sqrt_hz = 0.1",
+        "velocity_random_walk_ug_per_sqrt_hz = 0.01",
     );
     assert_ne!(text, quiet);
     std::fs::write(&run, quiet).unwrap();

@@ -224,14 +224,14 @@ impl Likelihood {
 #[cfg(test)]
 mod tests {
     use rand::SeedableRng;
-    use rand::rngs::StdRng;
+    use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
 
     use super::*;
 
     /// So many errors of unit variance, and of noise of moves in the first half.
     fn errors(seed: u64, count: usize, variance: f64) -> DVector<f64> {
-        let mut rng = StdRng::seed_from_u64(seed);
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
         DVector::from_fn(count, |k, _| {
             let normal: f64 = StandardNormal.sample(&mut rng);
             let of_moves = if 2 * k < count { variance } else { 0.0 };

@@ -1,8 +1,10 @@
 //! What a user states of a log beside it.
 
+use std::collections::BTreeSet;
+
 use super::name::{self, Unit};
 use crate::formats::quantity::{OUTPUTS, Of, units};
-use crate::imu::Sensor;
+use crate::imu::{Noise, PerSensor, Sensor};
 
 /// What a user states of a log that has no `run.toml`; what is not stated is found, or wide.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -19,6 +21,8 @@ pub struct Stated {
     pub gyro_unit: Option<StatedUnit>,
     /// Unit of the accelerometers.
     pub accel_unit: Option<StatedUnit>,
+    /// Noise figures.
+    pub noise: Option<PerSensor<Noise>>,
 }
 
 /// A unit in a word of `run.toml` or as files spell it, or so many of it: `deg/s`, `1/131 deg/s`, `0.061 mg`.
@@ -38,14 +42,11 @@ impl StatedUnit {
         };
         let unit = name::unit(text).filter(is_of_it);
         unit.map(Self).ok_or_else(|| {
-            let outputs = OUTPUTS.into_iter().skip(1);
-            let mut words: Vec<_> = outputs
-                .flat_map(|(_, output)| units(sensor, output))
-                .collect();
-            words.dedup_by_key(|(word, _)| *word);
-            let mut words: Vec<&str> = words.into_iter().map(|(word, _)| word).collect();
-            words.sort_unstable();
-            words.dedup();
+            let all = OUTPUTS
+                .into_iter()
+                .flat_map(|(_, output)| units(sensor, output));
+            let words: BTreeSet<&str> = all.map(|(word, _)| word).collect();
+            let words: Vec<&str> = words.into_iter().collect();
             let example = match sensor {
                 Sensor::Gyro => "1/131 deg/s",
                 Sensor::Accel => "1/16384 g",

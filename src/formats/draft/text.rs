@@ -5,7 +5,7 @@ use std::fmt::Display;
 use super::name::axes_of_program;
 use super::units::short;
 use super::{Draft, NO_COLUMNS};
-use crate::imu::{NoiseKeys, Output, Sensor};
+use crate::imu::{Noise, NoiseKeys, Output, Sensor};
 
 /// Lines of a `run.toml`.
 #[derive(Debug, Default)]
@@ -336,6 +336,10 @@ impl Draft {
             "white noise; turncal estimates it from the record unless it is stated",
         );
         for sensor in self.present() {
+            if let Some(noise) = &self.stated.noise {
+                stated_noise(page, sensor, noise.get(sensor));
+                continue;
+            }
             let (key, unit) = NoiseKeys::of(sensor).random_walk;
             match self.white_noise(sensor) {
                 Some(walk) => page.remark(format_args!(
@@ -347,8 +351,11 @@ impl Draft {
         }
     }
 
-    /// White noise of a triad at rest, (rad/s)√s or (m/s²)√s.
+    /// White noise of a triad, stated or at rest, (rad/s)√s or (m/s²)√s.
     pub(super) fn white_noise(&self, sensor: Sensor) -> Option<f64> {
+        if let Some(noise) = &self.stated.noise {
+            return Some(noise.get(sensor).random_walk);
+        }
         let scale = self.quantities.scale(sensor)?;
         Some((*self.random_walk.get(sensor))? / scale.abs())
     }
@@ -365,6 +372,26 @@ impl Draft {
                 "With a turntable's log: [turntable] with file, columns, position_sigma_arcsec and reading_sigma_arcsec.",
             ),
         }
+    }
+}
+
+fn stated_noise(page: &mut Page, sensor: Sensor, noise: &Noise) {
+    let keys = NoiseKeys::of(sensor);
+    let mut line = |key, value, why| page.line(key, format_args!("{:?}", seven(value)), why);
+    let (key, unit) = keys.random_walk;
+    line(key, noise.random_walk / unit, "as stated");
+    if let Some(bias) = noise.gauss_markov {
+        let (key, unit) = keys.gauss_markov;
+        line(
+            key,
+            bias.sigma / unit,
+            "grows at first as the stated random walk",
+        );
+        line(
+            keys.correlation_time,
+            bias.correlation_time,
+            "chosen, because a random walk has none",
+        );
     }
 }
 

@@ -3,8 +3,8 @@
 use std::io::{self, Read, Seek, SeekFrom};
 
 /// What a log's bytes come from.
-pub trait Source: Read + Seek {}
-impl<T: Read + Seek> Source for T {}
+pub trait Source: Read + Seek + Send {}
+impl<T: Read + Seek + Send> Source for T {}
 
 /// Why a file cannot be read on, and where.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -44,7 +44,7 @@ impl Input {
     }
 
     /// The file itself, at any place.
-    #[cfg_attr(not(feature = "npy"), allow(dead_code))]
+    #[cfg_attr(not(any(feature = "hdf5", feature = "npy")), allow(dead_code))]
     pub fn into_source(self) -> Box<dyn Source> {
         self.source
     }

@@ -44,8 +44,8 @@ pub fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
     if version != 0x0100 {
         return Err(Broken::new(
             124,
-            format_args!("a MAT file of version {version:04x}, HDF5 if it is 0200"),
-            "version 5: save it with -v7",
+            format_args!("a MAT file of version {version:04x} that begins like one of version 5"),
+            "0100: save it with -v7",
         ));
     }
     let mut arrays = Vec::new();

@@ -2,7 +2,7 @@
 //!
 //! A format is told by the file's first bytes, never by its name. Each is a feature of the crate.
 
-#[cfg(any(feature = "mat", feature = "npy"))]
+#[cfg(any(feature = "hdf5", feature = "mat", feature = "npy"))]
 mod arrays;
 // A build that reads no logs only tells what they are.
 #[cfg_attr(not(feature = "logs"), allow(dead_code))]
@@ -11,6 +11,8 @@ mod bytes;
 mod corrections;
 #[cfg(feature = "dataflash")]
 mod dataflash;
+#[cfg(feature = "hdf5")]
+mod hdf5;
 #[cfg(feature = "mat")]
 mod mat;
 #[cfg(feature = "mcap")]
@@ -110,7 +112,7 @@ macro_rules! reader {
     }};
 }
 
-fn formats() -> [Format; 8] {
+fn formats() -> [Format; 9] {
     [
         Format {
             name: "a PX4 ULog file",
@@ -127,8 +129,14 @@ fn formats() -> [Format; 8] {
         Format {
             name: "a MAT file",
             feature: "mat",
-            begins: &[b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"],
+            begins: &[b"MATLAB 5.0 MAT-file"],
             open: reader!("mat", mat::open),
+        },
+        Format {
+            name: "an HDF5 file, as MAT files of version 7.3 are",
+            feature: "hdf5",
+            begins: &[b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3 MAT-file"],
+            open: reader!("hdf5", hdf5::open),
         },
         Format {
             name: "an MCAP file",
@@ -164,16 +172,11 @@ fn formats() -> [Format; 8] {
 }
 
 /// What files begin with that turncal does not read, what they are, and what to do.
-const CLOSED: [(&[u8], &str, &str); 3] = [
+const CLOSED: [(&[u8], &str, &str); 2] = [
     (
         b"PAR1",
         "a Parquet file",
         "Save it as CSV, in Python by pandas.read_parquet(file).to_csv('imu.csv', index=False).",
-    ),
-    (
-        b"\x89HDF\r\n\x1a\n",
-        "an HDF5 file",
-        "Save its arrays in Python by numpy.savez, or as CSV.",
     ),
     (
         b"\xd0\xcf\x11\xe0",
@@ -237,7 +240,11 @@ impl Format {
 impl Broken {
     /// As the error of a file.
     fn of(&self, file: &Path, advice: &str) -> FileError {
-        let place = Place::Byte(self.offset);
+        // Zero where the format does not tell the place.
+        let place = match self.offset {
+            0 => Place::File,
+            offset => Place::Byte(offset),
+        };
         FileError::new(file, place, &self.found, &self.expected, advice)
     }
 }

@@ -69,9 +69,12 @@ fn accuracy(report: &Report, estimate: &Estimate) -> Table {
 /// The parameter of which the data left most of what was uncertain before.
 fn weakest(report: &Report) -> Option<String> {
     let (estimate, outcome) = (report.estimate()?, report.outcome?);
-    let index = super::weakest(estimate, &outcome.prior_sigma)?;
+    let (sigma_of, prior) = (estimate.sigma(), &outcome.prior_sigma);
+    let left = |i: &usize| sigma_of[*i] / prior[*i];
+    let known = estimate.estimated().filter(|i| left(i).is_finite());
+    let index = known.max_by(|a, b| left(a).total_cmp(&left(b)))?;
     let group = Group::of(index);
-    let own = sigma(estimate.sigma()[index] / group.unit_value());
+    let own = sigma(sigma_of[index] / group.unit_value());
     let axis = axis_name(estimate.form(), index);
     Some(format!(
         "{} {axis}, ±{own} {} (1σ)",

@@ -9,7 +9,7 @@ mod temperature;
 #[cfg(test)]
 mod tests;
 
-use crate::calibration::{Estimate, Finding, ParameterVector, Verdict, Word};
+use crate::calibration::{Finding, Verdict, Word};
 use crate::imu::{Noise, Sensor};
 use crate::report::prelude::*;
 use crate::report::{outlook, terms};
@@ -127,14 +127,6 @@ impl Report<'_> {
         };
         Some((word, format!("{of_it}, {findings}")))
     }
-}
-
-/// The parameter of which the data left most of what was uncertain before.
-fn weakest(estimate: &Estimate, prior: &ParameterVector) -> Option<usize> {
-    let sigma = estimate.sigma();
-    let left = |i: &usize| sigma[*i] / prior[*i];
-    let known = estimate.estimated().filter(|i| left(i).is_finite());
-    known.max_by(|a, b| left(a).total_cmp(&left(b)))
 }
 
 /// What was calibrated, by what its run says of it.

@@ -11,7 +11,7 @@ pub fn data(lot: &Lot) -> Value {
         "format": "turncal-lot/1",
         "body_frame": lot.body_frame,
         "nominal_scale": { "gyro": lot.nominal.gyro.0.as_slice(), "accel": lot.nominal.accel.0.as_slice() },
-        "verdict": super::verdict(lot).map(|(word, _)| json!({ "word": word, "reasons": reasons(lot) })),
+        "verdict": super::verdict::of(lot).map(|(word, _)| json!({ "word": word, "reasons": reasons(lot) })),
         "false_alarm": FALSE_ALARM,
         "false_trend": FALSE_TREND,
         "confidence": lot.specification.as_ref().map(|s| s.confidence),

@@ -6,12 +6,12 @@ mod shown;
 mod tables;
 #[cfg(test)]
 mod tests;
+mod verdict;
 
 use std::collections::BTreeMap;
 
 use shown::{change, title};
 
-use crate::calibration::Word;
 use crate::imu::AXES;
 use crate::lot::{FALSE_ALARM, FALSE_TREND, Lot, Row, Verdict};
 use crate::report::prelude::*;
@@ -23,7 +23,7 @@ pub fn document(lot: &Lot) -> Document {
         [row] => row.unit.name.clone(),
         _ => format!("Lot of {} units", count(units)),
     });
-    document.verdict = verdict(lot);
+    document.verdict = verdict::of(lot);
     document.lead = vec![format!(
         "General form, body frame: {}. Scale factors are departures from the lot's nominal ones. Every σ is 1σ.",
         lot.body_frame.words()
@@ -45,27 +45,6 @@ pub fn document(lot: &Lot) -> Document {
     document.data = data::data(lot);
     document.files = vec![("lot.csv".to_owned(), data::csv(lot))];
     document
-}
-
-/// Of all limits of all units, how many are exceeded, kept or neither for certain.
-pub fn verdict(lot: &Lot) -> Option<(Word, String)> {
-    let specification = lot.specification.as_ref()?;
-    let all: Vec<Verdict> = { lot.rows.iter() }
-        .flat_map(|row| row.checks.iter().map(|check| check.verdict))
-        .collect();
-    let of = |verdict| all.iter().filter(|of| **of == verdict).count();
-    let [passed, open, failed] = [Verdict::Pass, Verdict::NotDecided, Verdict::Fail].map(of);
-    let word = match (failed, open + lot.failures().count()) {
-        (0, 0) => Word::Pass,
-        (0, _) => Word::Undecided,
-        _ => Word::Fail,
-    };
-    let percent = 100.0 * specification.confidence;
-    let words = format!(
-        "{failed} of {} limits exceeded, {passed} kept, {open} undecided ({percent} % each)",
-        all.len()
-    );
-    Some((word, words))
 }
 
 fn facts(lot: &Lot) -> Facts {

@@ -43,7 +43,9 @@ fn as_they_are(rows: Vec<String>) -> Vec<String> {
 }
 
 fn says(run: &Run, words: &str) -> bool {
-    run.recording.notes.iter().any(|note| note.contains(words))
+    let recording = &run.recording;
+    let mut all = recording.doubts.iter().chain(&recording.notes);
+    all.any(|note| note.contains(words))
 }
 
 #[test]
@@ -60,7 +62,7 @@ fn gravity_that_no_place_has_is_said() {
             says(&run, "normal gravity"),
             said,
             "{:?}",
-            run.recording.notes
+            run.recording.doubts
         );
     }
 }
@@ -80,7 +82,7 @@ fn a_table_log_that_does_not_reach_over_the_record_is_said() {
         };
         let run = reread(cut, as_they_are);
         let said = says(&run, "The rest of the IMU log cannot be used");
-        assert_eq!(said, words.is_some(), "{:?}", run.recording.notes);
+        assert_eq!(said, words.is_some(), "{:?}", run.recording.doubts);
         assert!(words.is_none_or(|words| says(&run, words)));
     }
 }
@@ -177,7 +179,7 @@ fn rows_lost_behind_a_counter_that_wraps_are_not_counted_in_silence() {
         let run = read(&place);
         assert_eq!(run.recording.imu.len(), 300);
         let words = "the counter wraps every 256 samples, 2 s";
-        assert_eq!(says(&run, words), said, "{:?}", run.recording.notes);
+        assert_eq!(says(&run, words), said, "{:?}", run.recording.doubts);
     }
 }
 

@@ -10,12 +10,14 @@ use turncal::run::Run;
 
 use crate::shared::{read, shared, skipped};
 
-const FORMATS: [&str; 15] = [
+const FORMATS: [&str; 17] = [
     "npz",
     "deflated.npz",
     "npy",
     "mat",
     "plain.mat",
+    "v73.mat",
+    "h5",
     "mcap",
     "lz4.mcap",
     "plain.mcap",
@@ -128,7 +130,7 @@ fn every_format_gives_the_samples_of_the_text() {
 }
 
 #[test]
-#[ignore = "16 calibrations"]
+#[ignore = "18 calibrations"]
 fn every_format_gives_the_calibration_of_the_text() {
     let Some(record) = shared("real-mems-lot-0") else {
         return;

@@ -45,6 +45,29 @@ def mat_plain(path, time, accel, gyro):
     savemat(path, {"t": time, "gyro": gyro.T, "acc": accel.T})
 
 
+def mat_of_hdf5(path, time, accel, gyro):
+    import h5py
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        imu = file.create_group("imu")
+        for name, columns in (("t", time), ("gyro", gyro), ("acc", accel)):
+            # MATLAB's first dimension is HDF5's last.
+            imu.create_dataset(name, data=np.atleast_2d(columns.T), compression="gzip")
+            imu[name].attrs["MATLAB_class"] = np.bytes_("double")
+    with open(path, "r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file".ljust(116) + bytes(8) + b"\x00\x02IM")
+
+
+def hdf5(path, time, accel, gyro):
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        chunks = {"compression": "gzip", "shuffle": True, "fletcher32": True}
+        file.create_dataset("imu/t", data=time)
+        file.create_dataset("imu/gyro", data=gyro, chunks=(1000, 3), **chunks)
+        file.create_dataset("imu/acc", data=accel.T, chunks=(2, 1000), **chunks)
+
+
 IMU_DEFINITION = """std_msgs/Header header
 geometry_msgs/Quaternion orientation
 float64[9] orientation_covariance
@@ -235,6 +258,8 @@ FORMATS = {
     "npy": (npy, "s"),
     "mat": (mat, "s"),
     "plain.mat": (mat_plain, "s"),
+    "v73.mat": (mat_of_hdf5, "s"),
+    "h5": (hdf5, "s"),
     "mcap": (mcap_ros2, "ns"),
     "lz4.mcap": (mcap_lz4, "ns"),
     "plain.mcap": (mcap_plain, "ns"),

@@ -1,5 +1,6 @@
 //! What small files of every format give, whole, cut and damaged.
 
+mod mat_7_3;
 mod ulog;
 mod write;
 
@@ -43,6 +44,15 @@ fn fixtures() -> Vec<Fixture> {
         "imu.acc[1]",
         "imu.acc[2]",
     ];
+    let of_group = [
+        "imu/t",
+        "imu/gyro[0]",
+        "imu/gyro[1]",
+        "imu/gyro[2]",
+        "imu/acc[0]",
+        "imu/acc[1]",
+        "imu/acc[2]",
+    ];
     let mut json = ros("stamp");
     json[4..].copy_from_slice(&[
         "linear_acceleration[0]",
@@ -76,6 +86,14 @@ fn fixtures() -> Vec<Fixture> {
         ("t", write::npz(true), arrays, none),
         ("imu.t", write::mat(false), of_struct, none),
         ("imu.t", write::mat(true), of_struct, none),
+        ("imu.t", write::mat_of_hdf5(), of_struct, none),
+        ("imu/t", write::hdf5(), of_group, none),
+        (
+            "imu/acc",
+            include_bytes!("h5py.h5").to_vec(),
+            of_group,
+            none,
+        ),
         ("/imu", write::bag(false), ros("header.stamp"), none),
         ("/imu", write::bag(true), ros("header.stamp"), none),
         (
@@ -281,6 +299,13 @@ fn endure(seeds: &[Vec<u8>], count: u64, seed: u64) {
 fn damaged_files_of_every_format_end_without_a_panic() {
     let seeds: Vec<Vec<u8>> = fixtures().into_iter().map(|fixture| fixture.1).collect();
     endure(&seeds, 2_000, 1);
+}
+
+/// The format is read by a crate, whose word is not enough.
+#[test]
+fn damaged_hdf5_files_end_without_a_panic() {
+    let h5py = include_bytes!("h5py.h5").to_vec();
+    endure(&[write::hdf5(), write::mat_of_hdf5(), h5py], 5_000, 3);
 }
 
 #[test]

@@ -4,6 +4,8 @@ use std::io::Write;
 
 use flate2::Compression;
 use flate2::write::{DeflateEncoder, ZlibEncoder};
+use hdf5_pure::FileBuilder;
+use hdf5_pure::mat::{MatBuilder, MatClass, Options, StructWriter};
 
 /// Samples of each fixture.
 pub const SAMPLES: usize = 40;
@@ -95,6 +97,53 @@ pub fn npy_of_fields() -> Vec<u8> {
         descr,
         &(0..SAMPLES).flat_map(row).collect::<Vec<u8>>(),
     )
+}
+
+/// Gyros a row a sample, accelerometers a row an axis in big-endian order, both in chunks.
+pub fn hdf5() -> Vec<u8> {
+    let rows = SAMPLES as u64;
+    let column = |k: usize| (0..SAMPLES).map(move |row| sample(row)[k]);
+    let time: Vec<f64> = column(0).collect();
+    let gyro: Vec<f64> = (0..SAMPLES)
+        .flat_map(|k| sample(k)[1..4].to_vec())
+        .collect();
+    let accel: Vec<f32> = (4..7).flat_map(column).map(|value| value as f32).collect();
+    let mut file = FileBuilder::new();
+    let mut imu = file.create_group("imu");
+    imu.create_dataset("t").with_f64_data(&time);
+    imu.create_dataset("gyro")
+        .with_f64_data(&gyro)
+        .with_shape(&[rows, 3])
+        .with_chunks(&[16, 3])
+        .with_shuffle()
+        .with_deflate(6)
+        .with_fletcher32();
+    imu.create_dataset("acc")
+        .with_f32_data(&accel)
+        .with_shape(&[3, rows])
+        .with_chunks(&[2, 16])
+        .with_deflate(6);
+    file.add_group(imu.finish());
+    file.finish().unwrap()
+}
+
+/// A structure, text, a number and an empty array.
+pub fn mat_of_hdf5() -> Vec<u8> {
+    let column = |k: usize| (0..SAMPLES).map(move |row| sample(row)[k]);
+    let values = |from: usize| (from..from + 3).flat_map(column).collect::<Vec<f64>>();
+    let mut file = MatBuilder::new(Options::default());
+    let imu = |of: &mut StructWriter| {
+        of.write_f64("t", &[SAMPLES, 1], &column(0).collect::<Vec<f64>>())?;
+        of.write_f64("gyro", &[SAMPLES, 3], &values(1))?;
+        of.write_f64("acc", &[SAMPLES, 3], &values(4))?;
+        Ok(())
+    };
+    file.struct_("imu", imu).unwrap();
+    file.write_char("label", "forty letters forty letters forty letter")
+        .unwrap();
+    file.write_scalar_f64("count", 40.0).unwrap();
+    file.write_empty("none", MatClass::Double, &[0, 0]).unwrap();
+    file.finish().unwrap()
 }
 
 /// Of one array of a row a sample, and one of a column.
