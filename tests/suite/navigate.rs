@@ -183,7 +183,7 @@ fn what_cannot_be_navigated_is_refused_and_says_why() {
     for (options, code, says) in [
         (&["--latitude-deg", "90"][..], 1, "pole"),
         (&["--latitude-deg", "91"], 2, "-90 to 90"),
-        (&[], 2, "--latitude-deg"),
+        (&[], 1, "--latitude-deg"),
         (
             &["--latitude-deg", "5", "--attitude-deg", "1,2"],
             2,
