@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
+use crate::calibration::FindingKind as Kind;
 use crate::calibration::checks::dwell_scatter::DwellScores;
 use crate::calibration::checks::innovation::consistency;
-use crate::calibration::checks::kind::Kind;
 use crate::calibration::estimate::largest_growth;
 use crate::calibration::linearisation::{UNKNOWN_HEADING, not_invertible};
 use crate::calibration::{

@@ -204,14 +204,12 @@ impl Calibrate {
             Method::Ekf => format!("{name}-calibration"),
             Method::SixPosition => format!("{name}-calibration-six-position"),
         });
-        let directory = target
-            .as_deref()
-            .map(|target| {
-                let truth = self.truth.as_deref();
-                let inputs: Vec<&Path> = std::iter::once(path).chain(truth).collect();
-                self.overwrite.directory(target, &inputs)
-            })
-            .transpose()?;
+        let inputs: Vec<&Path> = { [Some(path), self.truth.as_deref()].into_iter() }
+            .flatten()
+            .collect();
+        let directory = target.as_deref();
+        let directory = directory.map(|target| self.overwrite.directory(target, &inputs));
+        let directory = directory.transpose()?;
 
         // What was found in the files may be why.
         let mut solution = solve(problem, self.estimation.method.into(), &activity)

@@ -63,7 +63,7 @@ fn of_finding(finding: &Finding) -> Markup {
         details {
             summary {
                 code { (finding.code) } " " (what)
-                @if let Some(next) = next { br; span.next { "→ " (next) } }
+                @if let Some(next) = next { span.next { "→ " (next) } }
             }
             p { (finding) }
             @if let Some(explanation) = explanation { p.note { (explanation) } }

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::finding::widened_by;
-use super::kind::Kind;
+use crate::calibration::FindingKind as Kind;
 use crate::calibration::{Finding, Posterior, Prior, Reduction, mean_square_interval};
 use crate::statistics::FALSE_ALARM;
 

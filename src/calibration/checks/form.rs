@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::kind::Kind;
+use crate::calibration::FindingKind as Kind;
 use crate::calibration::{
     AttitudePrior, CalibrationError, Finding, Iterated, Linearisation, Prior, Problem, Script,
     in_general_form,

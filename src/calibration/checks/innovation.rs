@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::kind::Kind;
 use crate::calibration::Finding;
+use crate::calibration::FindingKind as Kind;
 use crate::statistics::FALSE_ALARM;
 
 /// What was observed.

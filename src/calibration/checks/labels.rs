@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use super::kind::Kind;
 use crate::calibration::Finding;
+use crate::calibration::FindingKind as Kind;
 use crate::run::motion::LabelCheck;
 
 /// Sections whose labels the record contradicts, if there are any.

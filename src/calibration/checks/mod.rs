@@ -7,7 +7,6 @@ pub mod error_term_test;
 pub mod finding;
 pub mod form;
 pub mod innovation;
-pub mod kind;
 pub mod labels;
 pub mod observability;
 pub mod prior_distance;
@@ -17,7 +16,6 @@ pub mod residuals;
 pub mod rest_scatter;
 pub mod rounding;
 pub mod unexplained;
-pub mod verdict;
 
 use crate::calibration::{BudgetSource, Outcome, Problem};
 use cause::{FoundCause, settling};

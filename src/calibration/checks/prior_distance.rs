@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 
-use super::kind::Kind;
+use crate::calibration::FindingKind as Kind;
 use crate::calibration::{
     Estimate, Finding, Model, ParameterMatrix, from_vector, parameter, parameter_name,
     sensor_and_parameter,

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use super::kind::Kind;
 use crate::calibration::Finding;
+use crate::calibration::FindingKind as Kind;
 
 /// By how much recordings differ in a group of parameters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

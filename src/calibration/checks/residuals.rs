@@ -4,8 +4,8 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde_json::json;
 
 use super::finding::widened_by;
-use super::kind::Kind;
 use crate::calibration::Finding;
+use crate::calibration::FindingKind as Kind;
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 use crate::units::ARCSEC;
 

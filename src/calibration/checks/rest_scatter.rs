@@ -4,7 +4,7 @@ use nalgebra::Matrix3;
 use serde_json::json;
 
 use super::finding::triad_name;
-use super::kind::Kind;
+use crate::calibration::FindingKind as Kind;
 use crate::calibration::record::schedule::step_length;
 use crate::calibration::{Finding, Problem, mean_square_interval};
 use crate::imu::{AXES, NoiseKeys, PerSensor, Sensor, Triad};

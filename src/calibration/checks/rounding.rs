@@ -12,7 +12,7 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 use serde_json::json;
 
 use super::finding::{triad_name, widened_by};
-use super::kind::Kind;
+use crate::calibration::FindingKind as Kind;
 use crate::calibration::estimate::largest_growth;
 use crate::calibration::{Finding, ParameterMatrix, Problem, parameter};
 use crate::imu::{Output, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector};

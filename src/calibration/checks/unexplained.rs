@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use super::kind::Kind;
+use crate::calibration::FindingKind as Kind;
 use crate::calibration::noise::LOG_SIGMA;
 use crate::calibration::{Finding, Innovation, Nis, Outcome};
 use crate::statistics::chi_square_limit;

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::policy::NoisePolicy;
 use super::source::Source;
-use crate::calibration::checks::kind::Kind;
+use crate::calibration::FindingKind as Kind;
 use crate::calibration::{Finding, Problem};
 use crate::number::three_digits;
 

@@ -8,7 +8,7 @@ use super::gravity::AtRest;
 use super::labels::{Section, Used};
 use super::positions::{Observed, Position};
 use super::{labels, table};
-use crate::calibration::checks::kind::Kind;
+use crate::calibration::FindingKind as Kind;
 use crate::calibration::checks::observability::not_observed;
 use crate::calibration::checks::prior_distance::far_by_data;
 use crate::calibration::checks::rest_scatter::scatter_at_rest;

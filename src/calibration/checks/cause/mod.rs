@@ -11,7 +11,7 @@ pub mod settling;
 use nalgebra::Vector3;
 use serde_json::json;
 
-use crate::calibration::checks::kind::Kind;
+use crate::calibration::FindingKind as Kind;
 use crate::calibration::{
     AttitudePrior, CalibrationError, Constant, Disturbance, DisturbanceKind, ErrorTerm, Finding,
     Innovation, Iterated, Observation, Prior, Problem, Script,

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde_json::json;
 
-use crate::calibration::checks::kind::Kind;
+use crate::calibration::FindingKind as Kind;
 use crate::calibration::record::Rest;
 use crate::calibration::{
     CalibrationError, Finding, Observation, Problem, Script, Solved, Stretch,

@@ -3,8 +3,8 @@
 use rayon::prelude::*;
 use serde_json::json;
 
+use crate::calibration::FindingKind as Kind;
 use crate::calibration::checks::finding::widened_by;
-use crate::calibration::checks::kind::Kind;
 use crate::calibration::model::usual_variation;
 use crate::calibration::noise::LOG_SIGMA;
 use crate::calibration::{

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::finding::widened_by;
-use crate::calibration::checks::kind::Kind;
+use crate::calibration::FindingKind as Kind;
 use crate::calibration::{
     CalibrationError, ErrorTerm, Finding, Group, Outcome, PARAMETERS, ParameterMatrix, Posterior,
     Problem,

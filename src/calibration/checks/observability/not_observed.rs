@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use crate::calibration::checks::kind::Kind;
+use crate::calibration::FindingKind as Kind;
 use crate::calibration::{Finding, Outcome, auxiliary_name, parameter_name};
 use crate::units::DEGREE;
 

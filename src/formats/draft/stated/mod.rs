@@ -1,6 +1,10 @@
 //! What a user states of a log beside it.
 
+mod kalibr;
+
 use std::collections::BTreeSet;
+
+pub use kalibr::KalibrImu;
 
 use super::name::{self, Unit};
 use crate::formats::quantity::{OUTPUTS, Of, units};

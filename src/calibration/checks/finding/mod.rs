@@ -1,12 +1,15 @@
 //! What a calibration engineer must know before using the figures.
 
+pub mod kind;
+pub mod verdict;
+
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::kind::{Kind, Level};
 use crate::imu::Sensor;
+use kind::{Kind, Level};
 
 /// What a check found: what is wrong, what it means for the result and what to do, with its figures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::finding::Finding;
+use super::Finding;
 use super::kind::Level;
 
 /// Whether a calibration may be used.
