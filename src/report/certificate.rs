@@ -53,6 +53,9 @@ pub fn files(
     ])
 }
 
+/// Length of the line for a signature.
+const SIGNATURE: usize = 40;
+
 fn frame(certificate: &Certificate) -> Frame {
     let laboratory = &certificate.laboratory;
     let number = &laboratory.number;
@@ -98,8 +101,6 @@ pub fn document(certificate: &Certificate) -> Document {
         format!("{performed}, {}", laboratory.place.words()),
     );
     general.push("issued", laboratory.issued.to_string());
-    let (name, function) = &laboratory.authorised;
-    general.push("authorised by", format!("{name}, {function}"));
     document.page(general);
     if let Some(conformity) = &certificate.conformity {
         document.page(Block::Text("Conformity".to_owned(), verdict(conformity)));
@@ -114,6 +115,7 @@ pub fn document(certificate: &Certificate) -> Document {
         document.page(found(as_found));
     }
     document.page(traceability(certificate));
+    document.page(signature(certificate));
     document.page(remarks(certificate));
     document
 }
@@ -326,6 +328,14 @@ fn found(as_found: &AsFound) -> Table {
         as_found.earlier,
         as_found.body_frame.words()
     ))
+}
+
+/// Who authorises the certificate, with room for date and signature.
+fn signature(certificate: &Certificate) -> Facts {
+    let (name, function) = &certificate.laboratory.authorised;
+    let mut facts = Facts::new("Authorisation", [("name", format!("{name}, {function}"))]);
+    facts.push("date, signature", "_".repeat(SIGNATURE));
+    facts
 }
 
 fn traceability(certificate: &Certificate) -> Facts {

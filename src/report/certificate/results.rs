@@ -5,12 +5,17 @@ use crate::certificate::{Certificate, Measured, Quantity, to_twelve_digits};
 use crate::imu::{Sensor, Term};
 use crate::report::prelude::*;
 
-/// A parameter's name with the model's letter.
+/// A parameter in words, such as `gyroscope scale factor x`.
 pub fn name(measured: &str) -> String {
-    measured
-        .replace("installation", "E")
-        .replace("scale", "K")
-        .replace("bias", "D")
+    let words = [
+        ("gyro.", "gyroscope "),
+        ("accel.", "accelerometer "),
+        ("scale.", "scale factor "),
+        ("installation.", "misalignment "),
+    ];
+    let named = |name: String, (key, word): (&str, &str)| name.replace(key, word);
+    let name = words.into_iter().fold(measured.to_owned(), named);
+    name.replace(['.', '_'], " ")
 }
 
 /// Every parameter with its expanded uncertainty, and what both are.
@@ -26,8 +31,7 @@ pub fn results(certificate: &Certificate) -> Table {
         let expanded = of.expanded / size;
         cells![
             name(&of.name),
-            value(of.value / size, expanded),
-            sigma(expanded),
+            format!("{} ± {}", value(of.value / size, expanded), sigma(expanded)),
             unit,
             value(of.coverage_factor, 0.1),
             of.degrees_of_freedom.map_or(infinite.to_owned(), sigma),
@@ -49,19 +53,19 @@ pub fn results(certificate: &Certificate) -> Table {
         true => ", their uncertainty budget in calibration.json",
         false => "",
     };
-    let table = Table::new("Results", columns("parameter | value | U | unit | k | ν"))
+    let table = Table::new("Results", columns("parameter | value ± U | unit | k | ν"))
         .sections(groups)
         .sections(terms)
         .note(format!(
-            "K: scale factors, departure from nominal: gyros {}; accelerometers {}. E: entries of the installation \
-             matrix in row and column. D: biases.",
+            "Scale factor: departure from nominal, for the gyroscopes {}; for the accelerometers {}. Misalignment: entries \
+             of the installation matrix by row and column.",
             nominal(certificate, Sensor::Gyro, "rad/s"),
             nominal(certificate, Sensor::Accel, "m/s²"),
         ))
         .note(format!(
             "U: expanded uncertainty, the standard uncertainty times the coverage factor k for a coverage probability \
              of 95.45 % (JCGM 100); ν: effective degrees of freedom, – where not evaluated. Results are correlated: the covariance matrix of \
-             K, E and D is in both attached files{budget}.",
+             the scale factors, misalignments and biases is in both attached files{budget}.",
         ));
     match certificate.terms.is_empty() {
         true => table,
