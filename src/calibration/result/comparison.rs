@@ -24,6 +24,8 @@ pub struct Comparison {
     pub body_frame: BodyFrame,
     /// The reference's scale factors in the file's quantity, by which all are normalised.
     pub nominal: PerSensor<Nominal>,
+    /// The scale factors that the instrument should have, in the file's quantity, where a record states them.
+    pub stated_nominal: Option<PerSensor<[f64; 3]>>,
     /// The truth, or the first calibration.
     pub reference: Canonical,
     /// Whether the reference is a truth, taken as exact except for the σ that it may state.
@@ -48,6 +50,14 @@ impl Comparison {
         let (sensor, of_triad) = sensor_and_parameter(parameter);
         (Triad::kind(of_triad) == ParameterKind::Scale)
             .then(|| self.nominal.get(sensor).factor(of_triad))
+    }
+
+    /// The departure of the reference's scale factor from what it should be; none for other parameters, or where nothing
+    /// states that.
+    pub fn departure(&self, parameter: usize) -> Option<f64> {
+        let (sensor, axis) = sensor_and_parameter(parameter);
+        let nominal = self.stated_nominal.as_ref()?.get(sensor).get(axis)?;
+        Some(self.scale_factor(parameter)? / nominal - 1.0)
     }
 }
 
@@ -114,6 +124,10 @@ pub fn compare(
         false => BodyFrame::Table,
     };
     let nominal = own_nominal(first.record);
+    let provenance = all
+        .iter()
+        .find_map(|named| named.record.provenance.as_ref());
+    let stated_nominal = provenance.map(|of| of.nominal);
     let canonical = |n: &Named| Canonical::new(n.name, n.record, &nominal, body_frame);
     let mut all: Vec<Canonical> = all.iter().map(canonical).collect::<Result<_, _>>()?;
     let parameters = free_parameters(body_frame);
@@ -130,6 +144,7 @@ pub fn compare(
     Ok(Comparison {
         body_frame,
         nominal,
+        stated_nominal,
         against_truth: truth.is_some(),
         sides: sides.collect(),
         scatter,

@@ -97,13 +97,18 @@ fn parameters(comparison: &Comparison) -> Table {
     let table = Table::new("Parameters", beside_reference(comparison))
         .sections(sections)
         .note("Calibrations: difference to the reference ± the 1σ that the calibration claims.")
-        .note("K of the reference is in the file's quantity.")
         .note(format!(
             "z: difference in σ of the difference, ! beyond {FLAGGED}."
         ));
+    let table = match comparison.stated_nominal {
+        Some(_) => table,
+        None => table.note(
+            "K of the reference is in the file's quantity: no file states nominal scale factors.",
+        ),
+    };
     match comparison.against_truth {
         true => table,
-        false => table.note("z and NEES hold if the calibrations come of different data."),
+        false => table.note("z and NEES are valid only if the calibrations use different data."),
     }
 }
 
@@ -117,12 +122,14 @@ fn finest(comparison: &Comparison, indices: &[usize]) -> Option<f64> {
         .reduce(f64::min)
 }
 
-/// The reference's own value; scale factors in the file's quantity.
+/// The reference's own value; scale factors in the file's quantity where nothing states what they should be.
 fn reference_value(comparison: &Comparison, index: usize) -> String {
     let own = comparison.reference.sigma().map(|s| s[index]);
-    let (size, unit) = match comparison.scale_factor(index) {
-        Some(nominal) => (nominal, 1.0 / nominal.abs()),
-        None => {
+    let (departure, scale) = (comparison.departure(index), comparison.scale_factor(index));
+    let (size, unit) = match (departure, scale) {
+        (Some(departure), _) => (departure / PPM, PPM),
+        (None, Some(scale)) => (scale, 1.0 / scale.abs()),
+        (None, None) => {
             let unit = Group::of(index).unit_value();
             (comparison.reference.vector()[index] / unit, unit)
         }
