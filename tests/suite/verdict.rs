@@ -114,3 +114,42 @@ fn every_finding_is_explained() {
         "{message}"
     );
 }
+
+#[test]
+fn a_specification_that_is_not_met_is_status_three_with_the_limits_that_fail() {
+    let place = tempfile::tempdir().unwrap();
+    let run = simulated("demo", place.path());
+    let specification = place.path().join("specification.toml");
+    let specification = specification.to_string_lossy();
+    let status_with = |misalignment: &str| {
+        let text = format!(
+            "format = \"turncal-specification/1\"\nconfidence = 0.95\n[gyro]\ninstallation_arcsec = {misalignment}\n"
+        );
+        std::fs::write(&*specification, text).unwrap();
+        let (status, json, message) = turncal(&[
+            "calibrate",
+            &run,
+            "--specification",
+            &specification,
+            "--json",
+        ]);
+        let lot: Value = serde_json::from_str(&json).unwrap_or_else(|_| panic!("{message}"));
+        (status, lot)
+    };
+    let (status, lot) = status_with("{ within = 1000, xz = 10 }");
+    assert_eq!((status, &lot["verdict"]["word"]), (3, &Value::from("fail")));
+    let reasons = lot["verdict"]["reasons"].as_array().unwrap();
+    assert!(
+        reasons.len() == 1
+            && reasons[0]
+                .as_str()
+                .unwrap()
+                .ends_with("gyro.installation.xz fail")
+    );
+    assert_eq!(
+        lot["units"][0]["values"]["gyro.installation.xz"]["verdict"],
+        "fail"
+    );
+    let (status, lot) = status_with("1000");
+    assert_eq!((status, &lot["verdict"]["word"]), (0, &Value::from("pass")));
+}

@@ -41,25 +41,22 @@ fn reasons(lot: &Lot) -> Vec<String> {
 
 fn unit(lot: &Lot, place: usize, row: &Row) -> Value {
     let calibration = row.unit.calibrated.as_ref().ok().map(|of| &of.calibration);
-    let values = lot.statistics.iter().filter_map(|of| {
-        let (value, sigma) = shown(of.quantity, row.sample(of.quantity)?);
-        let mut entry = json!({ "value": value, "sigma": sigma, "unit": unit_key(of.quantity) });
-        if let Some(check) = row
-            .checks
-            .iter()
-            .find(|c| crate::lot::Quantity::Parameter(c.limit.parameter) == of.quantity)
-        {
+    let parameter = |check: &&Check| Quantity::Parameter(check.limit.parameter);
+    let quantities = Quantity::all(lot.body_frame).into_iter();
+    let values = quantities.filter_map(|quantity| {
+        let (value, sigma) = shown(quantity, row.sample(quantity)?);
+        let mut entry = json!({ "value": value, "sigma": sigma, "unit": unit_key(quantity) });
+        if let Some(check) = row.checks.iter().find(|check| parameter(check) == quantity) {
             entry["verdict"] = json!(check.verdict);
             entry["probability_within"] = json!(check.probability);
         }
-        Some((of.quantity.name(), entry))
+        Some((quantity.name(), entry))
     });
     let apart: Vec<String> = lot
         .outliers_of(place)
         .map(|of| of.quantity.name())
         .collect();
-    let failing = lot.statistics.iter().map(|of| of.quantity);
-    let failing = failing.filter(|q| verdict(row, *q) == Some(Verdict::Fail));
+    let failing = { row.checks.iter() }.filter(|check| check.verdict == Verdict::Fail);
     json!({
         "name": row.unit.name,
         "meta": row.unit.meta,
@@ -68,7 +65,7 @@ fn unit(lot: &Lot, place: usize, row: &Row) -> Value {
         "nis": calibration.and_then(|c| Some(c.consistency.as_ref()?.all.nis)),
         "warnings": calibration.map(|c| &c.warnings),
         "verdict": row.verdict,
-        "outside": failing.map(|q| q.name()).collect::<Vec<_>>(),
+        "outside": failing.map(|check| parameter(&check).name()).collect::<Vec<_>>(),
         "apart": apart,
         "values": values.collect::<Map<_, _>>(),
     })
