@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use crate::calibration::FindingKind as Kind;
 use crate::calibration::checks::dwell_scatter::DwellScores;
 use crate::calibration::checks::innovation::consistency;
 use crate::calibration::estimate::largest_growth;
@@ -13,7 +12,7 @@ use crate::calibration::{
     AttitudePrior, Auxiliary, BudgetSource, CalibrationError, Consistency, DwellScatter, Epoch,
     Estimate, Finding, FormTest, FoundCause, Innovation, Linearisation, Model, NoiseReport,
     OBSERVED_BELOW, Observability, Own, ParameterMatrix, ParameterVector, Pass, Posterior, Prior,
-    Problem, Reduction, Script, SeparateEstimate, Solved, Thermal,
+    Problem, Reduction, Script, SeparateEstimate, Solved, Thermal, Verdict, Word,
 };
 use crate::imu::Sensor;
 
@@ -143,13 +142,9 @@ impl Outcome {
         Ok(outcome)
     }
 
-    /// Whether it may be used: it converged, and noise explains what it leaves.
+    /// Whether it may be used.
     pub fn is_usable(&self) -> bool {
-        self.converged
-            && !self
-                .findings
-                .iter()
-                .any(|finding| finding.is(Kind::Unexplained))
+        Verdict::of(&self.findings).word != Word::Failed
     }
 
     /// Whether the run observed the heading: two that are opposite differ by more than 6 in χ² by what

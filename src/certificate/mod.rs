@@ -7,9 +7,9 @@ pub mod dcc;
 mod laboratory;
 mod results;
 
-use crate::calibration::FindingKind;
 use crate::calibration::result::{Calibration, Provenance};
 use crate::calibration::{ComparisonError, Correction, CorrectionError};
+use crate::calibration::{Verdict, Word};
 use crate::imu::BodyFrame;
 use crate::lot::Specification;
 
@@ -89,12 +89,8 @@ impl Certificate {
         if calibration.converged == Some(false) {
             return not_usable("did not converge");
         }
-        if calibration
-            .findings
-            .iter()
-            .any(|f| f.is(FindingKind::Unexplained))
-        {
-            return not_usable("leaves more than noise explains");
+        if Verdict::of(&calibration.findings).word == Word::Failed {
+            return not_usable("failed its checks");
         }
         Correction::of_record(&calibration)?;
         let missing = |field| CertificateError::Missing { field };

@@ -243,9 +243,7 @@ impl Calibrate {
             bail!("{name}: not converged; values and σ may not be used, see the findings");
         }
         if !solution.is_usable() {
-            bail!(
-                "{name}: no noise explains what the calibration leaves; values may not be used, see the findings"
-            );
+            bail!("{name}: values may not be used, see the findings");
         }
         Ok(())
     }

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use serde_json::{Value, json};
 
 use crate::calibration::FindingKind as Kind;
+use crate::calibration::start::mounting::is_beyond_tolerance;
 use crate::calibration::{
     Estimate, Finding, Model, ParameterMatrix, from_vector, parameter, parameter_name,
     sensor_and_parameter,
@@ -42,7 +43,19 @@ pub fn far_from_prior(model: &Model, estimate: &Estimate) -> Option<Finding> {
     let figures = json!({
         "sigmas": CONTRADICTS, "parameters": names, "distances": distances, "causes": causes
     });
-    (!far.is_empty()).then(|| Finding::new(Kind::FarFromPrior, text, figures))
+    let kind = match far.iter().any(|&i| is_another_scale(model, estimate, i)) {
+        true => Kind::PriorContradicted,
+        false => Kind::FarFromPrior,
+    };
+    (!far.is_empty()).then(|| Finding::new(kind, text, figures))
+}
+
+/// Whether a parameter is a scale factor that no careless prior explains.
+fn is_another_scale(model: &Model, estimate: &Estimate, index: usize) -> bool {
+    let (_, of_triad) = sensor_and_parameter(index);
+    let factor = estimate.vector()[index] / model.prior_mean[index];
+    Triad::kind(of_triad) == ParameterKind::Scale
+        && is_beyond_tolerance(factor, model.prior_sigma[index])
 }
 
 /// Parameters of which the data alone say other than their prior does, where that is in the estimate; by the

@@ -8,7 +8,6 @@ use super::gravity::AtRest;
 use super::labels::{Section, Used};
 use super::positions::{Observed, Position};
 use super::{labels, table};
-use crate::calibration::FindingKind as Kind;
 use crate::calibration::checks::observability::not_observed;
 use crate::calibration::checks::prior_distance::far_by_data;
 use crate::calibration::checks::rest_scatter::scatter_at_rest;
@@ -19,6 +18,7 @@ use crate::calibration::{
     CalibrationError, Estimate, Finding, Model, NoiseReport, OBSERVED_BELOW, Problem, checks,
     from_vector, parameter, parameter_name,
 };
+use crate::calibration::{Verdict, Word};
 use crate::earth::Site;
 use crate::imu::{BodyFrame, PerSensor, Sensor};
 use crate::run::motion::rests;
@@ -68,12 +68,9 @@ pub struct ClosedForm {
 }
 
 impl ClosedForm {
-    /// Whether it may be used: noise explains what it leaves.
+    /// Whether it may be used.
     pub fn is_usable(&self) -> bool {
-        !self
-            .findings
-            .iter()
-            .any(|finding| finding.is(Kind::Unexplained))
+        Verdict::of(&self.findings).word != Word::Failed
     }
 }
 

@@ -152,6 +152,10 @@ kinds! {
         "A statement of run.toml hardly fits the log: gravity far from normal gravity at the place, a column that never \
          changes or is there twice, a table log of another time or clock. Each of them changes the result by more than its \
          σ. Correct the field or the log that the finding names."
+    PriorContradicted = "W31" "prior-contradicted" Failed:
+        "A scale factor is so far from the stated one that no careless prior explains it: by more than 10 σ of the prior and \
+         more than 10 %, or by more than 41 %. The estimate may be of another turn or another unit. Correct scale, unit or \
+         sample_period_s in [imu], or widen scale_sigma_ppm if the sensor really is so far off."
 }
 
 impl Kind {

@@ -21,6 +21,7 @@ use crate::run::{Aiding, Run};
 pub use contradiction::Contradiction;
 use likelihood::{Errors, Likelihoods, TooSmall, by_gravity, by_labels, by_table};
 use motion::{Motion, unit};
+pub use rivals::is_beyond_tolerance;
 pub use sensitivity::Sensitivity;
 pub use statement::Mounting;
 use statement::{line, prior_differs};

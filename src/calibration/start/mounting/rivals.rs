@@ -98,7 +98,12 @@ fn is_another(run: &Run, sensor: Sensor, factor: f64) -> bool {
     if sensor == Sensor::Accel {
         sigma = sigma.hypot(prior.bias_sigma.max() / run.site.gravity);
     }
-    factor.ln().abs() > (CARELESS * sigma).clamp(WIDEST_TOLERANCE, NEXT_RANGE.ln())
+    is_beyond_tolerance(factor, sigma)
+}
+
+/// Whether a sensitivity this many times the stated one is another, and not a prior σ (relative) stated too small.
+pub fn is_beyond_tolerance(factor: f64, sigma: f64) -> bool {
+    factor.abs().ln().abs() > (CARELESS * sigma).clamp(WIDEST_TOLERANCE, NEXT_RANGE.ln())
 }
 
 /// The accelerometers whose specific force at rest is another than gravity, and how many times it is that.
