@@ -43,7 +43,7 @@ pub use checks::finding::verdict::{Verdict, Word};
 pub use checks::form::FormTest;
 pub use checks::innovation::{Consistency, Innovation, Nis, Observation, mean_square_interval};
 pub use checks::observability::{AttitudePart, Direction, Observability, Part};
-pub use checks::quality::{Measures, Quality, Spread};
+pub use checks::quality::{DwellResidual, Measures, Quality, Spread};
 pub use checks::recordings::RecordingDifference;
 use constants::{Constant, Known, Posterior, Prior};
 pub use constants::{Disturbance, DisturbanceKind};

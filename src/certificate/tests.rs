@@ -139,7 +139,7 @@ fn error_terms_are_results_with_their_uncertainty_and_stand_in_the_model() {
     }
     let (text, xml) = said(calibration);
     // 5e-9 rad/s per m/s² is 0.0101 °/h a g, and U is a fifth of it.
-    let row = r#"["gyro.g_sensitivity.xy", "0.0101", "0.0020", "°/h/g", "2.00", "–"]"#;
+    let row = r#"["gyroscope g sensitivity xy", "0.0101 ± 0.0020", "°/h/g", "2.00", "–"]"#;
     assert!(text.contains(row), "{text}");
     for needed in [EQUATION_WITH_TERMS, "g-sensitivity adds Q f to w"] {
         assert!(text.contains(needed), "no {needed} in {text}");

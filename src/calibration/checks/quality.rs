@@ -18,7 +18,7 @@ use crate::recording::LabelledMotion;
 use crate::run::{Dwell, Run};
 
 /// What a calibration leaves of gravity and of turns.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
     /// Over the whole record.
     pub all: Measures,
@@ -26,6 +26,52 @@ pub struct Quality {
     /// them; absent if the rest does not give a calibration.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out: Option<Measures>,
+    /// Residuals in each dwell.
+    #[serde(skip)]
+    pub dwells: Vec<DwellResidual>,
+    /// Residuals in the dwells that were held out, by the calibration without them.
+    #[serde(skip)]
+    pub held_out_dwells: Vec<DwellResidual>,
+}
+
+/// Residuals in one dwell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DwellResidual {
+    /// Its begin, s.
+    pub time: f64,
+    /// Magnitude of the mean specific force minus gravity, m/s².
+    pub gravity: f64,
+    /// Angle between gravity as the accelerometers see it and as the gyros carry it there from the dwell before, rad; none
+    /// in the first dwell of a stretch.
+    pub direction: Option<f64>,
+}
+
+/// Residuals in dwells and over turns.
+struct Residuals {
+    dwells: Vec<DwellResidual>,
+    /// rad
+    turns: Vec<f64>,
+}
+
+impl Residuals {
+    fn measures(&self) -> Measures {
+        Measures {
+            gravity: self.dwells.iter().map(|of| of.gravity).collect(),
+            direction: self.dwells.iter().filter_map(|of| of.direction).collect(),
+            turns: self.turns.iter().copied().collect(),
+        }
+    }
+}
+
+impl Quality {
+    fn new(all: Residuals, held_out: Option<Residuals>) -> Self {
+        Self {
+            all: all.measures(),
+            held_out: held_out.as_ref().map(Residuals::measures),
+            dwells: all.dwells,
+            held_out_dwells: held_out.map_or_else(Vec::new, |of| of.dwells),
+        }
+    }
 }
 
 /// Departures from what is known of a body that stands and turns.
@@ -91,11 +137,9 @@ impl Outcome {
             // Half the dwells may be too few.
             pass(&half, &script.ok()?, Gate::Innovations).ok()
         });
-        let held_out = half.map(|half| measures(problem, &half.estimate(), |k| k % 2 == 1));
-        Ok(Quality {
-            all: measures(problem, &estimate, |_| true)?,
-            held_out: held_out.transpose()?,
-        })
+        let held_out = half.map(|half| residuals(problem, &half.estimate(), |k| k % 2 == 1));
+        let all = residuals(problem, &estimate, |_| true)?;
+        Ok(Quality::new(all, held_out.transpose()?))
     }
 }
 
@@ -114,16 +158,16 @@ impl ClosedForm {
             let initial = first.map(|s| first_attitude(s, triads));
             let initial = initial.collect::<Result<_, _>>()?;
             let at = Linearisation::new(*triads, TermVector::zeros(), initial);
-            measures(problem, &at, judged)
+            residuals(problem, &at, judged)
         };
         let all = of(&self.estimate.triads, &|_| true)?;
         let dwells: Vec<&Dwell> = problem.dwells().collect();
         let held_out = match self.reference {
             Reference::Labels if run.recording.imu.continuous => {
-                let measures = of(&self.estimate.triads, &|k| !labelled(run, dwells[k]))?;
+                let of_others = of(&self.estimate.triads, &|k| !labelled(run, dwells[k]))?;
                 // Every labelled turn was used.
-                let turns = Spread::default();
-                Some(Measures { turns, ..measures })
+                let turns = Vec::new();
+                Some(Residuals { turns, ..of_others })
             }
             Reference::Labels => None,
             reference => {
@@ -134,10 +178,10 @@ impl ClosedForm {
                 half.transpose()?
             }
         };
-        Ok(Quality {
+        Ok(Quality::new(
             all,
-            held_out: held_out.filter(|measures| measures.gravity.count > 0),
-        })
+            held_out.filter(|of| !of.dwells.is_empty()),
+        ))
     }
 }
 
@@ -174,12 +218,12 @@ fn first_attitude(
 }
 
 /// What a calibration leaves in the judged dwells and in the turns that end in them.
-fn measures(
+fn residuals(
     problem: &Problem,
     at: &Linearisation,
     judged: impl Fn(usize) -> bool,
-) -> Result<Measures, CalibrationError> {
-    let (mut gravity, mut direction, mut turns) = (Vec::new(), Vec::new(), Vec::new());
+) -> Result<Residuals, CalibrationError> {
+    let (mut dwells, mut turns) = (Vec::new(), Vec::new());
     let mut number = 0;
     for (stretch, initial) in problem.stretches().iter().zip(&at.initial_attitudes) {
         let run = stretch.run;
@@ -203,21 +247,18 @@ fn measures(
             let force = force_at_rest(run, dwell, (at, &during(&dwell.samples)), &carried)?;
             let off = tilt(&(carried * force));
             if judged {
-                gravity.push(force.norm() - run.site.gravity);
-                if before.is_some() {
-                    direction.push(off.norm());
-                }
+                dwells.push(DwellResidual {
+                    time: run.recording.imu.time(dwell.samples.start),
+                    gravity: force.norm() - run.site.gravity,
+                    direction: before.map(|_| off.norm()),
+                });
             }
             carried = exp(off) * carried;
             before = Some(dwell);
         }
     }
     turns.extend(labelled_turns(problem, at, judged)?);
-    Ok(Measures {
-        gravity: gravity.into_iter().collect(),
-        direction: direction.into_iter().collect(),
-        turns: turns.into_iter().collect(),
-    })
+    Ok(Residuals { dwells, turns })
 }
 
 /// Gyro angle minus labelled angle, rad, of labelled turns that end in judged dwells.

@@ -59,7 +59,7 @@ impl Outcome {
             passes: Some(self.passes.len()),
             converged: Some(self.converged),
             consistency: Some(self.consistency_record()),
-            quality: Some(*quality),
+            quality: Some(quality.clone()),
             blocks: tests.iter().map(BlockRecord::from).collect(),
             observability: self.direction_records(),
             noise: Some(self.noise_record()),
@@ -149,7 +149,7 @@ impl ClosedForm {
     pub fn record(&self, problem: &Problem, quality: &Quality) -> Calibration {
         let (run, noise) = (problem.run(), self.noise.clone());
         let record = Calibration {
-            quality: Some(*quality),
+            quality: Some(quality.clone()),
             method: Some(Method::SixPosition),
             provenance: Some(problem.provenance()),
             gravity: Some(GravityRecord::new((

@@ -4,6 +4,7 @@ mod brief;
 mod budget;
 mod figures;
 mod report;
+mod residuals;
 mod tables;
 mod temperature;
 #[cfg(test)]
@@ -28,6 +29,11 @@ impl Report<'_> {
         brief::add(&mut document, self);
         document.page(item(self));
         document.pages(self.against_time().and_then(|outcome| self.sigma(outcome)));
+        document.pages(
+            self.quality
+                .filter(|of| !of.dwells.is_empty())
+                .map(residuals::figure),
+        );
         document.fold("Every parameter");
         document.both(self.groups());
         if let Some(estimate) = self.estimate() {

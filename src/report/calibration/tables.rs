@@ -253,5 +253,5 @@ pub fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
     }
 }
 
-const FORCE: [(&str, f64); 2] = [("µg", MICRO_G), ("mg", MILLI_G)];
-const ANGLE: [(&str, f64); 2] = [("″", ARCSEC), ("°", DEGREE)];
+pub const FORCE: [(&str, f64); 2] = [("µg", MICRO_G), ("mg", MILLI_G)];
+pub const ANGLE: [(&str, f64); 2] = [("″", ARCSEC), ("°", DEGREE)];

@@ -7,6 +7,7 @@
 
 mod score;
 pub mod settling;
+mod tried;
 
 use nalgebra::Vector3;
 use serde_json::json;
@@ -22,6 +23,7 @@ use crate::statistics::{FALSE_ALARM, chi_square_limit, ln_survival, median};
 use crate::units::{ARCSEC, DEG_PER_H, MICRO_G};
 pub use score::Cause;
 use score::Scores;
+use tried::Tried;
 
 /// Components of a disturbance.
 const COMPONENTS: usize = 3;
@@ -64,11 +66,14 @@ impl Causes {
         iterated: &Iterated,
     ) -> Result<Self, CalibrationError> {
         let read = of_readings(&iterated.held.innovations);
-        let scored = by_score(problem, priors, iterated)?;
-        let limit = -2.0 * (FALSE_ALARM / (read.len() + scored.len()).max(1) as f64).ln();
+        let tried = Tried::of(problem, &iterated.held.innovations);
+        let (all, scored) = by_score(problem, (priors, iterated), &tried)?;
+        let limit = -2.0 * (FALSE_ALARM / (read.len() + all).max(1) as f64).ln();
         let of_kind = |kind| {
-            let is =
-                |of: &&FoundCause| matches!(of.cause, Cause::Disturbance(of) if of.kind == kind);
+            let is = |of: &&FoundCause| match of.cause {
+                Cause::Disturbance(of) => of.kind == kind && tried.evenly(of.dwell),
+                Cause::Term(_) => false,
+            };
             chance(scored.iter().filter(is))
         };
         let of_read = chance(read.iter());
@@ -141,17 +146,21 @@ fn of_readings(innovations: &[Innovation]) -> Vec<FoundCause> {
     dwells.filter_map(of_dwell).collect()
 }
 
-/// All that may have happened once, then all error terms that are off and that the record can hold, by their scores.
+/// All that may have happened once in the dwells that are tried, then all error terms that are off and that the record can
+/// hold, by their scores; and the number of causes if all dwells were tried.
 fn by_score(
     problem: &Problem,
-    priors: &[AttitudePrior],
-    iterated: &Iterated,
-) -> Result<Vec<FoundCause>, CalibrationError> {
-    let (disturbances, mut model) = (disturbances(problem), problem.model.clone());
+    (priors, iterated): (&[AttitudePrior], &Iterated),
+    tried: &Tried,
+) -> Result<(usize, Vec<FoundCause>), CalibrationError> {
+    let (mut disturbances, mut model) = (disturbances(problem), problem.model.clone());
+    let everywhere = disturbances.len();
+    disturbances.retain(|of| tried.contains(of.dwell));
     let terms = ErrorTerm::constant().filter(|&term| !model.has(term) && model.can_have(term));
     let terms: Vec<ErrorTerm> = terms.collect();
     model.disturbances.extend(&disturbances);
     terms.iter().for_each(|&term| model.switch_on(term));
+    let all = everywhere + terms.len();
     let (with, at) = (problem.with_model(model), &iterated.estimate);
     let reduction = Script::new(&with, priors, at)?.reduce(&with, &iterated.held.accepted())?;
     let prior = Prior::new(&reduction.constants, &with.model, at);
@@ -159,7 +168,7 @@ fn by_score(
     let causes: Vec<Cause> = once.chain(terms.into_iter().map(Cause::Term)).collect();
     let is_off = |constant: &Constant| Cause::of(constant).is_some_and(|of| causes.contains(&of));
     let Some(scores) = Scores::new(&reduction, &prior, is_off) else {
-        return Ok(Vec::new());
+        return Ok((all, Vec::new()));
     };
     let candidates = causes.iter().filter_map(|&cause| {
         let explained = scores.explained_by(cause)?;
@@ -169,7 +178,7 @@ fn by_score(
         };
         Some(FoundCause::new(cause, time, explained))
     });
-    Ok(candidates.collect())
+    Ok((all, candidates.collect()))
 }
 
 /// All that may have happened once and is not estimated already.

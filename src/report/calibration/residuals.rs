@@ -1,0 +1,43 @@
+//! Residuals in each dwell, as a figure.
+
+use super::tables::{ANGLE, FORCE};
+use crate::calibration::{DwellResidual, Quality};
+use crate::report::prelude::*;
+
+/// Residuals of gravity's magnitude and direction against time; dwells that were left out of a fit as rings.
+pub fn figure(quality: &Quality) -> Plot {
+    let panel = |name: &str, units: &[(&str, f64)], of: fn(&DwellResidual) -> Option<f64>| {
+        let points = |dwells: &[DwellResidual]| -> Vec<Point> {
+            let residual = |dwell: &DwellResidual| Some((dwell.time, of(dwell)?));
+            dwells.iter().filter_map(residual).collect()
+        };
+        let (fitted, left_out) = (points(&quality.dwells), points(&quality.held_out_dwells));
+        let all = || fitted.iter().chain(&left_out).map(|point| point.1.abs());
+        let largest = all().fold(0.0, f64::max);
+        let fits = units.iter().find(|(_, size)| largest < 1000.0 * size);
+        let (unit, size) = *fits.unwrap_or(&units[units.len() - 1]);
+        let scaled = |points: Vec<Point>| points.into_iter().map(move |(time, y)| (time, y / size));
+        Panel::new(
+            format!("{name}, {unit}"),
+            Axis::linear("time, s"),
+            Axis::linear("").including([0.0]),
+        )
+        .with(Series::zero())
+        .with(Series::marks(Mark::Dot, scaled(fitted)).key("in the fit"))
+        .with(
+            Series::marks(Mark::Ring, scaled(left_out))
+                .nth(1)
+                .key("left out"),
+        )
+    };
+    let panels = [
+        panel("|f| − gravity", &FORCE, |dwell| Some(dwell.gravity)),
+        panel("direction of gravity after a move", &ANGLE, |dwell| {
+            dwell.direction
+        }),
+    ];
+    Plot::new("residuals.svg", "Residuals in each dwell", (2, 220), panels).caption(
+        "Left: magnitude of the mean specific force minus gravity. Right: angle between the vertical that the gyros carry \
+         over from the dwell before and the one that the accelerometers measure. Rings: by a fit without that dwell.",
+    )
+}
