@@ -46,6 +46,8 @@ mod study;
 mod table1;
 mod terms;
 mod threads;
+#[cfg(unix)]
+mod tutorial;
 mod two_clocks;
 mod unstated;
 mod velocity;
