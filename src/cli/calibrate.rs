@@ -232,9 +232,14 @@ impl Calibrate {
         match document {
             Some(document) if self.verbose => show(&document, false)?,
             Some(mut document) if !self.json => {
-                document
-                    .brief
-                    .push(files(target.as_deref(), path, &document.findings).into());
+                document.brief.push(
+                    files(
+                        target.as_deref(),
+                        &read_by(opened, target.as_deref(), path),
+                        &document.findings,
+                    )
+                    .into(),
+                );
                 show_brief(&document)?;
             }
             _ => print(&calibration.to_json(Path::new("standard output"))?)?,
@@ -249,6 +254,12 @@ impl Calibrate {
     }
 }
 
+/// The run.toml by which a run was read: of a log, the one that is written next to the result.
+fn read_by(opened: Option<&Opened>, target: Option<&Path>, path: &Path) -> PathBuf {
+    let of_log = opened.filter(|opened| opened.is_of_log()).and(target);
+    of_log.map_or_else(|| path.to_owned(), |target| target.join("run.toml"))
+}
+
 /// What was written, and what to do with it.
 fn files(target: Option<&Path>, run: &Path, findings: &[Finding]) -> Facts {
     let mut facts = Facts::default();
@@ -259,7 +270,10 @@ fn files(target: Option<&Path>, run: &Path, findings: &[Finding]) -> Facts {
         facts.push("report", shown(target.join("report").join("index.html")));
         facts.push(
             "use it",
-            format!("turncal apply {calibration} {}", run.display()),
+            format!(
+                "turncal apply {calibration} {} -o calibrated.csv",
+                run.display()
+            ),
         );
     }
     let explain = findings

@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use turncal::calibration::result::Calibration;
-use turncal::certificate::{Certificate as Content, Laboratory};
+use turncal::certificate::{Certificate as Content, Conformity, Decision, Laboratory};
 use turncal::formats::digest_of_bytes;
 use turncal::lot::Specification;
 use turncal::report::certificate;
 
+use super::lot::NotMet;
 use super::output::{Overwrite, print};
 
 /// Writes a calibration certificate as PDF/A-3, with a Digital Calibration Certificate in it
@@ -100,6 +101,13 @@ impl Certificate {
             "certificate: {}",
             self.output.join("certificate.pdf").display()
         );
-        Ok(())
+        let overall = content.conformity.as_ref().and_then(Conformity::overall);
+        match overall {
+            Some(Decision::Fail | Decision::ConditionalFail) => {
+                let limits = "the certificate names the limits".to_owned();
+                Err(NotMet(limits).into())
+            }
+            _ => Ok(()),
+        }
     }
 }

@@ -56,10 +56,16 @@ impl Init {
         show_found(&self.log, &draft.found());
         tell!("written: {}", output.display());
         let lines = text.lines().zip(1..);
-        for (line, number) in lines.filter(|(line, _)| line.contains("TODO:")) {
+        let open: Vec<_> = lines.filter(|(line, _)| line.contains("TODO:")).collect();
+        for (line, number) in &open {
             tell!("to do:   line {number} {}", line.trim_start_matches("# "));
         }
-        tell!("next:    turncal check {}", output.display());
+        let first = if open.is_empty() {
+            ""
+        } else {
+            "complete these lines, then "
+        };
+        tell!("next:    {first}turncal check {}", output.display());
         Ok(())
     }
 

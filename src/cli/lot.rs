@@ -194,7 +194,7 @@ pub fn deliver(
 /// All is done, but units do not meet their specification.
 #[derive(Debug, thiserror::Error)]
 #[error("the specification is not met: {0}")]
-pub struct NotMet(String);
+pub struct NotMet(pub String);
 
 /// A name for each unit: of its run's directory, or of its file where that is not called run.toml, with as many
 /// directories above as it takes to tell all apart.

@@ -74,6 +74,11 @@ impl Opened {
         })
     }
 
+    /// Whether there was no `run.toml`.
+    pub fn is_of_log(&self) -> bool {
+        self.log.is_some()
+    }
+
     /// Writes the `run.toml` by which a log was read into the directory of a result.
     ///
     /// # Errors

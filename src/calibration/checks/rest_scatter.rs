@@ -82,13 +82,13 @@ fn of_triad<'a>(
         Sensor::Accel => "µg/√Hz",
     };
     let text = format!(
-        "{} noise at rest is {compared} the stated value: {} instead of {} {symbol} (tolerance {:+.1} % to {:+.1} %). The \
+        "{} noise at rest is {compared} the stated value: {} instead of {} {symbol} (tolerance −{:.1} % to +{:.1} %). The \
          estimate uses 0.1 s averages, so vibration of the mount raises it too. Run turncal allan on a long static record \
          to separate the two, and correct {figure}.",
         triad_name(sensor),
         three_digits(found),
         three_digits(stated),
-        100.0 * (low - 1.0),
+        100.0 * (1.0 - low),
         100.0 * (high - 1.0)
     );
     let figures = json!({
