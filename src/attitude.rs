@@ -44,7 +44,7 @@ pub fn log(c: &Matrix3<f64>) -> Vector3<f64> {
     quaternion(c).scaled_axis()
 }
 
-/// The rotation matrix nearest to `c`, which must be one already but for rounding
+/// The rotation matrix nearest to `c`, which must already be a rotation matrix except for rounding
 /// (one step of Newton's iteration for the polar decomposition).
 #[inline]
 pub fn orthonormalised(c: &Matrix3<f64>) -> Matrix3<f64> {

@@ -12,8 +12,8 @@ pub const FALSE_ALARM: f64 = 1e-3;
 /// σ of a normal distribution over the median of its absolute deviations.
 pub const SIGMA_OF_MEDIAN: f64 = 1.482_602;
 
-/// What χ² of so many degrees of freedom stays below but for this chance; infinite without a degree of
-/// freedom, for then nothing is beyond chance.
+/// The limit that χ² with these degrees of freedom exceeds with probability `chance`; infinite for zero degrees of
+/// freedom.
 pub fn chi_square_limit(degrees: f64, chance: f64) -> f64 {
     ChiSquared::new(degrees).map_or(f64::INFINITY, |chi2| chi2.inverse_cdf(1.0 - chance))
 }
@@ -50,10 +50,10 @@ pub fn ln_survival(freedom: f64, x: f64) -> f64 {
 /// Degrees of freedom from which t is the normal distribution and its first correction, to 1e-7.
 const MANY: f64 = 1e4;
 
-/// What Student's t of so many degrees of freedom, one at least, stays below but for this chance of less than
-/// one half.
+/// The limit that Student's t exceeds with probability `chance`, which is below one half; `degrees` of freedom are at
+/// least one.
 ///
-/// The tail is halved in, for Newton's method on it goes in circles for some degrees of freedom. Source:
+/// The limit is found by bisection, because Newton's method does not converge for some degrees of freedom. Source:
 /// Abramowitz and Stegun, *Handbook of Mathematical Functions*, 26.7.1 and 26.7.5.
 pub fn student_limit(degrees: f64, chance: f64) -> f64 {
     if degrees > MANY {

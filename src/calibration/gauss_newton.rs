@@ -18,7 +18,7 @@ const DECIDED_AFTER: usize = 4;
 /// More than this part of all observations beyond the gate are no outliers.
 const MOST_OUTLIERS: f64 = 0.05;
 
-/// A step that leads where no pass can be made is shortened by half so many times at most: to a thousandth.
+/// Most halvings of a step to a point where no pass can be made: to a thousandth.
 const MOST_SHORTENED: usize = 10;
 
 /// One pass over the record.

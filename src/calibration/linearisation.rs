@@ -134,12 +134,12 @@ pub struct AttitudePrior {
 
 /// 1σ of the initial attitude before anything is known of it but one reading, rad: that may be a wrong one.
 const READ_ATTITUDE: f64 = DEGREE;
-/// So many times what the prior of the accelerometers leaves of the initial level without a table: what gave it is in
-/// the observations, too, so that it has to be told by these.
+/// σ of the initial level without a table, over its σ from the prior of the accelerometers: the data that gave this
+/// level are observations, too, and these have to determine it.
 const LEVEL_SIGMAS: f64 = 10.0;
 /// 1σ of the initial heading without a table, rad, if Earth rate shows it well; else …
 const HEADING: f64 = 15.0 * DEGREE;
-/// … so many times what Earth rate leaves of it.
+/// … this many times its σ from Earth rate.
 const HEADING_SIGMAS: f64 = 3.0;
 /// A heading less known than this, rad, is hidden: it may be any, and is fixed to within …
 const HIDDEN: f64 = 45.0 * DEGREE;

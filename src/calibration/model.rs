@@ -50,8 +50,8 @@ pub struct Model {
     /// How the body turns where it should not, in dwells without a table: 1σ density of a random walk,
     /// rad/√s. Gyros sense it, so it is none of their noise.
     pub turning_at_rest: f64,
-    /// Whether velocity begins anew after each move: without a table's log a move leaves more noise in it than it tells,
-    /// except of terms that show in nothing else.
+    /// Whether velocity is reset after each move: without a table's log, a move adds more noise to velocity than
+    /// information, except about terms that no other observation shows.
     pub velocity_anew: bool,
     /// 1σ of each parameter of the instrument's error terms, around zero; zero where a term is off.
     pub term_sigma: TermVector,
@@ -76,7 +76,7 @@ pub struct Model {
 }
 
 impl Model {
-    /// The model of a run: what the run states, and what the options ask for beside it.
+    /// The model of a run: the run's statements, completed by the options.
     pub fn new(run: &Run, options: &Options) -> Self {
         let aiding = options.aiding.unwrap_or_else(|| run.aiding());
         let table = run.observed_table(aiding);

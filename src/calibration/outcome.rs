@@ -27,8 +27,8 @@ pub struct Outcome {
     pub estimate: Estimate,
     /// Covariance of the parameters by noise and prior alone, as the last pass has it.
     pub covariance_by_noise: ParameterMatrix,
-    /// What the covariance of the estimate has beside that, each part by what it is of; see
-    /// [`crate::calibration::Solution::assess`] for those that come later.
+    /// The other parts of the covariance of the estimate, by their source;
+    /// [`crate::calibration::Solution::assess`] adds more.
     pub covariance_parts: BTreeMap<BudgetSource, ParameterMatrix>,
     /// 1σ of every parameter before the run.
     pub prior_sigma: ParameterVector,
@@ -65,9 +65,9 @@ pub struct Outcome {
     pub innovations: Vec<Innovation>,
     /// Consistency of the innovations with their covariance in the last pass.
     pub consistency: Consistency,
-    /// How much dwells scatter over what the covariance says; none where there are too few.
+    /// Scatter of the dwells relative to the covariance; `None` if there are too few dwells.
     pub dwell_scatter: Option<DwellScatter>,
-    /// Whether the data reject the installation form; none where they cannot.
+    /// Whether the data reject the installation form; `None` if they cannot test it.
     pub form_test: Option<FormTest>,
     /// What was estimated, with the noise that was used.
     pub model: Model,

@@ -16,7 +16,7 @@ use crate::recording::{Recording, TableLog};
 use crate::run::{Aiding, Dwell, LONG_ENOUGH, Position, Run};
 use crate::statistics::chi_square_limit;
 
-/// 1σ of the initial velocity of a body at rest, m/s, beside that with which it sways.
+/// 1σ of the initial velocity of a body at rest, m/s, in addition to that of its sway.
 const INITIAL_VELOCITY: f64 = 1e-3;
 
 /// Runs of one instrument with what is to be estimated of them.
@@ -186,14 +186,14 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// Duration of so many steps of a dwell, s.
+    /// Duration of this number of steps of a dwell, s.
     pub(in crate::calibration) fn duration_of_steps(&self, steps: usize) -> f64 {
         let period = self.run.recording.imu.period;
         (steps * step_length(period)) as f64 * period
     }
 
-    /// The same observed at the end of so many steps of a dwell, with the mean of what a table read
-    /// meanwhile.
+    /// The same problem, observed once per this number of steps of a dwell, with the mean of the table's readings over
+    /// them.
     pub(in crate::calibration) fn observed_every(&self, steps_of_dwell: usize) -> Self {
         let stretches = self.stretches.iter().map(|stretch| Stretch {
             steps: steps(stretch.run, stretch.table, &stretch.dwells, steps_of_dwell),

@@ -134,9 +134,9 @@ impl Solution {
         }
     }
 
-    /// Tests error terms and judges what is left of gravity and turns. What error terms do that the data
-    /// show, and that are not estimated, goes into the covariance of the estimate; so does what biases do that
-    /// may vary unseen where the noise was learnt.
+    /// Tests error terms and judges the residuals of gravity and turns. The effect of error terms that the data
+    /// show, but that are not estimated, is added to the covariance of the estimate; if the noise was estimated, so is
+    /// the effect of bias variations too small to be seen.
     ///
     /// # Errors
     /// [`CalibrationError`] where the problem is not the one of the solution.

@@ -11,12 +11,12 @@ use crate::imu::{PerSensor, ThermalState};
 pub struct SeparateEstimate {
     /// Its name.
     pub name: String,
-    /// Mean temperature of each axis, °C, and its rate, K/s, over its dwells; none where it is not known.
+    /// Mean temperature of each axis, °C, and its rate, K/s, over its dwells; `None` if unknown.
     pub temperature: Option<PerSensor<[f64; 3]>>,
     /// The span of its temperatures, K.
     pub span: f64,
-    /// Calibration at that temperature, with the noise that is stated or, where it may be learnt and has to be, with
-    /// that of its own; none where it gave none.
+    /// Calibration at that temperature, with the stated noise or, if the policy allows and the data demand it, with the
+    /// noise estimated from this recording; `None` if the calibration failed.
     pub estimate: Option<Estimate>,
     /// Where its temperature stands for all of it: the functions of temperature then.
     pub(in crate::calibration) state: Option<ThermalState>,

@@ -28,7 +28,7 @@ pub struct Change {
     pub found: f64,
     /// Value now.
     pub left: f64,
-    /// 1σ of the difference, as if both came of different data; none where the earlier one claims no σ.
+    /// 1σ of the difference, as if both came from independent data; `None` if the earlier calibration states no σ.
     pub sigma: Option<f64>,
 }
 

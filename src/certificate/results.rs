@@ -60,7 +60,7 @@ pub struct Measured {
     pub expanded: f64,
     /// Coverage factor.
     pub coverage_factor: f64,
-    /// Degrees of freedom; none where infinite.
+    /// Degrees of freedom; `None` if infinite.
     pub degrees_of_freedom: Option<f64>,
 }
 
@@ -141,7 +141,7 @@ pub fn terms(calibration: &Calibration) -> Vec<Measured> {
     (0..TERM_PARAMETERS).filter_map(measured).collect()
 }
 
-/// At which temperatures the results are valid, and where it is said how they change.
+/// States the temperatures at which the results are valid, and where their temperature coefficients are found.
 pub fn temperature_words(of: &ThermalRecord, number: impl Fn(f64) -> String) -> String {
     let triad = |(name, sensor): (&str, Sensor)| {
         let range = of.range.get(sensor);

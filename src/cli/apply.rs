@@ -42,8 +42,8 @@ pub struct Apply {
     /// File to write, `.csv` or `.csv.gz` [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Write rows that the log has lost, too, interpolated and with 1 in a column `filled`; not where so much is lost
-    /// that calibrate would begin anew
+    /// Interpolate lost rows and write them with 1 in a column `filled`, except in gaps too long for calibrate to
+    /// bridge
     #[arg(long)]
     fill: bool,
     /// Replace the output file if it exists

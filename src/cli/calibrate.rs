@@ -37,7 +37,7 @@ const HIGHEST_ORDER_AT_REST: usize = 5;
 ///
 /// Several runs are the units of a lot: each is calibrated into DIR/units/NAME/, and DIR/lot.json, lot.csv and
 /// index.html say what they are together. A unit that cannot be calibrated is a row with its reason, and the
-/// command fails after all is written. Begun again, it goes on with what is missing or has changed.
+/// command fails after all is written. Rerun it to process only missing or changed units.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal calibrate imu.csv --latitude 48.1 --height 520

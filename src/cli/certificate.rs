@@ -15,7 +15,7 @@ use super::output::{Overwrite, print};
 ///
 /// DIR/certificate.pdf says what ISO/IEC 17025 asks of a certificate: what calibration.json knows, and what
 /// lab.toml states. dcc.xml (PTB's DCC 3.3.0, with D-SI units and the covariance matrix) and calibration.json
-/// are embedded in it and written beside it. Required fields that are missing are named. All dates are those of
+/// are embedded in it and written to DIR, too. Required fields that are missing are named. All dates are those of
 /// lab.toml: the same files give the same bytes. It claims no accreditation.
 ///
 /// A draft of lab.toml: turncal certificate --draft

@@ -30,7 +30,7 @@ pub struct Estimation {
     noise: Noise,
 }
 
-/// How to estimate.
+/// Estimation method.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub enum Method {
     /// Extended Kalman filter over the whole run
@@ -50,7 +50,7 @@ pub enum Installation {
     ThreeAngle,
 }
 
-/// What the filter observes.
+/// Observations of the filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Aiding {
     /// Zero velocity in every dwell, and the attitude of the table
@@ -59,15 +59,15 @@ pub enum Aiding {
     Velocity,
 }
 
-/// Which noise the filter uses.
+/// Noise used by the filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Noise {
-    /// As run.toml and models state it
+    /// Use the noise that run.toml and models state
     Stated,
-    /// As stated unless the data contradict that, which right figures do once in a thousand runs
+    /// Use the stated noise; estimate it from the record if the two disagree (p < 0.001)
     #[value(alias = "estimate")]
     Auto,
-    /// As the data show it, around what is stated
+    /// Estimate the noise from the record, with the stated noise as prior
     Learnt,
 }
 

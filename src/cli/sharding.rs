@@ -19,8 +19,8 @@ pub struct Sharding {
 }
 
 impl Sharding {
-    /// Makes the part of a study of so many runs that is asked for, unless it is there already; false if all of
-    /// the study is asked for. `trials` makes runs by their numbers, telling of each.
+    /// Makes the requested part of a study of `runs` runs, unless that part exists; returns false if the whole study
+    /// is requested. `trials` makes runs by their numbers, and reports each.
     pub fn make<T: Serialize>(
         self,
         (job, study, runs): (JobKind, &impl Serialize, u64),

@@ -76,7 +76,7 @@ pub fn show_found(path: &Path, found: &[Found]) {
     }
 }
 
-/// A path of a run.toml, a log, or `-`; whoever names a run's directory is told the file.
+/// The path of a run.toml or a log, or `-`; if a run's directory is given instead, the error names the file in it.
 pub fn run_or_log(text: &str) -> Result<PathBuf, String> {
     let path = Path::new(text);
     let inside = path.join("run.toml");

@@ -35,8 +35,8 @@ pub struct GaussMarkov {
     pub correlation_time: f64,
 }
 
-/// White noise that a triad has in moves beside that at rest: 1σ densities of the angle or velocity that it
-/// adds up to. Simulations do not make it.
+/// White noise of a triad during moves, in addition to its noise at rest: 1σ densities of the integrated angle or
+/// velocity. Simulations do not generate it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct MotionNoise {
     /// By how fast a move is, √s: over the root of ∫|ω − ω_ie|² dt or ∫|f + g|² dt.
@@ -119,7 +119,7 @@ impl NoiseSource {
     }
 }
 
-/// A pulse counter: what is left over from one sample is carried into the next, so the sum of all
+/// A pulse counter: the remainder of each sample is carried into the next, so the sum of all
 /// pulses stays within half a count of the integral.
 #[derive(Debug, Clone, Default)]
 pub struct Pulses {

@@ -52,7 +52,7 @@ impl ThermalRange {
         (temperature - middle) / half
     }
 
-    /// All functions at a temperature in °C that changes by so many K/s.
+    /// All functions at a temperature in °C and its rate of change in K/s.
     pub fn values(&self, temperature: f64, rate: f64) -> ThermalValues {
         let here = legendre(self.scaled(temperature));
         let there = legendre(self.scaled(self.reference));

@@ -27,7 +27,7 @@ pub struct Instrument {
     pub variation: PerSensor<Variation>,
     /// 1σ of the parameters of its error terms, around zero; zero where it has none.
     pub term_sigma: TermVector,
-    /// How they change with temperature; none where they do not.
+    /// How they change with temperature; `None` if they do not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub thermal: Option<PerSensor<ThermalVariation>>,
 }

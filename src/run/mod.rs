@@ -54,7 +54,7 @@ impl Run {
         }
     }
 
-    /// What is observed unless it is said otherwise: the table's attitude where there is its log.
+    /// The default observation: the table's attitude if there is a table log, else zero velocity.
     pub fn aiding(&self) -> Aiding {
         match self.recording.table {
             Some(_) => Aiding::Table,

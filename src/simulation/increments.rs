@@ -194,9 +194,9 @@ mod tests {
         }
     }
 
-    /// Attitude and velocity from strapdown integration, relative to the inertial frame that is
-    /// East-North-Up at the start, over so many samples of 1 ms: so short that coning and sculling
-    /// beyond the second order are nothing.
+    /// Attitude and velocity from strapdown integration over samples of 1 ms, relative to the inertial
+    /// frame that is East-North-Up at the start. Samples are so short that coning and sculling beyond
+    /// the second order are negligible.
     fn integrated(
         motion: &Motion,
         site: &Site,
@@ -225,7 +225,7 @@ mod tests {
         (attitude, velocity)
     }
 
-    /// The number of milliseconds until the table stands after so many moves.
+    /// The number of milliseconds until the table stands after this number of moves.
     fn until_after(motion: &Motion, moves: usize) -> usize {
         let (start, _) = motion.dwells().nth(moves).unwrap();
         ((start + 1.0) / MILLISECOND) as usize

@@ -43,7 +43,7 @@ pub struct Simulated {
     /// The instrument's true parameters; where they change with temperature, those at the reference of
     /// [`Self::thermal`].
     pub truth: PerSensor<Triad>,
-    /// The same but for what is this recording's own.
+    /// The same without the deviations of this recording.
     pub common: PerSensor<Triad>,
     /// Those of its error terms.
     pub terms: TermVector,

@@ -15,8 +15,8 @@ use crate::recording::{TEMPERATURE_SPACING, Temperature};
 /// A climatic chamber, and how the instrument in it follows.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Chamber {
-    /// Time in s and temperature of the chamber in °C, which goes on straight lines between; before the first and
-    /// after the last it stays. The instrument has soaked at the first.
+    /// Time in s and temperature of the chamber in °C. Between the points it is linear; before the first and
+    /// after the last it is constant. The instrument has soaked at the first.
     pub profile: Vec<(f64, f64)>,
     /// Time constant of the instrument in the chamber, s; zero follows at once.
     pub time_constant: f64,

@@ -126,8 +126,8 @@ pub struct GroupAccuracy {
 }
 
 impl AccuracyStudy {
-    /// Makes all runs, on all cores; `done` is told of each. The result does not depend on how many
-    /// cores there are.
+    /// Makes all runs on all cores; `done` is called after each. The result does not depend on the number
+    /// of cores.
     ///
     /// # Errors
     /// [`StudyError`] if runs cannot be made. A run that the filter fails on is no error: it is
@@ -137,7 +137,7 @@ impl AccuracyStudy {
         self.result(self.trials(&all, done)?)
     }
 
-    /// Makes some of the runs, given by their numbers; `done` is told of each.
+    /// Makes some of the runs, given by their numbers; `done` is called after each.
     ///
     /// # Errors
     /// As [`Self::run`].

@@ -73,7 +73,7 @@ pub struct OrderChosen {
 }
 
 impl CampaignStudy {
-    /// Makes all campaigns, on all cores; `done` is told of each.
+    /// Runs all campaigns on all cores; `done` is called after each.
     ///
     /// # Errors
     /// [`StudyError`] if they cannot be simulated, or not even the bound can be had.

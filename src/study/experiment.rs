@@ -170,8 +170,8 @@ impl Spread {
 type ByParameter = SMatrix<f64, 2, PARAMETERS>;
 
 impl ExperimentStudy {
-    /// Makes everything, on all cores; `done` is told of each instrument. The result does not depend
-    /// on how many cores there are.
+    /// Runs the whole study on all cores; `done` is called after each instrument. The result does not
+    /// depend on the number of cores.
     ///
     /// # Errors
     /// [`ExperimentError`] if runs or missions cannot be made. A calibration that fails is no error:
@@ -181,7 +181,7 @@ impl ExperimentStudy {
         self.result(self.trials(&all, done)?)
     }
 
-    /// Makes some of the instruments, given by their numbers; `done` is told of each.
+    /// Runs some of the instruments, given by their numbers; `done` is called after each.
     ///
     /// # Errors
     /// As [`Self::run`].

@@ -43,7 +43,7 @@ pub struct Mission {
     pub motion: Motion,
     /// How many intervals it lasts.
     pub intervals: u32,
-    /// Time between two moments of the result, s; [`INTERVAL`] but for what lasts minutes or less.
+    /// Time between two moments of the result, s; [`INTERVAL`], except for missions of minutes or less.
     pub interval: f64,
 }
 

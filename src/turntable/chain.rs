@@ -128,7 +128,7 @@ impl Chain {
         start.into_iter().chain(of_joints)
     }
 
-    /// The state so many seconds after the start.
+    /// The state at this time after the start, s.
     pub fn at(&self, time: f64) -> Kinematics {
         let mut state = Kinematics {
             attitude: self.base,

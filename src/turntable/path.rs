@@ -1,4 +1,4 @@
-//! What a table is told to do.
+//! Commanded positions and moves of a table.
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};

@@ -9,7 +9,7 @@ use crate::calibration::{Budget, ErrorTermTest, ParameterVector};
 pub struct BudgetRecord {
     /// What each source adds; squares add to the variances.
     pub sources: Vec<BudgetPartRecord>,
-    /// Effective degrees of freedom; none where infinite.
+    /// Effective degrees of freedom; `None` if infinite.
     pub degrees_of_freedom: Vec<Option<f64>>,
     /// Coverage factor for 95.45 %.
     pub coverage_factor: Vec<f64>,
@@ -25,7 +25,7 @@ pub struct BudgetPartRecord {
     pub source: String,
     /// Standard uncertainty of each parameter.
     pub u: Vec<f64>,
-    /// Degrees of freedom with which it is known; none where infinite.
+    /// Degrees of freedom with which it is known; `None` if infinite.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub degrees_of_freedom: Option<f64>,
 }

@@ -51,7 +51,7 @@ pub struct DwellScores {
     pub scatter: DwellScatter,
     /// Square root of the covariance of the estimate.
     root: DMatrix<f64>,
-    /// The constants that are estimated, of so many.
+    /// Indices of the estimated constants.
     on: Vec<usize>,
     all: usize,
     /// Covariance of the estimate by the scores' own scatter.
@@ -185,7 +185,9 @@ mod tests {
         let ratio = sigma(&outcome) / sigma(&truth);
         let by_noise = outcome.covariance_by_noise.diagonal().map(f64::sqrt);
         let without = by_noise.rows(3, 6).norm() / sigma(&truth);
-        println!("σ of gyro E over those with the right figure: {ratio:.2}, by noise {without:.2}");
+        println!(
+            "σ of gyro E over those with the correct figure: {ratio:.2}, by noise {without:.2}"
+        );
         assert!(without < 0.5 && ratio > 0.7, "{without} {ratio}");
     }
 }

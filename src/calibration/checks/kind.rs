@@ -143,7 +143,7 @@ kinds! {
         "Labels of sections contradict gravity or the gyros. The finding says which, and whether the section was used. \
          Correct the label in the file of [segments]."
     SectionsLost = "W28" "sections-lost" Care:
-        "A labelled section lacks so many rows that it was not used. Record it again, or remove it from [segments]."
+        "A labelled section was skipped: too many rows are missing. Record it again, or remove it from [segments]."
     ResidualsLarge = "W29" "residuals-large" Care:
         "The closed form leaves larger residuals than stated noise and table errors explain. turncal widened σ by as much. \
          The finding names the interval with the largest residual: look there for a bump, a wrong label or attitude; else \

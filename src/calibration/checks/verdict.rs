@@ -13,7 +13,7 @@ pub enum Word {
     /// It converged, its σ agree with its residuals, and all that was asked for is determined.
     #[serde(rename = "good")]
     Good,
-    /// The same, but for what its reasons say.
+    /// As good, with the restrictions that its reasons state.
     #[serde(rename = "use with care")]
     UseWithCare,
     /// Its values may not be used.

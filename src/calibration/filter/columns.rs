@@ -52,7 +52,7 @@ pub struct Columns {
 }
 
 impl Columns {
-    /// Of so many constants and states, before anything is observed.
+    /// For this number of constants and states, before any observation.
     pub fn new(constants: usize, states: usize) -> Self {
         Self {
             of_states: DMatrix::zeros(constants, states),

@@ -19,7 +19,7 @@ pub enum Taken {
 
 /// Takes parts of dwells into filters of one kind.
 pub trait DwellFilters {
-    /// Takes in a part of a dwell. Innovations are worked out where it is told what is `known` of the constants.
+    /// Processes a part of a dwell. Innovations are computed if prior knowledge of the constants (`known`) is given.
     fn take_in(
         &mut self,
         filter: &mut Filter,

@@ -39,7 +39,7 @@ pub struct DwellFilter<'a, const M: usize, const G: usize> {
     /// Of what was observed, given `g = 0`: squares, and logarithm of the determinant of its covariance.
     squares: f64,
     log_determinant: f64,
-    /// What is known of `g`; none where innovations are not asked for.
+    /// Prior of `g`; `None` if innovations are not requested.
     given: Option<InputPrior<G>>,
 }
 

@@ -121,7 +121,7 @@ impl ByHand {
         model
     }
 
-    /// What it is told with.
+    /// The finding that reports it.
     pub fn finding(&self, problem: &Problem, report: &NoiseReport) -> Option<Finding> {
         noise_learnt(problem, (self.ratio, Self::limit()), &report.sources)
     }
@@ -194,7 +194,7 @@ fn add(covariance: &mut DMatrix<f64>, parts: &DVector<f64>, variance: f64) {
 
 /// Errors under a covariance.
 struct Likelihood {
-    /// −2 ln of it, but for a constant.
+    /// −2 ln of the likelihood, up to a constant.
     deviance: f64,
     inverse: DMatrix<f64>,
     weighted: DVector<f64>,

@@ -212,8 +212,8 @@ impl Likelihood<'_> {
 
     /// The factors of largest posterior density of these sources, the others held, and −2 ln of the likelihood there.
     ///
-    /// A variance that is zero and would go below rests until the others have settled; then each is
-    /// looked at once more.
+    /// A variance that is zero and would become negative is kept at zero until the others have converged; then each is
+    /// tested again.
     fn settled(
         &self,
         start: &Factors,

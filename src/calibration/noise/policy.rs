@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NoisePolicy {
-    /// What is stated.
+    /// The stated noise.
     Stated,
-    /// What is stated unless the data contradict it, which right figures do in one run of a thousand;
-    /// else what the data show.
+    /// The stated noise, unless the data contradict it (p < 0.001); then the noise estimated from the
+    /// data.
     #[default]
     Auto,
-    /// What the data show, around what is stated.
+    /// The noise estimated from the data, with the stated noise as prior.
     Learnt,
 }
 

@@ -18,7 +18,7 @@ pub struct NoiseReport {
     pub policy: NoisePolicy,
     /// Whether the noise is learnt; else it is as stated.
     pub learnt: bool,
-    /// The test of what is stated; none where nothing was tested.
+    /// The test of the stated noise; `None` if nothing was tested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub test: Option<NoiseTest>,
     /// Every source that the record can have.
@@ -26,7 +26,7 @@ pub struct NoiseReport {
     pub sources: Vec<SourceFigures>,
 }
 
-/// The test of stated noise against what the data show: −2 ln of the likelihood ratio.
+/// The test of the stated noise against the estimated noise: −2 ln of the likelihood ratio.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NoiseTest {
     /// Of stated noise to that which the data call for …
@@ -48,12 +48,12 @@ pub struct SourceFigures {
     pub name: String,
     /// Unit of the figures.
     pub unit: String,
-    /// What is stated, or seen in dwells before the filter; none where nothing is.
+    /// The stated value, or the one seen in dwells before the filter; `None` if there is neither.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stated: Option<f64>,
     /// What was used.
     pub used: f64,
-    /// Its 95 % interval; none where it was not learnt.
+    /// Its 95 % interval; `None` if it was not estimated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval: Option<[f64; 2]>,
 }

@@ -50,8 +50,8 @@ const STEP: f64 = 0.1;
 /// limited by random walk, not by its own noise.
 const STEPS_OF_PACKED: usize = 10;
 
-/// The steps from the begin of the first dwell to the end of the last, between which nothing is lost; in
-/// dwells so many taken together.
+/// The steps from the start of the first dwell to the end of the last, without a gap; in dwells, `together`
+/// steps are combined into one.
 pub fn steps(run: &Run, table: Option<&TableLog>, dwells: &[Dwell], together: usize) -> Vec<Step> {
     let imu = &run.recording.imu;
     let length = step_length(imu.period);
@@ -60,7 +60,7 @@ pub fn steps(run: &Run, table: Option<&TableLog>, dwells: &[Dwell], together: us
         false => length,
     };
     let of_dwell = |dwell: &Dwell| growing(dwell.samples.clone(), (length, longest), together);
-    // There may be so many that room to grow would be too much.
+    // Exact capacity: there may be too many steps for a vector that doubles.
     let count = dwells.iter().map(|dwell| 1 + of_dwell(dwell).count());
     let mut steps = Vec::with_capacity(count.sum());
     let mut at = dwells.first().map_or(0, |dwell| dwell.samples.start);
@@ -148,7 +148,7 @@ pub fn cut(range: Range<usize>, length: usize) -> impl Iterator<Item = Range<usi
 }
 
 /// Cuts a range into parts of the first length, then into ever longer ones, each as long as all before it, up
-/// to the second; so many of them are taken together.
+/// to the second; `together` parts are combined into one.
 fn growing(
     range: Range<usize>,
     (length, longest): (usize, usize),

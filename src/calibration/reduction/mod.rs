@@ -208,7 +208,7 @@ impl Smoothed {
         }
     }
 
-    /// What the recording has of its own; none where it has nothing.
+    /// The states that only this recording has; `None` if it has none.
     pub fn of_recording(filter: &Filter) -> Option<Self> {
         let (states, own): (Vec<usize>, Vec<OwnState>) = filter.layout.own.iter().copied().unzip();
         let first = *states.first()?;

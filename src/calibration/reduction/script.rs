@@ -12,7 +12,7 @@ use crate::imu::{PerSensor, Sensor};
 
 /// Rows of a dwell are kept apart for each second …
 const APART: f64 = 1.0;
-/// … or for so many times in a recording, if that is longer.
+/// … or for each of this many parts of a recording, if these are longer.
 const EPOCHS: f64 = 3600.0;
 
 /// What happens at one point of linearisation, whatever the noise.

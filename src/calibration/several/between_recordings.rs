@@ -107,8 +107,8 @@ impl RecordingEvidence {
     }
 }
 
-/// What takes what all recordings have in common, in prior σ, to the parameters of one: themselves, and so many functions
-/// of its temperature.
+/// Matrix from the common quantities of all recordings to the parameters of one, both in prior σ. Common are the
+/// parameters themselves and, of each, coefficients of the first `functions` functions of temperature.
 fn common(
     model: &Model,
     indices: &[usize],

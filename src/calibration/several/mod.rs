@@ -36,7 +36,7 @@ pub use temperatures::TemperatureOptions;
 pub struct Together {
     /// By how much they differ. Without a table the body axes go with the accelerometers, however they are mounted.
     pub day_to_day: DayToDay,
-    /// How parameters follow temperature; none where they do not.
+    /// How parameters follow temperature; `None` if they do not.
     pub temperature: Option<TemperatureOptions>,
 }
 

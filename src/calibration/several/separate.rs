@@ -132,7 +132,7 @@ fn of(
     Ok((alone, contradicted))
 }
 
-/// Mean temperature of each axis in the middles of a recording's dwells, °C; none where it is not known.
+/// Mean temperature of each axis in the middles of a recording's dwells, °C; `None` if unknown.
 fn middle_temperature(recording: &Problem) -> Option<PerSensor<[f64; 3]>> {
     let imu = &recording.run().recording.imu;
     let temperature = imu.temperature.as_ref()?;

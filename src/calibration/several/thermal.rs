@@ -109,8 +109,8 @@ impl Thermal {
         (ParameterVector::from_fn(|i, _| change[i]), at)
     }
 
-    /// The highest order that is on of each parameter of a triad, none where it does not change, and whether its rate
-    /// is on.
+    /// Number of temperature functions that are on for this parameter, zero if it does not change with temperature, and
+    /// whether its rate term is on.
     pub fn order(&self, index: usize) -> (usize, bool) {
         let of = |c: &&Coefficient| c.index() == index;
         let functions = self.coefficients.iter().filter(of).map(|c| c.function + 1);

@@ -65,7 +65,7 @@ pub struct Part {
     /// Numbers of the runs in it, from zero; none if it is all.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub holds: Vec<u64>,
-    /// SHA-256 of the file of results beside it.
+    /// SHA-256 of the file of results in the same directory.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub results: Option<String>,
 }

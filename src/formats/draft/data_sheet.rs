@@ -44,7 +44,7 @@ impl Scale {
         })
     }
 
-    /// Of the accelerometers' axes by gravity at rest, of rows so many of which are a second.
+    /// Scale of the accelerometers' axes from gravity at rest, for this number of rows per second.
     pub fn of_gravity(gravity: &Gravity, per_second: f64) -> Self {
         let Axes { scale, sigma, .. } = gravity.axes;
         let is_sure = sigma < TOLERANCE;

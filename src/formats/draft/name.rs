@@ -192,7 +192,7 @@ impl Name {
         self.unit.is_some_and(|unit| unit.of == Of::Time)
     }
 
-    /// Whole seconds of a time that goes on in another column, or what goes on there.
+    /// Whether this column holds one part of a time that is split over two: whole seconds, or their fraction.
     pub fn is_part_of_time(&self, word: &str) -> bool {
         self.unit
             .or_else(|| unit(&self.whole()))

@@ -59,7 +59,7 @@ impl Input {
         self.length.saturating_sub(self.offset)
     }
 
-    /// Reads so many bytes, all of which must be there; `what` they are.
+    /// Reads `count` bytes, all of which must exist; `what` names them in errors.
     pub fn take(&mut self, count: u64, into: &mut Vec<u8>, what: &str) -> Result<(), Broken> {
         into.clear();
         if count > self.left() {
@@ -97,7 +97,7 @@ impl Input {
         Ok(())
     }
 
-    /// Passes over so many bytes.
+    /// Skips `count` bytes.
     pub fn skip(&mut self, count: u64, what: &str) -> Result<(), Broken> {
         if count > self.left() {
             let found = format!("{} bytes to the end of the file", self.left());

@@ -1,6 +1,6 @@
 //! Logs as other programs write them: a file gives streams of samples.
 //!
-//! A format is told by the file's first bytes, never by its name. Each is a feature of the crate.
+//! A format is identified by the file's first bytes, never by its name. Each is a feature of the crate.
 
 #[cfg(any(feature = "hdf5", feature = "mat", feature = "npy"))]
 mod arrays;

@@ -9,7 +9,7 @@ use crate::run::Run;
 use crate::run::motion::{LabelCheck, Rest, Turn, Verdict};
 use crate::survey::Survey;
 
-/// Faults beyond so many are not listed one by one.
+/// Largest number of faults listed one by one.
 const LISTED: usize = 20;
 
 pub fn log_columns(run: &Run) -> Table {

@@ -181,7 +181,7 @@ fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
     moves.collect()
 }
 
-/// What both logs say of these samples; none where readings are too far apart, or nothing turns.
+/// The move over these samples according to both logs; `None` if readings are too far apart, or nothing turns.
 fn of_samples(
     run: &Run,
     table: &TableLog,

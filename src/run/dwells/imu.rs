@@ -17,8 +17,8 @@ use crate::units::DEG_PER_H;
 const WINDOW: f64 = 0.25;
 /// Windows in a row that make a standstill: after a hand has let go a sensor still swings.
 const FEWEST: usize = 4;
-/// A standstill of so many seconds between two moves is found wherever it lies: a window may lie across either end
-/// of it, the next one has not the same beside it, and the one after that is left out as too gentle a move.
+/// A standstill of this many seconds between two moves is always found. Its ends cut up to one window in all; at each
+/// end, the next window differs from its neighbour, and the one after is dropped because it may be a gentle move.
 pub const LONG_ENOUGH: f64 = (1 + 2 * 2 + FEWEST) as f64 * WINDOW;
 /// Output at rest is within this many σ of its noise …
 pub const STILL_SIGMAS: f64 = 6.0;
@@ -26,10 +26,10 @@ pub const STILL_SIGMAS: f64 = 6.0;
 pub const STILL_RATE: f64 = 100.0 * DEG_PER_H;
 /// … and specific force within this, m/s²: a turn of 0.02°.
 const STILL_FORCE: f64 = 3e-3;
-/// False-alarm rate of the test that ends a standstill where a window differs from the windows beside it: an axis
-/// has begun to turn, or still settles. A false alarm costs a window.
+/// False-alarm rate of the test that ends a standstill at a window that differs from its neighbours: an axis
+/// has started to turn, or still settles. A false alarm costs a window.
 const SETTLED: f64 = 0.01;
-/// Windows beside it.
+/// Number of neighbouring windows it is compared with.
 const BESIDE: usize = 2 * FEWEST;
 /// A bias that warms moves by less than [`STILL_RATE`] in this time, s.
 const WARMING: f64 = 20.0;
@@ -100,7 +100,7 @@ impl Windows {
         still
     }
 
-    /// The part of a standstill at whose ends the output is what it is beside them.
+    /// The part of a standstill at whose ends the output agrees with its neighbouring windows.
     fn settled(&self, standstill: Range<usize>) -> Range<usize> {
         let Range { mut start, mut end } = standstill;
         let limit = chi_square_limit(3.0, SETTLED);

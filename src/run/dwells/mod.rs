@@ -61,7 +61,7 @@ impl Run {
     fn labelled_dwells(&self) -> Vec<Dwell> {
         let standstills = imu::standstills(self);
         let within = |segment: &Segment| {
-            // A row at the edge of a section may be of the one beside it.
+            // A row at the edge of a section may belong to the adjacent one.
             let samples = segment.samples.start + 1..segment.samples.end.saturating_sub(1);
             let dwell = |standstill| Dwell::of(common(standstill, &samples));
             let is_long = |dwell: &Dwell| dwell.duration(&self.recording.imu) >= SHORTEST;

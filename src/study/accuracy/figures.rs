@@ -25,7 +25,7 @@ pub struct Figures {
     pub gain_in_equal_time: Option<Ratio>,
 }
 
-/// Mean squares of one run; none where a method gave nothing.
+/// Mean squares of one run; `None` if a method failed.
 #[derive(Default)]
 pub struct Squares {
     pub filter: Option<f64>,

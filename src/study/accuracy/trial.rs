@@ -32,7 +32,7 @@ pub struct Trial {
     pub auxiliary_bound: AuxiliaryVector,
     /// What the error terms did to the filter; of the first run only.
     pub effects: Vec<ErrorTermTest>,
-    /// Error of the closed form for each part of its dwells; none where it failed.
+    /// Error of the closed form for each part of its dwells; `None` if it failed.
     pub(super) closed_form: Vec<Option<ParameterVector>>,
 }
 
@@ -49,7 +49,7 @@ pub struct Filtered {
     pub auxiliary_error: AuxiliaryVector,
     /// σ that it claims of them.
     pub auxiliary_sigma: AuxiliaryVector,
-    /// NEES/n of the parameters and the constants beside them.
+    /// NEES/n of the parameters and the auxiliary constants.
     pub nees: Option<Nees>,
     /// Number of passes.
     pub passes: usize,
@@ -177,7 +177,7 @@ impl Filtered {
     }
 }
 
-/// NEES of the parameters, in the general form, and the constants beside them together.
+/// Joint NEES of the parameters, in the general form, and the auxiliary constants.
 fn whole_nees(
     outcome: &Outcome,
     estimate: &Estimate,

@@ -18,7 +18,7 @@ pub struct Outlook {
     /// Its 1σ predicted from the calibration's covariance, in the order of
     /// [`NavigationError::to_vector`].
     pub sigma: SVector<f64, STATES>,
-    /// The actual error; none where the truth is not known.
+    /// The actual error; `None` if the truth is not known.
     pub error: Option<NavigationError>,
 }
 
@@ -33,7 +33,7 @@ const DURATIONS: [f64; 17] = [
     1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 1800.0, 3600.0, 7200.0,
     14_400.0, 36_000.0, 144_000.0,
 ];
-/// At least so many moments make a curve.
+/// Fewest moments of a curve.
 const MOMENTS: f64 = 20.0;
 
 impl Mission {
@@ -54,7 +54,7 @@ impl Mission {
         ))
     }
 
-    /// Standing level for so many seconds.
+    /// Standing level for `duration` seconds.
     fn lasting(site: &Site, duration: f64) -> Self {
         let interval = INTERVAL.min(duration / MOMENTS);
         Self {

@@ -230,7 +230,7 @@ impl FoundCause {
         }
     }
 
-    /// As what is left with it taken in shows: chance is as wide as that beside what lasts throughout.
+    /// A lasting cause (Earth rate) gets the chance level found while it is estimated; other causes are unchanged.
     pub fn beside_what_it_leaves(self, left: &Causes) -> Self {
         match self.is_lasting() {
             true => self.beside(left.chance, self.limit),

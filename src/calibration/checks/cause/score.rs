@@ -34,7 +34,7 @@ pub struct Scores {
 }
 
 impl Scores {
-    /// Of those that are off; none where rounding has the last word.
+    /// Scores of the constants that `is_off` selects; `None` if rounding makes the information matrix singular.
     pub fn new(
         reduction: &Reduction,
         prior: &Prior,
@@ -66,8 +66,8 @@ impl Scores {
         })
     }
 
-    /// χ² of a cause if it is none, its degrees of freedom and its components; none where the data do not show it, or
-    /// not all of what happened once. An error term is of its usual size, and without components.
+    /// χ² of a cause under the null hypothesis, its degrees of freedom and its components; `None` if the cause is not
+    /// observed, or a single event only in part. An error term has its usual size, and no components.
     pub fn explained_by(&self, cause: Cause) -> Option<(f64, f64, Vector3<f64>)> {
         let constants = self.constants.iter().enumerate();
         let of = constants.filter(|(_, constant)| Cause::of(constant) == Some(cause));

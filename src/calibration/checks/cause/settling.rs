@@ -14,9 +14,9 @@ use crate::statistics::{FALSE_ALARM, chi_square_limit, median};
 /// A table settles within this time, s: what lasts longer is something else.
 const LONGEST: f64 = 3.0;
 
-/// Steps of a dwell in which the attitude of a table settles after a stop: so many of its readings are off those in the
-/// time after them beyond chance, which is as wide as half of all show. What the gyros sensed is taken off; whether a
-/// gate let the readings in does not count. A hand never settles.
+/// Number of steps at the start of a dwell in which a table settles: its readings there differ significantly from the
+/// later ones. The median over all steps gives the chance level. The rotation that the gyros sensed is subtracted;
+/// readings count whether or not a gate accepted them. Zero without a table.
 ///
 /// # Errors
 /// As of navigation.

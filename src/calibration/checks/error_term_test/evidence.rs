@@ -36,7 +36,7 @@ impl Evidence {
         }
     }
 
-    /// The χ² that it is by chance, and its degrees of freedom; none where the data show nothing of it.
+    /// The gain as a χ² under the null hypothesis, and its degrees of freedom; `None` if the term is not observed.
     pub fn chi_square(&self) -> Option<(f64, f64)> {
         (self.states > 0.0).then(|| (self.gain / self.share, self.states))
     }

@@ -98,9 +98,9 @@ impl ErrorTermTest {
         self.gain > self.limit.max(1.0)
     }
 
-    /// Of error terms that are off and that the data show, the likeliest, with those that cannot be told
-    /// from it and those that are also significant with it on. `growth` is that of σ by leaving them off;
-    /// none where σ do not include it.
+    /// Finding about the likeliest disabled error term that the data show, with the terms that cannot be
+    /// distinguished from it and those that remain significant with it on. `growth` is the factor by which
+    /// σ were widened because these terms are off; `None` if σ do not include it.
     pub fn most_significant(tests: &[Self], growth: Option<f64>) -> Option<Finding> {
         let likeliest = tests.iter().find(|test| test.role == Role::Likeliest)?;
         let names = |role: Role| -> Vec<&str> {

@@ -1,4 +1,4 @@
-//! The list that tells what turncal wrote into a directory from what a user put beside it.
+//! The list that distinguishes files that turncal wrote into a directory from files that a user added.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;

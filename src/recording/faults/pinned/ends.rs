@@ -134,8 +134,8 @@ impl Axis<'_> {
         at_end.any(|run| !self.is_level(run))
     }
 
-    /// Whether a run lies on a level that continues beside it, as that of a steady turn; at the end of a range
-    /// the truth comes from one side and goes back there.
+    /// Whether the values before and after a run lie at its level, as in a steady turn; at the end of a range
+    /// the true value comes from one side and returns to it.
     fn is_level(&self, run: &Range<usize>) -> bool {
         let value = self.values[run.start];
         let before = &self.values[run.start.saturating_sub(1 + BESIDE)..run.start - 1];
