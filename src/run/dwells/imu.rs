@@ -1,4 +1,4 @@
-//! Standstills in what the instrument itself says.
+//! Standstills found in the output of the instrument.
 
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, SQRT_2};
 use std::ops::Range;
@@ -15,7 +15,7 @@ use crate::units::DEG_PER_H;
 
 /// Length of the windows whose means are compared, s.
 const WINDOW: f64 = 0.25;
-/// Windows in a row that make a standstill: after a hand has let go a sensor still swings.
+/// Fewest consecutive windows of a standstill: after a hand has let go, a sensor still swings.
 const FEWEST: usize = 4;
 /// A standstill of this many seconds between two moves is always found. Its ends cut up to one window in all; at each
 /// end, the next window differs from its neighbour, and the one after is dropped because it may be a gentle move.
@@ -38,7 +38,7 @@ const BIAS_SIGMAS: f64 = 6.0;
 
 /// Mean output of a triad over each window.
 struct Windows {
-    /// Not a number where samples are missing, so that nothing is at rest or steady there.
+    /// NaN where samples are missing, so that no window counts as at rest or steady there.
     means: Vec<Vector3<f64>>,
     /// 1σ per axis of their noise.
     sigma: f64,
@@ -69,8 +69,8 @@ impl Windows {
         }
     }
 
-    /// Whether the gyros are at rest in each window, of those that may be. Their output at rest is what most windows say
-    /// that a bias could make; from the nearest of these on it is followed both ways as it warms.
+    /// Whether the gyros are at rest in each candidate window. Their output at rest is the median of windows that a
+    /// bias could explain; from the window nearest to it, its drift with warm-up is tracked in both directions.
     fn at_rest(&self, run: &Run, rate: f64, may_be: impl Fn(usize) -> bool) -> Vec<bool> {
         let prior = &run.instrument.prior.gyro;
         let limit = (prior.bias_sigma * BIAS_SIGMAS).add_scalar(ROTATION_RATE + rate);
@@ -120,7 +120,7 @@ impl Windows {
     }
 }
 
-/// Samples during which the gyros say what they say at rest and the accelerometers do not change.
+/// Samples during which the gyros give their output at rest and the accelerometers do not change.
 pub fn standstills(run: &Run) -> Vec<Range<usize>> {
     let imu = &run.recording.imu;
     let length = samples_of(WINDOW, imu.period);
