@@ -1,16 +1,17 @@
-//! White noise of a record of which nothing is stated.
+//! White noise of a record without stated noise.
 
 use crate::imu::Sensor;
 use crate::recording::ImuSamples;
 
-/// Length of the sums that are compared, s: long enough that whole pulses do not show.
+/// Length of the sums that are compared, s: long enough that the rounding of pulses is negligible.
 const SUM: f64 = 0.25;
-/// A third of normal deviates is below this, σ: if three quarters of a record are at rest, the first quarter of all is the
-/// first third of these. If half of it or all of it is, the noise is 1.6 or 0.74 times what it should be.
+/// A third of normal deviates lie below this, σ. If three quarters of a record are at rest, the lowest quarter of all
+/// deviates is the lowest third of those at rest. If half of it or all of it is, the noise is 1.6 or 0.74 times the true
+/// one.
 const FIRST_THIRD: f64 = 0.430_727;
 
-/// Random walk of a triad, rad/√s or (m/s)/√s, as the quieter part of a record shows it: by second differences of sums,
-/// which neither a bias nor its drift changes.
+/// Random walk of a triad, rad/√s or (m/s)/√s, estimated from the quieter part of a record: from second differences of
+/// sums, which neither a bias nor its drift affects.
 pub fn white_noise(imu: &ImuSamples, sensor: Sensor) -> f64 {
     let length = ((SUM / imu.period).round() as usize).max(1);
     let mut differences = Vec::new();
