@@ -6,8 +6,8 @@ use crate::recording::ImuSamples;
 /// Length of the sums that are compared, s: long enough that the rounding of pulses is negligible.
 const SUM: f64 = 0.25;
 /// A third of normal deviates lie below this, σ. If three quarters of a record are at rest, the lowest quarter of all
-/// deviates is the lowest third of those at rest. If half of it or all of it is, the noise is 1.6 or 0.74 times the true
-/// one.
+/// deviates is the lowest third of those at rest. If half of it or all of it is, the estimate is 1.6 or 0.74 times the
+/// noise.
 const FIRST_THIRD: f64 = 0.430_727;
 
 /// Random walk of a triad, rad/√s or (m/s)/√s, estimated from the quieter part of a record: from second differences of

@@ -267,7 +267,8 @@ impl<'a> Search<'a> {
         self.judged(mixture, &covariance)
     }
 
-    /// Whether every process of a mixture and its sum at every point are finite and positive.
+    /// Whether every process of a mixture contributes and is positive, except quantisation, which may be negative if it
+    /// models a bandwidth, and whether the sum is positive at every point.
     fn is_possible(&self, mixture: &[(Process, f64)]) -> bool {
         let (tau, variance) = (self.tau(), self.variance());
         let is_there = |&(process, strength): &(Process, f64)| {

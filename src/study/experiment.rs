@@ -1,9 +1,9 @@
 //! The paper's turntable experiment (§3.3, Figure 10) as a simulation: instruments are calibrated by
 //! the closed form and by the filter, and navigate with the errors that remain.
 //!
-//! A calibration's navigation error is `error(t) = (S(t) + Φ(t) X₀) δθ`: S what the parameter errors
-//! δθ do on the way, X₀ what they did to the alignment at the start. Both are linear, so each mission
-//! is followed once and serves every calibration.
+//! The navigation error of a calibration is `error(t) = (S(t) + Φ(t) X₀) δθ`: S is the effect of the
+//! parameter errors δθ during the mission, X₀ their effect on the initial alignment. Both are linear, so
+//! each mission is computed once for all calibrations.
 
 mod budget;
 mod method;
@@ -59,7 +59,7 @@ pub enum ExperimentError {
     /// A path that belongs to the experiment cannot be had.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// A path is beyond the table.
+    /// The table cannot follow a path.
     #[error(transparent)]
     Table(#[from] TableError),
     /// A mission cannot be navigated.
@@ -67,7 +67,7 @@ pub enum ExperimentError {
     Navigation(#[from] NavigationStudyError),
 }
 
-/// How an instrument navigates.
+/// Situation in which an instrument navigates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Situation {
     /// It stands level, heading North, and has found its attitude by itself.
