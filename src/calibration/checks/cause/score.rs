@@ -1,21 +1,21 @@
-//! Score and information of constants that are not estimated, beside those that are.
+//! Score and information of constants that are not estimated, given the estimated ones.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::calibration::checks::error_term_test::Evidence;
 use crate::calibration::{Constant, Disturbance, ErrorTerm, Prior, Reduction};
 
-/// What explains a record better than its model.
+/// A cause that explains a record better than its model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cause {
-    /// Something happened once.
+    /// A single event.
     Disturbance(Disturbance),
-    /// An error term is there.
+    /// An error term.
     Term(ErrorTerm),
 }
 
 impl Cause {
-    /// What a constant is of, if it is of a cause.
+    /// The cause to which a constant belongs, if any.
     pub fn of(constant: &Constant) -> Option<Self> {
         match *constant {
             Constant::Disturbance(of, _) => Some(Self::Disturbance(of)),
@@ -24,10 +24,10 @@ impl Cause {
     }
 }
 
-/// Scores of the constants that are not estimated, beside those that are.
+/// Scores of the constants that are not estimated, given the estimated ones.
 pub struct Scores {
     constants: Vec<Constant>,
-    /// 1σ of each before the data.
+    /// Prior 1σ of each.
     sigma: DVector<f64>,
     score: DVector<f64>,
     information: DMatrix<f64>,
