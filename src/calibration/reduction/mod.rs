@@ -1,8 +1,8 @@
-//! What a record says of the constants, at one point of linearisation and with given noise.
+//! Information of a record on the constants, at one linearisation point and with given noise.
 //!
-//! The Kalman filter runs over what moves and what is drawn anew; constants are columns that it carries (see
-//! [`super::filter::columns`]). Each dwell leaves whitened rows `[G ν]`, so that `ν = G c + noise of σ 1`: with a prior they
-//! give the estimate of any part of the constants, without another pass.
+//! The Kalman filter has the moving and the redrawn states; constants are columns that it propagates (see
+//! [`super::filter::columns`]). Each dwell gives whitened rows `[G ν]` with `ν = G c + noise of σ 1`: with a prior,
+//! they give the estimate of any subset of the constants, without another pass.
 
 mod script;
 
@@ -18,35 +18,35 @@ use crate::calibration::{
 };
 pub use script::{Moves, Script};
 
-/// Whitened rows of all dwells, and the states that go with them.
+/// Whitened rows of all dwells, and the dependent states.
 #[derive(Debug, Clone)]
 pub struct Reduction {
-    /// The constants that rows have columns of; the last column is what was observed.
+    /// The constants of the columns; one more column, the last, is the observation.
     pub constants: Vec<Constant>,
     pub parts: Vec<Part>,
-    /// Squares that no constant has a part in.
+    /// Sum of squares independent of all constants.
     pub squares: f64,
-    /// Logarithm of the determinant of the covariance of all that was observed, the constants given.
+    /// Logarithm of the determinant of the covariance of all observations, given the constants.
     pub log_determinant: f64,
     /// Initial attitude of each stretch.
     pub attitudes: Vec<Smoothed>,
-    /// What each recording has of its own; empty where none has anything.
+    /// States that belong to one recording only, for each recording; empty if there are none.
     pub own: Vec<Smoothed>,
-    /// Gravity at the last site, where there are several.
+    /// Gravity at the last site, if there are several.
     pub gravity: Option<Smoothed>,
 }
 
-/// What a part of a dwell left.
+/// Rows of a part of a dwell.
 #[derive(Debug, Clone)]
 pub struct Part {
     /// Number of the dwell.
     pub dwell: usize,
-    /// When it ended, s.
+    /// Time of its end, s.
     pub time: f64,
     pub rows: DMatrix<f64>,
 }
 
-/// What was known of the parameters of both triads at one time.
+/// Estimate of the parameters of both triads at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Epoch {
     /// Time, s.
@@ -188,12 +188,12 @@ pub struct Smoothed {
     own: Vec<OwnState>,
 }
 
-/// By how much a recording differs from what all recordings have in common.
+/// Deviation of a recording from the common parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Own {
     /// The estimate.
     pub values: Difference,
-    /// 1σ; zero of what is common to all.
+    /// 1σ; zero for parameters common to all.
     pub sigma: Difference,
 }
 
