@@ -1,4 +1,4 @@
-//! What iterations found, and with what they were made.
+//! Result of the iterations, with the problem that was solved.
 
 use crate::calibration::{
     AttitudePrior, CalibrationError, Estimate, Finding, FoundCause, Gate, Iterated, Linearisation,
@@ -6,7 +6,7 @@ use crate::calibration::{
 };
 use crate::imu::{PerSensor, ThermalState};
 
-/// What a recording alone says.
+/// A recording calibrated alone.
 #[derive(Debug, Clone)]
 pub struct SeparateEstimate {
     /// Its name.

@@ -77,7 +77,7 @@ impl Certificate {
     /// The certificate of a calibration whose file has this SHA-256.
     ///
     /// # Errors
-    /// [`CertificateError`] where the calibration may not be used, or something is missing.
+    /// [`CertificateError`] if the calibration may not be used, or something is missing.
     pub fn new(
         calibration: Calibration,
         sha256: String,

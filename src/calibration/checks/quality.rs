@@ -78,7 +78,7 @@ impl Outcome {
     /// linearisation point of the last pass, and no other information from it.
     ///
     /// # Errors
-    /// [`CalibrationError`] where the problem is not the one of the outcome.
+    /// [`CalibrationError`] if the problem is not the one of the outcome.
     pub fn quality(&self, problem: &Problem) -> Result<Quality, CalibrationError> {
         let problem = &self.as_calibrated(problem);
         let estimate = Linearisation {
@@ -106,7 +106,7 @@ impl ClosedForm {
     /// [`Outcome::quality`].
     ///
     /// # Errors
-    /// [`CalibrationError`] where the problem is not the one of the closed form.
+    /// [`CalibrationError`] if the problem is not the one of the closed form.
     pub fn quality(&self, problem: &Problem) -> Result<Quality, CalibrationError> {
         let run = problem.run();
         let of = |triads: &PerSensor<Triad>, judged: &dyn Fn(usize) -> bool| {

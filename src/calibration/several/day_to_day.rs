@@ -1,4 +1,4 @@
-//! What differs between recordings of one instrument: parameters from one day to the next, and how it is mounted.
+//! Differences between recordings of one instrument: parameters from day to day, and mounting.
 
 use nalgebra::{SMatrix, Vector3};
 
@@ -19,22 +19,22 @@ pub struct Turned {
     pub by_mounting: SMatrix<f64, PARAMETERS, 3>,
 }
 
-/// 1σ by which recordings of one instrument differ.
+/// 1σ of the differences between recordings of one instrument.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct DayToDay {
-    /// Of each parameter, normalised; zero where it is common to all.
+    /// 1σ of each parameter, normalised; zero if it is common to all.
     pub parameters: ParameterVector,
-    /// Of the turn of the whole instrument on its mounting face, about each body axis, rad.
+    /// 1σ of the rotation of the whole instrument on its mounting face, about each body axis, rad.
     pub mounting: f64,
 }
 
-/// By how much one recording differs from what all have in common; or 1σ of that.
+/// Deviation of one recording from the common parameters, or its 1σ.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Difference {
     /// Added to each parameter, normalised.
     pub parameters: ParameterVector,
-    /// Rotation vector of the whole instrument on its mounting face, body axes, rad: what the face senses as u
-    /// the instrument senses as `R(ψ)ᵀ u`.
+    /// Rotation vector ψ of the whole instrument on its mounting face, body axes, rad: for the input u of the face, the
+    /// instrument senses `R(ψ)ᵀ u`.
     pub mounting: Vector3<f64>,
 }
 

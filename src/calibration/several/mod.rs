@@ -1,9 +1,9 @@
-//! Several recordings of one instrument as one problem: what they have in common is estimated once, what is
-//! each one's own differs by a stated σ, and parameters may follow temperature.
+//! Several recordings of one instrument as one problem: common parameters are estimated once, differences between
+//! recordings have a stated σ, and parameters may depend on temperature.
 //!
-//! Each recording is first calibrated alone, on a thread of its own. Through these estimates go the polynomials
-//! from which the Gauss–Newton iterations of all data begin; with all orders that the temperatures support,
-//! then with those that a likelihood ratio calls for.
+//! Each recording is first calibrated alone, on its own thread. Polynomials through these estimates are the start of
+//! the Gauss–Newton iterations on all data: first with all orders that the temperatures support, then with those
+//! that a likelihood-ratio test selects.
 
 pub mod day_to_day;
 pub mod separate;
@@ -31,12 +31,12 @@ use crate::run::{Aiding, Run};
 pub use repeat::Repeatability;
 pub use temperatures::TemperatureOptions;
 
-/// What recordings of one instrument have in common, and what not.
+/// Common and individual properties of recordings of one instrument.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Together {
-    /// By how much they differ. Without a table the body axes go with the accelerometers, however they are mounted.
+    /// σ of their differences. Without a table, the body axes are those of the accelerometers, whatever the mounting.
     pub day_to_day: DayToDay,
-    /// How parameters follow temperature; `None` if they do not.
+    /// Temperature dependence of the parameters; `None` if there is none.
     pub temperature: Option<TemperatureOptions>,
 }
 
@@ -50,11 +50,11 @@ impl Default for Together {
 }
 
 impl<'a> Problem<'a> {
-    /// The problem that recordings of one instrument pose together. The first one's instrument and table stand for
-    /// all; one without a dwell is left out, and a finding says so.
+    /// The joint problem of several recordings of one instrument. The instrument and table of the first apply to all;
+    /// a recording without a dwell is dropped with a finding.
     ///
     /// # Errors
-    /// [`CalibrationError`] if there is none, or one has no temperature where parameters follow it.
+    /// [`CalibrationError`] if there is no recording, or if one has no temperature although parameters depend on it.
     pub fn together(
         runs: &[&'a Run],
         options: &Options,

@@ -1,4 +1,4 @@
-//! The temperatures of recordings: range, and how many of them are distinct.
+//! The temperatures of recordings: range, and number of distinct temperatures.
 
 use crate::calibration::problem::Stretch;
 use crate::calibration::{CalibrationError, Problem, parameter};
@@ -14,14 +14,14 @@ const ONE_TEMPERATURE: f64 = 1.0;
 /// instrument of its grade, so that the data decide.
 const CHANGE: f64 = 3.0;
 
-/// How parameters follow temperature.
+/// Options for the temperature dependence of parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TemperatureOptions {
-    /// Highest order of the polynomials that is tried, at most [`HIGHEST_ORDER`].
+    /// Highest order of the polynomials that are tried, at most [`HIGHEST_ORDER`].
     pub highest_order: usize,
-    /// Whether biases may follow the rate of temperature, too.
+    /// Whether biases may depend on the rate of temperature, too.
     pub rate: bool,
-    /// At which parameters are stated, °C; none: in the middle of the range.
+    /// Reference temperature of the parameters, °C; `None` for the middle of the range.
     pub reference: Option<f64>,
 }
 

@@ -24,10 +24,10 @@ use crate::imu::{BodyFrame, PerSensor, Sensor};
 use crate::run::motion::rests;
 use crate::run::{Aiding, Dwell};
 
-/// A reference vector within this cosine of a body axis makes a position of the six.
+/// Cosine above which a reference vector lies along a body axis, so that its position is one of the six.
 const ALONG_AXIS: f64 = 0.9998;
 
-/// Where the inputs of a closed form are known from.
+/// Source of the reference inputs of a closed form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reference {
     /// Attitudes of the table's log.
@@ -39,7 +39,7 @@ pub enum Reference {
 }
 
 impl Reference {
-    /// What fixes the body axes.
+    /// The body frame that this reference defines.
     pub fn body_frame(self) -> BodyFrame {
         match self {
             Self::Table | Self::Labels => BodyFrame::Table,
@@ -51,9 +51,9 @@ impl Reference {
 /// A closed-form calibration of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClosedForm {
-    /// The estimate; its σ follow from random walk, pulses and how well the inputs are known.
+    /// The estimate; its σ follow from random walk, pulses and the uncertainty of the inputs.
     pub estimate: Estimate,
-    /// Where the inputs are known from.
+    /// Source of the reference inputs.
     pub reference: Reference,
     /// Dwells or labelled positions used for each triad.
     pub positions: PerSensor<usize>,
@@ -61,14 +61,14 @@ pub struct ClosedForm {
     pub turns: usize,
     /// Total time of all dwells used, s.
     pub standing_time: f64,
-    /// Noise that was learnt; `None` if it is as stated.
+    /// The estimated noise; `None` if the stated noise is used.
     pub noise: Option<NoiseReport>,
-    /// What a calibration engineer must know before using the figures.
+    /// Findings that a calibration engineer must know before using the figures.
     pub findings: Vec<Finding>,
 }
 
 impl ClosedForm {
-    /// Whether it may be used: noise explains what it leaves.
+    /// Whether it may be used: noise explains its residuals.
     pub fn is_usable(&self) -> bool {
         !self
             .findings
@@ -79,13 +79,13 @@ impl ClosedForm {
 
 /// Calibrates both triads of a run without a filter.
 ///
-/// With a table's log, from its dwells: where they hold the paper's six positions of a triad (Earth
-/// rate or gravity along each body axis, both ways) from those, else from all. Without, from labelled
-/// sections; without those, from every dwell and turn by gravity alone. Least squares over six
-/// positions is the paper's half sums and half differences where they are exactly opposite.
+/// With a table's log, it uses the dwells: the paper's six positions of a triad (Earth rate or gravity along each
+/// body axis, in both directions) if there are such, else all dwells. Without a table it uses labelled sections;
+/// without those, every dwell and turn with gravity as the only reference. For exactly opposite positions, least
+/// squares equals the half sums and half differences of the paper.
 ///
 /// # Errors
-/// [`CalibrationError`] if nothing is at rest. What the positions do not determine keeps its prior.
+/// [`CalibrationError`] if there is no dwell. Parameters that the positions do not determine keep their prior.
 pub fn six_position(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     let sections = &problem.run().recording.segments;
     let reference = if problem.model.aiding == Aiding::Table {
