@@ -13,19 +13,19 @@ use super::error_term::TermArgument;
 /// Arguments that say how.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Estimation {
-    /// How to estimate
+    /// Estimation method
     #[arg(long, value_enum, default_value_t = Method::Ekf)]
     pub method: Method,
-    /// How installation angles make the installation matrix
+    /// Form of the installation matrix
     #[arg(long, value_enum, default_value_t = Installation::General)]
     pub installation: Installation,
-    /// What is observed [default: table if the run has its log, else velocity]
+    /// Observations of the filter [default: table if the run has its log, else velocity]
     #[arg(long, value_enum)]
     aiding: Option<Aiding>,
-    /// Error terms to estimate, beside those that the run switches on [default: those that the data call for]
+    /// Error terms to estimate, in addition to those that the run switches on [default: those that the data support]
     #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
     with: Vec<TermArgument>,
-    /// Which noise the filter uses
+    /// Noise used by the filter
     #[arg(long, value_enum, default_value_t = Noise::default())]
     noise: Noise,
 }

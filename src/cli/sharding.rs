@@ -13,7 +13,7 @@ use super::progress::Runs;
 /// The part of a study that is to be made.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub struct Sharding {
-    /// Make part i of M of the runs into DIR, to be merged with the others
+    /// Make part i of M of the runs into DIR, for turncal merge
     #[arg(long, value_name = "i/M", value_parser = shard, requires = "output", conflicts_with = "json")]
     shard: Option<Shard>,
 }
