@@ -78,7 +78,7 @@ pub fn student_limit(degrees: f64, chance: f64) -> f64 {
     }
 }
 
-/// The median of some numbers, which lose their order; none of none.
+/// The median of some numbers, which lose their order; `None` without values.
 pub fn median(values: &mut [f64]) -> Option<f64> {
     (!values.is_empty()).then(|| Data::new(values).median())
 }

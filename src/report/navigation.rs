@@ -28,7 +28,7 @@ pub struct Navigation<'a> {
     pub terms: bool,
     /// What fixes the body axes.
     pub body_frame: BodyFrame,
-    /// The triad whose errors were navigated with; none: both.
+    /// The triad whose errors were navigated with; `None` for both.
     pub only: Option<Sensor>,
     /// How the body moved, and how long.
     pub mission: &'a Mission,

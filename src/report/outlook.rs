@@ -169,7 +169,7 @@ fn row(navigated: &[Navigated], quantity: Quantity, of: Of) -> Vec<String> {
     row
 }
 
-/// Position error east and north against time; none if nothing was navigated.
+/// Position error east and north against time; `None` if nothing was navigated.
 pub fn figure(navigated: &[Navigated]) -> Option<Plot> {
     let last = navigated.last()?;
     let (heading, mut caption) = match is_known(navigated) {

@@ -126,7 +126,7 @@ pub struct Worth {
     /// Time in s against the median.
     pub against_time: Vec<(f64, f64)>,
     /// Median of the closed form in the same installation form over that of this method, both at the
-    /// end; none for the closed form itself.
+    /// end; `None` for the closed form itself.
     pub gain: Option<Ratio>,
     /// What the claimed covariance says of the error at the end.
     pub budget: Budget,

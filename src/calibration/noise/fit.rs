@@ -257,7 +257,7 @@ impl Likelihood<'_> {
         Ok((at, deviance))
     }
 
-    /// The point at the longest fraction of a step that lowers the cost; none if none does.
+    /// The point at the longest fraction of a step that lowers the cost; `None` if there is no such step.
     fn shortened(
         &self,
         at: &Factors,

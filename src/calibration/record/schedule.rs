@@ -36,7 +36,7 @@ pub struct AtRest {
 /// What is known of a dwell as a whole.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WholeDwell {
-    /// Mean of the table's readings, `C_b_n`; none without a table.
+    /// Mean of the table's readings, `C_b_n`; `None` without a table.
     pub attitude: Option<Matrix3<f64>>,
     /// How the table's attitude turns with errors of its axes, where their angles are known.
     pub axes: Option<Arc<AxisResponse>>,

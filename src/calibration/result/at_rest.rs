@@ -264,7 +264,7 @@ fn row(range: &ThermalRange, functions: &[usize], temperature: f64, rate: f64) -
     )
 }
 
-/// Root mean square; none of none.
+/// Root mean square; `None` without values.
 fn rms(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (sum, count) = values.fold((0.0, 0usize), |(sum, n), x| (sum + x * x, n + 1));
     (count > 0).then(|| (sum / count as f64).sqrt())

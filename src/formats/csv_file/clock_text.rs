@@ -87,7 +87,7 @@ fn parts(text: &str) -> Option<(f64, &str)> {
 }
 
 impl ClockText {
-    /// Of a column of which these are the texts in the first rows; none if plain numbers serve.
+    /// Of a column of which these are the texts in the first rows; `None` if plain numbers serve.
     pub fn of(texts: &[&str]) -> Option<Self> {
         let parts: Vec<_> = texts.iter().filter_map(|text| parts(text)).collect();
         if parts.is_empty() || 2 * parts.len() < texts.len() {

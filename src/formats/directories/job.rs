@@ -59,7 +59,7 @@ pub struct Part {
     pub job: Job,
     /// SHA-256 of the job.
     pub digest: String,
-    /// Which part; none if it is all.
+    /// Which part; `None` if it is all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<Shard>,
     /// Numbers of the runs in it, from zero; none if it is all.
@@ -90,7 +90,7 @@ impl Job {
         digest_of(&(&self.version, &self.processor, self.job, &self.options))
     }
 
-    /// How two jobs differ in what decides what a run gives, in words; none if they do not.
+    /// How two jobs differ in what decides what a run gives, in words; `None` if they do not.
     pub fn difference(&self, other: &Self) -> Option<String> {
         let differ = |what: &str, a: String, b: String| Some(format!("{what} {a} and {b}"));
         if self.job != other.job {

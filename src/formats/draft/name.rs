@@ -41,7 +41,7 @@ pub struct Name {
     pub unit: Option<Unit>,
 }
 
-/// The body axes of the program whose columns have such names; none if it is not known.
+/// The body axes of the program whose columns have such names; `None` if it is not known.
 pub fn axes_of_program(columns: &[String]) -> Option<&'static str> {
     let has = |name: &str| columns.iter().any(|column| column == name);
     // PX4's sensor_combined and ArduPilot's IMU: front, right, down.

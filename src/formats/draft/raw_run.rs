@@ -351,7 +351,7 @@ fn stretches(count: usize, breaks: &[usize], period: f64) -> Vec<Stretch> {
     stretches_between(count, 0.0, period, &lost)
 }
 
-/// Centre of the sphere on which points lie, by `|a|² = 2 b·a + c`, with its largest σ; none if they lie in a plane.
+/// Centre of the sphere on which points lie, by `|a|² = 2 b·a + c`, with its largest σ; `None` if they lie in a plane.
 fn centre(points: &[Vector3<f64>]) -> Option<(Vector3<f64>, f64)> {
     let middle = mean(points);
     let (mut information, mut right) = (SMatrix::<f64, 4, 4>::zeros(), SVector::<f64, 4>::zeros());

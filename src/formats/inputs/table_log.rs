@@ -132,7 +132,7 @@ impl AttitudeColumns<usize> {
         Ok(UnitQuaternion::from_quaternion(quaternion))
     }
 
-    /// The angles of the axes; none if there is only a quaternion.
+    /// The angles of the axes; `None` if there is only a quaternion.
     fn axes(&self, csv: &LogRows) -> Result<Option<AxisAngles>, FileError> {
         let axes: Result<Vec<_>, FileError> = self
             .angles

@@ -228,7 +228,7 @@ fn short(value: f64) -> f64 {
     format!("{value:.14e}").parse().unwrap_or(value)
 }
 
-/// A value in a file's unit; none of what is not above zero.
+/// A value in a file's unit; `None` if it is not above zero.
 fn above_zero(value: f64, unit: f64) -> Option<f64> {
     Some(short(value / unit)).filter(|&value| value > 0.0)
 }

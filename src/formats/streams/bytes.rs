@@ -235,7 +235,7 @@ impl Kind {
         }
     }
 
-    /// The number in the first bytes; none if there are too few.
+    /// The number in the first bytes; `None` if there are too few.
     pub fn number(self, bytes: &[u8], big_endian: bool) -> Option<f64> {
         let bits = self.bits(bytes, big_endian)?;
         Some(match self {
@@ -245,7 +245,7 @@ impl Kind {
         })
     }
 
-    /// The whole number in the first bytes, with all digits; none if it is none.
+    /// The whole number in the first bytes, with all digits; `None` if it is none.
     pub fn whole(self, bytes: &[u8], big_endian: bool) -> Option<i128> {
         let bits = self.bits(bytes, big_endian)?;
         Some(match self {

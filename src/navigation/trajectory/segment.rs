@@ -24,9 +24,9 @@ pub struct Segment {
     pub duration: f64,
     /// Turn by this angle, rad, clockwise positive.
     pub turn: Change,
-    /// Change to this horizontal speed, m/s; none keeps it.
+    /// Change to this horizontal speed, m/s; `None` keeps it.
     pub speed: Option<Change>,
-    /// Change to this height above the ellipsoid, m; none keeps it.
+    /// Change to this height above the ellipsoid, m; `None` keeps it.
     pub height: Option<Change>,
 }
 

@@ -112,7 +112,7 @@ fn terms(accuracy: &Accuracy) -> String {
     }
 }
 
-/// Median and largest number of passes; none if no run gave an estimate.
+/// Median and largest number of passes; `None` if no run gave an estimate.
 pub(super) fn passes(accuracy: &Accuracy) -> Option<(f64, usize)> {
     let mut passes: Vec<usize> = accuracy
         .filtered()

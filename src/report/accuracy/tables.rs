@@ -173,7 +173,7 @@ const SIGMAS_99: f64 = 2.576;
 /// Something whose error is compared, with how it is shown.
 pub struct Compared<'a> {
     pub(super) title: String,
-    /// The triad; none of a position.
+    /// The triad; `None` for a position.
     pub(super) sensor: Option<Sensor>,
     /// Symbol of the unit.
     pub(super) unit: &'static str,

@@ -231,7 +231,7 @@ fn sentence(name: &str, nis: &Nis) -> String {
     format!("NIS of {name} {mean} (95 % interval {low}–{high}, {scalars} scalars).")
 }
 
-/// Correlations of the estimated parameters; none if nothing was estimated.
+/// Correlations of the estimated parameters; `None` if nothing was estimated.
 fn correlation(estimate: &Estimate) -> Option<Plot> {
     let indices: Vec<usize> = estimate.estimated().collect();
     let sigma = estimate.sigma();

@@ -98,7 +98,7 @@ pub fn faults(run: &Run) -> Table {
     }
 }
 
-/// The file's column in which a fault is; none if it is in whole rows.
+/// The file's column in which a fault is; `None` if it is in whole rows.
 pub fn column_of<'r>(run: &'r Run, fault: &Fault) -> Option<&'r str> {
     let (sensor, axis) = fault.axis?;
     Some(&run.recording.imu.log.as_ref()?.columns.get(sensor)[axis].name)

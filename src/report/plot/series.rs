@@ -30,7 +30,7 @@ pub enum Shape {
         tops: Vec<Point>,
         /// Half the width of a bar.
         half: f64,
-        /// Height at which they stand; none: the foot of the axis.
+        /// Height at which they stand; `None` for the foot of the axis.
         base: Option<f64>,
         /// Whether they are shaded.
         filled: bool,
