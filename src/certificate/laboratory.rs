@@ -146,11 +146,11 @@ impl DecisionRule {
     pub fn words(self) -> &'static str {
         match self {
             Self::GuardBand => {
-                "guard band w = U (ILAC-G8): pass where the value is within its limit by the expanded uncertainty, \
+                "guard band w = U (ILAC-G8): pass if the value is within its limit by the expanded uncertainty, \
                  fail where it is beyond it by that; between these pass and fail are conditional"
             }
             Self::SimpleAcceptance => {
-                "simple acceptance (ILAC-G8): pass where the value is within its limit, whatever its uncertainty"
+                "simple acceptance (ILAC-G8): pass if the value is within its limit, regardless of its uncertainty"
             }
         }
     }

@@ -246,7 +246,7 @@ impl Calibrate {
         }
         if !solution.is_usable() {
             bail!(
-                "{name}: no noise explains what the calibration leaves; values may not be used, see the findings"
+                "{name}: no noise figure explains the residuals; values may not be used, see the findings"
             );
         }
         Ok(())

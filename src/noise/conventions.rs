@@ -181,8 +181,8 @@ pub type Line = (f64, &'static Convention);
 pub enum ConversionError {
     /// Unknown unit.
     #[error(
-        "`{unit}` is no unit of noise that is known.{} Known are, also as deg/sqrt(h), ug/sqrt(Hz), m/s^2 \
-         and the like:
+        "`{unit}` is not a known unit of noise.{} Known units (also spelt as deg/sqrt(h), ug/sqrt(Hz), m/s^2 \
+         and the like):
 {}",
         hint(unit),
         known()
@@ -193,7 +193,7 @@ pub enum ConversionError {
     },
     /// A figure per sample needs the sample rate.
     #[error(
-        "`{unit}` is the noise of each sample and says nothing without the sample rate: add --rate with \
+        "`{unit}` is the noise of each sample and has no meaning without the sample rate: add --rate with \
          the rate in Hz"
     )]
     NoRate {

@@ -94,7 +94,7 @@ pub enum NavigationStudyError {
     #[error(transparent)]
     NearPole(#[from] NearPole),
     /// A calibration that cannot be inverted.
-    #[error("the sensitivity matrix K·C of the {} is singular: such a calibration navigates nowhere", .sensor.name())]
+    #[error("the sensitivity matrix K·C of the {} is singular: this calibration cannot be used for navigation", .sensor.name())]
     Singular {
         /// The triad.
         sensor: Sensor,
@@ -103,7 +103,9 @@ pub enum NavigationStudyError {
     #[error(transparent)]
     Warming(#[from] WarmingError),
     /// Roll and heading are not distinguishable.
-    #[error("at a pitch of ±90° roll and heading are not apart: give a pitch within ±89°")]
+    #[error(
+        "at a pitch of ±90°, roll and heading cannot be distinguished: give a pitch within ±89°"
+    )]
     Upright,
 }
 

@@ -39,7 +39,7 @@ pub enum TemperatureError {
     },
     /// A coefficient of an unknown parameter, or of an invalid order.
     #[error(
-        "`{0}` in temperature.coefficients is no parameter with a polynomial of order 1 to 5; correct the file"
+        "`{0}` in temperature.coefficients is not a parameter with a polynomial of order 1 to 5; correct the file"
     )]
     Unknown(String),
 }

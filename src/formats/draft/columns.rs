@@ -20,7 +20,7 @@ pub struct Columns {
     pub triads: PerSensor<Option<[usize; 3]>>,
     /// Others that might be meant.
     pub others: PerSensor<Vec<[usize; 3]>>,
-    /// Whether the triads were told by their numbers, for their names say nothing.
+    /// Whether the triads were identified by their values, for their names say nothing.
     pub by_size: bool,
     pub temperature: Option<usize>,
     /// Four columns of norm one.

@@ -53,7 +53,7 @@ impl Scale {
             rests => format!(" ± {} % by gravity at {rests} rests", percent(sigma)),
         };
         if !is_sure {
-            by += ", if it says nothing at zero: gravity lies in too few directions to show that";
+            by += ", if its zero offset is zero: gravity lies in too few directions to verify that";
         }
         let often = likely_for_g((scale * per_second).mean());
         let often = if is_sure { String::new() } else { often + ": " };

@@ -200,7 +200,7 @@ impl Streams {
         }
         self.remarks.iter().for_each(|remark| page.remark(remark));
         if let Some(damage) = self.damage.as_ref().filter(|_| self.written.is_none()) {
-            let why = format_args!("take the # away to use what is whole. {damage}");
+            let why = format_args!("remove the # to use the intact part. {damage}");
             page.open("salvage = true", why);
         }
     }

@@ -43,7 +43,7 @@ impl Clock {
         let name = Name::of_column(&sheet.names[column], &sheet.units[column]);
         if name.is_counter() && name.is_time() < 2 && !steps.is_count {
             columns.time = None;
-            return Self::without(stated, "a counter that other packets share is no time");
+            return Self::without(stated, "a counter shared with other packets is not a time");
         }
         let second = |word: &str| units_of_time().find(|of| of.0 == word);
         let named = name

@@ -216,7 +216,7 @@ impl Quantities {
                     .to_owned()
             }
             Output::Increment => format!("gravity times {} s a row", short(rows.period)),
-            Output::Rate => "gravity has the same magnitude whatever the rate of rows".to_owned(),
+            Output::Rate => "specific force at rest is g itself, not g times the sample period".to_owned(),
         };
     }
 

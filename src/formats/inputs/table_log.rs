@@ -156,7 +156,7 @@ fn geometry(
             return Err(document.wrong(
                 &format!("turntable.{key}"),
                 "it with `angles` only, for a quaternion does not tell the axes apart",
-                "Remove it, or give the angles of the table's axes, alone or beside the quaternion.",
+                "Remove it, or give the angles of the table's axes, alone or with the quaternion.",
             ));
         }
         axes += kind.of_table(angles, sigma(stated));

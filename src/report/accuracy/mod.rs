@@ -23,7 +23,7 @@ pub fn document(accuracy: &Accuracy) -> Document {
         count(accuracy.trials.len()),
         accuracy.study.scenario.name
     ));
-    document.conclusions.heading = "What holds".to_owned();
+    document.conclusions.heading = "Conclusions".to_owned();
     document.warnings.heading = "To be noted".to_owned();
     verdict::say(&mut document, accuracy);
     document.both(facts(accuracy));
@@ -102,10 +102,10 @@ fn terms(accuracy: &Accuracy) -> String {
         named(&on)
     };
     match &left_out[..] {
-        [] => format!("beside K, E and D: {on}"),
+        [] => format!("in addition to K, E and D: {on}"),
         left_out => {
             format!(
-                "beside K, E and D: {on}; simulated but not modelled: {}",
+                "in addition to K, E and D: {on}; simulated but not modelled: {}",
                 named(left_out)
             )
         }

@@ -103,7 +103,7 @@ fn parameters(comparison: &Comparison) -> Table {
         ));
     match comparison.against_truth {
         true => table,
-        false => table.note("z and NEES hold if the calibrations come of different data."),
+        false => table.note("z and NEES are valid if the calibrations come from independent data."),
     }
 }
 
