@@ -1,4 +1,4 @@
-//! What a likelihood ratio stays below by chance.
+//! Significance limit of a likelihood ratio.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 

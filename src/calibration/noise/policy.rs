@@ -1,8 +1,8 @@
-//! Which noise is used.
+//! Noise policy.
 
 use serde::{Deserialize, Serialize};
 
-/// Which noise the filter uses.
+/// The noise used by the filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NoisePolicy {
@@ -17,7 +17,7 @@ pub enum NoisePolicy {
 }
 
 impl NoisePolicy {
-    /// All of them.
+    /// All policies.
     pub const ALL: [Self; 3] = [Self::Stated, Self::Auto, Self::Learnt];
 
     /// The name that command line and files use.

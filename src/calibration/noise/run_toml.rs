@@ -1,4 +1,4 @@
-//! Learnt noise as `run.toml` states it.
+//! Estimated noise in the notation of `run.toml`.
 
 use super::report::NoiseReport;
 use super::source::Source;
