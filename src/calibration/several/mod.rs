@@ -77,8 +77,8 @@ impl<'a> Problem<'a> {
         Ok(problem.with_model(model))
     }
 
-    /// Mean temperature in °C of each dwell, of all axes, and its rate in K/s; not a number where it is not known. None
-    /// where nothing follows temperature.
+    /// Mean temperature of each dwell over all axes, °C, and its rate, K/s; NaN if unknown. Empty if nothing depends on
+    /// temperature.
     pub(in crate::calibration) fn warming(&self) -> Vec<(f64, f64)> {
         if self.model.thermal.is_none() {
             return Vec::new();
@@ -107,8 +107,8 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// Solves a problem of several recordings, or one that varies, with stated noise. Recordings differ by what is stated
-/// or, where the noise may be learnt, by what they show.
+/// Solves a problem of several recordings, or one with temperature dependence, with the stated noise. Differences
+/// between recordings are as stated or, if noise may be estimated, as estimated.
 pub fn solve<'a>(
     problem: &Problem<'a>,
     progress: Progress,
@@ -144,7 +144,7 @@ pub fn solve<'a>(
     })
 }
 
-/// Where the iterations begin: of each parameter the polynomial through what each recording alone says.
+/// Start of the iterations: for each parameter, the polynomial through the recordings calibrated alone.
 fn start(problem: &Problem, alone: &[SeparateEstimate]) -> Linearisation {
     let model = &problem.model;
     let initial = alone.iter().flat_map(|a| a.at.initial_attitudes.clone());

@@ -26,8 +26,8 @@ pub struct Repeatability {
 }
 
 impl Outcome {
-    /// What a recording alone says less all together at its temperature, where its temperature stands, if it had been
-    /// mounted as the mean of all.
+    /// Deviation of a recording calibrated alone from the joint calibration at its temperature, reduced to the mean
+    /// mounting. `None` without a calibration, or if its temperature is not constant.
     fn departure(&self, number: usize, alone: &SeparateEstimate) -> Option<ParameterVector> {
         let mounting = self.own.get(number).map(|own| own.values.mounting);
         let turned_back = Difference {

@@ -7,11 +7,11 @@ use crate::imu::{
 };
 use crate::recording::Temperature;
 
-/// Recordings within this many kelvin are at one temperature: what a soaked instrument changes by itself.
+/// Recordings within this many kelvin count as one temperature: the self-heating of a soaked instrument.
 const ONE_TEMPERATURE: f64 = 1.0;
 
-/// What a parameter may change by within the range, in σ of what is known of it beforehand: more than an
-/// instrument of its grade, so that the data decide.
+/// Prior 1σ of the change of a parameter over the range, in its prior σ: more than for an instrument of its
+/// grade, so that the data decide.
 const CHANGE: f64 = 3.0;
 
 /// Options for the temperature dependence of parameters.
@@ -72,8 +72,8 @@ pub fn model(
     Ok(any.then_some(ThermalModel { range, sigma }))
 }
 
-/// How many temperatures at the ends of dwells lie apart by as much as a polynomial of the highest order needs to tell
-/// them, in the mean of a triad's axes.
+/// Number of temperatures at the ends of dwells, averaged over a triad's axes, that are far enough apart for a
+/// polynomial of the highest order.
 fn distinct(problem: &Problem, sensor: Sensor) -> usize {
     let of_stretch = |stretch: &Stretch| {
         let imu = &stretch.run.recording.imu;

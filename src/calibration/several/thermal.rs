@@ -22,7 +22,7 @@ pub struct Coefficient {
 }
 
 impl Coefficient {
-    /// Those that a model has on.
+    /// The coefficients that a model has on.
     pub(in crate::calibration) fn all(
         form: InstallationForm,
         model: Option<&ThermalModel>,
@@ -45,12 +45,12 @@ impl Coefficient {
         parameter(self.sensor, self.parameter)
     }
 
-    /// What an error of it is of its parameter's in this state.
+    /// Factor from an error of the coefficient to the error of its parameter in this state.
     pub(in crate::calibration) fn weight(&self, state: &ThermalState) -> f64 {
         state.get(self.sensor)[self.axis][self.function]
     }
 
-    /// Of these coefficients.
+    /// Its value among these coefficients.
     pub(in crate::calibration) fn of(&self, all: &PerSensor<ThermalCoefficients>) -> f64 {
         all.get(self.sensor)[(self.parameter, self.function)]
     }
