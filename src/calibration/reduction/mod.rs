@@ -75,7 +75,7 @@ impl Reduction {
         all
     }
 
-    /// One triangle of all rows: what remains of them where no dwell is looked at alone.
+    /// One triangle of all rows, which suffices if no dwell is evaluated separately.
     pub fn folded(mut self) -> Self {
         let rows = triangle(&self.stacked(&self.parts));
         self.parts = vec![Part {
@@ -86,7 +86,7 @@ impl Reduction {
         self
     }
 
-    /// With what is known beforehand.
+    /// Combines the rows with a prior.
     pub fn posterior(&self, prior: &Prior) -> Posterior {
         let mut known = Known::new(prior.clone());
         self.parts.iter().for_each(|part| known.learn(&part.rows));
@@ -98,7 +98,7 @@ impl Reduction {
         }
     }
 
-    /// Estimate and σ against time, as part after part comes in.
+    /// Estimate and σ against time, part by part.
     pub fn history(&self, prior: &Prior, at: &Linearisation) -> Vec<Epoch> {
         let mut known = Known::new(prior.clone());
         let parts = self.parts.iter().map(|part| {
@@ -124,20 +124,20 @@ impl Reduction {
         squares
     }
 
-    /// Information of the constants by the rows alone.
+    /// Information on the constants from the rows alone.
     pub fn information(&self) -> DMatrix<f64> {
         let n = self.constants.len();
         self.squares().view((0, 0), (n, n)).into_owned()
     }
 
-    /// By how much each recording differs, linearised `at` a point.
+    /// Deviation of each recording, linearised `at` a point.
     pub fn own(&self, at: &Linearisation, posterior: &Posterior) -> Vec<Own> {
         let each = self.own.iter().enumerate();
         each.map(|(recording, own)| own.difference(at.own(recording), posterior))
             .collect()
     }
 
-    /// Where the next pass linearises after one `at` a point.
+    /// Linearisation point of the next pass after one `at` a point.
     pub fn estimate(&self, at: &Linearisation, posterior: &Posterior) -> Linearisation {
         let initial_attitude = |(at, error): (&Matrix3<f64>, &Smoothed)| {
             let (mean, _) = error.given(posterior);
@@ -164,7 +164,7 @@ impl Reduction {
         estimate
     }
 
-    /// The coefficients of temperature among the constants, with their places.
+    /// The temperature coefficients among the constants, with their indices.
     pub fn coefficients(&self) -> impl Iterator<Item = (usize, Coefficient)> + '_ {
         let places = self.constants.iter().enumerate();
         places.filter_map(|(place, constant)| match constant {
@@ -174,7 +174,7 @@ impl Reduction {
     }
 }
 
-/// States with what constants do to them: with these at c their mean is `x + U c`.
+/// States with the effect of constants: for constants c, their mean is `x + U c`.
 ///
 /// Source: Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and Navigation*, §1.4.14, for the
 /// regression of states on constants.
@@ -184,7 +184,7 @@ pub struct Smoothed {
     covariance: DMatrix<f64>,
     /// U
     by_constants: DMatrix<f64>,
-    /// What they are, if they are of a recording.
+    /// Their meanings, if they belong to a recording.
     own: Vec<OwnState>,
 }
 
@@ -198,7 +198,7 @@ pub struct Own {
 }
 
 impl Smoothed {
-    /// So many states of a filter from a first one on, as they are now.
+    /// The current values of `count` states of a filter, from a first one on.
     pub fn of(filter: &Filter, first: usize, count: usize) -> Self {
         Self {
             mean: filter.x.rows(first, count).into_owned(),
@@ -232,7 +232,7 @@ impl Smoothed {
         &posterior.covariance * self.by_constants.transpose()
     }
 
-    /// What is of a recording, as a change of this.
+    /// The states of a recording, as a change of these values.
     pub fn difference(&self, values: Difference, posterior: &Posterior) -> Own {
         let (mean, covariance) = self.given(posterior);
         let sigma = Difference::default();

@@ -98,7 +98,7 @@ pub fn six_position(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     six_position_by(reference, problem)
 }
 
-/// The same by what the inputs are to be known from; labels need no dwells.
+/// The same with a given source of the reference inputs; labels need no dwells.
 pub fn six_position_by(
     reference: Reference,
     problem: &Problem,
@@ -125,7 +125,8 @@ pub fn six_position_by(
     Ok(closed_form)
 }
 
-/// The accelerometers are calibrated by gravity, so its error is in their scale factors, the same part in all three.
+/// Adds the error of gravity, by which the accelerometers are calibrated: the same relative error in all three scale
+/// factors.
 fn share_gravity(estimate: &mut Estimate, site: &Site) {
     let part = (site.gravity_sigma / site.gravity).powi(2);
     let scale = estimate.triads.accel.scale;
@@ -187,7 +188,7 @@ fn six_of(observed: &Observed) -> Vec<usize> {
     }
 }
 
-/// From the sections whose labels say how the instrument stands or turns.
+/// The closed form from sections whose labels state a position or a turn.
 fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     let run = problem.run();
     let rests = rests(run);
@@ -222,7 +223,8 @@ fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     })
 }
 
-/// From every dwell and every move by gravity alone, with the prior where they are too few.
+/// The closed form from every dwell and every move with gravity as the only reference, with the prior if there are too
+/// few.
 fn by_gravity(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     let rests = dwells(problem)?;
     let (turned, by_hand) = calibrated_as_held(problem, &rests)?;
