@@ -44,14 +44,14 @@ pub fn log(c: &Matrix3<f64>) -> Vector3<f64> {
     quaternion(c).scaled_axis()
 }
 
-/// The rotation matrix nearest to `c`, which must be one already but for rounding
+/// The rotation matrix nearest to `c`, which must already be a rotation matrix except for rounding
 /// (one step of Newton's iteration for the polar decomposition).
 #[inline]
 pub fn orthonormalised(c: &Matrix3<f64>) -> Matrix3<f64> {
     c * (Matrix3::identity() * 1.5 - c.tr_mul(c) * 0.5)
 }
 
-/// The mean of attitudes that lie close together; `None` of none.
+/// The mean of attitudes that are close together; `None` without attitudes.
 pub fn mean(attitudes: &[UnitQuaternion<f64>]) -> Option<Matrix3<f64>> {
     let first = attitudes.first()?;
     let back = first.inverse();
@@ -90,7 +90,7 @@ pub fn from_pitch_roll_heading(pitch: f64, roll: f64, heading: f64) -> Matrix3<f
 }
 
 /// Pitch, roll and heading in radians of `C_b_n`, the inverse of [`from_pitch_roll_heading`]. Pitch is
-/// within ±π/2, the others within ±π; at a pitch of ±π/2 roll and heading are not apart.
+/// within ±π/2, the others within ±π; at a pitch of ±π/2, roll and heading cannot be distinguished.
 pub fn to_pitch_roll_heading(c: &Matrix3<f64>) -> [f64; 3] {
     // The hypotenuse keeps digits near ±π/2 that an arcsine loses.
     [
@@ -100,7 +100,7 @@ pub fn to_pitch_roll_heading(c: &Matrix3<f64>) -> [f64; 3] {
     ]
 }
 
-/// The smallest turn, as a rotation vector, that brings a direction to Up.
+/// The smallest rotation, as a rotation vector, from a direction to Up.
 pub fn tilt(direction: &Vector3<f64>) -> Vector3<f64> {
     let across = direction.cross(&Vector3::z());
     let angle = across.norm().atan2(direction.z);
@@ -120,8 +120,8 @@ pub fn level(up: &Vector3<f64>) -> Matrix3<f64> {
 }
 
 /// The rotation by a tilt about East and North and then by a heading about Up, the components of an
-/// attitude error φ in rad. While both are small it is `exp([φ×])`; but a heading is no error of what
-/// gravity shows, and here however large a heading leaves the tilt what it is.
+/// attitude error φ in rad. If both are small, it is `exp([φ×])`. A heading error does not affect gravity, and here
+/// even a large heading leaves the tilt unchanged.
 pub fn from_tilt_and_heading(error: &Vector3<f64>) -> Matrix3<f64> {
     exp(Vector3::z() * error.z) * exp(Vector3::new(error.x, error.y, 0.0))
 }

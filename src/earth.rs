@@ -63,9 +63,9 @@ pub fn earth_rate_n(latitude: f64) -> Vector3<f64> {
 /// radius; meridian and prime vertical are meant.)
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Curvature {
-    /// Of the meridian, `R_M`: north and south.
+    /// Radius of the meridian, `R_M`: north and south.
     pub meridian: f64,
-    /// Of the prime vertical, `R_N`: east and west.
+    /// Radius of the prime vertical, `R_N`: east and west.
     pub prime_vertical: f64,
 }
 
@@ -94,20 +94,20 @@ impl Curvature {
     }
 }
 
-/// A place on the Earth where a turntable stands.
+/// Site of a turntable.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Site {
     /// Geodetic latitude in radians, north positive.
     pub latitude: f64,
-    /// Longitude in radians, east positive. Nothing that stands still depends on it.
+    /// Longitude in radians, east positive. It has no effect at rest.
     pub longitude: f64,
     /// Height above the ellipsoid in m.
     pub height: f64,
     /// Magnitude of gravity in m/s², plumb-line gravity with its centrifugal part.
     pub gravity: f64,
-    /// Its 1σ in m/s². The scale factors of all three accelerometers share what it is wrong by.
+    /// Its 1σ in m/s². The scale factors of all three accelerometers share its error.
     pub gravity_sigma: f64,
-    /// Whether the place is known; else Earth rotation is taken as zero with the σ of [`Site::earth_rate_sigma`].
+    /// Whether the site is known; if not, Earth rotation is zero with the σ of [`Site::earth_rate_sigma`].
     #[serde(default = "known")]
     pub is_known: bool,
 }
@@ -116,7 +116,7 @@ fn known() -> bool {
     true
 }
 
-/// 1σ by which gravity at a place departs from normal gravity, m/s²: 30 mGal. Free-air anomalies have an
+/// 1σ of the deviation of gravity from normal gravity, m/s²: 30 mGal. Free-air anomalies have an
 /// RMS of 30 to 40 mGal over the Earth (Torge, *Gravimetry*, §2.1).
 pub const ANOMALY_SIGMA: f64 = 30.0 * MILLIGAL;
 
@@ -125,8 +125,7 @@ pub const ANOMALY_SIGMA: f64 = 30.0 * MILLIGAL;
 const ANYWHERE: (f64, f64) = (9.806, 0.015);
 
 impl Site {
-    /// A site of which nothing is known but that it is on the Earth. What needs a latitude nevertheless has that of its
-    /// gravity.
+    /// An unknown site on the Earth. If a latitude is needed nevertheless, it is that of the mean gravity.
     pub fn unknown() -> Self {
         let (gravity, gravity_sigma) = ANYWHERE;
         Self {
@@ -165,7 +164,7 @@ impl Site {
         Vector3::new(0.0, 0.0, -self.gravity)
     }
 
-    /// Earth rotation `ω_ie` in East-North-Up, rad/s; zero where the place is unknown.
+    /// Earth rotation `ω_ie` in East-North-Up, rad/s; zero if the site is unknown.
     pub fn earth_rate_n(&self) -> Vector3<f64> {
         match self.is_known {
             true => earth_rate_n(self.latitude),
@@ -173,7 +172,7 @@ impl Site {
         }
     }
 
-    /// 1σ of each component of Earth rotation, rad/s: where the place is unknown, it may point anywhere.
+    /// 1σ of each component of Earth rotation, rad/s: if the site is unknown, its direction is arbitrary.
     pub fn earth_rate_sigma(&self) -> f64 {
         match self.is_known {
             true => 0.0,

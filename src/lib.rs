@@ -26,7 +26,7 @@
 //! # Ok(())
 //! # }
 //! ```
-//! `examples/` has three programs more: samples from arrays, both methods against a truth, a study of a
+//! `examples/` has three more programs: samples from arrays, both methods compared with a truth, a study of a
 //! path.
 //!
 //! # Frames, signs, units
@@ -41,17 +41,17 @@
 //! | units | SI and radians everywhere; [`units`] and [`formats`] convert at the edges |
 //!
 //! # Rooms
-//! A [`recording::Recording`] is data. A [`run::Run`] adds what is known beforehand: instrument, site,
-//! table. [`calibration::Options`] say what is to be estimated; a [`calibration::Problem`] looks at
-//! all of it once. Data flow one way: [`formats`] read runs, [`calibration`] solves, [`study`] judges by
-//! navigation and Monte Carlo, [`lot`] holds units of one type together, `report` shows. [`earth`], [`attitude`], [`imu`], [`turntable`] and
-//! [`navigation`] know none of these; [`simulation`] makes runs from [`models`]; [`survey`] looks at a
-//! run before it is calibrated, [`noise`] at its noise.
+//! A [`recording::Recording`] is data. A [`run::Run`] adds prior knowledge: instrument, site, table.
+//! [`calibration::Options`] select the estimated quantities; a [`calibration::Problem`] preprocesses all of it
+//! once. Data flow one way: [`formats`] read runs, [`calibration`] solves, [`study`] evaluates by navigation and
+//! Monte Carlo, [`lot`] compares units of one type, `report` presents the results. [`earth`], [`attitude`],
+//! [`imu`], [`turntable`] and [`navigation`] do not depend on these; [`simulation`] generates runs from
+//! [`models`]; [`survey`] examines a run before calibration, [`noise`] its noise.
 //!
 //! # Features
 //! `report` (pages, figures, tables), `certificate` (calibration certificates as PDF/A-3 and XML, with
-//! `report`) and `cli` (the command `turncal`, with `report`) are on by default. Without them no crate of a user interface is compiled:
-//! `turncal = { version = "…", default-features = false }`.
+//! `report`) and `cli` (the command `turncal`, with `report`) are on by default. Without default features, turncal
+//! compiles without any user-interface dependencies: `turncal = { version = "…", default-features = false }`.
 
 pub mod attitude;
 pub mod calibration;

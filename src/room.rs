@@ -2,7 +2,7 @@
 
 use std::hint::black_box;
 
-/// Whether so many bytes can be had at this moment.
+/// Whether this number of bytes can be allocated now.
 ///
 /// An allocation that fails within a calculation ends the program, and safe code cannot catch that. What a
 /// step will take is therefore asked for as a whole before it begins, where an error can still be given, and

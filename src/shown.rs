@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// A message shows so many characters of one input, no more.
+/// Most characters of an input that a message shows.
 pub const LONGEST: usize = 200;
 
 /// An input short enough for a message.
@@ -16,7 +16,7 @@ pub fn excerpt(text: &str) -> String {
 /// No file system has longer names.
 const LONGEST_NAME: usize = 255;
 
-/// A path as it is, but for names that no file has: these are cut.
+/// A path as given, except that names too long for a file are cut.
 pub fn path(path: &Path) -> String {
     let names = || {
         path.components()

@@ -1,4 +1,4 @@
-//! Order statistics, which a few wild values do not move, and what χ² and Student's t stay below.
+//! Order statistics, which are robust against outliers, and limits of χ² and Student's t.
 
 use nalgebra::Vector3;
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
@@ -6,19 +6,19 @@ use statrs::function::beta::beta_reg;
 use statrs::function::gamma::ln_gamma;
 use statrs::statistics::{Data, OrderStatistics};
 
-/// Rate of false alarms of a whole list of checks; each check has its share of it.
+/// False-alarm rate of a whole list of checks; each check has its share of it.
 pub const FALSE_ALARM: f64 = 1e-3;
 
 /// σ of a normal distribution over the median of its absolute deviations.
 pub const SIGMA_OF_MEDIAN: f64 = 1.482_602;
 
-/// What χ² of so many degrees of freedom stays below but for this chance; infinite without a degree of
-/// freedom, for then nothing is beyond chance.
+/// The limit that χ² with these degrees of freedom exceeds with probability `chance`; infinite for zero degrees of
+/// freedom.
 pub fn chi_square_limit(degrees: f64, chance: f64) -> f64 {
     ChiSquared::new(degrees).map_or(f64::INFINITY, |chi2| chi2.inverse_cdf(1.0 - chance))
 }
 
-/// ln of the chance that χ² with this many degrees of freedom is above `x`, however small it is.
+/// ln of the probability that χ² with these degrees of freedom exceeds `x`, accurate even if it is tiny.
 pub fn ln_survival(freedom: f64, x: f64) -> f64 {
     let (a, z) = (0.5 * freedom, 0.5 * x);
     if z < a + 1.0 {
@@ -50,10 +50,10 @@ pub fn ln_survival(freedom: f64, x: f64) -> f64 {
 /// Degrees of freedom from which t is the normal distribution and its first correction, to 1e-7.
 const MANY: f64 = 1e4;
 
-/// What Student's t of so many degrees of freedom, one at least, stays below but for this chance of less than
-/// one half.
+/// The limit that Student's t exceeds with probability `chance`, which is below one half; `degrees` of freedom are at
+/// least one.
 ///
-/// The tail is halved in, for Newton's method on it goes in circles for some degrees of freedom. Source:
+/// The limit is found by bisection, because Newton's method does not converge for some degrees of freedom. Source:
 /// Abramowitz and Stegun, *Handbook of Mathematical Functions*, 26.7.1 and 26.7.5.
 pub fn student_limit(degrees: f64, chance: f64) -> f64 {
     if degrees > MANY {
@@ -78,12 +78,12 @@ pub fn student_limit(degrees: f64, chance: f64) -> f64 {
     }
 }
 
-/// The median of some numbers, which lose their order; none of none.
+/// The median of some numbers, which are reordered; `None` without values.
 pub fn median(values: &mut [f64]) -> Option<f64> {
     (!values.is_empty()).then(|| Data::new(values).median())
 }
 
-/// Median of each axis; `None` of no vectors.
+/// Median of each axis; `None` without vectors.
 pub fn median_of_axes(vectors: &[Vector3<f64>]) -> Option<Vector3<f64>> {
     let of = |axis: usize| median(&mut vectors.iter().map(|v| v[axis]).collect::<Vec<_>>());
     Some(Vector3::new(of(0)?, of(1)?, of(2)?))

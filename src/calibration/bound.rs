@@ -9,7 +9,7 @@ use crate::calibration::{
 };
 use crate::imu::{PerSensor, TermVector, ThermalCoefficients, Triad};
 
-/// What no estimator of a run can beat.
+/// The bound of a run: the least covariance of any estimator.
 #[derive(Debug, Clone)]
 pub struct Bound {
     /// The truth, with the covariance that is the bound.
@@ -20,11 +20,10 @@ pub struct Bound {
     pub history: Vec<Epoch>,
 }
 
-/// The covariance of a pass linearised at the truth, `terms` those of the instrument, in the truth's own
-/// installation form, whatever that of the problem:
-/// the inverse of the Bayesian information matrix for Gaussian noise (Van Trees, *Detection,
+/// The covariance of a pass linearised at the truth, with `terms` the true error terms, in the installation
+/// form of the truth: the inverse of the Bayesian information matrix for Gaussian noise (Van Trees, *Detection,
 /// Estimation, and Modulation Theory*, part I, §2.4.3). The initial attitude is that of the first
-/// reading or the coarse start: arc seconds of tilt and arc minutes of heading are nothing to the
+/// reading or the coarse start: arc seconds of tilt and arc minutes of heading have no effect on the
 /// covariance.
 ///
 /// # Errors
@@ -58,8 +57,8 @@ fn pass_at(problem: &Problem, truth: Linearisation) -> Result<PassResult, Calibr
     pass(problem, &Script::new(problem, &attitudes, &at)?, Gate::Open)
 }
 
-/// The variances that no estimator of recordings together can beat, at a truth with these coefficients of
-/// temperature: of the parameters of both triads at the reference, then of the coefficients that the problem has on.
+/// Bound for the variances of any joint estimator of several recordings, at a truth with these temperature
+/// coefficients: of the parameters of both triads at the reference, then of the coefficients that are on.
 ///
 /// # Errors
 /// [`CalibrationError`] as for [`super::estimate`].

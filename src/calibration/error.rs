@@ -1,4 +1,4 @@
-//! Why a calibration cannot be had.
+//! Errors of calibrations and of comparisons.
 
 use thiserror::Error;
 
@@ -7,8 +7,8 @@ use crate::imu::Sensor;
 use crate::run::LONG_ENOUGH;
 use crate::run::motion::LabelCheck;
 
-/// Why a calibration cannot be had from a run. Each message says what was found, what was expected
-/// and what to do.
+/// Errors of a calibration. Each message states the problem, the expectation
+/// and the remedy.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum CalibrationError {
     /// Table aiding without a table.
@@ -17,27 +17,27 @@ pub enum CalibrationError {
          --aiding table out"
     )]
     NoTable,
-    /// A log of one triad.
+    /// A log with only one triad.
     #[error(
         "the log has no columns of {0}, and a calibration needs both triads: name the columns in run.toml, or see the \
          noise of the triad that is there by `turncal allan`", .sensor.name()
     )]
     OneTriad {
-        /// The one that is not there.
+        /// The missing triad.
         sensor: Sensor,
     },
-    /// Less memory than a calibration takes.
+    /// Not enough memory for a calibration.
     #[error(
         "{samples} samples were read, and there is no memory to calibrate them, about {megabytes} MB; give it \
          more, or split the record"
     )]
     NoMemory {
-        /// Of all runs.
+        /// Number of samples of all runs.
         samples: usize,
-        /// What it takes.
+        /// Required memory, MB.
         megabytes: usize,
     },
-    /// Parameters that follow temperature, and a recording without one.
+    /// Temperature-dependent parameters with a recording that has no temperature.
     #[error(
         "recording {number}, {recording}, has no temperature that could be used, which parameters are to follow: \
          name the column in its run.toml (columns, `temperature`), or temperature_degc in [meta] or beside the \
@@ -49,14 +49,14 @@ pub enum CalibrationError {
         /// Its number, from one.
         number: usize,
     },
-    /// Nothing at rest.
+    /// No dwell.
     #[error(
         "no still interval (dwell) was found. Hold the sensor still for at least {LONG_ENOUGH} s between turns, at \
          best with each axis up and each axis down. Check the table's log, and reading_sigma_arcsec if it is noisier \
          than stated; without a log, the gyros' prior bias and noise figures"
     )]
     NoDwells,
-    /// A prior of σ zero or an estimate that went astray.
+    /// A prior with σ of zero, or a diverged estimate.
     #[error(
         "the {} data contradict [imu.prior.{0}] (the fit diverged: K·C became singular). Check scale and units there, \
          and whether an axis is dead, stuck or wrapped, rows are lost or the table's log is of another run",
@@ -66,7 +66,7 @@ pub enum CalibrationError {
         /// Which triad.
         sensor: Sensor,
     },
-    /// Labelled sections of which none can be used.
+    /// No usable labelled section.
     #[error(
         "of the sections {} none tells how the instrument stands or turns, or a part of each is lost; \
          name positions and turns such as `x_up`, `x_down`, `rot_x+360`, or leave [segments] out and let \
@@ -76,27 +76,27 @@ pub enum CalibrationError {
         /// Labels of the sections.
         labels: Vec<String>,
     },
-    /// No labelled section does what its label says.
+    /// Every labelled section contradicts its label.
     #[error(
         "no labelled section does what its label says, expected at least one: {}; correct [segments], or \
          leave it out and let every dwell and turn count", .contradicted.iter().map(LabelCheck::to_string).collect::<Vec<_>>().join("; ")
     )]
     LabelsContradicted {
-        /// All of them.
+        /// The contradicted sections.
         contradicted: Vec<LabelCheck>,
     },
-    /// Progress said so.
+    /// Stopped by the progress callback.
     #[error("stopped before the iterations ended; nothing was written")]
     Stopped,
-    /// What run.toml states and the record contradicts.
+    /// A statement of run.toml that the record contradicts.
     #[error("{}{contradiction}", .recording.iter().map(|name| format!("{name}: ")).collect::<String>())]
     Contradicted {
         /// The run, if there are several.
         recording: Option<String>,
-        /// What it contradicts.
+        /// The contradicted statement.
         contradiction: Box<Contradiction>,
     },
-    /// Samples that no error within the prior explains, or absurd noise figures.
+    /// Samples that no error within the prior explains, or unrealistic noise figures.
     #[error(
         "the filter diverged at {time:.2} s: samples and run.toml do not fit each other; check latitude, \
          units, noise figures (zero only without noise), the prior's σ, and the samples there"
@@ -112,10 +112,10 @@ fn quoted(labels: &[String]) -> String {
     quoted.join(", ")
 }
 
-/// Why calibrations cannot be compared.
+/// Errors of a comparison of calibrations.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum ComparisonError {
-    /// Nothing to compare.
+    /// Only one calibration.
     #[error("a single calibration and no truth; give a second calibration, or a truth")]
     Single,
     /// Outputs of different quantities.

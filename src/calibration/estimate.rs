@@ -17,7 +17,7 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// With the covariance of a linear filter, to which second-order terms are added.
+    /// An estimate with the covariance of a linear filter plus second-order terms.
     pub(in crate::calibration) fn with_curvature(
         triads: PerSensor<Triad>,
         linear: &ParameterMatrix,
@@ -38,7 +38,8 @@ impl Estimate {
         self.covariance.diagonal().map(|v| v.max(0.0).sqrt())
     }
 
-    /// Joint covariance of its parameters and of further constants, given that of the constants and between both.
+    /// Joint covariance of the parameters and of further constants, from the covariance of these and the
+    /// cross-covariance.
     pub fn covariance_with<'a>(
         &self,
         cross: impl Into<DMatrixView<'a, f64>>,
@@ -61,7 +62,7 @@ impl Estimate {
         self.triads.gyro.form
     }
 
-    /// What the covariance gains where the length of the rows is not known: the same part of all gyro scale factors.
+    /// Addition to the covariance for an uncertain sample period: the same relative error of all gyro scale factors.
     pub(in crate::calibration) fn by_period(&self, run: &Run) -> ParameterMatrix {
         let scale = self.triads.gyro.scale * run.recording.imu.period_sigma;
         let mut gained = ParameterMatrix::zeros();
@@ -77,7 +78,7 @@ impl Estimate {
     }
 }
 
-/// By how much the σ that grew most did, of variances before and after.
+/// Largest growth factor of σ, from variances before and after.
 pub fn largest_growth(before: &[f64], after: &[f64]) -> f64 {
     let known = before
         .iter()

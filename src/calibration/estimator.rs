@@ -12,18 +12,18 @@ use crate::calibration::{
 };
 use crate::run::Aiding;
 
-/// More than one cause in this many dwells explains noise.
+/// Number of dwells per cause: more causes would explain noise.
 const DWELLS_OF_ONE: usize = 6;
 
-/// Estimates both triads, by standstill and, where it is observed, the attitude of the table.
+/// Estimates both triads from zero velocity in dwells and, if observed, the attitude of the table.
 ///
 /// Source: design of the passes after Maybeck, *Stochastic Models, Estimation and Control*, vol. 2,
-/// §9.7 (iterated, linearised filters): each pass with the linearisation held is a Gauss–Newton step of
+/// §9.7 (iterated, linearised filters): each pass with fixed linearisation is a Gauss–Newton step on
 /// all data.
 ///
 /// # Errors
-/// [`CalibrationError`] where the runs cannot give a calibration. Runs that give one without
-/// convergence are an [`Outcome`] with `converged = false` and a finding.
+/// [`CalibrationError`] if the runs cannot give a calibration. Without convergence, the result is an
+/// [`Outcome`] with `converged = false` and a finding.
 pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, CalibrationError> {
     let solved = match problem.varies() || problem.runs().nth(1).is_some() {
         true => several::solve(problem, progress)?,
@@ -44,7 +44,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
     outcome(&solved.as_stated(problem), solved, form_test)
 }
 
-/// What was found with its covariance, to which errors that no pass knows of are added.
+/// The outcome, with the errors that no pass models added to its covariance.
 fn outcome(
     as_stated: &Problem,
     solved: Solved,
@@ -61,8 +61,8 @@ fn outcome(
     Ok(outcome)
 }
 
-/// Without the time after each stop in which the attitude settles, as long as more of it shows; as it is where that lasts
-/// longer than a table settles.
+/// Drops the settling time after each stop, repeatedly until no more is found; unchanged if it is longer than a table
+/// needs to settle.
 fn settled<'a>(before: Solved<'a>, progress: Progress) -> Result<Solved<'a>, CalibrationError> {
     let mut solved = before.clone();
     loop {
@@ -79,7 +79,7 @@ fn settled<'a>(before: Solved<'a>, progress: Progress) -> Result<Solved<'a>, Cal
     }
 }
 
-/// With the causes that the record shows, the likeliest first, as long as one is beyond chance.
+/// Includes the causes that the record shows, the likeliest first, until none is significant.
 fn with_causes<'a>(
     mut solved: Solved<'a>,
     progress: Progress,
@@ -95,7 +95,7 @@ fn with_causes<'a>(
     Ok(solved)
 }
 
-/// With the likeliest cause that is beyond chance beside what it leaves, and what may be a cause then.
+/// Includes the likeliest cause that is significant against its residuals; also returns the causes that then remain.
 fn with_one<'a>(
     solved: &Solved<'a>,
     causes: &Causes,
@@ -124,7 +124,7 @@ fn causes_of(solved: &Solved) -> Result<Causes, CalibrationError> {
     Causes::of(&solved.problem, &solved.priors, &solved.iterated)
 }
 
-/// With the noise that the data show, where they contradict what is stated.
+/// Uses the noise estimated from the data, if they contradict the stated noise.
 fn with_noise<'a>(
     problem: &Problem<'a>,
     solved: Solved<'a>,
@@ -135,8 +135,8 @@ fn with_noise<'a>(
     Ok(solved.better(learnt)?.unwrap_or(solved))
 }
 
-/// Iterations with a prior that its estimate does not contradict: a wrong one would make outliers of correct
-/// observations, and noise of itself.
+/// Iterates with a prior that the estimate does not contradict: a wrong one would turn correct
+/// observations into outliers, and its own error into noise.
 fn with_wide_prior<'a>(
     solved: Solved<'a>,
     progress: Progress,

@@ -1,4 +1,4 @@
-//! Gauss–Newton iterations: passes with the linearisation held until nothing moves.
+//! Gauss–Newton iterations: passes with fixed linearisation until convergence.
 
 use std::ops::ControlFlow;
 
@@ -8,17 +8,17 @@ use crate::calibration::{
     Problem, Script, pass,
 };
 
-/// A cost that rises by more than this part means that the step was too long. Each pass knows the cost
-/// of its own linearised problem only, so a small rise means nothing.
+/// A cost that rises by more than this part indicates a step that was too long. Each pass knows only the cost
+/// of its own linearised problem, so a small rise is not significant.
 const COST_RISE: f64 = 0.1;
-/// After a step of more than this part of the one before, all go half as far.
+/// After a step longer than this part of the one before, all further steps are halved.
 const SHRINKS: f64 = 0.8;
-/// Passes after which the gate's decision stands, lest an observation at its edge goes in and out.
+/// Number of passes after which the gate's decisions are fixed, so that an observation at its edge does not toggle.
 const DECIDED_AFTER: usize = 4;
-/// More than this part of all observations beyond the gate are no outliers.
+/// If more than this part of all observations are beyond the gate, they are not outliers.
 const MOST_OUTLIERS: f64 = 0.05;
 
-/// A step that leads where no pass can be made is shortened by half so many times at most: to a thousandth.
+/// Most halvings of a step to a point where no pass can be made: to a thousandth.
 const MOST_SHORTENED: usize = 10;
 
 /// One pass over the record.
@@ -34,13 +34,13 @@ pub struct Pass {
     pub rejected: usize,
 }
 
-/// Told after each pass, may stop the work; the command line draws it.
+/// Callback after each pass, which may stop the work; the command line displays the progress.
 pub type Progress<'a> = &'a (dyn Fn(&Pass) -> ControlFlow<()> + Sync);
 
-/// Progress that nobody follows.
+/// A callback that does nothing.
 pub const UNWATCHED: Progress<'static> = &|_| ControlFlow::Continue(());
 
-/// Tells of a pass.
+/// Reports a pass.
 pub fn tell(progress: Progress, pass: &Pass) -> Result<(), CalibrationError> {
     match progress(pass) {
         ControlFlow::Continue(()) => Ok(()),
@@ -48,7 +48,7 @@ pub fn tell(progress: Progress, pass: &Pass) -> Result<(), CalibrationError> {
     }
 }
 
-/// The last pass, what it led to, and whether that moved nothing.
+/// The last pass, its estimate, and whether it converged.
 #[derive(Clone)]
 pub struct Iterated {
     pub held: PassResult,
@@ -57,7 +57,7 @@ pub struct Iterated {
 }
 
 impl Iterated {
-    /// Ended with a pass: at its estimate, or where it was made if that cannot be inverted.
+    /// The result of a last pass: at its estimate or, if that is singular, at its linearisation point.
     fn ended(held: PassResult, converged: bool) -> Self {
         let mut estimate = held.estimate();
         if not_invertible(&estimate.triads).is_some() {
@@ -70,15 +70,15 @@ impl Iterated {
         }
     }
 
-    /// What it makes of both triads.
+    /// The estimate of both triads.
     pub fn both_triads(&self) -> Estimate {
         let linear = &self.held.posterior.parameter_covariance;
         Estimate::with_curvature(self.estimate.triads, linear)
     }
 }
 
-/// Passes from a first point on, each linearised at the estimate of the one before; and whether they
-/// converged. `gate` is decided already, or by innovations.
+/// Iterates from a first point, each pass linearised at the estimate of the one before. `gate` is already
+/// decided, or decides by innovations.
 pub fn iterate(
     problem: &Problem,
     priors: &[AttitudePrior],
@@ -138,7 +138,7 @@ pub fn iterate(
     }
 }
 
-/// A pass at a point; where none can be made there, at one half as far from the pass before, and so on.
+/// A pass at a point; if it fails, at half the distance from the pass before, and so on.
 fn pass_towards(
     problem: &Problem,
     priors: &[AttitudePrior],
@@ -158,7 +158,7 @@ fn pass_towards(
     made
 }
 
-/// Part of all observations that are beyond the gate or were left out.
+/// Part of all observations that are beyond the gate or were rejected.
 fn beyond(result: &PassResult, gate: f64) -> f64 {
     let beyond = |i: &&Innovation| !i.accepted || i.distance() > gate;
     result.innovations.iter().filter(beyond).count() as f64 / result.innovations.len() as f64

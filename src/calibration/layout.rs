@@ -1,5 +1,5 @@
-//! The states of the filter, what moves or is drawn anew, and the constants, whose effect on them it carries along: named
-//! groups, made from what a problem has on. No other file knows an index.
+//! The states of the filter, which move or are redrawn, and the constants, whose effect on the states it propagates, as
+//! named groups that depend on the options of a problem. No other file uses an index directly.
 //!
 //! | states | number | meaning |
 //! |---|---|---|
@@ -40,7 +40,7 @@ pub const POSITION: usize = 6;
 /// Number of navigation states.
 pub const NAVIGATION: usize = 9;
 
-/// Where each group of states is, and which constants there are.
+/// Index of each group of states, and the list of constants.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
     /// Error of gravity, if it is a state.
@@ -49,22 +49,22 @@ pub struct Layout {
     pub earth_rate: Option<usize>,
     /// State, triad and index of the constant part among the triad's parameters of each varying bias.
     pub varying_biases: Vec<(usize, Sensor, usize)>,
-    /// State of each thing that is not common to all recordings.
+    /// State of each quantity that differs between recordings.
     pub own: Vec<(usize, OwnState)>,
     /// Error of the table's position, if it is a state.
     pub table_position: Option<usize>,
-    /// What the attitude error has become more since the body came to rest, if it is a state.
+    /// Increase of the attitude error since the body came to rest, if it is a state.
     pub turn_at_rest: Option<usize>,
     /// Attitude error at the first sample of the stretch.
     pub initial_attitude: usize,
-    /// What draws each state anew, or is known of it before.
+    /// Source of each state: its prior, or the noise that redraws it.
     pub sources: Vec<BudgetSource>,
     /// The constants, in the order of their columns.
     pub constants: Vec<Constant>,
 }
 
 impl Layout {
-    /// Of a model, of recordings with `one_gravity` or with more.
+    /// Layout of a model, for recordings with one common gravity (`one_gravity`) or several.
     pub fn new(model: &Model, one_gravity: bool) -> Self {
         let mut sources = vec![BudgetSource::InitialAttitude; VELOCITY];
         sources.resize(NAVIGATION, BudgetSource::Place);
@@ -108,7 +108,7 @@ impl Layout {
     }
 }
 
-/// The constants that a model has on, gravity if it is one.
+/// The constants of a model, including gravity if it is a constant.
 fn constants(model: &Model, gravity: bool) -> Vec<Constant> {
     let parameters = (0..PARAMETERS).filter(|&i| model.prior_sigma[i] > 0.0);
     let terms = (0..TERM_PARAMETERS).filter(|&k| model.term_sigma[k] > 0.0);

@@ -1,4 +1,4 @@
-//! Where a pass linearises, and what is known of attitudes before it.
+//! Linearisation point of a pass, and priors of the attitudes.
 
 use std::f64::consts::{PI, SQRT_2};
 use std::ops::Range;
@@ -23,17 +23,17 @@ pub struct Linearisation {
     pub triads: PerSensor<Triad>,
     /// Parameters of its error terms.
     pub terms: TermVector,
-    /// How it changes with temperature; zero where it does not.
+    /// Its temperature dependence; zero if there is none.
     pub thermal: PerSensor<ThermalCoefficients>,
-    /// By how much it differs in each recording from what all have in common; of those beyond the end, by
-    /// nothing.
+    /// Deviation in each recording from the common parameters; zero for recordings beyond the end of the
+    /// list.
     pub own: Vec<Difference>,
     /// `C_b_n` at the first sample of each stretch.
     pub initial_attitudes: Vec<Matrix3<f64>>,
 }
 
 impl Linearisation {
-    /// With what is the same at any temperature and in all recordings.
+    /// A point without temperature dependence and without differences between recordings.
     pub fn new(
         triads: PerSensor<Triad>,
         terms: TermVector,
@@ -56,7 +56,7 @@ impl Linearisation {
         }
     }
 
-    /// The instrument in a recording, told with its number, at the temperature in the middle of these samples.
+    /// The instrument in a recording, given by its number, at the temperature in the middle of these samples.
     pub(in crate::calibration) fn instrument(
         &self,
         model: &Model,
@@ -78,7 +78,7 @@ impl Linearisation {
         })
     }
 
-    /// By how much a recording differs from what all have in common.
+    /// Deviation of a recording from the common parameters.
     pub(in crate::calibration) fn own(&self, recording: usize) -> Difference {
         self.own.get(recording).copied().unwrap_or_default()
     }
@@ -120,41 +120,41 @@ pub fn singular(triads: &PerSensor<Triad>) -> CalibrationError {
     }
 }
 
-/// What is known of the attitude at the first sample of a stretch before the filter runs.
+/// Prior of the attitude at the first sample of a stretch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AttitudePrior {
     /// `C_b_n`: a reading of the table or, without, the coarse alignment.
     pub mean: Matrix3<f64>,
     /// 1σ about East, North and Up, rad; the last is that of the heading.
     pub sigma: Vector3<f64>,
-    /// 1σ of Earth rate along East, North and Up of this attitude, rad/s. Where its heading is not known, the heading is
-    /// fixed and Earth rate has any level direction; where the place is not known, any direction. Else zero.
+    /// 1σ of Earth rate along East, North and Up of this attitude, rad/s. If the heading is unknown, the heading is
+    /// fixed and Earth rate has any horizontal direction; if the site is unknown, any direction. Otherwise zero.
     pub earth_rate_sigma: Vector3<f64>,
 }
 
-/// 1σ of the initial attitude before anything is known of it but one reading, rad: that may be a wrong one.
+/// 1σ of an initial attitude known from one reading only, which may be wrong, rad.
 const READ_ATTITUDE: f64 = DEGREE;
-/// So many times what the prior of the accelerometers leaves of the initial level without a table: what gave it is in
-/// the observations, too, so that it has to be told by these.
+/// σ of the initial level without a table, over its σ from the prior of the accelerometers: the data that gave this
+/// level are observations, too, and these have to determine it.
 const LEVEL_SIGMAS: f64 = 10.0;
 /// 1σ of the initial heading without a table, rad, if Earth rate shows it well; else …
 const HEADING: f64 = 15.0 * DEGREE;
-/// … so many times what Earth rate leaves of it.
+/// … this many times its σ from Earth rate.
 const HEADING_SIGMAS: f64 = 3.0;
-/// A heading less known than this, rad, is hidden: it may be any, and is fixed to within …
+/// A heading with a larger σ than this, rad, is treated as unknown: it is fixed with a σ of …
 const HIDDEN: f64 = 45.0 * DEGREE;
-/// … this, rad: a number so small that it is none, where a state needs a σ.
+/// … this, rad: negligible, but a state needs a σ.
 const FIXED: f64 = 1e-6;
-/// 1σ of a heading that may be any, rad.
+/// 1σ of a uniformly distributed heading, rad.
 pub const UNKNOWN_HEADING: f64 = PI / 1.732_050_807_568_877_2;
 
 impl AttitudePrior {
-    /// Whether the heading is fixed because nothing tells it.
+    /// Whether the heading is fixed because it is unknown.
     pub fn heading_is_unknown(&self) -> bool {
         self.sigma.z == FIXED
     }
 
-    /// From a reading of a table.
+    /// Prior from a reading of a table.
     pub(in crate::calibration) fn of_reading(table: &TableAccuracy, mean: Matrix3<f64>) -> Self {
         // The one reading that gave it has all errors.
         let known = table.position_sigma.hypot(table.reading_sigma);
@@ -166,8 +166,8 @@ impl AttitudePrior {
         }
     }
 
-    /// From a coarse alignment that knows its heading to this 1σ, and its level to what accelerometers of this model
-    /// say.
+    /// Prior from a coarse alignment with this 1σ of the heading, and the 1σ of the level from the accelerometers of
+    /// this model.
     pub(in crate::calibration) fn of_alignment(
         mean: Matrix3<f64>,
         heading_sigma: f64,
@@ -190,8 +190,8 @@ impl AttitudePrior {
     }
 }
 
-/// 1σ of a level that one attitude of the accelerometers gives before they are calibrated, rad: of the axis of which
-/// least is known.
+/// 1σ of the level from uncalibrated accelerometers in one attitude, rad, for the axis with the largest
+/// uncertainty.
 fn known_level(model: &Model, gravity: f64) -> f64 {
     let mut variances = Vector3::<f64>::zeros();
     for of_triad in 0..PER_TRIAD {
@@ -212,11 +212,11 @@ fn known_level(model: &Model, gravity: f64) -> f64 {
 pub struct Start {
     /// Mean of φ₀, rad.
     pub attitude: Vector3<f64>,
-    /// East, North and Up, rad.
+    /// 1σ of φ₀, East, North and Up, rad.
     pub attitude_sigma: Vector3<f64>,
-    /// m/s
+    /// 1σ of velocity, m/s.
     pub velocity_sigma: f64,
-    /// m
+    /// 1σ of position, m.
     pub position_sigma: f64,
     /// Mean of the error of Earth rate along East, North and Up, rad/s …
     pub earth_rate: Vector3<f64>,

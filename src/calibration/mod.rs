@@ -1,8 +1,7 @@
-//! Calibration: closed form, coarse start, filter and Gauss–Newton iterations, and what can be said of a
-//! result.
+//! Calibration: closed form, coarse start, filter and Gauss–Newton iterations, and the checks of a result.
 //!
-//! A [`Problem`] takes runs and [`Options`]; [`estimate`] and [`six_position`] solve it; [`bound`] says what
-//! could be had. Nothing here prints, reads files or draws.
+//! A [`Problem`] takes runs and [`Options`]; [`estimate`] and [`six_position`] solve it; [`bound`] gives the
+//! Cramér–Rao bound. Nothing here prints, reads files or draws.
 
 mod checks;
 mod constants;
@@ -31,7 +30,7 @@ pub mod result;
 mod solution;
 mod solved;
 
-// What most of its files speak of is imported from here.
+// Most files of this module import their common types from here.
 pub use bound::{Bound, bound, thermal_bound};
 pub use budget::{Budget, BudgetPart, BudgetPartRecord, BudgetRecord, BudgetSource, LeftOffRecord};
 pub use checks::cause::{Cause, FoundCause};

@@ -1,4 +1,4 @@
-//! What is estimated of a run, and what is known of it beforehand: small, and cheap to copy and change.
+//! Estimated quantities of a run with their prior: small, and cheap to copy and modify.
 
 use std::sync::Arc;
 
@@ -18,23 +18,23 @@ use crate::run::{Aiding, Run};
 use crate::turntable::{AxisError, TableGeometry};
 use crate::units::ARCSEC;
 
-/// 1σ of a table's level where nothing better is known, rad.
+/// Default 1σ of a table's level, rad.
 pub const USUAL_LEVEL: f64 = 10.0 * ARCSEC;
-/// 1σ of its north.
+/// Default 1σ of its north, rad.
 pub const USUAL_NORTH: f64 = 60.0 * ARCSEC;
-/// 1σ of each tilt of its axes.
+/// Default 1σ of each tilt of its axes, rad.
 const USUAL_TILT: f64 = 10.0 * ARCSEC;
-/// Correlation time of a varying bias where nothing better is known, s.
+/// Default correlation time of a varying bias, s.
 const USUAL_CORRELATION: f64 = 100.0;
-/// How many times what white noise averages to in a correlation time a bias then varies by, 1σ.
+/// Default 1σ of a varying bias, in multiples of the white noise averaged over a correlation time.
 const USUAL_VARIATION: f64 = 3.0;
 
-/// What is estimated, and its uncertainty before the run.
+/// The estimated quantities with their prior uncertainty.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
-    /// How installation angles make the installation matrix.
+    /// Form of the installation matrix.
     pub form: InstallationForm,
-    /// What is observed at rest.
+    /// Observations at rest.
     pub aiding: Aiding,
     /// Mean of the parameters of both triads.
     pub prior_mean: ParameterVector,
@@ -42,22 +42,22 @@ pub struct Model {
     pub prior_sigma: ParameterVector,
     /// Noise of each triad.
     pub noise: PerSensor<Noise>,
-    /// What moves add to it.
+    /// Noise added during moves.
     pub motion_noise: PerSensor<MotionNoise>,
-    /// White 1σ at standstill of what each triad's output adds up to, attitude in rad and velocity in m/s;
-    /// none: in each stretch what its run states or shows.
+    /// White 1σ, at standstill, of the integral of each triad's output: attitude in rad, velocity in m/s;
+    /// `None`: in each stretch the value that its run states or shows.
     pub standstill_sigma: PerSensor<Option<f64>>,
-    /// How the body turns where it should not, in dwells without a table: 1σ density of a random walk,
-    /// rad/√s. Gyros sense it, so it is none of their noise.
+    /// Unwanted rotation of the body in dwells without a table: 1σ density of a random walk,
+    /// rad/√s. Gyros sense it, so it is not part of their noise.
     pub turning_at_rest: f64,
-    /// Whether velocity begins anew after each move: without a table's log a move leaves more noise in it than it tells,
-    /// except of terms that show in nothing else.
+    /// Whether velocity is reset after each move: without a table's log, a move adds more noise to velocity than
+    /// information, except about terms that no other observation shows.
     pub velocity_anew: bool,
-    /// 1σ of each parameter of the instrument's error terms, around zero; zero where a term is off.
+    /// 1σ of each parameter of the instrument's error terms, around zero; zero if a term is off.
     pub term_sigma: TermVector,
-    /// How the instrument changes with temperature, where it does.
+    /// Temperature dependence of the instrument, if any.
     pub thermal: Option<Arc<ThermalModel>>,
-    /// By how much recordings differ.
+    /// σ of the differences between recordings.
     pub day_to_day: DayToDay,
     /// 1σ of gravity at the site, m/s²; common to all dwells of a recording.
     pub gravity_sigma: f64,
@@ -65,18 +65,18 @@ pub struct Model {
     pub position_sigma: f64,
     /// 1σ per axis of a reading of the table, rad; zero without a table.
     pub reading_sigma: f64,
-    /// 1σ of what the table does not read; zero where it is off.
+    /// 1σ of table errors that its readings do not include; zero if off.
     pub geometry: TableGeometry,
-    /// What happened once, and is estimated.
+    /// Single events that are estimated.
     pub(in crate::calibration) disturbances: Vec<Disturbance>,
-    /// Axes of the table whose angles are read; zero where they are not.
+    /// Number of table axes with angle readings; zero if there are none.
     table_axes: usize,
-    /// The source whose variance is multiplied, and by what: how a budget tells its share.
+    /// The source whose variance is multiplied, with the factor: used to compute its share of the budget.
     pub(in crate::calibration) varied: Option<(BudgetSource, f64)>,
 }
 
 impl Model {
-    /// The model of a run: what the run states, and what the options ask for beside it.
+    /// The model of a run: the run's statements, completed by the options.
     pub fn new(run: &Run, options: &Options) -> Self {
         let aiding = options.aiding.unwrap_or_else(|| run.aiding());
         let table = run.observed_table(aiding);
@@ -113,7 +113,7 @@ impl Model {
         model
     }
 
-    /// What drives the navigation errors.
+    /// Process noise of the navigation errors.
     pub(in crate::calibration) fn process_noise(&self) -> PerSensor<ProcessNoise> {
         PerSensor::from_fn(|sensor| {
             let MotionNoise {
@@ -130,13 +130,13 @@ impl Model {
         })
     }
 
-    /// What the variance of a source is multiplied by.
+    /// Factor of the variance of a source.
     pub(in crate::calibration) fn weight(&self, source: BudgetSource) -> f64 {
         let varied = self.varied.filter(|&(varied, _)| varied == source);
         varied.map_or(1.0, |(_, factor)| factor)
     }
 
-    /// Sets the variance at standstill over the least that is ever taken, rad² or m²/s².
+    /// Sets the variance at standstill in excess of the floor, rad² or m²/s².
     pub(in crate::calibration) fn set_standstill_variance(
         &mut self,
         sensor: Sensor,
@@ -159,7 +159,7 @@ impl Model {
         }
     }
 
-    /// The same parameters in another form.
+    /// The model with its parameters in another form.
     pub(in crate::calibration) fn in_form(&self, run: &Run, form: InstallationForm) -> Self {
         let mut model = self.clone();
         model.set_form(run, form);
@@ -190,8 +190,8 @@ impl Model {
         }
     }
 
-    /// Whether the run can hold an error term: those of the table need its log, and those of its axes the angles of
-    /// its axes.
+    /// Whether the run supports an error term: terms of the table need its log, and terms of its axes need axis
+    /// angles.
     pub fn can_have(&self, term: ErrorTerm) -> bool {
         match term {
             ErrorTerm::TableBase => self.aiding == Aiding::Table,
@@ -200,8 +200,8 @@ impl Model {
         }
     }
 
-    /// Switches an error term on, with its usual σ unless the run states one. Nothing changes where the
-    /// run cannot hold it.
+    /// Switches an error term on, with its usual σ unless the run states one. No effect if the
+    /// run does not support it.
     pub fn switch_on(&mut self, term: ErrorTerm) {
         if !self.has(term) && self.can_have(term) {
             self.set(term, 1.0);
@@ -238,8 +238,8 @@ impl Model {
     }
 }
 
-/// 1σ of each error of a table's axes where nothing better is known, rad, on a table with this position
-/// error: what of a table's accuracy repeats with angle may be as large as what does not.
+/// Default 1σ of each error of a table's axes, rad, for this position error: the part of a table's error
+/// that repeats with angle may be as large as the part that does not.
 pub fn usual_axis_error(kind: AxisError, position_sigma: f64) -> f64 {
     match kind {
         AxisError::Tilt => USUAL_TILT,
@@ -247,7 +247,7 @@ pub fn usual_axis_error(kind: AxisError, position_sigma: f64) -> f64 {
     }
 }
 
-/// How a bias may vary where nothing better is known than the white noise.
+/// Default variation of a bias, from its white noise.
 pub fn usual_variation(noise: &Noise) -> GaussMarkov {
     GaussMarkov {
         sigma: USUAL_VARIATION * noise.random_walk / USUAL_CORRELATION.sqrt(),

@@ -1,11 +1,11 @@
-//! What is to be estimated, and how.
+//! Options of the estimation.
 
 use crate::calibration::{ErrorTerm, NoisePolicy};
 use crate::imu::InstallationForm;
 use crate::run::Aiding;
 use crate::statistics::FALSE_ALARM;
 
-/// What is to be estimated, and how; the default is right for most runs.
+/// Options of the estimation; the default suits most runs.
 ///
 /// ```
 /// use turncal::calibration::Options;
@@ -19,21 +19,21 @@ use crate::statistics::FALSE_ALARM;
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
-    /// How installation angles make the installation matrix.
+    /// Form of the installation matrix.
     pub form: InstallationForm,
-    /// What is observed at rest; none: the table's attitude where there is its log, else velocity.
+    /// Observations at rest; `None`: the table's attitude if there is a table log, else zero velocity.
     pub aiding: Option<Aiding>,
-    /// Error terms to be estimated beside those that the instrument and the table state a σ for.
+    /// Error terms to estimate in addition to those with a σ stated for instrument or table.
     pub terms: Vec<ErrorTerm>,
-    /// Whether error terms that the data call for are estimated, too.
+    /// Whether error terms that the data support are estimated, too.
     pub auto_terms: bool,
-    /// Which noise is used.
+    /// Noise policy.
     pub noise: NoisePolicy,
-    /// Chance that the gate rejects any observation of a record without outliers.
+    /// Probability that the gate rejects any observation of a record without outliers.
     pub false_rejection: f64,
-    /// Converged when no parameter moves by more than this many of its σ.
+    /// Convergence limit: largest step of any parameter, in σ.
     pub converged_sigma: f64,
-    /// Passes over the record at most.
+    /// Most passes over the record.
     pub passes: usize,
 }
 
@@ -53,12 +53,12 @@ impl Default for Options {
 }
 
 impl Options {
-    /// With this installation form.
+    /// Sets the installation form.
     pub fn installation(self, form: InstallationForm) -> Self {
         Self { form, ..self }
     }
 
-    /// With this aiding.
+    /// Sets the aiding.
     pub fn aiding(self, aiding: Aiding) -> Self {
         Self {
             aiding: Some(aiding),
@@ -66,12 +66,12 @@ impl Options {
         }
     }
 
-    /// With this noise.
+    /// Sets the noise policy.
     pub fn noise(self, noise: NoisePolicy) -> Self {
         Self { noise, ..self }
     }
 
-    /// With the error terms that are asked for and no others.
+    /// Restricts error terms to those requested.
     pub fn no_auto_terms(self) -> Self {
         Self {
             auto_terms: false,
@@ -79,7 +79,7 @@ impl Options {
         }
     }
 
-    /// With this error term, its σ being the usual one unless instrument or table state another.
+    /// Adds this error term, with its usual σ unless instrument or table state another.
     pub fn with(mut self, term: ErrorTerm) -> Self {
         self.terms.push(term);
         self

@@ -1,4 +1,4 @@
-//! What the filter says of a run: an estimate with its covariance, and how it was reached.
+//! Outcome of the filter for a run: an estimate with its covariance, and the diagnostics of the filter.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +16,7 @@ use crate::calibration::{
 };
 use crate::imu::Sensor;
 
-/// χ² by which opposite headings differ where a run observes the heading.
+/// Least χ² difference of opposite headings for an observed heading.
 const HEADING_SEEN: f64 = 6.0;
 
 /// The result of the filter on one run.
@@ -24,39 +24,39 @@ const HEADING_SEEN: f64 = 6.0;
 pub struct Outcome {
     /// The estimate after the last pass.
     pub estimate: Estimate,
-    /// Covariance of the parameters by noise and prior alone, as the last pass has it.
+    /// Covariance of the parameters due to noise and prior alone, from the last pass.
     pub covariance_by_noise: ParameterMatrix,
-    /// What the covariance of the estimate has beside that, each part by what it is of; see
-    /// [`crate::calibration::Solution::assess`] for those that come later.
+    /// The other parts of the covariance of the estimate, by their source;
+    /// [`crate::calibration::Solution::assess`] adds more.
     pub covariance_parts: BTreeMap<BudgetSource, ParameterMatrix>,
     /// 1σ of every parameter before the run.
     pub prior_sigma: ParameterVector,
-    /// What was known of the initial attitude of each stretch before the run.
+    /// Prior of the initial attitude of each stretch.
     pub prior_attitudes: Vec<AttitudePrior>,
-    /// 1σ of the initial attitude of the last stretch after it, rad about East, North and Up; the last is that of the
+    /// Posterior 1σ of the initial attitude of the last stretch about East, North and Up, rad; the last is that of the
     /// heading.
     pub attitude_sigma: Vector3<f64>,
     /// Errors of the table's geometry and parameters of the instrument's error terms.
     pub auxiliary: Auxiliary,
-    /// How parameters change with temperature, where they do.
+    /// Temperature dependence of the parameters, if any.
     pub thermal: Option<Thermal>,
-    /// By how much each recording differs from what all have in common; empty where nothing does.
+    /// Deviation of each recording from the common parameters; empty if there is none.
     pub own: Vec<Own>,
-    /// What each recording alone says, where something differs between recordings or temperatures.
+    /// Each recording calibrated alone, if something differs between recordings or temperatures.
     pub alone: Vec<SeparateEstimate>,
-    /// Mean temperature of each dwell in °C and its rate in K/s; empty where nothing follows temperature.
+    /// Mean temperature of each dwell, °C, and its rate, K/s; empty if nothing depends on temperature.
     pub warming: Vec<(f64, f64)>,
     /// Gravity and its 1σ after the run, m/s².
     pub gravity: (f64, f64),
-    /// What the run showed of the parameters and what it left as it was.
+    /// Observability of the parameters in the run.
     pub observability: Observability,
-    /// Where the last pass linearised.
+    /// Linearisation point of the last pass.
     pub linearised_at: Linearisation,
     /// Each pass in order.
     pub passes: Vec<Pass>,
     /// Whether the last pass moved no parameter by more than the limit.
     pub converged: bool,
-    /// Estimate and σ against time in the last pass, as the instrument was turned.
+    /// Estimate and σ against time in the last pass.
     pub history: Vec<Epoch>,
     /// White 1σ of the velocity at standstill that the filter used in the first stretch, m/s.
     pub velocity_sigma: f64,
@@ -64,19 +64,19 @@ pub struct Outcome {
     pub innovations: Vec<Innovation>,
     /// Consistency of the innovations with their covariance in the last pass.
     pub consistency: Consistency,
-    /// How much dwells scatter over what the covariance says; none where there are too few.
+    /// Scatter of the dwells relative to the covariance; `None` if there are too few dwells.
     pub dwell_scatter: Option<DwellScatter>,
-    /// Whether the data reject the installation form; none where they cannot.
+    /// Whether the data reject the installation form; `None` if they cannot test it.
     pub form_test: Option<FormTest>,
-    /// What was estimated, with the noise that was used.
+    /// The estimated model, with the noise that was used.
     pub model: Model,
-    /// How that noise was come by.
+    /// Origin of that noise.
     pub noise: NoiseReport,
     /// Steps of each dwell after a stop that are skipped.
     pub settling: usize,
-    /// Causes that the record shows and that its problem did not have.
+    /// Causes found in the record that were not part of the problem.
     pub causes: Vec<FoundCause>,
-    /// What a calibration engineer must know before using the figures.
+    /// Findings that a calibration engineer must know before using the figures.
     pub findings: Vec<Finding>,
 }
 
@@ -147,8 +147,8 @@ impl Outcome {
         Verdict::of(&self.findings).word != Word::Failed
     }
 
-    /// Whether the run observed the heading: two that are opposite differ by more than 6 in χ² by what
-    /// the run alone says.
+    /// Whether the run observed the heading: without the prior, opposite headings differ by more than 6
+    /// in χ².
     pub fn heading_observed(&self) -> bool {
         let information = |sigma: &Vector3<f64>| sigma.z.powi(-2);
         let Some(prior) = self.prior_attitudes.last() else {
@@ -162,7 +162,7 @@ impl Outcome {
         4.0 * of_run > HEADING_SEEN
     }
 
-    /// The problem as it was calibrated: with the noise that was learnt, and a prior that the data do not contradict.
+    /// The problem as calibrated: with the estimated noise, and a prior that the data do not contradict.
     pub(in crate::calibration) fn as_calibrated<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
         let problem = self.with_prior(problem);
         match self.noise.learnt {
@@ -171,7 +171,7 @@ impl Outcome {
         }
     }
 
-    /// The problem with that prior and all causes that were found, and noise as it is stated.
+    /// The problem with that prior and all causes found, but with the stated noise.
     pub(in crate::calibration) fn with_prior<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
         let causes = self.causes.iter();
         let problem = causes.fold(problem.settled(self.settling), |problem, of| {
@@ -212,7 +212,7 @@ impl Outcome {
         reduction.posterior(&Prior::new(constants, &problem.model, &self.linearised_at))
     }
 
-    /// A part of the covariance of the estimate that no pass knows of; zero where there is none of it.
+    /// A part of the covariance of the estimate that no pass includes; zero if there is none.
     pub fn part(&self, source: BudgetSource) -> ParameterMatrix {
         self.covariance_parts
             .get(&source)
@@ -220,13 +220,13 @@ impl Outcome {
             .unwrap_or_default()
     }
 
-    /// Adds such a part to the covariance of the estimate, in the place of what it had of it.
+    /// Sets such a part of the covariance of the estimate, in place of its former value.
     pub(in crate::calibration) fn set_part(&mut self, source: BudgetSource, part: ParameterMatrix) {
         self.estimate.covariance += part - self.part(source);
         self.covariance_parts.insert(source, part);
     }
 
-    /// How many times larger the σ of a parameter are, at most, for such a part.
+    /// Largest growth factor of σ due to such a part.
     pub(in crate::calibration) fn growth_by(&self, source: BudgetSource) -> f64 {
         let with = self.estimate.covariance;
         let without = with - self.part(source);

@@ -1,4 +1,4 @@
-//! A pass of the filter through a record: estimate, covariance, and which observations it let in.
+//! A pass of the filter through a record: estimate, covariance, and accepted observations.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -11,21 +11,21 @@ use crate::calibration::{
     Prior, Problem, Reduction, Script, Thermal, auxiliary_vector,
 };
 
-/// What a pass gives.
+/// Result of a pass.
 #[derive(Debug, Clone)]
 pub struct PassResult {
-    /// Where it linearised.
+    /// Its linearisation point.
     pub at: Linearisation,
     pub reduction: Reduction,
-    /// What the record says of the constants.
+    /// Posterior of the constants.
     pub posterior: Posterior,
-    /// Cost: whitened innovations squared, summed; the prior is in it, since the filter starts from it.
-    /// A rejected observation counts as much as the gate lets pass.
+    /// Cost: sum of squared whitened innovations; it includes the prior, because the filter starts from it.
+    /// A rejected observation counts with the limit of the gate.
     pub cost: f64,
     pub innovations: Vec<Innovation>,
 }
 
-/// A pass through what happens in a record.
+/// Runs a pass through the events of a record.
 pub fn pass(
     problem: &Problem,
     script: &Script,
@@ -47,27 +47,27 @@ pub fn pass(
 }
 
 impl PassResult {
-    /// Which observations were let in.
+    /// Whether each observation was accepted.
     pub fn accepted(&self) -> Vec<bool> {
         self.innovations.iter().map(|of| of.accepted).collect()
     }
 
-    /// Those that were.
+    /// The accepted observations.
     pub fn let_in(&self) -> impl Iterator<Item = &Innovation> {
         self.innovations.iter().filter(|of| of.accepted)
     }
 
-    /// −2 ln of the likelihood, except a constant.
+    /// −2 ln of the likelihood, up to a constant.
     pub fn deviance(&self) -> f64 {
         self.let_in().map(Innovation::deviance).sum()
     }
 
-    /// Where the next pass linearises.
+    /// Linearisation point of the next pass.
     pub fn estimate(&self) -> Linearisation {
         self.reduction.estimate(&self.at, &self.posterior)
     }
 
-    /// Mean and 1σ of the error of gravity, true − stated, m/s²; zero where it is not estimated.
+    /// Mean and 1σ of the error of gravity, true − stated, m/s²; zero if it is not estimated.
     pub fn gravity(&self) -> (f64, f64) {
         let Posterior {
             mean, covariance, ..
@@ -127,7 +127,7 @@ impl PassResult {
         auxiliary
     }
 
-    /// Estimates of the coefficients of temperature, where there are any.
+    /// Estimates of the temperature coefficients, if any.
     pub fn thermal(&self, model: &Model) -> Option<Thermal> {
         let of_model = model.thermal.as_deref()?;
         let (places, coefficients): (Vec<usize>, Vec<_>) = self.reduction.coefficients().unzip();

@@ -1,4 +1,4 @@
-//! A calibration problem: runs of one instrument, looked at once, and what is to be estimated of them.
+//! A calibration problem: preprocessed runs of one instrument, and the model to estimate.
 
 use std::sync::Arc;
 
@@ -16,16 +16,16 @@ use crate::recording::{Recording, TableLog};
 use crate::run::{Aiding, Dwell, LONG_ENOUGH, Position, Run};
 use crate::statistics::chi_square_limit;
 
-/// 1σ of the initial velocity of a body at rest, m/s, beside that with which it sways.
+/// 1σ of the initial velocity of a body at rest, m/s, in addition to that of its sway.
 const INITIAL_VELOCITY: f64 = 1e-3;
 
-/// Runs of one instrument with what is to be estimated of them.
+/// Runs of one instrument with the model to estimate.
 ///
-/// Dwells, moves and what is observed when are found once; estimate, tests, bound and quality share
-/// them. It is cheap to copy with another [`Model`].
+/// Dwells, moves and the schedule of observations are found once; estimate, tests, bound and quality share
+/// them. Copies with another [`Model`] are cheap.
 #[derive(Debug, Clone)]
 pub struct Problem<'a> {
-    /// What is estimated, and what is known of it beforehand.
+    /// The estimated quantities with their prior.
     pub model: Model,
     pub(in crate::calibration) options: Options,
     run: &'a Run,
@@ -35,13 +35,13 @@ pub struct Problem<'a> {
     left_out: Vec<String>,
 }
 
-/// Part of a recording without a break, from its first dwell to its last.
+/// Continuous part of a recording, from its first dwell to its last.
 #[derive(Debug, Clone)]
 pub struct Stretch<'a> {
     pub run: &'a Run,
-    /// The table's readings, where they are observed.
+    /// The table's readings, if they are observed.
     pub table: Option<&'a TableLog>,
-    /// Which of the problem's runs it is of.
+    /// Index of its run in the problem.
     pub recording: usize,
     pub dwells: Vec<Dwell>,
     pub steps: Vec<Step>,
@@ -63,8 +63,8 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The same with another run of the instrument. What is known of the instrument and of a table
-    /// beforehand stays that of the first; each site has its own gravity.
+    /// The same with another run of the instrument. The priors of the instrument and of the table remain those of the
+    /// first run; each site has its own gravity.
     pub fn and(&self, run: &'a Run) -> Self {
         let mut all = self.stretches.to_vec();
         all.extend(stretches(run, self.others.len() + 1, &self.model));
@@ -75,7 +75,7 @@ impl<'a> Problem<'a> {
         with
     }
 
-    /// Some of its recordings, at least one, told by number.
+    /// Some of its recordings, at least one, selected by number.
     pub(in crate::calibration) fn recordings(&self, which: impl Fn(usize) -> bool) -> Self {
         let renumbered = self.stretches.iter().filter(|of| which(of.recording));
         let renumbered = renumbered.map(|stretch| Stretch {
@@ -90,7 +90,7 @@ impl<'a> Problem<'a> {
         of
     }
 
-    /// Without the recordings that have no dwell, of which it says so; as it is where none has.
+    /// The problem without recordings that have no dwell, which are reported; unchanged if none has a dwell.
     pub(in crate::calibration) fn of_dwells(self) -> Self {
         let has = |number: usize| {
             let mut of = self.stretches.iter().filter(|of| of.recording == number);
@@ -117,7 +117,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The same with a model that is changed.
+    /// The same with a modified model.
     pub fn with(&self, change: impl FnOnce(&mut Model)) -> Self {
         let mut changed = self.clone();
         change(&mut changed.model);
@@ -131,7 +131,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The same observed in some of its dwells only, told by number.
+    /// The same, observed only in some of its dwells, selected by number.
     pub(in crate::calibration) fn observed_in(&self, used: impl Fn(usize) -> bool) -> Self {
         self.with_dwells(|number, _, dwell| used(number).then(|| dwell.clone()))
     }
@@ -186,14 +186,14 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// Duration of so many steps of a dwell, s.
+    /// Duration of this number of steps of a dwell, s.
     pub(in crate::calibration) fn duration_of_steps(&self, steps: usize) -> f64 {
         let period = self.run.recording.imu.period;
         (steps * step_length(period)) as f64 * period
     }
 
-    /// The same observed at the end of so many steps of a dwell, with the mean of what a table read
-    /// meanwhile.
+    /// The same problem, observed once per this number of steps of a dwell, with the mean of the table's readings over
+    /// them.
     pub(in crate::calibration) fn observed_every(&self, steps_of_dwell: usize) -> Self {
         let stretches = self.stretches.iter().map(|stretch| Stretch {
             steps: steps(stretch.run, stretch.table, &stretch.dwells, steps_of_dwell),
@@ -223,7 +223,7 @@ impl<'a> Problem<'a> {
         sum / self.stretches.len().max(1) as f64
     }
 
-    /// The run, of several the first.
+    /// The run; the first of several.
     pub fn run(&self) -> &'a Run {
         self.run
     }

@@ -1,4 +1,4 @@
-//! From a problem to a calibration, by either method, with all that can be said of it.
+//! Solution of a problem by either method, with its assessment.
 
 use crate::calibration::checks::error_term_test::bias_variation;
 use crate::calibration::result::Provenance;
@@ -19,7 +19,7 @@ const BYTES_A_PACKED_SAMPLE: usize = 8;
 /// Bytes of what does not grow with the record: threads, error terms that are tried, the report.
 const BYTES_BESIDE: usize = 16 << 20;
 
-/// What a method makes of a problem.
+/// Result of a method for a problem.
 #[derive(Debug, Clone)]
 pub enum Solution {
     /// The filter.
@@ -28,22 +28,22 @@ pub enum Solution {
     ClosedForm(Box<ClosedForm>),
 }
 
-/// What a solution does to the data, and what they say of the model.
+/// Assessment of a solution and of its model by the data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assessment {
-    /// What each error term costs and explains; empty for the closed form.
+    /// Tests of all error terms; empty for the closed form.
     pub error_terms: Vec<ErrorTermTest>,
-    /// What is left of gravity and turns.
+    /// Residuals of gravity and turns.
     pub quality: Quality,
-    /// Where its uncertainty comes from; none for the closed form.
+    /// Uncertainty budget; `None` for the closed form.
     pub budget: Option<Budget>,
 }
 
 impl Problem<'_> {
-    /// Solves it by a method, unless a mounting other than the stated one is found: then by none.
+    /// Solves the problem by a method; fails if the record contradicts run.toml.
     ///
     /// # Errors
-    /// [`CalibrationError`] where the runs cannot give a calibration by this method.
+    /// [`CalibrationError`] if the runs cannot give a calibration by this method.
     pub fn solve(&self, method: Method, progress: Progress) -> Result<Solution, CalibrationError> {
         let bytes_of = |run: &Run| {
             let imu = &run.recording.imu;
@@ -79,7 +79,7 @@ impl Problem<'_> {
         })
     }
 
-    /// What a calibration of it is made of, except the files.
+    /// Origin of a calibration of the problem, without the files.
     pub fn provenance(&self) -> Provenance {
         let run = self.run();
         let imu = &run.recording.imu;
@@ -121,12 +121,12 @@ impl Solution {
         }
     }
 
-    /// Whether the filter converged; a closed form always did.
+    /// Whether the filter converged; true for a closed form.
     pub fn converged(&self) -> bool {
         self.outcome().is_none_or(|outcome| outcome.converged)
     }
 
-    /// Whether it may be used: the filter converged, and noise explains what either method leaves.
+    /// Whether it may be used: the filter converged, and noise explains the residuals.
     pub fn is_usable(&self) -> bool {
         match self {
             Self::Filter(outcome) => outcome.is_usable(),
@@ -134,12 +134,12 @@ impl Solution {
         }
     }
 
-    /// Tests error terms and judges what is left of gravity and turns. What error terms do that the data
-    /// show, and that are not estimated, goes into the covariance of the estimate; so does what biases do that
-    /// may vary unseen where the noise was learnt.
+    /// Tests error terms and judges the residuals of gravity and turns. The effect of error terms that the data
+    /// show, but that are not estimated, is added to the covariance of the estimate; if the noise was estimated, so is
+    /// the effect of bias variations too small to be seen.
     ///
     /// # Errors
-    /// [`CalibrationError`] where the problem is not the one of the solution.
+    /// [`CalibrationError`] if the problem is not the one of the solution.
     pub fn assess(&mut self, problem: &Problem) -> Result<Assessment, CalibrationError> {
         let outcome = match self {
             Self::Filter(outcome) => outcome,
@@ -178,7 +178,7 @@ impl Solution {
         })
     }
 
-    /// What must be known before using the figures.
+    /// Findings that must be known before using the figures.
     pub fn findings(&self, assessment: &Assessment) -> Vec<Finding> {
         match self {
             Self::Filter(outcome) => outcome.findings_with(&assessment.error_terms),

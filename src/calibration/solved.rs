@@ -1,4 +1,4 @@
-//! What iterations found, and with what they were made.
+//! Result of the iterations, with the problem that was solved.
 
 use crate::calibration::{
     AttitudePrior, CalibrationError, Estimate, Finding, FoundCause, Gate, Iterated, Linearisation,
@@ -6,19 +6,19 @@ use crate::calibration::{
 };
 use crate::imu::{PerSensor, ThermalState};
 
-/// What a recording alone says.
+/// A recording calibrated alone.
 #[derive(Debug, Clone)]
 pub struct SeparateEstimate {
     /// Its name.
     pub name: String,
-    /// Mean temperature of each axis, °C, and its rate, K/s, over its dwells; none where it is not known.
+    /// Mean temperature of each axis, °C, and its rate, K/s, over its dwells; `None` if unknown.
     pub temperature: Option<PerSensor<[f64; 3]>>,
     /// The span of its temperatures, K.
     pub span: f64,
-    /// Calibration at that temperature, with the noise that is stated or, where it may be learnt and has to be, with
-    /// that of its own; none where it gave none.
+    /// Calibration at that temperature, with the stated noise or, if the policy allows and the data demand it, with the
+    /// noise estimated from this recording; `None` if the calibration failed.
     pub estimate: Option<Estimate>,
-    /// Where its temperature stands for all of it: the functions of temperature then.
+    /// Functions of temperature, if its temperature is constant.
     pub(in crate::calibration) state: Option<ThermalState>,
     /// The estimate with the initial attitudes, or the coarse start.
     pub(in crate::calibration) at: Linearisation,
@@ -36,23 +36,23 @@ impl SeparateEstimate {
 /// A problem whose iterations have ended.
 #[derive(Clone)]
 pub struct Solved<'a> {
-    /// As it was calibrated: with the noise that was estimated and the orders of temperature that the data call for.
+    /// The problem as calibrated: with the estimated noise and the selected temperature orders.
     pub problem: Problem<'a>,
     pub priors: Vec<AttitudePrior>,
     pub passes: Vec<Pass>,
     pub iterated: Iterated,
     pub noise: NoiseReport,
-    /// Each recording calibrated alone, where there are several.
+    /// Each recording calibrated alone, if there are several.
     pub alone: Vec<SeparateEstimate>,
     /// Steps of each dwell after a stop that are skipped.
     pub settling: usize,
-    /// Causes that were found and taken into the problem.
+    /// Causes that were found and included in the problem.
     pub causes: Vec<FoundCause>,
     pub findings: Vec<Finding>,
 }
 
 impl<'a> Solved<'a> {
-    /// With noise of which nothing is said yet.
+    /// A solution with noise that is not yet tested.
     pub fn new(
         problem: &Problem<'a>,
         priors: Vec<AttitudePrior>,
@@ -72,7 +72,7 @@ impl<'a> Solved<'a> {
         }
     }
 
-    /// The problem that was solved with noise and prior as they are stated; recordings differ as they show.
+    /// The solved problem with stated noise and prior, but with the estimated differences between recordings.
     pub fn as_stated(&self, stated: &Problem<'a>) -> Problem<'a> {
         self.problem.with(|model| {
             *model = model.with_noise_of(&stated.model);
@@ -80,7 +80,7 @@ impl<'a> Solved<'a> {
         })
     }
 
-    /// What iterating again led to, unless it failed or converged less than this did.
+    /// The result of iterating again, unless it failed or converged worse.
     pub fn better(
         &self,
         again: Result<Self, CalibrationError>,
@@ -93,7 +93,7 @@ impl<'a> Solved<'a> {
         }
     }
 
-    /// By iterations from a point of linearisation.
+    /// Iterates from a linearisation point.
     pub fn of(
         problem: &Problem<'a>,
         priors: Vec<AttitudePrior>,

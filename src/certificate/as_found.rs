@@ -1,4 +1,4 @@
-//! How the instrument was found: what its earlier calibration is off now.
+//! As-found state of the instrument: its deviation from the earlier calibration.
 
 use super::results::{Quantity, nominal};
 use crate::calibration::result::frame::{Canonical, free_parameters};
@@ -6,29 +6,29 @@ use crate::calibration::result::{Calibration, Provenance};
 use crate::calibration::{ComparisonError, Group, parameter_name};
 use crate::imu::{BodyFrame, InstallationForm, ParameterKind};
 
-/// An earlier calibration against this one.
+/// Comparison of an earlier calibration with this one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AsFound {
-    /// What the earlier one is called.
+    /// Name of the earlier calibration.
     pub earlier: String,
-    /// Body frame that both are brought to.
+    /// Common body frame.
     pub body_frame: BodyFrame,
     /// Every parameter that both have.
     pub changes: Vec<Change>,
 }
 
-/// What has become of a parameter.
+/// Change of a parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Change {
     /// Its name in the general form.
     pub name: String,
-    /// What it is.
+    /// Its quantity.
     pub quantity: Quantity,
     /// Earlier value, in SI; scale factors over their nominal value minus one.
     pub found: f64,
     /// Value now.
     pub left: f64,
-    /// 1σ of the difference, as if both came of different data; none where the earlier one claims no σ.
+    /// 1σ of the difference, as if both came from independent data; `None` if the earlier calibration states no σ.
     pub sigma: Option<f64>,
 }
 

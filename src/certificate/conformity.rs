@@ -1,4 +1,4 @@
-//! Whether limits are kept, by a stated decision rule.
+//! Conformity with limits, by a stated decision rule.
 //!
 //! Source: JCGM 106:2012, 8.3 (guard bands), 9.3 (specific consumer's risk); ILAC-G8:09/2019, 4.2.
 
@@ -13,16 +13,16 @@ use crate::lot::{Limit, Specification, probability_outside};
 /// Guard band over σ: the expanded uncertainty with k = 2.
 const GUARD: f64 = 2.0;
 
-/// What is decided of a limit.
+/// Decision on a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Decision {
-    /// It is kept.
+    /// Within the limit.
     Pass,
-    /// The value is within it by less than its uncertainty.
+    /// The value is within the limit by less than its uncertainty.
     ConditionalPass,
-    /// The value is beyond it by less than its uncertainty.
+    /// The value is beyond the limit by less than its uncertainty.
     ConditionalFail,
-    /// It is not kept.
+    /// Outside the limit.
     Fail,
 }
 
@@ -37,7 +37,7 @@ impl Decision {
         }
     }
 
-    /// As the Digital Calibration Certificate spells it.
+    /// Its code in the Digital Calibration Certificate.
     pub fn code(self) -> &'static str {
         match self {
             Self::Pass => "pass",
@@ -48,27 +48,27 @@ impl Decision {
     }
 }
 
-/// A parameter against its limit.
+/// Decision on a parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decided {
     /// Its name in the general form.
     pub name: String,
     /// The limit.
     pub limit: Limit,
-    /// Distance from its middle, in SI.
+    /// Distance from the centre of the limit, in SI.
     pub off: f64,
-    /// 1σ of that.
+    /// 1σ of this distance.
     pub sigma: f64,
-    /// What is decided.
+    /// The decision.
     pub decision: Decision,
-    /// Probability that this is wrong: that a parameter that passes is outside, or one that fails inside.
+    /// Probability that the decision is wrong (false acceptance or false rejection).
     pub risk: f64,
 }
 
-/// All limits.
+/// Conformity with all limits.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conformity {
-    /// How it was decided.
+    /// The decision rule.
     pub rule: DecisionRule,
     /// Each limit.
     pub limits: Vec<Decided>,
@@ -77,13 +77,13 @@ pub struct Conformity {
 }
 
 impl Conformity {
-    /// What all limits together come to; none if there is none.
+    /// Combined decision on all limits; `None` if there are no limits.
     pub fn overall(&self) -> Option<Decision> {
         self.limits.iter().map(|limit| limit.decision).max()
     }
 }
 
-/// A parameter so far from the middle of a limit.
+/// Decision on a parameter at this distance from the centre of a limit.
 pub fn decide(off: f64, sigma: f64, within: f64, rule: DecisionRule) -> (Decision, f64) {
     let outside = probability_outside(off, sigma, within);
     let guard = match rule {

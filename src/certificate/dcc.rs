@@ -410,7 +410,7 @@ fn ellipsoid(xml: &mut Xml, results: &[Measured], covariance: &[Vec<f64>]) {
     });
 }
 
-/// By how many σ an ellipsoid of so many dimensions holds the coverage probability.
+/// Radius, in σ, of the ellipsoid of this dimension that contains the coverage probability.
 fn of_ellipsoid(dimensions: usize) -> f64 {
     let square = ChiSquared::new(dimensions as f64).map(|chi2| chi2.inverse_cdf(PROBABILITY));
     square.map_or(1.0, f64::sqrt)

@@ -1,9 +1,9 @@
-//! What a calibration laboratory states of itself, its customer and the item: nothing of it can be known
-//! from data.
+//! Statements of a calibration laboratory on itself, its customer and the item, which do not follow from
+//! data.
 
 use serde::Deserialize;
 
-/// Who or where: a laboratory or a customer.
+/// Address of a laboratory or a customer.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Contact {
@@ -36,7 +36,7 @@ pub struct Day {
 }
 
 impl Day {
-    /// From `2026-03-31`; none if that is no day of the calendar.
+    /// Parses a date such as `2026-03-31`; `None` if it is invalid.
     pub fn parse(text: &str) -> Option<Self> {
         let mut parts = text.split('-');
         let mut next = |digits: usize| {
@@ -75,7 +75,7 @@ impl std::fmt::Display for Day {
     }
 }
 
-/// Where a calibration was performed, in the words of the Digital Calibration Certificate.
+/// Place of a calibration, in the terms of the Digital Calibration Certificate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Place {
@@ -120,7 +120,7 @@ pub struct Condition {
     pub uncertainty: f64,
 }
 
-/// A piece of equipment that traceability rests on.
+/// Equipment used for traceability.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Equipment {
     /// What it is.
@@ -131,13 +131,13 @@ pub struct Equipment {
     pub certificate: String,
 }
 
-/// How conformity is decided (ISO/IEC 17025, 7.8.6; ILAC-G8).
+/// Decision rule for conformity (ISO/IEC 17025, 7.8.6; ILAC-G8).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DecisionRule {
-    /// A limit is kept if the value is within it by the expanded uncertainty: guard band w = U.
+    /// A limit is met if the value is within it by the expanded uncertainty: guard band w = U.
     GuardBand,
-    /// A limit is kept if the value is within it.
+    /// A limit is met if the value is within it.
     SimpleAcceptance,
 }
 
@@ -146,22 +146,22 @@ impl DecisionRule {
     pub fn words(self) -> &'static str {
         match self {
             Self::GuardBand => {
-                "guard band w = U (ILAC-G8): pass where the value is within its limit by the expanded uncertainty, \
+                "guard band w = U (ILAC-G8): pass if the value is within its limit by the expanded uncertainty, \
                  fail where it is beyond it by that; between these pass and fail are conditional"
             }
             Self::SimpleAcceptance => {
-                "simple acceptance (ILAC-G8): pass where the value is within its limit, whatever its uncertainty"
+                "simple acceptance (ILAC-G8): pass if the value is within its limit, regardless of its uncertainty"
             }
         }
     }
 }
 
-/// What a laboratory states.
+/// Statements of a laboratory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Laboratory {
     /// The laboratory.
     pub contact: Contact,
-    /// Who asked for the calibration.
+    /// The customer of the calibration.
     pub customer: Contact,
     /// Unique number of the certificate.
     pub number: String,
@@ -171,17 +171,17 @@ pub struct Laboratory {
     pub received: Option<Day>,
     /// First and last day of the calibration.
     pub performed: (Day, Day),
-    /// Where it was performed.
+    /// Place of the calibration.
     pub place: Place,
-    /// What was calibrated, such as `inertial measurement unit`.
+    /// The calibrated item, such as `inertial measurement unit`.
     pub item: String,
-    /// Who made it.
+    /// Its manufacturer.
     pub manufacturer: Option<String>,
     /// Its model.
     pub model: String,
     /// Its serial number.
     pub serial: String,
-    /// In which state it was received.
+    /// Its state when received.
     pub state: String,
     /// The laboratory's own procedure.
     pub procedure: String,
@@ -191,13 +191,13 @@ pub struct Laboratory {
     pub temperature: Condition,
     /// Relative humidity, %.
     pub humidity: Option<Condition>,
-    /// How results are traceable to the SI, in the laboratory's words.
+    /// Statement of traceability to the SI, in the laboratory's words.
     pub traceability: String,
-    /// What they are traceable through.
+    /// Equipment that provides the traceability.
     pub equipment: Vec<Equipment>,
-    /// Who authorises the certificate, and as what.
+    /// Name and function of the person who authorises the certificate.
     pub authorised: (String, String),
-    /// How conformity is decided.
+    /// Decision rule for conformity.
     pub rule: Option<DecisionRule>,
     /// Anything else.
     pub remarks: Option<String>,

@@ -1,5 +1,5 @@
-//! A calibration certificate: what ISO/IEC 17025:2017, 7.8.2 and 7.8.4, asks for, from a calibration and what
-//! the laboratory states. It claims no accreditation.
+//! A calibration certificate according to ISO/IEC 17025:2017, 7.8.2 and 7.8.4, from a calibration and the
+//! statements of the laboratory. It claims no accreditation.
 
 mod as_found;
 mod conformity;
@@ -18,7 +18,7 @@ pub use conformity::{Conformity, Decided, Decision};
 pub use laboratory::{Condition, Contact, Day, DecisionRule, Equipment, Laboratory, Place};
 pub use results::{Measured, Quantity, temperature_words, to_twelve_digits};
 
-/// Why there can be no certificate.
+/// Errors of a certificate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CertificateError {
     /// The calibration may not be used.
@@ -27,16 +27,16 @@ pub enum CertificateError {
          findings."
     )]
     NotUsable {
-        /// Why not.
+        /// The reason.
         reason: &'static str,
     },
-    /// Something that a certificate needs is not in the file.
+    /// A required field is missing from the file.
     #[error("no `{field}` in the calibration, expected a file of this version; calibrate again")]
     Missing {
-        /// Which field.
+        /// The field.
         field: &'static str,
     },
-    /// Nothing says how conformity is decided.
+    /// The decision rule for conformity is missing.
     #[error(
         "no `decision.rule` in lab.toml, expected \"guard-band\" or \"simple-acceptance\"; ISO/IEC 17025, 7.8.6, \
          asks for it where conformity is stated. Add it."
@@ -45,19 +45,19 @@ pub enum CertificateError {
     /// The calibrations cannot be compared, or not with limits.
     #[error(transparent)]
     Comparison(#[from] ComparisonError),
-    /// A calibration that corrects nothing.
+    /// A calibration that cannot be applied.
     #[error(transparent)]
     Correction(#[from] CorrectionError),
 }
 
-/// What a certificate says.
+/// Content of a certificate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Certificate {
-    /// What the laboratory states.
+    /// Statements of the laboratory.
     pub laboratory: Laboratory,
     /// The calibration.
     pub calibration: Calibration,
-    /// What it was made of.
+    /// Origin of the calibration.
     pub provenance: Provenance,
     /// SHA-256 of the calibration's file.
     pub sha256: String,
@@ -67,9 +67,9 @@ pub struct Certificate {
     pub terms: Vec<Measured>,
     /// Covariance of the estimated parameters, in the order of the results, in SI.
     pub covariance: Vec<Vec<f64>>,
-    /// Whether limits are kept, if any are given.
+    /// Conformity with limits, if any are given.
     pub conformity: Option<Conformity>,
-    /// How the instrument was found, if an earlier calibration is given.
+    /// As-found state of the instrument, if an earlier calibration is given.
     pub as_found: Option<AsFound>,
 }
 
@@ -77,7 +77,7 @@ impl Certificate {
     /// The certificate of a calibration whose file has this SHA-256.
     ///
     /// # Errors
-    /// [`CertificateError`] where the calibration may not be used, or something is missing.
+    /// [`CertificateError`] if the calibration may not be used, or something is missing.
     pub fn new(
         calibration: Calibration,
         sha256: String,
@@ -126,7 +126,7 @@ impl Certificate {
         })
     }
 
-    /// What fixes the body axes.
+    /// The body frame.
     pub fn body_frame(&self) -> BodyFrame {
         self.calibration.body_frame
     }

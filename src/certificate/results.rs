@@ -6,7 +6,7 @@ use crate::calibration::{PARAMETERS, ThermalRecord, parameter_name, sensor_and_p
 use crate::imu::{Nominal, ParameterKind, PerSensor, Sensor, TERM_PARAMETERS, Term};
 use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
 
-/// Coverage factor for 95.45 % where nothing says another.
+/// Default coverage factor for 95.45 %.
 const COVERAGE_FACTOR: f64 = 2.0;
 
 /// A quantity of a certificate.
@@ -19,7 +19,7 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// Symbol of the unit that it is shown in, and its size in SI.
+    /// Symbol of its display unit, and the value of this unit in SI.
     pub fn unit(self) -> (&'static str, f64) {
         match self {
             Self::Term(term) => term.entry().unit,
@@ -51,25 +51,25 @@ impl Quantity {
 pub struct Measured {
     /// Its name, such as `gyro.scale.x`.
     pub name: String,
-    /// What it is.
+    /// Its quantity.
     pub quantity: Quantity,
-    /// In SI: scale factors over their nominal value minus one, angles in rad, biases in rad/s or m/s²; parameters of
-    /// error terms as the calibration's file has them.
+    /// Value in SI: scale factors over their nominal value minus one, angles in rad, biases in rad/s or m/s²;
+    /// parameters of error terms as in the calibration's file.
     pub value: f64,
     /// Expanded uncertainty.
     pub expanded: f64,
     /// Coverage factor.
     pub coverage_factor: f64,
-    /// Degrees of freedom; none where infinite.
+    /// Degrees of freedom; `None` if infinite.
     pub degrees_of_freedom: Option<f64>,
 }
 
-/// The nominal scales that a calibration was made with.
+/// The nominal scales of a calibration.
 pub fn nominal(provenance: &Provenance) -> PerSensor<Nominal> {
     PerSensor::from_fn(|sensor| Nominal((*provenance.nominal.get(sensor)).into()))
 }
 
-/// Every estimated parameter, and their covariance in SI; none if the record has no covariance.
+/// Every estimated parameter, and their covariance in SI; `None` if the record has no covariance.
 pub fn results(
     calibration: &Calibration,
     provenance: &Provenance,
@@ -124,7 +124,7 @@ pub fn results(
     Some((results.collect::<Option<_>>()?, covariance))
 }
 
-/// Every estimated parameter of the instrument's error terms; those of the table are no results of the instrument.
+/// Every estimated parameter of the instrument's error terms; those of the table are not results for the instrument.
 pub fn terms(calibration: &Calibration) -> Vec<Measured> {
     let measured = |k: usize| {
         let name = Term::parameter_name(k)?;
@@ -141,7 +141,7 @@ pub fn terms(calibration: &Calibration) -> Vec<Measured> {
     (0..TERM_PARAMETERS).filter_map(measured).collect()
 }
 
-/// At which temperatures the results are valid, and where it is said how they change.
+/// States the temperatures at which the results are valid, and where their temperature coefficients are found.
 pub fn temperature_words(of: &ThermalRecord, number: impl Fn(f64) -> String) -> String {
     let triad = |(name, sensor): (&str, Sensor)| {
         let range = of.range.get(sensor);
@@ -160,7 +160,7 @@ pub fn temperature_words(of: &ThermalRecord, number: impl Fn(f64) -> String) -> 
     )
 }
 
-/// A number to twelve digits: behind them stands the rounding of arithmetic alone.
+/// Rounds a number to twelve digits: further digits are only rounding errors.
 pub fn to_twelve_digits(x: f64) -> f64 {
     format!("{x:.11e}").parse().unwrap_or(x)
 }

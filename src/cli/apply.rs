@@ -17,15 +17,16 @@ use super::output::{keep, stream};
 use super::progress::Activity;
 use super::source::{OfLog, run_or_log};
 
-/// A scale factor this many of the run's σ off is hardly one of its instrument.
+/// A scale factor that deviates by more than this many σ of the run is hardly one of its instrument.
 const SUSPECT_SIGMAS: f64 = 10.0;
 
 /// Turns a run's raw samples into angular rate and specific force
 ///
-/// Writes a row a sample: its begin and end in s, angular rate in rad/s and specific force in m/s², both
-/// mean over the sample, along right, front and up of the calibration's body frame. Error terms of
-/// the calibration are corrected, too, and what changes with temperature by the run's own; the correction of its time offset neglects Earth rate. The file is
-/// itself a record for a run.toml: output = "rate", time_stamp = "end".
+/// Writes one row per sample: start and end in s, angular rate in rad/s and specific force in m/s², both
+/// averaged over the sample, along right, front and up of the calibration's body frame. Error terms of the
+/// calibration are corrected, too, and temperature dependence by the run's temperature; the correction of the
+/// time offset neglects Earth rate. The file is itself a record for a run.toml: output = "rate",
+/// time_stamp = "end".
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal apply result/calibration.json run.toml -o calibrated.csv.gz
@@ -42,8 +43,8 @@ pub struct Apply {
     /// File to write, `.csv` or `.csv.gz` [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Write rows that the log has lost, too, interpolated and with 1 in a column `filled`; not where so much is lost
-    /// that calibrate would begin anew
+    /// Interpolate lost rows and write them with 1 in a column `filled`, except in gaps too long for calibrate to
+    /// bridge
     #[arg(long)]
     fill: bool,
     /// Replace the output file if it exists

@@ -26,18 +26,18 @@ const HIGHEST_ORDER_AT_REST: usize = 5;
 
 /// Estimates scale factors, installation and biases of a run
 ///
-/// Writes DIR/calibration.json and DIR/report/ and prints a summary. A filter that does not converge is a
-/// failure.
+/// Writes DIR/calibration.json and DIR/report/ and prints a summary. The command fails if the filter does not
+/// converge.
 ///
-/// With --temperature parameters follow the temperature column; of an instrument that stands in one attitude only
+/// With --temperature, parameters depend on the temperature column; for an instrument at rest in one attitude, only
 /// biases do.
 ///
-/// A campaign.toml names several recordings of one instrument, which are calibrated as one: its parameters may
-/// follow temperature, and differ from day to day.
+/// A campaign.toml names several recordings of one instrument, which are calibrated jointly: parameters may depend
+/// on temperature and differ from day to day.
 ///
 /// Several runs are the units of a lot: each is calibrated into DIR/units/NAME/, and DIR/lot.json, lot.csv and
-/// index.html say what they are together. A unit that cannot be calibrated is a row with its reason, and the
-/// command fails after all is written. Begun again, it goes on with what is missing or has changed.
+/// index.html summarise the lot. Units that fail are listed with the reason; the command then fails after writing
+/// everything. Rerun it to process only missing or changed units.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal calibrate imu.csv --latitude 48.1 --height 520
@@ -64,19 +64,19 @@ pub struct Calibrate {
     output: Option<PathBuf>,
     #[command(flatten)]
     estimation: Estimation,
-    /// Let the parameters follow the temperature column of the run; a campaign does where it is known
+    /// Let parameters depend on the temperature column of the run; campaigns do so if temperature is known
     #[arg(long, conflicts_with_all = ["specification", "shard"])]
     temperature: bool,
-    /// True calibration; the estimator does not use it, summary and report show errors against it
+    /// True calibration: the estimator does not use it; summary and report show the errors against it
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
-    /// Limits that the units of a lot are held against: a specification.toml
+    /// Limits for the units of a lot: a specification.toml
     #[arg(long, value_name = "FILE", conflicts_with = "truth")]
     specification: Option<PathBuf>,
     /// Calibrate part i of M of a lot, to be merged with the others
     #[arg(long, value_name = "i/M", value_parser = shard, requires = "output", conflicts_with_all = ["json", "truth"])]
     shard: Option<Shard>,
-    /// Print the calibration, or what is said of the lot, as one JSON document and nothing else
+    /// Print the calibration, or the evaluation of the lot, as one JSON document and nothing else
     #[arg(long)]
     json: bool,
     /// Print all parameters, tests and findings

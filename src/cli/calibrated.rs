@@ -21,7 +21,7 @@ use turncal::survey::{self, Expected};
 
 use super::estimation::Method;
 
-/// A true calibration, in the general form, with the constants beside it.
+/// A true calibration, in the general form, with its error terms.
 pub struct Truth {
     triads: PerSensor<Triad>,
     terms: BTreeMap<String, TermRecord>,

@@ -14,10 +14,10 @@ use super::output::{Overwrite, print};
 
 /// Writes a calibration certificate as PDF/A-3, with a Digital Calibration Certificate in it
 ///
-/// DIR/certificate.pdf says what ISO/IEC 17025 asks of a certificate: what calibration.json knows, and what
-/// lab.toml states. dcc.xml (PTB's DCC 3.3.0, with D-SI units and the covariance matrix) and calibration.json
-/// are embedded in it and written beside it. Required fields that are missing are named. All dates are those of
-/// lab.toml: the same files give the same bytes. It claims no accreditation.
+/// DIR/certificate.pdf contains the fields that ISO/IEC 17025 requires of a certificate, from calibration.json and
+/// lab.toml. dcc.xml (PTB's DCC 3.3.0, with D-SI units and the covariance matrix) and calibration.json are embedded
+/// in it and written to DIR, too. Missing required fields are named. All dates are those of lab.toml: the same files
+/// give the same bytes. It claims no accreditation.
 ///
 /// A draft of lab.toml: turncal certificate --draft
 #[derive(Debug, clap::Args)]
@@ -31,10 +31,10 @@ pub struct Certificate {
     /// The calibration
     #[arg(value_name = "CALIBRATION.json", required_unless_present = "draft")]
     calibration: Option<PathBuf>,
-    /// What the laboratory states
+    /// The laboratory's statements
     #[arg(long, value_name = "lab.toml", required_unless_present = "draft")]
     laboratory: Option<PathBuf>,
-    /// Limits that the parameters are held against, by the decision rule of lab.toml
+    /// Limits for the parameters, applied by the decision rule of lab.toml
     #[arg(long, value_name = "specification.toml")]
     specification: Option<PathBuf>,
     /// The calibration with which the item was received

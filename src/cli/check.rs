@@ -9,11 +9,12 @@ use super::output::Delivery;
 use super::progress::Activity;
 use super::source::{OfLog, run_or_log};
 
-/// Says what a run holds, and what each method could observe of the instrument
+/// Describes the content of a run, and the parameters that each method could observe
 ///
-/// Reads everything and calibrates nothing: rate, jitter, faults and steps of the log; dwells with the axis
-/// that is up; turns with axis and angle; labelled sections against both; the σ to be expected of each method
-/// and what it would not observe; what to change. What it finds wrong is no failure.
+/// Reads everything and calibrates nothing. Shows rate, jitter, faults and steps of the log; dwells with the axis
+/// that points up; turns with axis and angle; labelled sections compared with both; the expected σ of each method
+/// and the parameters that it would not observe; changes to make. Problems that it finds do not change the exit
+/// status.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for a page and a figure of the record")))]
 #[command(after_help = "Examples:

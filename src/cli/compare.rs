@@ -10,10 +10,10 @@ use super::input::at_temperature;
 use super::names::short_names;
 use super::output::Delivery;
 
-/// Calibrations side by side, parameter by parameter, with their σ
+/// Compares calibrations, parameter by parameter, with their σ
 ///
-/// All are brought to the general installation form and to one body frame first. Without a truth the
-/// first is the reference. From three on, mean, scatter and χ² of the scatter against the claimed σ
+/// All are first converted to the general installation form and to one body frame. Without a truth, the
+/// first is the reference. For three or more, mean, scatter and χ² of the scatter with the stated σ
 /// are shown, too.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  turncal compare monday.json friday.json --truth truth.json")]
@@ -24,7 +24,7 @@ pub struct Compare {
     /// The true values, if they are known
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
-    /// Compare them at this temperature, °C; without, each at its own reference
+    /// Compare them at this temperature, °C [default: each at its own reference]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     temperature_degc: Option<f64>,
     #[command(flatten)]

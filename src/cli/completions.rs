@@ -6,7 +6,7 @@ use clap_complete::Shell;
 use super::Cli;
 use super::output::print;
 
-/// Prints what makes a shell complete turncal's commands and options
+/// Prints a shell-completion script
 ///
 /// Save it where your shell looks for completions; the examples show where.
 #[derive(Debug, clap::Args)]

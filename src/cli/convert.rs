@@ -10,22 +10,22 @@ use super::source::OfLog;
 
 /// Writes the log of another program as a plain run directory
 ///
-/// The streams that hold the instrument become CSV files with every column and all digits, beside a draft of
-/// run.toml as `turncal init` makes it. Reads MCAP, ROS bags, PX4 ULog, ArduPilot DataFlash, MATLAB and NumPy
-/// files; calibrate and check read them as they are, too.
+/// The instrument's streams become CSV files with every column and all digits, with a draft of run.toml as
+/// written by `turncal init`. Reads MCAP, ROS bags, PX4 ULog, ArduPilot DataFlash, MATLAB and NumPy files;
+/// calibrate and check also read them directly.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal convert flight.ulg -o my-run
   turncal convert drive.mcap --stream /imu/data -o my-run")]
 pub struct Convert {
-    /// The log; its content says of which format it is
+    /// The log; its format is identified by its content
     log: PathBuf,
     /// Directory to write
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     #[command(flatten)]
     of_log: OfLog,
-    /// Use what is whole before the first damage
+    /// Use the intact part before the first damage
     #[arg(long)]
     salvage: bool,
     #[command(flatten)]

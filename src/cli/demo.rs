@@ -22,12 +22,12 @@ use super::output::{Overwrite, show_brief};
 use super::progress::Activity;
 use super::simulate::{simulated, write};
 
-/// Shows the main job on an embedded scenario
+/// Simulates a calibration and compares it with the truth
 ///
-/// Simulates an instrument with the paper's errors on a three-axis table, ten minutes with turns for
-/// the filter and an hour of static positions for the paper's closed form, calibrates it both ways,
+/// Simulates an instrument with the paper's errors on a three-axis table: ten minutes with turns for the
+/// filter, and an hour of static positions for the paper's closed form. Calibrates it by both methods,
 /// compares both with the truth, navigates 40 h with each and writes a report. DIR is the filter's run
-/// directory and holds ekf/ with its calibration, six-position/ with the static run and its
+/// directory and contains ekf/ with its calibration, six-position/ with the static run and its
 /// calibration, and report/.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:  turncal demo -o my-demo --seed 3")]

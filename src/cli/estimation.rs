@@ -13,24 +13,24 @@ use super::error_term::TermArgument;
 /// Arguments that say how.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Estimation {
-    /// How to estimate
+    /// Estimation method
     #[arg(long, value_enum, default_value_t = Method::Ekf)]
     pub method: Method,
-    /// How installation angles make the installation matrix
+    /// Form of the installation matrix
     #[arg(long, value_enum, default_value_t = Installation::General)]
     pub installation: Installation,
-    /// What is observed [default: table if the run has its log, else velocity]
+    /// Observations of the filter [default: table if the run has its log, else velocity]
     #[arg(long, value_enum)]
     aiding: Option<Aiding>,
-    /// Error terms to estimate, beside those that the run switches on [default: those that the data call for]
+    /// Error terms to estimate, in addition to those that the run switches on [default: those that the data support]
     #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
     with: Vec<TermArgument>,
-    /// Which noise the filter uses
+    /// Noise used by the filter
     #[arg(long, value_enum, default_value_t = Noise::default())]
     noise: Noise,
 }
 
-/// How to estimate.
+/// Estimation method.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub enum Method {
     /// Extended Kalman filter over the whole run
@@ -50,7 +50,7 @@ pub enum Installation {
     ThreeAngle,
 }
 
-/// What the filter observes.
+/// Observations of the filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Aiding {
     /// Zero velocity in every dwell, and the attitude of the table
@@ -59,15 +59,15 @@ pub enum Aiding {
     Velocity,
 }
 
-/// Which noise the filter uses.
+/// Noise used by the filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Noise {
-    /// As run.toml and models state it
+    /// Use the noise that run.toml and models state
     Stated,
-    /// As stated unless the data contradict that, which right figures do once in a thousand runs
+    /// Use the stated noise; estimate it from the record if the two disagree (p < 0.001)
     #[value(alias = "estimate")]
     Auto,
-    /// As the data show it, around what is stated
+    /// Estimate the noise from the record, with the stated noise as prior
     Learnt,
 }
 

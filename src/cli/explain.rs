@@ -6,14 +6,14 @@ use turncal::report::wrapped;
 
 use super::output::{columns, print};
 
-/// Explains a finding: what it means, where it comes from and what to do
+/// Explains a finding: its meaning, its cause and the remedy
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal explain W07
   turncal explain noise-learnt
   turncal explain")]
 pub struct Explain {
-    /// Code or kind of the finding; without it all are listed
+    /// Code or kind of the finding [default: list all]
     #[arg(value_name = "CODE")]
     code: Option<String>,
 }

@@ -10,11 +10,11 @@ use turncal::run::Run;
 use super::input::{at_temperature, run_file};
 use super::output::{keep, print};
 
-/// Writes a calibration as what other programs read
+/// Exports a calibration for other programs (Kalibr, PX4, ROS, C, …)
 ///
-/// Formats that want rad/s and m/s² say what raw output is divided by first: the nominal scale of its
-/// unit, for counts that of --run, or else the calibrated scale factors rounded to three digits. What
-/// a format cannot hold is said in the file and on standard error.
+/// Formats with inputs in rad/s and m/s² state the divisor of the raw output: the nominal scale of its unit
+/// or, for counts, that of --run, else the calibrated scale factors rounded to three digits. Parts of the
+/// calibration that a format cannot hold are named in the file and on standard error.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal export result/calibration.json --format c -o imu.h
@@ -25,13 +25,13 @@ pub struct Export {
     /// The calibration
     #[arg(value_name = "CALIBRATION.json")]
     calibration: PathBuf,
-    /// What to write
+    /// Format to write
     #[arg(long, value_enum)]
     format: export::Format,
     /// A run of the same instrument, for noise figures, sample rate and nominal scales
     #[arg(long, value_name = "RUN.toml", value_parser = run_file)]
     run: Option<PathBuf>,
-    /// The calibration at this temperature, °C [default: its reference; c, px4 and ardupilot hold its change]
+    /// Calibration temperature, °C [default: its reference; c, px4 and ardupilot contain the temperature dependence]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     temperature_degc: Option<f64>,
     /// File to write [default: standard output]

@@ -9,11 +9,11 @@ use super::output::{keep, print};
 use super::progress::Activity;
 use super::source::{OfLog, show_found};
 
-/// Writes a draft of run.toml for a log that has none
+/// Writes a draft of run.toml for a log without one
 ///
-/// Columns by their names or their numbers, the unit of time, units by gravity at rest and by how far its
-/// direction turns with the gyros, white noise at rest: each guess with its reason. What only a person knows
-/// is marked TODO.
+/// Finds the columns by names or values, the unit of time, the units of the sensors from gravity at rest and from
+/// its rotation with the gyros, and the white noise at rest; each guess is given with its reason. Fields that only
+/// a person knows are marked TODO.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal init imu.csv
@@ -25,7 +25,7 @@ pub struct Init {
     /// with `.gz`; or MCAP, a ROS bag, PX4 ULog, ArduPilot DataFlash, MAT, NPY or NPZ, whose streams are listed
     #[arg(value_name = "IMU.csv")]
     log: PathBuf,
-    /// Rows of the accelerometers, where the other file has those of the gyros alone
+    /// File with the accelerometers' rows, if the log has those of the gyros only
     #[arg(value_name = "ACCEL.csv", conflicts_with = "stream")]
     accel: Option<PathBuf>,
     #[command(flatten)]

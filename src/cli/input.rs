@@ -9,7 +9,7 @@ use turncal::study::{Shard, ShardError};
 
 const HOUR: f64 = 3600.0;
 
-/// The path of a run.toml; whoever names its directory is told the file.
+/// The path of a run.toml; if a directory is given instead, the error names the file in it.
 pub fn run_file(text: &str) -> Result<PathBuf, String> {
     let path = Path::new(text);
     let inside = path.join("run.toml");

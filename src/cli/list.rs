@@ -8,8 +8,8 @@ use super::output::{columns, print};
 
 /// Shows the embedded scenarios, instruments, installations, tables, paths and trajectories
 ///
-/// Commands take these names where they take a TOML file, and so do scenarios of your own. A file of the
-/// same name in the way of the path wins.
+/// Commands and your own scenarios accept these names in place of a TOML file. If a file of that name exists,
+/// the file is used instead.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal list

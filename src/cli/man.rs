@@ -11,8 +11,8 @@ use super::output::print;
 
 /// Writes the manual pages
 ///
-/// One page for turncal and one for each command, into DIR beside what is there; without -o the page of
-/// turncal itself goes to standard output.
+/// Writes one page for turncal and one for each command into DIR, in addition to its other files; without -o, the
+/// page of turncal itself is written to standard output.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal man | man -l -

@@ -13,10 +13,10 @@ use turncal::study::{AccuracyStudy, ExperimentStudy};
 use super::lot;
 use super::output::Delivery;
 
-/// Puts parts of a job together, as one machine would have made it
+/// Merges the parts of a sharded job; the result is identical to a single run
 ///
-/// Parts are directories that --shard wrote: of a lot or of a study. Order, number and machine do not matter;
-/// a run that is missing or there twice, and a part of another job, are refused.
+/// Parts are directories written with --shard, of a lot or of a study. Their order, number and machines do not
+/// matter; missing or duplicate runs, and parts of another job, are refused.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:
   turncal study accuracy --runs 500 --shard 1/2 -o part-1

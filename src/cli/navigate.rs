@@ -23,11 +23,11 @@ const HOUR: f64 = 3600.0;
 /// Pitch beyond which roll and heading cannot be told apart, degrees.
 const LARGEST_PITCH: f64 = 89.0;
 
-/// The navigation error that a calibration's errors cause
+/// Shows the navigation error due to the errors of a calibration
 ///
-/// Navigates with the instrument of --truth, taken for that of the calibration, from perfect alignment,
-/// its height held to the true one: at rest, or along a trajectory. Shows errors of
-/// attitude, velocity and position, and the σ of them that the calibration's covariance predicts.
+/// Navigates with the instrument of --truth, corrected by the calibration, from perfect alignment and with the
+/// height held to the true height: at rest, or along a trajectory. Shows the errors of attitude, velocity and
+/// position, and their σ predicted from the calibration's covariance.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for navigation.csv, figures and a page")))]
 #[command(after_help = "Examples:
@@ -43,7 +43,7 @@ pub struct Navigate {
     /// The calibration that navigation uses
     #[arg(value_name = "CALIBRATION.json")]
     calibration: PathBuf,
-    /// What the instrument truly is: a truth.json or another calibration
+    /// The true parameters of the instrument: a truth.json or another calibration
     #[arg(long, value_name = "FILE")]
     truth: PathBuf,
     /// Latitude in degrees, north positive [default: the trajectory's, else the calibration's]
@@ -68,22 +68,22 @@ pub struct Navigate {
         value_parser = attitude
     )]
     attitude_deg: Attitude,
-    /// Which triad's errors
+    /// Triad with calibration errors
     #[arg(long, value_enum, default_value_t = Errors::Both)]
     errors: Errors,
-    /// How many hours, to the minute, up to 1000
+    /// Duration in hours, to the minute, up to 1000
     #[arg(long, default_value_t = 40.0, allow_negative_numbers = true, value_parser = hours)]
     hours: f64,
     /// Move instead of resting: a TOML file or an embedded name (flight, vehicle)
     #[arg(long, value_name = "FILE.toml")]
     trajectory: Option<String>,
-    /// Warm up meanwhile, from one temperature to another, °C
+    /// Warm up from one temperature to another during navigation, °C
     #[arg(long, value_name = "FROM,TO", allow_hyphen_values = true, conflicts_with_all = ["temperature_degc", "errors"], value_parser = two)]
     warming_degc: Option<Two>,
     /// Time constant of warming up, h
     #[arg(long, value_name = "H", default_value_t = 1.0, value_parser = time_constant)]
     warming_time_constant_h: f64,
-    /// At this temperature, °C; without, each calibration at its own reference
+    /// Temperature, °C [default: each calibration at its own reference]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     temperature_degc: Option<f64>,
     #[command(flatten)]
@@ -100,11 +100,11 @@ struct Attitude([f64; 3]);
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum Errors {
-    /// Of both triads
+    /// Both triads
     Both,
-    /// Of the gyros; the accelerometers are exact
+    /// The gyros; the accelerometers are exact
     Gyro,
-    /// Of the accelerometers; the gyros are exact
+    /// The accelerometers; the gyros are exact
     Accel,
 }
 

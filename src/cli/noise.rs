@@ -6,9 +6,9 @@ use turncal::report::conversion;
 use super::input::positive;
 use super::output::show;
 
-/// A noise figure in every convention: data sheets, Kalibr, PSINS, KF-GINS
+/// Converts a noise figure to every convention: data sheets, Kalibr, PSINS, KF-GINS
 ///
-/// Each line says which convention it is and who uses it. Densities are two-sided, as in IEEE Std 952; a
+/// Each line names the convention and its users. Densities are two-sided, as in IEEE Std 952; a
 /// one-sided density is √2 times as large. A unit of the rate itself (deg/s, m/s^2) means the noise of each
 /// sample with --rate, and bias instability without.
 #[derive(Debug, clap::Args)]
@@ -22,7 +22,7 @@ pub struct Noise {
     /// The figure
     #[arg(value_name = "VALUE", allow_negative_numbers = true, value_parser = positive)]
     value: f64,
-    /// Its unit, or the name that a program has for it
+    /// Its unit, or the name of the figure in a program
     #[arg(value_name = "UNIT")]
     unit: String,
     /// Sample rate in Hz, for the noise of each sample

@@ -13,14 +13,14 @@ use super::progress::Runs;
 /// The part of a study that is to be made.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub struct Sharding {
-    /// Make part i of M of the runs into DIR, to be merged with the others
+    /// Make part i of M of the runs into DIR, for turncal merge
     #[arg(long, value_name = "i/M", value_parser = shard, requires = "output", conflicts_with = "json")]
     shard: Option<Shard>,
 }
 
 impl Sharding {
-    /// Makes the part of a study of so many runs that is asked for, unless it is there already; false if all of
-    /// the study is asked for. `trials` makes runs by their numbers, telling of each.
+    /// Makes the requested part of a study of `runs` runs, unless that part exists; returns false if the whole study
+    /// is requested. `trials` makes runs by their numbers, and reports each.
     pub fn make<T: Serialize>(
         self,
         (job, study, runs): (JobKind, &impl Serialize, u64),

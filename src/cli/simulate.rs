@@ -15,10 +15,10 @@ use super::input::seed;
 use super::output::Overwrite;
 use super::progress::Activity;
 
-/// Makes a run directory with known truth from a scenario
+/// Simulates a run directory with known truth from a scenario
 ///
-/// Writes run.toml, the logs that it names and truth.json. The scenario is a TOML file or the name of an
-/// embedded one; turncal list shows them.
+/// Writes run.toml, its logs and truth.json. The scenario is a TOML file or the name of an embedded
+/// one, as shown by turncal list.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:  turncal simulate nineteen-position -o my-run --seed 7

@@ -13,16 +13,16 @@ use super::input::{latitude, positive};
 #[derive(Debug, Clone, PartialEq, Default, clap::Args)]
 #[command(next_help_heading = "Of a log without run.toml")]
 pub struct OfLog {
-    /// Rows a second
+    /// Rows per second
     #[arg(long, value_name = "HZ", value_parser = positive)]
     rate: Option<f64>,
-    /// Latitude of the place, degrees, north positive
+    /// Latitude of the site, degrees, north positive
     #[arg(long, value_name = "DEG", value_parser = latitude, allow_negative_numbers = true)]
     latitude: Option<f64>,
-    /// Height of the place above the ellipsoid, m
+    /// Height of the site above the ellipsoid, m
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     height: Option<f64>,
-    /// Gravity at the place, m/s²
+    /// Gravity at the site, m/s²
     #[arg(long, value_name = "M/S2", value_parser = positive)]
     gravity: Option<f64>,
     /// Unit of the gyros: rad/s, deg/s, deg/h, or what one count is, such as '1/131 deg/s'; of increments rad, deg,
@@ -32,10 +32,10 @@ pub struct OfLog {
     /// Unit of the accelerometers: m/s^2, g, or what one count is, such as '1/16384 g'; of increments m/s, g*s
     #[arg(long, value_name = "UNIT", value_parser = |text: &str| StatedUnit::parse(Sensor::Accel, text))]
     accel_unit: Option<StatedUnit>,
-    /// Noise figures and, without --rate, rows a second, as Kalibr's imu.yaml states them
+    /// Noise figures and, without --rate, rows per second, from Kalibr's imu.yaml
     #[arg(long, value_name = "YAML")]
     noise_file: Option<PathBuf>,
-    /// The stream that holds the instrument [default: the one with the most samples]
+    /// Stream of the instrument [default: the one with the most samples]
     #[arg(long, value_name = "NAME")]
     stream: Option<String>,
 }
@@ -76,7 +76,7 @@ pub fn show_found(path: &Path, found: &[Found]) {
     }
 }
 
-/// A path of a run.toml, a log, or `-`; whoever names a run's directory is told the file.
+/// The path of a run.toml or a log, or `-`; if a run's directory is given instead, the error names the file in it.
 pub fn run_or_log(text: &str) -> Result<PathBuf, String> {
     let path = Path::new(text);
     let inside = path.join("run.toml");

@@ -6,7 +6,7 @@ mod table1;
 
 use clap::Subcommand;
 
-/// Answers a question with many simulated runs
+/// Runs a Monte Carlo study
 #[derive(Debug, clap::Args)]
 #[command(arg_required_else_help = true)]
 #[command(after_help = "Example:  turncal study accuracy --runs 500 -o accuracy")]

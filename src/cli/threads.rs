@@ -23,8 +23,8 @@ pub fn with_threads<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, Threa
     Ok(work())
 }
 
-/// Does so many pieces of work, as many at once as there are threads; each is begun and ended by one of them, so
-/// that no more are in memory and the first are done early. Results are in order.
+/// Does `count` pieces of work, one at a time on each thread: no more than one per thread is in memory, and the first
+/// are done early. Results are in order.
 pub fn piece_by_piece<T: Send>(count: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let next = AtomicUsize::new(0);
     let results: Mutex<Vec<(usize, T)>> = Mutex::new(Vec::with_capacity(count));

@@ -1,4 +1,4 @@
-//! One door: a `run.toml`, or a log of which all else is found in it or stated beside it.
+//! Single entry point for inputs: a `run.toml`, or a log whose description is found in it or stated by options.
 
 use std::ffi::OsStr;
 use std::fs::{self, File};

@@ -89,7 +89,7 @@ pub fn spelled(text: &str) -> Option<(&'static str, f64, Of)> {
 }
 
 /// What a unit of rows says of the nominal scale of a triad: the file's quantity per second for one
-/// rad/s or m/s²; none for counts and for what is no unit.
+/// rad/s or m/s²; `None` for counts and unknown units.
 pub fn unit_scale(sensor: Sensor, unit: &str) -> Option<f64> {
     let mut all = OUTPUTS
         .iter()

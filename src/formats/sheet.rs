@@ -29,7 +29,7 @@ impl Sheet {
         Self::of(Source::of_file(path).open()?, fewest)
     }
 
-    /// Reads rows, of which there are at least so many, as far as it takes to see what they are.
+    /// Reads as many rows as are needed to identify the columns; the log must have at least `fewest`.
     pub(super) fn of(mut csv: LogRows, fewest: usize) -> Result<Self, FileError> {
         let names = csv.header().to_vec();
         let mut units = csv.units().to_vec();

@@ -1,18 +1,18 @@
-//! The 48 ways in which three axes can be ordered and reversed.
+//! The 48 orders and signs of three axes.
 
 use nalgebra::{Matrix3, Vector3};
 
 /// A signed permutation of three axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct AxisOrder {
-    /// For each axis of the result the axis of the argument that it is …
+    /// For each axis of the result, the index of the axis of the argument …
     pub source: [usize; 3],
-    /// … and whether that is reversed.
+    /// … and whether its sign is reversed.
     pub reversed: [bool; 3],
 }
 
 impl AxisOrder {
-    /// As they are.
+    /// The identity.
     pub const IDENTITY: Self = Self {
         source: [0, 1, 2],
         reversed: [false; 3],
@@ -36,17 +36,17 @@ impl AxisOrder {
         })
     }
 
-    /// The factor of an axis of the result, 1 or −1.
+    /// The sign of an axis of the result, 1 or −1.
     pub fn sign(&self, axis: usize) -> f64 {
         if self.reversed[axis] { -1.0 } else { 1.0 }
     }
 
-    /// A vector with its components so ordered and reversed.
+    /// Applies the order and signs to a vector.
     pub fn apply(&self, v: &Vector3<f64>) -> Vector3<f64> {
         Vector3::from_fn(|axis, _| self.sign(axis) * v[self.source[axis]])
     }
 
-    /// As a matrix.
+    /// The order as a matrix.
     pub fn matrix(&self) -> Matrix3<f64> {
         Matrix3::from_fn(|row, column| match column == self.source[row] {
             true => self.sign(row),
@@ -54,7 +54,7 @@ impl AxisOrder {
         })
     }
 
-    /// The order that is this one after another.
+    /// The composition: first `first`, then this order.
     pub fn after(&self, first: &Self) -> Self {
         Self {
             source: self.source.map(|axis| first.source[axis]),
@@ -63,7 +63,7 @@ impl AxisOrder {
         }
     }
 
-    /// The order that undoes it.
+    /// The inverse order.
     pub fn inverse(&self) -> Self {
         let mut inverse = Self::IDENTITY;
         for axis in 0..3 {
@@ -81,12 +81,12 @@ impl AxisOrder {
         }
     }
 
-    /// Whether right-handed axes stay right-handed: whether it is a rotation.
+    /// Whether it is a rotation: right-handed axes stay right-handed.
     pub fn is_rotation(&self) -> bool {
         self.matrix().determinant() > 0.0
     }
 
-    /// The axes that do not stay as they are.
+    /// The axes that this order changes.
     pub fn changed(&self) -> impl Iterator<Item = usize> {
         (0..3).filter(|&axis| self.source[axis] != axis || self.reversed[axis])
     }

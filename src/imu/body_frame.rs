@@ -1,12 +1,12 @@
-//! What fixes the body axes.
+//! The definition of the body axes.
 
 use serde::{Deserialize, Serialize};
 
-/// What fixes the body axes.
+/// The definition of the body axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BodyFrame {
-    /// The mounting face, of the table or of labelled positions.
+    /// Axes of the mounting face, given by the table or by labelled positions.
     #[default]
     Table,
     /// Accelerometer x along body x, accelerometer y in the xy plane.
@@ -14,7 +14,7 @@ pub enum BodyFrame {
 }
 
 impl BodyFrame {
-    /// In a few words.
+    /// A short description.
     pub fn words(self) -> &'static str {
         match self {
             Self::Table => "mounting face",

@@ -3,10 +3,10 @@
 use nalgebra::{Matrix3, SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
-/// Room for the installation angles of any form; a form with fewer leaves the last ones zero.
+/// Largest number of installation angles of any form; a form with fewer leaves the last ones zero.
 pub const ANGLES: usize = 6;
 
-/// How six or three small angles make an installation matrix.
+/// Definition of the installation matrix by six or three small angles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum InstallationForm {
@@ -46,12 +46,12 @@ impl InstallationForm {
         }
     }
 
-    /// Whether every installation in the other form has its equal in this one.
+    /// Whether this form can represent every installation of the other form.
     pub fn holds(self, other: Self) -> bool {
         self == other || self != Self::ThreeAngle
     }
 
-    /// What an angle adds to the off-diagonal entries of `C`, which are linear in the angles.
+    /// Derivative of the off-diagonal entries of `C`, which are linear in the angles, by one angle.
     fn slope(self, angle: usize) -> Matrix3<f64> {
         let (row, column) = self.angle_names()[angle];
         let mut slope = Matrix3::zeros();
@@ -96,10 +96,10 @@ impl InstallationForm {
 
     /// Splits a sensitivity matrix `A = K C` into scale factors and installation angles (design §4).
     ///
-    /// General and six-angle reproduce `A` exactly. Three-angle takes `K_i = A_ii` and the half
-    /// difference of the two entries of a pair, and is wrong by the pair's half sum. The sign of a scale
-    /// factor is that of its diagonal entry in every form: an axis that senses against its body axis has
-    /// a negative one.
+    /// General and six-angle reproduce `A` exactly. Three-angle takes `K_i = A_ii` and half the
+    /// difference of the two entries of a pair; its error is half their sum. In every form, the sign of a
+    /// scale factor is that of its diagonal entry: an axis that senses opposite to its body axis has a
+    /// negative scale factor.
     pub fn split(self, a: &Matrix3<f64>) -> (SVector<f64, 3>, SVector<f64, ANGLES>) {
         let scale = match self {
             Self::General => SVector::from_fn(|i, _| a.row(i).norm().copysign(a[(i, i)])),

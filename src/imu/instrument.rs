@@ -1,4 +1,4 @@
-//! What is known of an instrument before it is calibrated.
+//! Prior knowledge of an instrument.
 
 use super::triad::INSTALLATION;
 use super::{
@@ -6,20 +6,20 @@ use super::{
     TriadVector,
 };
 
-/// An instrument as data sheet and experience describe it.
+/// An instrument as described by data sheet and experience.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instrument {
     /// Nominal scale of each triad: the file's quantity per second for one rad/s or m/s².
     pub nominal: PerSensor<Nominal>,
     /// The file's quantity, such as `count`.
     pub unit: PerSensor<String>,
-    /// Knowledge of each triad before calibration.
+    /// Prior of each triad.
     pub prior: PerSensor<Prior>,
     /// Noise of each triad.
     pub noise: PerSensor<Noise>,
-    /// Whether white noise is stated; else it is what the quieter part of the record shows.
+    /// Whether white noise is stated; otherwise it is estimated from the quieter part of the record.
     pub noise_is_stated: PerSensor<bool>,
-    /// What moves add to it.
+    /// Noise added during moves.
     pub motion_noise: PerSensor<MotionNoise>,
     /// 1σ of each parameter of the error terms before calibration, around zero; zero where a term is
     /// off.
@@ -43,17 +43,17 @@ impl Instrument {
         }
     }
 
-    /// Both triads as the prior has them.
+    /// Prior mean of both triads.
     pub fn prior_mean(&self, form: InstallationForm) -> PerSensor<Triad> {
         PerSensor::from_fn(|sensor| self.prior.get(sensor).mean(form))
     }
 
-    /// 1σ of each parameter before calibration; zero where the form does not have it or the body frame holds it.
+    /// 1σ of each parameter before calibration; zero if the form does not have it or the body frame fixes it.
     ///
-    /// [`Prior`] speaks of the mounting face. In a frame along the accelerometers, turned from it by the angles
-    /// above their diagonal, each of these angles joins the one across the diagonal and the gyros' angles of the
-    /// same pair of axes, so variances add (first order in the angles; that the sums have a summand in common
-    /// is left out).
+    /// [`Prior`] refers to the mounting face. The accelerometer frame is rotated from it by the accelerometers'
+    /// angles above the diagonal. Each of these angles is added to the one across the diagonal and to the gyros'
+    /// angles of the same pair of axes, so variances add (first order in the angles; the correlation of these sums
+    /// is neglected).
     pub fn prior_sigma(
         &self,
         form: InstallationForm,

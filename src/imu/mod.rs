@@ -1,4 +1,4 @@
-//! The instrument: what a triad of gyros or accelerometers makes of its input.
+//! The instrument: output of a triad of gyros or accelerometers as a function of its input.
 //!
 //! `N = K C u + D` (Zhao, Jiang, Li 2016, Eq. 6; the second line of the printed Eq. 6 says `N_g`
 //! where the accelerometer is meant). `u` is the angular rate in rad/s or the specific force in
@@ -36,7 +36,7 @@ pub use triad::{Nominal, PARAMETERS, ParameterKind, Prior, Triad, TriadVector};
 /// Names of the body axes, in order.
 pub const AXES: [char; 3] = ['x', 'y', 'z'];
 
-/// Which of the two triads of an IMU.
+/// One of the two triads of an IMU.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Sensor {
     /// Angular rate in rad/s.
@@ -76,7 +76,7 @@ impl<T> PerSensor<T> {
         }
     }
 
-    /// The value of one triad, to be changed.
+    /// A mutable reference to the value of one triad.
     pub fn get_mut(&mut self, sensor: Sensor) -> &mut T {
         match sensor {
             Sensor::Gyro => &mut self.gyro,

@@ -17,12 +17,12 @@ pub struct NoiseKeys {
     pub by_motion: &'static str,
     /// Noise of moves by their duration, and its unit in rad/√s or (m/s)/√s.
     pub by_duration: (&'static str, f64),
-    /// What its 1σ was called when data sheets' floor of the Allan deviation goes by that name.
+    /// Former key of the bias 1σ; data sheets use this name for the floor of the Allan deviation.
     pub former: &'static str,
 }
 
 impl NoiseKeys {
-    /// Those of a triad.
+    /// The keys of a triad.
     pub const fn of(sensor: Sensor) -> Self {
         match sensor {
             Sensor::Gyro => Self {

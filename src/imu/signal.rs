@@ -1,11 +1,11 @@
-//! From an ideal output to what a sample of the instrument holds: noise, Gauss–Markov bias, pulses.
+//! From an ideal output to the samples of an instrument: noise, Gauss–Markov bias, pulses.
 
 use nalgebra::Vector3;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-/// What one sample holds.
+/// Quantity of one sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Output {
@@ -17,7 +17,7 @@ pub enum Output {
     Rate,
 }
 
-/// Noise of one triad, alike on its three axes.
+/// Noise of one triad, equal on its three axes.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Noise {
     /// Angle random walk in rad/√s, or velocity random walk in (m/s)/√s.
@@ -35,19 +35,19 @@ pub struct GaussMarkov {
     pub correlation_time: f64,
 }
 
-/// White noise that a triad has in moves beside that at rest: 1σ densities of the angle or velocity that it
-/// adds up to. Simulations do not make it.
+/// White noise of a triad during moves, in addition to its noise at rest: 1σ densities of the integrated angle or
+/// velocity. Simulations do not generate it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct MotionNoise {
-    /// By how fast a move is, √s: over the root of ∫|ω − ω_ie|² dt or ∫|f + g|² dt.
+    /// Part that grows with the speed of a move, √s: 1σ over the root of ∫|ω − ω_ie|² dt or ∫|f + g|² dt.
     pub by_motion: f64,
-    /// By how long it takes, rad/√s or (m/s)/√s.
+    /// Part that grows with the duration of a move, rad/√s or (m/s)/√s.
     pub by_duration: f64,
 }
 
 impl Noise {
-    /// Covariance on one axis of the mean outputs over two spans of time, each from begin to end in s:
-    /// (rad/s)² or (m/s²)². Of a span with itself it is the variance of its mean.
+    /// Covariance, on one axis, of the mean outputs over two time spans (start and end, s): (rad/s)² or (m/s²)².
+    /// For two equal spans it is the variance of the mean.
     ///
     /// Random walk is common to both where they overlap; the Gauss–Markov bias is the double integral of
     /// its autocovariance `σ² exp(−|t|/τ)` over both.
@@ -119,7 +119,7 @@ impl NoiseSource {
     }
 }
 
-/// A pulse counter: what is left over from one sample is carried into the next, so the sum of all
+/// A pulse counter: the remainder of each sample is carried into the next, so the sum of all
 /// pulses stays within half a count of the integral.
 #[derive(Debug, Clone, Default)]
 pub struct Pulses {

@@ -1,10 +1,10 @@
-//! How a triad changes with its temperature: each parameter is a polynomial in it, biases also follow
+//! Temperature dependence of a triad: each parameter is a polynomial in temperature; biases may also depend on
 //! its rate.
 //!
 //! `θ(T) = θ + Σ_k c_k B_k`, with `B_k = P_k(τ(T)) − P_k(τ(T_ref))` for the orders k from one on, P Legendre,
-//! τ the temperature scaled to [−1, 1] over the range seen, and a last B that is dT/dt over the largest
-//! seen. So θ is the parameter at the reference temperature while that does not change, and the c are of
-//! the size of what they do within the range.
+//! τ the temperature scaled to [−1, 1] over the recorded range, and a last B equal to dT/dt over its largest recorded
+//! magnitude. Thus θ is the parameter at a constant reference temperature, and each c has the magnitude of its effect
+//! within the range.
 
 use nalgebra::{SMatrix, SVector};
 
@@ -12,9 +12,9 @@ use super::{PARAMETERS, PerSensor, Sensor, Triad};
 
 /// Highest order of the polynomials.
 pub const HIGHEST_ORDER: usize = 5;
-/// Functions of temperature that parameters are made of: the orders from one on, then its rate.
+/// Number of temperature functions: the orders from one on, then the rate.
 pub const THERMAL_FUNCTIONS: usize = HIGHEST_ORDER + 1;
-/// Which of them is the rate.
+/// Index of the rate among them.
 pub const RATE: usize = HIGHEST_ORDER;
 
 /// Values of all functions at a time.
@@ -24,7 +24,7 @@ pub type ThermalCoefficients = SMatrix<f64, PARAMETERS, THERMAL_FUNCTIONS>;
 /// Values of all functions at a time, of the axes x, y and z of both triads.
 pub type ThermalState = PerSensor<[ThermalValues; 3]>;
 
-/// The temperatures of a triad within which its polynomials hold.
+/// The temperature range in which the polynomials of a triad are valid.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ThermalRange {
     /// The lowest, °C.
@@ -33,7 +33,7 @@ pub struct ThermalRange {
     /// The highest, °C.
     #[serde(rename = "highest_degc")]
     pub highest: f64,
-    /// At which its parameters are stated, °C.
+    /// Reference temperature of the parameters, °C.
     #[serde(rename = "reference_degc")]
     pub reference: f64,
     /// The largest magnitude of its rate, K/s.
@@ -42,7 +42,7 @@ pub struct ThermalRange {
 }
 
 impl ThermalRange {
-    /// Of a range that is none, half of the span that scales it, K.
+    /// Least half span used to scale a range, so that an empty range can be scaled, K.
     const LEAST: f64 = 0.5;
 
     /// The range scaled to [−1, 1].
@@ -52,7 +52,7 @@ impl ThermalRange {
         (temperature - middle) / half
     }
 
-    /// All functions at a temperature in °C that changes by so many K/s.
+    /// All functions at a temperature in °C and its rate of change in K/s.
     pub fn values(&self, temperature: f64, rate: f64) -> ThermalValues {
         let here = legendre(self.scaled(temperature));
         let there = legendre(self.scaled(self.reference));
@@ -66,7 +66,7 @@ impl ThermalRange {
         values
     }
 
-    /// Whether a temperature lies within it, except for the noise of its sensor, K.
+    /// Whether a temperature lies within the range, with a tolerance for the noise of its sensor, K.
     pub fn contains(&self, temperature: f64, tolerance: f64) -> bool {
         (self.lowest - tolerance..=self.highest + tolerance).contains(&temperature)
     }
@@ -103,7 +103,7 @@ fn legendre(x: f64) -> [f64; HIGHEST_ORDER + 1] {
 }
 
 impl Triad {
-    /// The triad where the functions of temperature have these values on its axes.
+    /// The triad at these values of the temperature functions on its axes.
     pub fn warmed(&self, coefficients: &ThermalCoefficients, values: &[ThermalValues; 3]) -> Self {
         let mut v = self.to_vector();
         for (parameter, of) in coefficients.row_iter().enumerate() {
@@ -116,12 +116,12 @@ impl Triad {
     }
 }
 
-/// What is estimated of an instrument's temperature dependence.
+/// The estimated temperature dependence of an instrument.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ThermalModel {
-    /// Where the polynomials of each triad hold.
+    /// Temperature range of each triad's polynomials.
     pub range: PerSensor<ThermalRange>,
-    /// 1σ of every coefficient before the recordings, around zero; zero where it is off.
+    /// Prior 1σ of every coefficient, around zero; zero if it is off.
     pub sigma: PerSensor<ThermalCoefficients>,
 }
 
@@ -139,7 +139,7 @@ impl ThermalModel {
     }
 }
 
-/// The coefficients of powers of `T − reference` in K that a parameter's coefficients amount to, from the first
+/// Converts a parameter's coefficients to those of powers of `T − reference` in K, from the first
 /// power on.
 pub fn powers(range: &ThermalRange, coefficients: &ThermalValues) -> [f64; HIGHEST_ORDER] {
     // Newton's divided differences at as many temperatures as there are coefficients, and the reference.

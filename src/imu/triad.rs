@@ -4,7 +4,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use super::{ANGLES, AXES, InstallationForm, Sensor};
 
-/// Parameters of a triad: three scale factors, room for six angles, three biases.
+/// Number of parameters of a triad: three scale factors, up to six angles, three biases.
 pub const PARAMETERS: usize = 3 + ANGLES + 3;
 const SCALE: usize = 0;
 pub const INSTALLATION: usize = 3;
@@ -17,7 +17,7 @@ pub type TriadVector = SVector<f64, PARAMETERS>;
 /// The model `N = K C u + D` of one triad, with `N` divided by the nominal scale of its axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Triad {
-    /// How the angles make `C`.
+    /// Installation form: definition of `C` by the angles.
     pub form: InstallationForm,
     /// Diagonal of `K`, relative to the nominal scale.
     pub scale: Vector3<f64>,
@@ -49,7 +49,7 @@ impl Triad {
         }
     }
 
-    /// The triad of another form with sensitivity nearest to this one's.
+    /// The triad of another form whose sensitivity is nearest to that of this triad.
     pub fn in_form(&self, form: InstallationForm) -> Self {
         Self::from_sensitivity(form, &self.sensitivity(), self.bias)
     }
@@ -108,8 +108,8 @@ impl Triad {
         }
     }
 
-    /// Indices of the installation angles above the diagonal of `C`. In a body frame along the
-    /// accelerometers theirs are zero.
+    /// Indices of the installation angles above the diagonal of `C`. In the accelerometer body frame, those of the
+    /// accelerometers are zero.
     pub fn above_the_diagonal(form: InstallationForm) -> impl Iterator<Item = usize> {
         let angles = form.angle_names().iter().enumerate();
         angles
@@ -126,12 +126,12 @@ impl Triad {
         Self::from_vector(self.form, &v)
     }
 
-    /// Which parameters a form has.
+    /// Whether a form has this parameter.
     pub fn has_parameter(form: InstallationForm, parameter: usize) -> bool {
         Self::axis(form, parameter).is_some()
     }
 
-    /// What a parameter is.
+    /// Kind of a parameter.
     pub fn kind(parameter: usize) -> ParameterKind {
         match parameter {
             SCALE..INSTALLATION => ParameterKind::Scale,
@@ -140,7 +140,7 @@ impl Triad {
         }
     }
 
-    /// The axis whose output a parameter is of; `None` if the form does not have the parameter.
+    /// The axis whose output depends on this parameter; `None` if the form does not have the parameter.
     pub fn axis(form: InstallationForm, parameter: usize) -> Option<usize> {
         match Self::kind(parameter) {
             ParameterKind::Scale => Some(parameter - SCALE),
@@ -187,7 +187,7 @@ impl ParameterKind {
     pub const ALL: [Self; 3] = [Self::Scale, Self::Installation, Self::Bias];
 }
 
-/// What is known of a triad before its calibration, in the model's normalised units.
+/// Prior knowledge of a triad, in the model's normalised units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
     /// 1σ of each scale factor, relative; its mean is the nominal scale.
@@ -223,7 +223,7 @@ impl Prior {
 }
 
 /// The nominal scale of a triad: the file's quantity per second for one rad/s or one m/s², axis by
-/// axis. The only bridge between a file's numbers and the normalised model.
+/// axis. It alone converts between a file's numbers and the normalised model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nominal(pub Vector3<f64>);
 

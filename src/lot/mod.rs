@@ -1,7 +1,7 @@
-//! A production lot: what the calibrations of many units of one type say together.
+//! A production lot: joint evaluation of the calibrations of many units of one type.
 //!
-//! Every unit's parameters in one form, body frame and nominal scale; mean and spread of the lot, and whether
-//! the spread is more than the units' own σ make; units apart from the others; trends; limits.
+//! All units are converted to one form, body frame and nominal scale. Results are mean and spread of the lot, with a
+//! test whether the spread exceeds the units' σ; outliers; trends; limits.
 
 mod limits;
 mod outlier;
@@ -30,26 +30,26 @@ pub use statistics::{FALSE_ALARM, FALSE_TREND, Statistics};
 pub use trend::{Against, Trend};
 pub use unit::{Calibrated, Row, Unit};
 
-/// What the units say together.
+/// The evaluation of a lot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lot {
     /// Every unit, in the order given.
     pub rows: Vec<Row>,
-    /// The body frame that all are brought to.
+    /// The common body frame.
     pub body_frame: BodyFrame,
-    /// Nominal scales by which all are normalised: of each axis the median of what the runs state.
+    /// Nominal scales by which all are normalised: for each axis, the median of the values stated in the runs.
     pub nominal: PerSensor<Nominal>,
-    /// 1σ of gravity over gravity, where all units have it from one site and so share its error; it is in each
-    /// unit's σ and in the mean's, not in the scatter.
+    /// Relative 1σ of gravity, if all units were calibrated at one site and therefore share its error. It is part of
+    /// each unit's σ and of the mean's σ, but not of the scatter.
     pub shared_gravity: Option<f64>,
     /// Every quantity that at least two units have.
     pub statistics: Vec<Statistics>,
-    /// The limits that units are held against; none if none are given.
+    /// The limits for units; `None` if there are none.
     pub specification: Option<Specification>,
 }
 
 impl Lot {
-    /// Brings units together, and holds them against limits where they are given.
+    /// Evaluates units, and checks them against limits if given.
     pub fn new(units: Vec<Unit>, specification: Option<Specification>) -> Self {
         let output = common_output(&units);
         let usable: Vec<_> = units.iter().map(|unit| usable(unit, output)).collect();
@@ -103,14 +103,14 @@ impl Lot {
             .filter_map(|row| Some((&row.unit, row.canonical.as_ref().err()?.as_str())))
     }
 
-    /// What is apart in a unit, by its place in the lot.
+    /// Quantities in which a unit, given by its index in the lot, is an outlier.
     pub fn outliers_of(&self, row: usize) -> impl Iterator<Item = &Statistics> {
         let apart = move |of: &&Statistics| of.outliers.contains(&row);
         self.statistics.iter().filter(apart)
     }
 }
 
-/// What was calibrated and may be compared with units of this output.
+/// The calibration of a unit, if it can be compared with units of this output; else the reason.
 fn usable<'a>(
     unit: &'a Unit,
     output: Option<&PerSensor<String>>,
@@ -132,7 +132,7 @@ fn usable<'a>(
     ))
 }
 
-/// The output that most units have, the first of them where several are as many.
+/// The output of most units; the first of several equally common ones.
 fn common_output(units: &[Unit]) -> Option<&PerSensor<String>> {
     let usable = units.iter().filter_map(|unit| usable(unit, None).ok());
     let stated: Vec<_> = usable
@@ -143,7 +143,7 @@ fn common_output(units: &[Unit]) -> Option<&PerSensor<String>> {
     stated.iter().rev().copied().max_by_key(count)
 }
 
-/// Relative 1σ of gravity, if all have it from the same place.
+/// Relative 1σ of gravity, if all units have it from the same site.
 fn shared_gravity(all: &[&Calibrated]) -> Option<f64> {
     let first = all.first()?.calibration.gravity?;
     let same = all.iter().all(|of| of.calibration.gravity == Some(first));

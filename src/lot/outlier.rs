@@ -1,13 +1,13 @@
-//! Units apart from the others: the generalized extreme Studentized deviate test (Rosner, *Technometrics* 25,
-//! 1983, 165), which several outliers together do not deceive, at a stated rate of false alarms.
+//! Outliers: the generalized extreme Studentized deviate test (Rosner, *Technometrics* 25, 1983, 165) with a stated
+//! false-alarm rate. Several outliers do not mask one another.
 
 use statrs::statistics::Statistics;
 
 use crate::statistics::{SIGMA_OF_MEDIAN, median, student_limit};
 
-/// How many values can be apart from the rest: one in four where the limits apply to several, which Rosner
-/// found from 25 values on, and of two from 15 on; else one, to which they apply by themselves (Grubbs). Fewer
-/// than five have no others to be apart from.
+/// Largest number of outliers. From 25 values on it is a quarter of them, and from 15 on two: there, Rosner found the
+/// limits valid for several outliers. From five values on it is one, for which the limits are exact (Grubbs). Fewer
+/// values cannot show an outlier.
 fn most(count: usize) -> usize {
     match count {
         25.. => count / 4,
@@ -17,7 +17,7 @@ fn most(count: usize) -> usize {
     }
 }
 
-/// Places of the outliers among values with their variances, at this chance of any among normal ones.
+/// Indices of the outliers among values with variances, at this false-alarm rate for normal values.
 pub fn outliers(samples: &[(f64, f64)], chance: f64) -> Vec<usize> {
     let mut rest: Vec<(usize, f64)> = standardised(samples).into_iter().enumerate().collect();
     let (mut removed, mut outliers) = (Vec::new(), 0);
@@ -36,7 +36,7 @@ pub fn outliers(samples: &[(f64, f64)], chance: f64) -> Vec<usize> {
     removed
 }
 
-/// Values on one scale: from the median, in units of their own σ and a robust spread of the lot together.
+/// Values on one scale: minus the median, over the root sum square of their own σ and a robust spread of the lot.
 fn standardised(samples: &[(f64, f64)]) -> Vec<f64> {
     let middle = |of: &dyn Fn(&(f64, f64)) -> f64| {
         median(&mut samples.iter().map(of).collect::<Vec<_>>()).unwrap_or_default()
@@ -54,7 +54,7 @@ fn standardised(samples: &[(f64, f64)]) -> Vec<f64> {
         .collect()
 }
 
-/// Place and Studentized deviate of the value that is farthest from the mean; `None` if all are the same.
+/// Index and Studentized deviate of the value farthest from the mean; `None` if all are equal.
 fn extreme(values: &[(usize, f64)]) -> Option<(usize, f64)> {
     let values = || values.iter().map(|v| v.1);
     let (mean, deviation) = (values().mean(), values().std_dev());
@@ -63,7 +63,7 @@ fn extreme(values: &[(usize, f64)]) -> Option<(usize, f64)> {
     (deviation > 0.0).then(|| (place, distance / deviation))
 }
 
-/// Limit of the largest deviate among this many values, exceeded with this chance.
+/// Limit of the largest deviate among this many values, exceeded with probability `chance`.
 fn limit(count: usize, chance: f64) -> f64 {
     let n = count as f64;
     let t = student_limit(n - 2.0, chance / (2.0 * n));

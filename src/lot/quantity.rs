@@ -10,7 +10,7 @@ pub fn axes() -> impl Iterator<Item = (Sensor, usize)> {
     Sensor::ALL.into_iter().flat_map(axes)
 }
 
-/// A number that every unit has one of.
+/// A quantity with one value per unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// A parameter of both triads by its index, in the general form.
@@ -20,14 +20,14 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// All that units in this body frame have.
+    /// All quantities of units in this body frame.
     pub fn all(body_frame: BodyFrame) -> Vec<Self> {
         let parameters = free_parameters(body_frame).into_iter();
         let noise = axes().map(|(sensor, axis)| Self::Noise(sensor, axis));
         parameters.map(Self::Parameter).chain(noise).collect()
     }
 
-    /// Whether a wrong gravity makes it wrong by the same part.
+    /// Whether a relative error of gravity causes the same relative error.
     pub fn follows_gravity(self) -> bool {
         let Self::Parameter(index) = self else {
             return false;
@@ -52,6 +52,6 @@ impl Quantity {
 pub struct Sample {
     /// Normalised, in SI.
     pub value: f64,
-    /// Zero where none is claimed.
+    /// Zero if no σ is stated.
     pub sigma: f64,
 }

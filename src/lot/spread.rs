@@ -1,4 +1,4 @@
-//! How much units differ beyond what their own σ make.
+//! Spread of units beyond their own σ.
 //!
 //! Unit k's value is `μ + τ a + σ_k b`, a and b standard normal: τ is the spread of the lot. With
 //! `w_k = 1/(τ² + σ_k²)` and the weighted mean `m`, `Q(τ²) = Σ w_k (x_k − m)²` follows χ² of n − 1 degrees of
@@ -12,10 +12,10 @@ use crate::calibration::ChiSquare;
 /// Probability outside the interval of a spread, half on each side.
 const OUTSIDE: f64 = 0.05;
 
-/// The spread of a lot, the σ of its units taken out.
+/// The spread of a lot, without the σ of its units.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Spread {
-    /// 1σ from unit to unit; zero where the units' own σ explain all.
+    /// 1σ from unit to unit; zero if the units' own σ explain the scatter.
     pub value: f64,
     /// Its own 1σ; `None` if it is zero.
     pub sigma: Option<f64>,
@@ -30,15 +30,15 @@ pub struct Scatter {
     pub mean: f64,
     /// Its 1σ.
     pub mean_sigma: f64,
-    /// Sample standard deviation as it stands.
+    /// Sample standard deviation, the units' σ included.
     pub deviation: f64,
-    /// The scatter in units of the claimed σ alone; `None` if a value has no σ.
+    /// χ² of the scatter relative to the stated σ alone; `None` if a value has no σ.
     pub chi_square: Option<ChiSquare>,
     /// The spread from unit to unit.
     pub spread: Spread,
 }
 
-/// Σ w of values with their variances, for a spread of this variance, with the weighted mean and Q.
+/// Sum of weights, weighted mean and Q of values with their variances, for a spread of this variance.
 fn weighted(samples: &[(f64, f64)], spread: f64) -> (f64, f64, f64) {
     let weighted = |of: &dyn Fn(f64) -> f64| -> f64 {
         let parts = samples.iter().map(|s| of(s.0) * (spread + s.1).recip());
@@ -49,7 +49,7 @@ fn weighted(samples: &[(f64, f64)], spread: f64) -> (f64, f64, f64) {
     (weights, mean, weighted(&|value| (value - mean).powi(2)))
 }
 
-/// Mean and scatter of values with their variances; none of fewer than two.
+/// Mean and scatter of values with their variances; `None` for fewer than two.
 pub fn scatter(samples: &[(f64, f64)]) -> Option<Scatter> {
     let freedom = samples.len().checked_sub(1).filter(|n| *n > 0)?;
     let n = freedom as f64;
@@ -91,7 +91,7 @@ pub fn scatter(samples: &[(f64, f64)]) -> Option<Scatter> {
     })
 }
 
-/// The variance of the spread at which Q has this value; zero where Q is below it without any spread.
+/// The variance of the spread at which Q has this value; zero if Q is below it even without spread.
 fn spread_where(samples: &[(f64, f64)], q: f64, scale: f64) -> f64 {
     let above = |spread: f64| weighted(samples, spread).2 > q;
     let (mut low, mut high) = (scale * f64::EPSILON, scale);

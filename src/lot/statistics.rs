@@ -7,29 +7,29 @@ use super::trend::{Against, Trend, trend};
 use super::unit::Row;
 use crate::imu::BodyFrame;
 
-/// False-alarm rate of outliers, and of spreads called real: for all quantities of a lot at once.
+/// False-alarm rate of outliers, and of significant spreads, for all quantities of a lot together.
 pub const FALSE_ALARM: f64 = 0.01;
-/// False-alarm rate of trends: for all quantities of a lot at once, by serial and by date.
+/// False-alarm rate of trends, for all quantities of a lot together, by serial number and by date.
 pub const FALSE_TREND: f64 = 0.01;
 
-/// What the units say of one quantity.
+/// Statistics of one quantity over the units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Statistics {
     /// The quantity.
     pub quantity: Quantity,
-    /// How many units have it.
+    /// Number of units that have it.
     pub count: usize,
-    /// Places of units that are apart from the others; the rest is without them.
+    /// Indices of outliers, which the other statistics exclude.
     pub outliers: Vec<usize>,
     /// Mean and spread.
     pub scatter: Scatter,
-    /// Whether the spread is more than the units' σ make, at [`FALSE_ALARM`] over all quantities.
+    /// Whether the spread exceeds the units' σ significantly, at [`FALSE_ALARM`] over all quantities.
     pub real: bool,
-    /// Changes with serial or date, at [`FALSE_TREND`] over all quantities and both.
+    /// Significant trends with serial number or date, at [`FALSE_TREND`] over all quantities and both.
     pub trends: Vec<Trend>,
 }
 
-/// Statistics of every quantity that two units have. `gravity` is the relative 1σ of gravity that all share.
+/// Statistics of every quantity that at least two units have. `gravity` is the shared relative 1σ of gravity.
 pub fn of_all(rows: &[Row], body_frame: BodyFrame, gravity: f64) -> Vec<Statistics> {
     let quantities = Quantity::all(body_frame);
     let alarm = FALSE_ALARM / quantities.len() as f64;

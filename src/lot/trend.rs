@@ -1,29 +1,29 @@
-//! Whether values change with the serial number or with time.
+//! Trends of values with the serial number or with time.
 
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use toml::value::Datetime;
 
 use super::unit::Unit;
 
-/// What a value may change with.
+/// Independent variable of a trend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Against {
-    /// The last number in the serial.
+    /// The last number in the serial number.
     Serial,
     /// The date, in days.
     Date,
 }
 
-/// A change that is beyond chance.
+/// A significant trend.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trend {
-    /// With what.
+    /// The independent variable.
     pub against: Against,
-    /// Change for one of the serial, or for a day.
+    /// Change per serial number, or per day.
     pub slope: f64,
     /// Its 1σ, from the scatter about the line.
     pub sigma: f64,
-    /// Chance of as much or more without a trend.
+    /// p-value: probability of at least this change without a trend.
     pub p: f64,
 }
 
@@ -31,7 +31,7 @@ impl Against {
     /// Both.
     pub const ALL: [Self; 2] = [Self::Serial, Self::Date];
 
-    /// Where a unit stands; none if it does not say.
+    /// Value of the independent variable for a unit; `None` if it is not stated.
     pub fn place(self, unit: &Unit) -> Option<f64> {
         match self {
             Self::Serial => serial_number(unit.meta.get("serial")?),
@@ -46,7 +46,7 @@ fn serial_number(serial: &str) -> Option<f64> {
     runs.find(|run| !run.is_empty())?.parse().ok()
 }
 
-/// Days from 1970-01-01 to an ISO 8601 date, with the part of the day where it has a time.
+/// Days from 1970-01-01 to an ISO 8601 date, with the fraction of the day if it has a time.
 fn days(date: &str) -> Option<f64> {
     const DAY: f64 = 86_400.0;
     let stamp: Datetime = date.trim().parse().ok()?;
@@ -65,7 +65,7 @@ fn days(date: &str) -> Option<f64> {
     Some(whole + part)
 }
 
-/// A weighted line through values: `(place, value, weight)`; `None` if it is within chance.
+/// A weighted line through values `(place, value, weight)`; `None` if its slope is not significant.
 pub fn trend(against: Against, points: &[(f64, f64, f64)], chance: f64) -> Option<Trend> {
     let freedom = points.len().checked_sub(2).filter(|n| *n >= 2)? as f64;
     let sum = |of: &dyn Fn(f64, f64) -> f64| -> f64 {

@@ -9,14 +9,14 @@ use crate::calibration::result::frame::Canonical;
 use crate::imu::{Nominal, PerSensor, Sensor};
 use crate::noise::RestNoise;
 
-/// A unit with what came of it.
+/// A unit with its calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unit {
-    /// Its name, no other unit's in the lot.
+    /// Its name, unique in the lot.
     pub name: String,
-    /// `[meta]` of its run, as far as that could be read.
+    /// `[meta]` of its run, if that could be read.
     pub meta: BTreeMap<String, String>,
-    /// Its calibration, or why it could not be calibrated.
+    /// Its calibration, or the reason for failure.
     pub calibrated: Result<Calibrated, String>,
 }
 
@@ -27,11 +27,11 @@ pub struct Calibrated {
     pub calibration: Calibration,
     /// Nominal scales of the run, in the file's quantity.
     pub nominal: PerSensor<[f64; 3]>,
-    /// Noise at rest, axis by axis; none if no dwell is long enough.
+    /// Noise of each axis at rest; `None` if no dwell is long enough.
     pub noise: Option<RestNoise>,
 }
 
-/// A unit's noise at rest, normalised by these scales in the place of its run's own.
+/// A unit's noise at rest, normalised by these scales instead of those of its run.
 pub fn noise_at_rest(unit: &Unit, nominal: &PerSensor<Nominal>) -> Option<RestNoise> {
     let calibrated = unit.calibrated.as_ref().ok()?;
     let mut noise = calibrated.noise?;
@@ -47,19 +47,19 @@ pub fn noise_at_rest(unit: &Unit, nominal: &PerSensor<Nominal>) -> Option<RestNo
 pub struct Row {
     /// The unit.
     pub unit: Unit,
-    /// Its calibration as the lot's are compared, or why there is none to be used.
+    /// Its calibration in the common form, or the reason why it cannot be used.
     pub canonical: Result<Canonical, String>,
-    /// Its noise at rest, by the lot's nominal scales; none if no dwell is long enough.
+    /// Its noise at rest, by the lot's nominal scales; `None` if no dwell is long enough.
     pub noise: Option<RestNoise>,
-    /// Each limit that concerns it.
+    /// Its checks against the limits.
     pub checks: Vec<Check>,
-    /// What all checks come to; none without a specification.
+    /// Combined verdict of all checks; `None` without a specification.
     pub verdict: Option<Verdict>,
 }
 
 impl Row {
-    /// The nominal scale that its run states farthest from the lot's: triad, axis and by which part; `None` if
-    /// they differ by rounding alone.
+    /// The nominal scale of its run with the largest deviation from the lot's: triad, axis and relative deviation;
+    /// `None` if they differ by rounding only.
     pub fn nominal_off(&self, lot: &PerSensor<Nominal>) -> Option<(Sensor, usize, f64)> {
         const ROUNDING: f64 = 1e-12;
         let own = &self.unit.calibrated.as_ref().ok()?.nominal;

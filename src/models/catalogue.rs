@@ -1,4 +1,4 @@
-//! What is embedded, for those who look for a name.
+//! Catalogue of the embedded models.
 
 use super::Room;
 
@@ -7,7 +7,7 @@ use super::Room;
 pub struct Embedded {
     /// Its folder.
     pub room: Room,
-    /// What it is called on the command line and in other models.
+    /// Its name on the command line and in other models.
     pub name: &'static str,
     text: &'static str,
 }
@@ -21,7 +21,7 @@ impl Embedded {
         })
     }
 
-    /// What it is: the first sentence of the comment that its file begins with.
+    /// Its description: the first sentence of the initial comment of its file.
     pub fn description(&self) -> String {
         let comment = self.text.lines().map_while(|line| line.strip_prefix('#'));
         let words: Vec<&str> = comment

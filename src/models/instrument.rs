@@ -1,4 +1,4 @@
-//! Instruments and installations: what a grade of instrument is before it is calibrated.
+//! Instruments and installations: grades of uncalibrated instruments.
 
 use nalgebra::{SVector, Vector3};
 use rand::Rng;
@@ -23,16 +23,16 @@ pub struct Instrument {
     pub pulse: PerSensor<f64>,
     /// Noise.
     pub noise: PerSensor<Noise>,
-    /// How one instrument of the grade differs from the next before calibration.
+    /// Variation between instruments of the grade before calibration.
     pub variation: PerSensor<Variation>,
-    /// 1σ of the parameters of its error terms, around zero; zero where it has none.
+    /// 1σ of the parameters of its error terms, around zero; zero if it has none.
     pub term_sigma: TermVector,
-    /// How they change with temperature; none where they do not.
+    /// Temperature dependence of the grade; `None` if there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub thermal: Option<PerSensor<ThermalVariation>>,
 }
 
-/// How a triad's scale factors and biases differ between instruments of a grade.
+/// Variation of a triad's scale factors and biases between instruments of a grade.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Variation {
     /// Scale factor − 1.
@@ -41,7 +41,7 @@ pub struct Variation {
     pub bias: Spread,
 }
 
-/// How a quantity is distributed.
+/// Distribution of a quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     mean: f64,
@@ -86,7 +86,7 @@ impl Spread {
     }
 }
 
-/// An installation form and how large its angles are.
+/// An installation form with the distribution of its angles.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct InstallationModel {
     /// The form.
@@ -168,7 +168,7 @@ impl Instrument {
         })
     }
 
-    /// What is known of a triad of this grade before calibration.
+    /// Prior of a triad of this grade.
     pub fn prior(&self, sensor: Sensor, installation: &InstallationModel) -> Prior {
         let Variation { scale, bias } = self.variation.get(sensor);
         Prior {

@@ -12,7 +12,7 @@ use crate::formats::{Finite, NonNegative, Positive};
 use crate::turntable::{AxesStep, Axis, BodyStep, Moves, Path, Rotation, Table, TableErrors};
 use crate::units::{ARCSEC, DEGREE};
 
-/// Finds and reads a turntable; returns its name beside it.
+/// Finds and reads a turntable; returns it with its name.
 ///
 /// # Errors
 /// If there is none of that name or it is malformed.
@@ -48,7 +48,7 @@ pub fn turntable(name_or_path: &str, named_in: &Place) -> Result<(Table, String)
     Ok((table, text.name()))
 }
 
-/// Finds and reads a path; returns its name beside it. Directions such as `earth-rate` are those of
+/// Finds and reads a path; returns it with its name. Directions such as `earth-rate` are those of
 /// the site.
 ///
 /// # Errors

@@ -1,4 +1,4 @@
-//! How instruments of a grade change with temperature.
+//! Temperature dependence of the instruments of a grade.
 
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +18,7 @@ pub struct ThermalVariation {
 }
 
 impl ThermalVariation {
-    /// Of no grade.
+    /// A variation for tests.
     #[cfg(test)]
     pub fn for_test() -> Self {
         Self {

@@ -7,7 +7,7 @@ use crate::formats::{Finite, NonNegative, Positive};
 use crate::navigation::{Change, Segment, Start, Trajectory};
 use crate::units::DEGREE;
 
-/// Finds and reads a trajectory; returns its name beside it.
+/// Finds and reads a trajectory; returns it with its name.
 ///
 /// # Errors
 /// If there is none of that name, or it is malformed or cannot be followed.

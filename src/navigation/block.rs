@@ -1,4 +1,4 @@
-//! What navigation hands to a filter: the error model over a range of samples.
+//! Interface of navigation to a filter: the error model over a range of samples.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use super::errors::{ErrorMatrix, ErrorVector, STATES};
 use super::process_noise::NoiseInputs;
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, ThermalState};
 
-/// Navigation errors against the parameters of one triad.
+/// Sensitivity of navigation errors to the parameters of one triad.
 pub type ParameterBlock = SMatrix<f64, STATES, PER_TRIAD>;
 
 /// Computed attitude, velocity and position.
@@ -23,7 +23,7 @@ pub struct State {
 }
 
 impl State {
-    /// At rest at the site.
+    /// A state at rest at the site.
     pub fn at_rest(attitude: Matrix3<f64>) -> Self {
         Self {
             attitude,
@@ -34,7 +34,7 @@ impl State {
 }
 
 /// The error model over a stretch of samples: the rows of the transition matrix that differ from
-/// identity, what process noise acts on, and the computed state at the end.
+/// identity, the inputs of process noise, and the computed state at the end.
 ///
 /// Errors: φ in `C_computed = (I − [φ×]) C_true` (rad), δV and δp computed − true (m/s, m), all
 /// East-North-Up; parameter errors δθ true − estimated, in the order of [`crate::imu::TriadVector`].
@@ -56,18 +56,18 @@ pub struct Block {
     pub gravity: ErrorVector,
     /// Transition from the parameter errors of error terms that are on.
     pub terms: Vec<TermColumn>,
-    /// Functions of temperature meanwhile: the transition from a coefficient's error is that from its
-    /// parameter's error times its function. None where parameters do not change with temperature.
+    /// Functions of temperature in the block: the transition from a coefficient's error is that from its
+    /// parameter's error times its function. `None` if parameters do not depend on temperature.
     pub thermal: Option<Box<ThermalState>>,
-    /// What noise acts on: its covariance follows for any densities.
+    /// Inputs of process noise, which give its covariance for any densities.
     pub noise: NoiseInputs,
 }
 
-/// What the error of one term parameter makes of the navigation errors.
+/// Effect of the error of one term parameter on the navigation errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TermColumn {
     /// The parameter's index among [`crate::imu::TERM_PARAMETERS`].
     pub parameter: usize,
-    /// Navigation errors by the parameter's error, true − estimated.
+    /// Navigation errors per error of the parameter, true − estimated.
     pub column: ErrorVector,
 }

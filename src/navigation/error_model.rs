@@ -30,12 +30,12 @@ const HEIGHT: usize = POSITION + 2;
 const RATE: usize = STATES;
 const FORCE: usize = STATES + 3;
 
-/// Navigation errors against input errors.
+/// Sensitivity of navigation errors to input errors.
 pub type InputMatrix = SMatrix<f64, STATES, INPUTS>;
 
 /// `ẋ = F x + G ε` about a true state, with ε the errors of the sensed rate and force.
 ///
-/// Eq. 13 as printed has slips that are put right here (Groves, 2nd ed., §14.2.4, has the same model
+/// Eq. 13 as printed has errors that are corrected here (Groves, 2nd ed., §14.2.4, has the same model
 /// in North-East-Down):
 /// * `δλ̇ = δV_E sec L/(R_N+h) + δL V_E tan L sec L/(R_N+h) − δh V_E sec L/(R_N+h)²`; printed, the
 ///   first term lacks sec L and the second has a minus.
@@ -46,12 +46,12 @@ pub type InputMatrix = SMatrix<f64, STATES, INPUTS>;
 /// * `V × (2δω_ie + δω_en)` belongs to `δV̇` as printed; gravity's change with height and latitude,
 ///   which is not printed, is added: without it a free height has no instability.
 ///
-/// What is linear leaves out that a vertical error of specific force changes the period of the Schuler
-/// motion, also where height is held: after a time t its phase is off by `ω_s t ∇_U / 2g`, one degree
+/// The linear model neglects that a vertical error of specific force changes the period of the Schuler
+/// oscillation, even if height is held: after a time t the phase error is `ω_s t ∇_U / 2g`, one degree
 /// in 40 h for 0.2 mg.
 ///
-/// Radii change with latitude: that is kept, so that the model is the derivative of
-/// [`super::Strapdown`] and not only near to it.
+/// The change of the radii with latitude is included, so that the model is the exact derivative of
+/// [`super::Strapdown`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorModel {
     /// F.
@@ -61,7 +61,7 @@ pub struct ErrorModel {
 }
 
 impl ErrorModel {
-    /// About a true state with this specific force along body axes, m/s². Where height is held its
+    /// The model about a true state with this specific force along body axes, m/s². If height is held, its
     /// error and that of vertical velocity are zero, and seven states remain.
     pub fn about(truth: &Solution, force: &Vector3<f64>, height: Height) -> Self {
         let (latitude, transport) = (truth.latitude, truth.transport_rate());
@@ -107,9 +107,9 @@ impl ErrorModel {
         }
     }
 
-    /// The exact discrete form over a time in s in which F, G and ε are constant: for a body that
-    /// stands or moves steadily of any length, otherwise as long as attitude and velocity may be taken
-    /// for constant (Van Loan, "Computing integrals involving the matrix exponential", IEEE Trans.
+    /// The exact discrete form over a time in s in which F, G and ε are constant: any time for a body at
+    /// rest or in steady motion, otherwise a time in which attitude and velocity are nearly
+    /// constant (Van Loan, "Computing integrals involving the matrix exponential", IEEE Trans.
     /// Automatic Control 23, 1978).
     pub fn over(&self, duration: f64) -> Transition {
         // All entries of the scaled matrix are about the Schuler frequency, so the exponential keeps
@@ -161,7 +161,7 @@ fn transport_slopes(truth: &Solution, transport: &Vector3<f64>) -> (Matrix3<f64>
     (by_velocity, by_position)
 }
 
-/// The error model over a step: `x ← Φ x + Γ ε`; sensitivities to constants alike, with `∂ε/∂θ` for ε.
+/// The error model over a step: `x ← Φ x + Γ ε`; the same for sensitivities to constants, with `∂ε/∂θ` for ε.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transition {
     /// Φ.
@@ -180,7 +180,7 @@ pub type Sensitivity<const N: usize = PARAMETERS> = SMatrix<f64, STATES, N>;
 pub struct SensedErrors(PerSensor<Response>);
 
 impl SensedErrors {
-    /// Of these triads.
+    /// The sensed errors of these triads.
     ///
     /// # Errors
     /// A triad whose sensitivity is singular.
@@ -195,7 +195,7 @@ impl SensedErrors {
         }))
     }
 
-    /// Where this is sensed.
+    /// The derivatives at this true state and input.
     pub fn at(&self, at: &Instant) -> SMatrix<f64, INPUTS, PARAMETERS> {
         let mut sensed = SMatrix::<f64, INPUTS, PARAMETERS>::zeros();
         for (place, (sensor, u)) in Sensor::ALL.into_iter().zip([at.rate, at.force]).enumerate() {
@@ -227,7 +227,7 @@ impl Linearisation {
         }
     }
 
-    /// The same with what each parameter drives times a weight of its own.
+    /// The same with the effect of each parameter multiplied by its own weight.
     pub fn weighted(&self, weight: impl Fn(usize) -> f64) -> Self {
         let mut weighted = self.clone();
         for (parameter, mut forcing) in weighted.forcing.row_iter_mut().enumerate() {
@@ -236,7 +236,7 @@ impl Linearisation {
         weighted
     }
 
-    /// What errors by parameters become through a step of this duration in s, linearised at start, middle and end.
+    /// Propagates sensitivities over a step of this duration in s, linearised at start, middle and end.
     pub fn follow(before: &Sensitivity, duration: f64, linearised: [&Self; 3]) -> Sensitivity {
         let rate =
             |linear: &Self, at: &Rows<STATES, PARAMETERS>| linear.forcing + at * linear.dynamics;

@@ -1,4 +1,4 @@
-//! Navigation errors: their order, many of them at once, and how they pass a short time at the site.
+//! Navigation errors: their order, and their propagation over a short time at the site.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
@@ -37,7 +37,7 @@ pub type Rows<const R: usize, const N: usize> = SMatrix<f64, N, R>;
 
 /// A short time at the site.
 pub struct Span {
-    /// Of the Earth, rad.
+    /// Rotation of the Earth, rad.
     pub earth_turn: Vector3<f64>,
     /// ∫f_n dt, m/s.
     pub force: Vector3<f64>,
@@ -46,7 +46,7 @@ pub struct Span {
 }
 
 impl Span {
-    /// Takes errors of any causes over it: the Earth turns them, force acts on tilt, velocity moves position.
+    /// Propagates errors of any cause: Earth rotation turns them, force couples with tilt, velocity changes position.
     #[inline]
     pub fn carry<const N: usize>(&self, errors: &mut Rows<STATES, N>) {
         for cause in 0..N {

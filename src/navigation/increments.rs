@@ -17,19 +17,19 @@ pub struct Increments {
     pub velocity: Vector3<f64>,
 }
 
-/// What a sample's increments amount to.
+/// Motion that results from the increments of a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
     /// Rotation vector of the body over the sample, rad.
     pub rotation: Vector3<f64>,
-    /// Velocity change along the body axes as they stood when the sample began, m/s.
+    /// Velocity change along the body axes at the start of the sample, m/s.
     pub velocity: Vector3<f64>,
 }
 
 impl Increments {
     /// Coning and sculling over this sample and the one before, exact to third order in the period;
-    /// the rotation term keeps `α×(α×Δv)/6`, without which a steady turn at 20°/s and 100 Hz makes
-    /// specific force 2 ppm too small while it lasts.
+    /// the rotation term includes `α×(α×Δv)/6`, without which specific force would be 2 ppm too small in a
+    /// steady turn at 20°/s and 100 Hz.
     ///
     /// Source: Savage 1998, "Strapdown inertial navigation integration algorithm design", part 1
     /// (coning `Δα_{m−1} × Δα_m / 12`) and part 2 (velocity rotation compensation and sculling).
@@ -52,10 +52,10 @@ impl Increments {
     }
 }
 
-/// Sums over consecutive samples of a body at rest, of what the triads give as it stands in the record: with
-/// them its motion follows to second order for any calibration, without the samples.
+/// Sums over consecutive samples of a body at rest, of the uncalibrated outputs of the triads: from these sums, the
+/// motion follows to second order for any calibration, without the samples.
 ///
-/// At rest what is not noise or unrest is the same in every sample, so that products are taken of the
+/// At rest, everything except noise and vibration is the same in every sample, so products are formed of the
 /// deviations from the mean. A calibration `u = A N − b` acts on the sums exactly:
 /// `A x × A y = cof(A)(x × y)`, and `Σ (A x)(B y)ᵀ = A (Σ x yᵀ) Bᵀ`.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,7 +75,7 @@ pub struct Sums {
 }
 
 impl Sums {
-    /// Of these samples of a record.
+    /// Sums over these samples of a record.
     pub fn new(imu: &ImuSamples, samples: Range<usize>) -> Self {
         let n = samples.len() as f64;
         let first = samples.start.saturating_sub(1);
@@ -130,7 +130,7 @@ impl Sums {
         }
     }
 
-    /// Rotation and velocity change where the integrals are these: second order from the sums.
+    /// Rotation and velocity change for these integrals, with second-order terms from the sums.
     ///
     /// Source: as for [`Increments::motion`], whose terms of neighbouring samples are in the sums.
     pub fn motion(&self, increments: &Increments, instrument: &PerSensor<Instrument>) -> Motion {

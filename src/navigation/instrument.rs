@@ -21,7 +21,7 @@ pub fn response(triad: &Triad, correction: &Matrix3<f64>) -> Response {
     Response::from_columns(&columns)
 }
 
-/// What corrects increments, and how its errors act.
+/// Correction of increments, and the effect of its errors.
 #[derive(Debug, Clone)]
 pub struct Instrument {
     pub correction: Matrix3<f64>,
@@ -31,7 +31,7 @@ pub struct Instrument {
 }
 
 impl Instrument {
-    /// Of a triad with this correction, for samples of a period in s.
+    /// The instrument of a triad with this correction, for samples of a period in s.
     pub fn new(triad: &Triad, correction: Matrix3<f64>, period: f64) -> Self {
         Self {
             correction,

@@ -1,13 +1,13 @@
-//! Strapdown navigation and its error model, twice.
+//! Strapdown navigation and its error model, in two forms.
 //!
 //! [`Navigator`] serves calibration: its frame is fixed to the Earth at the site (East-North-Up
-//! there). A turntable stays where it is, so gravity and Earth rate are those of the site, not of
-//! the computed position, and no transport rate arises: the equations are exact for the truth
+//! there). A turntable does not travel, so gravity and Earth rate are those of the site, not of
+//! the computed position, and there is no transport rate: the equations are exact for the truth
 //! (`V = 0` at rest) and linear in velocity and position.
 //!
-//! [`Strapdown`] goes over the ellipsoid, nonlinear; [`NonlinearError`] is how far it departs from the truth and
-//! shows what a calibration is worth; [`ErrorModel`] is its linear error model, [`NavigationError`] what is
-//! reported. [`Trajectory`] is where a body that moves truly is.
+//! [`Strapdown`] is nonlinear navigation on the ellipsoid; [`NonlinearError`] is its deviation from the truth, which
+//! measures a calibration; [`ErrorModel`] is its linear error model, [`NavigationError`] the reported error.
+//! [`Trajectory`] is the true motion of a moving body.
 //!
 //! Source: Savage, *Strapdown Analytics*, 2nd ed., ch. 4 and 7; Zhao, Jiang, Li 2016, Eq. 13.
 

@@ -1,4 +1,4 @@
-//! Navigation errors in the terms they are reported in.
+//! Navigation errors as reported.
 
 use std::f64::consts::{PI, TAU};
 
@@ -23,7 +23,7 @@ pub struct NavigationError {
 }
 
 impl NavigationError {
-    /// Of a computed solution against the true one.
+    /// Errors of a computed solution relative to the true one.
     pub fn of(computed: &Solution, truth: &Solution) -> Self {
         let [found, expected] =
             [computed, truth].map(|s| Vector3::from(to_pitch_roll_heading(&s.attitude)));
@@ -54,9 +54,9 @@ impl NavigationError {
         joined([self.attitude, self.velocity, self.position])
     }
 
-    /// `H`, which turns the states of the linear error model into these errors about a true state, and
-    /// their covariance `P` into `H P Hᵀ`. `None` at a pitch of ±90°, where roll and heading are not
-    /// apart.
+    /// `H`, which converts the states of the linear error model to these errors about a true state, and
+    /// their covariance `P` to `H P Hᵀ`. `None` at a pitch of ±90°, where roll and heading cannot be
+    /// distinguished.
     pub fn by_state(truth: &Solution) -> Option<ErrorMatrix> {
         let [pitch, _, heading] = to_pitch_roll_heading(&truth.attitude);
         let ((sin_p, cos_p), (sin_h, cos_h)) = (pitch.sin_cos(), heading.sin_cos());

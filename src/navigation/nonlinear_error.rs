@@ -1,4 +1,4 @@
-//! How computed navigation departs from the truth: exact and nonlinear.
+//! Deviation of computed navigation from the truth: exact and nonlinear.
 //!
 //! True and computed solution obey the same equations (those of [`super::Strapdown`]). Their difference obeys
 //! the difference of these, in which nothing is left out: with `E = Ĉ Cᵀ` (hats on what is computed)
@@ -36,7 +36,7 @@ pub struct NonlinearError(Errors);
 
 impl NonlinearError {
     /// The errors at the start, in the order of [`super::ErrorModel`]; those of the vertical channel, which is
-    /// held, are left out.
+    /// held, are ignored.
     pub fn new(start: &ErrorVector) -> Self {
         let turn = UnitQuaternion::from_scaled_axis(-start.fixed_rows::<3>(ATTITUDE));
         let mut errors = start.push(turn.w);
@@ -62,7 +62,7 @@ impl NonlinearError {
         Ok(())
     }
 
-    /// What is computed where this is true.
+    /// The computed solution for this true one.
     pub fn computed(&self, truth: &Solution) -> Solution {
         let cross = skew(self.0.fixed_rows::<3>(ATTITUDE).into_owned());
         let turn = Matrix3::identity() + (cross * self.0[SCALAR] + cross * cross) * 2.0;
@@ -81,7 +81,7 @@ fn moved(truth: &Solution, errors: &Errors) -> Solution {
     }
 }
 
-/// What drives the errors at one moment.
+/// Forcing of the errors at one moment.
 #[derive(Debug, Clone, Copy)]
 pub struct Forcing {
     truth: Solution,
@@ -94,7 +94,7 @@ pub struct Forcing {
 }
 
 impl Forcing {
-    /// Where this is true, and what is sensed has these errors.
+    /// The forcing at this true state with these errors of the sensed input.
     pub fn of(at: &Instant, sensed: &InputError) -> Self {
         let attitude = &at.truth.attitude;
         Self {

@@ -1,4 +1,4 @@
-//! White noise that drives the navigation errors over a block.
+//! White process noise of the navigation errors over a block.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -6,25 +6,25 @@ use super::errors::{ATTITUDE, ErrorMatrix, POSITION, Span, VELOCITY, blocks};
 use crate::attitude::skew;
 use crate::imu::PerSensor;
 
-/// White noise of a triad as 1σ densities, alike on its three axes. Each of its sources is independent of
-/// the others, so their variances add.
+/// White noise of a triad as 1σ densities, equal on its three axes. Its sources are independent, so their
+/// variances add.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ProcessNoise {
     /// Angle or velocity random walk, rad/√s or (m/s)/√s.
     pub random_walk: f64,
-    /// Of moves, by how fast they are: over the root of ∫|ω − ω_ie|² dt (gyros) or ∫|f + g|² dt
-    /// (accelerometers), √s. Scale nonlinearity, bandwidth, timing and size effect grow so.
+    /// Noise of moves that grows with their speed: 1σ over the root of ∫|ω − ω_ie|² dt (gyros) or ∫|f + g|² dt
+    /// (accelerometers), √s. Scale nonlinearity, bandwidth, timing and size effect grow in this way.
     pub by_motion: f64,
-    /// Of moves, by how long they take, rad/√s or (m/s)/√s.
+    /// Noise of moves that grows with their duration, rad/√s or (m/s)/√s.
     pub by_duration: f64,
 }
 
-/// What the sources of [`ProcessNoise`] act on over a block.
+/// Inputs of the sources of [`ProcessNoise`] over a block.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseInputs {
     /// Earth rate in `n`, rad/s.
     pub earth_rate: Vector3<f64>,
-    /// Short parts of the block, one after the other.
+    /// Short parts of the block, in sequence.
     pub parts: Vec<NoiseInput>,
 }
 
@@ -49,19 +49,19 @@ impl NoiseInputs {
     }
 }
 
-/// What the sources of [`ProcessNoise`] act on over a short part of a block.
+/// Inputs of the sources of [`ProcessNoise`] over a short part of a block.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct NoiseInput {
     /// Length in s.
     pub duration: f64,
     /// ∫f_n dt, m/s.
     pub force: Vector3<f64>,
-    /// ∫|ω − ω_ie|² dt in rad²/s and ∫|f + g|² dt in m²/s³ where the block is of a move, else zero.
+    /// ∫|ω − ω_ie|² dt in rad²/s and ∫|f + g|² dt in m²/s³ if the block is part of a move, else zero.
     pub motion: PerSensor<f64>,
-    /// Length in s where the block is of a move, else zero.
+    /// Length in s if the block is part of a move, else zero.
     pub moving: f64,
-    /// Covariance in `n` that interpolated samples add to the integral of each triad's input, rad² and
-    /// (m/s)², where there are any.
+    /// Covariance in `n` that interpolated samples, if any, add to the integral of each triad's input, rad² and
+    /// (m/s)².
     pub bridged: Option<Box<PerSensor<Matrix3<f64>>>>,
 }
 

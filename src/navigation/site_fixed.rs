@@ -28,7 +28,7 @@ pub fn samples_of(time: f64, period: f64) -> usize {
     ((time / period).round() as usize).max(1)
 }
 
-/// Navigates through a record with given triads and accumulates the error model as it goes.
+/// Navigates through a record with given triads and accumulates the error model.
 #[derive(Debug, Clone)]
 pub struct Navigator<'a> {
     imu: &'a ImuSamples,
@@ -46,7 +46,7 @@ pub struct Navigator<'a> {
     terms: TermVector,
     /// Whether any of them has a value.
     shifted: bool,
-    /// Where navigation stands.
+    /// The current state.
     pub state: State,
 }
 
@@ -98,7 +98,7 @@ impl<'a> Navigator<'a> {
         self
     }
 
-    /// Takes the triads as they are at the temperature in the middle of these samples.
+    /// Uses the triads at the temperature in the middle of these samples.
     pub fn warm(&mut self, samples: &Range<usize>) {
         let (Some(thermal), Some(temperature)) = (&mut self.thermal, &self.imu.temperature) else {
             return;
@@ -200,8 +200,8 @@ impl<'a> Navigator<'a> {
         }
     }
 
-    /// Navigates through these samples of the record and gives their block. Where the record has a
-    /// sample before the first of them, coning and sculling take it into account.
+    /// Navigates through these samples of the record and returns their block. If the record has a
+    /// sample before the first of them, coning and sculling use it.
     pub fn advance(&mut self, samples: Range<usize>) -> Block {
         let few = samples_of(PART, self.imu.period);
         let parts = samples.len().div_ceil(few);
@@ -260,10 +260,9 @@ impl<'a> Navigator<'a> {
         self.arrive(state);
     }
 
-    /// The block of these samples where the table stands in this attitude; its state is where navigation
-    /// is now. What the instrument senses there is known, so the error model takes it from the attitude, as of
-    /// one long sample: taken from the samples, their noise would be in both the innovations and the sensitivity
-    /// to scale factors, and the two together look like information.
+    /// The block of these samples for a table at rest in this attitude, with the current state. The sensed input is
+    /// known, so the error model uses the attitude, as for one long sample. If it used the samples, their noise would
+    /// be in both the innovations and the sensitivity to scale factors, and the product would look like information.
     pub fn standing(&self, attitude: &Matrix3<f64>, samples: Range<usize>) -> Block {
         let duration = samples.len() as f64 * self.imu.period;
         let change = -self.gravity * duration;

@@ -17,11 +17,11 @@ use crate::attitude::{exp, orthonormalised};
 use crate::earth::{Curvature, earth_rate_n, normal_gravity};
 use crate::units::DEGREE;
 
-/// Latitude in radians, north or south, beyond which East-North-Up is not navigated in: heading and
-/// longitude lose their meaning at the poles.
+/// Largest latitude, north or south, for navigation in East-North-Up, rad: heading and
+/// longitude are undefined at the poles.
 pub const LARGEST_LATITUDE: f64 = 89.9 * DEGREE;
 
-/// Where a navigating body is.
+/// State of a navigating body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solution {
     /// `C_b_n`, body to East-North-Up.
@@ -30,7 +30,7 @@ pub struct Solution {
     pub velocity: Vector3<f64>,
     /// Geodetic latitude in radians, north positive.
     pub latitude: f64,
-    /// Longitude in radians, east positive, counted on without wrapping.
+    /// Longitude in radians, east positive, without wrapping.
     pub longitude: f64,
     /// Height above the ellipsoid in m.
     pub height: f64,
@@ -72,7 +72,7 @@ impl Solution {
         )
     }
 
-    /// The same attitude and velocity elsewhere: so much further in latitude and longitude (rad) and height (m).
+    /// The same attitude and velocity at another place, displaced in latitude and longitude (rad) and height (m).
     pub(super) fn moved(&self, by: &Vector3<f64>) -> Self {
         Self {
             latitude: self.latitude + by.x,
@@ -82,13 +82,13 @@ impl Solution {
         }
     }
 
-    /// Of a body that keeps its attitude and its velocity in East-North-Up; at zero velocity, of one that stands.
+    /// The instant of a body with constant attitude and velocity in East-North-Up; at zero velocity, of a body at rest.
     pub fn steady(&self) -> Instant {
         Instant::of(*self, &Vector3::zeros(), &Vector3::zeros())
     }
 }
 
-/// A true state and what an ideal instrument senses in it.
+/// A true state with the input sensed by an ideal instrument.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Instant {
     /// The true state.
@@ -100,8 +100,8 @@ pub struct Instant {
 }
 
 impl Instant {
-    /// Of a body that turns relative to East-North-Up (rad/s) while its velocity's components change (m/s²), both in
-    /// these axes.
+    /// The instant of a body that turns relative to East-North-Up (rad/s) while its velocity components change (m/s²),
+    /// both in these axes.
     pub fn of(truth: Solution, turning: &Vector3<f64>, acceleration: &Vector3<f64>) -> Self {
         let rate = earth_rate_n(truth.latitude) + truth.transport_rate() + turning;
         // What an unsupported body would do is not sensed.
@@ -114,10 +114,10 @@ impl Instant {
     }
 }
 
-/// What becomes of height, which diverges e-fold in ten minutes when left to itself.
+/// Treatment of height, which diverges e-fold in ten minutes if it is free.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Height {
-    /// Nothing holds it.
+    /// Free height.
     Free,
     /// Height (m) and vertical velocity (m/s) are those of a reference at the end of the step.
     Held {
@@ -136,16 +136,16 @@ pub enum Height {
     LARGEST_LATITUDE / DEGREE
 )]
 pub struct NearPole {
-    /// The latitude that was reached, rad.
+    /// The computed latitude, rad.
     pub latitude: f64,
 }
 
 /// Navigates from increments.
 ///
-/// What the body does within a step comes from the increments with coning and sculling
+/// The motion of the body within a step follows from the increments with coning and sculling
 /// ([`Increments::motion`], third order in the step); the slow part — the turn of East-North-Up,
 /// Coriolis, gravity and position — is integrated with a Runge–Kutta step of fourth order, in which
-/// specific force changes linearly. A standing instrument can therefore be navigated in steps of tens
+/// specific force changes linearly. An instrument at rest can therefore be navigated in steps of tens
 /// of seconds.
 #[derive(Debug, Clone)]
 pub struct Strapdown {
@@ -155,7 +155,7 @@ pub struct Strapdown {
 }
 
 impl Strapdown {
-    /// Starts somewhere; every step is `period` seconds long.
+    /// Starts at a solution; every step is `period` seconds long.
     ///
     /// # Errors
     /// If the start is too near to a pole.
@@ -168,7 +168,7 @@ impl Strapdown {
         })
     }
 
-    /// Where navigation stands.
+    /// The current solution.
     pub fn solution(&self) -> &Solution {
         &self.solution
     }
@@ -176,7 +176,7 @@ impl Strapdown {
     /// Navigates through one step.
     ///
     /// # Errors
-    /// If the step leads too near to a pole; navigation then stays where it was.
+    /// If the step leads too near to a pole; the solution is then unchanged.
     pub fn advance(&mut self, increments: &Increments, height: Height) -> Result<(), NearPole> {
         let (period, start) = (self.period, self.solution);
         let before = self.before.unwrap_or(*increments);
@@ -220,7 +220,7 @@ impl Height {
 }
 
 impl Solution {
-    /// The computed solution that has these errors against this true one.
+    /// The computed solution with these errors relative to this true one.
     #[inline]
     pub fn with_errors(&self, errors: &ErrorVector) -> Self {
         let position = errors.fixed_rows::<3>(POSITION).into_owned();

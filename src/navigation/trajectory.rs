@@ -1,4 +1,4 @@
-//! Where a body that moves truly is, and what an ideal instrument on it senses.
+//! True motion of a moving body, and the input sensed by an ideal instrument on it.
 //!
 //! Speed, heading and height follow raised-cosine profiles in closed form, and with them velocity,
 //! attitude and their derivatives. Latitude and longitude, which have no closed form, are integrals of
@@ -20,9 +20,9 @@ const LEAST_GLIDE: f64 = 2.0;
 /// The least time in s that all segments together take.
 const LEAST_ROUND: f64 = 1.0;
 
-/// A start and segments, gone through again and again.
+/// A start and segments, which repeat.
 ///
-/// The body points where it goes: heading is that of the velocity, pitch its angle above the horizon.
+/// The body points along its velocity: heading is that of the velocity, pitch its angle above the horizon.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Trajectory {
     start: Start,
@@ -30,13 +30,13 @@ pub struct Trajectory {
     segments: Vec<Segment>,
 }
 
-/// Why a body cannot follow segments.
+/// Errors of segments that a body cannot follow.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum TrajectoryError {
-    /// Nothing happens, and that for no time.
+    /// The segments take no time.
     #[error("the segments together take {found} s; give one of them a duration_s or a move")]
     Short {
-        /// How long they take, s.
+        /// Their duration, s.
         found: f64,
     },
     /// A climb or descent that is too steep.
@@ -57,7 +57,7 @@ pub enum TrajectoryError {
 }
 
 impl Trajectory {
-    /// A trajectory whose segments fit each other.
+    /// A trajectory of these segments.
     ///
     /// # Errors
     /// If the segments take no time or a climb is too steep.
@@ -91,7 +91,7 @@ impl Trajectory {
         Ok(trajectory)
     }
 
-    /// Where it starts.
+    /// The start.
     pub fn start(&self) -> &Start {
         &self.start
     }

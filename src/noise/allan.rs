@@ -3,7 +3,7 @@
 /// Allan variance of one axis at growing cluster times.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    /// Cluster times, s.
+    /// Cluster times τ, s.
     pub tau: Vec<f64>,
     /// Allan variance at each, (rad/s)² or (m/s²)².
     pub variance: Vec<f64>,
@@ -20,10 +20,10 @@ pub fn mean(curves: &[&Curve]) -> Curve {
     }
 }
 
-/// A record has at least this many clusters: fewer show nothing.
+/// Fewest clusters of a record that give an Allan variance.
 const FEWEST_CLUSTERS: usize = 4;
 
-/// Lengths of clusters in samples: two in an octave, from one sample to a quarter of the record.
+/// Lengths of clusters in samples: two per octave, from one sample to a quarter of the record.
 pub fn cluster_sizes(samples: usize) -> Vec<usize> {
     let longest = samples / FEWEST_CLUSTERS;
     let mut sizes: Vec<usize> = (0..)

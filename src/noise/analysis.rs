@@ -1,4 +1,4 @@
-//! The stretch of a run that is examined, and its noise.
+//! The stretch of a run that is analysed, and its noise.
 
 use std::ops::Range;
 
@@ -8,9 +8,9 @@ use crate::imu::{PerSensor, Sensor};
 use crate::recording::Segment;
 use crate::run::Run;
 
-/// Part of a stretch that must lie in one standstill.
+/// Part of a stretch that must lie within one standstill.
 const STANDING: f64 = 0.95;
-/// Fewer samples show no slope.
+/// Fewest samples that show the slopes of the Allan deviation.
 const FEWEST: usize = 256;
 
 /// A stretch of samples.
@@ -20,22 +20,22 @@ pub struct Stretch {
     pub samples: Range<usize>,
     /// Its name, such as `the whole record`.
     pub name: String,
-    /// Whether the instrument stands during it, as far as it says.
+    /// Whether the instrument is at rest during it, according to its own output.
     pub stands: bool,
 }
 
-/// No stretch to examine.
+/// Errors in finding a stretch to analyse.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum StretchError {
     /// The label is not among the segments.
     #[error("no segment is labelled `{label}`; {}", known(labels))]
     UnknownLabel {
-        /// As asked for.
+        /// The requested label.
         label: String,
-        /// All that there are.
+        /// All labels of the run.
         labels: Vec<String>,
     },
-    /// Nothing stands.
+    /// There is no standstill.
     #[error(
         "found no standstill in the record, expected one of minutes or better hours: let the instrument \
          stand undisturbed, or name a section of it with --segment"
@@ -47,9 +47,9 @@ pub enum StretchError {
          hours: record longer standing still"
     )]
     TooShort {
-        /// Which stretch.
+        /// Name of the stretch.
         name: String,
-        /// Its samples.
+        /// Its number of samples.
         found: usize,
     },
 }
@@ -64,8 +64,8 @@ fn known(labels: &[String]) -> String {
 }
 
 impl Stretch {
-    /// The longest segment of this label; without a label the longest standstill, or the longest segment
-    /// where the record is not continuous.
+    /// The longest segment with this label; without a label, the longest standstill, or the longest segment
+    /// of a record that is not continuous.
     ///
     /// # Errors
     /// [`StretchError`] if there is none, or if it is too short.
@@ -148,20 +148,20 @@ fn times(run: &Run, samples: &Range<usize>) -> String {
 /// The noise of an instrument at rest, over one stretch of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseAnalysis {
-    /// What was examined.
+    /// The analysed stretch.
     pub stretch: Stretch,
     /// Length of a sample, s.
     pub period: f64,
-    /// Size of one pulse, rad and m/s; zero where samples are no pulses.
+    /// Size of one pulse, rad and m/s; zero if samples are not pulses.
     pub pulse: PerSensor<f64>,
-    /// Both triads.
+    /// Noise of both triads.
     pub triads: PerSensor<TriadNoise>,
-    /// Those that were recorded.
+    /// The triads that were recorded.
     pub sensors: Vec<Sensor>,
 }
 
 impl NoiseAnalysis {
-    /// Examines a stretch of a run.
+    /// Analyses a stretch of a run.
     pub fn new(run: &Run, stretch: Stretch) -> Self {
         let imu = &run.recording.imu;
         let clusters = Clusters::new(stretch.samples.len(), imu.period);
@@ -181,7 +181,7 @@ impl NoiseAnalysis {
         }
     }
 
-    /// Length of what was examined, s.
+    /// Length of the analysed stretch, s.
     pub fn duration(&self) -> f64 {
         self.stretch.samples.len() as f64 * self.period
     }

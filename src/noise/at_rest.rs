@@ -1,4 +1,4 @@
-//! Noise of each axis while the instrument is at rest, from the dwells of any run.
+//! Noise of each axis at rest, from the dwells of any run.
 
 use std::ops::Range;
 
@@ -8,7 +8,7 @@ use super::allan::overlapping;
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::ImuSamples;
 
-/// White-noise density of each axis that has the Allan variance of the dwells at one cluster time.
+/// White-noise density of each axis that matches the Allan variance of the dwells at one cluster time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RestNoise {
     /// The cluster time, s: a quarter of the median dwell, so that quantisation is small.
@@ -20,7 +20,7 @@ pub struct RestNoise {
 }
 
 impl RestNoise {
-    /// Of samples in these dwells; none if no dwell is long enough.
+    /// The noise of samples in these dwells; `None` if no dwell is long enough.
     pub fn of(imu: &ImuSamples, dwells: &[Range<usize>]) -> Option<Self> {
         let mut lengths: Vec<usize> = dwells.iter().map(ExactSizeIterator::len).collect();
         lengths.sort_unstable();
@@ -47,7 +47,7 @@ impl RestNoise {
         })
     }
 
-    /// 1σ of each density as part of it.
+    /// Relative 1σ of each density.
     pub fn relative_sigma(&self) -> f64 {
         (2.0 * self.freedom).sqrt().recip()
     }

@@ -1,4 +1,4 @@
-//! The cluster times of a record, and how Allan variances at them vary together under a mixture of processes.
+//! The cluster times of a record, and the covariance of Allan variances at them under a mixture of processes.
 //!
 //! An overlapping Allan variance is a mean of squared second differences `D`; for Gaussian noise
 //! `cov(⟨D₁²⟩, ⟨D₂²⟩) = 2 Σ cov(D₁, D₂)²` over all pairs of places. With strengths squared `c_p` that is
@@ -17,16 +17,17 @@ use super::process::Process;
 
 /// Weights of a second difference.
 const WEIGHTS: [f64; 3] = [1.0, -2.0, 1.0];
-/// Near the ends and the middle of a cluster, lags are taken in steps of this part of the shorter one.
+/// Near the ends and the middle of a cluster, lags are spaced by the shorter cluster divided by this number.
 const STEPS: i64 = 16;
 /// Further away each step is longer than the one before by this factor.
 const GROWTH: f64 = 1.1;
-/// Correlation times tried in an octave.
+/// Correlation times tried per octave.
 const PER_OCTAVE: f64 = 2.0;
-/// The shortest correlation time tried, in samples. What is correlated over less than an order of magnitude
-/// more than a sample is the bandwidth of white noise, and white to whoever integrates it.
+/// The shortest correlation time tried, in samples. Noise with a shorter correlation is band-limited white noise, and
+/// acts as white noise when it is integrated.
 const SHORTEST: f64 = 10.0;
-/// The shortest one, in cluster times that are explained: shorter ones look like white noise.
+/// The shortest correlation time, in multiples of the shortest cluster time used: below it, the process is
+/// indistinguishable from white noise.
 const DISTINCT: f64 = 2.0;
 
 /// A record's cluster times, with tables for the covariance of its Allan variances.
@@ -39,7 +40,7 @@ pub struct Clusters {
 }
 
 impl Clusters {
-    /// For a record of this many samples of `period` s.
+    /// Cluster times for a record of this many samples of `period` s.
     pub fn new(samples: usize, period: f64) -> Self {
         let sizes = cluster_sizes(samples);
         let longest = sizes.last().copied().unwrap_or(0) as f64;
@@ -96,12 +97,12 @@ impl Clusters {
         covariance
     }
 
-    /// The shortest correlation time where cluster times from this one on are explained, both in s.
+    /// The shortest correlation time to try if the fit starts at this cluster time, both in s.
     pub fn shortest_time(&self, shortest: f64) -> f64 {
         (SHORTEST * self.period).max(DISTINCT * shortest)
     }
 
-    /// Gauss–Markov processes to be tried there.
+    /// Gauss–Markov processes to try in such a fit.
     pub fn markov(&self, shortest: f64) -> impl Iterator<Item = Process> {
         let is_distinct = move |time: f64| time >= self.shortest_time(shortest);
         let processes = self.processes.iter().copied();
@@ -109,8 +110,8 @@ impl Clusters {
     }
 }
 
-/// Covariances of the Allan variances at a pair of cluster times, the shorter first: of each product of two
-/// processes of strength one.
+/// Covariances of the Allan variances at a pair of cluster times, the shorter first, for each product of two
+/// processes of unit strength.
 struct Table {
     pair: (usize, usize),
     products: DMatrix<f64>,
@@ -170,9 +171,9 @@ fn products(
     products / (2.0 * squares * (first * second) as f64)
 }
 
-/// Lags at which a sum over all lags is taken, with the number of lags that each stands for: dense where second
-/// differences over clusters of `short` and `long` samples have a corner in common, sparse elsewhere, and
-/// every lag once where clusters are short.
+/// Lags that approximate a sum over all lags, each with the number of lags that it represents: dense where second
+/// differences over clusters of `short` and `long` samples have a common corner, sparse elsewhere; if clusters are
+/// short, every lag once.
 fn graded_lags(short: i64, long: i64) -> BTreeMap<i64, f64> {
     let reach = 2 * (short + long);
     let mut lags = Vec::new();

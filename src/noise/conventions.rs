@@ -1,6 +1,6 @@
-//! The conventions in which noise figures are stated, and who uses which.
+//! The conventions for noise figures, and their users.
 //!
-//! Each row of the table is a unit: what one of it is in SI, and how the figure follows from the strength of the
+//! Each row of the table is a unit, with its value in SI and the relation of the figure to the strength of the
 //! process. Densities are two-sided (IEEE Std 952): white noise of density N has `σ = N √rate` in samples at that
 //! rate. Sources: Kalibr, *IMU Noise Model* (wiki); PSINS, `imuerrset`; KF-GINS, its configuration file.
 
@@ -11,21 +11,21 @@ use crate::units::{
     ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MILLIGAL, STANDARD_GRAVITY,
 };
 
-/// How a figure follows from the strength of a process in SI.
+/// Relation of a figure to the strength of a process in SI.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Scale {
-    /// As a multiple of this unit.
+    /// A multiple of this unit.
     Linear(f64),
-    /// As the square, with the unit of its root.
+    /// The square, with the unit of its root.
     Power(f64),
-    /// As 1σ of each sample of a rate, at a sample rate.
+    /// 1σ of each rate sample, at a sample rate.
     Samples(f64),
-    /// As 1σ of each increment, at a sample rate.
+    /// 1σ of each increment, at a sample rate.
     Increments(f64),
 }
 
 impl Scale {
-    /// The strength in SI; none without a rate that is needed.
+    /// The strength in SI; `None` if it needs a rate that is not given.
     fn strength(self, value: f64, rate: Option<f64>) -> Option<f64> {
         Some(match self {
             Linear(unit) => value * unit,
@@ -45,25 +45,25 @@ impl Scale {
     }
 }
 
-/// A quantity that noise figures state.
+/// A quantity described by noise figures.
 #[derive(Debug, PartialEq)]
 pub struct Quantity {
-    /// Of which triad.
+    /// Its triad.
     pub sensor: Sensor,
-    /// Such as `angle random walk`.
+    /// Its name, such as `angle random walk`.
     pub name: &'static str,
     conventions: &'static [Convention],
 }
 
-/// A unit of a quantity, and who uses it.
+/// A unit of a quantity, and its users.
 #[derive(Debug, PartialEq)]
 pub struct Convention {
     /// Its symbol.
     pub unit: &'static str,
     scale: Scale,
-    /// What it is called, and by whom. Keys of programs, in backticks, name the unit, too.
+    /// Its name and users. Keys of programs, in backticks, are accepted as names of the unit, too.
     pub meaning: &'static str,
-    /// Other ways to write the unit, normalised.
+    /// Other spellings of the unit, normalised.
     also: &'static [&'static str],
 }
 
@@ -89,7 +89,7 @@ const FLOOR: f64 = 0.664_282;
 /// coefficient.
 const MARKOV: f64 = FLOOR / 0.617_362;
 
-/// Every unit of every quantity. A unit that means several things means the first of them that can be.
+/// Every unit of every quantity. An ambiguous unit has the first possible meaning.
 #[rustfmt::skip]
 static QUANTITIES: [Quantity; 6] = [
     Quantity { sensor: Sensor::Gyro, name: "angle random walk", conventions: &[
@@ -163,13 +163,13 @@ static QUANTITIES: [Quantity; 6] = [
 /// A noise figure in every convention.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conversion {
-    /// What the figure states.
+    /// The quantity of the figure.
     pub quantity: &'static Quantity,
-    /// The figure as it was taken.
+    /// The figure as interpreted.
     pub given: Line,
     /// Sample rate in Hz.
     pub rate: Option<f64>,
-    /// The same in every convention.
+    /// The figure in every convention.
     pub lines: Vec<Line>,
 }
 
@@ -179,10 +179,10 @@ pub type Line = (f64, &'static Convention);
 /// A figure that could not be converted.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ConversionError {
-    /// No such unit.
+    /// Unknown unit.
     #[error(
-        "`{unit}` is no unit of noise that is known.{} Known are, also as deg/sqrt(h), ug/sqrt(Hz), m/s^2 \
-         and the like:
+        "`{unit}` is not a known unit of noise.{} Known units (also spelt as deg/sqrt(h), ug/sqrt(Hz), m/s^2 \
+         and the like):
 {}",
         hint(unit),
         known()
@@ -191,9 +191,9 @@ pub enum ConversionError {
         /// As given.
         unit: String,
     },
-    /// A figure for each sample says nothing without their rate.
+    /// A figure per sample needs the sample rate.
     #[error(
-        "`{unit}` is the noise of each sample and says nothing without the sample rate: add --rate with \
+        "`{unit}` is the noise of each sample and has no meaning without the sample rate: add --rate with \
          the rate in Hz"
     )]
     NoRate {
@@ -202,8 +202,8 @@ pub enum ConversionError {
     },
 }
 
-/// Converts a figure into every convention of its quantity. With a sample rate in Hz a unit that means
-/// both is taken as the noise of each sample, without as a bias instability.
+/// Converts a figure into every convention of its quantity. With a sample rate in Hz, an ambiguous unit is
+/// interpreted as the noise of each sample; without, as a bias instability.
 ///
 /// # Errors
 /// [`ConversionError`] if the unit is not known, or needs a rate.
@@ -235,7 +235,7 @@ fn all() -> impl Iterator<Item = (&'static Quantity, &'static Convention)> {
 }
 
 impl Convention {
-    /// Every name that is accepted, normalised.
+    /// Every accepted name, normalised.
     fn names(&self) -> impl Iterator<Item = String> {
         let keys = self.meaning.split('`').skip(1).step_by(2);
         let names = keys.chain(self.also.iter().copied()).map(str::to_owned);
@@ -243,7 +243,7 @@ impl Convention {
     }
 }
 
-/// A unit in the one spelling that stands for all of its spellings: of seconds that divide it their power.
+/// The canonical spelling of a unit; seconds in the denominator are combined into one power.
 pub(crate) fn normalised(unit: &str) -> String {
     const SAME: &str = "µ=u μ=u °=deg º=deg ″=arcsec √=sqrt ²=2 ³=3 ⁵=5 ⁻=- ¹=1 –=- dps=deg/s";
     let text = unit.to_lowercase().replace(['^', '(', ')', ' '], "");
@@ -273,7 +273,7 @@ fn power_of_seconds(part: &str) -> Option<u32> {
     }
 }
 
-/// What stands between strokes, with the usual word for a time and its root.
+/// One part between slashes, with the canonical word for a time and its root.
 fn part(part: &str) -> String {
     let base = part.strip_prefix("sqrt").or(part.strip_prefix("rt"));
     let root = if base.is_some() { "sqrt" } else { "" };
@@ -287,7 +287,7 @@ fn part(part: &str) -> String {
     format!("{root}{base}{power}")
 }
 
-/// Twice the powers of angle, length and time in a normalised unit whose parts are all known.
+/// Twice the powers of angle, length and time in a normalised unit; `None` if a part is unknown.
 fn dimension(unit: &str) -> Option<[i32; 3]> {
     let mut all = [0i32; 3];
     for (k, part) in unit.split('/').enumerate() {
@@ -316,7 +316,7 @@ fn dimension(unit: &str) -> Option<[i32; 3]> {
     Some(all)
 }
 
-/// A normalised unit with one word for all that is of time.
+/// A normalised unit with one word for all units of time.
 fn without_times(unit: &str) -> String {
     let part = |part: &str| match part.strip_prefix("sqrt") {
         Some("s" | "h" | "hz") => "sqrtt".to_owned(),
@@ -326,8 +326,8 @@ fn without_times(unit: &str) -> String {
     unit.split('/').map(part).collect::<Vec<_>>().join("/")
 }
 
-/// The unit most like one that is not known: of the same dimension if that is clear, else one with other words for its
-/// times.
+/// The known unit most similar to an unknown one: of the same dimension if that is clear, else one that differs in its
+/// units of time.
 fn hint(unit: &str) -> String {
     let wanted = normalised(unit);
     let wanted_dimension = dimension(&wanted);

@@ -13,7 +13,7 @@ pub fn allan_variance(mixture: &[(Process, f64)], tau: f64) -> f64 {
     parts.map(|(p, c)| c * p.allan_variance(tau)).sum()
 }
 
-/// Points with the covariance that weighs them.
+/// Points with the covariance that gives their weights.
 pub struct Weighted<'a> {
     tau: &'a [f64],
     variance: &'a [f64],
@@ -21,7 +21,7 @@ pub struct Weighted<'a> {
 }
 
 impl<'a> Weighted<'a> {
-    /// None if the covariance is not positive definite.
+    /// `None` if the covariance is not positive definite.
     pub fn new(tau: &'a [f64], variance: &'a [f64], covariance: DMatrix<f64>) -> Option<Self> {
         let root = covariance.cholesky()?;
         Some(Self {
@@ -37,14 +37,14 @@ impl<'a> Weighted<'a> {
         self.root.l_dirty().solve_lower_triangular(&values)
     }
 
-    /// A whitened column for each process; none if the points are too few for them.
+    /// A whitened column for each process; `None` if there are too few points.
     fn columns(&self, processes: impl Iterator<Item = Process>) -> Option<Vec<DVector<f64>>> {
         let column = |of: Process| self.white(self.tau.iter().map(|&tau| of.allan_variance(tau)));
         let columns: Vec<_> = processes.map(column).collect::<Option<_>>()?;
         (!columns.is_empty() && columns.len() < self.tau.len()).then_some(columns)
     }
 
-    /// The strengths squared that fit best, whatever their signs; none if the processes are not distinct.
+    /// The best-fit squared strengths, of any sign; `None` if the processes are not distinguishable.
     pub fn solve(&self, processes: &[Process]) -> Option<Mixture> {
         let columns = self.columns(processes.iter().copied())?;
         let factors = DMatrix::from_columns(&columns).qr();
@@ -56,8 +56,8 @@ impl<'a> Weighted<'a> {
         Some(processes.zip(strengths.iter().copied()).collect())
     }
 
-    /// Covariance of the strengths squared of a fit, and last of the logarithm of the correlation time
-    /// where one of its processes has one.
+    /// Covariance of the squared strengths of a fit and, in the last row, of the logarithm of the correlation time
+    /// if one of its processes has one.
     pub fn covariance(&self, mixture: &[(Process, f64)]) -> Option<DMatrix<f64>> {
         const STEP: f64 = 1e-4;
         let mut columns = self.columns(mixture.iter().map(|(process, _)| *process))?;

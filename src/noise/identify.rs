@@ -1,23 +1,23 @@
-//! What a curve shows: processes with their strengths, limits of those not found, and intervals.
+//! Result for a curve: processes with their strengths, limits for processes not found, and intervals.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 use super::allan::Curve;
 use super::process::Process;
 
-/// With more degrees of freedom than this a variance is as good as normal.
+/// With more degrees of freedom than this, a variance is treated as normally distributed.
 pub const MANY: f64 = 1e4;
 
 /// A process that was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Found {
-    /// Which.
+    /// The process.
     pub process: Process,
     /// Its strength, see [`Process`].
     pub strength: f64,
     /// 1σ of the strength.
     pub sigma: f64,
-    /// 1σ of the logarithm of the correlation time, where it has one.
+    /// 1σ of the logarithm of the correlation time, if it has one.
     pub sigma_log_time: Option<f64>,
 }
 
@@ -28,7 +28,7 @@ impl Found {
     }
 }
 
-/// One of a kind, if it is among some processes.
+/// The process of this kind, if it is among those found.
 pub fn of_kind(found: &[Found], process: Process) -> Option<&Found> {
     found.iter().find(|f| f.process.same_kind(process))
 }
@@ -36,41 +36,41 @@ pub fn of_kind(found: &[Found], process: Process) -> Option<&Found> {
 /// A process that was not found.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hidden {
-    /// Which.
+    /// The process.
     pub process: Process,
-    /// What its strength may be at most, with 95 % probability.
+    /// Upper limit of its strength, with 95 % probability.
     pub limit: f64,
 }
 
-/// What a curve shows.
+/// Processes identified in a curve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identified {
     /// Processes found.
     pub found: Vec<Found>,
     /// Slopes not found.
     pub hidden: Vec<Hidden>,
-    /// By how much the curve departs from every mixture of processes beyond chance, as a part of the
-    /// Allan variance (1σ); zero if it does not.
+    /// Significant deviation of the curve from every mixture of processes, relative to the
+    /// Allan variance (1σ); zero if there is none.
     pub misfit: f64,
-    /// Points at the begin of the curve, the shortest cluster times, that the processes do not describe:
-    /// there the sensor's bandwidth or its pulses show.
+    /// Number of points at the start of the curve, the shortest cluster times, that the processes do not describe
+    /// because of the sensor's bandwidth or its pulses.
     pub first: usize,
-    /// Equivalent degrees of freedom of each point, from the scatter of the points where no process describes
-    /// them.
+    /// Equivalent degrees of freedom of each point; for points that no process describes, from their
+    /// scatter.
     pub freedom: Vec<f64>,
-    /// What a filter that knows white noise and one Gauss–Markov process should use: the same as what was
-    /// found, with the nearest Gauss–Markov process in the place of whatever else varies.
+    /// Processes for a filter that models white noise and one Gauss–Markov process: the processes found, with the
+    /// nearest Gauss–Markov process in place of all other variations.
     pub for_filter: Vec<Found>,
 }
 
 impl Identified {
-    /// Allan variance at a cluster time of all that was found.
+    /// Allan variance, at a cluster time, of all processes found.
     pub fn allan_variance(&self, tau: f64) -> f64 {
         let parts = self.found.iter();
         parts.map(|found| found.allan_variance(tau)).sum()
     }
 
-    /// The interval that holds the Allan variance at a point with this probability, by χ².
+    /// The interval that contains the Allan variance at a point with this probability, by χ².
     pub fn interval(&self, curve: &Curve, point: usize, probability: f64) -> Option<(f64, f64)> {
         let (freedom, variance) = (*self.freedom.get(point)?, *curve.variance.get(point)?);
         let tail = 0.5 * (1.0 - probability);

@@ -1,8 +1,8 @@
-//! The processes that a slope of the Allan deviation stands for.
+//! The noise processes behind the slopes of the Allan deviation.
 
 use std::f64::consts::{LN_2, PI};
 
-/// A noise process in a rate, its strength squared as the one number that its Allan variance is linear in.
+/// A noise process in a rate. Its Allan variance is proportional to its squared strength.
 ///
 /// Sources: IEEE Std 952-1997, annex C (all terms and the Markov process); El-Sheimy, Hou, Niu,
 /// *Analysis and Modeling of Inertial Sensors Using Allan Variance*, IEEE Trans. Instrum. Meas. 57
@@ -18,7 +18,7 @@ pub enum Process {
     BiasInstability,
     /// Random walk of the rate; slope +1/2, strength K in rad/s/√s or m/s²/√s.
     RateRandomWalk,
-    /// A rate that grows evenly; slope +1, strength R in rad/s² or m/s³. Not random.
+    /// A rate that grows linearly; slope +1, strength R in rad/s² or m/s³. Not random.
     RateRamp,
     /// A stationary first-order Gauss–Markov process of the rate; strength its 1σ in rad/s or m/s².
     GaussMarkov {
@@ -28,7 +28,7 @@ pub enum Process {
 }
 
 impl Process {
-    /// Those with a slope of their own, shortest cluster times first.
+    /// The processes with a slope of their own, shortest cluster times first.
     pub const SLOPES: [Self; 5] = [
         Self::Quantisation,
         Self::RandomWalk,
@@ -37,7 +37,7 @@ impl Process {
         Self::RateRamp,
     ];
 
-    /// Stands for a Gauss–Markov process of any correlation time.
+    /// Placeholder for a Gauss–Markov process of any correlation time.
     pub const MARKOV: Self = Self::GaussMarkov {
         correlation_time: 1.0,
     };
@@ -47,7 +47,7 @@ impl Process {
         std::mem::discriminant(&self) == std::mem::discriminant(&other)
     }
 
-    /// In s, where it has one.
+    /// Correlation time in s, if the process has one.
     pub fn correlation_time(self) -> Option<f64> {
         match self {
             Self::GaussMarkov { correlation_time } => Some(correlation_time),
@@ -55,7 +55,7 @@ impl Process {
         }
     }
 
-    /// With its correlation time, if it has one, longer by a factor.
+    /// The process with its correlation time, if it has one, multiplied by a factor.
     pub fn stretched(self, factor: f64) -> Self {
         self.correlation_time()
             .map_or(self, |time| Self::GaussMarkov {
@@ -63,7 +63,7 @@ impl Process {
             })
     }
 
-    /// Allan variance at a cluster time in s, for strength one.
+    /// Allan variance at a cluster time in s, for unit strength.
     pub fn allan_variance(self, tau: f64) -> f64 {
         match self {
             Self::Quantisation => 3.0 / tau.powi(2),
@@ -79,7 +79,7 @@ impl Process {
         }
     }
 
-    /// Generalised autocovariance of the integral at a lag in s, for strength one; zero for the ramp, which is
+    /// Generalised autocovariance of the integral at a lag in s, for unit strength; zero for the ramp, which is
     /// not random.
     pub fn autocovariance(self, lag: f64) -> f64 {
         let t = lag.abs();

@@ -1,4 +1,4 @@
-//! White noise of a record of which nothing is stated.
+//! White noise of a record without stated noise.
 
 use crate::imu::Sensor;
 use crate::recording::ImuSamples;
@@ -27,7 +27,7 @@ pub fn white_noise(imu: &ImuSamples, sensor: Sensor) -> f64 {
     found
 }
 
-/// What a quarter of the second differences of sums of so many samples stays below; none of a record without any.
+/// The lower quartile of the second differences of sums over `length` samples; `None` for a record without any.
 fn quieter_part(imu: &ImuSamples, sensor: Sensor, length: usize) -> Option<f64> {
     let mut differences = Vec::new();
     for stretch in &imu.stretches {

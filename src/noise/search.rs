@@ -1,9 +1,9 @@
 //! The search for the most likely combination of processes.
 //!
-//! Generalised least squares of the Allan variance itself, at cluster times half an octave apart, with the
-//! covariance that its points have under the very mixture that is fitted. Of all combinations of processes the most
-//! likely one is taken, where each process must raise twice the logarithm of the likelihood by [`SIGNIFICANT`], and
-//! a correlation time by [`SIGNIFICANT_TIME`]: a slope that is not there gives no coefficient.
+//! Generalised least squares of the Allan variance itself, at cluster times half an octave apart, with the covariance
+//! of its points under the fitted mixture. The most likely combination of processes is selected. Each process must
+//! raise twice the logarithm of the likelihood by [`SIGNIFICANT`], and a correlation time by [`SIGNIFICANT_TIME`], so
+//! that a slope that is not observed gets no coefficient.
 //!
 //! After El-Sheimy, Hou, Niu 2008 (the slopes) and Guerrier, Skaloud, Stebler, Victoria-Feser,
 //! *Wavelet-Variance-Based Estimation for Composite Stochastic Processes*, JASA 108 (2013) (least squares with the
@@ -18,40 +18,39 @@ use super::fit::{Mixture, Weighted, allan_variance};
 use super::identify::{Found, Hidden, Identified, of_kind};
 use super::process::Process;
 
-/// What each process must raise twice the logarithm of the likelihood by: three standard deviations,
+/// Least increase of twice the log-likelihood for each process: three standard deviations,
 /// squared.
 const SIGNIFICANT: f64 = 9.0;
-/// What its correlation time must raise it by besides: two, for this only shows which process it is that
-/// varies.
+/// Additional increase for a correlation time: two standard deviations, squared, because it only distinguishes
+/// between processes.
 const SIGNIFICANT_TIME: f64 = 4.0;
 /// A fit less probable than this does not describe the curve.
 const IMPROBABLE: f64 = 1e-3;
-/// Where cluster times have to be left out, a start less probable than this is taken only if no later one is
-/// more so: one too late costs little, one too early is wrong.
+/// If cluster times must be dropped, a start with a probability below this is accepted only if no later one is
+/// above it: a start too late costs little, a start too early is wrong.
 const DOUBTFUL: f64 = 0.05;
-/// Cluster times left out in a step: an octave.
+/// Cluster times dropped per step: an octave.
 const STEP: usize = 2;
-/// Departure from all models that is looked for, as a part of the Allan variance.
+/// Range in which the deviation from all models is searched, relative to the Allan variance.
 const MISFITS: (f64, f64) = (1e-3, 10.0);
 /// Rounds of weights and fit.
 const ROUNDS: usize = 5;
 /// Halvings of the step between correlation times tried.
 const REFINEMENTS: usize = 10;
-/// Of a normal distribution, below which 95 % lie.
+/// 95 % quantile of the normal distribution.
 const BELOW_95: f64 = 1.645;
-/// Points to either side of one whose scatter counts as its own.
+/// Number of points on either side of a point whose scatter gives its variance.
 const NEAR: usize = 3;
-/// The octaves at the short end of a curve, in points, whose departure is looked for by itself.
+/// Lengths of the short end of a curve, in points, that are tested separately: one and two octaves.
 const SHORT_ENDS: [usize; 2] = [2, 4];
 
 impl Clusters {
-    /// What the mean of some curves over these clusters shows; `None` if they are of others, too short or
-    /// zero somewhere. Axes that are averaged count as independent.
+    /// Identifies the processes in the mean of some curves; `None` if the curves have other cluster times, are too
+    /// short or contain a zero. Averaged axes count as independent.
     ///
-    /// Pulses coarser than the noise and the bandwidth of a sensor make the deviations at short cluster
-    /// times, and no process describes them: where none does, the shortest ones are left out, up to half of
-    /// all, and one octave more for a remainder just below notice. What no start helps is taken as it is, with
-    /// a misfit.
+    /// At short cluster times, coarse pulses and the bandwidth of a sensor cause deviations that no process
+    /// describes. Such cluster times are dropped, up to half of all, and one octave more for a remainder that is not
+    /// significant. If no start fits, the whole curve is fitted with a misfit.
     pub fn identify(&self, curves: &[&Curve]) -> Option<Identified> {
         let is_of_these = |of: &&Curve| of.variance.len() == self.sizes().len();
         if !curves.iter().all(is_of_these) {
@@ -87,7 +86,7 @@ impl Clusters {
     }
 }
 
-/// As how many equal ones the averaged curves count at each cluster time.
+/// Equivalent number of equal curves in the average at each cluster time.
 fn shares(curves: &[&Curve]) -> Vec<f64> {
     let share = |point: usize| {
         let at = || curves.iter().map(|curve| curve.variance[point]);
@@ -97,20 +96,20 @@ fn shares(curves: &[&Curve]) -> Vec<f64> {
     (0..points).map(share).collect()
 }
 
-/// A curve that is searched.
+/// The search on one curve.
 #[derive(Clone, Copy)]
 struct Search<'a> {
     clusters: &'a Clusters,
     curve: &'a Curve,
-    /// As how many equal curves it counts, at each point.
+    /// Equivalent number of equal curves at each point.
     shares: &'a [f64],
-    /// Points at its begin that are left out.
+    /// Number of points dropped at its start.
     first: usize,
-    /// Departure from every model that is allowed for, as a part of the Allan variance.
+    /// Allowed deviation from every model, relative to the Allan variance.
     misfit: f64,
 }
 
-/// A mixture and how likely it is.
+/// A mixture with its likelihood.
 #[derive(Clone)]
 struct Candidate {
     mixture: Mixture,
@@ -139,14 +138,14 @@ impl Candidate {
         self.unlikelihood + SIGNIFICANT * self.mixture.len() as f64 + SIGNIFICANT_TIME * time
     }
 
-    /// How probable its residuals are.
+    /// Probability (p-value) of its residuals.
     fn probability(&self) -> f64 {
         let parameters = self.mixture.len() + usize::from(self.has_time());
         let freedom = self.residual.len().saturating_sub(parameters).max(1);
         beyond(self.chi_square(), freedom)
     }
 
-    /// How probable those of an octave or two at the short end are, given the others.
+    /// Probability of the residuals of one or two octaves at the short end, given the others.
     fn probability_of_ends(&self) -> f64 {
         let of_end = |points: usize| {
             let shortest = self.residual.iter().rev().take(points);
@@ -174,8 +173,8 @@ impl<'a> Search<'a> {
         &self.curve.variance[self.first..]
     }
 
-    /// What it shows, and how probable the residuals of the most likely mixture are: all of them, and those of
-    /// an octave or two at its short end.
+    /// The most likely mixture, if its residuals are probable, with their probability: the smaller one of all
+    /// residuals and of those at the short end.
     fn probable(&self) -> Option<(Identified, f64)> {
         let best = self.most_likely()?;
         let probability = best.probability().min(best.probability_of_ends());
@@ -183,7 +182,7 @@ impl<'a> Search<'a> {
         Some((identified.flatten()?, probability))
     }
 
-    /// What it shows if all may depart from every model, by as little as makes the most likely one probable.
+    /// The most likely mixture with the smallest deviation from all models that makes it probable.
     fn with_misfit(self) -> Option<Identified> {
         let with = |misfit: f64| Self { misfit, ..self };
         let (mut low, mut high) = MISFITS;
@@ -214,8 +213,8 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Equivalent degrees of freedom of every point: those of the mixture, and where it does not describe
-    /// the curve no more than neighbouring points show by their scatter.
+    /// Equivalent degrees of freedom of every point: those of the mixture; for points that it does not describe, at
+    /// most those of the scatter of neighbouring points.
     fn degrees(&self, mixture: &[(Process, f64)]) -> Vec<f64> {
         let mixture = &positive(mixture);
         let covariance = self.clusters.covariance(mixture);
@@ -235,7 +234,7 @@ impl<'a> Search<'a> {
         self.curve.tau.iter().enumerate().map(of_point).collect()
     }
 
-    /// The covariance of the points under a mixture, with the departure from every model.
+    /// The covariance of the points under a mixture, with the deviation from every model.
     fn covariance(&self, mixture: &[(Process, f64)]) -> DMatrix<f64> {
         let whole = self.clusters.covariance(&positive(mixture));
         let (tau, share) = (self.tau(), &self.shares[self.first..]);
@@ -250,7 +249,7 @@ impl<'a> Search<'a> {
         Weighted::new(self.tau(), self.variance(), self.covariance(mixture))
     }
 
-    /// The fit of a combination of processes, weighted by itself; none if one of them is not positive.
+    /// The fit of a combination of processes, with weights from the fit itself; `None` if a strength is not positive.
     fn candidate(&self, processes: &[Process]) -> Option<Candidate> {
         let (tau, variance) = (self.tau(), self.variance());
         // To begin with every point counts by its length alone.
@@ -268,7 +267,8 @@ impl<'a> Search<'a> {
         self.judged(mixture, &covariance)
     }
 
-    /// Whether every process of a mixture is there and positive, and so is the whole at every point.
+    /// Whether every process of a mixture contributes and is positive, except quantisation, which may be negative if it
+    /// models a bandwidth, and whether the sum is positive at every point.
     fn is_possible(&self, mixture: &[(Process, f64)]) -> bool {
         let (tau, variance) = (self.tau(), self.variance());
         let is_there = |&(process, strength): &(Process, f64)| {
@@ -289,8 +289,8 @@ impl<'a> Search<'a> {
             && !is_bandwidth
     }
 
-    /// How likely a mixture is, under which the points have this covariance. The cube roots of the variances
-    /// count as normal (Wilson, Hilferty 1931), for at long cluster times they have few degrees of freedom.
+    /// Likelihood of a mixture with this covariance of the points. The cube roots of the variances are treated as
+    /// normal (Wilson, Hilferty 1931), because at long cluster times there are few degrees of freedom.
     fn judged(&self, mixture: Mixture, covariance: &DMatrix<f64>) -> Option<Candidate> {
         let (tau, variance, count) = (self.tau(), self.variance(), self.tau().len());
         let model: Vec<f64> = tau
@@ -320,14 +320,14 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Of all combinations the most likely one by its score.
+    /// The combination with the best score.
     fn most_likely(&self) -> Option<Candidate> {
         // Cluster times that are left out leave a tail behind, significant or not.
         let is_whole = |of: &Vec<Process>| self.first == 0 || of.contains(&Process::Quantisation);
         self.least(self.combinations().filter(is_whole), Candidate::score)
     }
 
-    /// Every combination of slopes, and those without a floor with each Gauss–Markov process, which comes last.
+    /// Every combination of slopes; those without a floor also with each Gauss–Markov process, which comes last.
     fn combinations(&self) -> impl Iterator<Item = Vec<Process>> {
         let markov = self.clusters.markov(self.tau()[0]);
         let with_markov = markov.flat_map(|process| {
@@ -337,7 +337,7 @@ impl<'a> Search<'a> {
         subsets().chain(with_markov)
     }
 
-    /// Of some combinations, among those that fit, the one for which a figure is least.
+    /// The combination, among those that can be fitted, with the least figure.
     fn least(
         &self,
         combinations: impl Iterator<Item = Vec<Process>>,
@@ -348,7 +348,7 @@ impl<'a> Search<'a> {
             .min_by(|a, b| figure(a).total_cmp(&figure(b)))
     }
 
-    /// With a correlation time between those tried, if it has one.
+    /// Refines the correlation time, if there is one, between those tried.
     fn refined(&self, mut best: Candidate) -> Candidate {
         let shortest = self.clusters.shortest_time(self.tau()[0]);
         let mut step = std::f64::consts::SQRT_2;
@@ -370,7 +370,7 @@ impl<'a> Search<'a> {
         best
     }
 
-    /// Slopes that are not found, each with its upper limit.
+    /// Slopes not found, each with its upper limit.
     fn hidden(&self, weighted: &Weighted, best: &Candidate, found: &[Found]) -> Vec<Hidden> {
         let limit = |process: Process| -> Option<Hidden> {
             let mut processes = best.processes();
@@ -391,7 +391,7 @@ impl<'a> Search<'a> {
         slopes.filter(is_hidden).filter_map(limit).collect()
     }
 
-    /// With the nearest Gauss–Markov process in the place of whatever varies.
+    /// The processes with the nearest Gauss–Markov process in place of all other variations.
     fn for_filter(&self, best: &Candidate) -> Option<Vec<Found>> {
         use Process::{BiasInstability, GaussMarkov, RateRandomWalk};
         let mut others = best.processes();
@@ -408,12 +408,12 @@ impl<'a> Search<'a> {
     }
 }
 
-/// The processes that are there, without what a bandwidth takes away.
+/// The processes with positive strength, without the negative ones that model a bandwidth.
 fn positive(mixture: &[(Process, f64)]) -> Mixture {
     mixture.iter().copied().filter(|of| of.1 > 0.0).collect()
 }
 
-/// A fit's strengths with their σ.
+/// The strengths of a fit with their σ.
 fn found(weighted: &Weighted, mixture: &[(Process, f64)]) -> Option<Vec<Found>> {
     let covariance = weighted.covariance(mixture)?;
     let sigma = |i: usize| covariance[(i, i)].sqrt();

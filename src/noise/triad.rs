@@ -9,11 +9,11 @@ use super::process::Process;
 use crate::imu::{GaussMarkov, Noise};
 use crate::statistics::{SIGMA_OF_MEDIAN, median};
 
-/// Neighbouring samples that differ by more than this many σ are not noise.
+/// Neighbouring samples that differ by more than this many σ count as a knock.
 const KNOCK: f64 = 8.0;
-/// A smaller variation than this part of the mean is rounding.
+/// Variation below this part of the mean is rounding.
 const ROUNDING: f64 = 1e-9;
-/// Where the Allan deviation of a Gauss–Markov process peaks, in correlation times.
+/// Cluster time at which the Allan deviation of a Gauss–Markov process peaks, in correlation times.
 const PEAK: f64 = 1.89;
 
 /// The noise of a triad.
@@ -21,8 +21,8 @@ const PEAK: f64 = 1.89;
 pub struct TriadNoise {
     /// x, y, z.
     pub axes: [AxisNoise; 3],
-    /// The mean of the Allan variances of all axes that vary, and what it shows: where they are alike it
-    /// sees more than each alone. What all axes show lies within what they show.
+    /// Noise from the mean Allan variance of all axes that vary. If axes are alike, it resolves more than each
+    /// alone. Processes found on all axes are kept within the range of the axes.
     pub mean: AxisNoise,
 }
 
@@ -31,27 +31,27 @@ pub struct TriadNoise {
 pub struct AxisNoise {
     /// Its Allan variance.
     pub curve: Curve,
-    /// What it shows; none if samples do not vary at all.
+    /// Processes identified; `None` if samples do not vary at all.
     pub identified: Option<Identified>,
-    /// Samples that jump farther than noise does.
+    /// Number of jumps beyond noise.
     pub knocks: usize,
-    /// Whether its samples vary by rounding alone.
+    /// Whether its samples vary by rounding only.
     pub is_constant: bool,
 }
 
-/// Noise figures for a run, and where they come from.
+/// Noise figures for a run, and their origin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseFigures {
-    /// As `[imu.noise]` has them.
+    /// The figures of `[imu.noise]`.
     pub noise: Noise,
-    /// Whether the random walk is a limit only: its slope was not found.
+    /// Whether the random walk is only an upper limit, because its slope was not found.
     pub random_walk_is_limit: bool,
-    /// Whether the curve does not show the end of the correlation: a longer one would do as well.
+    /// Whether the correlation time is only a lower limit: the curve does not show the end of the correlation.
     pub correlation_is_open: bool,
 }
 
 impl TriadNoise {
-    /// Of integrals over samples of `period` s, at rest.
+    /// Noise of integrals over samples of `period` s, at rest.
     pub(crate) fn new(samples: &[Vector3<f64>], period: f64, clusters: &Clusters) -> Self {
         let axes = [0, 1, 2].map(|axis| {
             let values: Vec<f64> = samples.iter().map(|sample| sample[axis]).collect();
@@ -74,7 +74,7 @@ impl TriadNoise {
         Self { axes, mean }
     }
 
-    /// What a run should state of it; none if nothing was found.
+    /// Noise figures to state in a run; `None` if no process was found.
     pub fn figures(&self) -> Option<NoiseFigures> {
         let found = &self.mean.identified.as_ref()?.for_filter;
         let white = of_kind(found, Process::RandomWalk).map(|of| of.strength);
@@ -127,7 +127,7 @@ impl AxisNoise {
         self.identified.as_ref().map_or(&[], |of| &of.hidden)
     }
 
-    /// Lowest Allan deviation with its cluster time, if it is not the last: what is read off a curve as
+    /// Lowest Allan deviation with its cluster time, if it is not the last: commonly read off as
     /// bias instability.
     pub fn minimum(&self) -> Option<(f64, f64)> {
         let Curve { tau, variance } = &self.curve;
@@ -137,7 +137,7 @@ impl AxisNoise {
     }
 }
 
-/// How many times neighbouring samples differ by more than noise does.
+/// Number of neighbouring samples that differ by more than noise.
 fn knocks(values: &[f64]) -> usize {
     let mut steps: Vec<f64> = values.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     // Where most samples are equal the steps are those of quantisation.
@@ -146,9 +146,9 @@ fn knocks(values: &[f64]) -> usize {
     steps.iter().filter(|step| **step > limit).count()
 }
 
-/// What the mean of several axes shows, with every process that all axes show: its own figures where they lie
-/// within those of the axes, else the root of the axes' mean square. The mean separates processes better, and a
-/// process that it alone finds takes from the others.
+/// Result for the mean of several axes, with every process found on all axes. Figures of the mean are kept if they
+/// lie within those of the axes; else they are replaced by the root mean square of the axes. The mean separates
+/// processes better, but a process found in the mean only reduces the others.
 pub fn within(mut mean: Identified, axes: &[&Identified]) -> Identified {
     if axes.is_empty() {
         return mean;
@@ -178,7 +178,7 @@ fn hold(own: &mut Vec<Found>, axes: &[&Identified], found: fn(&Identified) -> &V
     }
 }
 
-/// Zero where it has none.
+/// Correlation time, s; zero if it has none.
 fn time(of: &Found) -> f64 {
     of.process.correlation_time().unwrap_or_default()
 }

@@ -1,22 +1,22 @@
-//! What a log looks like, before anything is made of it.
+//! Statistics of a log as read.
 
 use crate::imu::{AxisOrder, Output, PerSensor, Sensor};
 
-/// The instrument's file in figures, in its own units.
+/// Statistics of the instrument's file, in its own units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LogFacts {
     /// Rows in the file.
     pub rows: usize,
-    /// What they hold.
+    /// Quantity of the samples.
     pub output: Output,
-    /// RMS of stamps against the uniform clock, s.
+    /// RMS deviation of the time stamps from the uniform clock, s.
     pub jitter_rms: f64,
-    /// The largest of these differences, s.
+    /// The largest of these deviations, s.
     pub jitter_max: f64,
-    /// The stamps' period over the one that was stated less one, where they contradict each other and
-    /// the stamps were taken.
+    /// Period of the time stamps relative to the stated period, minus one, if they contradict each other and
+    /// the stamps were used.
     pub off_stated_period: Option<f64>,
-    /// The columns that hold each triad's body axes right, front, up, as they stand in the file.
+    /// The columns of each triad's body axes right, front, up, with values as in the file.
     pub columns: PerSensor<[ColumnFacts; 3]>,
     /// The columns as `run.toml` names them.
     pub named: NamedColumns,
@@ -27,11 +27,11 @@ pub struct LogFacts {
 /// The columns as `run.toml` names them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NamedColumns {
-    /// Of time, if it is named.
+    /// Column of time, if it is named.
     pub time: Option<String>,
-    /// Of both triads, along the axes of the file.
+    /// Columns of both triads, along the axes of the file.
     pub triads: PerSensor<[FileColumn; 3]>,
-    /// Of temperature, if it is named.
+    /// Column of temperature, if it is named.
     pub temperature: Option<String>,
     /// From the file's axes to right-front-up.
     pub axes: AxisOrder,
@@ -40,9 +40,9 @@ pub struct NamedColumns {
 /// A column of a triad.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FileColumn {
-    /// Its name in the file; empty of a triad that is not there.
+    /// Its name in the file; empty if the triad was not recorded.
     pub name: String,
-    /// Whether its values are read with their sign turned round.
+    /// Whether its values are read with the sign reversed.
     pub reversed: bool,
 }
 
@@ -91,7 +91,7 @@ pub struct ColumnFacts {
     pub at_largest: usize,
     /// The step of the grid on which all values lie, if they do.
     pub step: Option<f64>,
-    /// What one of its unit in a row is, rad or m/s by the nominal scale.
+    /// One unit of the column per row, rad or m/s by the nominal scale.
     pub unit: f64,
 }
 
@@ -107,7 +107,7 @@ pub struct TemperatureFacts {
 }
 
 impl ColumnFacts {
-    /// Of a column that is not empty.
+    /// Statistics of a column that is not empty.
     pub(crate) fn of(name: &str, values: &[f64], unit: f64) -> Self {
         let ends = (f64::INFINITY, f64::NEG_INFINITY);
         let ends = values
@@ -132,7 +132,7 @@ impl ColumnFacts {
 }
 
 impl ColumnFacts {
-    /// The same of a column of which these are the rows that follow.
+    /// Combines the statistics with those of the rows that follow.
     pub(crate) fn and(self, later: &Self) -> Self {
         let smallest = self.smallest.min(later.smallest);
         let largest = self.largest.max(later.largest);
@@ -165,8 +165,8 @@ impl ColumnFacts {
     }
 }
 
-/// Values are on a grid if no difference between two in a row is further than this from a multiple of
-/// its step.
+/// Values are on a grid if no difference of consecutive values deviates by more than this part of a step from a
+/// multiple of the step.
 const OFF_GRID: f64 = 0.05;
 /// A range of more steps is that of a floating-point number, not of a register.
 const MOST_STEPS: f64 = 4_294_967_296.0;

@@ -1,6 +1,6 @@
-//! What was recorded: samples of the instrument, readings of the table, labelled sections, and what
-//! their reader found. Data only; what is known of the instrument, the site and the table beforehand is
-//! in [`crate::run`], what is to be estimated in [`crate::calibration`].
+//! Recorded data: samples of the instrument, readings of the table, labelled sections, and notes of the
+//! reader. Data only; prior knowledge of the instrument, the site and the table is in [`crate::run`],
+//! estimation in [`crate::calibration`].
 
 pub(crate) mod faults;
 mod log_facts;
@@ -32,7 +32,7 @@ use crate::turntable::AxisAngles;
 pub struct Recording {
     /// A short name for titles and file names.
     pub name: String,
-    /// Instrument, serial, operator and the like, carried into calibration and report.
+    /// Instrument, serial number, operator and the like, copied into calibration and report.
     pub meta: BTreeMap<String, String>,
     /// The instrument's samples.
     pub imu: ImuSamples,
@@ -40,23 +40,23 @@ pub struct Recording {
     pub table: Option<TableLog>,
     /// Labelled sections, if there are any.
     pub segments: Vec<Segment>,
-    /// The files that it was read from; none if it was made.
+    /// The files that it was read from; empty for a simulated recording.
     pub files: Vec<PathBuf>,
-    /// What is wrong with the files and was mended, and what they say without effect, a sentence each.
+    /// Faults of the files that were repaired, and statements without effect, a sentence each.
     pub notes: Vec<String>,
-    /// What hardly fits the record of what is stated of it, a few sentences each.
+    /// Statements that hardly fit the record, a few sentences each.
     pub doubts: Vec<String>,
 }
 
 impl Recording {
-    /// Labels of the segments, in their order in the record; one that comes back stands more than once.
+    /// Labels of the segments, in their order in the record, repetitions included.
     pub(crate) fn labels(&self) -> Vec<String> {
         self.segments.iter().map(|s| s.label.clone()).collect()
     }
 
-    /// A recording of samples that follow one another without a gap: time in s at which the first
-    /// begins, length of each in s, integrals of the normalised output (see [`crate::imu::Nominal`]) over
-    /// each, rad and m/s along right-front-up.
+    /// A recording of consecutive samples without a gap: start of the first sample, s; length of each, s;
+    /// integrals of the normalised output (see [`crate::imu::Nominal`]) over each, rad and m/s along
+    /// right-front-up.
     ///
     /// # Errors
     /// [`SampleError`] if the triads differ in length, or a number is not finite, or the period not
@@ -81,14 +81,14 @@ impl Recording {
     }
 }
 
-/// What the turntable reads of the attitude of its mounting face, which is the body frame.
+/// Readings of the turntable for the attitude of its mounting face, which is the body frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TableLog {
     /// Time of each reading, s.
     pub time: Vec<f64>,
     /// Reading `C_b_n`, body to East-North-Up; as quaternions, since there may be a million of them.
     pub attitude: Vec<UnitQuaternion<f64>>,
-    /// The axes at each reading; empty where it does not tell them apart.
+    /// Angles of the axes at each reading; empty if the log does not give them.
     pub axes: Vec<AxisAngles>,
 }
 

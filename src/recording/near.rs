@@ -1,4 +1,4 @@
-//! Samples of both triads near the one that is looked at.
+//! Samples of both triads near the current one.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -8,10 +8,10 @@ use nalgebra::Vector3;
 use super::ImuSamples;
 use crate::imu::PerSensor;
 
-/// Samples that are unpacked ahead.
+/// Number of samples that are unpacked ahead.
 const AHEAD: usize = 1024;
 
-/// Samples of a record about one place, which moves on; where the record is not packed, all of them.
+/// A moving window of samples of a record; if the record is not packed, all samples.
 #[derive(Debug, Clone)]
 pub struct Near<'a> {
     imu: &'a ImuSamples,
@@ -20,7 +20,7 @@ pub struct Near<'a> {
 }
 
 impl<'a> Near<'a> {
-    /// At the begin of a record.
+    /// A window at the start of a record.
     pub fn new(imu: &'a ImuSamples) -> Self {
         let mut near = Self {
             imu,
@@ -38,7 +38,7 @@ impl<'a> Near<'a> {
         near
     }
 
-    /// Goes to where these samples are, which the next ones follow.
+    /// Moves the window to these samples and those that follow.
     #[inline]
     pub fn reach(&mut self, samples: &Range<usize>) {
         let end = samples.end.min(self.imu.len());
@@ -55,7 +55,7 @@ impl<'a> Near<'a> {
         };
     }
 
-    /// Increments of both triads in a sample that is reached.
+    /// Increments of both triads in a sample within the window.
     #[inline]
     pub fn at(&self, k: usize) -> PerSensor<Vector3<f64>> {
         let PerSensor { gyro, accel } = &self.triads;

@@ -13,33 +13,33 @@ use crate::imu::{PerSensor, Sensor};
 pub struct ImuSamples {
     /// Length of every sample, s …
     pub period: f64,
-    /// … and its 1σ, as a part of it; zero where a clock tells it.
+    /// … and its relative 1σ; zero if a clock determines it.
     pub period_sigma: f64,
-    /// Stretches in which each sample begins where the one before ended, in order; at least one. Between
-    /// two there is at least one sample, and what lies there is lost.
+    /// Stretches of consecutive samples, in order; at least one. Between two stretches at least one sample is
+    /// lost.
     pub stretches: Vec<Stretch>,
-    /// Whether samples follow one another in time as far as is known; if not, they are sections laid
-    /// end to end, and only a labelled section or a dwell is of one piece.
+    /// Whether samples are consecutive in time as far as is known; if not, they are concatenated sections,
+    /// and only a labelled section or a dwell is continuous.
     pub continuous: bool,
     /// Integrals of the normalised gyro output over each sample, rad.
     pub gyro: Series,
     /// Integrals of the normalised accelerometer output over each sample, m/s.
     pub accel: Series,
-    /// One pulse, rad and m/s, where samples are whole pulses; zero otherwise.
+    /// One pulse, rad and m/s, if samples are whole pulses; zero otherwise.
     pub pulse: PerSensor<f64>,
-    /// What was wrong with the file's samples, in order of kind, axis and time.
+    /// Faults of the file's samples, in order of kind, axis and time.
     pub faults: Vec<Fault>,
-    /// Interpolated samples, those of the same axes together, in order of time; those of one axis do not
+    /// Interpolated samples, grouped by axes, in order of time; bridges of one axis do not
     /// overlap.
     pub bridges: Vec<Bridge>,
-    /// The instrument's temperature meanwhile, where it is known.
+    /// The instrument's temperature during the recording, if known.
     pub temperature: Option<Temperature>,
-    /// The file that the samples are from; none if they were made.
+    /// Statistics of the file; `None` for simulated samples.
     pub log: Option<LogFacts>,
 }
 
 impl ImuSamples {
-    /// Whether a triad was recorded; the samples of one that was not are zeros.
+    /// Whether a triad was recorded; if not, its samples are zeros.
     pub fn has(&self, sensor: Sensor) -> bool {
         let is_named = |log: &LogFacts| !log.named.triads.get(sensor)[0].name.is_empty();
         self.log.as_ref().is_none_or(is_named)
@@ -55,7 +55,7 @@ pub struct Stretch {
     pub start: f64,
 }
 
-/// Why arrays are no samples.
+/// Invalid arrays of samples.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SampleError {
     /// Triads of different length.
@@ -77,7 +77,7 @@ pub enum SampleError {
         /// The first such sample.
         sample: usize,
     },
-    /// A period that is none.
+    /// An invalid period.
     #[error("a period of {period} s; give the length of a sample in s, above zero")]
     Period {
         /// The period, s.
@@ -94,12 +94,12 @@ impl ImuSamples {
         }
     }
 
-    /// Whether they are packed, as those of long records are.
+    /// Whether they are packed, as in long records.
     pub fn is_packed(&self) -> bool {
         self.gyro.is_packed()
     }
 
-    /// Samples that follow one another without a gap, the first from `start` on, s.
+    /// Consecutive samples without a gap; the first begins at `start`, s.
     ///
     /// # Errors
     /// [`SampleError`], as for [`super::Recording::from_samples`].
@@ -133,7 +133,7 @@ impl ImuSamples {
         Ok(Self::made(start, period, gyro, accel))
     }
 
-    /// The same of rates with another period, of which this 1σ is known, as a part of it.
+    /// Samples of rates with another period, of this relative 1σ.
     pub(crate) fn with_period(mut self, period: f64, sigma: f64) -> Self {
         let longer = period / self.period;
         for triad in [&mut self.gyro, &mut self.accel] {
@@ -152,7 +152,7 @@ impl ImuSamples {
         }
     }
 
-    /// The same of samples that are made, and so are what they should be.
+    /// Simulated samples, which need no checks.
     pub(crate) fn made(
         start: f64,
         period: f64,
@@ -198,8 +198,8 @@ impl ImuSamples {
         self.time(self.len())
     }
 
-    /// Time in s at which sample `k` begins, or the last of its stretch ended; before the first stretch as its
-    /// clock runs.
+    /// Time in s at which sample `k` begins, or at which the last sample of its stretch ends; before the first stretch,
+    /// its clock is extrapolated.
     pub fn time(&self, k: usize) -> f64 {
         let begun = self.stretches.partition_point(|s| s.samples.start <= k);
         self.stretches
@@ -209,8 +209,8 @@ impl ImuSamples {
             })
     }
 
-    /// A time as a real number of samples from the first one. Stretches may be further apart in time than their samples:
-    /// what is later than all lost samples between two is at the last of these.
+    /// A time as a real number of samples from the first one. If two stretches are farther apart in time than in
+    /// samples, times after all lost samples between them map to the last lost sample.
     pub fn edge(&self, time: f64) -> f64 {
         let begun = self.stretches.partition_point(|s| s.start <= time);
         let stretch = self.stretches.get(begun.saturating_sub(1));
@@ -223,12 +223,12 @@ impl ImuSamples {
         }
     }
 
-    /// Whether these samples follow one another without a break.
+    /// Whether these samples are consecutive, without a break.
     pub fn unbroken(&self, samples: &Range<usize>) -> bool {
         self.continuous && !self.is_lost(samples)
     }
 
-    /// Whether some of these samples are not known.
+    /// Whether some of these samples are lost.
     pub fn is_lost(&self, samples: &Range<usize>) -> bool {
         let begun = |stretch: &Stretch| stretch.samples.start <= samples.start;
         let begun = self.stretches.partition_point(begun);
@@ -236,7 +236,7 @@ impl ImuSamples {
         stretch.is_none_or(|stretch| samples.end > stretch.samples.end)
     }
 
-    /// The samples before, between and after stretches, of which nothing is known.
+    /// The lost samples before, between and after stretches.
     pub fn missing(&self) -> impl Iterator<Item = Range<usize>> {
         let ends = self.stretches.iter().map(|stretch| stretch.samples.end);
         let starts = self.stretches.iter().map(|stretch| stretch.samples.start);
@@ -245,7 +245,7 @@ impl ImuSamples {
             .filter(|missing| !missing.is_empty())
     }
 
-    /// The samples that the log has no row for, interpolated or not, in order.
+    /// The samples without a row in the log, interpolated or not, in order.
     pub fn lost(&self) -> Vec<Range<usize>> {
         let faults = self.faults.iter();
         let bridged = faults.filter(|fault| fault.kind == FaultKind::Missing);
@@ -257,13 +257,13 @@ impl ImuSamples {
         lost
     }
 
-    /// Time that the samples last, s.
+    /// Duration of the samples, s.
     pub fn duration(&self) -> f64 {
         self.len() as f64 * self.period
     }
 }
 
-/// The stretches of this many samples of a uniform clock between faults that no interpolation bridges.
+/// The stretches, among `count` samples of a uniform clock, between faults that are not bridged.
 pub fn stretches_between(count: usize, start: f64, period: f64, faults: &[Fault]) -> Vec<Stretch> {
     let unbridged = faults.iter().filter(|fault| !fault.bridged);
     let mut lost: Vec<Range<usize>> = unbridged.map(|fault| fault.samples.clone()).collect();

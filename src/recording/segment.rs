@@ -15,23 +15,23 @@ pub struct Segment {
     pub samples: Range<usize>,
     /// `x_up` … `z_down`, `rot_x+360` and the like, or any other text.
     pub label: String,
-    /// What the label says of the motion, if anything.
+    /// The motion that the label states, if any.
     pub motion: Option<LabelledMotion>,
 }
 
-/// What a label says of a section.
+/// Motion of a section according to its label.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LabelledMotion {
-    /// `z_down`: it stands, and this direction along right-front-up is up.
+    /// `z_down`: the instrument is at rest, and this direction along right-front-up points up.
     Stands {
         /// Unit vector.
         up: Vector3<f64>,
     },
-    /// `rot_x-360`: it stands, turns about this direction along right-front-up, and stands again.
+    /// `rot_x-360`: the instrument is at rest, turns about this direction along right-front-up, and is at rest again.
     Turns {
         /// Unit vector.
         axis: Vector3<f64>,
-        /// rad, right-handed.
+        /// Angle, right-handed, rad.
         angle: f64,
     },
 }

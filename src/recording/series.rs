@@ -1,4 +1,4 @@
-//! Increments of a triad, one after the other: as they are, or packed where there are too many of them.
+//! Increments of a triad in sequence, packed if there are too many of them.
 
 mod packed;
 
@@ -10,15 +10,15 @@ use nalgebra::Vector3;
 use packed::Packed;
 pub(crate) use packed::{Packer, finest_step};
 
-/// Increments of a triad along right-front-up, rad or m/s a sample.
+/// Increments of a triad along right-front-up, rad or m/s per sample.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Series {
     whole: Vec<Vector3<f64>>,
-    /// In place of the whole ones.
+    /// Packed increments, which replace the plain ones.
     packed: Option<Packed>,
 }
 
-/// Samples that are unpacked at once where they are read one after the other.
+/// Number of samples that are unpacked at once in sequential reading.
 const AT_ONCE: usize = 4096;
 
 impl Series {
@@ -32,22 +32,22 @@ impl Series {
         self.len() == 0
     }
 
-    /// Whether they are packed: then reading them takes longer, and to have many at once takes memory.
+    /// Whether they are packed: then reading takes longer, and holding many at once takes memory.
     pub fn is_packed(&self) -> bool {
         self.packed.is_some()
     }
 
-    /// The step of packed ones, on average over the axes; else zero.
+    /// The mean packing step of the axes; zero if they are not packed.
     pub(crate) fn step(&self) -> f64 {
         self.packed.as_ref().map_or(0.0, Packed::step)
     }
 
-    /// One of them; zero where there is none.
+    /// The increment of a sample; zero beyond the end.
     pub fn at(&self, k: usize) -> Vector3<f64> {
         self.part(k..k + 1).first().copied().unwrap_or_default()
     }
 
-    /// Some that follow one another, at once; fewer where the record ends.
+    /// A range of increments; fewer at the end of the record.
     pub fn part(&self, samples: Range<usize>) -> Cow<'_, [Vector3<f64>]> {
         let end = samples.end.min(self.len());
         let samples = samples.start.min(end)..end;
@@ -57,7 +57,7 @@ impl Series {
         }
     }
 
-    /// Some that follow one another, in parts of this length; the last may be shorter.
+    /// A range of increments in parts of this length; the last part may be shorter.
     pub fn parts(
         &self,
         samples: Range<usize>,
@@ -69,7 +69,7 @@ impl Series {
         begins.map(move |begin| self.part(begin..(begin + length).min(end)))
     }
 
-    /// Some that follow one another, one by one.
+    /// Iterates over a range of increments.
     pub fn within(&self, samples: Range<usize>) -> impl Iterator<Item = Vector3<f64>> {
         let length = match self.is_packed() {
             true => AT_ONCE,
@@ -85,12 +85,12 @@ impl Series {
         })
     }
 
-    /// All of them, one by one.
+    /// Iterates over all increments.
     pub fn iter(&self) -> impl Iterator<Item = Vector3<f64>> {
         self.within(0..self.len())
     }
 
-    /// Sum of some that follow one another.
+    /// Sum over a range of increments.
     pub fn sum(&self, samples: Range<usize>) -> Vector3<f64> {
         match self.packed {
             None => self.part(samples).iter().sum(),
@@ -98,7 +98,7 @@ impl Series {
         }
     }
 
-    /// The sums of some that follow one another, `length` at a time; the rest at the end is left out.
+    /// Sums over a range of increments, `length` at a time; an incomplete sum at the end is dropped.
     pub fn sums(&self, samples: Range<usize>, length: usize) -> impl Iterator<Item = Vector3<f64>> {
         let length = length.max(1);
         let whole = samples.len() / length * length;
@@ -112,7 +112,7 @@ impl Series {
         })
     }
 
-    /// All of them, to be changed; packed ones are no longer so.
+    /// All increments, to be modified; unpacks them.
     pub fn to_mut(&mut self) -> &mut Vec<Vector3<f64>> {
         if let Some(packed) = self.packed.take() {
             self.whole = packed.part(0..packed.len());
@@ -121,7 +121,7 @@ impl Series {
     }
 }
 
-/// Takes samples as they come, in the quantity of a file: to keep them as they are, or packed.
+/// Collects samples in the quantity of a file, plain or packed.
 pub enum SeriesWriter {
     Whole(Vec<Vector3<f64>>),
     Packed(Packer),
@@ -141,7 +141,7 @@ impl SeriesWriter {
         }
     }
 
-    /// The samples times `seconds`, one of the output being `nominal` in the quantity that came.
+    /// The samples times `seconds`, divided by the nominal scale `nominal` of the file's quantity.
     pub fn finish(self, seconds: f64, nominal: Vector3<f64>) -> Series {
         match self {
             Self::Whole(mut samples) => {

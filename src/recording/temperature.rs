@@ -1,4 +1,4 @@
-//! The instrument's temperature while it recorded.
+//! Temperature of the instrument during a recording.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -6,11 +6,11 @@ use crate::imu::{PerSensor, Sensor, ThermalRange};
 
 /// Time between two knots, s.
 pub const SPACING: f64 = 1.0;
-/// Knots on each side through which value and slope at a knot go: half a minute, below the time constants of
-/// cases, in which the noise of a sensor averages out.
+/// Number of knots on each side used for value and slope at a knot: half a minute is below the thermal time
+/// constants of cases, but averages the noise of a sensor.
 const OVER: usize = 30;
 
-/// Temperatures against time: one sensor for all axes, or several.
+/// Temperature as a function of time: one sensor for all axes, or several.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Temperature {
     /// Time of the first knot, s.
@@ -23,15 +23,15 @@ pub struct Temperature {
 /// One temperature sensor.
 #[derive(Debug, Clone, PartialEq)]
 struct Channel {
-    /// At the knots, °C.
+    /// Values at the knots, °C.
     values: Vec<f64>,
     /// Slopes at the knots, K/s.
     rates: Vec<f64>,
 }
 
 impl Temperature {
-    /// From means over spans of [`SPACING`] that follow one another, the first about `start`, °C; `of` tells
-    /// which of these sensors each axis has. `None` without values, or where an axis has no sensor.
+    /// Temperatures from means over consecutive spans of [`SPACING`], the first centred on `start`, °C; `of` is
+    /// the index of the sensor of each axis. `None` without values, or if an axis has no sensor.
     pub fn new(start: f64, channels: Vec<Vec<f64>>, of: PerSensor<[usize; 3]>) -> Option<Self> {
         let has_values = |values: &Vec<f64>| !values.is_empty();
         let known = |&channel: &usize| channels.get(channel).is_some_and(has_values);
@@ -45,7 +45,7 @@ impl Temperature {
             })
     }
 
-    /// One that does not change, °C.
+    /// A constant temperature, °C.
     pub fn constant(temperature: f64) -> Self {
         Self {
             start: 0.0,
@@ -54,7 +54,7 @@ impl Temperature {
         }
     }
 
-    /// Of each axis at a time, °C; before the first knot and after the last it stays.
+    /// Temperature of each axis at a time, °C; constant before the first knot and after the last.
     pub fn at(&self, time: f64) -> PerSensor<[f64; 3]> {
         self.of_axes(time, |channel| &channel.values)
     }
@@ -64,7 +64,7 @@ impl Temperature {
         self.of_axes(time, |channel| &channel.rates)
     }
 
-    /// The temperatures that recordings saw; parameters are stated in the middle.
+    /// Temperature range of some recordings; its middle is the reference of parameters.
     pub fn seen<'a>(all: impl Iterator<Item = &'a Self> + Clone) -> PerSensor<ThermalRange> {
         PerSensor::from_fn(|sensor| {
             let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -119,8 +119,8 @@ impl Channel {
     }
 }
 
-/// Value at a knot, and slope per s, of the parabola through the knots about it: a straight line would cut the corners
-/// of a ramp by hundredths of a kelvin.
+/// Value and slope per s, at a knot, of the parabola through the surrounding knots: a straight line would cut the
+/// corners of a ramp by hundredths of a kelvin.
 fn parabola(values: &[f64], knot: usize) -> (f64, f64) {
     let over = knot.saturating_sub(OVER)..(knot + OVER + 1).min(values.len());
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
@@ -143,7 +143,7 @@ fn parabola(values: &[f64], knot: usize) -> (f64, f64) {
     (values[knot] + of[0], of[1] / (OVER as f64 * SPACING))
 }
 
-/// Between two knots on the straight line, beyond the ends as at the ends.
+/// Linear interpolation between two knots; constant beyond the ends.
 fn between(values: &[f64], at: f64) -> f64 {
     let last = values.len() - 1;
     let at = at.clamp(0.0, last as f64);

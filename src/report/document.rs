@@ -1,44 +1,44 @@
-//! What a result has to say, as data: facts, tables, plots, findings. Renderers turn it into text, a page or
-//! JSON; none of them knows what the result was.
+//! Report of a result as data: facts, tables, plots, findings. Renderers turn it into text, a page or
+//! JSON, independently of the kind of result.
 
 use serde_json::Value;
 
 use super::plot::Plot;
 use crate::calibration::{Finding, Word};
 
-/// Everything that is said about one result.
+/// The complete report of one result.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Document {
-    /// Heading of the whole.
+    /// Title of the report.
     pub title: String,
-    /// Whether the result may be used, and what it amounts to in a line.
+    /// Whether the result may be used, and a summary in one line.
     pub verdict: Option<(Word, String)>,
-    /// What was done on what, a paragraph each.
+    /// Method and data, a paragraph each.
     pub lead: Vec<String>,
-    /// What was found in a calibration, the most severe first.
+    /// Findings of a calibration, the most severe first.
     pub findings: Vec<Finding>,
-    /// What one screen shows in place of the blocks; they are all there is where it is empty.
+    /// Short version for one screen, in place of the blocks; if empty, the blocks are shown.
     pub brief: Vec<Block>,
-    /// What must be known before the figures are used.
+    /// Warnings for the use of the figures.
     pub warnings: List,
-    /// What the figures show, the most important first.
+    /// Conclusions from the figures, the most important first.
     pub conclusions: List,
-    /// Facts, tables and plots in their order, each with where it is shown.
+    /// Facts, tables and plots in their order, each with its medium.
     pub blocks: Vec<(Medium, Block)>,
-    /// The figures by name, with the unit in the name; what is not a number is null.
+    /// The figures by name, with the unit in the name; NaN is null.
     pub data: Value,
     /// Auxiliary files by name, such as a table as CSV.
     pub files: Vec<(String, String)>,
 }
 
-/// Where a part of a document is shown.
+/// Medium on which a part of a document is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Medium {
-    /// On the page, which has room for all.
+    /// The page, which has room for everything.
     Page,
-    /// In a terminal alone.
+    /// The terminal only.
     Terminal,
-    /// On both.
+    /// Both.
     Both,
 }
 
@@ -55,9 +55,9 @@ pub enum Block {
     List(List),
     /// A paragraph below a heading, which may be empty.
     Text(String, String),
-    /// Lines to be copied as they are, below a heading.
+    /// Lines to copy verbatim, below a heading.
     Code(String, String),
-    /// What follows is detail under this heading, up to the next of them: folded away on a page.
+    /// Start of a section of details with this heading, up to the next one; collapsed on a page.
     Fold(String),
 }
 
@@ -79,23 +79,23 @@ pub struct List {
     pub items: Vec<String>,
 }
 
-/// Cells in rows, the first of each naming it.
+/// Cells in rows; the first cell of a row is its name.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Table {
-    /// What it shows.
+    /// Heading of the table.
     pub heading: String,
-    /// A heading for each column; may be of several lines.
+    /// A heading for each column; it may have several lines.
     pub columns: Vec<String>,
-    /// Rows that belong together.
+    /// Sections of rows.
     pub sections: Vec<Vec<Vec<String>>>,
-    /// How to read it, a sentence each.
+    /// Notes on reading it, a sentence each.
     pub notes: Vec<String>,
-    /// Columns that a narrow terminal does without, the least important last.
+    /// Columns that a narrow terminal omits, the least important last.
     pub optional: Vec<usize>,
 }
 
 impl Document {
-    /// A document that says nothing yet.
+    /// An empty document.
     pub fn new(title: impl Into<String>) -> Self {
         Self {
             title: title.into(),
@@ -105,7 +105,7 @@ impl Document {
         }
     }
 
-    /// Says what the figures show: a conclusion if it is as one would wish, else a warning.
+    /// Adds a statement about the figures: a conclusion if `good`, else a warning.
     pub fn say(&mut self, good: bool, text: impl Into<String>) {
         let list = if good {
             &mut self.conclusions
@@ -115,27 +115,27 @@ impl Document {
         list.items.push(text.into());
     }
 
-    /// Adds what page and terminal show; what is empty is left out.
+    /// Adds a block for page and terminal; empty blocks are omitted.
     pub fn both(&mut self, block: impl Into<Block>) {
         self.add(Medium::Both, block.into());
     }
 
-    /// Adds what the page alone has room for.
+    /// Adds a block for the page only.
     pub fn page(&mut self, block: impl Into<Block>) {
         self.add(Medium::Page, block.into());
     }
 
-    /// The same for several.
+    /// The same for several blocks.
     pub fn pages(&mut self, blocks: impl IntoIterator<Item = impl Into<Block>>) {
         blocks.into_iter().for_each(|block| self.page(block));
     }
 
-    /// Adds what stands in a terminal in the place of a plot or of a longer table.
+    /// Adds a block for the terminal only, in place of a plot or of a longer table.
     pub fn terminal(&mut self, block: impl Into<Block>) {
         self.add(Medium::Terminal, block.into());
     }
 
-    /// Begins a part that a page folds away.
+    /// Starts a section that is collapsed on a page.
     pub fn fold(&mut self, heading: &str) {
         self.page(Block::Fold(heading.to_owned()));
     }
@@ -187,7 +187,7 @@ impl Facts {
         }
     }
 
-    /// One more pair.
+    /// Adds a pair.
     pub fn push(&mut self, name: &str, value: impl Into<String>) {
         self.rows.push((name.to_owned(), value.into()));
     }
@@ -206,7 +206,7 @@ impl Table {
         }
     }
 
-    /// Rows that belong together; none if there are none.
+    /// Adds a section of rows, unless it is empty.
     pub fn section(mut self, rows: impl IntoIterator<Item = Vec<String>>) -> Self {
         let rows: Vec<_> = rows.into_iter().collect();
         if !rows.is_empty() {
@@ -223,7 +223,7 @@ impl Table {
         sections.into_iter().fold(self, Self::section)
     }
 
-    /// A sentence on how to read it.
+    /// Adds a note on reading the table.
     pub fn note(mut self, note: impl Into<String>) -> Self {
         self.notes.push(note.into());
         self
@@ -241,10 +241,10 @@ macro_rules! into_block {
 }
 into_block!(Facts, Table, Plot, List);
 
-/// In the place of a number that there is not.
+/// Placeholder for a missing number.
 pub(super) const NONE: &str = "–";
 
-/// The headings of a table's columns, of a line with bars between them.
+/// Splits a line at bars into the headings of a table's columns.
 pub(super) fn columns(line: &str) -> impl Iterator<Item = &str> {
     line.split('|').map(str::trim)
 }

@@ -69,7 +69,7 @@ pub fn axis_name(form: InstallationForm, index: usize) -> String {
         .unwrap_or_default()
 }
 
-/// Which function of temperature a coefficient is of; none: a parameter at the reference.
+/// Which function of temperature a coefficient is of; `None` for a parameter at the reference.
 pub fn function_name(function: Option<usize>) -> String {
     match function {
         None => "at the reference".to_owned(),

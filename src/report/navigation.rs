@@ -24,11 +24,11 @@ pub struct Navigation<'a> {
     pub truth: &'a str,
     /// False if the calibration says that its method did not converge.
     pub converged: bool,
-    /// Whether one of the two has error terms beside K, E and D, which are not navigated.
+    /// Whether one of the two has error terms in addition to K, E and D, which navigation does not use.
     pub terms: bool,
     /// What fixes the body axes.
     pub body_frame: BodyFrame,
-    /// The triad whose errors were navigated with; none: both.
+    /// The triad whose errors were navigated with; `None` for both.
     pub only: Option<Sensor>,
     /// How the body moved, and how long.
     pub mission: &'a Mission,
@@ -117,7 +117,7 @@ impl Navigation<'_> {
             warnings.push(format!("{name} claims no σ, so none is predicted."));
         }
         if self.terms {
-            let text = "Error terms beside K, E and D are taken for exact: these are the errors that K, E and D \
+            let text = "Error terms other than K, E and D are assumed exact: these are the errors that K, E and D \
                         leave.";
             warnings.push(text.to_owned());
         }

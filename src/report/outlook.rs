@@ -41,7 +41,7 @@ fn duration(navigated: &[Navigated]) -> f64 {
     ends.map(|end| end.time).fold(0.0, f64::max)
 }
 
-/// The unit of time in which it is told: symbol and seconds.
+/// The unit of time of the report: its symbol and its length in seconds.
 fn clock(navigated: &[Navigated]) -> (&'static str, f64) {
     let units = [("h", 3600.0), ("min", 60.0)].into_iter();
     let mut fits = units.filter(|(_, size)| duration(navigated) >= *size);
@@ -169,7 +169,7 @@ fn row(navigated: &[Navigated], quantity: Quantity, of: Of) -> Vec<String> {
     row
 }
 
-/// Position error east and north against time; none if nothing was navigated.
+/// Position error east and north against time; `None` if nothing was navigated.
 pub fn figure(navigated: &[Navigated]) -> Option<Plot> {
     let last = navigated.last()?;
     let (heading, mut caption) = match is_known(navigated) {

@@ -6,7 +6,7 @@ use textwrap::{Options, WordSplitter};
 use super::document::{Block, Document, Facts, List, Medium, Table};
 use crate::calibration::{Finding, Level};
 
-/// A heading of a column is broken into lines of at least so many letters.
+/// Least width, in letters, of the lines into which a column heading is broken.
 const HEADING: usize = 9;
 /// Between two columns.
 const GAP: usize = 2;
@@ -321,7 +321,7 @@ mod tests {
         let mut document = Document::new("A result");
         document
             .lead
-            .push("What was done to what, in a sentence that goes on.".to_owned());
+            .push("What was done to what, in a sentence that continues.".to_owned());
         document.both(Facts::new(
             "Facts",
             [("long name", "one two three four five six seven")],

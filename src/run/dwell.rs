@@ -1,4 +1,4 @@
-//! A dwell: samples during which the instrument is at rest, and what sensors and table give in it.
+//! A dwell: samples during which the instrument is at rest, with the output of sensors and table.
 
 use std::ops::Range;
 
@@ -9,15 +9,15 @@ use crate::attitude::{exp, log};
 use crate::imu::Sensor;
 use crate::recording::ImuSamples;
 
-/// Shortest dwell worth a name, s.
+/// Shortest dwell that is used, s.
 pub const SHORTEST: f64 = 0.5;
 
 /// Samples during which the instrument is at rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dwell {
-    /// Samples that lie wholly within it.
+    /// Samples that lie completely within it.
     pub samples: Range<usize>,
-    /// What the table says of it; none without a table.
+    /// Position of the table; `None` without a table.
     pub position: Option<Position>,
 }
 
@@ -35,13 +35,13 @@ pub struct Position {
 pub struct MeanOutput {
     /// Normalised output per second, rad/s or m/s².
     pub output: Vector3<f64>,
-    /// Variance per axis by the instrument's noise, pulses and, where samples were interpolated, on the axis that
-    /// has most of that.
+    /// Variance per axis from the instrument's noise, pulses and, if samples were interpolated, interpolation on the
+    /// axis with most of it.
     pub variance: f64,
 }
 
 impl Dwell {
-    /// Of these samples, without a table.
+    /// A dwell over these samples, without a table.
     pub fn of(samples: Range<usize>) -> Self {
         Self {
             samples,
@@ -49,19 +49,19 @@ impl Dwell {
         }
     }
 
-    /// s
+    /// Duration, s.
     pub fn duration(&self, imu: &ImuSamples) -> f64 {
         self.samples.len() as f64 * imu.period
     }
 
-    /// Begin and end, s.
+    /// Start and end, s.
     pub fn times(&self, run: &Run) -> [f64; 2] {
         let imu = &run.recording.imu;
         let begin = imu.time(self.samples.start);
         [begin, begin + self.duration(imu)]
     }
 
-    /// Mean output of a triad over it.
+    /// Mean output of a triad over the dwell.
     pub fn mean(&self, sensor: Sensor, run: &Run) -> MeanOutput {
         let imu = &run.recording.imu;
         let duration = self.duration(imu);
@@ -79,12 +79,12 @@ impl Dwell {
         }
     }
 
-    /// Mean specific force along body axes by nominal scales and prior biases, m/s².
+    /// Mean specific force along body axes, from nominal scales and prior biases, m/s².
     pub fn force(&self, run: &Run) -> Vector3<f64> {
         self.mean(Sensor::Accel, run).output - run.instrument.prior.accel.bias
     }
 
-    /// The first part of it; the attitude is that of all its readings.
+    /// The first part of the dwell; the attitude remains the mean of all its readings.
     pub fn first_part(&self, part: f64, imu: &ImuSamples) -> Self {
         let samples = (part * self.duration(imu) / imu.period).round() as usize;
         let end = self.samples.end.min(self.samples.start + samples);
@@ -94,7 +94,7 @@ impl Dwell {
         }
     }
 
-    /// Takes in a later dwell at the same position.
+    /// Merges a later dwell at the same position into this one.
     pub fn extend(&mut self, later: &Self) {
         self.samples.end = later.samples.end;
         if let (Some(position), Some(later)) = (&mut self.position, &later.position) {

@@ -1,8 +1,7 @@
-//! A run: one recording, and what is known beforehand of the instrument, the site and the table that
-//! made it.
+//! A run: one recording, and prior knowledge of the instrument, the site and the table.
 //!
-//! All is in SI, on right-front-up body axes and in normalised outputs (see [`crate::imu::Nominal`]);
-//! the files' units and axes end in [`crate::formats`].
+//! Everything is in SI, on right-front-up body axes and in normalised outputs (see [`crate::imu::Nominal`]);
+//! [`crate::formats`] converts the units and axes of files.
 
 mod doubts;
 mod dwell;
@@ -21,28 +20,28 @@ use crate::recording::{Recording, TableLog};
 use crate::turntable::TableAccuracy;
 use crate::units::DEGREE;
 
-/// 1σ per axis of a position that is set by hand, rad.
+/// 1σ per axis of a position set by hand, rad.
 pub const SET_BY_HAND: f64 = DEGREE;
 
-/// A recording with what is known beforehand.
+/// A recording with the prior knowledge about it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
-    /// What was recorded.
+    /// The recorded data.
     pub recording: Recording,
     /// The instrument that was recorded.
     pub instrument: Instrument,
-    /// Where the turntable stands.
+    /// Site of the turntable.
     pub site: Site,
-    /// How well the table's readings tell its attitude; without effect where there are none.
+    /// Accuracy of the table's readings; without effect if there are none.
     pub table: TableAccuracy,
     /// How still the IMU is while the table is at rest.
     pub standstill: Standstill,
-    /// 1σ per axis of the attitude of a labelled position, and of where a labelled turn ends, rad.
+    /// 1σ per axis of the attitude of a labelled position, and of the end of a labelled turn, rad.
     pub segment_sigma: f64,
 }
 
 impl Run {
-    /// A run without a table's accuracy, standstill as usual.
+    /// A run with the default table accuracy and the default standstill.
     pub fn new(recording: Recording, instrument: Instrument, site: Site) -> Self {
         Self {
             recording,
@@ -54,7 +53,7 @@ impl Run {
         }
     }
 
-    /// What is observed unless it is said otherwise: the table's attitude where there is its log.
+    /// The default observation: the table's attitude if there is a table log, else zero velocity.
     pub fn aiding(&self) -> Aiding {
         match self.recording.table {
             Some(_) => Aiding::Table,
@@ -62,7 +61,7 @@ impl Run {
         }
     }
 
-    /// The table's readings, where they are observed.
+    /// The table's readings, if they are observed.
     pub fn observed_table(&self, aiding: Aiding) -> Option<&TableLog> {
         self.recording
             .table
@@ -71,18 +70,18 @@ impl Run {
     }
 }
 
-/// What the filter observed.
+/// Observations of the filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Aiding {
-    /// Standstill and the table's attitude.
+    /// Zero velocity and the table's attitude.
     Table,
-    /// Standstill only.
+    /// Zero velocity only.
     Velocity,
 }
 
 impl Aiding {
-    /// What fixes the body axes under it.
+    /// The body frame that these observations define.
     pub fn body_frame(self) -> BodyFrame {
         match self {
             Self::Table => BodyFrame::Table,
@@ -94,14 +93,14 @@ impl Aiding {
 /// How still the IMU is while the table is at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Standstill {
-    /// White 1σ of what each triad's output adds up to at standstill: attitude in rad, velocity in m/s;
-    /// found from the dwells if not given.
+    /// White 1σ of the integral of each triad's output at standstill: attitude in rad, velocity in m/s;
+    /// estimated from the dwells if not given.
     pub sigma: PerSensor<Option<f64>>,
-    /// How the body turns where it should not, where no table is observed: 1σ density of a random walk,
+    /// Unwanted rotation of the body at rest if no table is observed: 1σ density of a random walk,
     /// rad/√s.
     pub turning: f64,
-    /// 1σ of the IMU's position while the table is at rest, m. Never below the IMU's distance from the
-    /// table's centre, for that is how far it moves between positions.
+    /// 1σ of the IMU's position while the table is at rest, m. At least the IMU's distance from the
+    /// table's centre, because the IMU moves that far between positions.
     pub position_sigma: f64,
 }
 

@@ -1,4 +1,4 @@
-//! What counts as a turn of the gyros, and as another one than a label or the table says.
+//! Criteria for a turn of the gyros, and for its disagreement with a label or the table.
 
 use std::ops::Range;
 
@@ -9,22 +9,22 @@ use crate::navigation::samples_of;
 use crate::recording::ImuSamples;
 use crate::units::DEGREE;
 
-/// Turns are measured in steps this long, s, so that noise adds little to them.
+/// Length of the steps in which turns are measured, s, so that noise adds little to them.
 pub const STEP: f64 = 0.1;
-/// What turns by less has not turned, rad.
+/// Smallest angle that counts as a turn, rad.
 pub const SMALLEST: f64 = 1.0 * DEGREE;
-/// A turn that differs by more than this part of it is another one …
+/// A turn disagrees if its angle is off by more than this part of it …
 const OTHER_ANGLE: f64 = 0.1;
-/// … or that many σ of the gyros' scale.
+/// … or by more than this many σ of the gyros' scale factor, whichever is larger.
 pub const SCALE_SIGMAS: f64 = 5.0;
 
-/// By which part of a turn the gyros may be off before it is another one.
+/// Largest relative error of a turn by the gyros that still agrees with a label or the table.
 pub fn tolerance(run: &Run) -> f64 {
     OTHER_ANGLE.max(SCALE_SIGMAS * run.instrument.prior.gyro.scale_sigma.amax())
 }
 
-/// The steps of some samples, with this output of the gyros as zero, rad/s: time in the middle and duration, s, and
-/// turn, rad.
+/// The steps of some samples: time of the middle and duration, s, and turn, rad. `zero` is the gyros' output at rest,
+/// rad/s.
 pub fn steps(
     imu: &ImuSamples,
     samples: Range<usize>,

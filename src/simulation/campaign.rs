@@ -23,11 +23,11 @@ use crate::turntable::TableError;
 pub struct SimulatedCampaign {
     /// A short name for titles and file names.
     pub name: String,
-    /// What all recordings have in common.
+    /// The scenario common to all recordings.
     pub scenario: Scenario,
-    /// Name of each, and the chamber that it has for itself.
+    /// Name of each recording, and its own chamber, if any.
     pub recordings: Vec<(String, Option<Chamber>)>,
-    /// By how much they differ.
+    /// σ of the differences between recordings.
     pub day_to_day: DayToDay,
 }
 
@@ -35,7 +35,7 @@ pub struct SimulatedCampaign {
 const STREAMS: u64 = 1 << 10;
 
 impl SimulatedCampaign {
-    /// Whether a campaign is meant: a file that lists recordings, else an embedded one.
+    /// Whether the name is that of a campaign: a file that lists recordings, else an embedded campaign.
     pub fn is_named(name_or_path: &str) -> bool {
         match models::text(Room::Campaign, name_or_path, &Place::CommandLine) {
             Ok(text) if text.place == Place::Embedded => true,
@@ -44,7 +44,7 @@ impl SimulatedCampaign {
         }
     }
 
-    /// Finds and reads one, by embedded name or path, and what it names.
+    /// Finds and reads a campaign, by embedded name or path, with the models that it names.
     ///
     /// # Errors
     /// If one of them does not exist or is malformed.
@@ -81,11 +81,11 @@ impl SimulatedCampaign {
         })
     }
 
-    /// Simulates all recordings of one instrument. The same seed and stream give the same bits; a Monte Carlo keeps
-    /// the seed and counts the stream.
+    /// Simulates all recordings of one instrument. The same seed and stream give the same bits; a Monte Carlo study
+    /// keeps the seed and increments the stream.
     ///
     /// # Errors
-    /// If the path is beyond the table.
+    /// If the table cannot follow the path.
     pub fn simulate(&self, seed: u64, stream: u64) -> Result<Vec<Simulated>, TableError> {
         let all = (0..).zip(&self.recordings);
         all.map(|(number, (name, chamber))| {
@@ -108,8 +108,8 @@ impl SimulatedCampaign {
         .collect()
     }
 
-    /// The truth that simulated recordings have in common, in the file's quantity: it changes with temperature
-    /// within what they saw.
+    /// The common truth of simulated recordings, in the file's quantity, with its temperature dependence over their
+    /// temperature range.
     pub fn truth(simulated: &[Simulated]) -> Option<Calibration> {
         let first = simulated.first()?;
         let run = &first.run;
@@ -128,7 +128,7 @@ impl SimulatedCampaign {
         })
     }
 
-    /// What its recordings have in common, as an engineer would say of it.
+    /// Common and individual properties of its recordings, as an engineer would state them.
     pub fn together(&self) -> Together {
         let chambers = self.recordings.iter().map(|(_, own)| own);
         let warms = self.scenario.chamber.is_some() || chambers.flatten().next().is_some();

@@ -1,4 +1,4 @@
-//! One way of a table along its path: what runs have in common that differ in random numbers only.
+//! One drive of a table along its path: the common part of runs that differ only in random numbers.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -7,12 +7,12 @@ use crate::calibration::Difference;
 use crate::imu::{PerSensor, TermVector};
 use crate::turntable::{AxisAngles, Imperfection, Motion, Moves, TableError, axis_angles};
 
-/// How a table moves, and what an ideal instrument on it senses.
+/// Motion of a table, and the input sensed by an ideal instrument on it.
 #[derive(Debug, Clone)]
 pub struct Drive {
     imperfection: Imperfection,
     terms: TermVector,
-    /// How long it takes, s.
+    /// Duration, s.
     pub(super) duration: f64,
     /// Integrals over each sample: see [`true_increments`].
     pub(super) ideal: PerSensor<Vec<Vector3<f64>>>,
@@ -22,7 +22,7 @@ pub struct Drive {
     pub(super) axes: Vec<AxisAngles>,
 }
 
-/// Many runs of a scenario. Where the table is perfect all of them are on one drive, which is made once.
+/// Many runs of a scenario. With a perfect table, all of them share one drive, which is computed once.
 #[derive(Debug, Clone)]
 pub struct Runs<'a> {
     scenario: &'a Scenario,
@@ -33,7 +33,7 @@ impl<'a> Runs<'a> {
     /// Of a scenario.
     ///
     /// # Errors
-    /// If the path is beyond the table.
+    /// If the table cannot follow the path.
     pub fn new(scenario: &'a Scenario) -> Result<Self, TableError> {
         let none = Imperfection::none(&scenario.table);
         Ok(Self {
@@ -45,7 +45,7 @@ impl<'a> Runs<'a> {
     /// Simulates one of them, as [`Scenario::simulate`] does.
     ///
     /// # Errors
-    /// If the path is beyond the table.
+    /// If the table cannot follow the path.
     pub fn simulate(&self, seed: u64, stream: u64) -> Result<Simulated, TableError> {
         let own = Difference::default();
         let shared = Some(&self.perfect);

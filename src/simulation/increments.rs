@@ -1,4 +1,4 @@
-//! What an ideal IMU on a moving table senses: exact integrals, finer than its samples.
+//! Input sensed by an ideal IMU on a moving table: exact integrals, with steps finer than its samples.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -7,12 +7,12 @@ use crate::earth::Site;
 use crate::imu::{self, PerSensor, Sensor, TermVector};
 use crate::turntable::Motion;
 
-/// How increments are integrated.
+/// Settings of the integration of increments.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Integrator {
     /// Length of a sample, s.
     pub period: f64,
-    /// From the table's centre, where its axes meet, to the IMU, along body axes, m.
+    /// Lever arm from the table's centre, where its axes meet, to the IMU, along body axes, m.
     pub lever_arm: Vector3<f64>,
     /// Steps in a sample, each with two Gauss–Legendre points.
     pub steps: u32,
@@ -22,7 +22,8 @@ pub struct Integrator {
 ///
 /// `ω_ib = ω_nb + C_n_b ω_ie`, `f = −C_n_b g + ω̇_ib × r + ω_ib × (ω_ib × r)`, with r the lever arm.
 ///
-/// to which the instrument's error terms with these parameters are added. While the table stands both are constant and computed once.
+/// to which the instrument's error terms with these parameters are added. While the table is at rest, both are
+/// constant and computed once.
 pub fn true_increments(
     motion: &Motion,
     site: &Site,
@@ -194,9 +195,9 @@ mod tests {
         }
     }
 
-    /// Attitude and velocity from strapdown integration, relative to the inertial frame that is
-    /// East-North-Up at the start, over so many samples of 1 ms: so short that coning and sculling
-    /// beyond the second order are nothing.
+    /// Attitude and velocity from strapdown integration over samples of 1 ms, relative to the inertial
+    /// frame that is East-North-Up at the start. Samples are so short that coning and sculling beyond
+    /// the second order are negligible.
     fn integrated(
         motion: &Motion,
         site: &Site,
@@ -225,7 +226,7 @@ mod tests {
         (attitude, velocity)
     }
 
-    /// The number of milliseconds until the table stands after so many moves.
+    /// The number of milliseconds until the table stands after this number of moves.
     fn until_after(motion: &Motion, moves: usize) -> usize {
         let (start, _) = motion.dwells().nth(moves).unwrap();
         ((start + 1.0) / MILLISECOND) as usize

@@ -1,4 +1,4 @@
-//! Simulated runs with known truth: an instrument on a table that is driven along a path.
+//! Simulated runs with known truth: an instrument on a table that follows a path.
 //!
 //! Everything happens in memory. Truth, noise, the table's imperfections, its position errors and its
 //! readings draw from generators of their own, so that changing one leaves the others as they were.
@@ -35,23 +35,23 @@ use crate::run::{Run, SET_BY_HAND, Standstill};
 use crate::turntable::{AxisError, TABLE_GEOMETRY, TableAccuracy, TableGeometry, across};
 use crate::turntable::{Imperfection, Moves, TableError};
 
-/// A run and what it was made from.
+/// A run with its truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulated {
-    /// What a laboratory would have recorded.
+    /// The run as a laboratory would have recorded it.
     pub run: Run,
-    /// The instrument's true parameters; where they change with temperature, those at the reference of
+    /// The instrument's true parameters; if they depend on temperature, those at the reference of
     /// [`Self::thermal`].
     pub truth: PerSensor<Triad>,
-    /// The same but for what is this recording's own.
+    /// The same without the deviations of this recording.
     pub common: PerSensor<Triad>,
-    /// Those of its error terms.
+    /// The true parameters of its error terms.
     pub terms: TermVector,
     /// The table's true geometry, in the order of [`crate::turntable::TableGeometry::vector`], rad.
     pub geometry: SVector<f64, TABLE_GEOMETRY>,
-    /// How they change with temperature, where they do.
+    /// Their temperature dependence, if any.
     pub thermal: Option<ThermalTruth>,
-    /// What a sample holds when the run is written to a file.
+    /// Quantity of a sample when the run is written to a file.
     pub output: Output,
 }
 
@@ -110,11 +110,11 @@ fn normal(rng: &mut ChaCha8Rng) -> Vector3<f64> {
 }
 
 impl Scenario {
-    /// Simulates one run. The same seed and stream give the same bits; a Monte Carlo keeps the seed
-    /// and counts the stream.
+    /// Simulates one run. The same seed and stream give the same bits; a Monte Carlo study keeps the seed
+    /// and increments the stream.
     ///
     /// # Errors
-    /// If the path is beyond the table.
+    /// If the table cannot follow the path.
     pub fn simulate(&self, seed: u64, stream: u64) -> Result<Simulated, TableError> {
         self.simulate_recording(seed, stream, stream, &Difference::default())
     }
@@ -123,7 +123,7 @@ impl Scenario {
     /// its parameters differ by `own`.
     ///
     /// # Errors
-    /// If the path is beyond the table.
+    /// If the table cannot follow the path.
     pub fn simulate_recording(
         &self,
         seed: u64,

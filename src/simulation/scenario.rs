@@ -1,4 +1,4 @@
-//! What is simulated, read from a TOML file.
+//! A simulation scenario, read from a TOML file.
 
 use nalgebra::{SVector, Vector3};
 use rand_chacha::ChaCha8Rng;
@@ -23,40 +23,40 @@ const STEPS: u32 = 4;
 /// The longest record that is simulated in memory; it takes some gigabytes.
 const MOST_SAMPLES: f64 = 2e7;
 
-/// Everything that makes a simulated run but its random numbers.
+/// Complete definition of a simulated run, except its random numbers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scenario {
     /// A short name for titles and file names.
     pub name: String,
-    /// Where the table stands.
+    /// Site of the table.
     pub site: Site,
     /// The grade of instrument.
     pub instrument: Instrument,
     /// Its installation.
     pub installation: InstallationModel,
-    /// What fixes the true body axes: in the accelerometers' frame, the installation angles that it
+    /// The true body frame: in the accelerometer frame, the installation angles that it
     /// fixes are not drawn.
     pub body_frame: BodyFrame,
-    /// True values that are given, not drawn.
+    /// True values that are given instead of drawn.
     pub given: PerSensor<Given>,
     /// The table.
     pub table: Table,
     /// The table's name.
     pub table_name: String,
-    /// How the table is driven.
+    /// Path of the table.
     pub path: Path,
     /// The path's name.
     pub path_name: String,
-    /// What a sample holds.
+    /// Quantity of a sample.
     pub output: Output,
     /// Sample period, lever arm and step of the truth.
     pub integrator: Integrator,
     /// Readings of the table per second.
     pub reading_rate: f64,
-    /// The climatic chamber that it stands in; none at an even temperature.
+    /// The climatic chamber of the instrument; `None` for a constant temperature.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chamber: Option<Chamber>,
-    /// Seed to use where none is asked for.
+    /// Default seed.
     pub seed: u64,
 }
 
@@ -180,24 +180,24 @@ impl Scenario {
         }
     }
 
-    /// The temperature at which its instrument is as drawn, °C.
+    /// Reference temperature, at which the instrument has its drawn parameters, °C.
     pub fn reference_temperature(&self) -> f64 {
         ROOM_TEMPERATURE
     }
 
-    /// How long a run takes, s.
+    /// Duration of a run, s.
     ///
     /// # Errors
-    /// If the path is beyond the table.
+    /// If the table cannot follow the path.
     pub fn duration(&self) -> Result<f64, TableError> {
         let perfect = Imperfection::none(&self.table);
         Ok(Motion::new(&self.table, &self.path, &perfect)?.duration())
     }
 
-    /// For how much of that the table stands, s.
+    /// Total time of the dwells in it, s.
     ///
     /// # Errors
-    /// If the path is beyond the table.
+    /// If the table cannot follow the path.
     pub fn standing_time(&self) -> Result<f64, TableError> {
         let perfect = Imperfection::none(&self.table);
         let motion = Motion::new(&self.table, &self.path, &perfect)?;

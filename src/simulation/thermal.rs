@@ -12,11 +12,11 @@ use crate::imu::{
 use crate::models::ThermalVariation;
 use crate::recording::{TEMPERATURE_SPACING, Temperature};
 
-/// A climatic chamber, and how the instrument in it follows.
+/// A climatic chamber, with the thermal response of the instrument.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Chamber {
-    /// Time in s and temperature of the chamber in °C, which goes on straight lines between; before the first and
-    /// after the last it stays. The instrument has soaked at the first.
+    /// Time in s and temperature of the chamber in °C. Between the points it is linear; before the first and
+    /// after the last it is constant. The instrument has soaked at the first.
     pub profile: Vec<(f64, f64)>,
     /// Time constant of the instrument in the chamber, s; zero follows at once.
     pub time_constant: f64,
@@ -96,12 +96,12 @@ impl Warming {
     }
 }
 
-/// How a simulated instrument truly changes with temperature.
+/// True temperature dependence of a simulated instrument.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ThermalTruth {
-    /// At which it is what [`super::Simulated::truth`] says, °C.
+    /// Reference temperature of [`super::Simulated::truth`], °C.
     pub reference: f64,
-    /// Of each triad for T, T² and dT/dt: per K, K² and K/s.
+    /// Coefficients of each triad for T, T² and dT/dt: per K, K² and K/s.
     pub by: PerSensor<[TriadVector; 3]>,
 }
 
@@ -126,8 +126,8 @@ impl ThermalTruth {
         Self { reference, by }
     }
 
-    /// By how much a triad's parameters differ from those at the reference at a temperature in °C that changes by so
-    /// many K/s.
+    /// Change of a triad's parameters from those at the reference, at a temperature in °C and its rate in
+    /// K/s.
     fn change(&self, by: &[TriadVector; 3], temperature: f64, rate: f64) -> TriadVector {
         let t = temperature - self.reference;
         by[0] * t + by[1] * (t * t) + by[2] * rate
@@ -142,7 +142,7 @@ impl ThermalTruth {
         })
     }
 
-    /// The coefficients in a range that make the same: exact, for they hold any polynomial of their order.
+    /// Re-expands the polynomials over another range; exact for polynomials of the same order.
     pub fn coefficients(&self, range: &PerSensor<ThermalRange>) -> PerSensor<ThermalCoefficients> {
         PerSensor::from_fn(|sensor| {
             let (range, by) = (range.get(sensor), self.by.get(sensor));

@@ -1,4 +1,4 @@
-//! How accurate the filter is, and whether its σ are true, over many simulated runs: against the
+//! Accuracy of the filter and consistency of its σ over many simulated runs, compared with the
 //! truth, the Cramér–Rao bound, and the closed form on the paper's static positions.
 //!
 //! Everything is compared in the general form and in the body frame of the table.
@@ -31,48 +31,48 @@ pub use figures::Figures;
 pub use navigation::{Containment, Journey, NavigationAccuracy, Position, Region};
 pub use trial::{Filtered, Trial};
 
-/// What is studied.
+/// Configuration of the study.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct AccuracyStudy {
-    /// What is simulated.
+    /// The simulated scenario.
     pub scenario: Scenario,
     /// The filter's installation form; the truth has that of the scenario.
     pub form: InstallationForm,
-    /// Error terms that are there and that the filter does not have.
+    /// Error terms of the truth that the filter does not model.
     pub unmodelled: Vec<ErrorTerm>,
-    /// Which noise the filter uses.
+    /// Noise policy of the filter.
     pub noise: NoisePolicy,
     /// Number of runs.
     pub runs: u64,
-    /// Seed; each run has its own streams of it.
+    /// Seed; each run has its own random streams.
     pub seed: u64,
 }
 
-/// A study that cannot be made.
+/// Errors of a study.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
-    /// The closed form's static positions or the trajectory of navigation cannot be had.
+    /// The closed form's static positions or the trajectory of navigation cannot be read.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The path is beyond the table.
+    /// The table cannot follow the path.
     #[error(transparent)]
     Table(#[from] TableError),
-    /// Not even the bound can be had from a run.
+    /// The bound of a run cannot be computed.
     #[error("run {run} of the study: {source}")]
     Bound {
-        /// Its number.
+        /// Number of the run.
         run: u64,
-        /// Why.
+        /// The cause.
         source: CalibrationError,
     },
 }
 
-/// The result.
+/// Result of the study.
 #[derive(Debug, Clone)]
 pub struct Accuracy {
-    /// What was studied.
+    /// The configuration.
     pub study: AccuracyStudy,
-    /// How the closed form was made.
+    /// The runs of the closed form.
     pub baseline: Baseline,
     /// Length of a run of the filter, s.
     pub table_time: f64,
@@ -80,7 +80,7 @@ pub struct Accuracy {
     pub trials: Vec<Trial>,
     /// Figures of each group.
     pub groups: Vec<GroupAccuracy>,
-    /// What the calibrations are worth in each mission.
+    /// Navigation accuracy of the calibrations in each mission.
     pub navigation: Vec<NavigationAccuracy>,
     /// Missions that cannot be navigated from the scenario's site.
     pub not_navigated: Vec<(Journey, NavigationStudyError)>,
@@ -88,7 +88,7 @@ pub struct Accuracy {
     pub anees: Option<Anees>,
     /// Figures of each error term that was estimated, RMS over its parameters, in rad or SI.
     pub error_terms: Vec<(ErrorTerm, Figures)>,
-    /// What each error term did to the filter in the first run: see [`crate::calibration::test_error_terms`].
+    /// Effect of each error term on the filter in the first run: see [`crate::calibration::test_error_terms`].
     pub effects: Vec<ErrorTermTest>,
     /// NIS of zero velocity over all runs.
     pub velocity: Nis,
@@ -101,9 +101,9 @@ pub struct Accuracy {
 pub struct Anees {
     /// The average.
     pub mean: f64,
-    /// n, directions of one run that have a σ.
+    /// n, the number of directions of one run that have a σ.
     pub directions: usize,
-    /// 95 % interval of the average if σ are true (χ²).
+    /// 95 % interval of the average if σ are correct (χ²).
     pub interval_95: (f64, f64),
     /// 99.8 % interval.
     pub interval_998: (f64, f64),
@@ -126,18 +126,18 @@ pub struct GroupAccuracy {
 }
 
 impl AccuracyStudy {
-    /// Makes all runs, on all cores; `done` is told of each. The result does not depend on how many
-    /// cores there are.
+    /// Makes all runs on all cores; `done` is called after each. The result does not depend on the number
+    /// of cores.
     ///
     /// # Errors
-    /// [`StudyError`] if runs cannot be made. A run that the filter fails on is no error: it is
+    /// [`StudyError`] if runs cannot be made. A run on which the filter fails is not an error: it is
     /// counted.
     pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Accuracy, StudyError> {
         let all: Vec<u64> = (0..self.runs).collect();
         self.result(self.trials(&all, done)?)
     }
 
-    /// Makes some of the runs, given by their numbers; `done` is told of each.
+    /// Makes some of the runs, given by their numbers; `done` is called after each.
     ///
     /// # Errors
     /// As [`Self::run`].
@@ -152,7 +152,7 @@ impl AccuracyStudy {
         all.collect()
     }
 
-    /// What all runs say, in the order of their numbers.
+    /// The result of all runs, in the order of their numbers.
     ///
     /// # Errors
     /// As [`Self::run`].
@@ -187,7 +187,7 @@ impl AccuracyStudy {
 }
 
 impl Accuracy {
-    /// What the filter gave in each run in which it gave anything.
+    /// Results of the filter in the runs in which it did not fail.
     pub fn filtered(&self) -> impl Iterator<Item = &Filtered> {
         filtered(&self.trials)
     }
@@ -199,7 +199,7 @@ impl Accuracy {
             .filter_map(|trial| Some((trial.run, trial.failure.as_deref()?)))
     }
 
-    /// Number of runs whose data reject the filter's installation form, and of those tested.
+    /// Number of runs whose data reject the filter's installation form, and number of runs tested.
     pub fn rejections(&self) -> (usize, usize) {
         let tests = || self.filtered().filter_map(|filtered| filtered.form_test);
         let rejected = tests().filter(|test| test.rejects());
@@ -208,7 +208,7 @@ impl Accuracy {
 }
 
 impl GroupAccuracy {
-    /// None if the form and the body frame leave nothing of the group to be estimated.
+    /// `None` if the form and the body frame leave no parameter of the group to estimate.
     fn new(group: Group, trials: &[Trial], baseline: &Baseline, table_time: f64) -> Option<Self> {
         let estimated = |&i: &usize| trials.iter().any(|trial| trial.bound[i] > 0.0);
         let indices: Vec<usize> = (0..PARAMETERS)
@@ -278,7 +278,7 @@ fn anees(trials: &[Trial]) -> Option<Anees> {
     })
 }
 
-/// One NIS of all runs.
+/// NIS over all runs.
 fn pooled(trials: &[Trial], of: impl Fn(&Filtered) -> &Nis) -> Nis {
     let all: Vec<&Nis> = filtered(trials)
         .map(of)

@@ -1,5 +1,5 @@
-//! How accurate the calibration of a campaign is, and whether its σ are true, over many simulated campaigns:
-//! parameters at the reference temperature, their coefficients, and the orders that are chosen.
+//! Accuracy of the calibration of a campaign and consistency of its σ over many simulated campaigns: parameters at
+//! the reference temperature, their coefficients, and the selected orders.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -13,42 +13,42 @@ use crate::imu::{InstallationForm, ParameterKind, PerSensor, ThermalCoefficients
 use crate::run::Run;
 use crate::simulation::{Simulated, SimulatedCampaign, ThermalTruth};
 
-/// What is studied.
+/// Configuration of the study.
 #[derive(Debug, Clone)]
 pub struct CampaignStudy {
-    /// What is simulated.
+    /// The simulated campaign.
     pub campaign: SimulatedCampaign,
-    /// The filter's installation form, to which the truth is brought.
+    /// The filter's installation form, to which the truth is converted.
     pub form: InstallationForm,
-    /// Which noise the filter uses.
+    /// Noise policy of the filter.
     pub noise: NoisePolicy,
     /// Number of campaigns.
     pub runs: u64,
-    /// Seed; each campaign has its own streams of it.
+    /// Seed; each campaign has its own random streams.
     pub seed: u64,
     /// Whether biases may follow the rate of temperature.
     pub rate: bool,
 }
 
-/// The result.
+/// Result of the study.
 #[derive(Debug, Clone)]
 pub struct CampaignAccuracy {
-    /// What was studied.
+    /// The configuration.
     pub study: CampaignStudy,
     /// Every campaign that gave a calibration, in order.
     pub trials: Vec<CampaignTrial>,
-    /// How many gave none.
+    /// Number of campaigns without a calibration.
     pub failures: usize,
 }
 
 /// One campaign.
 #[derive(Debug, Clone)]
 pub struct CampaignTrial {
-    /// Squared error by the covariance, correlations included, of all parameters and coefficients, and their number.
+    /// NEES of all parameters and coefficients, with the full covariance, and their number.
     pub nees: (f64, usize),
-    /// What each error is of: a parameter at the reference, or a coefficient of it.
+    /// Errors of the parameters at the reference, and of their coefficients.
     pub errors: Vec<ErrorOf>,
-    /// Order that was chosen and true order of each group, and whether its rate was, and is there.
+    /// Selected and true order of each group, each with the presence of the rate term.
     pub orders: [OrderChosen; 6],
 }
 
@@ -57,26 +57,26 @@ pub struct CampaignTrial {
 pub struct ErrorOf {
     /// The parameter's group.
     pub group: Group,
-    /// Index among the functions of temperature; none: the parameter at the reference.
+    /// Index among the functions of temperature; `None` for the parameter at the reference.
     pub function: Option<usize>,
-    /// Squared error, σ² claimed and bound, normalised.
+    /// Squared error, stated σ² and squared bound, normalised.
     pub squares: [f64; 3],
 }
 
-/// Order of a group, chosen and true.
+/// Selected and true order of a group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OrderChosen {
-    /// Chosen order, and whether the rate is on.
+    /// Selected order, and whether the rate term is on.
     pub chosen: (usize, bool),
-    /// True ones.
+    /// The same of the truth.
     pub truth: (usize, bool),
 }
 
 impl CampaignStudy {
-    /// Makes all campaigns, on all cores; `done` is told of each.
+    /// Runs all campaigns on all cores; `done` is called after each.
     ///
     /// # Errors
-    /// [`StudyError`] if they cannot be simulated, or not even the bound can be had.
+    /// [`StudyError`] if they cannot be simulated, or if the bound cannot be computed.
     pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<CampaignAccuracy, StudyError> {
         let streams: Vec<u64> = (0..self.runs).collect();
         let all = streams.into_par_iter().with_max_len(1).map(|stream| {
@@ -117,7 +117,7 @@ impl CampaignStudy {
         Ok(compare(&outcome, &simulated, &bound))
     }
 
-    /// Covariance of parameters and of the coefficients that the outcome has, at the truth.
+    /// Bound for the covariance of the parameters and of the outcome's coefficients, linearised at the truth.
     fn bound(
         &self,
         problem: &Problem,
@@ -133,7 +133,7 @@ impl CampaignStudy {
     }
 }
 
-/// The true triads at the reference temperature of an outcome, as the mean of all recordings has them.
+/// The true triads at the reference temperature of an outcome, averaged over all recordings.
 fn truth(outcome: &Outcome, simulated: &[Simulated]) -> PerSensor<Triad> {
     let form = outcome.estimate.form();
     let base = simulated
@@ -217,7 +217,7 @@ fn compare(
     })
 }
 
-/// The order of each group that was chosen, and the true one.
+/// The selected and the true order of each group.
 fn orders(outcome: &Outcome, simulated: &[Simulated]) -> [OrderChosen; 6] {
     let form = outcome.estimate.form();
     let thermal = outcome.thermal.as_ref();
@@ -248,7 +248,7 @@ fn true_order(truth: &ThermalTruth, group: Group) -> (usize, bool) {
 }
 
 impl CampaignAccuracy {
-    /// NEES/n over all campaigns with its 99 % interval; none without campaigns.
+    /// NEES/n over all campaigns with its 99 % interval; `None` without campaigns.
     pub fn anees(&self) -> Option<(f64, (f64, f64))> {
         let (sum, count) = self.trials.iter().fold((0.0, 0), |(sum, count), trial| {
             (sum + trial.nees.0, count + trial.nees.1)
@@ -256,8 +256,8 @@ impl CampaignAccuracy {
         (count > 0).then(|| (sum / count as f64, mean_square_interval(count, 0.01)))
     }
 
-    /// Figures of the parameters of a group at the reference, or of their coefficients of one function, normalised; and how
-    /// many campaigns have them.
+    /// Figures of the parameters of a group at the reference, or of their coefficients of one function, normalised, and
+    /// the number of campaigns that have them.
     pub fn figures(&self, group: Group, function: Option<usize>) -> Option<(Figures, usize)> {
         let of = |trial: &CampaignTrial| {
             let of_group = |e: &&ErrorOf| e.group == group && e.function == function;
@@ -276,7 +276,7 @@ impl CampaignAccuracy {
         (count > 0).then(|| (Figures::new(all.into_iter()), count))
     }
 
-    /// In how many campaigns the order of a group was chosen as it is, and of how many.
+    /// Number of campaigns in which the true order of a group was selected, and number of all campaigns.
     pub fn right_orders(&self, group: Group) -> (usize, usize) {
         let place = Group::all().position(|g| g == group).unwrap_or(0);
         let right = |trial: &&CampaignTrial| {
@@ -288,7 +288,7 @@ impl CampaignAccuracy {
 }
 
 impl CampaignAccuracy {
-    /// The functions of temperature that any campaign has, after none for parameters at the reference.
+    /// `None`, for parameters at the reference, followed by the temperature functions of any campaign.
     pub fn functions(&self) -> Vec<Option<usize>> {
         let all = self.trials.iter().flat_map(|trial| &trial.errors);
         let mut functions: Vec<Option<usize>> = all.map(|error| error.function).collect();

@@ -1,9 +1,9 @@
 //! The paper's turntable experiment (§3.3, Figure 10) as a simulation: instruments are calibrated by
 //! the closed form and by the filter, and navigate with the errors that remain.
 //!
-//! A calibration's navigation error is `error(t) = (S(t) + Φ(t) X₀) δθ`: S what the parameter errors
-//! δθ do on the way, X₀ what they did to the alignment at the start. Both are linear, so each mission
-//! is followed once and serves every calibration.
+//! The navigation error of a calibration is `error(t) = (S(t) + Φ(t) X₀) δθ`: S is the effect of the
+//! parameter errors δθ during the mission, X₀ their effect on the initial alignment. Both are linear, so
+//! each mission is computed once for all calibrations.
 
 mod budget;
 mod method;
@@ -59,7 +59,7 @@ pub enum ExperimentError {
     /// A path that belongs to the experiment cannot be had.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// A path is beyond the table.
+    /// The table cannot follow a path.
     #[error(transparent)]
     Table(#[from] TableError),
     /// A mission cannot be navigated.
@@ -67,7 +67,7 @@ pub enum ExperimentError {
     Navigation(#[from] NavigationStudyError),
 }
 
-/// How an instrument navigates.
+/// Situation in which an instrument navigates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Situation {
     /// It stands level, heading North, and has found its attitude by itself.
@@ -126,7 +126,7 @@ pub struct Worth {
     /// Time in s against the median.
     pub against_time: Vec<(f64, f64)>,
     /// Median of the closed form in the same installation form over that of this method, both at the
-    /// end; none for the closed form itself.
+    /// end; `None` for the closed form itself.
     pub gain: Option<Ratio>,
     /// What the claimed covariance says of the error at the end.
     pub budget: Budget,
@@ -170,8 +170,8 @@ impl Spread {
 type ByParameter = SMatrix<f64, 2, PARAMETERS>;
 
 impl ExperimentStudy {
-    /// Makes everything, on all cores; `done` is told of each instrument. The result does not depend
-    /// on how many cores there are.
+    /// Runs the whole study on all cores; `done` is called after each instrument. The result does not
+    /// depend on the number of cores.
     ///
     /// # Errors
     /// [`ExperimentError`] if runs or missions cannot be made. A calibration that fails is no error:
@@ -181,7 +181,7 @@ impl ExperimentStudy {
         self.result(self.trials(&all, done)?)
     }
 
-    /// Makes some of the instruments, given by their numbers; `done` is told of each.
+    /// Runs some of the instruments, given by their numbers; `done` is called after each.
     ///
     /// # Errors
     /// As [`Self::run`].

@@ -1,4 +1,4 @@
-//! Studies: what many simulated runs say.
+//! Studies: statistics over many simulated runs.
 
 pub mod accuracy;
 pub mod campaign;

@@ -1,5 +1,5 @@
-//! What a calibration is worth: the navigation error that what is wrong with it causes, by the
-//! nonlinear equations of navigation, and the σ of that error that its covariance predicts, by the linear model.
+//! Navigation accuracy of a calibration: the navigation error due to its errors, by the nonlinear equations of
+//! navigation, and the σ of this error predicted from its covariance, by the linear model.
 
 mod outlook;
 mod warming;
@@ -27,34 +27,34 @@ pub use warming::{Warming, WarmingError, WarmingPair};
 pub const INTERVAL: f64 = 60.0;
 /// Intervals in the 40 h of the paper's study.
 pub const FORTY_HOURS: u32 = 40 * 60;
-/// How a body moves while it navigates.
+/// Motion of a navigating body.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Motion {
-    /// It stands.
+    /// At rest.
     Standing(Solution),
-    /// It follows a trajectory.
+    /// Along a trajectory.
     Moving(Trajectory),
 }
 
-/// How, and how long, a body navigates, from perfect alignment, its height held to the true one.
+/// Motion and duration of navigation, from perfect alignment, with the height held to the true height.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mission {
-    /// How it moves.
+    /// Motion of the body.
     pub motion: Motion,
-    /// How many intervals it lasts.
+    /// Number of intervals.
     pub intervals: u32,
-    /// Time between two moments of the result, s; [`INTERVAL`] but for what lasts minutes or less.
+    /// Time between two moments of the result, s; [`INTERVAL`], except for missions of minutes or less.
     pub interval: f64,
 }
 
 /// A calibration and the truth, in one body frame and one installation form.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pair {
-    /// What the instrument is.
+    /// The true triads.
     pub truth: PerSensor<Triad>,
-    /// What it is taken for.
+    /// The triads according to the calibration.
     pub calibration: PerSensor<Triad>,
-    /// Covariance of the calibration minus the truth; none if no σ is claimed.
+    /// Covariance of the calibration minus the truth; `None` if no σ is stated.
     pub covariance: Option<ParameterMatrix>,
 }
 
@@ -65,8 +65,8 @@ pub struct Epoch {
     pub time: f64,
     /// The actual error.
     pub error: NavigationError,
-    /// The covariance predicted, in the order of [`NavigationError::to_vector`]; none if the
-    /// calibration claims no σ.
+    /// The predicted covariance, in the order of [`NavigationError::to_vector`]; `None` if the
+    /// calibration states no σ.
     pub covariance: Option<ErrorMatrix>,
 }
 
@@ -78,38 +78,40 @@ impl Epoch {
     }
 }
 
-/// Navigation errors against the parameters of both triads at one moment.
+/// Sensitivity of navigation errors to the parameters of both triads at one moment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Exposure {
     /// Time since the start, s.
     pub time: f64,
-    /// Errors in the order of [`NavigationError::to_vector`] by parameter errors, true − estimated.
+    /// Errors, in the order of [`NavigationError::to_vector`], per parameter error, true − estimated.
     pub by_parameter: SMatrix<f64, STATES, PARAMETERS>,
 }
 
-/// Why a calibration's navigation error cannot be had.
+/// Errors in computing the navigation error of a calibration.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum NavigationStudyError {
-    /// East-North-Up ends at the poles.
+    /// East-North-Up is singular at the poles.
     #[error(transparent)]
     NearPole(#[from] NearPole),
     /// A calibration that cannot be inverted.
-    #[error("the sensitivity matrix K·C of the {} is singular: such a calibration navigates nowhere", .sensor.name())]
+    #[error("the sensitivity matrix K·C of the {} is singular: this calibration cannot be used for navigation", .sensor.name())]
     Singular {
-        /// Which triad.
+        /// The triad.
         sensor: Sensor,
     },
     /// Calibrations that cannot be navigated with while they warm up.
     #[error(transparent)]
     Warming(#[from] WarmingError),
-    /// Roll and heading are one.
-    #[error("at a pitch of ±90° roll and heading are not apart: give a pitch within ±89°")]
+    /// Roll and heading are not distinguishable.
+    #[error(
+        "at a pitch of ±90°, roll and heading cannot be distinguished: give a pitch within ±89°"
+    )]
     Upright,
 }
 
 impl Pair {
-    /// From records, brought to the general form and to a common body frame, which is returned, too.
-    /// The truth may be a calibration with a σ of its own.
+    /// A pair from records, converted to the general form and to a common body frame, which is returned, too.
+    /// The truth may be a calibration with its own σ.
     ///
     /// # Errors
     /// If the records cannot be compared.
@@ -148,7 +150,7 @@ impl Pair {
         self
     }
 
-    /// What the calibration makes of the instrument's output, `u_est = M u + m` for each triad.
+    /// Calibrated output of the instrument, `u_est = M u + m` for each triad.
     fn sensed(&self) -> Result<PerSensor<Sensed>, NavigationStudyError> {
         let of = |sensor: Sensor| {
             let (truth, calibration) = (self.truth.get(sensor), self.calibration.get(sensor));
@@ -166,7 +168,7 @@ impl Pair {
     }
 }
 
-/// Error of what a triad senses: proportional to the input, and constant.
+/// Error of the sensed input of a triad: a proportional part, and a constant one.
 struct Sensed {
     relative: Matrix3<f64>,
     constant: Vector3<f64>,
@@ -215,7 +217,7 @@ impl Mission {
         Ok(moments)
     }
 
-    /// The errors alone, by their nonlinear equations: milliseconds for a body that stands for 40 h.
+    /// The errors alone, by their nonlinear equations, which takes milliseconds for 40 h at rest.
     ///
     /// # Errors
     /// As for [`Self::navigate`].
@@ -235,7 +237,7 @@ impl Mission {
         self.errors_by(start, |_| pair.sensed())
     }
 
-    /// The same where what is sensed is new in each interval, told by number.
+    /// The same with sensor errors that change in each interval, given by its number.
     fn errors_by(
         &self,
         start: &ErrorVector,
@@ -261,8 +263,8 @@ impl Mission {
         Ok(moments)
     }
 
-    /// What each parameter's error does, by the linear model, at the start and after each interval. It
-    /// depends on the instrument so little that one will do for all of a grade.
+    /// Sensitivity to each parameter, by the linear model, at the start and after each interval. It depends so
+    /// little on the instrument that one serves for a whole grade.
     ///
     /// # Errors
     /// As for [`Self::navigate`].
@@ -273,7 +275,7 @@ impl Mission {
         self.exposure_from(Sensitivity::zeros(), truth)
     }
 
-    /// The same where the errors at the start depend on the parameters, too.
+    /// The same if the errors at the start depend on the parameters, too.
     ///
     /// # Errors
     /// As for [`Self::navigate`].
@@ -303,7 +305,7 @@ impl Mission {
         Ok(exposures)
     }
 
-    /// The same with a linear model that is new in each interval, told by number.
+    /// The same with a linear model that changes in each interval, given by its number.
     fn exposure_by<L: Fn(&Instant) -> Linearisation>(
         &self,
         mut sensitivity: Sensitivity,
@@ -329,7 +331,7 @@ impl Mission {
 }
 
 impl Exposure {
-    /// Horizontal position error, east and north in m, by parameter errors, true − estimated.
+    /// Horizontal position error, east and north in m, per parameter error, true − estimated.
     pub fn position(&self) -> SMatrix<f64, 2, PARAMETERS> {
         self.by_parameter.fixed_rows::<2>(6).into_owned()
     }
@@ -366,7 +368,7 @@ fn exposure(
     })
 }
 
-/// A body's true motion step by step, whether it stands or moves.
+/// True motion of a body step by step, at rest or moving.
 enum Course<'a> {
     Standing { here: Instant, time: f64 },
     Moving(Box<Strides<'a>>),
@@ -383,7 +385,7 @@ impl<'a> Course<'a> {
         }
     }
 
-    /// The true state now and what is sensed in it.
+    /// The current true state and sensed input.
     fn here(&self) -> &Instant {
         match self {
             Self::Standing { here, .. } => here,
@@ -391,7 +393,7 @@ impl<'a> Course<'a> {
         }
     }
 
-    /// Goes on until a time in s since the start, as [`Strides::go`] does.
+    /// Continues until a time in s since the start, like [`Strides::go`].
     fn go<E>(
         &mut self,
         until: f64,

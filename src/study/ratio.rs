@@ -7,13 +7,13 @@ use rand_chacha::ChaCha8Rng;
 const SAMPLES: usize = 2000;
 /// Probability outside the interval, half on each side.
 const OUTSIDE: f64 = 0.01;
-/// The bootstrap's own seed: its draws have nothing to do with those of the runs.
+/// The bootstrap's own seed: its draws are independent of those of the runs.
 const SEED: u64 = 0;
 
 /// A ratio of root mean squares, or of medians.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ratio {
-    /// Of all runs.
+    /// Ratio over all runs.
     pub value: f64,
     /// 99 % interval: percentiles of the ratio over runs drawn with replacement (Efron, Tibshirani,
     /// *An Introduction to the Bootstrap*, §13.3).
@@ -21,8 +21,8 @@ pub struct Ratio {
 }
 
 impl Ratio {
-    /// The ratio of two root mean squares of the same runs, each given by the sum of squares of each
-    /// run; `None` without runs.
+    /// The ratio of two root mean squares over the same runs, each given by the sums of squares of all
+    /// runs; `None` without runs.
     pub(super) fn of(over: &[f64], under: &[f64]) -> Option<Self> {
         let sum = |of: &[f64], chosen: &[usize]| chosen.iter().map(|&k| of[k]).sum::<f64>();
         let ratio = |chosen: &[usize]| (sum(over, chosen) / sum(under, chosen)).sqrt();
@@ -70,8 +70,8 @@ pub fn median(of: &[f64], chosen: &[usize]) -> f64 {
     quantile(&values, 0.5)
 }
 
-/// The value below which this share of sorted values lies, between two of them by proportion; NaN of
-/// none.
+/// The value below which this share of sorted values lies, by linear interpolation; NaN without
+/// values.
 pub fn quantile(sorted: &[f64], share: f64) -> f64 {
     let place = share * sorted.len().saturating_sub(1) as f64;
     let (below, part) = (place as usize, place.fract());

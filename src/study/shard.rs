@@ -1,4 +1,4 @@
-//! A part of a job of many runs, so that several machines can share it.
+//! A part of a job of many runs, for execution on several machines.
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,22 +8,22 @@ use serde::{Deserialize, Serialize};
 /// Part `index` of `of` of a job: every `of`-th run, the first being run `index - 1`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shard {
-    /// From one.
+    /// Number of the part, from one.
     index: u64,
-    /// How many parts there are.
+    /// Number of parts.
     of: u64,
 }
 
-/// Not a part of a job.
+/// Invalid part of a job.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("expected two whole numbers i/M, i from 1 to M, such as 3/8 for the third part of eight")]
 pub struct ShardError;
 
 impl Shard {
-    /// All of a job.
+    /// The whole job.
     pub const WHOLE: Self = Self { index: 1, of: 1 };
 
-    /// The numbers of its runs among `count`, from zero, in order.
+    /// The numbers of its runs among `count` runs, from zero, in order.
     pub fn runs(self, count: u64) -> Vec<u64> {
         let mut runs = Vec::new();
         let mut next = Some(self.index - 1);

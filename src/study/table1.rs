@@ -1,16 +1,15 @@
-//! The paper's Table 1: what the two simplified installation forms cost in 40 h of navigation (Zhao,
+//! The paper's Table 1: errors of 40 h of navigation due to the two simplified installation forms (Zhao,
 //! Jiang, Li 2016, §3.2).
 //!
-//! Installation angles are drawn (six independent ones for each triad, rows of unit norm), the triad
-//! is calibrated by the closed form from six positions without noise, and the errors that remain
-//! at rest is navigated with, standing level at a perfect alignment and with height held: gyros and
-//! accelerometers one after the other. The figure of a sample is the largest absolute error of the
-//! run.
+//! For each sample, installation angles are drawn (six independent ones for each triad, rows of unit norm),
+//! and the triad is calibrated by the closed form from six positions without noise. Navigation at rest uses
+//! the remaining errors, level, with perfect alignment and height held, for gyros and accelerometers
+//! separately. The figure of a sample is the largest absolute error of the run.
 //!
-//! Navigation is the linear error model. That suffices because the errors are small: the terms it
-//! leaves out are products of two errors, at most a hundredth of the largest error in any row of the
-//! table (a test holds it against nonlinear navigation). What is second order in the calibration, such
-//! as scale factors of rows of unit norm, is not left out.
+//! Navigation uses the linear error model. This suffices because the errors are small: the neglected terms
+//! are products of two errors, at most a hundredth of the largest error in any row of the table (a test
+//! compares it with nonlinear navigation). Second-order terms of the calibration, such as scale factors of
+//! rows of unit norm, are included.
 
 pub mod paper;
 mod response;
@@ -33,18 +32,18 @@ pub use paper::{ByQuantity, Installation, Kind, Quantity, Reading};
 pub use response::Moments;
 pub use verdict::{AGREEMENT, Verdict};
 
-/// Verdicts rest on at least this many samples, so that chance is the paper's alone.
+/// Least number of samples for verdicts, so that only the paper's sampling error matters.
 pub const POPULATION: usize = 4000;
 
-/// Times at which the courses of samples are kept.
+/// Number of times at which the errors of samples are stored.
 const TIMES: usize = 500;
 
-/// What is studied.
+/// Configuration of the study.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Table1Study {
     /// Number of samples, at least two.
     pub samples: usize,
-    /// Seed; each sample has its own stream of it.
+    /// Seed; each sample has its own random stream.
     pub seed: u64,
     /// Length of a run, h.
     pub hours: f64,
@@ -52,7 +51,7 @@ pub struct Table1Study {
     pub latitude: f64,
 }
 
-/// A study that cannot be made.
+/// Errors of a study.
 #[derive(Debug, thiserror::Error)]
 pub enum Table1Error {
     /// The embedded models of the paper's instrument cannot be read.
@@ -65,10 +64,10 @@ pub enum Table1Error {
         LARGEST_LATITUDE / DEGREE
     )]
     Latitude(f64),
-    /// The length of a run.
+    /// Invalid length of a run, h.
     #[error("a run of {0} h; expected more than 0 h")]
     Hours(f64),
-    /// Standard deviations need two.
+    /// Standard deviations need two samples.
     #[error("{0} samples; expected at least 2")]
     Samples(usize),
     /// A sample's positions leave its calibration undetermined.
@@ -78,29 +77,29 @@ pub enum Table1Error {
     Degenerate(usize),
 }
 
-/// The result.
+/// Result of the study.
 #[derive(Debug, Clone)]
 pub struct Table1 {
-    /// What was studied.
+    /// The configuration.
     pub study: Table1Study,
-    /// Number of samples that verdicts rest on; the first of them are those of the study.
+    /// Number of samples for the verdicts; the first of them are those of the study.
     pub population: usize,
     /// The paper's columns, in its order.
     pub columns: Vec<Column>,
 }
 
-/// One of the paper's columns under all its readings.
+/// One of the paper's columns under all readings.
 #[derive(Debug, Clone)]
 pub struct Column {
-    /// The paper's.
+    /// The published column.
     pub published: &'static Published,
-    /// As the paper states it.
+    /// The row under the stated reading.
     pub stated: Row,
-    /// Under its other readings.
+    /// The rows under other readings.
     pub others: Vec<Row>,
-    /// What can be said of the paper's figures.
+    /// Verdict on the paper's figures.
     pub verdict: Verdict,
-    /// How errors went over time, as stated.
+    /// Errors against time, under the stated reading.
     pub courses: Courses,
 }
 
@@ -111,9 +110,9 @@ pub struct Row {
     pub reading: &'static Reading,
     /// Length of the runs, h.
     pub hours: f64,
-    /// Of the samples of the study.
+    /// Moments over the samples of the study.
     pub sample: ByQuantity<Moments>,
-    /// Of the population.
+    /// Moments over the population.
     pub population: ByQuantity<Moments>,
     /// Difference of the paper's mean from that of the population, in standard errors of the
     /// difference.
@@ -124,35 +123,35 @@ pub struct Row {
 }
 
 impl Column {
-    /// All rows, that as stated first.
+    /// All rows; the stated reading first.
     pub fn rows(&self) -> impl Iterator<Item = &Row> {
         std::iter::once(&self.stated).chain(&self.others)
     }
 }
 
 impl Row {
-    /// Whether a quantity agrees with the paper's.
+    /// Whether a quantity agrees with the paper's figure.
     pub fn agrees(&self, quantity: Quantity) -> bool {
         self.difference[quantity as usize].abs() <= AGREEMENT
     }
 }
 
-/// How errors go over time: attitude with its sign, velocity and position as norms.
+/// Errors against time: attitude with its sign, velocity and position as norms.
 #[derive(Debug, Clone, Default)]
 pub struct Courses {
     /// Times, s.
     pub times: Vec<f64>,
-    /// For each of the first samples, at most as many as the paper's, its errors at each time.
+    /// Errors at each time of the first samples, at most as many as in the paper.
     pub samples: Vec<Vec<ByQuantity<f64>>>,
-    /// Over all samples of the study, at each time.
+    /// Moments over all samples of the study, at each time.
     pub moments: Vec<ByQuantity<Moments>>,
 }
 
 impl Table1Study {
-    /// Makes the table, on all cores. The result does not depend on how many there are.
+    /// Computes the table on all cores. The result does not depend on the number of cores.
     ///
     /// # Errors
-    /// [`Table1Error`] if no table can be made of what is asked for.
+    /// [`Table1Error`] if the configuration is invalid.
     pub fn run(&self) -> Result<Table1, Table1Error> {
         if self.samples < 2 {
             return Err(Table1Error::Samples(self.samples));
@@ -275,7 +274,7 @@ impl Table1Study {
         })
     }
 
-    /// How the errors of a row go over time.
+    /// Errors of a row against time.
     ///
     /// # Errors
     /// As [`Self::run`].
@@ -296,7 +295,7 @@ impl Table1Study {
     }
 }
 
-/// What a calibration computes from the output at rest, minus the true input.
+/// The input that a calibration computes from the output at rest, minus the true input.
 fn sensed(truth: &Triad, calibrated: Option<Triad>, input: &Vector3<f64>) -> Option<Vector3<f64>> {
     let calibrated = calibrated?;
     Some(calibrated.correction()? * (truth.output(input) - calibrated.bias) - input)

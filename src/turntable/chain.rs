@@ -1,4 +1,4 @@
-//! The chain of joints from the Earth to the body, and how it moves.
+//! The chain of joints from the Earth to the body, and its motion.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -23,7 +23,7 @@ impl Kinematics {
         self.acceleration = constant.tr_mul(&self.acceleration);
     }
 
-    /// Goes on through a joint that turns about `axis`.
+    /// Continues the chain through a joint that turns about `axis`.
     fn turn(&mut self, axis: &Vector3<f64>, angle: f64, rate: f64, acceleration: f64) {
         let rotation = exp(axis * angle);
         self.times(&rotation);
@@ -32,18 +32,18 @@ impl Kinematics {
     }
 }
 
-/// Rotation vectors that go with each of [`phases`] of an angle, rad.
+/// Rotation vectors for each of [`phases`] of an angle, rad.
 type Harmonics = [Vector3<f64>; PHASES];
 
-/// The joints that move during one stretch of a path, and what is fixed around them.
+/// The joints that move during one stretch of a path, with the fixed rotations around them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Chain {
-    /// What lies before the first joint; `C_b_n` where nothing moves.
+    /// Rotation before the first joint; `C_b_n` if nothing moves.
     base: Matrix3<f64>,
     joints: Vec<Joint>,
 }
 
-/// A moving joint and what is fixed behind it.
+/// A moving joint with the fixed rotation behind it.
 #[derive(Debug, Clone, PartialEq)]
 struct Joint {
     axis: Vector3<f64>,
@@ -54,7 +54,7 @@ struct Joint {
 }
 
 impl Chain {
-    /// A body that stands.
+    /// A body at rest.
     pub fn still(attitude: Matrix3<f64>) -> Self {
         Self {
             base: attitude,
@@ -69,7 +69,7 @@ impl Chain {
         chain
     }
 
-    /// A table whose axes turn from these angles along these profiles; without profiles it stands.
+    /// A table whose axes turn from these angles along these profiles; without profiles it is at rest.
     pub fn of_table(
         table: &Table,
         imperfection: &Imperfection,
@@ -115,7 +115,7 @@ impl Chain {
         self.joints.is_empty()
     }
 
-    /// How long the slowest joint takes, s.
+    /// Duration of the slowest joint's move, s.
     pub fn duration(&self) -> f64 {
         let durations = self.joints.iter().map(|joint| joint.profile.duration());
         durations.fold(0.0, f64::max)
@@ -128,7 +128,7 @@ impl Chain {
         start.into_iter().chain(of_joints)
     }
 
-    /// The state so many seconds after the start.
+    /// The state at this time after the start, s.
     pub fn at(&self, time: f64) -> Kinematics {
         let mut state = Kinematics {
             attitude: self.base,
@@ -149,7 +149,7 @@ impl Chain {
 }
 
 impl Joint {
-    /// Goes on through its harmonics.
+    /// Continues the chain through its harmonics.
     fn stray(&self, state: &mut Kinematics, angle: f64, turned: &Turned) {
         // Cosine and sine of the angle, then of twice the angle, with their derivatives.
         let [c, s, c2, s2] = phases(angle);

@@ -1,4 +1,4 @@
-//! What a table is wrong by and does not read.
+//! Errors of a table that its readings do not include.
 
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -17,7 +17,7 @@ pub const PHASES: usize = 4;
 pub const AXIS_ERRORS: usize = ACROSS * (AXES - 1) + AXES * PHASES * ACROSS + AXES * PHASES;
 /// Errors of the base and of the axes.
 pub const TABLE_GEOMETRY: usize = 3 + AXIS_ERRORS;
-/// How the attitude turns in the navigation frame with each error of the axes.
+/// Rotation of the attitude in the navigation frame per error of the axes.
 pub type AxisResponse = SMatrix<f64, 3, AXIS_ERRORS>;
 /// Axes of a table, outermost first: direction when all angles are zero, and angle in rad.
 pub type AxisAngles = [Option<(Vector3<f64>, f64)>; AXES];
@@ -52,7 +52,7 @@ impl AxisError {
         }
     }
 
-    /// That of an index among the errors of the axes; `None` beyond the last.
+    /// The kind at an index among the errors of the axes; `None` beyond the last.
     pub fn of(index: usize) -> Option<Self> {
         let mut all = Self::ALL.into_iter();
         all.find(|kind| kind.range().contains(&index))
@@ -73,13 +73,13 @@ impl AxisError {
     }
 }
 
-/// 1σ of errors that move a table's true attitude and not its reading; zero where they are not to be
+/// 1σ of errors that change a table's true attitude but not its reading; zero if they are not
 /// estimated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TableGeometry {
-    /// Of the base about East, North (level) and Up (north), rad.
+    /// 1σ of the base about East, North (level) and Up (north), rad.
     pub base: Vector3<f64>,
-    /// Of each error of the axes, see [`AxisError::range`], rad; zero for axes that the table does not
+    /// 1σ of each error of the axes, see [`AxisError::range`], rad; zero for axes that the table does not
     /// have.
     pub axes: SVector<f64, AXIS_ERRORS>,
 }
@@ -94,12 +94,12 @@ impl Default for TableGeometry {
 }
 
 impl TableGeometry {
-    /// Whether there are any of a kind.
+    /// Whether there are errors of this kind.
     pub fn has(&self, kind: AxisError) -> bool {
         self.axes.rows_range(kind.range()).amax() > 0.0
     }
 
-    /// Of the base about East, North and Up, then of each error of the axes.
+    /// 1σ of the base about East, North and Up, then of each error of the axes.
     pub fn vector(&self) -> SVector<f64, TABLE_GEOMETRY> {
         SVector::from_iterator(self.base.iter().chain(&self.axes).copied())
     }
@@ -127,12 +127,12 @@ pub fn table_geometry_name(k: usize) -> Option<String> {
     })
 }
 
-/// How the attitude of a table whose axes stand at these angles turns with errors of the axes.
+/// Rotation of the attitude of a table with axes at these angles, per error of the axes.
 ///
-/// `C_b_n = C_base R(a₁, θ₁) [I + t₂×] R(a₂, θ₂) [I + t₃×] R(a₃, θ₃) …`: what turns an axis in the frame of
-/// the next one outwards turns all that it carries, in the navigation frame by `R(a₁, θ₁) t₂` and
-/// `R(a₁, θ₁) R(a₂, θ₂) t₃`. Wobble is a t across the axis that goes with its angle, an error of its
-/// encoder one along it.
+/// `C_b_n = C_base R(a₁, θ₁) [I + t₂×] R(a₂, θ₂) [I + t₃×] R(a₃, θ₃) …`: a tilt of an axis in the frame of
+/// the next one outwards rotates everything that the axis carries, in the navigation frame by `R(a₁, θ₁) t₂`
+/// and `R(a₁, θ₁) R(a₂, θ₂) t₃`. Wobble is a t across the axis that depends on its angle, an encoder error a t
+/// along it.
 pub fn axis_response(axes: &AxisAngles) -> AxisResponse {
     let mut response = AxisResponse::zeros();
     let mut carried = Matrix3::identity();
@@ -156,7 +156,7 @@ pub fn axis_response(axes: &AxisAngles) -> AxisResponse {
     response
 }
 
-/// What goes with an axis' angle once and twice a turn.
+/// Cosine and sine of an axis' angle and of twice the angle.
 pub fn phases(angle: f64) -> [f64; PHASES] {
     let ((s, c), (s2, c2)) = (angle.sin_cos(), (2.0 * angle).sin_cos());
     [c, s, c2, s2]

@@ -1,10 +1,10 @@
-//! The machine: a turntable, the path it is driven along, and where it then is at any time.
+//! The machine: a turntable, its path, and its attitude at any time.
 //!
 //! `C_b_n = C_base R(axis₁, a₁) R(axis₂, a₂) … C_mount`, axes from the outermost to the innermost.
-//! The machine's errors are of two kinds. What it does not know (level, north, non-orthogonality,
-//! wobble, encoder errors that repeat with angle) moves the true attitude but not the reading, see
-//! [`Imperfection`]; what it reads wrongly
-//! (position error and reading noise) is left to whoever makes the readings.
+//! The machine's errors are of two kinds. Errors unknown to it (level, north, non-orthogonality,
+//! wobble, encoder errors that repeat with angle) change the true attitude but not the reading, see
+//! [`Imperfection`]. Errors of the reading (position error and reading noise) are added where readings
+//! are made.
 
 mod chain;
 mod geometry;
@@ -23,13 +23,13 @@ pub use path::{AxesStep, BodyStep, Moves, Path, Rotation};
 pub use profile::{Profile, Turned};
 pub use table::{Axis, AxisImperfection, Imperfection, Table, TableAccuracy, TableErrors};
 
-/// Why a table cannot be driven along a path.
+/// Errors of a table that cannot follow a path.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TableError {
     /// A list of angles that does not fit the table.
     #[error("{place}: {found} angles for a table of {expected} axes; give one angle per axis")]
     AxisCount {
-        /// Where in the path.
+        /// Place in the path.
         place: String,
         /// Number of angles.
         found: usize,
@@ -45,16 +45,16 @@ pub enum TableError {
         step: usize,
         /// `rate` or `acceleration`.
         what: &'static str,
-        /// Asked for.
+        /// Requested value.
         found: f64,
-        /// Allowed.
+        /// Allowed value.
         limit: f64,
         /// Unit of both.
         unit: &'static str,
         /// Name of the axis.
         axis: String,
     },
-    /// A rotation that cannot be made in its time.
+    /// A rotation that cannot be completed in its time.
     #[error(
         "step {step}: {angle_deg:.3}° in {duration} s needs more than its acceleration; allow {needed:.2} s or more"
     )]
@@ -68,7 +68,7 @@ pub enum TableError {
         /// Time needed, s.
         needed: f64,
     },
-    /// Errors of axes on a path that does not say how the axes turn.
+    /// Axis errors on a path that does not state how the axes turn.
     #[error(
         "the path turns about body axes, which does not say how the table's axes turn; take a table without non-orthogonality, wobble and encoder harmonics, or a path in table axes"
     )]

@@ -1,4 +1,4 @@
-//! Where the table is at any time.
+//! Attitude of the table at any time.
 
 use std::f64::consts::PI;
 
@@ -28,7 +28,7 @@ pub struct Motion {
 impl Motion {
     /// Drives a table with these imperfections along a path.
     ///
-    /// A rotation about body axes is held against the lowest limits of all axes.
+    /// A rotation about body axes is checked against the lowest limits of all axes.
     ///
     /// # Errors
     /// If the path does not fit the table's axes or is beyond its limits.
@@ -77,28 +77,28 @@ impl Motion {
         Ok(motion)
     }
 
-    /// How long the path takes, s.
+    /// Duration of the path, s.
     pub fn duration(&self) -> f64 {
         self.stretches.last().map_or(0.0, |last| last.end)
     }
 
     /// The times in s, in order, at which derivatives of the rate jump. An integral across one of
-    /// them is best made in two parts.
+    /// them is best computed in two parts.
     pub fn breaks(&self) -> &[f64] {
         &self.breaks
     }
 
-    /// Whether the table stands at a time in s.
+    /// Whether the table is at rest at a time in s.
     pub fn stands(&self, time: f64) -> bool {
         self.stretch(time).chain.stands()
     }
 
-    /// How many moves have begun at a time in s: the number of the position in force.
+    /// Number of moves started before a time in s, which is the number of the current position.
     pub fn position(&self, time: f64) -> usize {
         self.stretch(time).position
     }
 
-    /// When the table stands, `(start, end)` in s, in order.
+    /// The dwells, `(start, end)` in s, in order.
     pub fn dwells(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
         self.stretches
             .iter()

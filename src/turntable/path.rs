@@ -1,12 +1,12 @@
-//! What a table is told to do.
+//! Commanded positions and moves of a table.
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// A sequence of positions, with the attitude that it starts from.
+/// A sequence of positions with its initial attitude.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Path {
-    /// How long the table stands before the first step, s.
+    /// Dwell before the first step, s.
     pub first_dwell: f64,
     /// The moves, in axes of one kind.
     pub moves: Moves,
@@ -34,26 +34,26 @@ pub enum Moves {
 /// All named axes turn at once, then the table stands.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AxesStep {
-    /// By how much each axis turns, outermost first, rad.
+    /// Turn of each axis, outermost first, rad.
     pub angles: Vec<f64>,
     /// Rate that the turns reach, rad/s.
     pub rate: f64,
     /// Peak acceleration, rad/s².
     pub acceleration: f64,
-    /// How long the table stands afterwards, s.
+    /// Dwell afterwards, s.
     pub dwell: f64,
 }
 
 /// One rotation about a body axis, then the table stands.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BodyStep {
-    /// Where to.
+    /// The rotation.
     pub rotation: Rotation,
-    /// How long the rotation takes, s.
+    /// Duration of the rotation, s.
     pub duration: f64,
     /// Peak acceleration, rad/s².
     pub acceleration: f64,
-    /// How long the table stands afterwards, s.
+    /// Dwell afterwards, s.
     pub dwell: f64,
 }
 
@@ -62,7 +62,7 @@ pub struct BodyStep {
 pub enum Rotation {
     /// By a rotation vector along body axes, rad.
     By(Vector3<f64>),
-    /// The shortest way to where a body axis points along a direction.
+    /// The shortest rotation that points a body axis along a direction.
     Point {
         /// Unit vector along body axes.
         axis: Vector3<f64>,

@@ -1,4 +1,4 @@
-//! How an axis gets from one angle to another.
+//! Motion profile of an axis from one angle to another.
 
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -58,12 +58,12 @@ impl Profile {
         })
     }
 
-    /// How long the turn takes, s.
+    /// Duration of the turn, s.
     pub fn duration(&self) -> f64 {
         2.0 * self.ramp + self.plateau
     }
 
-    /// The highest rate, rad/s, not signed.
+    /// The highest rate, rad/s, unsigned.
     pub fn peak_rate(&self) -> f64 {
         self.rate.abs()
     }

@@ -1,4 +1,4 @@
-//! The table: its axes, their limits, and what is wrong with them.
+//! The table: its axes, their limits and their errors.
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -11,7 +11,7 @@ const SINE: usize = 1;
 /// A rotation axis of a table.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Axis {
-    /// What its makers call it, such as `outer`.
+    /// Its name, such as `outer`.
     pub name: String,
     /// Unit vector in the frame of the next axis outwards; that of the outermost in East-North-Up.
     pub direction: Vector3<f64>,
@@ -28,19 +28,19 @@ pub struct Table {
     pub axes: Vec<Axis>,
     /// `C_mount`, body to the innermost axis' frame.
     pub mount: Matrix3<f64>,
-    /// How large its errors are.
+    /// 1σ of its errors.
     pub errors: TableErrors,
 }
 
-/// 1σ of what a table's log is wrong by.
+/// 1σ of the errors of a table's log.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TableAccuracy {
-    /// Per axis of the position error, constant while the table is at rest and new at every position,
+    /// 1σ per axis of the position error, constant while the table is at rest and new at every position,
     /// rad.
     pub position_sigma: f64,
-    /// Per axis of the white error of each reading, rad.
+    /// 1σ per axis of the white error of each reading, rad.
     pub reading_sigma: f64,
-    /// Of what it does not read.
+    /// 1σ of errors that the reading does not include.
     pub geometry: TableGeometry,
 }
 
@@ -60,10 +60,10 @@ pub struct TableErrors {
     pub nonorthogonality: f64,
     /// Amplitude of the tilt that every axis makes once per turn.
     pub wobble: f64,
-    /// Of what every axis tilts by with cosine and sine of its angle and of twice its angle, for each
+    /// Amplitudes of the tilt of every axis with cosine and sine of its angle and of twice its angle, for each
     /// direction across it.
     pub wobble_harmonics: f64,
-    /// Of what every encoder reads wrongly with cosine and sine of its angle and of twice its angle.
+    /// Amplitudes of the error of every encoder with cosine and sine of its angle and of twice its angle.
     pub encoder_harmonics: f64,
 }
 
@@ -73,7 +73,7 @@ impl TableErrors {
         *self.of_axes_mut(kind)
     }
 
-    /// The same, to be changed.
+    /// A mutable reference to the same.
     pub fn of_axes_mut(&mut self, kind: AxisError) -> &mut f64 {
         match kind {
             AxisError::Tilt => &mut self.nonorthogonality,
@@ -83,12 +83,12 @@ impl TableErrors {
     }
 }
 
-/// What one table really is beside its drawing: the errors that stay through a run.
+/// Deviations of one table from its design: the errors that are constant in a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Imperfection {
     /// Rotation vector of the base, East-North-Up, rad: `C_base = exp([base×])`.
     pub base: Vector3<f64>,
-    /// Those of each axis.
+    /// Errors of each axis.
     pub axes: Vec<AxisImperfection>,
 }
 
@@ -97,8 +97,7 @@ pub struct Imperfection {
 pub struct AxisImperfection {
     /// A constant tilt.
     pub tilt: Vector3<f64>,
-    /// What goes with each of [`super::phases`] of its angle: across it a wobble, along it what its encoder
-    /// does not read.
+    /// Errors for each of [`super::phases`] of its angle: wobble across the axis, encoder error along it.
     pub harmonics: [Vector3<f64>; PHASES],
 }
 
@@ -111,7 +110,7 @@ impl Imperfection {
         }
     }
 
-    /// A table as its 1σ say, made from independent standard normal numbers.
+    /// Draws a table according to its 1σ, from independent standard normal numbers.
     pub fn draw(table: &Table, mut normal: impl FnMut() -> f64) -> Self {
         let errors = &table.errors;
         let mut any = || Vector3::from_fn(|_, _| normal());

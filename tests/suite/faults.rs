@@ -231,7 +231,7 @@ fn what_no_interpolation_bridges_parts_the_record_and_is_said_with_its_place() {
     let line = format!("line {}", turn.start + 1);
     let said = |finding: &Finding| {
         let words = finding.to_string();
-        words.contains("start anew") && words.contains(&line)
+        words.contains("restart") && words.contains(&line)
     };
     assert!(spoilt.findings.iter().any(said), "{:?}", spoilt.findings);
     // What stands is as it was, and so are the parameters.

@@ -1,9 +1,9 @@
-//! What the curvature of the model adds to a covariance.
+//! Contribution of the model's curvature to a covariance.
 //!
-//! A linear filter sees `K C` change in proportion to the parameters. Where a path leaves some at
-//! their prior σ, squares and products of their errors reach those that it determines: two angles of
-//! 200″ shorten a row of the general form by 1 ppm, while a few turns give its scale factor to
-//! 0.3 ppm. Next to errors of arc seconds these terms are nothing.
+//! A linear filter assumes that `K C` is linear in the parameters. If a path leaves some parameters at
+//! their prior σ, squares and products of their errors affect the parameters that it determines: two angles
+//! of 200″ shorten a row of the general form by 1 ppm, while a few turns give its scale factor to
+//! 0.3 ppm. For errors of arc seconds these terms are negligible.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -13,9 +13,9 @@ use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector}
 /// Step of the second differences; the forms' third derivatives are of order one at most.
 const STEP: f64 = 1e-3;
 
-/// Mean squares of what second-order terms in the errors of each row's three parameters make of them,
-/// for errors of this covariance (Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to
-/// Tracking and Navigation*, §10.3.2): to be added to it.
+/// Mean squares of the second-order terms in the errors of each row's three parameters, for errors of this
+/// covariance, to which they are to be added (Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to
+/// Tracking and Navigation*, §10.3.2).
 pub fn curvature(triads: &PerSensor<Triad>, covariance: &ParameterMatrix) -> ParameterMatrix {
     let mut added = ParameterMatrix::zeros();
     for sensor in Sensor::ALL {

@@ -1,9 +1,9 @@
-//! The uncertainty budget of an estimate: its covariance by what it comes from (JCGM 100:2008, JCGM 102:2011).
+//! The uncertainty budget of an estimate: its covariance by source (JCGM 100:2008, JCGM 102:2011).
 //!
-//! The covariance of a filter is homogeneous of degree one in the variances of all sources together: what was known
-//! before, noise of the instrument, errors of the table, noise of each observation. So the part of a source is its
-//! variance times the derivative by it, and the parts add up to the covariance (Euler). That of what was known of the
-//! constants is exact; the derivative by a noise is that of the information in two reductions.
+//! The covariance of a filter is homogeneous of degree one in the variances of all sources together: priors, noise of
+//! the instrument, errors of the table, noise of each observation. So the part of a source is its variance times the
+//! derivative by it, and the parts add up to the covariance (Euler). The part of the constants' prior is exact; the
+//! derivative by a noise is computed from the information of two reductions.
 
 pub mod curvature;
 
@@ -26,40 +26,40 @@ use crate::statistics::student_limit;
 pub use record::{BudgetPartRecord, BudgetRecord, LeftOffRecord};
 pub use source::BudgetSource;
 
-/// Two-sided probability that a coverage factor is for: k = 2 with a normal distribution.
+/// Two-sided coverage probability: k = 2 with a normal distribution.
 const COVERAGE: f64 = 0.954_499_736_103_642;
 /// The end of a 95 % interval, in σ.
 const END_OF_INTERVAL: f64 = 1.959_963_984_540_054;
-/// A part of less than this share of every variance is nothing.
+/// A part below this share of every variance is negligible.
 const NOTHING: f64 = 1e-12;
 
 /// Covariance of an estimate by source.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Budget {
-    /// What each source adds; the sum is the covariance of the estimate.
+    /// The part of each source; the sum is the covariance of the estimate.
     pub parts: Vec<BudgetPart>,
 }
 
-/// What one source adds to the covariance of an estimate.
+/// Contribution of one source to the covariance of an estimate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BudgetPart {
-    /// Which.
+    /// The source.
     pub source: BudgetSource,
     /// Its part of the covariance of the parameters of both triads, in their units.
     pub covariance: ParameterMatrix,
-    /// Degrees of freedom with which its variance is known (JCGM 100, G.4.2); infinite where it is stated.
+    /// Degrees of freedom with which its variance is known (JCGM 100, G.4.2); infinite if it is stated.
     pub degrees_of_freedom: f64,
 }
 
-/// By which part of itself the variance of a source becomes larger and smaller: the difference is exact to its square,
-/// and rounding of covariances that fall by ten orders of magnitude stays below that.
+/// Relative change of a source's variance for central differences: they are accurate to its square, and the rounding of
+/// covariances that fall by ten orders of magnitude stays below that.
 const STEP: f64 = 0.01;
 
 impl Budget {
     /// The budget of an outcome's estimate.
     ///
     /// # Errors
-    /// [`CalibrationError`] where the problem is not the one of the outcome.
+    /// [`CalibrationError`] if the problem is not the one of the outcome.
     pub fn new(problem: &Problem, outcome: &Outcome) -> Result<Self, CalibrationError> {
         let problem = &outcome.as_calibrated(problem);
         let (script, accepted) = (outcome.script(problem)?, outcome.accepted());
@@ -105,7 +105,7 @@ impl Budget {
         })
     }
 
-    /// With one part more, of what is exactly known.
+    /// Adds a part whose variance is known exactly.
     pub(in crate::calibration) fn and(
         mut self,
         source: BudgetSource,
@@ -125,7 +125,7 @@ impl Budget {
     }
 
     /// Degrees of freedom of the combined standard uncertainty of a parameter (Welch and Satterthwaite,
-    /// JCGM 100, G.4.1); infinite where all are.
+    /// JCGM 100, G.4.1); infinite if those of all parts are.
     pub fn degrees_of_freedom(&self, parameter: usize) -> f64 {
         let of = |part: &BudgetPart| part.covariance[(parameter, parameter)];
         let combined: f64 = self.parts.iter().map(of).sum();
@@ -136,7 +136,7 @@ impl Budget {
         combined.powi(2) / sum
     }
 
-    /// Coverage factor of a parameter for 95.45 %: 2 where the degrees of freedom are infinite, else
+    /// Coverage factor of a parameter for 95.45 %: 2 for infinite degrees of freedom, else
     /// from Student's t (JCGM 100, G.3).
     pub fn coverage_factor(&self, parameter: usize) -> f64 {
         coverage_factor(self.degrees_of_freedom(parameter))
@@ -144,7 +144,7 @@ impl Budget {
 }
 
 impl Problem<'_> {
-    /// The sources of noise that its reduction has.
+    /// The noise sources of its reduction.
     fn sources(&self) -> BTreeSet<BudgetSource> {
         let model = &self.model;
         let layout = Layout::new(model, self.one_gravity());
@@ -176,9 +176,9 @@ impl Problem<'_> {
 }
 
 impl BudgetSource {
-    /// Degrees of freedom with which its variance is known: ½ (u/Δu)² (JCGM 100, G.4.2), Δu from the upper
-    /// end of the interval of what was learnt, for the lower one may be nothing at all; of several the
-    /// least, and not less than one.
+    /// Degrees of freedom with which its variance is known: ½ (u/Δu)² (JCGM 100, G.4.2). Δu is taken from the
+    /// upper end of the interval of the estimated noise, because the lower end may be zero; of several
+    /// figures the least counts, but at least one.
     fn degrees_of_freedom(self, outcome: &Outcome) -> f64 {
         if self == Self::DwellScatter {
             let parameters = outcome.estimate.estimated().count().max(1);
@@ -195,7 +195,7 @@ impl BudgetSource {
         freedoms.fold(f64::INFINITY, f64::min)
     }
 
-    /// What is learnt of it from a record, if anything is.
+    /// The noise figures of this source that are estimated from a record, if any.
     fn learnt(self) -> &'static [Source] {
         match self {
             Self::White(Sensor::Gyro) => &[Source::AngleRandomWalk],

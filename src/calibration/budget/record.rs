@@ -1,4 +1,4 @@
-//! A budget as a calibration's file holds it.
+//! A budget as stored in a calibration's file.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,42 +7,42 @@ use crate::calibration::{Budget, ErrorTermTest, ParameterVector};
 /// Standard uncertainties of the estimated parameters by source, in their order and units.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BudgetRecord {
-    /// What each source adds; squares add to the variances.
+    /// Contribution of each source; their squares add up to the variances.
     pub sources: Vec<BudgetPartRecord>,
-    /// Effective degrees of freedom; none where infinite.
+    /// Effective degrees of freedom; `None` if infinite.
     pub degrees_of_freedom: Vec<Option<f64>>,
     /// Coverage factor for 95.45 %.
     pub coverage_factor: Vec<f64>,
-    /// Error terms that are not estimated, in no sum.
+    /// Error terms that are not estimated; not included in any sum.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub left_off: Vec<LeftOffRecord>,
 }
 
-/// What one source adds.
+/// Contribution of one source.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BudgetPartRecord {
     /// Its name, such as `table position`.
     pub source: String,
     /// Standard uncertainty of each parameter.
     pub u: Vec<f64>,
-    /// Degrees of freedom with which it is known; none where infinite.
+    /// Degrees of freedom with which it is known; `None` if infinite.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub degrees_of_freedom: Option<f64>,
 }
 
-/// What an error term that is not estimated may have done.
+/// Possible effect of an error term that is not estimated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LeftOffRecord {
     /// Its name, such as `size-effect`.
     pub term: String,
-    /// What it changes each parameter by, 1σ, where it is as large as is usual; three digits.
+    /// 1σ of the change of each parameter if the term has its usual size; three digits.
     pub usual: Vec<f64>,
-    /// RMS of that where it is also as the record shows it; three digits.
+    /// RMS of the change if the record's evidence of the term is used as well; three digits.
     pub shown: Vec<f64>,
 }
 
 impl Budget {
-    /// As a record of these parameters, each with the factor that brings it to the file's unit.
+    /// Converts to a record of these parameters, each with its factor to the file's unit.
     pub(in crate::calibration) fn record(
         &self,
         estimated: &[usize],

@@ -1,4 +1,4 @@
-//! Where the uncertainty of an estimate comes from.
+//! Sources of the uncertainty of an estimate.
 
 use crate::imu::{Sensor, Term};
 
@@ -7,11 +7,11 @@ use crate::imu::{Sensor, Term};
 pub enum BudgetSource {
     /// Random walk of a triad's output.
     White(Sensor),
-    /// What moves add to it.
+    /// Additional noise of a triad during moves.
     Moves(Sensor),
-    /// Its Gauss–Markov biases.
+    /// Gauss–Markov biases of a triad.
     Wander(Sensor),
-    /// Samples that were missing and are interpolated.
+    /// Interpolation of missing samples.
     Interpolated,
     /// Whole pulses, of both triads.
     Pulses,
@@ -40,34 +40,34 @@ pub enum BudgetSource {
     TableEncoder,
     /// Gravity at the site.
     Gravity,
-    /// What was known of the attitude at the first sample.
+    /// Prior of the attitude at the first sample.
     InitialAttitude,
-    /// What was known of the parameters.
+    /// Prior of the parameters.
     Prior,
-    /// What was known of how parameters change with temperature.
+    /// Prior of the parameters' temperature dependence.
     Temperature,
-    /// By how much the instrument differs between recordings.
+    /// Differences of the instrument between recordings.
     Recording,
-    /// What was known of the parameters of an error term, which is estimated.
+    /// Prior of the parameters of an estimated error term.
     Term(Term),
-    /// Second order of the installation form in angles that are hardly known.
+    /// Second-order effects of the installation form in poorly known angles.
     Curvature,
-    /// Heading that Earth rate does not tell.
+    /// Headings that Earth rate does not determine.
     Headings,
-    /// By how much dwells scatter more than all noise says.
+    /// Scatter of the dwells beyond all noise.
     DwellScatter,
     /// Rounding of rates to steps wider than their noise.
     Rounding,
-    /// Length of the rows where nothing tells it.
+    /// Sample period, if it is not determined by a clock.
     Period,
-    /// What error terms do that the data show and that are not estimated.
+    /// Error terms that the data show, but that are not estimated.
     ErrorTermsLeftOff,
-    /// What biases do that may vary though the noise learnt from the record does not hold that.
+    /// Bias variation that may exist although the noise estimated from the record does not include it.
     UnseenVariation,
 }
 
 impl BudgetSource {
-    /// What outputs of a triad add up to at standstill.
+    /// The source of the integrated output of a triad at standstill.
     pub fn at_rest(sensor: Sensor) -> Self {
         match sensor {
             Sensor::Gyro => Self::AttitudeAtRest,
@@ -75,7 +75,7 @@ impl BudgetSource {
         }
     }
 
-    /// What an engineer calls it.
+    /// Its name for reports.
     pub fn name(self) -> String {
         let name = match self {
             Self::White(sensor) => return format!("{} white noise", sensor.name()),

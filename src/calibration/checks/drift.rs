@@ -1,4 +1,4 @@
-//! Parameters that change while the closed form's positions are visited.
+//! Parameters that drift during the positions of the closed form.
 
 use nalgebra::DMatrix;
 use serde_json::json;
@@ -11,25 +11,25 @@ use crate::imu::{AXES, ParameterKind, Sensor};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 use crate::units::{DEG_PER_H, MICRO_G, PPM};
 
-/// Both kinds of both triads are tested.
+/// Number of tests: scale and bias of both triads.
 const TESTS: f64 = 4.0;
 
-/// How one kind of a triad's parameters makes the residuals' equations.
+/// Design of the residuals' equations for one kind of a triad's parameters.
 pub struct Changing {
     pub sensor: Sensor,
     /// Scale or bias.
     pub kind: ParameterKind,
-    /// The equations' columns of the three axes, as far as they are unknown, in normalised units.
+    /// Columns of the unknown axes in the equations, in normalised units.
     pub columns: DMatrix<f64>,
-    /// Which axes those are.
+    /// Indices of these axes.
     pub axes: Vec<usize>,
 }
 
-/// Parameters whose even change in time explains residuals beyond chance, and better than any one position
-/// or turn that is off does.
+/// Parameters whose linear drift explains the residuals significantly, and better than a single wrong position
+/// or turn.
 ///
-/// The likelihoods of two hypotheses differ by the χ² that the change takes away. What lasts from one
-/// position to the next leaves residuals that are each small, so that the sum of all squares may hold.
+/// The log-likelihoods of the two hypotheses differ by the decrease of χ². A drift leaves residuals that are each
+/// small, so that the sum of all squares may still pass its test.
 pub fn drift(
     residuals: &Residuals,
     changing: &[Changing],

@@ -1,11 +1,12 @@
-//! What the dwells say of σ without any model of noise: whether they scatter as much as the covariance of
-//! the estimate says.
+//! Test of σ without a noise model: whether the scatter of the dwells agrees with the covariance of the
+//! estimate.
 //!
-//! The whitened rows G of each dwell tell what it adds: information `ΔI = Gᵀ G` and a score `s = Gᵀ (ν − G θ̂)`.
-//! Attitude and velocity that carry over from one dwell to the next are integrated out, so the scores are those of `p(y_u | y_1 … y_{u−1}, θ)` and independent of each other whatever they
-//! carry. If the model is right the covariance of a score is `ΔI − ΔI P ΔI`; if it is not, the scores show
-//! their own (White 1982, "Maximum likelihood estimation of misspecified models", Econometrica 50(1);
-//! correction of the leverage of few clusters: Bell and McCaffrey 2002, Survey Methodology 28(2)).
+//! The whitened rows G of a dwell give its contribution: information `ΔI = Gᵀ G` and score `s = Gᵀ (ν − G θ̂)`.
+//! Attitude and velocity that carry over from one dwell to the next are integrated out, so the scores are those
+//! of `p(y_u | y_1 … y_{u−1}, θ)` and independent of each other. If the model is correct, the covariance of a score
+//! is `ΔI − ΔI P ΔI`; if not, it is estimated from the scores (White 1982, "Maximum likelihood estimation of
+//! misspecified models", Econometrica 50(1); correction of the leverage of few clusters: Bell and McCaffrey 2002,
+//! Survey Methodology 28(2)).
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -16,23 +17,23 @@ use crate::calibration::FindingKind as Kind;
 use crate::calibration::{Finding, Posterior, Prior, Reduction, mean_square_interval};
 use crate::statistics::FALSE_ALARM;
 
-/// A direction of which a dwell has less than this part of all information says nothing of the dwell but
-/// rounding.
+/// Directions in which a dwell has less than this part of the total information are ignored: only rounding
+/// shows there.
 const SHARE: f64 = 1e-3;
 
-/// How much the dwells scatter, over what the covariance says.
+/// Scatter of the dwells relative to the covariance.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DwellScatter {
-    /// Mean of squared scores, each over its σ; one if σ are true.
+    /// Mean of squared normalised scores; one if σ are correct.
     pub mean: f64,
-    /// How many scores.
+    /// Number of scores.
     pub count: usize,
-    /// Its limit if σ are true, at the false-alarm rate.
+    /// Its limit for correct σ, at the false-alarm rate.
     pub limit: f64,
 }
 
 impl DwellScatter {
-    /// The finding where σ were widened by so much because of it.
+    /// The finding, with the factor by which σ were widened.
     pub fn finding(&self, growth: f64) -> Finding {
         let Self { mean, limit, .. } = self;
         let text = format!(
@@ -51,15 +52,15 @@ pub struct DwellScores {
     pub scatter: DwellScatter,
     /// Square root of the covariance of the estimate.
     root: DMatrix<f64>,
-    /// The constants that are estimated, of so many.
+    /// Indices of the estimated constants.
     on: Vec<usize>,
     all: usize,
-    /// Covariance of the estimate by the scores' own scatter.
+    /// Covariance of the estimate from the scatter of the scores (robust covariance).
     robust: DMatrix<f64>,
 }
 
 impl DwellScores {
-    /// Of the rows of each dwell; none if there are too few to say anything.
+    /// Scores from the rows of each dwell; `None` if there are too few.
     pub fn new(reduction: &Reduction, prior: &Prior, posterior: &Posterior) -> Option<Self> {
         let all = reduction.constants.len();
         let sigma = posterior.covariance.diagonal().map(f64::sqrt);
@@ -115,8 +116,8 @@ impl DwellScores {
         })
     }
 
-    /// Covariance of the estimate, where the scores say more than the model does as much as
-    /// they say; none if they are not too large.
+    /// Covariance of the estimate, raised to that of the scores wherever it is larger than that of the model; `None`
+    /// if the scatter is within its limit.
     pub fn widened(&self) -> Option<DMatrix<f64>> {
         if self.scatter.mean <= self.scatter.limit {
             return None;
@@ -185,7 +186,9 @@ mod tests {
         let ratio = sigma(&outcome) / sigma(&truth);
         let by_noise = outcome.covariance_by_noise.diagonal().map(f64::sqrt);
         let without = by_noise.rows(3, 6).norm() / sigma(&truth);
-        println!("σ of gyro E over those with the right figure: {ratio:.2}, by noise {without:.2}");
+        println!(
+            "σ of gyro E over those with the correct figure: {ratio:.2}, by noise {without:.2}"
+        );
         assert!(without < 0.5 && ratio > 0.7, "{without} {ratio}");
     }
 }

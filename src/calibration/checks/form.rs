@@ -1,4 +1,4 @@
-//! Whether the data reject the installation form.
+//! Test of the installation form by the data.
 
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -14,11 +14,11 @@ use crate::statistics::{FALSE_ALARM, chi_square_limit};
 /// The likelihood ratio of a restricted installation form against the general one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct FormTest {
-    /// By how much the cost, −2 ln of likelihood and prior, falls if the general form is allowed.
+    /// Decrease of the cost, −2 ln of likelihood and prior, if the general form is allowed.
     pub gain: f64,
-    /// Angles that the general form has more.
+    /// Number of additional angles of the general form.
     pub angles: usize,
-    /// What the gain stays below in all but one in a thousand runs if the form is right (χ²).
+    /// Limit of the gain at a false-alarm rate of 0.1 % (χ²).
     pub limit: f64,
 }
 
@@ -28,7 +28,7 @@ impl FormTest {
         self.gain > self.limit
     }
 
-    /// The finding where the data reject this form.
+    /// The finding, if the data reject this form.
     pub fn finding(&self, form: InstallationForm) -> Option<Finding> {
         let Self {
             gain,
@@ -46,9 +46,9 @@ impl FormTest {
     }
 }
 
-/// Tests the form of a converged pass by what the record says in the general form, linearised at the same
-/// estimate (Van Trees, *Detection, Estimation, and Modulation Theory*, part I, §2.5). `None` for a form with as many
-/// angles as the general one, which no data can reject.
+/// Tests the form of a converged pass against the general form, linearised at the same estimate (Van Trees,
+/// *Detection, Estimation, and Modulation Theory*, part I, §2.5). `None` for a form with as many angles as the
+/// general one, which no data can reject.
 pub fn form_test(
     restricted: &Problem,
     priors: &[AttitudePrior],

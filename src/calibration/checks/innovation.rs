@@ -1,4 +1,4 @@
-//! Innovations: observation minus prediction, and whether they are as large as their covariance.
+//! Innovations: observation minus prediction, and their consistency with their covariance.
 
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -8,7 +8,7 @@ use crate::calibration::Finding;
 use crate::calibration::FindingKind as Kind;
 use crate::statistics::FALSE_ALARM;
 
-/// What was observed.
+/// Kind of observation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Observation {
@@ -16,7 +16,7 @@ pub enum Observation {
     Velocity,
     /// Attitude of the table.
     Table,
-    /// Attitude that does not change at standstill, without a table.
+    /// Constant attitude at standstill, without a table.
     Attitude,
 }
 
@@ -24,7 +24,7 @@ impl Observation {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Velocity, Self::Table, Self::Attitude];
 
-    /// In words.
+    /// Its name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Velocity => "velocity",
@@ -39,17 +39,17 @@ impl Observation {
 pub struct Innovation {
     /// Time, s.
     pub time: f64,
-    /// What was observed.
+    /// Kind of observation.
     pub observation: Observation,
     /// East, North and Up in units of their own σ, independent of each other.
     pub whitened: [f64; 3],
     /// These σ, rad or m/s.
     pub sigma: [f64; 3],
-    /// Whether the gate let it in.
+    /// Whether the gate accepted it.
     pub accepted: bool,
-    /// Number of the dwell in which it was made.
+    /// Number of its dwell.
     pub dwell: usize,
-    /// Whether it shows the errors of the move before that dwell: not where rows are lost between them.
+    /// Whether it shows the errors of the move before its dwell, which it does not if rows are lost in between.
     pub after_move: bool,
 }
 
@@ -59,13 +59,13 @@ impl Innovation {
         self.whitened.iter().map(|w| w * w).sum()
     }
 
-    /// −2 ln of its likelihood, except a constant.
+    /// −2 ln of its likelihood, up to a constant.
     pub fn deviance(&self) -> f64 {
         self.distance() + 2.0 * self.sigma.map(f64::ln).iter().sum::<f64>()
     }
 }
 
-/// Normalised innovation squared, apart for each kind of observation.
+/// Normalised innovation squared, separately for each kind of observation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Consistency {
     /// All observations.
@@ -74,12 +74,12 @@ pub struct Consistency {
     pub velocity: Nis,
     /// Attitude of the table.
     pub table: Nis,
-    /// Attitude that does not change at standstill, without a table.
+    /// Constant attitude at standstill, without a table.
     pub attitude: Nis,
 }
 
 impl Consistency {
-    /// The kinds of observation that there are.
+    /// The kinds of observation that were made.
     pub fn kinds(&self) -> impl Iterator<Item = (Observation, Nis)> {
         let each = [self.velocity, self.table, self.attitude];
         let all = Observation::ALL.into_iter().zip(each);
@@ -87,10 +87,10 @@ impl Consistency {
     }
 }
 
-/// Mean of normalised innovations squared.
+/// Mean normalised innovation squared.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Nis {
-    /// Mean per scalar observation; one if σ are true. NaN without observations.
+    /// Mean per scalar observation; one if σ are correct. NaN without observations.
     pub mean: f64,
     /// Number of scalar observations.
     pub count: usize,
@@ -100,10 +100,10 @@ pub struct Nis {
     pub lag_one: f64,
 }
 
-/// What is wrong with a model shows in a few innovations only: squares, of which the mean is one if σ are true.
+/// Selects the innovations in which a model error shows: their squares, with mean one if σ are correct.
 type Squares = fn(&[&Innovation]) -> Vec<f64>;
 
-/// Innovations that are tested separately: their kind, in words after what was observed, and their squares.
+/// Innovations that are tested separately: words that follow the kind of observation, and the squares.
 const LOOKS: [(&str, &str, Squares); 3] = [
     ("all", "", of_all),
     (AFTER_MOVES, " first after each move", after_moves),
@@ -111,20 +111,20 @@ const LOOKS: [(&str, &str, Squares); 3] = [
 ];
 const AFTER_MOVES: &str = "after-moves";
 
-/// Those that were let in.
+/// All accepted innovations.
 fn of_all(innovations: &[&Innovation]) -> Vec<f64> {
     let accepted = innovations.iter().filter(|i| i.accepted);
     accepted.flat_map(|i| i.whitened.map(|w| w * w)).collect()
 }
 
-/// The first of each dwell after a move, let in or not: it shows the errors that the move made.
+/// The first innovation of each dwell after a move, accepted or not: it shows the errors of the move.
 fn after_moves(innovations: &[&Innovation]) -> Vec<f64> {
     let dwells = innovations.chunk_by(|a, b| a.dwell == b.dwell);
     let first = dwells.filter_map(|dwell| dwell.first().filter(|i| i.after_move));
     first.flat_map(|i| i.whitened.map(|w| w * w)).collect()
 }
 
-/// Sums over each dwell of those that were let in, each over its σ: they show errors that last.
+/// Normalised sums of the accepted innovations over each dwell: they show lasting errors.
 fn over_dwells(innovations: &[&Innovation]) -> Vec<f64> {
     let dwells = innovations.chunk_by(|a, b| a.dwell == b.dwell);
     let summed = dwells.flat_map(|dwell| {
@@ -138,7 +138,7 @@ fn over_dwells(innovations: &[&Innovation]) -> Vec<f64> {
     summed.collect()
 }
 
-/// Observations that the gate rejected, if there are any, and where most of them are.
+/// The finding on observations that the gate rejected, if any, with the place of most of them.
 pub fn outliers(innovations: &[Innovation]) -> Option<Finding> {
     let observations = innovations.len();
     let rejected: Vec<&Innovation> = innovations.iter().filter(|i| !i.accepted).collect();
@@ -156,7 +156,7 @@ pub fn outliers(innovations: &[Innovation]) -> Option<Finding> {
     Some(Finding::new(Kind::Outliers, text, figures))
 }
 
-/// Innovations that are larger or smaller than their covariance makes them, if there are any.
+/// The finding on innovations that do not agree with their covariance, if any.
 pub fn inconsistent(innovations: &[Innovation]) -> Option<Finding> {
     let of = |kind| innovations.iter().filter(move |i| i.observation == kind);
     let kinds = Observation::ALL.map(|kind| (kind, of(kind).collect::<Vec<_>>()));
@@ -196,7 +196,7 @@ pub fn inconsistent(innovations: &[Innovation]) -> Option<Finding> {
 /// Two-sided probability outside the intervals.
 const OUTSIDE: f64 = 0.05;
 
-/// Consistency of a pass: velocity and table apart.
+/// Consistency of a pass, separately for each kind of observation.
 pub fn consistency(innovations: &[Innovation]) -> Consistency {
     let accepted = innovations.iter().filter(|i| i.accepted);
     let of = |kind| nis(accepted.clone().filter(move |i| i.observation == kind));
@@ -227,7 +227,7 @@ fn nis<'a>(innovations: impl Iterator<Item = &'a Innovation>) -> Nis {
     }
 }
 
-/// The interval that holds the mean of `count` squared standard normal numbers except with probability
+/// The interval outside which the mean of `count` squared standard normal numbers lies with probability
 /// `outside`, half on each side (Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to
 /// Tracking and Navigation*, §5.4.2). NaN if there are none.
 pub fn mean_square_interval(count: usize, outside: f64) -> (f64, f64) {

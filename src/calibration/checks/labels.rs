@@ -1,4 +1,4 @@
-//! Whether labelled sections can be used.
+//! Findings on labelled sections.
 
 use serde_json::{Value, json};
 
@@ -6,7 +6,7 @@ use crate::calibration::Finding;
 use crate::calibration::FindingKind as Kind;
 use crate::run::motion::LabelCheck;
 
-/// Sections whose labels the record contradicts, if there are any.
+/// The finding on sections whose labels the record contradicts, if any.
 pub fn contradicted(contradicted: &[LabelCheck]) -> Option<Finding> {
     let each: Vec<String> = contradicted.iter().map(LabelCheck::to_string).collect();
     let text = format!(
@@ -25,7 +25,7 @@ pub fn contradicted(contradicted: &[LabelCheck]) -> Option<Finding> {
     (!contradicted.is_empty()).then(|| Finding::new(Kind::LabelsContradicted, text, figures))
 }
 
-/// Labelled sections a part of which is missing, if there are any.
+/// The finding on labelled sections with missing parts, if any.
 pub fn lost(labels: &[String]) -> Option<Finding> {
     let text = format!(
         "Skipped because part of it is missing from the log: section {}. Record it again, or remove it from \

@@ -1,4 +1,4 @@
-//! Checks of model, noise and record by the data: each file a check with its words.
+//! Checks of model, noise and record by the data: each file is a check with its messages.
 
 pub mod cause;
 pub mod drift;
@@ -22,8 +22,8 @@ use cause::{FoundCause, settling};
 use error_term_test::{ErrorTermTest, biases_may_vary};
 use finding::Finding;
 
-/// What the checks find of a filter's outcome, and what was found on the way to it, causes before what they
-/// may have brought about. The problem is the one with what is stated.
+/// Findings of all checks of a filter's outcome, and earlier findings; causes before their possible consequences. The
+/// problem is the one as stated.
 pub fn findings(problem: &Problem, outcome: &Outcome, others: Vec<Finding>) -> Vec<Finding> {
     let (estimate, innovations) = (&outcome.estimate, &outcome.innovations);
     let rounding = outcome.part(BudgetSource::Rounding);
@@ -60,7 +60,7 @@ pub fn findings(problem: &Problem, outcome: &Outcome, others: Vec<Finding>) -> V
 }
 
 impl Outcome {
-    /// Its findings with those of error terms, and of what these add to its covariance.
+    /// The outcome's findings with those on error terms, and on their addition to the covariance.
     pub fn findings_with(&self, tests: &[ErrorTermTest]) -> Vec<Finding> {
         let [variation, left_off] = [
             BudgetSource::UnseenVariation,

@@ -1,4 +1,4 @@
-//! Parameters that the prior does not allow, and what most likely made them so.
+//! Parameters that contradict their prior, and the likely causes.
 
 use nalgebra::Vector3;
 use serde_json::{Value, json};
@@ -13,14 +13,14 @@ use crate::imu::{AXES, ParameterKind, PerSensor, Sensor, Triad};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 use crate::units::{DEGREE, PPM};
 
-/// Parameters further from their prior than this many of its σ contradict it.
+/// Parameters farther from their prior than this many of its σ contradict it.
 const CONTRADICTS: f64 = 5.0;
-/// What data do not see, rounding moves by such a part of the prior's variance.
+/// Part of the prior variance by which rounding changes unobserved parameters.
 const ROUNDING: f64 = 1e-9;
-/// Parts that differ by less than this much of what they have in common are alike.
+/// Two vectors are alike if they differ by less than this part of their common part.
 const ALIKE: f64 = 0.5;
 
-/// Parameters of an estimate that are too far from their prior, as a finding, if there are any.
+/// The finding on parameters of an estimate that are too far from their prior, if any.
 pub fn far_from_prior(model: &Model, estimate: &Estimate) -> Option<Finding> {
     let far = far(model, estimate);
     let off = estimate.vector() - model.prior_mean;
@@ -58,12 +58,12 @@ fn is_another_scale(model: &Model, estimate: &Estimate, index: usize) -> bool {
         && is_beyond_tolerance(factor, model.prior_sigma[index])
 }
 
-/// Parameters of which the data alone say other than their prior does, where that is in the estimate; by the
-/// covariance of how far data bring an estimate from a prior that is right.
+/// The finding on parameters for which the data alone contradict the prior, if the estimate includes the prior. The
+/// test uses the covariance of the distance between estimate and a correct prior.
 ///
-/// A prior that is too tight holds the estimate, so that its distance says nothing. With `P⁻¹ = S⁻¹ + V⁻¹` of
-/// prior and data it is `P V⁻¹` of theirs, `P S⁻¹ P V⁻¹` its variance where the prior is right: over its σ it is what
-/// theirs is over both σ.
+/// A prior that is too tight holds the estimate, so that the distance itself shows nothing. With
+/// `P⁻¹ = S⁻¹ + V⁻¹` of prior and data, the distance of the estimate is `P V⁻¹` times that of the data, and its
+/// covariance for a correct prior is `P S⁻¹ P V⁻¹`: normalised, it equals the distance of data and prior over both σ.
 pub fn far_by_data(
     model: &Model,
     estimate: &Estimate,
@@ -88,9 +88,9 @@ pub fn far_by_data(
     far_from_prior(model, &by_data)
 }
 
-/// The model with a prior that its estimate does not contradict: where it does, σ of each parameter is at
-/// least its distance. None where the prior holds. A wrong prior would make sound observations outliers,
-/// and noise of what is none.
+/// The model with a prior widened so that its estimate does not contradict it: σ of every parameter is at least its
+/// distance. `None` if nothing contradicts the prior. A wrong prior would turn correct observations into outliers,
+/// and its own error into noise.
 pub fn widened(model: &Model, estimate: &Estimate) -> Option<Model> {
     let off = estimate.vector() - model.prior_mean;
     let known: Vec<usize> = estimate
@@ -108,8 +108,8 @@ pub fn widened(model: &Model, estimate: &Estimate) -> Option<Model> {
     contradicted.then_some(widened)
 }
 
-/// The parameters that contradict their prior. Their own σ counts with the prior's, for an estimate may
-/// be made without it.
+/// The parameters that contradict their prior. Their own σ is added to the prior's, because an estimate may
+/// be made without the prior.
 fn far(model: &Model, estimate: &Estimate) -> Vec<usize> {
     let sigma = estimate.sigma();
     let off = estimate.vector() - model.prior_mean;
@@ -120,7 +120,7 @@ fn far(model: &Model, estimate: &Estimate) -> Vec<usize> {
     estimate.estimated().filter(far).collect()
 }
 
-/// What most likely brought parameters away from their prior, in words and figures.
+/// The likely cause of parameters that contradict their prior: text and figures.
 type Cause = (String, Value);
 
 fn causes(far: &[usize], triads: &PerSensor<Triad>) -> Vec<Cause> {
@@ -149,7 +149,7 @@ fn causes(far: &[usize], triads: &PerSensor<Triad>) -> Vec<Cause> {
     scales.chain(installation).chain(biases).collect()
 }
 
-/// Of scale factors of a triad, this count of which are far from their prior.
+/// Likely cause for the scale factors of a triad, of which `count` are far from their prior.
 fn of_scales(of: Sensor, scale: &Vector3<f64>, far: &[usize], count: usize) -> Cause {
     let is_reversed = |&axis: &usize| scale[axis] < 0.0 && far.contains(&parameter(of, axis));
     let reversed: Vec<String> = (0..3)
@@ -180,12 +180,12 @@ fn of_scales(of: Sensor, scale: &Vector3<f64>, far: &[usize], count: usize) -> C
     (words, json!({ "cause": "scale", "sensor": sensor }))
 }
 
-/// Whether a vector is near another by the measure of that.
+/// Whether the difference of two vectors is small relative to the second.
 fn alike(one: &Vector3<f64>, other: &Vector3<f64>) -> bool {
     (one - other).norm() < ALIKE * other.norm()
 }
 
-/// Of installation angles of the triads in which some are far from their prior.
+/// Likely causes for the installation angles of triads with some angles far from their prior.
 fn of_installation(triads: &PerSensor<Triad>, far: PerSensor<bool>) -> Vec<Cause> {
     // To first order the antisymmetric half of installation is a rotation, the symmetric half a skew.
     let half = |sensor: Sensor, sign: f64| {

@@ -1,4 +1,4 @@
-//! How well a calibration explains what is known without a truth: gravity, and turns.
+//! Quality of a calibration by references that need no truth: gravity and turns.
 
 use std::ops::Range;
 
@@ -20,10 +20,10 @@ use crate::run::{Dwell, Run};
 /// What a calibration leaves of gravity and of turns.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
-    /// Over the whole record.
+    /// Residuals over the whole record.
     pub all: Measures,
-    /// By a calibration that did without every other dwell, over those dwells and the turns that end in
-    /// them; absent if the rest does not give a calibration.
+    /// Cross-validation: residuals of a calibration without every other dwell, over these dwells and the turns that
+    /// end in them; `None` if the other dwells do not give a calibration.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub held_out: Option<Measures>,
     /// Residuals in each dwell.
@@ -74,30 +74,30 @@ impl Quality {
     }
 }
 
-/// Departures from what is known of a body that stands and turns.
+/// Deviations from the references of a body at rest and in turns.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Measures {
     /// Magnitude of the mean specific force in each dwell minus gravity, m/s².
     #[serde(rename = "gravity_m_s2")]
     pub gravity: Spread,
-    /// Angle in each dwell between gravity as the accelerometers see it and as the gyros carry it there
+    /// Angle in each dwell between the directions of gravity from the accelerometers and from the gyros, propagated
     /// from the dwell before, rad.
     #[serde(rename = "direction_rad")]
     pub direction: Spread,
-    /// What the gyros are wrong by over a turn between two readings of the table, or about the axis of a
+    /// Error of the gyros over a turn between two readings of the table, or about the axis of a
     /// labelled turn, rad.
     #[serde(rename = "turns_rad")]
     pub turns: Spread,
 }
 
-/// Several departures of one kind.
+/// Statistics of the deviations of one kind.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Spread {
-    /// How many; the rest is zero if there are none.
+    /// Their number; if it is zero, so are the other figures.
     pub count: usize,
     /// Their root mean square.
     pub rms: f64,
-    /// The largest, whatever its sign.
+    /// The largest magnitude.
     pub largest: f64,
 }
 
@@ -120,11 +120,11 @@ impl FromIterator<f64> for Spread {
 impl Outcome {
     /// The quality of this calibration of a problem.
     ///
-    /// What is held out is judged by one pass more, without the observations of every other dwell. It
-    /// linearises where the last pass did; nothing else of that pass is in it.
+    /// Cross-validation uses one additional pass, without the observations of every other dwell. It has the
+    /// linearisation point of the last pass, and no other information from it.
     ///
     /// # Errors
-    /// [`CalibrationError`] where the problem is not the one of the outcome.
+    /// [`CalibrationError`] if the problem is not the one of the outcome.
     pub fn quality(&self, problem: &Problem) -> Result<Quality, CalibrationError> {
         let problem = &self.as_calibrated(problem);
         let estimate = Linearisation {
@@ -146,11 +146,11 @@ impl Outcome {
 impl ClosedForm {
     /// The quality of this calibration of a problem.
     ///
-    /// From labels, what is held out are dwells without a label; else every other dwell, as in
+    /// For labelled sections, cross-validation uses the dwells without a label; otherwise every other dwell, as in
     /// [`Outcome::quality`].
     ///
     /// # Errors
-    /// [`CalibrationError`] where the problem is not the one of the closed form.
+    /// [`CalibrationError`] if the problem is not the one of the closed form.
     pub fn quality(&self, problem: &Problem) -> Result<Quality, CalibrationError> {
         let run = problem.run();
         let of = |triads: &PerSensor<Triad>, judged: &dyn Fn(usize) -> bool| {
@@ -185,8 +185,8 @@ impl ClosedForm {
     }
 }
 
-/// The problem with its dwells from the first on, leaving out every other; none if that leaves less than
-/// two, or a stretch with none.
+/// The problem with every other dwell, from the first on; `None` if fewer than two remain, or if a stretch
+/// has none.
 fn every_other<'a>(problem: &Problem<'a>) -> Option<Problem<'a>> {
     let half = problem.observed_in(|k| k % 2 == 0);
     let empty = half.stretches().iter().any(|of| of.dwells.is_empty());
@@ -200,7 +200,7 @@ fn labelled(run: &Run, Dwell { samples, .. }: &Dwell) -> bool {
     })
 }
 
-/// The table's attitude in the first dwell of a stretch, or one of those in which it is level.
+/// The table's attitude in the first dwell of a stretch or, without a table, a levelled attitude.
 fn first_attitude(
     stretch: &Stretch,
     triads: &PerSensor<Triad>,
@@ -289,7 +289,7 @@ fn labelled_turns(
     each.collect()
 }
 
-/// Attitude after these samples, navigated from this one before.
+/// Attitude after these samples, propagated from an attitude before them.
 fn navigate(
     run: &Run,
     (at, triads): (&Linearisation, &PerSensor<Triad>),
@@ -306,11 +306,11 @@ fn navigate(
     Ok(block.state.attitude)
 }
 
-/// A term changes the force that it responds to by a hundredth at most, so three rounds leave a millionth
-/// of it.
+/// Iterations for the force: a term changes the force on which it depends by a hundredth at most, so the error
+/// is a millionth of it.
 const ROUNDS: usize = 3;
 
-/// Mean specific force along body axes over a dwell at about this attitude, m/s².
+/// Mean specific force along body axes over a dwell, with an approximate attitude, m/s².
 fn force_at_rest(
     run: &Run,
     dwell: &Dwell,

@@ -1,4 +1,4 @@
-//! Whether recordings differ by more than is stated.
+//! Test whether recordings differ by more than stated.
 
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -6,22 +6,22 @@ use serde_json::json;
 use crate::calibration::Finding;
 use crate::calibration::FindingKind as Kind;
 
-/// By how much recordings differ in a group of parameters.
+/// Differences between recordings in a group of parameters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RecordingDifference {
     /// The key of `[day_to_day]`.
     pub key: String,
-    /// What it states, in its unit.
+    /// The stated 1σ, in its unit.
     pub stated: f64,
-    /// 1σ that the recordings show, in its unit.
+    /// 1σ estimated from the recordings, in its unit.
     pub found: f64,
-    /// −2 ln of the likelihood ratio of stated to found …
+    /// −2 ln of the likelihood ratio of the stated to the estimated σ …
     pub ratio: f64,
     /// … and its limit at this group's share of the false-alarm rate.
     pub limit: f64,
 }
 
-/// Differences that were estimated and are used.
+/// The finding on differences that were estimated and are used.
 pub fn recordings_differ(differences: &[RecordingDifference]) -> Finding {
     let one =
         |of: &RecordingDifference| format!("{} = {:.2e} (stated {})", of.key, of.found, of.stated);

@@ -1,4 +1,4 @@
-//! What a triad's outputs leave of any linear triad, whatever its parameters.
+//! Residuals of a triad's outputs after the best-fit linear triad.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde_json::json;
@@ -9,44 +9,44 @@ use crate::calibration::FindingKind as Kind;
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 use crate::units::ARCSEC;
 
-/// Triads whose residuals are tested.
+/// Number of triads with tested residuals.
 const TRIADS: f64 = 2.0;
-/// Directions of unit columns that are shorter than this beside all others are rounding.
+/// Directions of unit columns with a remaining length below this are rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Residuals of linear equations, without what any value of their unknowns explains.
+/// Residuals of linear equations, projected orthogonally to their unknowns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Residuals {
-    /// Of unit covariance.
+    /// Errors of the equations, whitened to unit covariance.
     whitened: DVector<f64>,
-    /// Orthonormal, spans what the unknowns explain.
+    /// Orthonormal basis of the space that the unknowns explain.
     explained: DMatrix<f64>,
     /// Columns of the whitening's inverse factor: one for each equation.
     whitening: DMatrix<f64>,
 }
 
-/// What more unknowns would explain.
+/// Improvement by additional unknowns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Explained {
-    /// By how much χ² falls.
+    /// Decrease of χ².
     pub fall: f64,
-    /// How many of them it is for.
+    /// Number of additional unknowns.
     pub degrees: usize,
     /// Their values.
     pub coefficients: Vec<f64>,
 }
 
-/// Equations that fit the others least.
+/// The equations that fit the others worst.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Worst {
-    /// Which groups of equations: several if their data cannot tell them apart.
+    /// The groups of equations; several if the data cannot distinguish them.
     pub groups: Vec<usize>,
     /// χ² of all others alone.
     pub without: f64,
 }
 
 impl Residuals {
-    /// Of `errors = design · unknowns + noise`, the noise of this covariance. `None` if that is none.
+    /// Residuals of `errors = design · unknowns + noise` with this covariance of the noise; `None` if it is singular.
     pub fn new(
         design: &DMatrix<f64>,
         errors: &DVector<f64>,
@@ -80,7 +80,7 @@ impl Residuals {
         })
     }
 
-    /// Sum of squares, each over its variance.
+    /// Sum of normalised squares.
     pub fn chi_square(&self) -> f64 {
         self.whitened.norm_squared()
     }
@@ -90,24 +90,24 @@ impl Residuals {
         self.explained.nrows() - self.explained.ncols()
     }
 
-    /// Limit of χ² if model and σ are right, at a triad's share of the false-alarm rate.
+    /// Limit of χ² for correct model and σ, at a triad's share of the false-alarm rate.
     pub fn limit(&self) -> f64 {
         limit(self.degrees())
     }
 
-    /// Whether this χ² is within its limit with this many equations left out.
+    /// Whether this χ² would be within its limit with this many equations dropped.
     pub fn would_hold(&self, chi_square: f64, left_out: usize) -> bool {
         let degrees = self.degrees().saturating_sub(left_out);
         degrees > 0 && chi_square <= limit(degrees)
     }
 
-    /// By how much all σ are to grow, the Birge ratio; absent if χ² is within its limit.
+    /// Factor by which all σ have to be widened (Birge ratio); `None` if χ² is within its limit.
     pub fn growth(&self) -> Option<f64> {
         let (chi_square, degrees) = (self.chi_square(), self.degrees());
         (chi_square > self.limit()).then(|| (chi_square / degrees as f64).sqrt())
     }
 
-    /// Which of some groups of equations the others contradict most: χ² falls by most without it.
+    /// The group of equations that contradicts the others most: without it, χ² falls most.
     pub fn worst(&self, groups: &[Vec<usize>]) -> Worst {
         let falls: Vec<f64> = groups
             .iter()
@@ -121,9 +121,9 @@ impl Residuals {
         }
     }
 
-    /// The finding that residuals of `gyro`, `accel` or `both triads` are large, by which the largest σ grew so much.
-    /// The worst equations are those of dwells or moves at these times in s; a base off level and north by
-    /// this σ in rad may explain all.
+    /// The finding on large residuals of `gyro`, `accel` or `both triads`, with the growth of the σ that grew most. The
+    /// worst equations are those of dwells or moves at these times, s; an error of the base's level and north of this
+    /// σ, rad, may explain all.
     pub fn large(
         &self,
         of: &str,
@@ -166,17 +166,17 @@ impl Residuals {
         Finding::new(Kind::ResidualsLarge, text, figures)
     }
 
-    /// By how much χ² falls if these equations may be off by anything.
+    /// Decrease of χ² if these equations may have any error.
     fn falls_without(&self, equations: &[usize]) -> f64 {
         self.fall(self.whitening.select_columns(equations)).fall
     }
 
-    /// What unknowns with these columns would explain of the errors.
+    /// Improvement by additional unknowns with these columns.
     pub fn explained_by(&self, columns: &DMatrix<f64>) -> Explained {
         self.fall(&self.whitening * columns)
     }
 
-    /// The same of whitened columns.
+    /// The same for whitened columns.
     fn fall(&self, shifts: DMatrix<f64>) -> Explained {
         let free = &shifts - &self.explained * self.explained.tr_mul(&shifts);
         let of_shifts = shifts.column_iter().map(|c| c.norm_squared());

@@ -1,4 +1,4 @@
-//! How much the rows scatter at rest, beside what the stated noise makes of them.
+//! Scatter of the rows at rest, compared with the stated noise.
 
 use nalgebra::Matrix3;
 use serde_json::json;
@@ -12,16 +12,16 @@ use crate::number::three_digits;
 use crate::run::{Dwell, Run};
 use crate::statistics::FALSE_ALARM;
 
-/// Increments of two neighbouring steps differ by a second difference of what pulses leave over, each half a
-/// pulse at most.
+/// Largest error of the difference of two neighbouring increments by pulses: a second difference of remainders, each
+/// half a pulse at most.
 const PULSES: f64 = 2.0;
 
-/// Triads that scatter at rest by more or less than their noise says, as findings; of inputs as calibrated, for a prior
-/// scale that is off is no noise.
+/// Findings on triads with a scatter at rest that does not agree with their noise. Calibrated inputs are used, because
+/// a wrong prior scale factor is not noise.
 ///
-/// A step lasts a tenth of a second, as the filter's: what is faster averages out, and slower than that
-/// only random walk, bias and a mount that shakes are seen. Nothing is changed by it, for it does not tell
-/// them apart.
+/// A step lasts a tenth of a second, as in the filter: faster errors average out, and of slower ones only random
+/// walk, bias and vibration of the mount remain. The result changes nothing, because it does not distinguish
+/// between them.
 pub fn scatter_at_rest(problem: &Problem, calibrated: &PerSensor<Triad>) -> Vec<Finding> {
     let runs = problem.runs().enumerate();
     let each = runs.flat_map(|(recording, run)| Sensor::ALL.map(|sensor| (recording, run, sensor)));

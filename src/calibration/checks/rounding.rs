@@ -1,9 +1,9 @@
-//! What rates leave open that are rounded to steps wider than their noise.
+//! Uncertainty of rates that are rounded to steps wider than their noise.
 //!
-//! Rounding errs by the same in every row where nothing moves the value over the edge of a step: no mean takes that
-//! away. Noise of σ leaves of it a sum of waves of the value, the k-th of amplitude step/πk · exp(−2π²k²σ²/step²)
-//! (Widrow and Kollár, *Quantization Noise*, 2008, on dither); where the value lies within a step is anybody's guess,
-//! so half their squares add up. With σ of half a step next to nothing is left.
+//! If nothing moves the value over the edge of a step, the rounding error is the same in every row, and averaging does
+//! not reduce it. With noise of σ, the remaining error is a sum of sine waves of the value, the k-th of amplitude
+//! step/πk · exp(−2π²k²σ²/step²) (Widrow and Kollár, *Quantization Noise*, 2008, on dither). The place of the value
+//! within a step is unknown, so half their squares add up. With σ of half a step, the remaining error is negligible.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
@@ -19,14 +19,14 @@ use crate::imu::{Output, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, Tria
 use crate::run::{Aiding, Run};
 use crate::units::DEGREE;
 
-/// Waves that are summed: what others add is a thousandth.
+/// Number of waves that are summed: the others add a thousandth.
 const WAVES: u32 = 600;
-/// What rounds to once as large says nothing.
+/// Least growth of σ that is reported.
 const SAID: f64 = 1.05;
 
-/// Covariance that rounding adds: what it leaves in the mean of every dwell, by least squares of these and the prior.
-/// Dwells that have their mean within one step err by the same. Without a table, accelerometers at rest tell how
-/// large gravity is along itself only.
+/// Covariance due to rounding: the rounding errors in the means of dwells, propagated through least squares with the
+/// prior. Dwells with means within the same step have the same error. Without a table, accelerometers at rest observe
+/// only the magnitude of gravity.
 pub fn by_rounding(problem: &Problem, triads: &PerSensor<Triad>) -> ParameterMatrix {
     let mut covariance = ParameterMatrix::zeros();
     for sensor in Sensor::ALL {
@@ -38,7 +38,7 @@ pub fn by_rounding(problem: &Problem, triads: &PerSensor<Triad>) -> ParameterMat
     covariance
 }
 
-/// The triads of which that says something, covariance being that of an estimate with it.
+/// Findings on triads for which rounding matters; `covariance` is that of the estimate, rounding included.
 pub fn rounded(
     problem: &Problem,
     by_rounding: &ParameterMatrix,
@@ -70,7 +70,7 @@ pub fn rounded(
     Sensor::ALL.into_iter().filter_map(of).collect()
 }
 
-/// Covariance of a triad's parameters by rounding errors in means of dwells; absent if rows are not rounded.
+/// Covariance of a triad's parameters due to rounding errors in means of dwells; `None` if rows are not rounded.
 fn of_triad(
     problem: &Problem,
     sensor: Sensor,
@@ -115,8 +115,8 @@ fn of_triad(
     Some(errors.map(|error| error * error.transpose()).sum())
 }
 
-/// Steps of rates along body axes, rad/s or m/s²; zero where there are none, or where rows are integrals, which may
-/// carry what rounding leaves over.
+/// Steps of rates along body axes, rad/s or m/s²; zero if there are none, or if rows are integrals, which may carry the
+/// remainder.
 fn steps(run: &Run, sensor: Sensor) -> Vector3<f64> {
     let imu = &run.recording.imu;
     let Some(log) = imu.log.as_ref().filter(|log| log.output == Output::Rate) else {
@@ -130,15 +130,15 @@ fn steps(run: &Run, sensor: Sensor) -> Vector3<f64> {
 
 /// The mean of a triad's rows over a dwell.
 struct Mean {
-    /// Along body axes, rad/s or m/s².
+    /// Mean along body axes, rad/s or m/s².
     output: Vector3<f64>,
-    /// The step that it lies in, axis by axis.
+    /// Number of the step in which it lies, for each axis.
     step: [i64; 3],
-    /// What rounding leaves in it, (rad/s)² or (m/s²)².
+    /// Variance of its rounding error, (rad/s)² or (m/s²)².
     variance: Vector3<f64>,
 }
 
-/// Means of a recording's dwells; absent if rows are not rounded.
+/// Means of a recording's dwells; empty if rows are not rounded.
 fn of_recording(problem: &Problem, recording: usize, run: &Run, sensor: Sensor) -> Vec<Mean> {
     let steps = steps(run, sensor);
     if steps == Vector3::zeros() {
@@ -177,8 +177,8 @@ fn of_recording(problem: &Problem, recording: usize, run: &Run, sensor: Sensor) 
     means.into_iter().map(mean).collect()
 }
 
-/// Variance that rounding to this step leaves in a mean of rows that scatter by this variance, rounding included, and
-/// whose noise is stated to have that.
+/// Variance of the rounding error in a mean of rows with this step, with this scatter (rounding included) and this
+/// stated noise variance.
 fn left(step: f64, scatter: f64, stated: f64) -> f64 {
     if step == 0.0 {
         return 0.0;

@@ -7,19 +7,19 @@ use crate::calibration::noise::LOG_SIGMA;
 use crate::calibration::{Finding, Innovation, Nis, Outcome};
 use crate::statistics::chi_square_limit;
 
-/// Part of stated figures that are wrong by more than what is still taken for a wrong figure.
+/// Probability that a stated figure is wrong by more than the accepted limit.
 const SO_WRONG: f64 = 1e-2;
 
-/// What NIS, or χ² over its degrees of freedom, stays below.
+/// Limit of NIS, or of χ² over its degrees of freedom.
 ///
-/// Noise as stated is wrong by a factor of three at one σ, wherever it is learnt; by so much that NIS, its
-/// square, goes beyond the limit, once in a hundred. Beyond, samples and model are of two things.
+/// 1σ of a stated noise figure is a factor of three, as everywhere in noise estimation. Its error exceeds the limit of
+/// NIS, its square, in one case of a hundred. Beyond that, samples and model do not belong together.
 fn limit() -> f64 {
     let sigmas = chi_square_limit(1.0, 2.0 * SO_WRONG).sqrt();
     (2.0 * LOG_SIGMA * sigmas).exp()
 }
 
-/// The finding where the iterations of the filter did not converge.
+/// The finding, if the iterations of the filter did not converge.
 pub fn not_converged(outcome: &Outcome) -> Option<Finding> {
     let passes = outcome.passes.len();
     let step = outcome
@@ -34,15 +34,15 @@ pub fn not_converged(outcome: &Outcome) -> Option<Finding> {
     (!outcome.converged).then(|| Finding::new(Kind::NotConverged, text, figures))
 }
 
-/// The finding where innovations are larger than a data sheet's figures can be wrong by.
+/// The finding, if innovations are larger than wrong figures of a data sheet can explain.
 pub fn unexplained(all: &Nis, innovations: &[Innovation]) -> Option<Finding> {
     let distances = innovations.iter().map(|i| (i.time, i.distance()));
     let worst = distances.max_by(|one, other| one.1.total_cmp(&other.1))?;
     rejected("NIS", all.mean, worst.0)
 }
 
-/// The same of a closed form, by the findings of its residuals: no noise explains the residuals even without the
-/// worst position, nor does the table's base.
+/// The same for a closed form, from the findings on its residuals: neither noise, even without the worst position,
+/// nor the table's base explains them.
 pub fn unexplained_residuals(findings: &[Finding]) -> Option<Finding> {
     let large = findings
         .iter()
@@ -56,7 +56,7 @@ pub fn unexplained_residuals(findings: &[Finding]) -> Option<Finding> {
     })
 }
 
-/// The finding where this mean of squares, the largest of them at this time in s, is beyond the limit.
+/// The finding, if this mean of squares exceeds the limit; the largest square is at this time, s.
 fn rejected(name: &str, nis: f64, worst: f64) -> Option<Finding> {
     let limit = limit();
     let text = format!(

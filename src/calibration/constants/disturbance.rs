@@ -1,32 +1,32 @@
-//! What happened once in a record.
+//! Single events in a record.
 
 use crate::earth::ROTATION_RATE;
 use crate::imu::Sensor;
 
-/// What happened once: with the begin of a dwell, told by its number among all, something is other than before.
+/// A single event: a change that starts with a dwell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disturbance {
-    /// What.
+    /// Its kind.
     pub kind: DisturbanceKind,
     /// Number of the dwell.
     pub dwell: usize,
 }
 
-/// What a disturbance is, by its three components.
+/// Kind of a disturbance; each has three components.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum DisturbanceKind {
-    /// The attitude that the table reads in that dwell alone is off, East, North and Up, rad.
+    /// Error of the table's attitude reading in this dwell only, East, North and Up, rad.
     Position,
-    /// The body turned in the move before that dwell as the gyros did not sense, East, North and Up, rad.
+    /// Rotation in the move before this dwell that the gyros did not sense, East, North and Up, rad.
     Slip,
-    /// Earth rate is other than at the stated latitude, throughout: East, North and Up, rad/s.
+    /// Deviation of Earth rate from that at the stated latitude, throughout: East, North and Up, rad/s.
     EarthRate,
-    /// The biases of a triad step, from half a step below their mean to half a step above it, rad/s or m/s².
+    /// Step of the biases of a triad, from half a step below their mean to half a step above it, rad/s or m/s².
     BiasStep(Sensor),
 }
 
 impl Disturbance {
-    /// What it may be before the data, 1σ of each component: anything that is linear still or, of a bias, as `bias` says.
+    /// Prior 1σ of each component: the linear range or, for a bias, the value of `bias`.
     pub fn sigma(self, bias: impl Fn(Sensor) -> f64) -> f64 {
         match self.kind {
             DisturbanceKind::Position | DisturbanceKind::Slip => LINEAR,
@@ -37,5 +37,5 @@ impl Disturbance {
     }
 }
 
-/// An attitude error that is linear still, rad.
+/// Largest attitude error in the linear range, rad.
 const LINEAR: f64 = 0.1;

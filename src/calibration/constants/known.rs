@@ -1,23 +1,23 @@
-//! What is known of constants so far: the prior and whitened rows `[G ν]` as one triangle.
+//! Current information on constants: the prior and whitened rows `[G ν]` as one triangle.
 
 use faer::MatRef;
 use nalgebra::{DMatrix, DVector};
 
 use crate::calibration::{Posterior, Prior};
 
-/// What is known of constants so far.
+/// Current information on constants.
 #[derive(Debug, Clone)]
 pub struct Known {
     prior: Prior,
-    /// Those that the prior leaves open, and those that it has at its mean.
+    /// Constants that the prior leaves free, and those that it fixes at their mean.
     open: Vec<usize>,
     fixed: Vec<usize>,
-    /// Rows of the open ones, and what they measured: an upper triangle.
+    /// Rows of the free constants, with their measured values: an upper triangle.
     root: DMatrix<f64>,
 }
 
 impl Known {
-    /// Before the data.
+    /// The prior, before any data.
     pub fn new(prior: Prior) -> Self {
         let all = 0..prior.sigma.len();
         let (open, fixed): (Vec<usize>, Vec<usize>) = all.partition(|&k| prior.sigma[k] > 0.0);
@@ -35,7 +35,7 @@ impl Known {
         }
     }
 
-    /// Takes in rows of all constants.
+    /// Adds rows of all constants.
     pub fn learn(&mut self, rows: &DMatrix<f64>) {
         let (n, all) = (self.open.len(), self.prior.sigma.len());
         let mut with = DMatrix::zeros(n + 1 + rows.nrows(), n + 1);
@@ -52,7 +52,7 @@ impl Known {
         self.root = triangle(&with);
     }
 
-    /// What is known of combinations of the constants, a row of weights each: mean, and a root of the covariance.
+    /// Mean and root of the covariance of combinations of the constants, each given by a row of weights.
     pub fn through(&self, weights: &DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
         let n = self.open.len();
         let mut across = weights.select_columns(&self.open).transpose();
@@ -68,7 +68,7 @@ impl Known {
         )
     }
 
-    /// Estimate and covariance. Where a constant is open still they are no numbers.
+    /// Estimate and covariance; NaN if a constant is still undetermined.
     pub fn posterior(&self) -> Posterior {
         let (n, all) = (self.open.len(), self.prior.sigma.len());
         let (mean, root) = self.through(&DMatrix::identity(all, all));
@@ -85,7 +85,7 @@ impl Known {
     }
 }
 
-/// The upper triangle that has the same squares as these rows, by Householder's reflections.
+/// The upper triangle R with `RᵀR` equal to that of these rows, by Householder's reflections.
 pub fn triangle(rows: &DMatrix<f64>) -> DMatrix<f64> {
     let rows = MatRef::from_column_major_slice(rows.as_slice(), rows.nrows(), rows.ncols());
     let qr = rows.qr();

@@ -1,4 +1,4 @@
-//! The constants of a record, what is known of them beforehand, and with the data.
+//! The constants of a record, with their prior and posterior.
 
 mod disturbance;
 mod known;
@@ -15,7 +15,7 @@ pub use known::{Known, triangle};
 pub use posterior::{Posterior, of_parameters};
 pub use prior::Prior;
 
-/// What is the same throughout a recording.
+/// A quantity that is constant throughout a recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Constant {
     /// A parameter of both triads, by its index.
@@ -28,12 +28,12 @@ pub enum Constant {
     Base(usize),
     /// An error of the table's axes, by its index.
     Axis(usize),
-    /// A component of what happened once.
+    /// A component of a single event.
     Disturbance(Disturbance, usize),
 }
 
 impl Constant {
-    /// What is known of it before.
+    /// The budget source of its prior.
     pub fn source(self) -> BudgetSource {
         match self {
             Self::Parameter(_) | Self::Disturbance(..) => BudgetSource::Prior,
@@ -60,7 +60,7 @@ impl Constant {
         }
     }
 
-    /// The error term that it is of, if it is of one.
+    /// The error term to which it belongs, if any.
     pub fn error_term(self) -> Option<ErrorTerm> {
         match self {
             Self::Term(index) => Term::of(index).map(ErrorTerm::Instrument),
@@ -71,7 +71,7 @@ impl Constant {
     }
 }
 
-/// The parameters of both triads among constants: place and index of each.
+/// The parameters of both triads among constants: position in the list, and parameter index.
 pub fn parameters(constants: &[Constant]) -> impl Iterator<Item = (usize, usize)> + '_ {
     let places = constants.iter().enumerate();
     places.filter_map(|(place, constant)| match constant {

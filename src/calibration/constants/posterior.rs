@@ -1,31 +1,31 @@
-//! What is known of constants with the data.
+//! The posterior of constants.
 
 use nalgebra::{DMatrix, DVector};
 
 use super::parameters;
 use crate::calibration::{Constant, ParameterMatrix, ParameterVector};
 
-/// What is known of constants with the data.
+/// The posterior of constants.
 #[derive(Debug, Clone)]
 pub struct Posterior {
-    /// Of which.
+    /// The constants.
     pub constants: Vec<Constant>,
-    /// Errors of all constants.
+    /// Estimated errors of all constants.
     pub mean: DVector<f64>,
-    /// Errors of the parameters of both triads.
+    /// Estimated errors of the parameters of both triads.
     pub parameters: ParameterVector,
-    /// Of all constants; zero of what was known.
+    /// Covariance of all constants; zero for fixed ones.
     pub covariance: DMatrix<f64>,
-    /// Of the parameters of both triads.
+    /// Covariance of the parameters of both triads.
     pub parameter_covariance: ParameterMatrix,
-    /// Squared residuals over their σ, with those of the prior.
+    /// Sum of squared normalised residuals, those of the prior included.
     pub cost: f64,
-    /// −2 ln of the likelihood, except a constant.
+    /// −2 ln of the likelihood, up to a constant.
     pub deviance: f64,
 }
 
 impl Posterior {
-    /// Of constants, with the logarithm of how many times the data shrank their volume, squared.
+    /// The posterior of constants; `shrinking` is the logarithm of the squared ratio of prior to posterior volume.
     pub fn new(
         constants: &[Constant],
         mean: DVector<f64>,
@@ -57,15 +57,15 @@ impl Posterior {
         }
     }
 
-    /// What the covariance of another one lacks if this one's prior is right: the mean square error of what that
-    /// one finds is the covariance here and the square of what is between them.
+    /// Addition to the covariance of another posterior if the prior of this one is correct: the mean square error of
+    /// the other estimate is this covariance plus the square of the difference of the estimates.
     pub fn added_to(&self, other: &Self) -> ParameterMatrix {
         let change = self.parameters - other.parameters;
         self.parameter_covariance - other.parameter_covariance + change * change.transpose()
     }
 }
 
-/// A matrix of constants as one of the parameters of both triads.
+/// Extracts the parameters of both triads from a matrix of constants.
 pub fn of_parameters(constants: &[Constant], of_constants: &DMatrix<f64>) -> ParameterMatrix {
     let mut all = ParameterMatrix::zeros();
     for (row, i) in parameters(constants) {

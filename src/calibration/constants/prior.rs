@@ -1,4 +1,4 @@
-//! What is known of constants beforehand.
+//! The prior of constants.
 
 use std::collections::BTreeMap;
 
@@ -8,18 +8,18 @@ use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::{Constant, Linearisation, Model, Posterior, parameter, to_vector};
 use crate::imu::PARAMETERS as PER_TRIAD;
 
-/// What is known of constants beforehand, as errors of the point of linearisation.
+/// The prior of constants, as errors of the linearisation point.
 #[derive(Debug, Clone)]
 pub struct Prior {
-    /// Of which.
+    /// The constants.
     pub constants: Vec<Constant>,
     pub mean: DVector<f64>,
-    /// 1σ of each; zero of what is known to be at its mean.
+    /// 1σ of each; zero for constants fixed at their mean.
     pub sigma: DVector<f64>,
 }
 
 impl Prior {
-    /// Of these constants, by a model, as errors of this point.
+    /// The prior of these constants by a model, as errors of this point.
     pub fn new(constants: &[Constant], model: &Model, at: &Linearisation) -> Self {
         let parameters = model.prior_mean - to_vector(&at.triads);
         let of = |constant: &Constant| match *constant {
@@ -46,7 +46,7 @@ impl Prior {
         }
     }
 
-    /// What it adds to a covariance by its sources, which is exact: `P P₀⁻¹ P`.
+    /// Its exact contribution to a covariance, by source: `P P₀⁻¹ P`.
     pub fn parts(&self, of: &Posterior) -> BTreeMap<BudgetSource, DMatrix<f64>> {
         let n = self.constants.len();
         let mut parts = BTreeMap::new();

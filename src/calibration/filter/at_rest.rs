@@ -1,4 +1,4 @@
-//! How errors go on at rest, and what a filter of a part of a dwell is given.
+//! Propagation of errors at rest, and the inputs of the filter of a part of a dwell.
 
 use nalgebra::DMatrix;
 
@@ -13,17 +13,17 @@ use crate::calibration::{
 };
 use crate::navigation::Block;
 
-/// Rates and specific forces that are constant in a dwell.
+/// Number of rates and specific forces that are constant in a dwell.
 const CONSTANTS: usize = 6;
 
-/// How the errors make what a filter of a part of a dwell is about.
+/// Map from the errors to the quantities of a filter of a part of a dwell.
 pub struct Map {
     pub given: Linear,
-    /// By how much the attitude of the table is off, East, North and Up.
+    /// Attitude error of the table, East, North and Up.
     pub table: Linear,
 }
 
-/// The moving states, of this many, that are in `g`: nothing in a dwell depends on the position.
+/// The moving states, of this number, that are in `g`: nothing in a dwell depends on the position.
 pub fn begins(moving: usize) -> Vec<usize> {
     let is_position = |place: &usize| (POSITION..POSITION + 3).contains(place);
     (0..moving).filter(|place| !is_position(place)).collect()
@@ -74,7 +74,7 @@ impl Filter {
         Map { given, table }
     }
 
-    /// By how much the attitude of the table is off.
+    /// Attitude error of the table.
     fn table_map(&self, rest: &Rest) -> Linear {
         let mut table = self.none(3);
         let response = rest.axes.as_deref();
@@ -97,7 +97,7 @@ impl Filter {
         table
     }
 
-    /// What is known of `g` before, given its covariance with all states and what is known of the constants.
+    /// Prior of `g`, from its covariance with all states and the knowledge of the constants.
     pub fn given<const G: usize>(
         &self,
         rows: &Linear,
@@ -114,7 +114,7 @@ impl Filter {
         )
     }
 
-    /// How the states that move go on in a step of a dwell, and what noise and constants add to them.
+    /// Propagation of the moving states in a step of a dwell, with noise and the effect of constants.
     pub fn step_model<const M: usize>(&self, block: &Block) -> StepModel<M> {
         // The last states are varying biases, which drive navigation errors as those that are constant do.
         let first = M - self.varying.len();
@@ -156,7 +156,7 @@ impl Filter {
     }
 }
 
-/// What three constant rates and three specific forces make of the navigation errors at rest.
+/// Effect of three constant rates and three specific forces on the navigation errors at rest.
 fn driven_at_rest(block: &Block) -> [[f64; NAVIGATION]; CONSTANTS] {
     let t = block.duration;
     std::array::from_fn(|constant| {
@@ -177,7 +177,7 @@ fn driven_at_rest(block: &Block) -> [[f64; NAVIGATION]; CONSTANTS] {
     })
 }
 
-/// Rate in rad/s and specific force in m/s² that make this of a block at rest.
+/// Rate in rad/s and specific force in m/s² that have this effect on a block at rest.
 fn rates(block: &Block, column: &[f64; NAVIGATION]) -> [f64; CONSTANTS] {
     let t = block.duration;
     std::array::from_fn(|k| match k {

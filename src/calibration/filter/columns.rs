@@ -1,16 +1,16 @@
-//! What constants do to a filter.
+//! Effect of constants on a filter.
 //!
 //! The filter is linear: with constants at q instead of zero its mean would be `x + U q`, and its
-//! innovations `ν − G q` with the same covariance. U is carried along; whitened rows `[G ν]` are kept. Estimate and
-//! covariance of q, and what q does to every state, are those of a filter that has q among its states, of any prior
-//! and any part of q (Friedland 1969, "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control 14(4)),
-//! without the cost of that filter.
+//! innovations `ν − G q` with the same covariance. U is propagated; whitened rows `[G ν]` are kept. They give the same
+//! estimate and covariance of q, and the same effect of q on every state, as a filter with q among its states, for any
+//! prior and any subset of q (Friedland 1969, "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control
+//! 14(4)), without the cost of that filter.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::calibration::constants::triangle;
 
-/// Quantities that are linear in the errors, a row each: by state, and by constant that is no state.
+/// Quantities that are linear in the errors, a row each: coefficients of states, and of constants that are not states.
 #[derive(Debug)]
 pub struct Linear {
     pub states: DMatrix<f64>,
@@ -18,7 +18,7 @@ pub struct Linear {
 }
 
 impl Linear {
-    /// Combinations of them, a row of weights each.
+    /// Combinations of the quantities, each given by a row of weights.
     pub fn combined(&self, weights: &DMatrix<f64>) -> Self {
         Self {
             states: weights * &self.states,
@@ -26,7 +26,7 @@ impl Linear {
         }
     }
 
-    /// The rows from a first on become more by others.
+    /// Adds other rows to the rows from a first one on.
     pub fn add(&mut self, first: usize, others: &Self) {
         let count = others.states.nrows();
         let mut rows = self.states.rows_mut(first, count);
@@ -36,23 +36,23 @@ impl Linear {
     }
 }
 
-/// What constants do to a filter.
+/// Effect of constants on a filter.
 #[derive(Debug, Clone)]
 pub struct Columns {
     /// U, a column for each state.
     pub of_states: DMatrix<f64>,
-    /// Whitened rows `[G ν]`, one after the other …
+    /// Whitened rows `[G ν]`, in sequence …
     rows: Vec<f64>,
-    /// … and how many of these numbers were looked at.
+    /// … and the count of these numbers that were read already.
     looked_at: usize,
-    /// Squares of what was observed that no constant and no state has a part in.
+    /// Sum of squares of the observations, independent of constants and states.
     pub squares: f64,
-    /// Logarithm of the determinant of the covariance of what was observed, the constants given.
+    /// Logarithm of the determinant of the covariance of the observations, given the constants.
     pub log_determinant: f64,
 }
 
 impl Columns {
-    /// Of so many constants and states, before anything is observed.
+    /// For this number of constants and states, before any observation.
     pub fn new(constants: usize, states: usize) -> Self {
         Self {
             of_states: DMatrix::zeros(constants, states),
@@ -63,7 +63,8 @@ impl Columns {
         }
     }
 
-    /// Measurements H are taken in by a gain: what whitens their innovations, and the whitened innovations.
+    /// Updates with measurements H by a gain, given the whitening matrix of their innovations and the whitened
+    /// innovations.
     pub fn update(
         &mut self,
         h: &Linear,
@@ -80,14 +81,14 @@ impl Columns {
         }
     }
 
-    /// The rows that were not looked at before.
+    /// The rows that were not read before.
     pub fn new_rows(&mut self) -> DMatrix<f64> {
         let rows = self.matrix(&self.rows[self.looked_at..]);
         self.looked_at = self.rows.len();
         rows
     }
 
-    /// The rows since they were last taken, a triangle of them where they are more than that has.
+    /// The rows since the last call, reduced to a triangle if that has fewer rows.
     pub fn take_rows(&mut self) -> DMatrix<f64> {
         let rows = self.matrix(&self.rows);
         self.rows.clear();

@@ -1,4 +1,4 @@
-//! A part of a dwell at once.
+//! Processing of a part of a dwell in one step.
 
 use super::Filter;
 use super::at_rest::{Map, begins};
@@ -8,18 +8,18 @@ use super::gate::{Judge, Verdict};
 use crate::calibration::record::Rest;
 use crate::calibration::{ATTITUDE, Known, NAVIGATION, Observation, POSITION, Stretch, VELOCITY};
 
-/// What a part of a dwell did.
+/// Result of processing a part of a dwell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Taken {
     Whole,
     Abandoned,
-    /// A covariance is not positive definite any more.
+    /// A covariance is no longer positive definite.
     Diverged,
 }
 
-/// Takes parts of dwells into filters of one kind.
+/// Processes parts of dwells for filters of one kind.
 pub trait DwellFilters {
-    /// Takes in a part of a dwell. Innovations are worked out where it is told what is `known` of the constants.
+    /// Processes a part of a dwell. Innovations are computed if prior knowledge of the constants (`known`) is given.
     fn take_in(
         &mut self,
         filter: &mut Filter,
@@ -41,8 +41,8 @@ impl<const M: usize, const G: usize> DwellFilters for GainCache<M, G> {
     }
 }
 
-/// Of filters like this, by what moves in them: navigation errors, then turn at rest or the biases of a triad, then
-/// two of these, then all.
+/// The implementation for this filter, by its moving states: navigation errors, then turn at rest or the biases of a
+/// triad, then two of these, then all.
 pub fn dwell_filters(filter: &Filter) -> Box<dyn DwellFilters> {
     let moving = filter.moving().len();
     let begins = begins(moving);
@@ -55,7 +55,7 @@ pub fn dwell_filters(filter: &Filter) -> Box<dyn DwellFilters> {
 }
 
 impl Filter {
-    /// A part of a dwell begins, before anything is observed of it.
+    /// Starts a part of a dwell, before its first observation.
     pub fn begin_rest(&mut self, rest: &Rest, stretch: &Stretch) {
         if rest.first {
             self.come_to_rest(&rest.from);
@@ -109,7 +109,7 @@ impl Filter {
         Taken::Whole
     }
 
-    /// A filter of a part alone through all of it.
+    /// Runs a filter of a part alone through the whole part.
     fn through<const M: usize, const G: usize>(
         &self,
         dwell: &mut DwellFilter<M, G>,
@@ -146,7 +146,7 @@ impl Filter {
         Taken::Whole
     }
 
-    /// The states that move become what they are at the end of a part.
+    /// Sets the moving states to their values at the end of a part.
     fn end(&mut self, summary: &Summary, Map { given, table }: &Map, moving: &[usize]) {
         let mut end = given.combined(&summary.of_given);
         end.add(ATTITUDE, table);

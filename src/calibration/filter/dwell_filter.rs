@@ -1,12 +1,11 @@
 //! A filter of a part of a dwell alone.
 //!
-//! At rest the parameters act through three rates and three specific forces that do not change. Given these
-//! and the navigation errors at the begin, together `g`, only noise
-//! is left: a small filter of navigation errors that are known when it begins takes it out of each
-//! observation. What is left of the observations is linear in `g` and white, so all of them together are one
-//! measurement of `g`, and the errors at the end are linear in `g`, too. Nothing is lost: it is the filter
-//! of all states with its steps in another order (Friedland 1969, "Treatment of bias in recursive
-//! filtering", IEEE Trans. Automatic Control 14(4)).
+//! At rest, the parameters act through three constant rates and three constant specific forces. Given these and
+//! the navigation errors at the start, together `g`, only noise remains: a small filter of navigation errors that
+//! are known at its start removes it from each observation. The residuals of the observations are linear in `g`
+//! and white, so together they are one measurement of `g`, and the errors at the end are linear in `g`, too.
+//! Nothing is lost: it is the filter of all states with its steps in another order (Friedland 1969, "Treatment of
+//! bias in recursive filtering", IEEE Trans. Automatic Control 14(4)).
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -22,34 +21,34 @@ pub struct Observed {
     pub kind: Observation,
     pub state: usize,
     pub residual: Vector3<f64>,
-    /// Of each component.
+    /// Variance of each component.
     pub variance: f64,
 }
 
-/// Navigation errors `U g + m` where `g` is given, and what is known of `g`: `M` states move, `G` is the size of
+/// Navigation errors `U g + m` for given `g`, and the information on `g`: `M` states move, `G` is the size of
 /// `g`.
 pub struct DwellFilter<'a, const M: usize, const G: usize> {
     gains: &'a mut GainCache<M, G>,
-    /// The point of its course where it is.
+    /// Its current point in the course.
     at: usize,
-    /// m
+    /// Mean m.
     mean: [f64; M],
-    /// Rows of `g` times what they measured, summed.
+    /// Sum of rows of `g` times their measured values.
     vector: [f64; G],
-    /// Of what was observed, given `g = 0`: squares, and logarithm of the determinant of its covariance.
+    /// Of the observations, given `g = 0`: sum of squares, and logarithm of the determinant of the covariance.
     squares: f64,
     log_determinant: f64,
-    /// What is known of `g`; none where innovations are not asked for.
+    /// Prior of `g`; `None` if innovations are not requested.
     given: Option<InputPrior<G>>,
 }
 
-/// What a part of a dwell comes to.
+/// Result of a part of a dwell.
 pub struct Summary {
     /// Rows of `g` …
     pub measured: DMatrix<f64>,
-    /// … and what each measures, of σ 1.
+    /// … and their measured values, of σ 1.
     pub values: DVector<f64>,
-    /// Squares of what was observed that `g` has no part in, and logarithm of the determinant of its covariance.
+    /// Sum of squares of the observations independent of `g`, and logarithm of the determinant of their covariance.
     pub squares: f64,
     pub log_determinant: f64,
     /// Navigation errors at the end: rows of `g`, offset, covariance.
@@ -71,7 +70,7 @@ impl<'a, const M: usize, const G: usize> DwellFilter<'a, M, G> {
         }
     }
 
-    /// Errors of a state become more by a known amount.
+    /// Adds a known amount to the errors of a state.
     pub fn refer(&mut self, state: usize, by: f64) {
         self.mean[state] += by;
     }
@@ -85,7 +84,7 @@ impl<'a, const M: usize, const G: usize> DwellFilter<'a, M, G> {
         self.mean = mean;
     }
 
-    /// Takes an observation in if the judge lets it; `None` if it is not finite or its covariance not positive
+    /// Processes an observation if the judge accepts it; `None` if it is not finite or its covariance is not positive
     /// definite.
     pub fn observe(&mut self, observed: &Observed, judge: &mut Judge) -> Option<Verdict> {
         if self.given.is_none() && !judge.lets_in() {

@@ -1,26 +1,26 @@
 //! Cache of covariances and gains of filters of parts of dwells: they do not depend on the data.
 //!
-//! Covariance and gain of a Kalman filter depend on which steps and observations follow one another, not on
-//! what is observed, and may be had beforehand (Gelb, *Applied Optimal Estimation*, §4.2). At rest they do not depend
-//! on the attitude either: East, North and Up, gravity and the Earth's rate are where they always are. So most
-//! dwells repeat the course of the one before.
+//! Covariance and gain of a Kalman filter depend on the sequence of steps and observations, not on the observed
+//! values, and can be computed in advance (Gelb, *Applied Optimal Estimation*, §4.2). At rest, they do not depend on
+//! the attitude either, because gravity and Earth rate are constant in East-North-Up. So most dwells repeat the
+//! course of the one before.
 
 use nalgebra::Matrix3;
 
 use super::rows::{add, whiten};
 
-/// How navigation errors go on in one step, and what `g` and noise add to them. `M` states move.
+/// Propagation of navigation errors in one step, with the effect of `g` and noise. `M` states move.
 #[derive(PartialEq)]
 pub struct StepModel<const M: usize> {
     /// Covariance of noise.
     pub noise: [[f64; M]; M],
-    /// What is not zero of Φ: row, column, value.
+    /// Nonzero elements of Φ: row, column, value.
     pub transition: Vec<(usize, usize, f64)>,
-    /// What the constants of `g` add: row, index in `g`, value.
+    /// Effect of the constants of `g`: row, index in `g`, value.
     pub driven: Vec<(usize, usize, f64)>,
 }
 
-/// The course that a part of a dwell has taken, as far as the next one repeats it.
+/// The course of a part of a dwell, reused as far as the next one repeats it.
 pub struct GainCache<const M: usize, const G: usize> {
     pub models: Vec<StepModel<M>>,
     pub course: Vec<Point<M, G>>,
@@ -28,10 +28,10 @@ pub struct GainCache<const M: usize, const G: usize> {
 
 /// A point of a course.
 pub struct Point<const M: usize, const G: usize> {
-    /// What led to it.
+    /// The event that led to it.
     event: Event,
     pub known: Known<M, G>,
-    /// How an observation was taken in, if that led to it.
+    /// Gain of the observation, if one led to it.
     pub gain: Option<Gain<M, G>>,
 }
 
@@ -44,34 +44,34 @@ enum Event {
     Observed(usize, f64),
 }
 
-/// How an observation is taken in where `g` is given.
+/// Gain of an observation for given `g`.
 pub struct Gain<const M: usize, const G: usize> {
     /// Lower triangular root of its covariance.
     pub root: Matrix3<f64>,
     /// Rows of `g`, whitened by it.
     pub rows: [[f64; G]; 3],
-    /// What the whitened observation gains of the navigation errors.
+    /// Gain of the navigation errors from the whitened observation.
     pub of_errors: [[f64; M]; 3],
     /// Logarithm of the determinant of its covariance.
     pub log_determinant: f64,
 }
 
-/// What is known of navigation errors `U g + m` where `g` is given, and of `g`.
+/// Covariance of navigation errors `U g + m` for given `g`, and information on `g`.
 #[derive(Clone)]
 pub struct Known<const M: usize, const G: usize> {
     /// U
     pub of_given: [[f64; G]; M],
-    /// Of m.
+    /// Covariance of m.
     pub covariance: [[f64; M]; M],
-    /// Information of `g` by the observations so far, and by nothing else.
+    /// Information on `g` from the observations so far only.
     pub information: [[f64; G]; G],
 }
 
 impl<const M: usize, const G: usize> GainCache<M, G> {
-    /// Where all begin.
+    /// Index of the common start.
     pub const BEGIN: usize = 0;
 
-    /// Component `k` of `g` is the error of the moving state `begins[k]` where a part begins.
+    /// Component `k` of `g` is the error of the moving state `begins[k]` at the start of a part.
     pub fn new(begins: &[usize]) -> Self {
         let mut known = Known {
             of_given: [[0.0; G]; M],
@@ -91,7 +91,7 @@ impl<const M: usize, const G: usize> GainCache<M, G> {
         }
     }
 
-    /// A part of these models begins: what was worked out with others is forgotten.
+    /// Starts a part with these models; results for other models are dropped.
     pub fn begin(&mut self, models: Vec<StepModel<M>>) {
         let pairs = self.models.iter().zip(&models);
         let alike = pairs.take_while(|(one, other)| one == other).count();
@@ -101,7 +101,7 @@ impl<const M: usize, const G: usize> GainCache<M, G> {
         self.models = models;
     }
 
-    /// Where a step leads.
+    /// The point after a step.
     pub fn step(&mut self, from: usize, model: usize) -> usize {
         let event = Event::Step(model);
         if !self.is_next(from, event) {
@@ -111,8 +111,8 @@ impl<const M: usize, const G: usize> GainCache<M, G> {
         from + 1
     }
 
-    /// Where it leads to take in three navigation errors from a state on, observed with this variance each; `None`
-    /// where their covariance is not positive definite.
+    /// The point after an observation of three navigation errors from a state on, each with this variance; `None`
+    /// if their covariance is not positive definite.
     pub fn observe(&mut self, from: usize, state: usize, variance: f64) -> Option<usize> {
         let event = Event::Observed(state, variance);
         if !self.is_next(from, event) {
@@ -176,7 +176,7 @@ impl<const M: usize, const G: usize> Known<M, G> {
         })
     }
 
-    /// Takes in an observation.
+    /// Updates with an observation.
     fn tell(&mut self, gain: &Gain<M, G>) {
         for (row, of_errors) in gain.rows.iter().zip(&gain.of_errors) {
             for (state, gain) in of_errors.iter().enumerate() {

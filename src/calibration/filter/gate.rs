@@ -1,34 +1,34 @@
-//! The gate: which observations are let in.
+//! The gate: acceptance of observations.
 
 use nalgebra::Vector3;
 
 use crate::calibration::{Innovation, Observation};
 
-/// After this many rejections in a row the gate doubts itself rather than the data.
+/// After this many consecutive rejections, the gate suspects the first accepted observation instead.
 const REOPEN: usize = 5;
-/// This many correct ones behind the only one that was let in speak against that one: it alone had a wide
-/// innovation covariance, and two outliers in a row are rarer than one.
+/// Number of rejected observations after a single accepted one that discredit the latter: it alone had a wide
+/// innovation covariance, and two consecutive outliers are rarer than one.
 const BEHIND_THE_FIRST: usize = 2;
-/// At most this many observations of a dwell are left out for having closed the gate.
+/// Most observations of a dwell that are dropped because they closed the gate.
 const MOST_CLOSING: usize = 3;
 
-/// Which observations a pass lets in.
+/// Rule for the acceptance of observations in a pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Gate<'a> {
     /// All.
     Open,
-    /// Those that its innovations do not make outliers.
+    /// Accept observations whose innovations are not outliers.
     Innovations,
-    /// Those of another pass, in their order; those beyond its end, too.
+    /// Accept as in another pass, in the same order; accept all beyond its end.
     As(&'a [bool]),
 }
 
-/// What is done with an innovation.
+/// Decision on an innovation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     Accepted,
     Rejected,
-    /// The dwell is taken in again, without the observation that closed the gate.
+    /// The dwell is processed again, without the observation that closed the gate.
     Abandoned,
 }
 
@@ -38,12 +38,12 @@ pub struct Judge<'a> {
     /// Squared whitened innovation beyond which an observation is an outlier.
     limit: f64,
     pub innovations: Vec<Innovation>,
-    /// Observations that were decided on without their innovations.
+    /// Number of observations decided without their innovations.
     unseen: usize,
     dwell: Dwell,
 }
 
-/// What the gate remembers of a dwell.
+/// State of the gate in a dwell.
 #[derive(Debug, Clone, Default)]
 struct Dwell {
     /// Number of dwells that have begun.
@@ -51,9 +51,9 @@ struct Dwell {
     after_move: bool,
     /// Number of its first innovation.
     first: usize,
-    /// Rejections in a row of each kind of observation.
+    /// Consecutive rejections of each kind of observation.
     row: [usize; Observation::ALL.len()],
-    /// Observations that are left out because they closed the gate to those after them.
+    /// Observations that are dropped because they closed the gate to later ones.
     closing: Vec<usize>,
 }
 
@@ -68,7 +68,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// A dwell begins, after a move or not.
+    /// Starts a dwell, after a move or not.
     pub fn begin(&mut self, after_move: bool) {
         self.dwell = Dwell {
             begun: self.dwell.begun + 1,
@@ -78,13 +78,13 @@ impl<'a> Judge<'a> {
         };
     }
 
-    /// The dwell begins again, without the observation that closed the gate.
+    /// Restarts the dwell, without the observation that closed the gate.
     pub fn begin_again(&mut self) {
         self.dwell.row = Default::default();
         self.innovations.truncate(self.dwell.first);
     }
 
-    /// Whether the next observation is let in, where innovations are not worked out.
+    /// Whether the next observation is accepted, if innovations are not computed.
     pub fn lets_in(&mut self) -> bool {
         self.unseen += 1;
         match self.gate {
@@ -136,8 +136,8 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// The observation that closed the gate: where several in a row were rejected, the dwell's first of
-    /// their kind that was not. None if there is no such thing, or were too many already.
+    /// The observation that closed the gate: after several consecutive rejections, the dwell's first accepted one of
+    /// their kind. `None` if there is none, or if too many were dropped already.
     fn closing(&self) -> Option<usize> {
         let Dwell {
             first,

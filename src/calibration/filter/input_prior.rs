@@ -1,10 +1,10 @@
-//! What is known of a few constants, in root form.
+//! Prior of a few constants, in square-root form.
 
 use nalgebra::{Matrix3, Vector3};
 
 use super::rows::{add, dot, factor, whiten};
 
-/// Mean of constants `g` and a root S of their covariance, `S Sᵀ`: what is known of `g` may shrink by twelve
+/// Mean of constants `g` and a root S of their covariance, `S Sᵀ`: the covariance may shrink by twelve
 /// orders of magnitude from one observation to the next, and a root keeps twice the digits (Bierman 1977,
 /// *Factorization Methods for Discrete Sequential Estimation*, §II).
 pub struct InputPrior<const G: usize> {
@@ -13,7 +13,7 @@ pub struct InputPrior<const G: usize> {
     root: [[f64; G]; G],
 }
 
-/// Three scalars, less what was expected of them.
+/// Three scalars minus their expectation.
 pub struct Unexpected<const G: usize> {
     /// In units of their σ, independent of one another.
     pub whitened: Vector3<f64>,
@@ -34,7 +34,7 @@ impl<const G: usize> InputPrior<G> {
         Self { mean, root }
     }
 
-    /// What of three independent scalars of σ 1, rows H of `g`, is not expected; `None` if that is not finite.
+    /// The innovations of three independent scalars of σ 1, rows H of `g`; `None` if they are not finite.
     #[inline]
     pub fn predict(&self, rows: &[[f64; G]; 3], scalars: &Vector3<f64>) -> Option<Unexpected<G>> {
         let mut by_root = [[0.0; G]; 3];
@@ -55,8 +55,8 @@ impl<const G: usize> InputPrior<G> {
         })
     }
 
-    /// Takes it in: Potter's form of three scalars at once, `S − S Bᵀ L⁻ᵀ (L + 1)⁻¹ B` (Andrews 1968, "A square
-    /// root formulation of the Kalman covariance equations", AIAA Journal 6(6)).
+    /// Updates with them, in Potter's form for three scalars at once: `S − S Bᵀ L⁻ᵀ (L + 1)⁻¹ B` (Andrews 1968, "A
+    /// square root formulation of the Kalman covariance equations", AIAA Journal 6(6)).
     #[inline]
     pub fn update(&mut self, unexpected: &Unexpected<G>) {
         let Unexpected {

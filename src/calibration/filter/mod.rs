@@ -1,4 +1,4 @@
-//! The Kalman filter over what moves or is drawn anew. What constants do to it are columns that it carries.
+//! The Kalman filter of the moving and redrawn states. The effect of constants is propagated as columns.
 
 mod at_rest;
 mod columns;
@@ -37,25 +37,25 @@ pub struct Filter {
     noise: PerSensor<ProcessNoise>,
     /// 1σ and correlation time of each varying bias, by its state.
     varying: Vec<(usize, f64, f64)>,
-    /// What the mounting of the recording does to the parameters, where it has its own.
+    /// Effect of the recording's own mounting on the parameters, if it has one.
     turned: Option<Turned>,
-    /// What constants do.
+    /// Effect of the constants.
     pub columns: Columns,
     /// Number of dwells that have begun.
     dwells: usize,
 }
 
-/// What a stretch begins after.
+/// Gap before a stretch.
 #[derive(Debug)]
 pub enum Since<'a> {
-    /// So much time of the same recording, s, of which nothing is known.
+    /// A lost time in the same recording, s.
     Lost(f64),
-    /// Nothing of its recording: where it is linearised what is of that alone, and what its mounting does.
+    /// A new recording: its deviation at the linearisation point, and the effect of its mounting.
     Anew(&'a Difference, Option<&'a Turned>),
 }
 
 impl Filter {
-    /// Before the first stretch begins, of recordings with one gravity or with more.
+    /// The filter before the first stretch, for recordings with one common gravity or several.
     pub fn new(model: &Model, one_gravity: bool) -> Self {
         let layout = Layout::new(model, one_gravity);
         let n = layout.sources.len();
@@ -79,10 +79,10 @@ impl Filter {
         }
     }
 
-    /// A stretch begins: navigation errors and the table's position start anew. In another recording the
-    /// variation of biases (first-order Gauss–Markov: Brown and Hwang, *Introduction to Random Signals*,
-    /// 4th ed., §3.8) does, too, and what is of the recording; in the same one it has gone on meanwhile. `gravity` is
-    /// its 1σ at another site.
+    /// Starts a stretch: navigation errors and the table's position are redrawn. In another recording, so are the
+    /// variation of biases (first-order Gauss–Markov: Brown and Hwang, *Introduction to Random Signals*, 4th ed., §3.8)
+    /// and the states of the recording; in the same recording, the biases have varied meanwhile. `gravity` is its 1σ
+    /// at another site.
     pub fn begin(&mut self, start: &Start, since: Since, gravity: Option<f64>) {
         let initial = self.layout.initial_attitude;
         let (still, level) = (Vector3::zeros(), (&start.attitude, &start.attitude_sigma));
@@ -118,12 +118,12 @@ impl Filter {
         }
     }
 
-    /// Forgets three states, given means and 1σ of their errors.
+    /// Redraws three states, with these means and 1σ of their errors.
     fn redraw_three(&mut self, first: usize, (mean, sigma): (&Vector3<f64>, &Vector3<f64>)) {
         (0..3).for_each(|axis| self.redraw(first + axis, mean[axis], sigma[axis]));
     }
 
-    /// Forgets a state: its error is drawn anew, independent of all others.
+    /// Redraws a state: its new error is independent of all others.
     fn redraw(&mut self, state: usize, mean: f64, sigma: f64) {
         self.x[state] = mean;
         self.columns.of_states.column_mut(state).fill(0.0);
@@ -132,12 +132,12 @@ impl Filter {
         self.p[(state, state)] = sigma.powi(2) * self.weight_of(state);
     }
 
-    /// What the variance of the source that draws a state is multiplied by.
+    /// Variance factor of the source that draws a state.
     fn weight_of(&self, state: usize) -> f64 {
         self.model.weight(self.layout.sources[state])
     }
 
-    /// The table has left its position: its error is drawn anew.
+    /// Redraws the position error of the table after it has left its position.
     pub fn redraw_table(&mut self) {
         if let Some(table) = self.layout.table_position {
             let sigma = self.model.position_sigma;
@@ -145,12 +145,12 @@ impl Filter {
         }
     }
 
-    /// The body has come to rest after a move by hand, from which nothing is learnt of its velocity.
+    /// Redraws the velocity after a move by hand, which gives no information on it.
     pub fn redraw_velocity(&mut self, sigma: f64) {
         (VELOCITY..VELOCITY + 3).for_each(|state| self.redraw(state, 0.0, sigma));
     }
 
-    /// A dwell begins.
+    /// Starts a dwell.
     pub fn begin_dwell(&mut self) {
         for (k, constant) in self.layout.constants.iter().enumerate() {
             if let Constant::Disturbance(of, component) = constant
@@ -162,26 +162,25 @@ impl Filter {
         self.dwells += 1;
     }
 
-    /// Whether a dwell is the one that began last.
+    /// Whether a dwell is the current one.
     pub fn is_in(&self, dwell: usize) -> bool {
         self.dwells == dwell + 1
     }
 
-    /// The body does not turn from now on: what the computed attitude does is an error.
+    /// From now on the body does not turn: any change of the computed attitude is an error.
     pub fn begin_to_hold(&mut self) {
         if let Some(turn) = self.layout.turn_at_rest {
             (turn..turn + 3).for_each(|state| self.redraw(state, 0.0, 0.0));
         }
     }
 
-    /// The body has come to rest: errors of velocity and position become those in the computed frame,
-    /// `δV + φ × V`, of the computed state.
+    /// Converts the errors of velocity and position to those in the computed frame, `δV + φ × V`, when the body
+    /// comes to rest.
     ///
-    /// A heading that is wrong turns computed velocity and position with it, and `computed − true`
-    /// takes that for something observed of the heading; in the computed frame a heading is invisible
-    /// (Barrau and Bonnabel 2017, "The invariant extended Kalman filter as a stable observer", IEEE
-    /// Trans. Automatic Control 62(4)). Without it the σ of a heading that nothing shows shrinks with
-    /// every turn.
+    /// A wrong heading rotates computed velocity and position with it, and `computed − true` would treat this as an
+    /// observation of the heading; in the computed frame, the heading is not observed (Barrau and Bonnabel 2017,
+    /// "The invariant extended Kalman filter as a stable observer", IEEE Trans. Automatic Control 62(4)). Without
+    /// this step, the σ of an unobserved heading would shrink with every turn.
     pub fn come_to_rest(&mut self, computed: &State) {
         for (first, computed) in [(VELOCITY, computed.velocity), (POSITION, computed.position)] {
             let turn = skew(-computed);

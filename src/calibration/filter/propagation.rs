@@ -1,4 +1,4 @@
-//! The covariance over a block of navigation.
+//! Propagation of the covariance over a block of navigation.
 
 use nalgebra::DMatrix;
 
@@ -13,7 +13,7 @@ use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor};
 use crate::navigation::{Block, ErrorMatrix};
 
 impl Filter {
-    /// Carries mean and covariance over a block of a move.
+    /// Propagates mean and covariance over a block of a move.
     pub fn propagate(&mut self, block: &Block) {
         let moving = self.moving_in_moves();
         let count = moving.len();
@@ -37,7 +37,7 @@ impl Filter {
         self.vary(block.duration);
     }
 
-    /// The states that a move drives: navigation errors and, where there is one, the turn at rest.
+    /// The states that a move drives: navigation errors and the turn at rest, if it is a state.
     pub fn moving_in_moves(&self) -> Vec<usize> {
         let turn = self.layout.turn_at_rest;
         let turn = turn.into_iter().flat_map(|turn| turn..turn + 3);
@@ -99,7 +99,7 @@ impl Filter {
         of_navigation[(own(row), own(column))] + alone * turning
     }
 
-    /// What navigation errors, and each state that drives them, make of the navigation errors.
+    /// Effect of the navigation errors, and of each state that drives them, on the navigation errors.
     pub fn driving_columns(&self, block: &Block) -> Vec<[f64; NAVIGATION]> {
         let layout = &self.layout;
         let navigation = block.navigation.column_iter();
@@ -127,7 +127,7 @@ impl Filter {
             .collect()
     }
 
-    /// What each constant makes of the navigation errors.
+    /// Effect of each constant on the navigation errors.
     pub fn constant_effects<'a>(
         &'a self,
         block: &'a Block,
@@ -174,7 +174,7 @@ impl Filter {
         }
     }
 
-    /// Varying biases forget as time goes by, and are driven.
+    /// Propagates varying biases: decay and process noise.
     pub fn vary(&mut self, duration: f64) {
         for k in 0..self.varying.len() {
             let (state, sigma, correlation_time) = self.varying[k];
@@ -189,7 +189,7 @@ impl Filter {
     }
 }
 
-/// Which navigation error a state that moves follows: the turn at rest does what the attitude does.
+/// The navigation error that a moving state follows: the turn at rest follows the attitude.
 pub fn own(place: usize) -> usize {
     match place.checked_sub(NAVIGATION) {
         Some(axis) => ATTITUDE + axis,
@@ -197,19 +197,19 @@ pub fn own(place: usize) -> usize {
     }
 }
 
-/// What a state `k` with this column of effects on the navigation errors makes of a state that moves; of the turn at
-/// rest as much as the attitude error has changed.
+/// Effect of a state `k`, with this column of effects on the navigation errors, on a moving state; for the turn at
+/// rest, the change of the attitude error.
 pub fn of_moving(column: &[f64; NAVIGATION], row: usize, k: usize) -> f64 {
     column[own(row)] - f64::from(row >= NAVIGATION && own(row) == k)
 }
 
-/// What a parameter of a triad makes of the navigation errors.
+/// Effect of a parameter of a triad on the navigation errors.
 pub fn effect_of(block: &Block, sensor: Sensor, parameter: usize) -> [f64; NAVIGATION] {
     let columns = block.parameters.get(sensor);
     std::array::from_fn(|row| columns[(row, parameter)])
 }
 
-/// What a change of Earth rate along East, North or Up makes of the navigation errors.
+/// Effect of a change of Earth rate along East, North or Up on the navigation errors.
 fn of_earth_rate(block: &Block, axis: usize) -> [f64; NAVIGATION] {
     let mut column = [0.0; NAVIGATION];
     column[ATTITUDE + axis] = -block.duration;
@@ -220,7 +220,7 @@ fn of_earth_rate(block: &Block, axis: usize) -> [f64; NAVIGATION] {
     column
 }
 
-/// What a change of the parameters of both triads makes of the navigation errors.
+/// Effect of a change of the parameters of both triads on the navigation errors.
 fn of_parameters(block: &Block, change: &ParameterVector) -> [f64; NAVIGATION] {
     let of = |sensor: Sensor| {
         let change = change.fixed_rows::<PER_TRIAD>(parameter(sensor, 0));

@@ -41,8 +41,8 @@ pub fn whiten<const N: usize>(root: &Matrix3<f64>, rows: &mut [[f64; N]; 3]) {
 }
 
 /// Rows r with `Σ rᵀ r` this matrix and, with a value v each, `Σ rᵀ v` this vector, each after the component
-/// that it takes out: Cholesky's factorisation, the largest of what is left first, until rounding is all that is left
-/// (Golub and Van Loan, *Matrix Computations*, 4th ed., §4.2.8).
+/// that it eliminates: Cholesky factorisation with pivoting on the largest remaining diagonal element, until only
+/// rounding remains (Golub and Van Loan, *Matrix Computations*, 4th ed., §4.2.8).
 pub fn factor<const N: usize>(
     mut matrix: [[f64; N]; N],
     mut vector: [f64; N],

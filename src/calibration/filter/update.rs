@@ -1,4 +1,4 @@
-//! Measurements, linear in the errors.
+//! Updates with measurements that are linear in the errors.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,7 +8,7 @@ use crate::calibration::POSITION;
 use crate::navigation::State;
 
 impl Filter {
-    /// This many quantities that no error does anything to.
+    /// This number of quantities that do not depend on any error.
     pub fn none(&self, rows: usize) -> Linear {
         Linear {
             states: DMatrix::zeros(rows, self.x.len()),
@@ -16,7 +16,7 @@ impl Filter {
         }
     }
 
-    /// Takes in the site's position, `z = δp`, known to this variance per axis.
+    /// Updates with the site's position, `z = δp`, with this variance per axis.
     pub fn update_position(&mut self, computed: &State, variance: f64) {
         let mut h = self.none(3);
         (0..3).for_each(|axis| h.states[(axis, POSITION + axis)] = 1.0);
@@ -25,8 +25,8 @@ impl Filter {
         self.take((&h, across), &z, variance);
     }
 
-    /// Takes in measurements `z = H x + v`, v white of variance R each, given H and H P, in Joseph's form, which
-    /// keeps the covariance symmetric and positive whatever the rounding of the gain (Bar-Shalom, Li,
+    /// Updates with measurements `z = H x + v`, v white of variance R each, given H and H P, in Joseph's form, which
+    /// keeps the covariance symmetric and positive despite rounding of the gain (Bar-Shalom, Li,
     /// Kirubarajan, *Estimation with Applications to Tracking and Navigation*, Eq. 5.2.3-18).
     pub fn take(&mut self, (h, across): (&Linear, DMatrix<f64>), z: &DVector<f64>, variance: f64) {
         let mut innovation = &across * h.states.transpose();

@@ -1,4 +1,4 @@
-//! What turning and holding by hand leave, from the equations of a calibration by gravity alone.
+//! Additional noise of turning and holding by hand, from the equations of a calibration by gravity alone.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -10,47 +10,47 @@ use crate::statistics::FALSE_ALARM;
 
 /// Longest step of ln of a variance.
 const LONGEST: f64 = 3.0;
-/// A step of ln of a variance that is nothing, over its σ.
+/// A step of ln of a variance below this part of its σ counts as converged.
 const SETTLED: f64 = 0.01;
-/// Steps at most.
+/// Most steps.
 const STEPS: usize = 40;
 
-/// What a hand may add: to the attitude in moves, of either kind, and in dwells.
+/// Sources of noise by hand: attitude noise in moves, of both kinds, and in dwells.
 pub const BY_HAND: [Source; 3] = [
     Source::GyroMotion,
     Source::GyroMoving,
     Source::RotationAtRest,
 ];
 
-/// How much of each of [`BY_HAND`] is in errors, where that is one in SI and radians.
+/// Share of each of [`BY_HAND`] in the errors, for unit σ in SI and radians.
 pub type Parts = [DVector<f64>; BY_HAND.len()];
 
-/// Noise that makes errors likelier than what is stated does.
+/// Additional noise that makes the errors more likely than the stated noise.
 ///
-/// Found by maximum likelihood, the parameters being integrated out with their prior. Residuals would not show it
-/// where there are hardly more equations than parameters: these then explain any noise, by values that the prior
-/// calls unlikely.
+/// It is found by maximum likelihood, with the parameters integrated out with their prior. Residuals would not show it
+/// if there are hardly more equations than parameters: then the parameters explain any noise, with values that are
+/// unlikely under the prior.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ByHand {
     found: Vec<Found>,
-    /// −2 ln of the likelihood ratio of stated noise to this.
+    /// −2 ln of the likelihood ratio of the stated noise to this noise.
     ratio: f64,
 }
 
 /// One source.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Found {
-    /// Its place in [`BY_HAND`].
+    /// Its index in [`BY_HAND`].
     place: usize,
-    /// Of what is beyond the stated noise, in SI and radians.
+    /// Variance in excess of the stated noise, in SI and radians.
     variance: f64,
-    /// 1σ of ln of it.
+    /// 1σ of the logarithm of the variance.
     spread: f64,
 }
 
 impl ByHand {
-    /// Source after source as long as one more makes the errors likelier than chance does; from errors of equations
-    /// before the data, and their covariance by prior and stated noise.
+    /// Adds source after source as long as the improvement is significant, from the errors of the equations before the
+    /// data and their covariance due to prior and stated noise.
     pub fn likeliest(
         errors: &DVector<f64>,
         covariance: &DMatrix<f64>,
@@ -84,17 +84,17 @@ impl ByHand {
         })
     }
 
-    /// What −2 ln of the likelihood ratio of one source more stays below by chance.
+    /// Limit of −2 ln of the likelihood ratio of one additional source.
     fn limit() -> f64 {
         limit(0, 1, FALSE_ALARM / BY_HAND.len() as f64)
     }
 
-    /// Whether the data call for none.
+    /// Whether the data support no source.
     pub fn is_none(&self) -> bool {
         self.found.is_empty()
     }
 
-    /// Whether another is no other: the same sources, as large within a tenth of how well they are known.
+    /// Whether two results agree: the same sources, with variances equal within a tenth of their uncertainty.
     pub fn is_like(&self, other: &Self) -> bool {
         let alike = |(one, other): (&Found, &Found)| {
             let off = (one.variance / other.variance).ln().abs();
@@ -103,14 +103,14 @@ impl ByHand {
         self.found.len() == other.found.len() && self.found.iter().zip(&other.found).all(alike)
     }
 
-    /// A covariance without it.
+    /// Subtracts this noise from a covariance.
     pub fn taken_from(&self, covariance: &mut DMatrix<f64>, parts: &Parts) {
         for one in &self.found {
             add(covariance, &parts[one.place], -one.variance);
         }
     }
 
-    /// The model of a problem with it.
+    /// The model of a problem with this noise.
     pub fn model(&self, problem: &Problem) -> Model {
         let mut model = problem.model.clone();
         for one in &self.found {
@@ -121,12 +121,12 @@ impl ByHand {
         model
     }
 
-    /// What it is told with.
+    /// The finding that reports it.
     pub fn finding(&self, problem: &Problem, report: &NoiseReport) -> Option<Finding> {
         noise_learnt(problem, (self.ratio, Self::limit()), &report.sources)
     }
 
-    /// What became of the noise of a problem with it.
+    /// The noise report of a problem with this noise.
     pub fn report(&self, problem: &Problem) -> NoiseReport {
         let figures = |one: &Found| {
             let stated = BY_HAND[one.place].sigma(problem);
@@ -146,8 +146,8 @@ impl ByHand {
     }
 }
 
-/// Sets the variances by which errors are likeliest, and gives −2 ln of their likelihood; `None` if one is zero. The
-/// last one begins there.
+/// Sets the variances to their maximum-likelihood values, and returns −2 ln of the likelihood; `None` if one is zero.
+/// The last one starts from zero.
 ///
 /// Source: Fisher scoring of the likelihood of components of variance, Patterson and Thompson 1971, Biometrika 58(3);
 /// of one after the other.
@@ -194,7 +194,7 @@ fn add(covariance: &mut DMatrix<f64>, parts: &DVector<f64>, variance: f64) {
 
 /// Errors under a covariance.
 struct Likelihood {
-    /// −2 ln of it, but for a constant.
+    /// −2 ln of the likelihood, up to a constant.
     deviance: f64,
     inverse: DMatrix<f64>,
     weighted: DVector<f64>,

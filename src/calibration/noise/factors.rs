@@ -1,4 +1,4 @@
-//! The variance of every source, over a reference.
+//! The variance of every source, relative to a reference.
 
 use super::source::Source;
 use crate::calibration::record::schedule::step_length;
@@ -9,21 +9,21 @@ use crate::run::Aiding;
 /// Number of sources.
 pub const SOURCES: usize = Source::ALL.len();
 
-/// Variance of each source over its reference, in the order of [`Source::ALL`].
+/// Variance of each source relative to its reference, in the order of [`Source::ALL`].
 pub type Factors = [f64; SOURCES];
 
-/// What variances are counted in: what is stated; for what is not, as much as the stated random walks
-/// make of the same.
+/// Reference variances: the stated ones; for figures that are not stated, the equivalent of the stated random
+/// walks.
 #[derive(Debug, Clone)]
 pub struct Scale {
-    /// Reference variance of each source in SI and radians; zero where the run cannot have it.
+    /// Reference variance of each source in SI and radians; zero if the run cannot have it.
     reference: [f64; SOURCES],
-    /// Whether a figure that is not zero is stated, of what the run can have.
+    /// Whether a nonzero figure is stated, for each source that the run can have.
     pub stated: [bool; SOURCES],
-    /// What the problem has without learning.
+    /// The factors of the problem without estimation.
     pub initial: Factors,
-    /// Of a bias that is not stated to vary, s. What varies faster acts as random walk, what varies
-    /// slower as a constant bias: the length of the longest recording.
+    /// Correlation time of a bias without stated variation, s: the length of the longest recording. Faster variation
+    /// acts as random walk, slower variation as a constant bias.
     correlation_time: f64,
 }
 
@@ -66,7 +66,7 @@ impl Scale {
         }
     }
 
-    /// What is stated, and of what is not as much as the stated random walks make.
+    /// The stated factors, and the reference for figures that are not stated.
     pub fn broad(&self) -> Factors {
         let mut broad = self.initial;
         for k in self.present() {
@@ -87,7 +87,7 @@ impl Scale {
         (factors[source] * self.reference[source]).sqrt()
     }
 
-    /// A model with these factors. What is as it was stays untouched.
+    /// A model with these factors. Unchanged factors leave the model untouched.
     pub fn apply(&self, factors: &Factors, model: &Model) -> Model {
         let mut model = model.clone();
         for (k, source) in Source::ALL.into_iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Which sources the data call for, and Fisher scoring over their factors.
+//! Selection of the noise sources that the data support, and Fisher scoring of their factors.
 //!
 //! Source: gradient and expected information of a Gaussian likelihood by its innovations, Gupta and Mehra
 //! 1974, "Computational aspects of maximum likelihood estimation and reduction in sensitivity function
@@ -12,32 +12,32 @@ use super::factors::{Factors, SOURCES, Scale};
 use super::likelihood_ratio::limit;
 use crate::calibration::{CalibrationError, Gate, Innovation, PassResult, Problem, Script, pass};
 
-/// 1σ of ln σ of a stated figure before the data: a factor of three.
+/// Prior 1σ of ln σ of a stated figure: a factor of three.
 pub const LOG_SIGMA: f64 = 1.098_612_288_668_109_8;
-/// Chance that scores call for a likelihood ratio which is not needed. The score of a variance is as skewed as χ², so it
-/// does not decide; but it costs no fit.
+/// False-alarm rate of the screening by scores. The score of a variance is as skewed as χ², so it does not decide;
+/// but it needs no fit.
 const SCREEN: f64 = 0.05;
-/// Chance that a source which is not there is kept.
+/// Probability of keeping an absent source.
 const NEEDLESS: f64 = 0.05;
-/// Step of ln σ, or of a variance that is zero over its reference, for differences.
+/// Step for differences: of ln σ or, for a zero variance, of the variance relative to its reference.
 const DIFFERENCE: f64 = 1e-3;
-/// A variance that is not stated and below this of its reference is none.
+/// An unstated variance below this part of its reference counts as zero.
 const NOTHING: f64 = 1e-3;
-/// A fall of −2 ln of the likelihood that is nothing: a third of a σ of one factor.
+/// A decrease of −2 ln of the likelihood below this counts as converged: a third of a σ of one factor.
 pub const SETTLED: f64 = 0.1;
 /// Longest step of ln σ.
 const LONGEST: f64 = 1.5;
-/// A step that lowers nothing at this fraction of itself is given up.
+/// A step is given up if it does not lower the cost even at this fraction.
 const SHORTEST: f64 = 0.01;
-/// Steps at most.
+/// Most steps.
 const STEPS: usize = 40;
 
-/// The likelihood of noise at one point of linearisation.
+/// The likelihood of noise at one linearisation point.
 pub struct Likelihood<'a> {
     pub problem: &'a Problem<'a>,
     pub script: &'a Script<'a>,
     pub scale: &'a Scale,
-    /// Of each observation of three components, whether it is let in.
+    /// Whether each observation of three components is accepted.
     pub accepted: Vec<bool>,
 }
 
@@ -53,9 +53,9 @@ pub struct Slope {
 #[derive(Debug, Clone)]
 pub struct Fit {
     pub factors: Factors,
-    /// Those that are not as stated.
+    /// The sources that differ from the stated noise.
     pub sources: Vec<usize>,
-    /// −2 ln of the likelihood there, without the prior of factors.
+    /// −2 ln of the likelihood of the fit, without the prior of factors.
     pub deviance: f64,
 }
 
@@ -66,7 +66,7 @@ impl Likelihood<'_> {
         pass(&problem, self.script, Gate::As(&self.accepted))
     }
 
-    /// Score and information by these sources from a replay at a point, from as many replays more as there are sources.
+    /// Score and information of these sources from a replay at a point and one more replay per source.
     pub fn slope(
         &self,
         here: PassResult,
@@ -104,7 +104,7 @@ impl Likelihood<'_> {
         })
     }
 
-    /// Twice what the prior of stated figures takes off ln of the likelihood.
+    /// −2 ln of the prior of stated figures.
     fn penalty(&self, factors: &Factors) -> f64 {
         let stated = (0..SOURCES).filter(|&k| self.scale.stated[k]);
         stated
@@ -112,8 +112,8 @@ impl Likelihood<'_> {
             .sum()
     }
 
-    /// The factors of largest posterior density of all sources, from those of another point of linearisation on; as
-    /// stated where the score of no source is beyond chance.
+    /// The factors of largest posterior density of all sources, starting from those of another linearisation point; as
+    /// stated if no score is significant.
     pub fn fit(&self, before: Option<&Fit>) -> Result<Fit, CalibrationError> {
         let present = self.scale.present();
         let stated = self.scale.initial;
@@ -145,12 +145,12 @@ impl Likelihood<'_> {
         })
     }
 
-    /// Those of these sources that the data call for, at the factors of largest posterior density; the others become
-    /// what is stated, else nothing.
+    /// Selects the sources that the data support, at the factors of largest posterior density; the others get their
+    /// stated value, or zero.
     ///
-    /// A variance cannot be below zero, so fitting every source gives a small one to about half of those that are not
-    /// there, and their sum makes σ of the parameters too large. The least goes first, then the least of what the others
-    /// make of it, in the quadratic model of the likelihood.
+    /// A variance cannot be negative, so a fit of every source gives a small variance to about half of the absent ones,
+    /// and their sum makes σ of the parameters too large. The least significant source is removed first, then the next
+    /// by the quadratic model of the likelihood.
     fn called_for(
         &self,
         factors: &mut Factors,
@@ -199,7 +199,7 @@ impl Likelihood<'_> {
         }
     }
 
-    /// Whether the score of any source is beyond chance; where a variance is zero and would fall it is not.
+    /// Whether the score of any source is significant; a zero variance with a negative score is not.
     fn is_called_for(&self, slope: &Slope, stated: &Factors, present: &[usize]) -> bool {
         present.iter().enumerate().any(|(i, &k)| {
             let one_sided = usize::from(stated[k] == 0.0);
@@ -212,8 +212,8 @@ impl Likelihood<'_> {
 
     /// The factors of largest posterior density of these sources, the others held, and −2 ln of the likelihood there.
     ///
-    /// A variance that is zero and would go below rests until the others have settled; then each is
-    /// looked at once more.
+    /// A variance that is zero and would become negative is kept at zero until the others have converged; then each is
+    /// tested again.
     fn settled(
         &self,
         start: &Factors,
@@ -257,7 +257,7 @@ impl Likelihood<'_> {
         Ok((at, deviance))
     }
 
-    /// The point at the longest fraction of a step that lowers the cost; none if none does.
+    /// The point at the longest fraction of a step that lowers the cost; `None` if there is no such step.
     fn shortened(
         &self,
         at: &Factors,
@@ -290,8 +290,8 @@ impl Likelihood<'_> {
         None
     }
 
-    /// 1σ after the data of ln σ of each factor that is above zero, and of the variance over its reference of each that
-    /// is zero.
+    /// Posterior 1σ of ln σ of each positive factor, and of the variance relative to its reference of each zero
+    /// factor.
     pub fn sigma(
         &self,
         factors: &Factors,
@@ -306,8 +306,8 @@ impl Likelihood<'_> {
     }
 }
 
-/// Of each scalar that was let in, what changes between two passes over the step of a factor: ln of its variance, and
-/// the innovation over its σ.
+/// Derivatives by a factor from two passes, for each accepted scalar: of ln of its variance, and of its normalised
+/// innovation.
 fn differences(here: &PassResult, there: &PassResult) -> Vec<(f64, f64)> {
     let scalars = |of: &Innovation| [0, 1, 2].map(|k| (of.whitened[k], of.sigma[k]));
     let here = here.let_in().flat_map(scalars);
@@ -319,7 +319,7 @@ fn differences(here: &PassResult, there: &PassResult) -> Vec<(f64, f64)> {
     each.collect()
 }
 
-/// The solution of `information · step = score`; a direction of no information takes no step.
+/// The solution of `information · step = score`, without a step in directions without information.
 fn solve(mut information: DMatrix<f64>, score: &DVector<f64>) -> Option<DVector<f64>> {
     for i in 0..information.nrows() {
         information[(i, i)] += f64::EPSILON.sqrt() * (1.0 + information[(i, i)]);
@@ -328,7 +328,7 @@ fn solve(mut information: DMatrix<f64>, score: &DVector<f64>) -> Option<DVector<
 }
 
 impl Slope {
-    /// With the prior of what is stated.
+    /// Adds the prior of stated figures.
     fn with_prior(mut self, scale: &Scale, at: &Factors, sources: &[usize]) -> Self {
         for (i, &k) in sources
             .iter()

@@ -1,4 +1,4 @@
-//! From a calibration with stated noise to one with the noise that its data show.
+//! From a calibration with stated noise to one with estimated noise.
 
 use super::factors::{Factors, Scale};
 use super::fit::{Fit, Likelihood, SETTLED};
@@ -12,19 +12,19 @@ use crate::calibration::{
 };
 use crate::statistics::FALSE_ALARM;
 
-/// Points of linearisation at most.
+/// Most linearisation points.
 const ROUNDS: usize = 6;
-/// Observations of three components that noise is first learnt from: 900 numbers, half of which tell σ of
+/// Number of observations of three components for the first noise estimate: of 900 numbers, half determine σ of
 /// a white noise to 3 %.
 const ENOUGH: usize = 300;
-/// Steps of a dwell between these observations at most: longer ones would not tell white noise of velocity
-/// and attitude from random walk at all.
+/// Most steps of a dwell between these observations: with longer intervals, white noise of velocity
+/// and attitude could not be distinguished from random walk.
 const LONGEST: usize = 10;
-/// What 95 % stay below, in σ.
+/// 95 % quantile of the normal distribution, one-sided, in σ.
 const ONE_SIDED: f64 = 1.645;
 
-/// Keeps stated noise or estimates it, as the problem's options say, from what was solved with some noise, and iterates
-/// with that: noise at one point of linearisation, and again until neither moves.
+/// Keeps the stated noise or estimates it, according to the problem's options, from a solution with some noise, and
+/// iterates: noise at one linearisation point, then estimation, until both converge.
 pub fn learn<'a>(
     as_stated: &Problem<'a>,
     solved: Solved<'a>,
@@ -62,8 +62,8 @@ pub fn learn<'a>(
     Ok(Solved { noise, ..solved })
 }
 
-/// Iterates with noise that was estimated at one point of linearisation, and estimates it there again, until neither
-/// moves.
+/// Iterates with the noise estimated at one linearisation point, and estimates it again at the result, until both
+/// converge.
 fn with_noise<'a>(
     as_stated: &Problem<'a>,
     mut solved: Solved<'a>,
@@ -104,7 +104,7 @@ fn with_noise<'a>(
     Ok(solved)
 }
 
-/// Of each observation where this many steps of a dwell are taken together, whether all that it stands for are let in.
+/// Acceptance of observations for combined steps: accepted if all observations of the combined steps are.
 fn taken_together(problem: &Problem, accepted: &[bool], steps: usize) -> Vec<bool> {
     let (mut accepted, mut together) = (accepted.iter(), Vec::new());
     for stretch in problem.stretches() {
@@ -127,8 +127,8 @@ fn taken_together(problem: &Problem, accepted: &[bool], steps: usize) -> Vec<boo
     together
 }
 
-/// Lets in what the gate allows; leaves out what it does not where that is still `open`. Otherwise the set
-/// only grows, so it cannot toggle.
+/// Accepts observations within the gate; rejects others if `open`. If not `open`, the accepted set
+/// only grows, so that it cannot toggle.
 fn regate(accepted: &mut [bool], distances: impl Iterator<Item = f64>, gate: f64, open: bool) {
     for (accepted, distance) in accepted.iter_mut().zip(distances) {
         let sound = distance <= gate;
@@ -139,8 +139,8 @@ fn regate(accepted: &mut [bool], distances: impl Iterator<Item = f64>, gate: f64
 }
 
 impl Likelihood<'_> {
-    /// The test of what is stated against a fit, whose sources were chosen from all that are present: chance is that of
-    /// all of them.
+    /// The test of the stated noise against a fit. The sources of the fit were selected from all present ones, so the
+    /// limit is that for all of them.
     fn test(&self, fit: &Fit) -> Result<NoiseTest, CalibrationError> {
         let stated = self.scale.initial;
         let present = self.scale.present().into_iter();

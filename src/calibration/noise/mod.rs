@@ -1,9 +1,9 @@
-//! Noise learnt from a record: what `run.toml` states, unless the data contradict it.
+//! Noise estimated from a record, for figures of `run.toml` that the data contradict.
 //!
-//! A few sources of noise, each with one σ, are found by maximum likelihood around what is stated. The
-//! filter integrates parameters, attitudes and table errors out, so this is the restricted likelihood
-//! (Patterson and Thompson 1971, Biometrika 58(3)): no degree of freedom is lost to them. What is learnt
-//! is in the [`super::Model`], so that every later pass has it.
+//! A few sources of noise, each with one σ, are estimated by maximum likelihood with the stated values as prior. The
+//! filter integrates out parameters, attitudes and table errors, so this is the restricted likelihood
+//! (Patterson and Thompson 1971, Biometrika 58(3)): no degree of freedom is lost to them. The estimated noise
+//! is stored in the [`super::Model`], so that every later pass uses it.
 
 mod by_hand;
 mod factors;

@@ -1,23 +1,23 @@
-//! Which noise is used.
+//! Noise policy.
 
 use serde::{Deserialize, Serialize};
 
-/// Which noise the filter uses.
+/// The noise used by the filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NoisePolicy {
-    /// What is stated.
+    /// The stated noise.
     Stated,
-    /// What is stated unless the data contradict it, which right figures do in one run of a thousand;
-    /// else what the data show.
+    /// The stated noise, unless the data contradict it (p < 0.001); then the noise estimated from the
+    /// data.
     #[default]
     Auto,
-    /// What the data show, around what is stated.
+    /// The noise estimated from the data, with the stated noise as prior.
     Learnt,
 }
 
 impl NoisePolicy {
-    /// All of them.
+    /// All policies.
     pub const ALL: [Self; 3] = [Self::Stated, Self::Auto, Self::Learnt];
 
     /// The name that command line and files use.

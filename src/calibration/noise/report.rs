@@ -1,4 +1,4 @@
-//! What became of the noise of a record.
+//! Report on the noise of a record.
 
 use std::fmt;
 
@@ -11,14 +11,14 @@ use crate::calibration::FindingKind as Kind;
 use crate::calibration::{Finding, Problem};
 use crate::number::three_digits;
 
-/// What noise a calibration used, and how it came to that.
+/// The noise used by a calibration, and its origin.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NoiseReport {
-    /// What was asked for.
+    /// The requested policy.
     pub policy: NoisePolicy,
-    /// Whether the noise is learnt; else it is as stated.
+    /// Whether the noise was estimated; if not, it is as stated.
     pub learnt: bool,
-    /// The test of what is stated; none where nothing was tested.
+    /// The test of the stated noise; `None` if nothing was tested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub test: Option<NoiseTest>,
     /// Every source that the record can have.
@@ -26,40 +26,40 @@ pub struct NoiseReport {
     pub sources: Vec<SourceFigures>,
 }
 
-/// The test of stated noise against what the data show: −2 ln of the likelihood ratio.
+/// The test of the stated noise against the estimated noise: −2 ln of the likelihood ratio.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NoiseTest {
-    /// Of stated noise to that which the data call for …
+    /// −2 ln of the likelihood ratio of the stated to the estimated noise …
     #[serde(default)]
     pub ratio: f64,
-    /// … and what it stays below in 999 of 1000 runs if what is stated is right.
+    /// … and its limit for correct stated noise (p < 0.001).
     #[serde(rename = "ratio_limit")]
     pub limit: f64,
-    /// Whether the data contradict what is stated.
+    /// Whether the data contradict the stated noise.
     pub rejected: bool,
 }
 
 /// 1σ of a source, in the unit named.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SourceFigures {
-    /// Which.
+    /// The source.
     pub source: Source,
-    /// In words.
+    /// Its name.
     pub name: String,
     /// Unit of the figures.
     pub unit: String,
-    /// What is stated, or seen in dwells before the filter; none where nothing is.
+    /// The stated value, or the one seen in dwells before the filter; `None` if there is neither.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stated: Option<f64>,
-    /// What was used.
+    /// The value used.
     pub used: f64,
-    /// Its 95 % interval; none where it was not learnt.
+    /// Its 95 % interval; `None` if it was not estimated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interval: Option<[f64; 2]>,
 }
 
 impl NoiseReport {
-    /// The finding where noise was learnt because the data contradict what is stated.
+    /// The finding, if noise was estimated because the data contradict the stated noise.
     pub(in crate::calibration) fn finding(&self, problem: &Problem) -> Option<Finding> {
         let test = self.test.filter(|test| self.learnt && test.rejected)?;
         noise_learnt(problem, (test.ratio, test.limit), &self.sources)
@@ -94,7 +94,7 @@ impl fmt::Display for NoiseReport {
 }
 
 impl SourceFigures {
-    /// Of σ in SI and radians.
+    /// Figures from σ in SI and radians.
     pub(in crate::calibration) fn new(
         source: Source,
         stated: Option<f64>,
@@ -112,7 +112,7 @@ impl SourceFigures {
         }
     }
 
-    /// Whether it is there at all, stated or learnt.
+    /// Whether the source is present, stated or estimated.
     pub fn counts(&self) -> bool {
         self.used > 0.0 || self.stated.is_some()
     }
@@ -150,8 +150,8 @@ fn symbol(unit: &str) -> String {
     })
 }
 
-/// Noise that was learnt: −2 ln of the likelihood ratio of stated to learnt noise, its limit, and the sources.
-/// None where none was stated.
+/// The finding on estimated noise: −2 ln of the likelihood ratio of stated to estimated noise, its limit, and the
+/// sources. `None` if no noise was stated.
 pub fn noise_learnt(
     problem: &Problem,
     (ratio, limit): (f64, f64),

@@ -1,4 +1,4 @@
-//! Learnt noise as `run.toml` states it.
+//! Estimated noise in the notation of `run.toml`.
 
 use super::report::NoiseReport;
 use super::source::Source;
@@ -9,8 +9,8 @@ use crate::units::{ARCSEC, DEGREE};
 const TABLES: [&str; 3] = ["imu.noise", "standstill", "turntable"];
 
 impl NoiseReport {
-    /// The lines of `run.toml` that state learnt noise, each below the table it belongs to; none where
-    /// nothing was learnt. `correlation_time` is that of each triad's Gauss–Markov bias in s.
+    /// The lines of `run.toml` that state the estimated noise, each below the table it belongs to; `None` if no
+    /// noise was estimated. `correlation_time` is that of each triad's Gauss–Markov bias in s.
     pub fn run_toml(&self, correlation_time: PerSensor<Option<f64>>) -> Option<String> {
         if !self.learnt {
             return None;

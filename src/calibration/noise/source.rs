@@ -1,4 +1,4 @@
-//! The sources of noise: what each is called, and where its σ is in the model.
+//! The sources of noise: their names, and the place of their σ in the model.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,19 +15,19 @@ pub enum Source {
     AngleRandomWalk,
     /// Velocity random walk.
     VelocityRandomWalk,
-    /// Attitude noise of moves by how fast they are.
+    /// Attitude noise of moves that grows with their speed.
     GyroMotion,
-    /// Velocity noise of moves by how fast they are.
+    /// Velocity noise of moves that grows with their speed.
     AccelMotion,
-    /// Attitude noise of moves by how long they take.
+    /// Attitude noise of moves that grows with their duration.
     GyroMoving,
-    /// Velocity noise of moves by how long they take.
+    /// Velocity noise of moves that grows with their duration.
     AccelMoving,
     /// White velocity at standstill.
     Velocity,
     /// White attitude at standstill, without a table.
     Attitude,
-    /// Turning where the body should stand still, without a table.
+    /// Unwanted rotation at rest, without a table.
     #[serde(rename = "turning")]
     RotationAtRest,
     /// Position error of the table.
@@ -41,7 +41,7 @@ pub enum Source {
 }
 
 impl Source {
-    /// All of them.
+    /// All sources.
     pub const ALL: [Self; 13] = [
         Self::AngleRandomWalk,
         Self::VelocityRandomWalk,
@@ -58,7 +58,7 @@ impl Source {
         Self::AccelGaussMarkov,
     ];
 
-    /// What an engineer calls it.
+    /// Its name for reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::AngleRandomWalk => "angle random walk",
@@ -93,7 +93,7 @@ impl Source {
         }
     }
 
-    /// White noise of it alone, one in SI and radians, where it is one of the gyros' in moves.
+    /// Process noise of this source alone with unit σ in SI and radians, if it is gyro noise in moves.
     pub(in crate::calibration) fn alone(self) -> PerSensor<ProcessNoise> {
         let mut noise = PerSensor::<ProcessNoise>::default();
         match self {
@@ -104,7 +104,7 @@ impl Source {
         noise
     }
 
-    /// The triad that it is of, or whose random walk it is counted in.
+    /// Its triad, or the triad whose random walk is its reference.
     pub(in crate::calibration) fn triad(self) -> Sensor {
         match self {
             Self::VelocityRandomWalk
@@ -116,15 +116,15 @@ impl Source {
         }
     }
 
-    /// Whether the run states a figure of it that is not zero.
+    /// Whether the run states a nonzero figure for it.
     pub(in crate::calibration) fn stated(self, problem: &Problem) -> bool {
         let of_dwells = problem.run().standstill.sigma.get(self.triad());
         let seen = matches!(self, Self::Velocity | Self::Attitude) && of_dwells.is_none();
         !seen && self.sigma(problem) > 0.0
     }
 
-    /// Its σ in the model of a problem, in SI and radians; the smallest unrest that is ever taken counts
-    /// as none.
+    /// Its σ in the model of a problem, in SI and radians; the floor of the standstill noise counts
+    /// as zero.
     pub(in crate::calibration) fn sigma(self, problem: &Problem) -> f64 {
         let (model, sensor) = (&problem.model, self.triad());
         let (noise, of_moves) = (model.noise.get(sensor), model.motion_noise.get(sensor));
@@ -142,7 +142,7 @@ impl Source {
         }
     }
 
-    /// Sets its σ, in SI and radians. A bias that is not stated to vary gets the given correlation time.
+    /// Sets its σ, in SI and radians. A bias without stated variation gets the given correlation time.
     pub(in crate::calibration) fn set(self, model: &mut Model, sigma: f64, correlation_time: f64) {
         let sensor = self.triad();
         let of_moves = model.motion_noise.get_mut(sensor);

@@ -1,5 +1,5 @@
-//! Constants that are estimated beside scale factors, installation and biases: errors of the table's
-//! own geometry, then parameters of the instrument's error terms.
+//! Auxiliary constants, estimated in addition to scale factors, installation and biases: errors of the
+//! table's geometry, then parameters of the instrument's error terms.
 
 use nalgebra::{DMatrix, SVector};
 
@@ -16,7 +16,7 @@ pub type AuxiliaryVector = SVector<f64, AUXILIARY>;
 /// Index among the auxiliary parameters of the first of the table's axes.
 pub const OF_AXES: usize = TABLE_GEOMETRY - AXIS_ERRORS;
 
-/// Which kind of parameter stands at an index.
+/// Kind of an auxiliary parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AuxiliaryKind {
     /// An error of the table, by its index among them.
@@ -67,10 +67,10 @@ pub fn auxiliary_vector(
     all
 }
 
-/// Correlation beyond which two terms are not told apart.
+/// Correlation beyond which two terms are not distinguished.
 const INSEPARABLE: f64 = 0.99;
 
-/// Estimates of the parameters. What is off is zero in all of it.
+/// Estimates of the auxiliary parameters; all figures of a disabled one are zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Auxiliary {
     /// The estimates, rad for the table, SI for terms.
@@ -115,8 +115,8 @@ impl Auxiliary {
             .into()
     }
 
-    /// Whether second order and asymmetry of an accelerometer are both estimated and hardly more than
-    /// their sum is seen.
+    /// Whether second order and asymmetry of an accelerometer are both estimated, although hardly more than
+    /// their sum is observed.
     pub fn even_terms_inseparable(&self) -> bool {
         let first = |term: Term| TABLE_GEOMETRY + term.parameters().start;
         let (second, asymmetry) = (first(Term::AccelSecondOrder), first(Term::AccelAsymmetry));

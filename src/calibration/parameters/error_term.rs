@@ -1,11 +1,11 @@
-//! Error terms: what may be estimated beside scale factors, installation and biases.
+//! Error terms, which may be estimated in addition to scale factors, installation and biases.
 
 use serde::{Deserialize, Serialize};
 
 use crate::imu::Term;
 use crate::turntable::AxisError;
 
-/// An error of instrument or table that is estimated where it is on.
+/// An error of instrument or table that is estimated if it is on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ErrorTerm {
     /// Biases that vary as first-order Gauss–Markov processes.
@@ -19,8 +19,8 @@ pub enum ErrorTerm {
 }
 
 impl ErrorTerm {
-    /// Every error term. Of two that explain a record equally well, the one that stands first here is
-    /// the more usual.
+    /// Every error term. Of two that explain a record equally well, the first in this order is
+    /// the more common.
     pub const ALL: [Self; 5 + Term::ALL.len()] = {
         let mut all = [Self::GaussMarkovBias; 5 + Term::ALL.len()];
         (all[1], all[2]) = (Self::TableBase, Self::TableAxes(AxisError::Tilt));
@@ -52,7 +52,7 @@ impl ErrorTerm {
         }
     }
 
-    /// How many states it has.
+    /// Its number of states.
     pub fn states(self) -> usize {
         match self {
             Self::GaussMarkovBias => 6,

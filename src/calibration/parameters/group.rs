@@ -1,4 +1,4 @@
-//! The six groups in which an engineer reads a calibration.
+//! The six groups of parameters in reports: scale factor, installation and bias of both triads.
 
 use super::{PARAMETERS, parameter_name, sensor_and_parameter};
 use crate::calibration::Estimate;
@@ -12,7 +12,7 @@ pub struct Group {
     kind: ParameterKind,
 }
 
-/// How the figures of a group are written.
+/// Notation for the figures of a group.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GroupEntry {
     /// Its kind with the letter of the model.
@@ -52,7 +52,7 @@ impl Group {
         self.kind
     }
 
-    /// How its figures are written.
+    /// Notation for its figures.
     pub fn entry(self) -> GroupEntry {
         let (title, key, unit, value) = match (self.kind, self.sensor) {
             (ParameterKind::Scale, _) => ("scale factor K", "scale_ppm", "ppm", PPM),

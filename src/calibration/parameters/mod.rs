@@ -71,7 +71,7 @@ pub fn factor(nominal: &PerSensor<Nominal>, index: usize) -> f64 {
     nominal.get(sensor).factor(of_triad)
 }
 
-/// A run has observed a parameter if it leaves less than this part of its prior σ.
+/// A parameter counts as observed if less than this part of its prior σ remains.
 pub const OBSERVED_BELOW: f64 = 0.5;
 
 /// The same triads in the general form.
@@ -79,8 +79,8 @@ pub fn in_general_form(triads: &PerSensor<Triad>) -> PerSensor<Triad> {
     PerSensor::from_fn(|sensor| triads.get(sensor).in_form(InstallationForm::General))
 }
 
-/// Derivatives of a smooth function of unit scale, by central differences of sixth order: their step leaves 1e-14, and so
-/// do rounding errors.
+/// Derivatives of a smooth function of unit scale, by central differences of sixth order; truncation and rounding
+/// errors are both about 1e-14.
 pub fn derivatives<const M: usize, const N: usize>(
     at: &SVector<f64, N>,
     of: impl Fn(&SVector<f64, N>) -> SVector<f64, M>,

@@ -192,9 +192,9 @@ pub fn samples_of(steps: &[Step]) -> Range<usize> {
     ends.map_or(0..0, |(first, last)| first.samples.start..last.samples.end)
 }
 
-/// By how much errors of attitude, velocity and position become more when they are referred to another
-/// computed state of the same moment, to first order as all of a pass: the filter stays linear, and what it
-/// finds does not depend on the order of what it is told.
+/// Change of the errors of attitude, velocity and position when they are referred to another computed state of
+/// the same moment. It is of first order, as everything in a pass: the filter stays linear, and its result does
+/// not depend on the order of observations.
 pub fn between(from: &State, to: &State) -> [Vector3<f64>; 3] {
     [
         to_tilt_and_heading(&(from.attitude * to.attitude.transpose())),

@@ -1,4 +1,4 @@
-//! What happens in a pass, event by event: navigation, which no noise changes.
+//! Events of a pass: navigation, which does not depend on noise.
 
 pub mod dwell;
 pub mod schedule;
@@ -13,14 +13,14 @@ pub use dwell::{Rest, between, part_of};
 use dwell::{longest, samples_of};
 use schedule::{cut, step_length};
 
-/// A move, or a piece of one, or a part of a dwell.
+/// A move or a piece of one, or a part of a dwell.
 pub enum Event {
     Move(Box<Block>),
     Rest(Box<Rest>),
 }
 
-/// What happens in a stretch of a problem, for a filter of this layout, linearised at this point, `initial` its attitude at
-/// the stretch's first sample.
+/// Events in a stretch of a problem, for a filter of this layout, linearised at this point; `initial` is the attitude
+/// at the first sample.
 pub fn events(
     of: (&Problem, &Stretch),
     layout: &Layout,
@@ -71,7 +71,7 @@ pub fn events(
     Ok(events)
 }
 
-/// Navigation through a stretch from this initial attitude on.
+/// Navigator for a stretch, starting from this attitude.
 fn navigator<'a>(
     stretch: &Stretch<'a>,
     (at, initial): (&Linearisation, &Matrix3<f64>),

@@ -1,4 +1,4 @@
-//! What is observed when: a stretch of a recording cut into steps, each with what its end shows.
+//! Schedule of observations: a stretch of a recording cut into steps, each with the observations at its end.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -16,29 +16,29 @@ use crate::turntable::{AxisResponse, axis_response};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
     pub samples: Range<usize>,
-    /// Set where they lie within a dwell.
+    /// Set within a dwell.
     pub at_rest: Option<AtRest>,
 }
 
-/// What is known at the end of a step within a dwell.
+/// Data at the end of a step within a dwell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AtRest {
     /// Whether it is the dwell's first.
     pub first: bool,
-    /// Its samples, summed.
+    /// Sums of its samples.
     pub sums: Sums,
-    /// Mean of the table's readings during the step, and how many they were.
+    /// Mean of the table's readings during the step, and their number.
     pub reading: Option<(Matrix3<f64>, usize)>,
-    /// What its dwell is as a whole.
+    /// Data of the whole dwell.
     pub dwell: Arc<WholeDwell>,
 }
 
-/// What is known of a dwell as a whole.
+/// Data of a whole dwell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WholeDwell {
-    /// Mean of the table's readings, `C_b_n`; none without a table.
+    /// Mean of the table's readings, `C_b_n`; `None` without a table.
     pub attitude: Option<Matrix3<f64>>,
-    /// How the table's attitude turns with errors of its axes, where their angles are known.
+    /// Rotation of the table's attitude per error of its axes, if their angles are known.
     pub axes: Option<Arc<AxisResponse>>,
     /// Mean output of the accelerometers.
     pub accel: Vector3<f64>,
@@ -46,12 +46,12 @@ pub struct WholeDwell {
 
 /// Length of a step, s: covariance is propagated and observations are taken at 10 Hz.
 const STEP: f64 = 0.1;
-/// The same of a packed record once a dwell has lasted as long, in such steps: by then what is observed is
-/// limited by random walk, not by its own noise.
+/// Longest step of a packed record, in such steps, once a dwell has lasted as long: by then, observations are
+/// limited by random walk, not by their own noise.
 const STEPS_OF_PACKED: usize = 10;
 
-/// The steps from the begin of the first dwell to the end of the last, between which nothing is lost; in
-/// dwells so many taken together.
+/// The steps from the start of the first dwell to the end of the last, without a gap; in dwells, `together`
+/// steps are combined into one.
 pub fn steps(run: &Run, table: Option<&TableLog>, dwells: &[Dwell], together: usize) -> Vec<Step> {
     let imu = &run.recording.imu;
     let length = step_length(imu.period);
@@ -60,7 +60,7 @@ pub fn steps(run: &Run, table: Option<&TableLog>, dwells: &[Dwell], together: us
         false => length,
     };
     let of_dwell = |dwell: &Dwell| growing(dwell.samples.clone(), (length, longest), together);
-    // There may be so many that room to grow would be too much.
+    // Exact capacity: there may be too many steps for a vector that doubles.
     let count = dwells.iter().map(|dwell| 1 + of_dwell(dwell).count());
     let mut steps = Vec::with_capacity(count.sum());
     let mut at = dwells.first().map_or(0, |dwell| dwell.samples.start);
@@ -112,12 +112,12 @@ pub fn steps(run: &Run, table: Option<&TableLog>, dwells: &[Dwell], together: us
 }
 
 impl AtRest {
-    /// Where a pass linearises while the table is at rest: in the table's mean attitude, else in the computed one,
+    /// Linearisation point while the table is at rest: the table's mean attitude, else the computed attitude,
     /// levelled.
     ///
-    /// Both are within arc seconds of the truth in every pass, so what noise adds up to over a long
-    /// record never leaves the linear range; nor does a tilt that it makes change what a wrong heading
-    /// does.
+    /// Both are within arc seconds of the truth in every pass, so the noise accumulated over a long
+    /// record never leaves the linear range, and a tilt due to noise does not change the effect of a wrong
+    /// heading.
     pub fn tied(&self, computed: &State, accel: &Triad) -> State {
         State::at_rest(self.dwell.attitude.unwrap_or_else(|| {
             let up = accel.correction().unwrap_or_default() * (self.dwell.accel - accel.bias);
@@ -126,7 +126,7 @@ impl AtRest {
     }
 }
 
-/// The attitude that a table's first reading gives.
+/// The attitude of a table's first reading.
 pub fn first_reading(table: Option<&TableLog>, dwells: &[Dwell]) -> Option<Matrix3<f64>> {
     let position = dwells.first()?.position.as_ref()?;
     table?
@@ -148,7 +148,7 @@ pub fn cut(range: Range<usize>, length: usize) -> impl Iterator<Item = Range<usi
 }
 
 /// Cuts a range into parts of the first length, then into ever longer ones, each as long as all before it, up
-/// to the second; so many of them are taken together.
+/// to the second; `together` parts are combined into one.
 fn growing(
     range: Range<usize>,
     (length, longest): (usize, usize),

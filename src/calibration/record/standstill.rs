@@ -1,4 +1,4 @@
-//! How still the IMU is while the table is at rest.
+//! Residual motion of the IMU while the table is at rest.
 
 use nalgebra::Vector3;
 
@@ -6,18 +6,17 @@ use super::schedule::step_length;
 use crate::imu::{PerSensor, Sensor};
 use crate::run::{Dwell, Run};
 
-/// Below this neither velocity, m/s, nor attitude, rad, at standstill is ever trusted. Small beside what
-/// random walk makes of a tenth of a second in the best of instruments, lest the innovations be smaller
-/// than they claim.
+/// Floor of the noise of attitude, rad, and velocity, m/s, at standstill. It is small compared with the random
+/// walk of the best instruments over a tenth of a second, so that innovations are not smaller than their stated σ.
 pub const FLOOR: PerSensor<f64> = PerSensor {
     gyro: 1e-9,
     accel: 1e-7,
 };
-/// Excess below this many of its own standard errors is chance.
+/// Least significant excess, in its standard errors.
 const SIGNIFICANT: f64 = 3.0;
 
-/// White 1σ at standstill of what each triad's output adds up to, beyond random walk and pulses: attitude
-/// in rad, velocity in m/s. As the run states it, else as its dwells show it.
+/// White 1σ, at standstill, of the integral of each triad's output, in excess of random walk and pulses: attitude
+/// in rad, velocity in m/s. As stated in the run, else estimated from its dwells.
 pub fn standstill_sigma(run: &Run, dwells: &[Dwell]) -> PerSensor<f64> {
     PerSensor::from_fn(|sensor| {
         let floor = *FLOOR.get(sensor);
@@ -26,8 +25,8 @@ pub fn standstill_sigma(run: &Run, dwells: &[Dwell]) -> PerSensor<f64> {
     })
 }
 
-/// Neighbouring increments share the attitude or velocity at their common border, so its variance is
-/// minus their covariance; random walk has none.
+/// Estimate from dwells: neighbouring increments share the attitude or velocity at their common border, so its
+/// variance is minus their covariance; random walk has no such covariance.
 fn shown(run: &Run, dwells: &[Dwell], sensor: Sensor) -> f64 {
     let imu = &run.recording.imu;
     let (samples, floor) = (imu.of(sensor), *FLOOR.get(sensor));

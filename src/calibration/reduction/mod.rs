@@ -1,8 +1,8 @@
-//! What a record says of the constants, at one point of linearisation and with given noise.
+//! Information of a record on the constants, at one linearisation point and with given noise.
 //!
-//! The Kalman filter runs over what moves and what is drawn anew; constants are columns that it carries (see
-//! [`super::filter::columns`]). Each dwell leaves whitened rows `[G ν]`, so that `ν = G c + noise of σ 1`: with a prior they
-//! give the estimate of any part of the constants, without another pass.
+//! The Kalman filter has the moving and the redrawn states; constants are columns that it propagates (see
+//! [`super::filter::columns`]). Each dwell gives whitened rows `[G ν]` with `ν = G c + noise of σ 1`: with a prior,
+//! they give the estimate of any subset of the constants, without another pass.
 
 mod script;
 
@@ -18,35 +18,35 @@ use crate::calibration::{
 };
 pub use script::{Moves, Script};
 
-/// Whitened rows of all dwells, and the states that go with them.
+/// Whitened rows of all dwells, and the dependent states.
 #[derive(Debug, Clone)]
 pub struct Reduction {
-    /// The constants that rows have columns of; the last column is what was observed.
+    /// The constants of the columns; one more column, the last, is the observation.
     pub constants: Vec<Constant>,
     pub parts: Vec<Part>,
-    /// Squares that no constant has a part in.
+    /// Sum of squares independent of all constants.
     pub squares: f64,
-    /// Logarithm of the determinant of the covariance of all that was observed, the constants given.
+    /// Logarithm of the determinant of the covariance of all observations, given the constants.
     pub log_determinant: f64,
     /// Initial attitude of each stretch.
     pub attitudes: Vec<Smoothed>,
-    /// What each recording has of its own; empty where none has anything.
+    /// States that belong to one recording only, for each recording; empty if there are none.
     pub own: Vec<Smoothed>,
-    /// Gravity at the last site, where there are several.
+    /// Gravity at the last site, if there are several.
     pub gravity: Option<Smoothed>,
 }
 
-/// What a part of a dwell left.
+/// Rows of a part of a dwell.
 #[derive(Debug, Clone)]
 pub struct Part {
     /// Number of the dwell.
     pub dwell: usize,
-    /// When it ended, s.
+    /// Time of its end, s.
     pub time: f64,
     pub rows: DMatrix<f64>,
 }
 
-/// What was known of the parameters of both triads at one time.
+/// Estimate of the parameters of both triads at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Epoch {
     /// Time, s.
@@ -75,7 +75,7 @@ impl Reduction {
         all
     }
 
-    /// One triangle of all rows: what remains of them where no dwell is looked at alone.
+    /// One triangle of all rows, which suffices if no dwell is evaluated separately.
     pub fn folded(mut self) -> Self {
         let rows = triangle(&self.stacked(&self.parts));
         self.parts = vec![Part {
@@ -86,7 +86,7 @@ impl Reduction {
         self
     }
 
-    /// With what is known beforehand.
+    /// Combines the rows with a prior.
     pub fn posterior(&self, prior: &Prior) -> Posterior {
         let mut known = Known::new(prior.clone());
         self.parts.iter().for_each(|part| known.learn(&part.rows));
@@ -98,7 +98,7 @@ impl Reduction {
         }
     }
 
-    /// Estimate and σ against time, as part after part comes in.
+    /// Estimate and σ against time, part by part.
     pub fn history(&self, prior: &Prior, at: &Linearisation) -> Vec<Epoch> {
         let mut known = Known::new(prior.clone());
         let parts = self.parts.iter().map(|part| {
@@ -124,20 +124,20 @@ impl Reduction {
         squares
     }
 
-    /// Information of the constants by the rows alone.
+    /// Information on the constants from the rows alone.
     pub fn information(&self) -> DMatrix<f64> {
         let n = self.constants.len();
         self.squares().view((0, 0), (n, n)).into_owned()
     }
 
-    /// By how much each recording differs, linearised `at` a point.
+    /// Deviation of each recording, linearised `at` a point.
     pub fn own(&self, at: &Linearisation, posterior: &Posterior) -> Vec<Own> {
         let each = self.own.iter().enumerate();
         each.map(|(recording, own)| own.difference(at.own(recording), posterior))
             .collect()
     }
 
-    /// Where the next pass linearises after one `at` a point.
+    /// Linearisation point of the next pass after one `at` a point.
     pub fn estimate(&self, at: &Linearisation, posterior: &Posterior) -> Linearisation {
         let initial_attitude = |(at, error): (&Matrix3<f64>, &Smoothed)| {
             let (mean, _) = error.given(posterior);
@@ -164,7 +164,7 @@ impl Reduction {
         estimate
     }
 
-    /// The coefficients of temperature among the constants, with their places.
+    /// The temperature coefficients among the constants, with their indices.
     pub fn coefficients(&self) -> impl Iterator<Item = (usize, Coefficient)> + '_ {
         let places = self.constants.iter().enumerate();
         places.filter_map(|(place, constant)| match constant {
@@ -174,7 +174,7 @@ impl Reduction {
     }
 }
 
-/// States with what constants do to them: with these at c their mean is `x + U c`.
+/// States with the effect of constants: for constants c, their mean is `x + U c`.
 ///
 /// Source: Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and Navigation*, §1.4.14, for the
 /// regression of states on constants.
@@ -184,21 +184,21 @@ pub struct Smoothed {
     covariance: DMatrix<f64>,
     /// U
     by_constants: DMatrix<f64>,
-    /// What they are, if they are of a recording.
+    /// Their meanings, if they belong to a recording.
     own: Vec<OwnState>,
 }
 
-/// By how much a recording differs from what all recordings have in common.
+/// Deviation of a recording from the common parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Own {
     /// The estimate.
     pub values: Difference,
-    /// 1σ; zero of what is common to all.
+    /// 1σ; zero for parameters common to all.
     pub sigma: Difference,
 }
 
 impl Smoothed {
-    /// So many states of a filter from a first one on, as they are now.
+    /// The current values of `count` states of a filter, from a first one on.
     pub fn of(filter: &Filter, first: usize, count: usize) -> Self {
         Self {
             mean: filter.x.rows(first, count).into_owned(),
@@ -208,7 +208,7 @@ impl Smoothed {
         }
     }
 
-    /// What the recording has of its own; none where it has nothing.
+    /// The states that only this recording has; `None` if it has none.
     pub fn of_recording(filter: &Filter) -> Option<Self> {
         let (states, own): (Vec<usize>, Vec<OwnState>) = filter.layout.own.iter().copied().unzip();
         let first = *states.first()?;
@@ -232,7 +232,7 @@ impl Smoothed {
         &posterior.covariance * self.by_constants.transpose()
     }
 
-    /// What is of a recording, as a change of this.
+    /// The states of a recording, as a change of these values.
     pub fn difference(&self, values: Difference, posterior: &Posterior) -> Own {
         let (mean, covariance) = self.given(posterior);
         let sigma = Difference::default();

@@ -1,5 +1,5 @@
-//! What happens in a record at one point of linearisation: navigation is done once, the filter as often as noise is tried
-//! or a variance is changed.
+//! Events of a record at one linearisation point: navigation runs once, the filter runs for every trial of noise or of
+//! a variance.
 
 use super::{Part, Smoothed};
 use crate::calibration::filter::{DwellFilters, Filter, Gate, Judge, Since, Taken, dwell_filters};
@@ -10,23 +10,23 @@ use crate::calibration::{
 };
 use crate::imu::{PerSensor, Sensor};
 
-/// Rows of a dwell are kept apart for each second …
+/// Rows of a dwell are kept separately for each second …
 const APART: f64 = 1.0;
-/// … or for so many times in a recording, if that is longer.
+/// … or for each of this many parts of a recording, if these are longer.
 const EPOCHS: f64 = 3600.0;
 
-/// What happens at one point of linearisation, whatever the noise.
+/// Events at one linearisation point, independent of the noise.
 pub struct Script<'a> {
     pub at: &'a Linearisation,
     priors: &'a [AttitudePrior],
-    /// Of each stretch.
+    /// Events of each stretch.
     events: Vec<Vec<Event>>,
 }
 
-/// What the noise of moves grows with, over all moves.
+/// Quantities with which the noise of moves grows, over all moves.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Moves {
-    /// s
+    /// Duration, s.
     pub duration: f64,
     /// ∫|ω − ω_ie|² dt and ∫|f + g|² dt.
     pub motion: PerSensor<f64>,
@@ -59,7 +59,7 @@ impl<'a> Script<'a> {
         })
     }
 
-    /// What noise of moves grows with.
+    /// Quantities with which the noise of moves grows.
     pub fn moves(&self) -> Moves {
         let mut moves = Moves::default();
         for event in self.events.iter().flatten() {
@@ -75,8 +75,8 @@ impl<'a> Script<'a> {
         moves
     }
 
-    /// What the record says of the constants, without innovations. `accepted` tells of each observation of
-    /// three components whether it is let in; those beyond its end are.
+    /// Information of the record on the constants, without innovations. `accepted` flags each observation of
+    /// three components; those beyond its end are accepted.
     pub fn reduce(
         &self,
         problem: &Problem,
@@ -86,7 +86,7 @@ impl<'a> Script<'a> {
         self.follow(problem, &mut judge, false)
     }
 
-    /// Takes a filter through the record, with innovations or without.
+    /// Runs a filter through the record, with or without innovations.
     pub fn follow(
         &self,
         problem: &Problem,
@@ -131,7 +131,7 @@ impl<'a> Script<'a> {
         })
     }
 
-    /// A stretch begins after another: what is of another recording or site starts anew.
+    /// Starts a stretch after another: states of another recording or site are redrawn.
     fn begin(
         &self,
         filter: &mut Filter,
@@ -157,7 +157,7 @@ impl<'a> Script<'a> {
 struct Follower {
     filter: Filter,
     dwells: Box<dyn DwellFilters>,
-    /// What is known of the constants so far, where innovations are worked out.
+    /// Current information on the constants, if innovations are computed.
     known: Option<Known>,
     parts: Vec<Part>,
     /// Number of dwells that have ended.
@@ -220,7 +220,7 @@ impl Follower {
         }
     }
 
-    /// Keeps the rows of a part, with those of the next one unless that is a second off.
+    /// Stores the rows of a part, combined with those of the next one unless that is a second later.
     fn keep(&mut self, rest: &Rest, apart: f64) -> Result<(), CalibrationError> {
         self.learn();
         let time = rest.end();

@@ -1,9 +1,9 @@
-//! What the outputs of an instrument that stands in one attitude say of its temperature.
+//! Temperature dependence from the outputs of an instrument at rest in one attitude.
 //!
-//! Nothing turns, so scale factors and misalignment are not observed, and of the accelerometers' biases only how they
-//! change. Each output is a polynomial in the temperature of its axis and follows its rate, by least squares over
-//! means of seconds; the order is the one that predicts blocks best that are left out (cross-validation over blocks, Stone
-//! 1974, J. Royal Statistical Society B 36(2)), because noise of such a record is far from white.
+//! Without rotation, scale factors and misalignment are not observed, and of the accelerometers' biases only their
+//! change. Each output is a polynomial in the temperature of its axis, plus a term with its rate, fitted by least
+//! squares to means over seconds. Because the noise of such a record is far from white, the order is selected by
+//! cross-validation over blocks (Stone 1974, J. Royal Statistical Society B 36(2)).
 
 use nalgebra::{DMatrix, DVector};
 
@@ -32,22 +32,22 @@ const SECONDS_EACH: usize = 10;
 /// Outputs at rest against temperature.
 #[derive(Debug, Clone)]
 pub struct AtRest {
-    /// Where the polynomials hold.
+    /// Temperature range of the polynomials.
     pub range: PerSensor<ThermalRange>,
-    /// Of gyro x, y, z, then accelerometer x, y, z.
+    /// Gyro x, y, z, then accelerometer x, y, z.
     pub axes: Vec<AxisAtRest>,
 }
 
 /// One output at rest against temperature.
 #[derive(Debug, Clone)]
 pub struct AxisAtRest {
-    /// Whose.
+    /// The triad.
     pub sensor: Sensor,
-    /// Which.
+    /// The axis.
     pub axis: usize,
     /// Output at the reference temperature and its 1σ, normalised, rad/s or m/s².
     pub at_reference: (f64, f64),
-    /// Coefficient of each function; zero where off.
+    /// Coefficient of each function; zero if off.
     pub coefficients: ThermalValues,
     /// Covariance of the output at the reference, then of each coefficient that is on.
     pub covariance: DMatrix<f64>,
@@ -57,11 +57,11 @@ pub struct AxisAtRest {
     pub about_mean: f64,
     /// RMS of the residuals.
     pub residual: f64,
-    /// RMS of the residuals in blocks that were left out of the fit.
+    /// RMS of the residuals in blocks that were excluded from the fit (cross-validation).
     pub cross_validated: f64,
-    /// The same of a cubic without its rate, which is what most compensate.
+    /// The same for a cubic without the rate, a common compensation.
     pub cubic: f64,
-    /// Cooling less heating at the same temperature, by temperature in °C.
+    /// Output during cooling minus output during heating at the same temperature, with the temperature in °C.
     pub hysteresis: Vec<(f64, f64)>,
     /// Temperature, rate in K/s, output and residual of each second.
     pub seconds: Vec<Second>,
@@ -70,18 +70,19 @@ pub struct AxisAtRest {
 /// Means of one second.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Second {
-    /// °C.
+    /// Temperature, °C.
     pub temperature: f64,
-    /// K/s.
+    /// Its rate, K/s.
     pub rate: f64,
     /// Normalised output.
     pub output: f64,
-    /// What the polynomial leaves of it.
+    /// Residual after the polynomial.
     pub residual: f64,
 }
 
 impl AtRest {
-    /// Of a run that stands throughout; `None` without its temperature, or where that changes too little or too short.
+    /// The evaluation of a run at rest throughout; `None` without temperature, or if it changes too little or too
+    /// briefly.
     pub fn new(run: &Run, highest_order: usize) -> Option<Self> {
         let imu = &run.recording.imu;
         let temperature = imu.temperature.as_ref()?;
@@ -154,7 +155,7 @@ impl AtRest {
         }
     }
 
-    /// What it does not show.
+    /// Findings on parameters that the record does not show.
     pub fn findings(&self, estimate: &Estimate) -> Vec<Finding> {
         let names = |which: &dyn Fn(Sensor, bool) -> bool| -> Vec<String> {
             let is = |&index: &usize| {
@@ -172,8 +173,8 @@ impl AtRest {
         findings.into_iter().flatten().collect()
     }
 
-    /// Both triads at the reference temperature and 1σ of their parameters: biases of the gyros within Earth rate, all
-    /// else as it was known before.
+    /// Both triads at the reference temperature and 1σ of their parameters: biases of the gyros to within Earth rate,
+    /// the others from the prior.
     pub fn triads(&self, run: &Run) -> (PerSensor<Triad>, PerSensor<TriadVector>) {
         let form = InstallationForm::General;
         let mut triads = run.instrument.prior_mean(form);
@@ -241,8 +242,8 @@ impl AxisAtRest {
         })
     }
 
-    /// Change of the output from that at the reference at a temperature in °C that does not change, and 1σ of the
-    /// output then: of the curve, and of a second about it.
+    /// Change of the output between the reference and a constant temperature in °C, and the 1σ of the
+    /// curve and of a second about the curve.
     pub fn at(&self, range: &ThermalRange, temperature: f64) -> (f64, f64) {
         let row = row(range, &self.functions, temperature, 0.0);
         let variance = row.dot(&(&self.covariance * &row));
@@ -263,7 +264,7 @@ fn row(range: &ThermalRange, functions: &[usize], temperature: f64, rate: f64) -
     )
 }
 
-/// Root mean square; none of none.
+/// Root mean square; `None` without values.
 fn rms(values: impl Iterator<Item = f64>) -> Option<f64> {
     let (sum, count) = values.fold((0.0, 0usize), |(sum, n), x| (sum + x * x, n + 1));
     (count > 0).then(|| (sum / count as f64).sqrt())

@@ -1,4 +1,4 @@
-//! A calibration read back as an estimate, and one that changes with temperature at one.
+//! Conversion of a calibration to an estimate, and of a temperature-dependent calibration to one temperature.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use thiserror::Error;
@@ -19,10 +19,10 @@ const ONE: PerSensor<Nominal> = PerSensor {
     accel: Nominal(Vector3::new(1.0, 1.0, 1.0)),
 };
 
-/// Why there is no calibration at a temperature.
+/// Errors of a calibration at a temperature.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum TemperatureError {
-    /// It lies outside.
+    /// The temperature is out of range.
     #[error(
         "{found} °C, expected {lowest} to {highest} °C: outside that the polynomials of the {} are not known; \
          calibrate at temperatures that reach there", .sensor.name()
@@ -37,19 +37,19 @@ pub enum TemperatureError {
         /// Highest of the range.
         highest: f64,
     },
-    /// A coefficient of what is no parameter, or of an order that does not exist.
+    /// A coefficient of an unknown parameter, or of an invalid order.
     #[error(
-        "`{0}` in temperature.coefficients is no parameter with a polynomial of order 1 to 5; correct the file"
+        "`{0}` in temperature.coefficients is not a parameter with a polynomial of order 1 to 5; correct the file"
     )]
     Unknown(String),
 }
 
 impl Calibration {
-    /// The same at one temperature of all axes, °C, that does not change: a calibration without temperature, with
-    /// the covariance that it has there. One that does not change with temperature is itself.
+    /// The calibration at one constant temperature of all axes, °C, with its covariance there; the result does not
+    /// depend on temperature. A calibration without temperature dependence is returned unchanged.
     ///
     /// # Errors
-    /// If that lies outside its range, or coefficients are of no parameter.
+    /// If the temperature is out of range, or a coefficient has an unknown parameter.
     pub fn at_temperature(&self, temperature: f64) -> Result<Self, TemperatureError> {
         let Some(thermal) = &self.temperature else {
             return Ok(self.clone());
@@ -68,7 +68,7 @@ impl Calibration {
         self.in_state(&thermal.range.everywhere(temperature, 0.0))
     }
 
-    /// The same where the functions of temperature have these values.
+    /// The same for these values of the functions of temperature.
     ///
     /// # Errors
     /// If coefficients are of no parameter.

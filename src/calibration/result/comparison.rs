@@ -1,5 +1,5 @@
-//! Calibrations side by side: differences in one form and one frame, and whether the claimed σ
-//! explain them.
+//! Comparison of calibrations: differences in one form and one frame, and their consistency with the
+//! stated σ.
 
 use super::frame::{Canonical, free_parameters, own_nominal};
 use super::nees::{Nees, nees};
@@ -8,7 +8,7 @@ use crate::calibration::result::Calibration;
 use crate::calibration::{ComparisonError, ParameterMatrix, ParameterVector, sensor_and_parameter};
 use crate::imu::{BodyFrame, Nominal, ParameterKind, PerSensor, Sensor, Triad};
 
-/// A record with the name that tables and messages give it.
+/// A record with its name in tables and messages.
 #[derive(Debug, Clone, Copy)]
 pub struct Named<'a> {
     /// Its name.
@@ -17,7 +17,7 @@ pub struct Named<'a> {
     pub record: &'a Calibration,
 }
 
-/// Calibrations in the general form and a common body frame, held against a reference.
+/// Calibrations in the general form and a common body frame, compared with a reference.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Comparison {
     /// The common frame: of the accelerometers if any record is in theirs.
@@ -28,11 +28,11 @@ pub struct Comparison {
     pub stated_nominal: Option<PerSensor<[f64; 3]>>,
     /// The truth, or the first calibration.
     pub reference: Canonical,
-    /// Whether the reference is a truth, taken as exact except for the σ that it may state.
+    /// Whether the reference is a truth, which is exact except for its stated σ, if any.
     pub against_truth: bool,
     /// Indices of the parameters that the common frame leaves free.
     pub parameters: Vec<usize>,
-    /// Every calibration but the reference, in the order given.
+    /// Every calibration except the reference, in the given order.
     pub sides: Vec<Side>,
     /// Scatter of all calibrations, from three on.
     pub scatter: Option<Scatter>,
@@ -45,7 +45,7 @@ impl Comparison {
         std::iter::once(&self.reference).chain(sides)
     }
 
-    /// The reference's scale factor in the file's quantity; none for other parameters.
+    /// The reference's scale factor in the file's quantity; `None` for other parameters.
     pub fn scale_factor(&self, parameter: usize) -> Option<f64> {
         let (sensor, of_triad) = sensor_and_parameter(parameter);
         (Triad::kind(of_triad) == ParameterKind::Scale)
@@ -69,9 +69,9 @@ pub struct Side {
     /// Calibration minus reference, normalised: scale factors relative, angles pure numbers, biases in
     /// rad/s or m/s².
     pub difference: ParameterVector,
-    /// 1σ of the difference, as if both came of different data; absent if a side claims no σ.
+    /// 1σ of the difference, as if both came from independent data; `None` if one of them states no σ.
     pub difference_sigma: Option<ParameterVector>,
-    /// Consistency of the difference with its covariance; none without covariance.
+    /// Consistency of the difference with its covariance; `None` without covariance.
     pub nees: Option<Nees>,
 }
 
@@ -98,14 +98,14 @@ impl Side {
         }
     }
 
-    /// Difference in units of its σ; absent if there is no σ.
+    /// Difference in units of its σ; `None` if there is no σ.
     pub fn z(&self, parameter: usize) -> Option<f64> {
         let sigma = self.difference_sigma?[parameter];
         (sigma > 0.0).then(|| self.difference[parameter] / sigma)
     }
 }
 
-/// Compares calibrations with the truth, or, without one, with the first of them.
+/// Compares calibrations with the truth or, without a truth, with the first of them.
 pub fn compare(
     calibrations: &[Named],
     truth: Option<Named>,

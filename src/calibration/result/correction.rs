@@ -1,4 +1,4 @@
-//! A calibration, ready to turn outputs into what the body does.
+//! Application of a calibration: from outputs to angular rate and specific force.
 
 use nalgebra::{Matrix3, Vector3};
 use thiserror::Error;
@@ -8,7 +8,7 @@ use crate::imu::{AXES, PerSensor, Sensed, Sensor, TERM_PARAMETERS, Term, TermVec
 use crate::recording::{Near, TEMPERATURE_SPACING};
 use crate::run::Run;
 
-/// `u = (K C)⁻¹ (N − D) − t(q)`, from a record, in the file's quantity per second.
+/// The correction `u = (K C)⁻¹ (N − D) − t(q)` of a record, in the file's quantity per second.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correction {
     /// `K C` of each triad: the file's quantity per second for one rad/s or m/s² along right, front
@@ -18,9 +18,9 @@ pub struct Correction {
     pub matrix: PerSensor<Matrix3<f64>>,
     /// `D`, the file's quantity per second.
     pub bias: PerSensor<Vector3<f64>>,
-    /// Parameters `q` of error terms, in SI; zero where the record has none.
+    /// Parameters `q` of error terms, in SI; zero if the record has none.
     pub terms: TermVector,
-    /// The record, where it changes with temperature.
+    /// The record, if it depends on temperature.
     changing: Option<Box<Calibration>>,
 }
 
@@ -35,7 +35,7 @@ pub struct Calibrated {
     pub rate: Vector3<f64>,
     /// Mean specific force, m/s².
     pub force: Vector3<f64>,
-    /// Whether its temperature is one that the calibration holds for.
+    /// Whether its temperature is within the range of the calibration.
     pub in_range: bool,
 }
 
@@ -49,7 +49,7 @@ const SMALLEST_VOLUME: f64 = 1e-6;
 /// millionth of it.
 const ROUNDS: usize = 3;
 
-/// Why a calibration cannot be applied.
+/// Errors in applying a calibration.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum CorrectionError {
     /// The matrix has no inverse.
@@ -58,13 +58,13 @@ pub enum CorrectionError {
          plane; correct scale and installation in the calibration, or calibrate again", .0.name()
     )]
     Singular(Sensor),
-    /// A constant that is not known.
+    /// An unknown constant.
     #[error(
         "`{0}` in terms is no parameter of a known term; calibrate again with this version, or remove \
          the entry if it should have no effect"
     )]
     UnknownTerm(String),
-    /// Another unit than the run's.
+    /// The unit differs from that of the run.
     #[error(
         "the calibration is for {} output in `{calibration}`, the run's is in `{run}`; give the \
          calibration of this instrument, or correct {}_unit in run.toml", .sensor.name(), .sensor.name()
@@ -77,7 +77,7 @@ pub enum CorrectionError {
         /// Unit of the run.
         run: String,
     },
-    /// Another scale than the run's.
+    /// The scale differs from that of the run.
     #[error(
         "{} {axis}: the calibration has {calibration:.6e} for one {}, the run's nominal scale is \
          {run:.6e}; they must agree within a factor of two and in sign. Give the calibration of this \
@@ -98,7 +98,7 @@ pub enum CorrectionError {
 }
 
 impl Correction {
-    /// What a record says. Constants of the table (`table.…`) are no part of it.
+    /// The correction of a record, without constants of the table (`table.…`).
     pub fn of_record(record: &Calibration) -> Result<Self, CorrectionError> {
         let sensitivity = PerSensor::from_fn(|sensor| record.triad(sensor).sensitivity());
         let inverse = |sensor: Sensor| {
@@ -131,7 +131,7 @@ impl Correction {
         })
     }
 
-    /// The same, and the record must be one of the run's instrument: units and nominal scales agree.
+    /// The same with a check that the record belongs to the run's instrument: units and nominal scales must agree.
     pub fn for_run(record: &Calibration, run: &Run) -> Result<Self, CorrectionError> {
         let correction = Self::of_record(record)?;
         for sensor in Sensor::ALL {
@@ -170,12 +170,12 @@ impl Correction {
         self.terms().any(|k| term.parameters().contains(&k))
     }
 
-    /// The samples of a run, one after the other.
+    /// The calibrated samples of a run, in sequence.
     ///
-    /// Error terms respond to the calibrated sample itself. The angular acceleration that the size
-    /// effect asks for is the difference of the rates before and after; where the record is not
-    /// continuous it is taken for zero. The time offset asks for the rate over the Earth and gets the
-    /// inertial one: 10 ms times Earth rate is 0.7 µg.
+    /// Error terms are evaluated at the calibrated sample. The angular acceleration for the size effect is the
+    /// difference of the rates before and after; it is zero if the record is not continuous. The time offset
+    /// uses the inertial rate instead of the rate relative to the Earth: the error is 0.7 µg for 10 ms times
+    /// Earth rate.
     pub fn samples<'a>(&'a self, run: &'a Run) -> impl Iterator<Item = Calibrated> + 'a {
         let plain = self.terms().next().is_none();
         // A calibration that changes with temperature is made anew each second.
@@ -209,7 +209,7 @@ impl Correction {
         })
     }
 
-    /// Whether it changes with temperature.
+    /// Whether it depends on temperature.
     pub fn changes(&self) -> bool {
         self.changing.is_some()
     }

@@ -29,7 +29,7 @@ use crate::run::Aiding;
 
 /// The version of the format.
 pub const FORMAT: &str = "turncal-calibration/1";
-/// The version of one that changes with temperature.
+/// The version of the format with temperature dependence.
 pub const FORMAT_WITH_TEMPERATURE: &str = "turncal-calibration/2";
 
 /// The equation of a record.
@@ -39,23 +39,23 @@ pub const EQUATION: &str = "N = scale * (installation * u) + bias; u = correctio
 pub const EQUATION_WITH_TERMS: &str = "N = scale * (installation * (u + t)) + bias; u = correction * (N - bias) - t; t: what terms add \
      to u, zero in test_vectors";
 
-/// A calibration with its accuracy and how it was reached, or a known truth.
+/// A calibration with its accuracy and origin, or a known truth.
 ///
-/// Only the two triads are always there. Unknown fields are ignored when reading.
+/// Only the two triads are mandatory. Unknown fields are ignored when reading.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Calibration {
     /// [`FORMAT`], or [`FORMAT_WITH_TEMPERATURE`].
     pub format: String,
-    /// How it was found; none for a truth.
+    /// The method of estimation; `None` for a truth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub method: Option<Method>,
-    /// How angles make the installation matrix.
+    /// Form of the installation matrix.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub installation_form: Option<InstallationForm>,
-    /// What the filter observed; none for a method without filter.
+    /// Observations of the filter; `None` for a method without filter.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub aiding: Option<Aiding>,
-    /// What fixes the body axes.
+    /// The body frame.
     #[serde(default)]
     pub body_frame: BodyFrame,
     /// The gyros.
@@ -65,7 +65,7 @@ pub struct Calibration {
     /// The file's quantity, such as `count`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<PerSensor<String>>,
-    /// 1σ of every value, zero where fixed.
+    /// 1σ of every value, zero if fixed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma: Option<PerSensor<TriadRecord>>,
     /// Names of the estimated parameters, such as `gyro.installation.xy`.
@@ -74,17 +74,17 @@ pub struct Calibration {
     /// Covariance of the estimated parameters, in their units.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub covariance: Vec<Vec<f64>>,
-    /// What each source adds to their uncertainty.
+    /// Uncertainty budget of the parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub budget: Option<BudgetRecord>,
     /// Parameters of error terms, such as `accel.second_order.x`, in SI, and errors of the table,
     /// such as `table.base.up`, in rad, by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub terms: BTreeMap<String, TermRecord>,
-    /// How it changes with temperature; the values are those at its reference. None where it does not.
+    /// Temperature dependence; the values are those at the reference. `None` without temperature dependence.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature: Option<ThermalRecord>,
-    /// What each of several recordings says.
+    /// Results of each of several recordings.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub recordings: Vec<RecordingRecord>,
     /// Gravity at the site.
@@ -93,35 +93,35 @@ pub struct Calibration {
     /// Number of passes over the record.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub passes: Option<usize>,
-    /// Whether the last pass moved nothing.
+    /// Whether it converged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub converged: Option<bool>,
     /// Whether the innovations agree with their covariance.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub consistency: Option<ConsistencyRecord>,
-    /// What it leaves of gravity and turns.
+    /// Residuals of gravity and turns.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quality: Option<Quality>,
-    /// What error terms did, or would do.
+    /// Effects of error terms, enabled or not.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub blocks: Vec<BlockRecord>,
     /// Independent directions of the parameters, the least observed first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub observability: Vec<DirectionRecord>,
-    /// The noise that was used; absent if a file states noise of another kind, as a truth may.
+    /// The noise that was used; `None` if a file states noise of another kind, as a truth may.
     #[serde(
         default,
         deserialize_with = "if_known",
         skip_serializing_if = "Option::is_none"
     )]
     pub noise: Option<NoiseRecord>,
-    /// Whether the values may be used; none of what was not estimated, such as a truth.
+    /// Whether the values may be used; `None` for values that were not estimated, such as a truth.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub verdict: Option<Verdict>,
-    /// What must be known before using the values.
+    /// Warnings for the use of the values.
     #[serde(default)]
     pub warnings: Vec<String>,
-    /// The same as values: kind, words, figures.
+    /// The same in structured form: kind, text, figures.
     #[serde(default)]
     pub findings: Vec<Finding>,
     /// Names of parameters that were not estimated.
@@ -133,10 +133,10 @@ pub struct Calibration {
     /// The matrix of `u = correction (N − bias)`, ready to use.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub correction: Option<PerSensor<[[f64; 3]; 3]>>,
-    /// Raw outputs with what they are calibrated, to check a user's own code.
+    /// Raw outputs with their calibrated values, to check a user's own code.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub test_vectors: Vec<TestVector>,
-    /// What it was made of.
+    /// Origin of the calibration.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub provenance: Option<Provenance>,
     /// `[meta]` of the run.
@@ -144,12 +144,12 @@ pub struct Calibration {
     pub meta: BTreeMap<String, String>,
 }
 
-/// What a calibration was made of: enough to say which data and program gave it.
+/// Origin of a calibration: data and program.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Provenance {
     /// The program with its version.
     pub program: String,
-    /// Each file that was read with its SHA-256, the run.toml first; empty where nothing was.
+    /// Each file that was read, with its SHA-256, the run.toml first; empty if none was read.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub inputs: Vec<InputFile>,
     /// Nominal scales: the file's quantity per second for one rad/s or m/s².
@@ -158,11 +158,11 @@ pub struct Provenance {
     pub latitude_deg: f64,
     /// Height of the site, m.
     pub height_m: f64,
-    /// Time recorded, s.
+    /// Recorded time, s.
     pub duration_s: f64,
-    /// Samples a second.
+    /// Samples per second.
     pub rate_hz: f64,
-    /// How many dwells.
+    /// Number of dwells.
     pub dwells: usize,
 }
 
@@ -181,7 +181,7 @@ pub struct NoiseRecord {
     /// Policy, test and sources.
     #[serde(flatten)]
     pub report: NoiseReport,
-    /// `[imu.noise]` of what was learnt, to be pasted into `run.toml`; absent if nothing was.
+    /// The estimated noise as `[imu.noise]`, to be pasted into `run.toml`; `None` if it was not estimated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub run_toml: Option<String>,
 }
@@ -194,12 +194,12 @@ fn if_known<'de, T: DeserializeOwned, D: Deserializer<'de>>(
     Ok(serde_json::from_value(value).ok())
 }
 
-/// A constant beside the parameters of the triads.
+/// An auxiliary constant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TermRecord {
     /// Its value, in SI.
     pub value: f64,
-    /// 1σ; none for a truth.
+    /// 1σ; `None` for a truth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma: Option<f64>,
 }
@@ -213,7 +213,7 @@ pub struct GravityRecord {
     pub sigma_m_s2: f64,
 }
 
-/// How a calibration was found.
+/// Method of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
@@ -234,27 +234,27 @@ pub struct TriadRecord {
     pub bias: [f64; 3],
 }
 
-/// Normalised innovation squared of all observations, and of each kind apart.
+/// Normalised innovation squared of all observations, and of each kind separately.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ConsistencyRecord {
-    /// Of all observations.
+    /// NIS of all observations.
     #[serde(flatten)]
     pub all: NisRecord,
-    /// Of zero velocity.
+    /// NIS of zero velocity.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub velocity: Option<NisRecord>,
-    /// Of the table's attitude.
+    /// NIS of the table's attitude.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<NisRecord>,
-    /// Scores of dwells over their σ; absent if there are too few dwells.
+    /// Scatter of the dwells' scores relative to their σ; `None` if there are too few dwells.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dwells: Option<DwellScatter>,
-    /// Of the attitude that does not change at standstill, without a table.
+    /// NIS of the constant attitude at standstill, without a table.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub attitude: Option<NisRecord>,
 }
 
-/// Mean of normalised innovations squared with its 95 % interval; one if σ are true.
+/// Mean normalised innovation squared with its 95 % interval; one if σ are correct.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NisRecord {
     /// Mean per scalar observation.
@@ -263,21 +263,21 @@ pub struct NisRecord {
     pub nis_interval: [f64; 2],
 }
 
-/// An error term against the same run without it.
+/// Comparison of a run with and without an error term.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BlockRecord {
     /// Its name, such as `accel-second-order`.
     pub block: String,
-    /// Whether it was on; if not, it was tried with its usual σ.
+    /// Whether it was on; if not, it was tested with its usual σ.
     pub on: bool,
-    /// σ with the block over σ without it, of gyro K, E, D and accel K, E, D; absent if there is
+    /// σ with the block over σ without it, of gyro K, E, D and accel K, E, D; `None` if there is
     /// no σ.
     pub sigma_factors: [Option<f64>; 6],
-    /// By how much the cost, −2 ln of likelihood and prior, falls with it.
+    /// Decrease of the cost, −2 ln of likelihood and prior, with it.
     pub merit_gain: f64,
     /// Its limit at this term's share of the false-alarm rate.
     pub merit_gain_limit: f64,
-    /// Whether it is more, so that the data ask for the block.
+    /// Whether the gain exceeds its limit, so that the data support the block.
     pub asked_for: bool,
     /// NIS of all observations without it …
     pub nis_without: f64,
@@ -285,18 +285,18 @@ pub struct BlockRecord {
     pub nis_with: f64,
 }
 
-/// A combination of parameters, each in units of its prior σ, and how well a run observed it.
+/// A combination of parameters, each in units of its prior σ, with its observability in a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DirectionRecord {
     /// Posterior over prior σ.
     pub remaining: f64,
-    /// In words, such as `gyro scale z with gyro bias z`.
+    /// Description, such as `gyro scale z with gyro bias z`.
     pub words: String,
-    /// Name and component of the parameters that make up most of it; squares of all sum to one.
+    /// Name and component of its major parameters; the squares of all components sum to one.
     pub parts: BTreeMap<String, f64>,
 }
 
-/// A raw output of both triads and what it becomes, gyro first.
+/// A raw output of both triads with its calibrated value, gyro first.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TestVector {
     /// `N`, in the file's quantity per second.
@@ -321,7 +321,7 @@ impl Index<&str> for Calibration {
 }
 
 impl Calibration {
-    /// A record of the two triads and nothing else, as a truth is.
+    /// A record of the two triads only, such as a truth.
     pub fn new(gyro: TriadRecord, accel: TriadRecord) -> Self {
         Self {
             format: FORMAT.to_owned(),
@@ -347,7 +347,7 @@ impl Calibration {
         of_triads.or_else(|| self.terms.get(name).map(|term| &term.value))
     }
 
-    /// 1σ of a parameter by name, zero where it was not estimated; none if no σ is claimed.
+    /// 1σ of a parameter by name, zero if it was not estimated; `None` if no σ is stated.
     pub fn sigma_of(&self, name: &str) -> Option<&f64> {
         let sigma = self.sigma.as_ref()?;
         let of_triads = entry(name, |sensor| sigma.get(sensor));

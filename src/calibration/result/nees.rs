@@ -1,4 +1,4 @@
-//! An error measured by its covariance, correlations included.
+//! Consistency of an error with its covariance, correlations included.
 
 use faer::{Mat, Side};
 use nalgebra::{DMatrix, DMatrixView, DVector, DVectorView};
@@ -6,22 +6,22 @@ use serde::{Deserialize, Serialize};
 
 use crate::calibration::mean_square_interval;
 
-/// A correlation matrix has no information in directions whose eigenvalue is below this: they are
-/// zero except for rounding, as where three angles stand for six.
+/// Eigenvalue of a correlation matrix below which a direction is zero except for rounding, for example if three
+/// angles represent six.
 const NO_DIRECTION: f64 = 1e-11;
 
-/// Normalised estimation error squared, a mean of squares of independent numbers of σ 1.
+/// Normalised estimation error squared, as a mean of squares of independent numbers of σ 1.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Nees {
     /// NEES/n.
     pub mean: f64,
     /// n: number of independent directions in which the covariance is not zero.
     pub count: usize,
-    /// 95 % interval of NEES/n if the σ are true (χ²).
+    /// 95 % interval of NEES/n if σ are correct (χ²).
     pub interval: (f64, f64),
 }
 
-/// NEES of a difference over those of some parameters that have a σ; none if none has.
+/// NEES of a difference over the parameters with a σ among those given; `None` if there are none.
 pub fn nees<'a>(
     difference: impl Into<DVectorView<'a, f64>>,
     covariance: impl Into<DMatrixView<'a, f64>>,
@@ -50,8 +50,8 @@ pub struct Directions {
 }
 
 impl Directions {
-    /// Of the covariance of some parameters, each of which has a σ; none if there are none, or if the
-    /// matrix cannot be a covariance.
+    /// Directions of the covariance of some parameters, each with a σ; `None` if there are none, or if the
+    /// matrix is not a covariance.
     pub fn new<'a>(covariance: impl Into<DMatrixView<'a, f64>>, indices: &[usize]) -> Option<Self> {
         let covariance = covariance.into();
         let n = indices.len();

@@ -1,4 +1,4 @@
-//! From an estimate to the record that others read.
+//! Conversion of an estimate to the record for files.
 
 use std::collections::BTreeMap;
 
@@ -30,7 +30,7 @@ const TEST_INPUTS: [[f64; 6]; 3] = [
 ];
 
 impl Outcome {
-    /// This calibration of a problem, with what error terms did to it and what it leaves of gravity and
+    /// The record of this calibration of a problem, with the effects of error terms and the residuals of gravity and
     /// turns.
     pub fn record(
         &self,
@@ -145,7 +145,7 @@ impl GravityRecord {
 }
 
 impl ClosedForm {
-    /// This calibration of a problem, with what it leaves of gravity and turns.
+    /// The record of this calibration of a problem, with the residuals of gravity and turns.
     pub fn record(&self, problem: &Problem, quality: &Quality) -> Calibration {
         let (run, noise) = (problem.run(), self.noise.clone());
         let record = Calibration {
@@ -167,8 +167,8 @@ impl ClosedForm {
 }
 
 impl AtRest {
-    /// What of a calibration it gives: biases of the gyros within Earth rate, and how all biases change; the rest is
-    /// the prior.
+    /// The partial calibration that it gives: biases of the gyros to within Earth rate, and the temperature dependence
+    /// of all biases; the rest is the prior.
     pub fn record(&self, run: &Run) -> Calibration {
         let (triads, sigma) = self.triads(run);
         let sigma = [sigma.gyro, sigma.accel];

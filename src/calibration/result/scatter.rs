@@ -1,4 +1,4 @@
-//! Scatter of repeated calibrations against the σ that they claim.
+//! Scatter of repeated calibrations compared with their stated σ.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -7,48 +7,48 @@ use super::frame::Canonical;
 use super::nees::Directions;
 use crate::calibration::ParameterVector;
 
-/// Mean and scatter of three calibrations or more, taken as of one instrument that has not changed
-/// and of different data.
+/// Mean and scatter of three or more calibrations, assumed to be of one unchanged instrument
+/// and of independent data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scatter {
-    /// Each parameter by itself.
+    /// Scatter of each parameter.
     pub parameters: Vec<ParameterScatter>,
-    /// All parameters with their correlations, over the calibrations that give them; none if fewer
-    /// than two do, or if one leaves directions without σ, as three angles do.
+    /// Scatter of all parameters with their correlations, over the calibrations that give correlations; `None` if fewer
+    /// than two do, or if one has directions without σ, as with three angles.
     pub joint: Option<ChiSquare>,
 }
 
-/// Mean and scatter of one parameter, over the calibrations that claim a σ for it, or over all if
+/// Mean and scatter of one parameter, over the calibrations that state a σ for it, or over all if
 /// fewer than two do.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ParameterScatter {
     /// Index among the parameters of both triads.
     pub index: usize,
-    /// Number of calibrations that entered.
+    /// Number of calibrations used.
     pub count: usize,
-    /// Mean minus the reference's value, weighted by 1/σ²; not weighted without σ.
+    /// Mean minus the reference's value, weighted by 1/σ²; unweighted without σ.
     pub mean: f64,
-    /// 1σ of the weighted mean by the claimed σ.
+    /// 1σ of the weighted mean from the stated σ.
     pub mean_sigma: Option<f64>,
     /// Sample standard deviation.
     pub deviation: f64,
-    /// The scatter about the weighted mean in units of the claimed σ.
+    /// χ² of the scatter about the weighted mean with the stated σ.
     pub chi_square: Option<ChiSquare>,
 }
 
-/// A sum of squares that follows a χ² distribution if the claimed σ are true.
+/// A sum of squares that follows a χ² distribution if the stated σ are correct.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChiSquare {
     /// The sum.
     pub value: f64,
     /// Degrees of freedom.
     pub freedom: usize,
-    /// Probability of a sum as large or larger: near zero, the σ are too small; near one, too large.
+    /// Probability of at least this sum: near zero if σ are too small; near one if they are too large.
     pub p: f64,
 }
 
 impl ChiSquare {
-    /// Of a sum with its degrees of freedom; none without any.
+    /// χ² of a sum with its degrees of freedom; `None` without degrees of freedom.
     pub(crate) fn new(value: f64, freedom: usize) -> Option<Self> {
         let p = ChiSquared::new(freedom as f64).ok()?.sf(value);
         Some(Self { value, freedom, p })

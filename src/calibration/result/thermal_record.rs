@@ -1,4 +1,4 @@
-//! How a calibration changes with temperature, as a file holds it, and the calibration at one temperature.
+//! Temperature dependence of a calibration as stored in a file, and the calibration at one temperature.
 
 use std::collections::BTreeMap;
 
@@ -20,16 +20,16 @@ const EQUATION: &str = "p(T) = p + sum_k c_k (P_k(tau) - P_k(tau_ref)) + c_rate 
                         tau = (2 T - lowest - highest) / (highest - lowest); P_k Legendre; p stands in scale, \
                         installation (off the diagonal) and bias. powers: the same as sum_k a_k (T - reference)^k.";
 
-/// Error of a temperature sensor, K, within which a temperature still counts as within a range.
+/// Tolerance for the error of a temperature sensor in range checks, K.
 pub const TOLERANCE: f64 = 1.0;
 
-/// How the parameters of a calibration change with temperature.
+/// Temperature dependence of the parameters of a calibration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ThermalRecord {
-    /// What the figures mean.
+    /// Meaning of the figures.
     #[serde(default)]
     pub equation: String,
-    /// Where they hold, by triad; the calibration itself is at the reference.
+    /// Temperature range of each triad; the calibration itself is at the reference.
     pub range: PerSensor<ThermalRange>,
     /// The coefficients, in the units of their parameters.
     pub coefficients: Vec<CoefficientRecord>,
@@ -47,12 +47,12 @@ pub struct ThermalRecord {
 /// One coefficient.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CoefficientRecord {
-    /// The parameter that it changes.
+    /// Its parameter.
     pub parameter: String,
-    /// The order of its polynomial; none: it follows the rate.
+    /// The order of its polynomial; `None` for the rate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub order: Option<usize>,
-    /// In the unit of the parameter.
+    /// Value, in the unit of the parameter.
     pub value: f64,
     /// 1σ.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -67,11 +67,11 @@ pub struct RecordingRecord {
     /// Mean temperature of its dwells, of all axes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temperature_degc: Option<f64>,
-    /// Its parameters alone, by name; absent if it alone gives no calibration.
+    /// Its parameters when calibrated alone, by name; empty if it gives no calibration alone.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub alone: BTreeMap<String, ValueRecord>,
-    /// By how much its parameters differ from what all have in common; `mounting.x` and so on, in rad: how the whole
-    /// instrument is turned on its mounting face, about body axes.
+    /// Deviation of its parameters from the common ones; `mounting.x` and so on, in rad, is the rotation of the whole
+    /// instrument on its mounting face, about body axes.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub own: BTreeMap<String, ValueRecord>,
 }
@@ -79,7 +79,7 @@ pub struct RecordingRecord {
 /// A value with its 1σ.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ValueRecord {
-    /// In the unit of its parameter.
+    /// Value, in the unit of its parameter.
     pub value: f64,
     /// 1σ.
     pub sigma: f64,
@@ -174,7 +174,7 @@ impl ThermalRecord {
         }
     }
 
-    /// Whether all temperatures lie in their ranges.
+    /// Whether all temperatures are in range.
     pub fn holds(&self, temperatures: &PerSensor<[f64; 3]>) -> bool {
         Sensor::ALL.into_iter().all(|sensor| {
             let range = self.range.get(sensor);

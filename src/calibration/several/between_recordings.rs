@@ -1,4 +1,4 @@
-//! By how much recordings differ beyond what is stated: learnt from what each says alone.
+//! Differences between recordings beyond the stated ones, estimated from each recording calibrated alone.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -11,22 +11,22 @@ use crate::calibration::{
 use crate::imu::{RATE, ThermalState, Triad};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
-/// Fewer recordings do not tell a difference from a change with temperature.
+/// Fewest recordings that distinguish a difference from a temperature dependence.
 const FEWEST: usize = 3;
-/// The least part of its prior variance that a recording is believed to leave of a direction; below it rounding rules.
+/// Least remaining part of the prior variance of a direction; below it, rounding dominates.
 const LEAST_LEFT: f64 = 1e-12;
 /// Halvings of the logarithm of a variance, over this many decades.
 const HALVINGS: usize = 16;
 const DECADES: f64 = 24.0;
-/// Rounds over the variances that are found, and a fall of −2 ln of the likelihood that is none.
+/// Most rounds over the estimated variances, and the decrease of −2 ln of the likelihood that counts as converged.
 const ROUNDS: usize = 20;
 const SETTLED: f64 = 1e-2;
 
-/// What recordings differ by where they differ by more than is stated, and the finding that says so.
+/// The estimated σ of differences between recordings, if they differ by more than stated, and the finding on it.
 ///
-/// Each parameter is a polynomial in temperature, and each recording's own departs from it by a difference that all
-/// parameters of a group draw with one σ. The variances are those of the largest marginal likelihood. The group that
-/// the data call for most comes in first, then the next, as long as the likelihood ratio exceeds chance.
+/// Each parameter is a polynomial in temperature plus a difference for each recording, with one σ for all parameters of
+/// a group. The variances maximise the marginal likelihood. The most significant group is added first, then the
+/// next, as long as the likelihood ratio is significant.
 ///
 /// Source: Patterson and Thompson 1971, "Recovery of inter-block information when block sizes are unequal",
 /// Biometrika 58(3), for the likelihood; Henderson 1975, "Best linear unbiased estimation and prediction under a
@@ -56,25 +56,25 @@ pub fn learnt(model: &Model, alone: &[SeparateEstimate]) -> Option<(DayToDay, Fi
     Some((day_to_day, recordings_differ(&differences)))
 }
 
-/// What one recording says beyond its prior, along the directions of which it says more than that.
+/// Information of one recording beyond its prior, along the directions that it observes.
 struct RecordingEvidence {
-    /// Each with an error of 1σ …
+    /// Values, each with an error of 1σ …
     values: DVector<f64>,
     /// … of its own parameters, in prior σ: a row for each value …
     by_own: DMatrix<f64>,
-    /// … and of what all recordings have in common.
+    /// … and of the common parameters.
     by_common: DMatrix<f64>,
 }
 
-/// What all recordings say of the parameters that are estimated.
+/// Information of all recordings on the estimated parameters.
 struct RecordingsEvidence {
     recordings: Vec<RecordingEvidence>,
-    /// Of each parameter: the group's place, and the prior variance.
+    /// Group index and prior variance of each parameter.
     parameters: Vec<(usize, f64)>,
     groups: Vec<Group>,
-    /// Covariance of what a recording has of its own as is stated, in prior σ.
+    /// Stated covariance of the deviation of a recording, in prior σ.
     stated: DMatrix<f64>,
-    /// Of what all have in common: the inverse of the prior variance.
+    /// Inverse of the prior variance of the common parameters.
     prior: DVector<f64>,
 }
 
@@ -107,8 +107,8 @@ impl RecordingEvidence {
     }
 }
 
-/// What takes what all recordings have in common, in prior σ, to the parameters of one: themselves, and so many functions
-/// of its temperature.
+/// Matrix from the common quantities of all recordings to the parameters of one, both in prior σ. Common are the
+/// parameters themselves and, of each, coefficients of the first `functions` functions of temperature.
 fn common(
     model: &Model,
     indices: &[usize],
@@ -135,7 +135,7 @@ fn common(
 }
 
 impl RecordingsEvidence {
-    /// `None` where too few recordings say anything.
+    /// `None` if too few recordings give information.
     fn new(model: &Model, alone: &[SeparateEstimate]) -> Option<Self> {
         let groups: Vec<Group> = Group::all().collect();
         let indices = groups.iter().flat_map(|group| group.parameters(model.form));
@@ -183,8 +183,8 @@ impl RecordingsEvidence {
         })
     }
 
-    /// −2 ln of the likelihood, except for a constant, and its derivative by the variance of each group beyond what is
-    /// stated. `None` where rounding has the last word.
+    /// −2 ln of the likelihood, up to a constant, and its derivative by the variance of each group in excess of the
+    /// stated one. `None` if rounding makes the matrix singular.
     fn likelihood(&self, variances: &[f64]) -> Option<(f64, Vec<f64>)> {
         let mut own = self.stated.clone();
         for (i, &(group, prior)) in self.parameters.iter().enumerate() {
@@ -223,7 +223,7 @@ impl RecordingsEvidence {
         Some((deviance, slopes))
     }
 
-    /// The variance of a group at which the likelihood is largest, the others' held; zero where any lowers it.
+    /// The variance of a group that maximises the likelihood, with the others fixed; zero if any variance lowers it.
     fn most_likely(&self, group: usize, variances: &[f64]) -> Option<f64> {
         let mut trial = variances.to_vec();
         let mut falls = |variance: f64| {
@@ -249,7 +249,7 @@ impl RecordingsEvidence {
         Some(10f64.powf(0.5 * (low + high)))
     }
 
-    /// The groups whose variance the data call for beyond this likelihood ratio, with both; `None` where there are none.
+    /// The groups with a likelihood ratio beyond this limit, with variance and ratio; `None` if there are none.
     fn found(&self, limit: f64) -> Option<Vec<(Group, f64, f64)>> {
         let mut variances = vec![0.0; self.groups.len()];
         let deviance = |variances: &[f64]| self.likelihood(variances).map(|of| of.0);
@@ -298,7 +298,7 @@ impl RecordingsEvidence {
     }
 }
 
-/// What an estimate is off the mean of the prior, and its covariance, in prior σ.
+/// Deviation of an estimate from the prior mean, and its covariance, in prior σ.
 fn in_prior_sigma(
     estimate: &Estimate,
     model: &Model,

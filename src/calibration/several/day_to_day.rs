@@ -1,4 +1,4 @@
-//! What differs between recordings of one instrument: parameters from one day to the next, and how it is mounted.
+//! Differences between recordings of one instrument: parameters from day to day, and mounting.
 
 use nalgebra::{SMatrix, Vector3};
 
@@ -9,45 +9,45 @@ use crate::calibration::{
 };
 use crate::imu::{PerSensor, Triad};
 
-/// What an instrument that is turned on its mounting face makes of parameters: derivatives of those of the recording.
+/// Effect of a rotation of the instrument on its mounting face: derivatives of the recording's parameters.
 #[derive(Debug, Clone)]
 pub struct Turned {
-    /// By those that all recordings have in common, a column each. What is weak, the mean of all mountings, leans on
-    /// what is strong, so they have to be as exact as their ratio.
+    /// By the common parameters, a column each. The poorly determined mean of all mountings depends on well-determined
+    /// quantities, so the derivatives have to be as exact as the ratio of the two.
     pub by_parameters: ParameterMatrix,
-    /// By the turn about each body axis.
+    /// By the rotation about each body axis.
     pub by_mounting: SMatrix<f64, PARAMETERS, 3>,
 }
 
-/// 1σ by which recordings of one instrument differ.
+/// 1σ of the differences between recordings of one instrument.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct DayToDay {
-    /// Of each parameter, normalised; zero where it is common to all.
+    /// 1σ of each parameter, normalised; zero if it is common to all.
     pub parameters: ParameterVector,
-    /// Of the turn of the whole instrument on its mounting face, about each body axis, rad.
+    /// 1σ of the rotation of the whole instrument on its mounting face, about each body axis, rad.
     pub mounting: f64,
 }
 
-/// By how much one recording differs from what all have in common; or 1σ of that.
+/// Deviation of one recording from the common parameters, or its 1σ.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Difference {
     /// Added to each parameter, normalised.
     pub parameters: ParameterVector,
-    /// Rotation vector of the whole instrument on its mounting face, body axes, rad: what the face senses as u
-    /// the instrument senses as `R(ψ)ᵀ u`.
+    /// Rotation vector ψ of the whole instrument on its mounting face, body axes, rad: for the input u of the face, the
+    /// instrument senses `R(ψ)ᵀ u`.
     pub mounting: Vector3<f64>,
 }
 
-/// One thing that a recording has of its own.
+/// A quantity that differs between recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OwnState {
     /// The difference of a parameter of both triads.
     Parameter(usize),
-    /// The turn about a body axis.
+    /// The rotation about a body axis.
     Mounting(usize),
 }
 
-/// Rounds in which a mounting of a degree is found to a thousandth of a second of arc.
+/// Iterations that determine a mounting of a degree to a thousandth of a second of arc.
 const ROUNDS: usize = 3;
 
 impl DayToDay {
@@ -65,7 +65,7 @@ impl DayToDay {
         )
     }
 
-    /// All that a recording has of its own, with its 1σ.
+    /// 1σ of one differing quantity.
     pub(in crate::calibration) fn of(&self, own: OwnState) -> f64 {
         match own {
             OwnState::Parameter(index) => self.parameters[index],
@@ -73,7 +73,7 @@ impl DayToDay {
         }
     }
 
-    /// Covariance of the parameters of a recording around what all have in common.
+    /// Covariance of the parameters of a recording around the common ones.
     pub(in crate::calibration) fn covariance(&self, common: &PerSensor<Triad>) -> ParameterMatrix {
         let parameters = self.parameters.component_mul(&self.parameters);
         let parameters = ParameterMatrix::from_diagonal(&parameters);
@@ -86,7 +86,7 @@ impl DayToDay {
 }
 
 impl Difference {
-    /// The value of one thing that differs.
+    /// The value of one differing quantity.
     pub(in crate::calibration) fn get(&self, own: OwnState) -> f64 {
         match own {
             OwnState::Parameter(index) => self.parameters[index],
@@ -111,7 +111,7 @@ impl Difference {
         }
     }
 
-    /// How the parameters of the recording change with those of all and with its mounting.
+    /// Derivatives of the recording's parameters by the common ones and by its mounting.
     pub(in crate::calibration) fn response(&self, common: &PerSensor<Triad>) -> Turned {
         let before = to_vector(common) + self.parameters;
         let after = |mounting: &Vector3<f64>, parameters: &ParameterVector| {

@@ -1,9 +1,9 @@
-//! Several recordings of one instrument as one problem: what they have in common is estimated once, what is
-//! each one's own differs by a stated σ, and parameters may follow temperature.
+//! Several recordings of one instrument as one problem: common parameters are estimated once, differences between
+//! recordings have a stated σ, and parameters may depend on temperature.
 //!
-//! Each recording is first calibrated alone, on a thread of its own. Through these estimates go the polynomials
-//! from which the Gauss–Newton iterations of all data begin; with all orders that the temperatures support,
-//! then with those that a likelihood ratio calls for.
+//! Each recording is first calibrated alone, on its own thread. Polynomials through these estimates are the start of
+//! the Gauss–Newton iterations on all data: first with all orders that the temperatures support, then with those
+//! that a likelihood-ratio test selects.
 
 pub mod day_to_day;
 pub mod separate;
@@ -31,12 +31,12 @@ use crate::run::{Aiding, Run};
 pub use repeat::Repeatability;
 pub use temperatures::TemperatureOptions;
 
-/// What recordings of one instrument have in common, and what not.
+/// Common and individual properties of recordings of one instrument.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Together {
-    /// By how much they differ. Without a table the body axes go with the accelerometers, however they are mounted.
+    /// σ of their differences. Without a table, the body axes are those of the accelerometers, whatever the mounting.
     pub day_to_day: DayToDay,
-    /// How parameters follow temperature; none where they do not.
+    /// Temperature dependence of the parameters; `None` if there is none.
     pub temperature: Option<TemperatureOptions>,
 }
 
@@ -50,11 +50,11 @@ impl Default for Together {
 }
 
 impl<'a> Problem<'a> {
-    /// The problem that recordings of one instrument pose together. The first one's instrument and table stand for
-    /// all; one without a dwell is left out, and a finding says so.
+    /// The joint problem of several recordings of one instrument. The instrument and table of the first apply to all;
+    /// a recording without a dwell is dropped with a finding.
     ///
     /// # Errors
-    /// [`CalibrationError`] if there is none, or one has no temperature where parameters follow it.
+    /// [`CalibrationError`] if there is no recording, or if one has no temperature although parameters depend on it.
     pub fn together(
         runs: &[&'a Run],
         options: &Options,
@@ -77,8 +77,8 @@ impl<'a> Problem<'a> {
         Ok(problem.with_model(model))
     }
 
-    /// Mean temperature in °C of each dwell, of all axes, and its rate in K/s; not a number where it is not known. None
-    /// where nothing follows temperature.
+    /// Mean temperature of each dwell over all axes, °C, and its rate, K/s; NaN if unknown. Empty if nothing depends on
+    /// temperature.
     pub(in crate::calibration) fn warming(&self) -> Vec<(f64, f64)> {
         if self.model.thermal.is_none() {
             return Vec::new();
@@ -107,8 +107,8 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// Solves a problem of several recordings, or one that varies, with stated noise. Recordings differ by what is stated
-/// or, where the noise may be learnt, by what they show.
+/// Solves a problem of several recordings, or one with temperature dependence, with the stated noise. Differences
+/// between recordings are as stated or, if noise may be estimated, as estimated.
 pub fn solve<'a>(
     problem: &Problem<'a>,
     progress: Progress,
@@ -144,7 +144,7 @@ pub fn solve<'a>(
     })
 }
 
-/// Where the iterations begin: of each parameter the polynomial through what each recording alone says.
+/// Start of the iterations: for each parameter, the polynomial through the recordings calibrated alone.
 fn start(problem: &Problem, alone: &[SeparateEstimate]) -> Linearisation {
     let model = &problem.model;
     let initial = alone.iter().flat_map(|a| a.at.initial_attitudes.clone());

@@ -1,4 +1,4 @@
-//! Which orders of the polynomials the data call for.
+//! Selection of the orders of the temperature polynomials.
 
 use super::thermal::{Coefficient, Thermal};
 use crate::calibration::checks::observability::temperature_not_seen;
@@ -8,17 +8,17 @@ use crate::calibration::{Finding, Group, Linearisation, OBSERVED_BELOW, Problem,
 use crate::imu::{InstallationForm, RATE, ThermalModel};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
-/// What of a model the data call for.
+/// The selected model.
 pub struct Selected {
     pub model: ThermalModel,
     /// The estimates under it.
     pub at: Linearisation,
-    /// What the recordings did not show.
+    /// The finding on temperature dependence that the recordings do not show.
     pub finding: Option<Finding>,
 }
 
-/// Takes the highest order of a kind of parameters off while the data do not call for it: where it is zero, the
-/// ratio of likelihoods with and without it is χ² of as many degrees as it has coefficients (Wilks).
+/// Removes the highest order of a group of parameters while it is not significant: if its coefficients are zero,
+/// −2 ln of the likelihood ratio is χ² with as many degrees of freedom as there are coefficients (Wilks).
 pub fn select(problem: &Problem, iterated: &Iterated, thermal: &Thermal) -> Selected {
     let held = &iterated.held;
     let reduction = held.reduction.clone().folded();
@@ -68,7 +68,7 @@ pub fn select(problem: &Problem, iterated: &Iterated, thermal: &Thermal) -> Sele
     }
 }
 
-/// Parameters of whose first order little more is known than before, if there are any.
+/// The finding on parameters whose first order is hardly determined beyond its prior, if any.
 fn unseen(form: InstallationForm, thermal: &Thermal) -> Option<Finding> {
     let all = thermal.coefficients.iter().enumerate();
     let unseen = all.filter(|(k, c)| {

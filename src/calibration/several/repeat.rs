@@ -1,4 +1,4 @@
-//! Whether recordings repeat each other: what each alone says against all together.
+//! Repeatability: each recording calibrated alone, compared with the joint calibration.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,26 +8,26 @@ use crate::calibration::{
 };
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
-/// How a parameter repeats from one recording to the next.
+/// Repeatability of a parameter between recordings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Repeatability {
     /// Its index.
     pub parameter: usize,
-    /// Standard deviation of what recordings alone say about the common curve …
+    /// Standard deviation of the individual calibrations about the common curve …
     pub spread: f64,
     /// … its 1σ …
     pub sigma: f64,
-    /// … and what their claimed σ make of it.
+    /// … and its expectation from their stated σ.
     pub claimed: f64,
-    /// Squared departures, each over its variance, for each degree of freedom; one if σ are true.
+    /// χ² of the deviations per degree of freedom; one if σ are correct.
     pub chi_square: f64,
-    /// What that stays below in 999 of 1000 campaigns if σ are true.
+    /// Its limit at a false-alarm rate of 0.1 %.
     pub limit: f64,
 }
 
 impl Outcome {
-    /// What a recording alone says less all together at its temperature, where its temperature stands, if it had been
-    /// mounted as the mean of all.
+    /// Deviation of a recording calibrated alone from the joint calibration at its temperature, reduced to the mean
+    /// mounting. `None` without a calibration, or if its temperature is not constant.
     fn departure(&self, number: usize, alone: &SeparateEstimate) -> Option<ParameterVector> {
         let mounting = self.own.get(number).map(|own| own.values.mounting);
         let turned_back = Difference {
@@ -43,8 +43,8 @@ impl Outcome {
         Some(off)
     }
 
-    /// Squared distance of what a recording alone says from all together, for each of its parameters, and what it
-    /// stays below in 999 of 1000. `None` where it alone says nothing.
+    /// Squared normalised distance between a recording calibrated alone and the joint calibration, per parameter, and
+    /// its limit at a false-alarm rate of 0.1 %. `None` if the recording gives no calibration alone.
     pub fn distance_alone(&self, number: usize) -> Option<(f64, f64)> {
         let alone = self.alone.get(number)?;
         let off = self.departure(number, alone)?;
@@ -79,7 +79,7 @@ impl Outcome {
         ))
     }
 
-    /// How each parameter repeats, where at least three recordings say it alone.
+    /// Repeatability of each parameter that at least three recordings determine alone.
     pub fn repeatability(&self) -> Vec<Repeatability> {
         let all = self.alone.iter().enumerate().filter_map(|(k, alone)| {
             Some((self.departure(k, alone)?, alone.estimate.as_ref()?.sigma()))
@@ -111,8 +111,8 @@ impl Outcome {
         (0..PARAMETERS).filter_map(of).collect()
     }
 
-    /// Of each dwell that had any, told by number, the sums of its whitened innovations of velocity over the root of
-    /// their number.
+    /// Sums of the whitened velocity innovations over the root of their number, for each dwell that has any, with the
+    /// number of the dwell.
     pub fn by_dwell(&self) -> Vec<(usize, [f64; 3])> {
         let seen = self.innovations.iter();
         let seen = seen.filter(|i| i.accepted && i.observation == Observation::Velocity);

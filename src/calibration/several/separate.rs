@@ -16,15 +16,15 @@ use crate::calibration::{
 use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalModel, ThermalRange};
 use crate::run::Dwell;
 
-/// A recording alone says less of a parameter than its noise does by this factor: what it leaves off may be
-/// more.
+/// Factor by which σ of a recording calibrated alone may exceed that of its noise: neglected effects may be
+/// larger.
 const BEYOND_NOISE: f64 = 10.0;
 
-/// A recording within this part of the range is at one temperature.
+/// A recording that spans less than this part of the range counts as one temperature.
 const PART_OF_RANGE: f64 = 0.1;
 
-/// Each recording alone, on as many threads as there are, with the noise that is stated or, where it may be learnt
-/// and has to be, with that of what each shows.
+/// Calibrates each recording alone, in parallel, with the stated noise or, if the policy allows and the data demand it,
+/// with the noise estimated from it.
 pub fn each(problem: &Problem) -> Result<Vec<SeparateEstimate>, CalibrationError> {
     let runs = problem.runs().count();
     let plain = |number: usize| plain(&problem.recordings(|of| of == number), &problem.model);
@@ -44,7 +44,7 @@ pub fn each(problem: &Problem) -> Result<Vec<SeparateEstimate>, CalibrationError
     Ok(all)
 }
 
-/// The problem of a recording without what differs between recordings and temperatures.
+/// The problem of a recording without differences between recordings and without temperature dependence.
 fn plain<'a>(recording: &Problem<'a>, model: &Model) -> Problem<'a> {
     let mut model = model.clone();
     model.thermal = None;
@@ -52,8 +52,8 @@ fn plain<'a>(recording: &Problem<'a>, model: &Model) -> Problem<'a> {
     recording.with_model(model)
 }
 
-/// A model with the noise that recordings show which have no parameter in common: a short one does not show its own,
-/// and what they differ by is no noise.
+/// Noise model estimated jointly from recordings that share no parameters. A short recording cannot show its own noise,
+/// and differences between recordings must not be taken for noise.
 fn noise_of_all(problem: &Problem, alone: &[SeparateEstimate]) -> Option<Model> {
     let known = |number: usize| alone[number].estimate.is_some();
     let problem = problem.recordings(known);
@@ -83,7 +83,8 @@ fn noise_of_all(problem: &Problem, alone: &[SeparateEstimate]) -> Option<Model> 
     learnt.noise.learnt.then(of_all)
 }
 
-/// A recording alone with the noise that is stated or that it shows, and whether it shows other than is stated.
+/// Calibrates a recording alone with the stated or the estimated noise; also returns whether it contradicts the stated
+/// noise.
 fn of(
     plain: &Problem,
     thermal: Option<&ThermalModel>,
@@ -132,7 +133,7 @@ fn of(
     Ok((alone, contradicted))
 }
 
-/// Mean temperature of each axis in the middles of a recording's dwells, °C; none where it is not known.
+/// Mean temperature of each axis in the middles of a recording's dwells, °C; `None` if unknown.
 fn middle_temperature(recording: &Problem) -> Option<PerSensor<[f64; 3]>> {
     let imu = &recording.run().recording.imu;
     let temperature = imu.temperature.as_ref()?;
@@ -147,7 +148,7 @@ fn middle_temperature(recording: &Problem) -> Option<PerSensor<[f64; 3]>> {
     }))
 }
 
-/// What a recording alone says with other noise.
+/// The estimate of a recording alone with other noise.
 fn with_noise(alone: &SeparateEstimate, recording: &Problem) -> Option<Estimate> {
     alone.estimate.as_ref()?;
     let (priors, at) = (alone.priors.clone(), alone.at.clone());
@@ -159,8 +160,8 @@ fn estimate(iterated: &Iterated) -> Option<Estimate> {
     iterated.converged.then(|| iterated.both_triads())
 }
 
-/// Of a parameter, the part common to all recordings beyond its prior mean, and the coefficient of each function of
-/// temperature: least squares through what each recording alone says.
+/// For a parameter: the common deviation from its prior mean, and the coefficient of each function of temperature, by
+/// least squares through the recordings calibrated alone.
 pub fn through(
     model: &Model,
     alone: &[SeparateEstimate],

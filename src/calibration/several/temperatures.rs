@@ -1,4 +1,4 @@
-//! The temperatures of recordings: range, and how many of them are distinct.
+//! The temperatures of recordings: range, and number of distinct temperatures.
 
 use crate::calibration::problem::Stretch;
 use crate::calibration::{CalibrationError, Problem, parameter};
@@ -7,21 +7,21 @@ use crate::imu::{
 };
 use crate::recording::Temperature;
 
-/// Recordings within this many kelvin are at one temperature: what a soaked instrument changes by itself.
+/// Recordings within this many kelvin count as one temperature: the self-heating of a soaked instrument.
 const ONE_TEMPERATURE: f64 = 1.0;
 
-/// What a parameter may change by within the range, in σ of what is known of it beforehand: more than an
-/// instrument of its grade, so that the data decide.
+/// Prior 1σ of the change of a parameter over the range, in its prior σ: more than for an instrument of its
+/// grade, so that the data decide.
 const CHANGE: f64 = 3.0;
 
-/// How parameters follow temperature.
+/// Options for the temperature dependence of parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TemperatureOptions {
-    /// Highest order of the polynomials that is tried, at most [`HIGHEST_ORDER`].
+    /// Highest order of the polynomials that are tried, at most [`HIGHEST_ORDER`].
     pub highest_order: usize,
-    /// Whether biases may follow the rate of temperature, too.
+    /// Whether biases may depend on the rate of temperature, too.
     pub rate: bool,
-    /// At which parameters are stated, °C; none: in the middle of the range.
+    /// Reference temperature of the parameters, °C; `None` for the middle of the range.
     pub reference: Option<f64>,
 }
 
@@ -72,8 +72,8 @@ pub fn model(
     Ok(any.then_some(ThermalModel { range, sigma }))
 }
 
-/// How many temperatures at the ends of dwells lie apart by as much as a polynomial of the highest order needs to tell
-/// them, in the mean of a triad's axes.
+/// Number of temperatures at the ends of dwells, averaged over a triad's axes, that are far enough apart for a
+/// polynomial of the highest order.
 fn distinct(problem: &Problem, sensor: Sensor) -> usize {
     let of_stretch = |stretch: &Stretch| {
         let imu = &stretch.run.recording.imu;

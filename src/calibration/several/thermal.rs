@@ -1,4 +1,4 @@
-//! How parameters depend on temperature, as estimated: coefficients of [`crate::imu::ThermalModel`].
+//! Estimated temperature dependence of the parameters: coefficients of [`crate::imu::ThermalModel`].
 
 use nalgebra::{DMatrix, DVector};
 
@@ -8,21 +8,21 @@ use crate::imu::{
     ThermalState, Triad,
 };
 
-/// A coefficient of a parameter's dependence on temperature.
+/// A coefficient of a parameter's temperature dependence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Coefficient {
-    /// Whose.
+    /// The triad.
     pub sensor: Sensor,
     /// Index among the triad's parameters.
     pub parameter: usize,
     /// Index among [`THERMAL_FUNCTIONS`].
     pub function: usize,
-    /// The axis whose temperature counts.
+    /// The axis whose temperature is used.
     pub axis: usize,
 }
 
 impl Coefficient {
-    /// Those that a model has on.
+    /// The coefficients that a model has on.
     pub(in crate::calibration) fn all(
         form: InstallationForm,
         model: Option<&ThermalModel>,
@@ -45,12 +45,12 @@ impl Coefficient {
         parameter(self.sensor, self.parameter)
     }
 
-    /// What an error of it is of its parameter's in this state.
+    /// Factor from an error of the coefficient to the error of its parameter in this state.
     pub(in crate::calibration) fn weight(&self, state: &ThermalState) -> f64 {
         state.get(self.sensor)[self.axis][self.function]
     }
 
-    /// Of these coefficients.
+    /// Its value among these coefficients.
     pub(in crate::calibration) fn of(&self, all: &PerSensor<ThermalCoefficients>) -> f64 {
         all.get(self.sensor)[(self.parameter, self.function)]
     }
@@ -66,15 +66,15 @@ impl Coefficient {
 /// Estimated coefficients with their covariance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Thermal {
-    /// Ranges, and σ before.
+    /// Temperature ranges and prior σ.
     pub model: ThermalModel,
-    /// What each of the estimates is.
+    /// The coefficient of each estimate.
     pub coefficients: Vec<Coefficient>,
-    /// Normalised as the parameters.
+    /// The estimates, normalised like the parameters.
     pub values: DVector<f64>,
-    /// Of the values.
+    /// Covariance of the values.
     pub covariance: DMatrix<f64>,
-    /// Of the parameters of both triads (rows) with them.
+    /// Covariance of the parameters of both triads (rows) with the values.
     pub cross: DMatrix<f64>,
 }
 
@@ -88,8 +88,8 @@ impl Thermal {
         all
     }
 
-    /// By how much the parameters of both triads differ from those at the reference in a state, and
-    /// covariance of what they are then, given that of those at the reference.
+    /// Deviation of the parameters of both triads from those at the reference in a state, and the covariance of the
+    /// parameters in that state, given the covariance at the reference.
     pub fn at(
         &self,
         state: &ThermalState,
@@ -109,8 +109,8 @@ impl Thermal {
         (ParameterVector::from_fn(|i, _| change[i]), at)
     }
 
-    /// The highest order that is on of each parameter of a triad, none where it does not change, and whether its rate
-    /// is on.
+    /// Number of temperature functions that are on for this parameter, zero if it does not change with temperature, and
+    /// whether its rate term is on.
     pub fn order(&self, index: usize) -> (usize, bool) {
         let of = |c: &&Coefficient| c.index() == index;
         let functions = self.coefficients.iter().filter(of).map(|c| c.function + 1);

@@ -7,7 +7,7 @@ use crate::calibration::reduction::Script;
 use crate::calibration::solved::Solved;
 use crate::calibration::{CalibrationError, NoisePolicy, Problem, Progress};
 
-/// From the coarse start, with the noise that is stated or, where it may be learnt, with what a hand adds to it as the
+/// Iterates from the coarse start, with the stated noise or, if noise may be estimated, with the noise by hand that the
 /// start shows.
 pub fn from_coarse_start<'a>(
     problem: &Problem<'a>,

@@ -1,4 +1,4 @@
-//! Both triads from positions, and what their residuals show of prior, base and positions.
+//! Both triads from positions, with the evaluation of their residuals with respect to prior, base and positions.
 
 use nalgebra::SMatrix;
 
@@ -13,12 +13,12 @@ use crate::calibration::{
 use crate::imu::{PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
 
-/// Scale factors further from zero than this many σ are of an axis that senses.
+/// A scale factor farther from zero than this many σ belongs to a working axis.
 const SENSES: f64 = 5.0;
 
-/// Both triads from positions; with what is known beforehand where they do not determine a triad. Where
-/// residuals ring, σ are widened until they do not, and a finding says so. The same where positions alone
-/// contradict the prior, which would else hide what they show.
+/// Both triads from positions, with the prior for parameters that these do not determine. If residuals exceed
+/// their limit, σ are widened until they do not, with a finding. The same is done if the positions alone contradict
+/// the prior, which would otherwise hide it.
 pub fn both_triads(
     observed: &PerSensor<Observed>,
     problem: &Problem,
@@ -68,9 +68,9 @@ struct Stated<'a> {
     observed: &'a Observed,
     fit: Fit,
     drift: Option<Finding>,
-    /// Where residuals ring.
+    /// Evaluation of residuals that exceed their limit.
     rings: Option<Judged>,
-    /// 1σ of the table's base, rad, if that explains why they do.
+    /// 1σ of the table's base, rad, if that explains the residuals.
     base: Option<f64>,
 }
 
@@ -95,7 +95,8 @@ impl<'a> Stated<'a> {
         })
     }
 
-    /// On a base whose level and north are as stated, or known to this σ only, rad; wider where residuals ring.
+    /// Calibrates on a base with level and north as stated, or with this σ, rad; σ are widened if residuals exceed
+    /// their limit.
     fn calibrated(
         &self,
         prior: &Model,
@@ -132,7 +133,7 @@ impl<'a> Stated<'a> {
     }
 }
 
-/// 1σ of the base's level and north, rad, if it explains why residuals of a triad ring.
+/// 1σ of the base's level and north, rad, if it explains the residuals of a triad.
 fn base_off(residuals: &Residuals, observed: &Observed, triad: &Triad) -> Option<f64> {
     observed.base_sigma?;
     // By a turn of 1 rad.
@@ -143,11 +144,10 @@ fn base_off(residuals: &Residuals, observed: &Observed, triad: &Triad) -> Option
         .then(|| (squares / explained.degrees as f64).sqrt())
 }
 
-/// The variance that every axis of these positions must have more for χ² of the residuals to be what is
-/// expected of it.
+/// Additional variance on every axis of these positions for which χ² of the residuals equals its expectation.
 ///
 /// It is added, not multiplied: residuals may all be of axes across the input, where a table's attitude
-/// makes stated σ large, and show nothing of how far those along it are off, by which scale factors are found.
+/// makes stated σ large, and show nothing of the errors along the input, which determine the scale factors.
 fn unexplained(observed: &Observed, triad: &Triad, places: &[usize]) -> f64 {
     /// A factor of two a step, down to rounding.
     const HALVINGS: i32 = 60;
@@ -176,15 +176,15 @@ fn unexplained(observed: &Observed, triad: &Triad, places: &[usize]) -> f64 {
     high
 }
 
-/// The model of a problem, its prior along the axes of table or labels, so that no angle is a choice of the
-/// body frame.
+/// The model of a problem, with its prior along the axes of table or labels, so that no angle is fixed by the
+/// choice of the body frame.
 fn along_table_axes(problem: &Problem) -> Model {
     let mut model = problem.model.clone();
     model.aiding = Aiding::Table;
     model.in_form(problem.run(), model.form)
 }
 
-/// Both triads by positions alone; what they do not determine, or what no triad explains, is as in the prior.
+/// Both triads from positions alone; undetermined parameters, and triads that do not fit, keep the prior.
 fn without_prior(observed: &PerSensor<Observed>, model: &Model) -> Estimate {
     let mut estimate = Estimate {
         triads: from_vector(model.form, &model.prior_mean),

@@ -24,10 +24,10 @@ use crate::imu::{BodyFrame, PerSensor, Sensor};
 use crate::run::motion::rests;
 use crate::run::{Aiding, Dwell};
 
-/// A reference vector within this cosine of a body axis makes a position of the six.
+/// Cosine above which a reference vector lies along a body axis, so that its position is one of the six.
 const ALONG_AXIS: f64 = 0.9998;
 
-/// Where the inputs of a closed form are known from.
+/// Source of the reference inputs of a closed form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reference {
     /// Attitudes of the table's log.
@@ -39,7 +39,7 @@ pub enum Reference {
 }
 
 impl Reference {
-    /// What fixes the body axes.
+    /// The body frame that this reference defines.
     pub fn body_frame(self) -> BodyFrame {
         match self {
             Self::Table | Self::Labels => BodyFrame::Table,
@@ -51,9 +51,9 @@ impl Reference {
 /// A closed-form calibration of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClosedForm {
-    /// The estimate; its σ follow from random walk, pulses and how well the inputs are known.
+    /// The estimate; its σ follow from random walk, pulses and the uncertainty of the inputs.
     pub estimate: Estimate,
-    /// Where the inputs are known from.
+    /// Source of the reference inputs.
     pub reference: Reference,
     /// Dwells or labelled positions used for each triad.
     pub positions: PerSensor<usize>,
@@ -61,9 +61,9 @@ pub struct ClosedForm {
     pub turns: usize,
     /// Total time of all dwells used, s.
     pub standing_time: f64,
-    /// Noise that was learnt; `None` if it is as stated.
+    /// The estimated noise; `None` if the stated noise is used.
     pub noise: Option<NoiseReport>,
-    /// What a calibration engineer must know before using the figures.
+    /// Findings that a calibration engineer must know before using the figures.
     pub findings: Vec<Finding>,
 }
 
@@ -76,13 +76,13 @@ impl ClosedForm {
 
 /// Calibrates both triads of a run without a filter.
 ///
-/// With a table's log, from its dwells: where they hold the paper's six positions of a triad (Earth
-/// rate or gravity along each body axis, both ways) from those, else from all. Without, from labelled
-/// sections; without those, from every dwell and turn by gravity alone. Least squares over six
-/// positions is the paper's half sums and half differences where they are exactly opposite.
+/// With a table's log, it uses the dwells: the paper's six positions of a triad (Earth rate or gravity along each
+/// body axis, in both directions) if there are such, else all dwells. Without a table it uses labelled sections;
+/// without those, every dwell and turn with gravity as the only reference. For exactly opposite positions, least
+/// squares equals the half sums and half differences of the paper.
 ///
 /// # Errors
-/// [`CalibrationError`] if nothing is at rest. What the positions do not determine keeps its prior.
+/// [`CalibrationError`] if there is no dwell. Parameters that the positions do not determine keep their prior.
 pub fn six_position(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     let sections = &problem.run().recording.segments;
     let reference = if problem.model.aiding == Aiding::Table {
@@ -95,7 +95,7 @@ pub fn six_position(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     six_position_by(reference, problem)
 }
 
-/// The same by what the inputs are to be known from; labels need no dwells.
+/// The same with a given source of the reference inputs; labels need no dwells.
 pub fn six_position_by(
     reference: Reference,
     problem: &Problem,
@@ -122,7 +122,8 @@ pub fn six_position_by(
     Ok(closed_form)
 }
 
-/// The accelerometers are calibrated by gravity, so its error is in their scale factors, the same part in all three.
+/// Adds the error of gravity, by which the accelerometers are calibrated: the same relative error in all three scale
+/// factors.
 fn share_gravity(estimate: &mut Estimate, site: &Site) {
     let part = (site.gravity_sigma / site.gravity).powi(2);
     let scale = estimate.triads.accel.scale;
@@ -184,7 +185,7 @@ fn six_of(observed: &Observed) -> Vec<usize> {
     }
 }
 
-/// From the sections whose labels say how the instrument stands or turns.
+/// The closed form from sections whose labels state a position or a turn.
 fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     let run = problem.run();
     let rests = rests(run);
@@ -219,7 +220,8 @@ fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     })
 }
 
-/// From every dwell and every move by gravity alone, with the prior where they are too few.
+/// The closed form from every dwell and every move with gravity as the only reference, with the prior if there are too
+/// few.
 fn by_gravity(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     let rests = dwells(problem)?;
     let (turned, by_hand) = calibrated_as_held(problem, &rests)?;

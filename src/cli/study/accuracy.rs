@@ -16,14 +16,14 @@ use super::super::output::Delivery;
 use super::super::progress::Runs;
 use super::super::sharding::Sharding;
 
-/// How accurate the filter is, and whether its σ are true
+/// Tests the accuracy of the filter and the consistency of its σ
 ///
-/// Simulates many runs, each with another instrument, other noise and other table errors, and
-/// calibrates each by the filter and, on the paper's static positions, by the closed form. Shows the
-/// RMS error of each group, and of the position after 40 h of navigation, against the Cramér–Rao bound
-/// and against the closed form, and whether the filter's σ are true (NEES, NIS, position errors within
-/// their predicted σ). Of a campaign it shows parameters at the reference temperature, coefficients and the
-/// orders that were chosen. A run on which the filter fails is counted, not dropped.
+/// Simulates many runs, each with a different instrument, different noise and different table errors, and
+/// calibrates each by the filter and, on the paper's static positions, by the closed form. Shows the RMS
+/// error of each group, and of the position after 40 h of navigation, compared with the Cramér–Rao bound
+/// and with the closed form, and the consistency of the filter's σ (NEES, NIS, position errors within
+/// their predicted σ). For a campaign it shows parameters at the reference temperature, coefficients and
+/// selected orders. A run on which the filter fails is counted, not dropped.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal study accuracy --runs 500
@@ -40,7 +40,7 @@ pub struct Accuracy {
     /// Another path for it: a TOML file or an embedded name
     #[arg(long, value_name = "PATH")]
     path: Option<String>,
-    /// What the filter observes
+    /// Observations of the filter
     #[arg(long, value_enum, default_value_t = Aiding::Table)]
     aiding: Aiding,
     /// Installation form of the filter
@@ -50,16 +50,16 @@ pub struct Accuracy {
     /// scenario's]
     #[arg(long, value_name = "MODEL")]
     truth_installation: Option<String>,
-    /// Error terms to simulate and to estimate, beside those of the scenario
+    /// Error terms to simulate and to estimate, in addition to those of the scenario
     #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
     with: Vec<TermArgument>,
     /// Error terms to simulate and not to estimate
     #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
     unmodelled: Vec<TermArgument>,
-    /// Which noise the filter uses; what a scenario states is right
+    /// Noise used by the filter; the noise stated in a scenario is correct
     #[arg(long, value_enum, default_value_t = Noise::Stated)]
     noise: Noise,
-    /// In a campaign, do not let biases follow the rate of temperature
+    /// In a campaign, do not let biases depend on the rate of temperature
     #[arg(long)]
     without_rate: bool,
     /// Number of runs

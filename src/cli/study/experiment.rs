@@ -17,13 +17,13 @@ use super::super::sharding::Sharding;
 const HOUR: f64 = 3600.0;
 const SCENARIO: &str = "experiment";
 
-/// The paper's turntable experiment: what each calibration is worth in 40 h of navigation
+/// Simulates the paper's turntable experiment: navigation accuracy after each calibration
 ///
 /// Simulates many instruments on a table with position errors, with noise and Gauss–Markov biases.
 /// Calibrates each by the closed form on the paper's static positions and by the filter, in a sixth of
 /// that time and in the same time, in all installation forms, and navigates with the remaining
 /// errors: at rest, aligned by the calibrated instrument itself or perfectly, and moving. Shows the position error of
-/// every method, and which parameters make it.
+/// every method, and the parameters that cause it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal study experiment
@@ -36,10 +36,10 @@ pub struct Experiment {
     /// Seed of all random numbers [default: the scenario's]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
-    /// What the instrument that moves follows: a TOML file or an embedded name
+    /// Trajectory of the moving instrument: a TOML file or an embedded name
     #[arg(long, value_name = "TRAJECTORY", default_value = "flight")]
     trajectory: String,
-    /// How many hours each navigates, to the minute, up to 1000
+    /// Hours of navigation, to the minute, up to 1000
     #[arg(long, default_value_t = 40.0, value_parser = hours)]
     hours: f64,
     #[command(flatten)]

@@ -9,11 +9,12 @@ use super::super::input::{at_least_two, hours, latitude, seed};
 use super::super::output::Delivery;
 use super::super::progress::Activity;
 
-/// The paper's Table 1: what a simplified installation form costs in 40 h of navigation
+/// Reproduces the paper's Table 1: navigation errors due to a simplified installation form
 ///
-/// Draws installation angles as the paper does, calibrates gyros and accelerometers by the closed form
-/// in the six-angle and the three-angle form, without noise, and navigates with the remaining errors. Shows the largest errors beside the paper's figures, under every reading of its text, and
-/// says which of them a correct program gives.
+/// Draws installation angles as in the paper, calibrates gyros and accelerometers by the closed form in the
+/// six-angle and the three-angle form, without noise, and navigates with the remaining errors. Shows the
+/// largest errors next to the paper's figures, under every reading of its text, and states which of these
+/// figures a correct program gives.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for a report with the paper's Figures 2 to 9")))]
 #[command(after_help = "Examples:
@@ -30,7 +31,7 @@ pub struct Table1 {
     /// Length of a run in hours, a minute to 1000
     #[arg(long, default_value_t = paper::HOURS, value_parser = hours)]
     hours: f64,
-    /// Geodetic latitude in degrees; the paper states none, its figures say 45.78
+    /// Geodetic latitude in degrees; the paper states none, its figures imply 45.78
     #[arg(long, default_value_t = paper::LATITUDE_DEG, value_name = "L", allow_negative_numbers = true, value_parser = latitude)]
     latitude_deg: f64,
     #[command(flatten)]

@@ -67,7 +67,8 @@ impl Knots {
     }
 
     /// From a clock of this period whose first sample is due later than that of the one that stamps are referred to, and
-    /// whose period is longer; none if stamps are near enough to that one. Err is the line where times do not increase.
+    /// whose period is longer; `None` if stamps are near enough to that one. Err is the line where times do not
+    /// increase.
     pub fn wander(&self, later: f64, longer: f64, period: f64) -> Result<Option<Wander>, u64> {
         let knots = self.knots.iter().map(|knot| {
             let off = (knot.off - later - knot.number * longer) / period;

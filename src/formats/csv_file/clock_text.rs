@@ -20,8 +20,8 @@ fn days(year: i64, month: i64, day: i64) -> i64 {
         - 719_469
 }
 
-/// The days of a date that begins with its year; of others nobody knows which number is the month, and the time of day
-/// goes on beyond midnight.
+/// Days of a date that begins with its year. Other dates give zero, because the order of day and month is ambiguous;
+/// the time of day then continues beyond midnight.
 fn date(text: &str) -> i64 {
     let numbers: Vec<&str> = text
         .split(|c: char| !c.is_ascii_digit())
@@ -87,7 +87,7 @@ fn parts(text: &str) -> Option<(f64, &str)> {
 }
 
 impl ClockText {
-    /// Of a column of which these are the texts in the first rows; none if plain numbers serve.
+    /// Of a column of which these are the texts in the first rows; `None` if plain numbers serve.
     pub fn of(texts: &[&str]) -> Option<Self> {
         let parts: Vec<_> = texts.iter().filter_map(|text| parts(text)).collect();
         if parts.is_empty() || 2 * parts.len() < texts.len() {

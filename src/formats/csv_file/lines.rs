@@ -6,9 +6,9 @@ use std::io::{self, BufRead, BufReader, ErrorKind, Read};
 
 use super::row::Malformed;
 
-/// Within so many bytes a row ends, comments and empty lines before it counted; what does not is no log.
+/// Longest row in bytes, including comments and empty lines before it; a file with a longer one is not a log.
 pub const LONGEST: u64 = 1 << 20;
-/// So many lines and bytes at most are looked at to see what the others are.
+/// Most lines and bytes that are read to identify the format of the file.
 const MOST_AHEAD: usize = 1 << 11;
 const BYTES_AHEAD: usize = 1 << 18;
 
@@ -165,7 +165,7 @@ impl Lines {
         self.line.is_ended
     }
 
-    /// Takes the next line that is not empty, within so many bytes; false at the end of the file.
+    /// Takes the next line that is not empty, within `left` bytes; false at the end of the file.
     fn take(&mut self, left: &mut u64) -> Result<bool, Stop> {
         loop {
             let line = &mut self.line;

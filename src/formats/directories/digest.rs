@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 
 use crate::formats::small_file;
 
-/// What a run.toml or a campaign.toml names beside it; neither need be right.
+/// Input files named in a run.toml or a campaign.toml, which may be invalid.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 struct Inputs {

@@ -59,13 +59,13 @@ pub struct Part {
     pub job: Job,
     /// SHA-256 of the job.
     pub digest: String,
-    /// Which part; none if it is all.
+    /// Which part; `None` if it is all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<Shard>,
     /// Numbers of the runs in it, from zero; none if it is all.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub holds: Vec<u64>,
-    /// SHA-256 of the file of results beside it.
+    /// SHA-256 of the file of results in the same directory.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub results: Option<String>,
 }
@@ -90,7 +90,7 @@ impl Job {
         digest_of(&(&self.version, &self.processor, self.job, &self.options))
     }
 
-    /// How two jobs differ in what decides what a run gives, in words; none if they do not.
+    /// How two jobs differ in what decides what a run gives, in words; `None` if they do not.
     pub fn difference(&self, other: &Self) -> Option<String> {
         let differ = |what: &str, a: String, b: String| Some(format!("{what} {a} and {b}"));
         if self.job != other.job {

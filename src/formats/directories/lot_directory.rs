@@ -1,5 +1,5 @@
 //! The directory of a lot, which grows unit by unit: `job.json`, `units/NAME/` each whole or not there at all,
-//! and what is said of all of them last. Begun again by the same job, it goes on where it was.
+//! and the summary of all units last. If the same job is started again, it continues where it stopped.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
@@ -28,7 +28,7 @@ const FORMAT: &str = "turncal-unit/1";
 /// A lot's directory, in which no other process works as long as this lives.
 pub struct LotDirectory {
     root: PathBuf,
-    /// Locked; none where the file system has no locks.
+    /// The lock file; `None` if the file system has no locks.
     _lock: Option<File>,
 }
 
@@ -65,8 +65,8 @@ pub fn read_part_unit(part: &Path, name: &str) -> Result<Unit, FileError> {
 }
 
 impl LotDirectory {
-    /// Begins a lot's directory, or goes on with one that the same job has begun; `waiting` is told if another
-    /// process has to finish first. With `force` everything begins anew.
+    /// Creates a lot's directory, or continues one that the same job has begun; `waiting` is called if another
+    /// process has to finish first. With `force` the lot restarts from the beginning.
     ///
     /// # Errors
     /// [`FileError`] if it holds another job, another part of this one, units that are not of this lot, or
@@ -194,8 +194,8 @@ fn check_same(target: &Path, found: &Part, expected: &Part) -> Result<(), FileEr
             target,
             Place::File,
             format_args!("a lot begun with other options: {difference}"),
-            "the job that was begun here, to go on with it",
-            "Give the same options, choose another directory, or give --force to begin anew.",
+            "the job that was begun here, to continue it",
+            "Give the same options, choose another directory, or add --force to restart.",
         ))
     })
 }
@@ -220,7 +220,7 @@ fn check_units(units: &Path, part: &Part) -> Result<(), FileError> {
             Place::File,
             format_args!("unit `{other}`, which is not among the runs given"),
             "units of this lot only",
-            "Give its run.toml, too, choose another directory, or give --force to begin anew.",
+            "Give its run.toml, too, choose another directory, or add --force to restart.",
         ))
     })
 }
@@ -304,7 +304,7 @@ fn write_unit(unit: &Unit, key: &str, directory: &Path) -> Result<(), FileError>
     Ok(())
 }
 
-/// Copies files and directories but for the list of what they are, which the copy gets anew.
+/// Copies files and directories, except for the manifest: the copy gets its own.
 fn copy_all(from: &Path, to: &Path) -> std::io::Result<()> {
     for entry in fs::read_dir(from)? {
         let entry = entry?;

@@ -86,7 +86,7 @@ impl WholeDirectory {
                         }
                     ),
                     "a directory that can be replaced",
-                    "Choose another name; replacing this one would delete what is still needed.",
+                    "Choose another name; replacing this one would delete files that are still needed.",
                 ));
             }
             only_output(target)?;
@@ -134,7 +134,7 @@ pub fn list_anew(directory: &Path, names: &[&str]) -> Result<(), FileError> {
         let still = |name: &&str| old.file_name() == Some(name.as_ref());
         if !names.iter().any(still) {
             fs::remove_file(&old)
-                .map_err(|error| unwritable(directory, "remove what is out of date", &error))?;
+                .map_err(|error| unwritable(directory, "remove outdated files", &error))?;
         }
     }
     let list = manifest::of_names(names.iter().copied());

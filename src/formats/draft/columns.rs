@@ -20,7 +20,7 @@ pub struct Columns {
     pub triads: PerSensor<Option<[usize; 3]>>,
     /// Others that might be meant.
     pub others: PerSensor<Vec<[usize; 3]>>,
-    /// Whether the triads were told by their numbers, for their names say nothing.
+    /// Whether the triads were identified by their values, for their names say nothing.
     pub by_size: bool,
     pub temperature: Option<usize>,
     /// Four columns of norm one.
@@ -197,7 +197,7 @@ fn both(seconds: &[f64], nanoseconds: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Whole seconds with the nanoseconds beside them, by their names or, without names, their numbers.
+/// Columns of whole seconds and of nanoseconds, found by their names or, without names, by their values.
 fn split_time(sheet: &Sheet, names: &[Name]) -> Option<[usize; 2]> {
     let is_whole = |k: usize| sheet.columns[k].iter().all(|value| value.fract() == 0.0);
     let is_pair = |k: &usize| {

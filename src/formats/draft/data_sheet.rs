@@ -44,7 +44,7 @@ impl Scale {
         })
     }
 
-    /// Of the accelerometers' axes by gravity at rest, of rows so many of which are a second.
+    /// Scale of the accelerometers' axes from gravity at rest, for this number of rows per second.
     pub fn of_gravity(gravity: &Gravity, per_second: f64) -> Self {
         let Axes { scale, sigma, .. } = gravity.axes;
         let is_sure = sigma < TOLERANCE;
@@ -53,7 +53,7 @@ impl Scale {
             rests => format!(" ± {} % by gravity at {rests} rests", percent(sigma)),
         };
         if !is_sure {
-            by += ", if it says nothing at zero: gravity lies in too few directions to show that";
+            by += ", if its zero offset is zero: gravity lies in too few directions to verify that";
         }
         let often = likely_for_g((scale * per_second).mean());
         let often = if is_sure { String::new() } else { often + ": " };

@@ -41,7 +41,7 @@ pub struct Name {
     pub unit: Option<Unit>,
 }
 
-/// The body axes of the program whose columns have such names; none if it is not known.
+/// The body axes of the program whose columns have such names; `None` if it is not known.
 pub fn axes_of_program(columns: &[String]) -> Option<&'static str> {
     let has = |name: &str| columns.iter().any(|column| column == name);
     // PX4's sensor_combined and ArduPilot's IMU: front, right, down.
@@ -192,7 +192,7 @@ impl Name {
         self.unit.is_some_and(|unit| unit.of == Of::Time)
     }
 
-    /// Whole seconds of a time that goes on in another column, or what goes on there.
+    /// Whether this column holds one part of a time that is split over two: whole seconds, or their fraction.
     pub fn is_part_of_time(&self, word: &str) -> bool {
         self.unit
             .or_else(|| unit(&self.whole()))

@@ -25,7 +25,7 @@ struct Class {
     accel_bias: f64,
 }
 
-/// A bias of more than so many σ of its class is none of its class.
+/// Largest bias, in σ of a class, of an instrument of that class.
 const BEYOND: f64 = 3.0;
 
 #[rustfmt::skip]

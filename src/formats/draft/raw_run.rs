@@ -30,7 +30,7 @@ const ASKEW: f64 = 2.0 * DEGREE;
 const ABOUT_ZERO: f64 = 1.0;
 /// … and of gyros, rad/s: their output at rest shows it.
 const ANY_RATE: f64 = 10.0;
-/// Gravity at rest is told to this part: raw outputs are not straight, and wander.
+/// Relative accuracy of gravity at rest: raw outputs are not linear, and drift.
 const PART: f64 = 1e-3;
 /// How long an output wanders one way, s.
 const WANDERS: f64 = 1.0;
@@ -250,7 +250,7 @@ impl RawRun {
         })
     }
 
-    /// How the gyros turn gravity from rest to rest; none where that does not tell one order and scale from all others.
+    /// How the gyros turn gravity from dwell to dwell; `None` if this does not single out one axis order and scale.
     pub fn turns(&mut self) -> Option<Turns> {
         let (run, dwells) = self.at_rest()?;
         let options = Options::default().noise(NoisePolicy::Stated);
@@ -351,7 +351,7 @@ fn stretches(count: usize, breaks: &[usize], period: f64) -> Vec<Stretch> {
     stretches_between(count, 0.0, period, &lost)
 }
 
-/// Centre of the sphere on which points lie, by `|a|² = 2 b·a + c`, with its largest σ; none if they lie in a plane.
+/// Centre of the sphere on which points lie, by `|a|² = 2 b·a + c`, with its largest σ; `None` if they lie in a plane.
 fn centre(points: &[Vector3<f64>]) -> Option<(Vector3<f64>, f64)> {
     let middle = mean(points);
     let (mut information, mut right) = (SMatrix::<f64, 4, 4>::zeros(), SVector::<f64, 4>::zeros());

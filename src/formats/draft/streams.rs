@@ -63,7 +63,7 @@ struct Member {
 }
 
 impl Streams {
-    /// Looks at a log; none if it is a text whose rows are one stream.
+    /// Looks at a log; `None` if it is a text whose rows are one stream.
     pub fn of_file(file: &Path, wanted: Option<&str>) -> Result<Option<(Self, Sheet)>, FileError> {
         let (members, damage) = match streams::open(file)? {
             Some(log) => {
@@ -200,7 +200,7 @@ impl Streams {
         }
         self.remarks.iter().for_each(|remark| page.remark(remark));
         if let Some(damage) = self.damage.as_ref().filter(|_| self.written.is_none()) {
-            let why = format_args!("take the # away to use what is whole. {damage}");
+            let why = format_args!("remove the # to use the intact part. {damage}");
             page.open("salvage = true", why);
         }
     }
@@ -380,7 +380,7 @@ fn names(found: &Found) -> Vec<String> {
     bare.iter().map(|name| format!("{stream}.{name}")).collect()
 }
 
-/// The streams of a text whose rows tags tell apart; none of another.
+/// The streams of a text whose rows are distinguished by tags; empty for other texts.
 fn tagged(file: &Path) -> Result<Vec<Member>, FileError> {
     let of_tag = |tag: String| {
         let source = Source {

@@ -414,7 +414,7 @@ fn a_counter_that_other_packets_share_is_no_time_and_a_compass_no_gyro() {
     has(
         &text,
         &[
-            "# a counter that other packets share is no time: the period of the rows is found from the turns",
+            "# a counter shared with other packets is not a time: the period of the rows is found from the turns",
             "columns = { gyro = [\"%float(RawGyroX)\", \"%float(RawGyroY)\", \"%float(RawGyroZ)\"], \
              accel = [\"%float(RawAccelX)\", ",
         ],

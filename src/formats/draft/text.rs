@@ -96,7 +96,7 @@ impl Draft {
     fn site(&self, page: &mut Page) {
         page.table(
             "site",
-            "the place of the instrument; what is not stated is wide",
+            "the site of the instrument; fields that are not stated get a wide σ",
         );
         let stated = &self.stated;
         for (key, value, why) in [
@@ -270,7 +270,7 @@ impl Draft {
         }
         if columns.by_size && columns.triads.gyro.is_some() {
             page.remark(
-                "The triads were told by their numbers: gravity keeps the magnitude of the accelerometers'.",
+                "The triads were identified by their values: gravity keeps the magnitude of the accelerometers constant.",
             );
         }
         if let Some((down, accel)) = self.down.zip(columns.triads.accel) {

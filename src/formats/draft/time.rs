@@ -33,7 +33,7 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// Looks at the column of time, or takes none where other packets share its counter.
+    /// Examines the time column, and drops it if it is a counter that other packets share.
     pub fn find(sheet: &Sheet, columns: &mut Columns) -> Self {
         let stated = sheet.rate.map(f64::recip);
         let Some((column, stamps)) = columns.time.zip(columns.stamps(sheet)) else {
@@ -43,7 +43,7 @@ impl Clock {
         let name = Name::of_column(&sheet.names[column], &sheet.units[column]);
         if name.is_counter() && name.is_time() < 2 && !steps.is_count {
             columns.time = None;
-            return Self::without(stated, "a counter that other packets share is no time");
+            return Self::without(stated, "a counter shared with other packets is not a time");
         }
         let second = |word: &str| units_of_time().find(|of| of.0 == word);
         let named = name
@@ -85,7 +85,7 @@ impl Clock {
         }
     }
 
-    /// Which of the samples of some rows, with this period, come after a gap of so many seconds.
+    /// Samples, among these rows of this period, that follow a gap longer than `seconds`.
     pub fn breaks(&self, rows: &[usize], period: f64, seconds: f64) -> Vec<usize> {
         let long = |gap: &&Gap| gap.missing * period > seconds;
         let first = |gap: &Gap| rows.partition_point(|&row| row < gap.before);

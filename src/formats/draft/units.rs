@@ -51,13 +51,13 @@ struct Hypothesis {
     word: &'static str,
     output: Output,
     per_si: f64,
-    /// How many times as large as it says gravity is, or as far as it says its turns; none where nothing shows it.
+    /// Ratio of measured gravity, or of the measured turn, to its value in this unit; `None` if it is not observed.
     factor: Option<f64>,
     told_apart: f64,
 }
 
 impl Hypothesis {
-    /// A unit of which there are so many for one in SI, a second.
+    /// A unit by its name and its number per SI unit (rad/s or m/s²).
     fn new(sensor: Sensor, (word, per_si): (&'static str, f64), output: Output, of: &Rows) -> Self {
         let (gravity, angle) = (of.motion.gravity / STANDARD_GRAVITY, of.motion.angle);
         let factor = match (sensor, output) {
@@ -216,7 +216,7 @@ impl Quantities {
                     .to_owned()
             }
             Output::Increment => format!("gravity times {} s a row", short(rows.period)),
-            Output::Rate => "gravity has the same magnitude whatever the rate of rows".to_owned(),
+            Output::Rate => "specific force at rest is g itself, not g times the sample period".to_owned(),
         };
     }
 

@@ -131,7 +131,7 @@ pub fn ardupilot(source: &Source) -> Exported {
     let notes = [
         UNCORRECTED,
         "which instance it is: the second has INS_ACC2OFFS_X and so on",
-        "gyro offsets for long: ArduPilot finds them anew when it starts, unless INS_GYR_CAL is 0",
+        "lasting gyro offsets: ArduPilot determines them again at every start, unless INS_GYR_CAL is 0",
     ];
     let reads = ("#", "ArduPilot reads rad/s and m/s^2");
     let mut file = Document::correcting(source, &axes, reads, &held, &notes);

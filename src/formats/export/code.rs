@@ -127,7 +127,7 @@ fn at_temperature(source: &Source, file: &mut Document) {
             text + "}"
         };
         file.comment(&format!(
-            "{name}: value at {} degC and coefficients of powers of T - {} from the first on; hold from {} to {} degC",
+            "{name}: value at {} degC and coefficients of powers of T - {} from the first on; valid from {} to {} degC",
             range.reference, range.reference, range.lowest, range.highest
         ));
         file.line(&format!(

@@ -15,8 +15,8 @@ pub struct Document {
 }
 
 impl Document {
-    /// Begins with what all formats say; `notes` are what this one does not hold, beside the error terms but for those
-    /// of which `held` is true.
+    /// Begins with the lines that all formats share. `notes` name everything that this format cannot hold, except error
+    /// terms: those for which `held` is false are added here.
     pub fn holding(
         source: &Source,
         mark: &'static str,

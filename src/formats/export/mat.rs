@@ -101,7 +101,7 @@ fn array(class: u32, name: &str, rows: usize, columns: usize, rest: &[u8]) -> Ve
     element(MATRIX, &parts.concat())
 }
 
-/// Columns of so many rows.
+/// A matrix with this number of rows, column by column.
 fn numbers(name: &str, rows: usize, values: &[f64]) -> Vec<u8> {
     let bytes: Vec<u8> = values
         .iter()

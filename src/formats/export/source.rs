@@ -316,8 +316,8 @@ impl Remainder {
             Sensor::Accel => format!("{:.3} mg", 1e3 * self.constant.amax() / STANDARD_GRAVITY),
         };
         format!(
-            "{name}: what is left is up to {:.1} ppm of scale and {:.1} arcsec of misalignment, together {example} \
-             in any direction, and {bias} of bias",
+            "{name}: the residual error is up to {:.1} ppm of scale and {:.1} arcsec of misalignment, together \
+             {example} in any direction, and {bias} of bias",
             scale / PPM,
             across.amax() / ARCSEC
         )

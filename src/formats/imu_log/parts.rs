@@ -37,7 +37,7 @@ const BESIDE: usize = 1 << 13;
 pub struct Parts<'a> {
     log: &'a ImuLog<'a>,
     layout: Layout,
-    /// Rows of a part; none if all rows are one.
+    /// Rows of a part; `None` if all rows are one.
     size: Option<usize>,
     clock: Line,
     /// The sample of each row that is held.

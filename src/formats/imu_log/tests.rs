@@ -301,7 +301,7 @@ fn a_clock_that_wraps_goes_on_and_one_that_was_set_begins_a_stretch() {
             assert!(number == 0 || imu.edge(stretch.start - 100.0) == begin as f64 - 1.0);
         }
     }
-    // Nothing goes on from a time of so many digits, wherever it stands.
+    // A time of 19 digits is refused, wherever it stands.
     for garbage in [0, 1, 5000, 9999] {
         let damaged = |k: usize| match k == garbage {
             true => 10u64.pow(18),
@@ -314,7 +314,7 @@ fn a_clock_that_wraps_goes_on_and_one_that_was_set_begins_a_stretch() {
         );
         assert!(refused.to_string().contains(&said), "{refused}");
     }
-    // Whoever forgot the unit is told it.
+    // If the unit is missing, the error names it.
     let in_microseconds = |k: usize| 10_000 * k as u64;
     let refused = read(&in_microseconds, 1.0, Breaks::Settings).unwrap_err();
     let said = "line 4: found times that go on by 10000 from row to row, expected 0.01 s, as sample_period_s says. Give \

@@ -134,7 +134,7 @@ impl Resampled {
         }
     }
 
-    /// What a row would hold of the interval between two places; none if the course does not have it.
+    /// What a row would hold of the interval between two places; `None` if the course does not have it.
     pub fn sample(&mut self, course: &Course, begin: f64, end: f64) -> Option<[f64; 3]> {
         let (sums, weight) = course.between(begin, end)?;
         self.weights += weight;

@@ -132,7 +132,7 @@ impl AttitudeColumns<usize> {
         Ok(UnitQuaternion::from_quaternion(quaternion))
     }
 
-    /// The angles of the axes; none if there is only a quaternion.
+    /// The angles of the axes; `None` if there is only a quaternion.
     fn axes(&self, csv: &LogRows) -> Result<Option<AxisAngles>, FileError> {
         let axes: Result<Vec<_>, FileError> = self
             .angles
@@ -156,7 +156,7 @@ fn geometry(
             return Err(document.wrong(
                 &format!("turntable.{key}"),
                 "it with `angles` only, for a quaternion does not tell the axes apart",
-                "Remove it, or give the angles of the table's axes, alone or beside the quaternion.",
+                "Remove it, or give the angles of the table's axes, alone or with the quaternion.",
             ));
         }
         axes += kind.of_table(angles, sigma(stated));

@@ -215,7 +215,7 @@ fn doubt_stuck(runs: &mut [Run]) {
     }
 }
 
-/// How parameters follow temperature; none if they do not.
+/// How parameters follow temperature; `None` if they do not.
 fn temperature(
     document: Document,
     stated: TemperatureFile,

@@ -14,7 +14,7 @@ use crate::formats::error::{FileError, Place, list, suggestion};
 const MEANINGS: [(&str, &str); 19] = [
     ("accel", "the names of three columns, or of one"),
     ("accel_unit", "the unit of a row"),
-    ("column", "the column that tells instruments apart"),
+    ("column", "the column that identifies the instrument"),
     ("columns", "the names of the columns"),
     ("file", "a file name"),
     ("format", "the format of this file"),
@@ -22,13 +22,13 @@ const MEANINGS: [(&str, &str); 19] = [
     ("gyro_unit", "the unit of a row"),
     (
         "imu",
-        "a table of the instrument, its file and what that holds",
+        "a table of the instrument: its file and the content of the file",
     ),
     (
         "number",
-        "what the column says of the instrument that is meant",
+        "the value of the column for the instrument to use",
     ),
-    ("output", "what a row holds: pulse, increment or rate"),
+    ("output", "the quantity of a row: pulse, increment or rate"),
     ("position_sigma_arcsec", "a 1σ in seconds of arc"),
     ("reading_sigma_arcsec", "a 1σ in seconds of arc"),
     (

@@ -117,7 +117,7 @@ fn with_usual_period(
         return Ok(false);
     }
     if run.imu.output != Output::Rate || run.turntable.is_some() {
-        let meaning = "the name of a column; rows of pulses or increments, or rows beside a [turntable], need it, \
+        let meaning = "the name of a column; rows of pulses or increments, or rows with a [turntable], need it, \
                        or else sample_period_s";
         return Err(document.missing("imu.columns.time", meaning));
     }

@@ -266,7 +266,7 @@ const FREE_AIR: f64 = 0.3086 * MILLIGAL;
 fn site(document: Document, run: &RunFile, notes: &mut Vec<String>) -> Result<Site, FileError> {
     let file = &run.site;
     if file.latitude_deg.is_none() && run.turntable.is_some() {
-        let meaning = "a latitude, north positive: beside a [turntable] Earth rate must be known";
+        let meaning = "a latitude, north positive: with a [turntable], Earth rate must be known";
         return Err(document.missing("site.latitude_deg", meaning));
     }
     let longitude = file.longitude_deg.map_or(0.0, |degrees| degrees.0 * DEGREE);

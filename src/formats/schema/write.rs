@@ -31,7 +31,7 @@ const ANGLES: [&str; 3] = ["outer", "middle", "inner"];
 /// Writes a run into a directory that is there: `run.toml`, `imu.csv.gz`, `table.csv.gz`,
 /// `segments.csv`, `truth.json`.
 ///
-/// [`Run::read`] gives the same run again, but for rounding in the last digit, its name (which is the
+/// [`Run::read`] returns the same run, except for rounding in the last digit, its name (which is the
 /// directory's) and its notes. The same run gives the same bytes. `run.instrument.unit` must be a unit of this
 /// `output`.
 pub fn write_run(
@@ -193,8 +193,8 @@ fn table_rows(file: &mut dyn Write, run: &Run, table: &TableLog) -> io::Result<(
     Ok(())
 }
 
-/// The axes of a table of which errors are stated, as files name them; none where nothing is stated, or they stand
-/// otherwise.
+/// The axes of a table with stated errors, by their letters in files; `None` if no error is stated, or if an axis has
+/// no letter.
 fn axis_letters(run: &Run) -> Option<Vec<&'static str>> {
     let stated = AxisError::ALL
         .iter()
@@ -228,7 +228,7 @@ fn short(value: f64) -> f64 {
     format!("{value:.14e}").parse().unwrap_or(value)
 }
 
-/// A value in a file's unit; none of what is not above zero.
+/// A value in a file's unit; `None` if it is not above zero.
 fn above_zero(value: f64, unit: f64) -> Option<f64> {
     Some(short(value / unit)).filter(|&value| value > 0.0)
 }

@@ -169,7 +169,7 @@ impl Cursor {
         self.row.get(cell.place..).unwrap_or_default()
     }
 
-    /// Reads what is left, so that damage there shows.
+    /// Reads the remaining rows, so that damage in them is found.
     fn finish(&mut self) -> io::Result<()> {
         if self.next < self.rows {
             self.read(self.rows - 1)?;

@@ -59,7 +59,7 @@ impl Input {
         self.length.saturating_sub(self.offset)
     }
 
-    /// Reads so many bytes, all of which must be there; `what` they are.
+    /// Reads `count` bytes, all of which must exist; `what` names them in errors.
     pub fn take(&mut self, count: u64, into: &mut Vec<u8>, what: &str) -> Result<(), Broken> {
         into.clear();
         if count > self.left() {
@@ -97,7 +97,7 @@ impl Input {
         Ok(())
     }
 
-    /// Passes over so many bytes.
+    /// Skips `count` bytes.
     pub fn skip(&mut self, count: u64, what: &str) -> Result<(), Broken> {
         if count > self.left() {
             let found = format!("{} bytes to the end of the file", self.left());
@@ -235,7 +235,7 @@ impl Kind {
         }
     }
 
-    /// The number in the first bytes; none if there are too few.
+    /// The number in the first bytes; `None` if there are too few.
     pub fn number(self, bytes: &[u8], big_endian: bool) -> Option<f64> {
         let bits = self.bits(bytes, big_endian)?;
         Some(match self {
@@ -245,7 +245,7 @@ impl Kind {
         })
     }
 
-    /// The whole number in the first bytes, with all digits; none if it is none.
+    /// The whole number in the first bytes, with all digits; `None` if it is none.
     pub fn whole(self, bytes: &[u8], big_endian: bool) -> Option<i128> {
         let bits = self.bits(bytes, big_endian)?;
         Some(match self {

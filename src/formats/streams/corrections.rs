@@ -179,7 +179,7 @@ fn words(program: &str, sensor: Sensor, done: &Done) -> String {
             of.name
         ),
         None => format!(
-            "{program} corrects its {triad}; by what the log does not say, so its values are taken as they are."
+            "{program} corrects its {triad}; the log does not state the correction, so its values are used unchanged."
         ),
     }
 }

@@ -95,7 +95,7 @@ impl Walk {
     }
 }
 
-/// A dataset as an array; none if it holds no numbers.
+/// A dataset as an array; `None` if it holds no numbers.
 fn array(name: String, dataset: Dataset, file: u64) -> Result<Option<Array>, Broken> {
     let of_it = |error| {
         let Broken { found, .. } = broken(error);

@@ -162,7 +162,7 @@ impl<'a> Element<'a> {
         kind.number(self.bytes.get(at..)?, self.big_endian)
     }
 
-    /// An array of its numbers; none if it has none.
+    /// An array of its numbers; `None` if it has none.
     fn array(&self, name: String, shape: Vec<usize>) -> Result<Option<Array>, Broken> {
         let Some(kind) = self.kind() else {
             return Ok(None);

@@ -1,6 +1,6 @@
 //! Logs as other programs write them: a file gives streams of samples.
 //!
-//! A format is told by the file's first bytes, never by its name. Each is a feature of the crate.
+//! A format is identified by the file's first bytes, never by its name. Each is a feature of the crate.
 
 #[cfg(any(feature = "hdf5", feature = "mat", feature = "npy"))]
 mod arrays;
@@ -77,7 +77,7 @@ pub trait Log {
     /// The streams found up to here.
     fn streams(&self) -> &[Stream];
 
-    /// Goes to the next sample of any stream, and says of which; none at the end of the file.
+    /// Goes to the next sample of any stream, and says of which; `None` at the end of the file.
     fn advance(&mut self) -> Result<Option<usize>, Broken>;
 
     /// The values of the sample, one for each column of its stream; NaN where there is no number.
@@ -185,7 +185,7 @@ const CLOSED: [(&[u8], &str, &str); 2] = [
     ),
 ];
 
-/// Opens a log by its content; none if it is no such log, but perhaps rows of text.
+/// Opens a log by its content; `None` if it is no such log, but perhaps rows of text.
 pub fn open(path: &Path) -> Result<Option<Box<dyn Log>>, FileError> {
     let refused = |error: std::io::Error| {
         FileError::io(

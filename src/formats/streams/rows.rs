@@ -251,7 +251,7 @@ fn no_stream(file: &Path, log: &dyn Log, with_samples: &[usize], name: Option<&s
     let advice = suggestion(
         name.unwrap_or_default(),
         names.iter().copied(),
-        "Name one of them; `turncal init FILE` says what each holds.",
+        "Name one of them; `turncal init FILE` shows the content of each.",
     );
     FileError::new(file, Place::File, found, expected, advice)
 }

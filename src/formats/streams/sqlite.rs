@@ -46,7 +46,7 @@ pub struct Row {
 }
 
 impl Row {
-    /// The value in a column; none of a column that the table lacks.
+    /// The value in a column; [`Value::Null`] if the table lacks it.
     pub fn get(&self, column: &str) -> &Value {
         let place = self.columns.iter().position(|known| known == column);
         let value = place.and_then(|place| self.values.get(place));
@@ -104,7 +104,7 @@ impl Database {
         })
     }
 
-    /// The begin of a table; none if there is none of this name.
+    /// The begin of a table; `None` if there is no table of this name.
     pub fn table(&mut self, name: &str) -> Result<Option<Table>, Broken> {
         let columns = ["type", "name", "tbl_name", "rootpage", "sql"];
         let mut schema = self.begin(1, columns.map(str::to_owned).to_vec())?;
@@ -156,7 +156,7 @@ impl Database {
         })
     }
 
-    /// The next row of a table; none at its end.
+    /// The next row of a table; `None` at its end.
     pub fn next(&mut self, table: &mut Table) -> Result<Option<Row>, Broken> {
         loop {
             let Some((page, at)) = table.pages.last_mut() else {

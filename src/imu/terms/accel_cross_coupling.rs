@@ -1,4 +1,4 @@
-//! Output of an accelerometer with the product of specific force along two axes.
+//! Accelerometer output proportional to the product of specific force along two axes.
 
 use nalgebra::RowVector3;
 

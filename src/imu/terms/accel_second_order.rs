@@ -1,4 +1,4 @@
-//! Output of an accelerometer with the square of specific force along its axis.
+//! Accelerometer output proportional to the square of specific force along its axis.
 
 use super::entry::{PER_AXIS, TermEntry};
 use crate::imu::Sensor;

@@ -1,4 +1,4 @@
-//! Output of an accelerometer with the third power of specific force along its axis.
+//! Accelerometer output proportional to the third power of specific force along its axis.
 
 use super::entry::{PER_AXIS, TermEntry};
 use crate::imu::Sensor;

@@ -1,4 +1,4 @@
-//! Another scale factor for one sign of the input than for the other, of either triad.
+//! Scale-factor asymmetry of either triad: different scale factors for positive and negative input.
 
 use super::entry::{PER_AXIS, TermEntry};
 use crate::imu::Sensor;

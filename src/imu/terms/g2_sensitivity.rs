@@ -1,9 +1,9 @@
-//! Bias of a gyro with the square of specific force along its axis: a suspension or a resonator that yields
-//! under load.
+//! Gyro bias proportional to the square of specific force along its axis, as from a suspension or a resonator that
+//! yields under load.
 //!
 //! Source: IEEE Std 528-2019, acceleration-squared-sensitive drift rate (second power of one component).
-//! Products of two components are not in it. Neither is |f|², which stays the same in every dwell on Earth and
-//! so is part of the bias.
+//! Products of two components are not included. Neither is |f|², which is the same in every dwell on Earth and
+//! therefore part of the bias.
 
 use super::entry::{PER_AXIS, REFERENCE_RATE, TermEntry};
 use crate::imu::Sensor;

@@ -1,4 +1,4 @@
-//! Scale factor of a gyro that changes with the magnitude of its rate: odd in the rate, of second and
+//! Dependence of a gyro's scale factor on the magnitude of its rate: odd in the rate, of second and
 //! third order.
 
 use super::entry::{Columns, REFERENCE_RATE, Sensed, TermEntry};

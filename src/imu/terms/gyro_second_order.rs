@@ -1,4 +1,4 @@
-//! Output of a gyro with the square of its rate: even in the rate, as an asymmetry is.
+//! Gyro output proportional to the square of its rate: even in the rate, like an asymmetry.
 
 use super::asymmetry;
 use super::entry::{PER_AXIS, REFERENCE_RATE, TermEntry};

@@ -1,5 +1,5 @@
-//! Error terms of an instrument, in addition to `K`, `E` and `D`: each changes what a triad takes for
-//! its input, `N = K C (u + t(q)) + D`, by parameters `q` of its own.
+//! Error terms of an instrument, in addition to `K`, `E` and `D`: each adds `t(q)` to the input of a triad,
+//! `N = K C (u + t(q)) + D`, with parameters `q` of its own.
 //!
 //! A term is a [`TermEntry`] in a file of its own and a line of the registry below. Options, files,
 //! simulation, estimation, budget, report and exports read the entry.
@@ -41,10 +41,10 @@ macro_rules! registry {
             /// Every term, in the order of the parameters.
             pub const ALL: [Self; [$(stringify!($term)),*].len()] = [$(Self::$term),*];
 
-            /// Their names, in the same order.
+            /// Names of the terms, in the same order.
             pub const NAMES: [&'static str; Self::ALL.len()] = [$($entry.name),*];
 
-            /// How it is called, and what it does.
+            /// Names, units and effect of the term.
             pub const fn entry(self) -> &'static TermEntry {
                 match self {
                     $(Self::$term => &$entry,)*
@@ -58,15 +58,15 @@ macro_rules! registry {
 registry! {
     /// Accelerometers add `q_i f_i²`; q in s²/m.
     AccelSecondOrder: accel_second_order::ENTRY,
-    /// Accelerometers add `q_i |f_i|`: another scale factor down than up.
+    /// Accelerometers add `q_i |f_i|`: the scale factor differs between positive and negative specific force.
     AccelAsymmetry: asymmetry::ACCEL,
-    /// Accelerometers x and y stand away from z by lever arms in m along body axes.
+    /// Accelerometers x and y are displaced from z by lever arms in m along body axes.
     SizeEffect: size_effect::ENTRY,
-    /// Accelerometer samples are those of a time q later than the gyros', in s.
+    /// Accelerometer samples refer to a time q later than the gyros', in s.
     TimeOffset: time_offset::ENTRY,
     /// Gyros add `Q f`, Q row by row, in rad/s per m/s².
     GSensitivity: g_sensitivity::ENTRY,
-    /// Gyros add `q_i |ω_i|`: another scale factor in one sense of turn than in the other.
+    /// Gyros add `q_i |ω_i|`: the scale factor differs between the two senses of rotation.
     GyroAsymmetry: asymmetry::GYRO,
     /// Gyros add `q_i ω_i² / ω_r`, which is even in the rate; ω_r is [`REFERENCE_RATE`].
     GyroSecondOrder: gyro_second_order::ENTRY,
@@ -95,23 +95,23 @@ const FIRST: [usize; Term::ALL.len() + 1] = {
 pub const TERM_PARAMETERS: usize = FIRST[Term::ALL.len()];
 /// The parameters of all terms, in the order of [`Term::ALL`]; zero where a term is off.
 pub type TermVector = SVector<f64, TERM_PARAMETERS>;
-/// What each parameter adds to the input of a triad.
+/// Effect of each parameter on the input of a triad.
 pub type TermResponse = SMatrix<f64, 3, TERM_PARAMETERS>;
 
 impl Term {
-    /// The name that files and commands use.
+    /// Name in files and commands.
     pub fn name(self) -> &'static str {
         self.entry().name
     }
 
-    /// Those of a triad.
+    /// The terms of a triad.
     fn of_sensor(sensor: Sensor) -> impl Iterator<Item = Self> {
         let all = Self::ALL.into_iter();
         all.filter(move |term| term.entry().sensor == sensor)
     }
 
-    /// 1σ of each of its parameters where nothing better is known, in SI: ten times what precise
-    /// instruments have.
+    /// Default 1σ of each of its parameters, in SI: ten times the value of precise
+    /// instruments.
     pub fn usual_sigma(self) -> f64 {
         let entry = self.entry();
         entry.usual_sigma * entry.unit.1
@@ -143,7 +143,7 @@ impl Term {
 }
 
 impl Sensed {
-    /// `t(q)`: what terms with these parameters add to the input of a triad, rad/s or m/s².
+    /// `t(q)`: addition of the terms with these parameters to the input of a triad, rad/s or m/s².
     pub fn added(&self, sensor: Sensor, q: &TermVector) -> Vector3<f64> {
         let mut linear = self.response(sensor, q);
         let mut others = Vector3::zeros();
@@ -156,8 +156,7 @@ impl Sensed {
         linear * q + others
     }
 
-    /// `∂t/∂q` of one triad, in rad/s or m/s² by the unit of each parameter, where the parameters are
-    /// these.
+    /// `∂t/∂q` of one triad at these parameters, in rad/s or m/s² per unit of each parameter.
     pub fn response(&self, sensor: Sensor, q: &TermVector) -> TermResponse {
         let mut response = TermResponse::zeros();
         for term in Term::of_sensor(sensor) {

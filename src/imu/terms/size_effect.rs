@@ -1,5 +1,5 @@
-//! Accelerometers that stand apart: x and y stand away from z by lever arms r_x and r_y and sense row i of
-//! `([ω̇×] + [ω×]²) r_i` besides. One lever arm common to all three cannot be told from rest.
+//! Size effect: accelerometers x and y are displaced from z by lever arms r_x and r_y and also sense row i of
+//! `([ω̇×] + [ω×]²) r_i`. A lever arm common to all three is not observable from dwells.
 
 use super::entry::{Columns, REFERENCE_RATE, Sensed, TermEntry, set_rows};
 use crate::imu::Sensor;

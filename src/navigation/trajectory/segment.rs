@@ -1,8 +1,8 @@
-//! What a trajectory is stated by: a start and segments.
+//! Definition of a trajectory: a start and segments.
 
 use serde::{Deserialize, Serialize};
 
-/// Where a trajectory starts.
+/// Start of a trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Start {
     /// Geodetic latitude in radians, north positive.
@@ -17,23 +17,23 @@ pub struct Start {
     pub speed: f64,
 }
 
-/// Moves that begin together. The segment ends with the last of them.
+/// Changes that start together. The segment ends with the last of them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Segment {
-    /// The least time that it takes, s.
+    /// Least duration, s.
     pub duration: f64,
     /// Turn by this angle, rad, clockwise positive.
     pub turn: Change,
-    /// Change to this horizontal speed, m/s; none keeps it.
+    /// Change to this horizontal speed, m/s; `None` keeps it.
     pub speed: Option<Change>,
-    /// Change to this height above the ellipsoid, m; none keeps it.
+    /// Change to this height above the ellipsoid, m; `None` keeps it.
     pub height: Option<Change>,
 }
 
-/// A change of a quantity, and how fast it may be.
+/// A change of a quantity, with its limits.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Change {
-    /// By or to what.
+    /// The change, or the new value.
     pub amount: f64,
     /// Rate that the change reaches, per s.
     pub rate: f64,

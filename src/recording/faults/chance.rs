@@ -1,21 +1,21 @@
-//! How improbable a flawless record must make samples before they are called a fault.
+//! Significance limits for faults: how improbable samples must be in a faultless record.
 
 use statrs::distribution::{ContinuousCDF, Normal};
 
-/// Sound records of which one is said to have a fault of a kind.
+/// Number of faultless records per false alarm of one kind of fault.
 const RECORDS: f64 = 1e4;
 
-/// The limit of one kind of fault in a record: Bonferroni over all samples of its six axes.
+/// The limit of one kind of fault in a record, with Bonferroni's correction over all samples of its six axes.
 #[derive(Debug, Clone, Copy)]
 pub struct Limit {
-    /// −ln of the probability that a sound sample goes beyond it.
+    /// −ln of the probability that a faultless sample exceeds the limit.
     pub nats: f64,
-    /// The same in σ of a normal distribution, either sign.
+    /// The same in σ of a normal distribution, two-sided.
     pub sigmas: f64,
 }
 
 impl Limit {
-    /// Of a record with this number of rows.
+    /// The limit for a record with this number of rows.
     pub fn of_rows(rows: usize) -> Self {
         let probability = (6.0 * rows.max(1) as f64 * RECORDS).recip();
         Self {
@@ -24,19 +24,19 @@ impl Limit {
         }
     }
 
-    /// The limit in σ where σ is itself an estimate of few degrees of freedom, by Wallace's
+    /// The limit in σ if σ is itself an estimate with few degrees of freedom, by Wallace's
     /// approximation of Student's distribution.
     pub fn of_student(&self, freedom: f64) -> f64 {
         let exponent = self.sigmas.powi(2) * (freedom - 1.5).max(0.0) / (freedom - 1.0).powi(2);
         (freedom * exponent.exp_m1()).sqrt()
     }
 
-    /// The quantile that one in a thousand of these values exceeds, and the limit of a statistic whose tail
-    /// they show, in the σ that it has if it is normal.
+    /// The quantile that one in a thousand of these values exceeds, and the limit of a statistic with the tail of
+    /// these values, in σ of the normal distribution.
     ///
-    /// Two quantiles of the values themselves are carried on to the limit by a power of the normal
-    /// distribution's own quantiles, so that the tail may be heavier than normal, never lighter. A few
-    /// faults among the values do not move them. `values` lose their order.
+    /// Two quantiles of the values are extrapolated to the limit by a power of the normal quantiles, so that the tail
+    /// may be heavier than normal, never lighter. A few faults among the values do not affect these quantiles.
+    /// `values` lose their order.
     pub fn of_tail(&self, values: &mut [f64]) -> (f64, f64) {
         let rows = values.len();
         let [inner, outer] = TAIL.map(|part| {
@@ -56,12 +56,12 @@ impl Limit {
     }
 }
 
-/// Parts of a record's samples that lie beyond the quantiles from which its tail is carried on.
+/// Fractions of samples beyond the two quantiles from which the tail is extrapolated.
 const TAIL: [f64; 2] = [5e-2, 5e-3];
-/// What few values of a flawless record exceed.
+/// Fraction of the values of a faultless record beyond the first returned quantile.
 const FEW: f64 = 1e-3;
 
-/// σ beyond which a normal variate lies with this probability, either sign.
+/// σ beyond which a normal variate lies with this probability, two-sided.
 fn quantile(probability: f64) -> f64 {
     -Normal::standard().inverse_cdf(0.5 * probability)
 }

@@ -1,4 +1,4 @@
-//! Values that no instrument at rest or on a turntable gives: remains of a failed transfer or of a counter
+//! Values that no instrument at rest or on a turntable can give, as from a failed transfer or a counter
 //! below zero.
 
 use std::ops::Range;
@@ -9,20 +9,20 @@ use crate::units::STANDARD_GRAVITY;
 
 /// Beyond the range of any gyro, rad/s (57,000 °/s).
 const FASTEST: f64 = 1000.0;
-/// Beyond the specific force of anything that turns on a table, m/s² (1,000 g).
+/// Beyond the specific force of any instrument on a table, m/s² (1,000 g).
 const LARGEST_FORCE: f64 = 1e4;
 
 /// Rows whose values are impossible.
 #[derive(Default)]
 pub struct Impossible {
-    /// By nominal scales beyond what any instrument measures, by column.
+    /// Rows beyond the range of any instrument by nominal scales, for each column.
     pub beyond: [Vec<Range<usize>>; 6],
-    /// Zero in all columns, though gravity does not fit between zero and the next value.
+    /// Rows of zeros in all columns, although gravity exceeds the smallest step.
     pub zero: Vec<Range<usize>>,
 }
 
 impl Impossible {
-    /// Nothing where it is most of a column: then units are wrong, not rows.
+    /// Finds impossible rows; none in a column of which most rows are impossible, because then its unit is wrong.
     pub fn find(rows: &Rows) -> Self {
         let count = rows.columns[0].len();
         let few =
@@ -59,12 +59,12 @@ impl Impossible {
         self.zero.is_empty() && self.beyond.iter().all(Vec::is_empty)
     }
 
-    /// All rows of a column that are impossible.
+    /// All impossible rows of a column.
     pub fn of_column(&self, column: usize) -> impl Iterator<Item = &Range<usize>> {
         self.beyond[column].iter().chain(&self.zero)
     }
 
-    /// Columns in which the value before stands in place of each that is impossible.
+    /// Columns in which each impossible value is replaced by the value before it.
     pub fn without(&self, columns: &[Vec<f64>; 6]) -> [Vec<f64>; 6] {
         let mut without = columns.clone();
         for (k, column) in without.iter_mut().enumerate() {

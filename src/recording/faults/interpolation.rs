@@ -1,4 +1,4 @@
-//! Holes in an axis filled from both sides, with an error measured where there is no hole.
+//! Interpolation of holes in an axis from both sides, with an error measured on intact stretches.
 
 mod fill;
 
@@ -7,10 +7,10 @@ use std::ops::Range;
 
 use fill::Fill;
 
-/// Samples taken from either side at most.
+/// Most samples used from either side.
 const MOST: usize = 64;
-/// Polynomials tried: degree, and samples taken from either side. Each next one must agree with the
-/// best so far at the hole itself, for the stretches that judge it are farther away.
+/// Polynomials tried: degree, and samples used from either side. Each next one must agree with the
+/// best so far at the hole itself, because the stretches on which it is tested are farther away.
 const CANDIDATES: [(usize, usize); 12] = [
     (1, 1),
     (1, 2),
@@ -25,27 +25,28 @@ const CANDIDATES: [(usize, usize); 12] = [
     (3, 32),
     (1, MOST),
 ];
-/// The same for a hole at the begin or end of the record.
+/// The same for a hole at the start or end of the record.
 const ONE_SIDED: [(usize, usize); 4] = [(0, 1), (0, 4), (0, 16), (0, MOST)];
-/// A hole and its neighbours lie within this many times what they span without other holes.
+/// A hole and its neighbours may span this many times their own length, other holes included.
 const REACH: usize = 4;
 /// σ within which two ways to fill a hole agree.
 const AGREE: f64 = 3.0;
 
-/// The ways to fill samples that are not sound, whatever axis they are of.
+/// The interpolations available for a range of faulty samples, on any axis.
 pub struct Hole<'a> {
     sound: &'a [bool],
     samples: Range<usize>,
     /// The nearest sound samples before and after, outwards.
     sides: [Vec<usize>; 2],
     candidates: &'static [(usize, usize)],
-    /// The first of the candidates that is possible, and the straight one through most samples.
+    /// The first possible candidate, and the straight line through most samples.
     extremes: OnceCell<Option<[Fill; 2]>>,
     fills: OnceCell<Vec<Fill>>,
 }
 
 impl<'a> Hole<'a> {
-    /// These samples, `sound` telling it of all; a hole longer than `longest` is not to be vouched for.
+    /// A hole of these samples; `sound` flags the usable samples of the record. No error is stated for a hole longer
+    /// than `longest`.
     pub fn new(sound: &'a [bool], samples: Range<usize>, longest: usize) -> Self {
         let sides = [
             neighbours(sound, (0..samples.start).rev(), samples.len()),
@@ -69,12 +70,12 @@ impl<'a> Hole<'a> {
         }
     }
 
-    /// Fills them on an axis. Gives the mean square of the error of their sum; none if it cannot be told.
+    /// Fills the hole on an axis. Returns the mean square error of the sum over the hole; `None` if it is unknown.
     ///
-    /// `rounding` is the mean square of what whole steps alone can make of that error. A choice among fills by
-    /// errors that small goes with the very steps next to the hole: of pulses that are mostly zero the fill
-    /// that meets none seems to be without error, and is wrong by whole pulses, on average too. The widest is
-    /// then taken whatever the values are: it is linear in them, and so right on average.
+    /// `rounding` is the mean square of this error that rounding to whole steps can cause. If errors are that small,
+    /// selecting the best fill depends on the individual steps next to the hole: among pulses that are mostly zero, a
+    /// fill that meets no pulse seems free of error, but is biased by whole pulses. The widest fill is then used
+    /// regardless of the values: it is linear in them, and therefore unbiased.
     pub fn fill(&self, axis: &mut [f64], rounding: f64) -> Option<f64> {
         let best = self.within(axis, rounding).or_else(|| self.best(axis));
         if let Some(best) = best {
@@ -93,7 +94,7 @@ impl<'a> Hole<'a> {
         None
     }
 
-    /// The widest fill if its error is no more than rounding can make.
+    /// The widest fill, if its error is within that of rounding.
     fn within(&self, axis: &[f64], rounding: f64) -> Option<Trial<'_>> {
         if rounding <= 0.0 {
             return None;
@@ -113,7 +114,7 @@ impl<'a> Hole<'a> {
         })
     }
 
-    /// The fill that has the least error where there is no hole.
+    /// The fill with the least error on intact stretches.
     fn best(&self, axis: &[f64]) -> Option<Trial<'_>> {
         let mut best: Option<Trial> = None;
         for fill in self.fills.get_or_init(|| self.all()) {
@@ -181,13 +182,13 @@ fn neighbours(sound: &[bool], outwards: impl Iterator<Item = usize>, hole: usize
         .collect()
 }
 
-/// A way to fill a hole that has been tried.
+/// A tested way to fill a hole.
 struct Trial<'a> {
     fill: &'a Fill,
     sum: f64,
-    /// Mean square of the error, by one half of the intact stretches.
+    /// Mean square error on one half of the intact stretches.
     first_half: f64,
-    /// The same as it is stated.
+    /// The variance to be stated.
     variance: f64,
 }
 

@@ -1,4 +1,4 @@
-//! What is wrong with a log's rows, and what was done about it.
+//! Faults in the rows of a log, and their repair.
 
 mod chance;
 mod impossible;
@@ -22,38 +22,38 @@ pub use repair::{Repaired, Rows};
 pub use slower::Slower;
 use spikes::spikes;
 
-/// Samples of a record that are not what the instrument sensed.
+/// Samples of a record that do not show the instrument's input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fault {
-    /// What is wrong.
+    /// The kind of fault.
     pub kind: FaultKind,
-    /// Triad and body axis (right, front, up); none if whole rows are concerned.
+    /// Triad and body axis (right, front, up); `None` if whole rows are affected.
     pub axis: Option<(Sensor, usize)>,
-    /// The samples; for a duplicate the one that the file has twice.
+    /// The samples; for a duplicate, the sample that occurs twice in the file.
     pub samples: Range<usize>,
-    /// Line of the file: of the first sample, of the second of two equal rows, or of the last row
+    /// Line in the file: of the first sample, of the second of two equal rows, or of the last row
     /// before missing ones.
     pub line: u64,
-    /// Whether the samples can be used: filled in with an error that [`Bridge`] knows, or dropped.
+    /// Whether the samples are repaired: interpolated with the error in a [`Bridge`], or dropped.
     pub bridged: bool,
 }
 
-/// What can be wrong with samples.
+/// The kinds of fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum FaultKind {
-    /// The file lacks the rows.
+    /// Rows that are missing from the file.
     Missing,
-    /// The row before again, stamp and all.
+    /// A copy of the row before, time stamp included.
     Duplicate,
-    /// At the end of the axis' range, so that the truth may be beyond.
+    /// Values at the end of the axis' range; the true value may lie beyond.
     Saturated,
-    /// The same value again and again, while the axis' noise or motion continues.
+    /// A repeated value, although the axis' noise or motion continues.
     Stuck,
-    /// A single sample to which neither what is before nor what is after leads.
+    /// A single sample that fits neither the samples before nor those after it.
     Spike,
-    /// All values of the row are zero, though gravity is not.
+    /// A row of zeros, although gravity is not zero.
     Zero,
-    /// Beyond what any instrument measures.
+    /// Values beyond the range of any instrument.
     Beyond,
 }
 
@@ -69,7 +69,7 @@ impl FaultKind {
         Self::Beyond,
     ];
 
-    /// In a word.
+    /// Name of the kind.
     pub fn name(self) -> &'static str {
         match self {
             Self::Missing => "missing",
@@ -83,7 +83,7 @@ impl FaultKind {
     }
 }
 
-/// Samples that were interpolated on some axes.
+/// Interpolated samples on some axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bridge {
     /// The samples.
@@ -96,7 +96,7 @@ pub struct Bridge {
 }
 
 impl Bridge {
-    /// Of no axis yet.
+    /// A bridge over these samples, without an axis yet.
     pub fn new(samples: Range<usize>) -> Self {
         Self {
             samples,
@@ -105,14 +105,14 @@ impl Bridge {
         }
     }
 
-    /// The same of one axis more, with its variance.
+    /// Adds an axis with its variance.
     pub fn with(mut self, sensor: Sensor, axis: usize, variance: f64) -> Self {
         self.variance.get_mut(sensor)[axis] = variance;
         self.axes.get_mut(sensor)[axis] = true;
         self
     }
 
-    /// Puts those of the same axes together, in order of time.
+    /// Sorts by axes, then by time.
     pub(crate) fn sort(bridges: &mut [Self]) {
         let axes = |bridge: &Self| (bridge.axes.gyro, bridge.axes.accel);
         bridges.sort_unstable_by_key(|bridge| (axes(bridge), bridge.samples.start));
@@ -129,7 +129,7 @@ impl Bridge {
 }
 
 impl ImuSamples {
-    /// The bridges that these samples touch, each with the part of it that they are.
+    /// The bridges that overlap these samples, each with the overlapping fraction of the bridge.
     pub fn bridged(&self, samples: &Range<usize>) -> impl Iterator<Item = (&Bridge, f64)> {
         let mut rest = self.bridges.as_slice();
         let touched = std::iter::from_fn(move || {
@@ -149,7 +149,7 @@ impl ImuSamples {
     }
 }
 
-/// Rows of one column that are not what the instrument sensed.
+/// Faulty rows of one column.
 struct Found {
     kind: FaultKind,
     column: usize,
@@ -204,8 +204,8 @@ fn find(
     found.into_iter().flatten().collect()
 }
 
-/// What a column of numbers with a fixed count of digits resolves at its largest values, by the smallest change
-/// relative to the value: a last digit is up to ten times that.
+/// Resolution, at its largest values, of a column of numbers with a fixed number of digits. It follows from the
+/// smallest change relative to the value; a last digit is up to ten times that.
 fn last_digit(values: &[f64]) -> f64 {
     let changes = values.windows(2).filter(|pair| pair[0] != pair[1]);
     let relative = changes.map(|pair| (pair[1] - pair[0]).abs() / pair[0].abs().max(pair[1].abs()));
@@ -234,7 +234,7 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Runs of rows or samples that are so.
+/// Runs of rows or samples for which `is` is true.
 pub fn ranges(count: usize, is: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     let mut ranges: Vec<Range<usize>> = Vec::new();
     for row in (0..count).filter(|&row| is(row)) {

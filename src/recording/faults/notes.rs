@@ -3,7 +3,7 @@
 use super::{Fault, FaultKind, Slower};
 use crate::recording::ImuSamples;
 
-/// A sentence for each part of a lower rate and for each kind of fault that a record has beside.
+/// A sentence for each part of a lower rate, and for each kind of fault outside such parts.
 pub fn notes(imu: &ImuSamples) -> Vec<String> {
     let slower = imu.slower();
     let is_beside = |fault: &&Fault| !slower.iter().any(|part| part.holds(fault));
@@ -24,7 +24,7 @@ pub fn notes(imu: &ImuSamples) -> Vec<String> {
             "bridged by interpolation, whose error is in the σ.".to_owned()
         } else {
             format!(
-                "too long to be bridged at {unbridged} of {} places, where attitude and velocity start anew.",
+                "too long to be bridged at {unbridged} of {} places, where attitude and velocity restart.",
                 faults.len()
             )
         };
@@ -46,7 +46,7 @@ pub fn notes(imu: &ImuSamples) -> Vec<String> {
 }
 
 impl ImuSamples {
-    /// How rows come in a part of a lower rate, and what becomes of it.
+    /// A sentence on a part of a lower rate: its rate, and how it is handled.
     fn of_rate(&self, part: &Slower) -> String {
         let [from, to] = [part.samples.start, part.samples.end].map(|k| self.time(k));
         let [usual, step] = [1, part.step].map(|samples| 1e3 * self.period * samples as f64);
@@ -55,7 +55,7 @@ impl ImuSamples {
                 "the samples between are interpolated, with the error of that in the σ.".to_owned()
             }
             unbridged => format!(
-                "the samples between are interpolated, but at {unbridged} of {} places attitude and velocity start anew, \
+                "the samples between are interpolated, but at {unbridged} of {} places attitude and velocity restart, \
                  and dwells and moves are lost. Split the log where its rate changes, and calibrate its parts together \
                  as a campaign.",
                 part.places
@@ -67,7 +67,7 @@ impl ImuSamples {
         )
     }
 
-    /// So many rows or samples, the columns of the latter, and what is wrong with them.
+    /// The number of rows or samples, the columns of samples, and their fault.
     fn what<'a>(
         &self,
         kind: FaultKind,

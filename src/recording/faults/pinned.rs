@@ -1,8 +1,8 @@
-//! Axes pinned to a value while the instrument lives: stuck within their range, or held at an end of it.
+//! Axes pinned to a value while the instrument works: stuck within their range, or clipped at its end.
 //!
-//! An axis that is alive repeats a value as long as its noise and its motion stay within a step of its grid. Equal
-//! values in a row are a fault where that is improbable: by the noise that the axis has at rest, by the level on either
-//! side, by the motion that crosses them, and at an end of the range by the motion on either side.
+//! A working axis repeats a value as long as its noise and its motion stay within a step of its grid. A run of equal
+//! values is a fault if it is improbable given the noise of the axis at rest, the level on either side, the motion that
+//! crosses the run or, at an end of the range, the motion on either side.
 
 mod ends;
 
@@ -21,9 +21,9 @@ pub use ends::saturated;
 const BLOCK: usize = 64;
 /// Part of the blocks that may be quieter than noise at rest: axes stuck for long.
 const STUCK_PART: f64 = 0.1;
-/// Rows whose sum is hardly rounded.
+/// Number of rows whose sum is nearly free of rounding.
 const SUM: usize = 4;
-/// Rows next to a run.
+/// Number of rows next to a run whose mean is taken.
 const NEXT: usize = 4 * SUM;
 /// Parts of the record in which repeats of repeats are counted.
 const PARTS: usize = 32;
@@ -32,20 +32,20 @@ const CLOSE: usize = 16;
 /// Median magnitude of second differences of white noise over its σ: √6 times that of a normal variate.
 const OF_SECOND_DIFFERENCES: f64 = 2.449_489_742_783_178 * 0.674_489_750_196_081_7;
 
-/// A column and what it is judged by.
+/// A column with the statistics by which it is judged.
 pub struct Axis<'a> {
     values: &'a [f64],
     facts: &'a ColumnFacts,
-    /// What values differ by at least; zero if they are all the same.
+    /// Smallest difference of values; zero if they are all equal.
     step: f64,
     /// Whether values are whole pulses, the remainder being carried into the next.
     pulses: bool,
-    /// Stretches of rows each equal to the one before.
+    /// Runs of rows equal to the row before them.
     runs: Vec<Range<usize>>,
-    /// Variance of the noise at rest where the axis is not at an extreme, steps²: an axis that is clipped over whole
-    /// dwells has none there.
+    /// Variance of the noise at rest, steps², from rows that are not at an extreme: an axis clipped over a whole dwell
+    /// shows no noise there.
     noise: f64,
-    /// Of all repeats those that are repeated: noise that is correlated.
+    /// Fraction of repeats that are repeated again, which shows correlated noise.
     repeated: f64,
 }
 
@@ -76,8 +76,8 @@ impl<'a> Axis<'a> {
         }
     }
 
-    /// The rows that repeat the one before them so long that an axis alive would not, the first of
-    /// equal values left out.
+    /// Rows that repeat the row before them for longer than a working axis does, without the first of the
+    /// equal values.
     pub fn stuck(&self, limit: Limit) -> Vec<Range<usize>> {
         if self.step <= 0.0 {
             return Vec::new();
@@ -94,9 +94,9 @@ impl<'a> Axis<'a> {
     /// −ln of the largest probability that a sample repeats the one before, wherever the true value lies, with white
     /// noise of this variance, steps².
     ///
-    /// By the noise at rest a value stays within its step most probably if the truth is in the middle
-    /// of it (Anderson's inequality). Noise that is correlated stays longer; it shows in how often
-    /// repeats are repeated.
+    /// With the noise at rest, a value is most likely to stay within its step if the true value is in the
+    /// middle of it (Anderson's inequality). Correlated noise stays longer, which shows in the fraction of
+    /// repeated repeats.
     fn nats(&self, variance: f64) -> f64 {
         let white = repeats_at_best(variance);
         // Pulses count an angle that walks: it stays between two edges of a step with the largest
@@ -110,8 +110,8 @@ impl<'a> Axis<'a> {
         by_noise.max(self.repeated).recip().ln()
     }
 
-    /// Variance of white noise that the axis always has, steps², not more than it is: what the grid can
-    /// make of a slow motion without noise is taken off.
+    /// Lower bound for the variance of the axis' white noise, steps²: the variance that the grid can cause in a
+    /// slow motion without noise is subtracted.
     fn noise_at_rest(&self, values: &[f64]) -> f64 {
         let origin = self.values[0];
         let of_block = |block: &[f64]| {
@@ -132,8 +132,8 @@ impl<'a> Axis<'a> {
         variance.max(0.0)
     }
 
-    /// Variance of white noise whose second differences were as large as those of most of these rows, steps²: a few
-    /// are where a motion begins or ends.
+    /// Variance of white noise with the median second difference of these rows, steps²: the median ignores the few rows
+    /// where a motion starts or ends.
     fn unrest(&self, rows: Range<usize>) -> f64 {
         let second = |three: &[f64]| (three[0] - 2.0 * three[1] + three[2]).abs();
         let mut sizes: Vec<f64> = self.values[rows].windows(3).map(second).collect();
@@ -143,7 +143,7 @@ impl<'a> Axis<'a> {
         }
     }
 
-    /// The same of the quieter side of these rows, for the other may be where a motion begins or ends; zero at the begin
+    /// The same for the quieter side of these rows, because a motion may start or end on the other; zero at the start
     /// and the end of the record.
     fn unrest_beside(&self, rows: &Range<usize>) -> f64 {
         let Some(before) = rows.start.checked_sub(CLOSE) else {
@@ -156,15 +156,15 @@ impl<'a> Axis<'a> {
         before.min(self.unrest(rows.end..rows.end + CLOSE))
     }
 
-    /// Variance that rounding adds to noise, steps².
+    /// Variance of rounding, steps².
     fn of_grid(&self) -> f64 {
         if self.pulses { 1.0 / 6.0 } else { 1.0 / 12.0 }
     }
 
-    /// Whether both sides of a run stay on a level on which that many equal values are improbable.
+    /// Whether both sides of a run stay on a level at which that many equal values are improbable.
     ///
-    /// The rate within may be off from that beside as much as that beside changes in the same time: one
-    /// that only touches the value, `a t²` off, is off by 0.6 of that.
+    /// The rate within the run may differ from the rate next to it by as much as the latter changes in the same time. A
+    /// parabola `a t²` that only touches the value differs by 0.6 of that.
     fn leaves_its_level(&self, run: &Range<usize>, limit: Limit) -> bool {
         let least = 8 * SUM;
         let most = (run.len() / 2).max(least);
@@ -174,7 +174,7 @@ impl<'a> Axis<'a> {
         halves.any(|half| self.is_off_level(run, half, limit) == Some(true))
     }
 
-    /// The same with two halves of this many rows on either side.
+    /// The same, with two halves of this many rows on either side.
     fn is_off_level(&self, run: &Range<usize>, half: usize, limit: Limit) -> Option<bool> {
         let first = run.start - 1;
         let before = &self.values[first.checked_sub(2 * half)?..first];
@@ -234,8 +234,8 @@ impl<'a> Axis<'a> {
         points.any(|points| self.is_crossed(run, points, limit) == Some(true))
     }
 
-    /// To which side of a run's value the rows before and those after lead, each by themselves: few of an axis alive do
-    /// lead away, and a line costs least.
+    /// The side of the run's value to which lines through the rows before and through those after extrapolate, if they
+    /// agree. This inexpensive test excludes most runs of a working axis.
     fn led_past(&self, run: &Range<usize>, points: usize, limit: Limit) -> Option<f64> {
         let (count, length) = (points as f64, run.len() as f64);
         let apart = 0.5 * (count + length);
@@ -254,8 +254,7 @@ impl<'a> Axis<'a> {
         lost(before, 1.0).filter(|side| lost(after, -1.0) == Some(*side))
     }
 
-    /// Whether a cubic through both sides of a run is likelier than two parabolas that stop at its value and start from
-    /// it.
+    /// Whether a cubic through both sides of a run is more likely than two parabolas that end and start at its value.
     fn is_crossed(&self, run: &Range<usize>, points: usize, limit: Limit) -> Option<bool> {
         let side = self.led_past(run, points, limit)?;
         let before = run.start.checked_sub(points)?..run.start;
@@ -293,7 +292,7 @@ impl<'a> Axis<'a> {
     }
 }
 
-/// Whether more steps are lost than rounding and an error of this variance allow.
+/// Whether the lost steps exceed rounding and an error of this variance.
 fn is_lost(lost: f64, variance: f64, limit: Limit) -> bool {
     lost > 2.0 + limit.sigmas * variance.sqrt()
 }
@@ -318,8 +317,8 @@ fn repeats_at_best(variance: f64) -> f64 {
     erf((8.0 * variance).sqrt().recip())
 }
 
-/// Of all repeats those that are repeated, in the parts of the record where most are; the longest run
-/// of each part is left out, for the axis may be stuck there.
+/// Fraction of repeats that are repeated again, in the parts of the record with most of them; the longest run
+/// of each part is excluded, because the axis may be stuck there.
 fn repeats_of_repeats(values: &[f64]) -> f64 {
     let part = values.len().div_ceil(PARTS).max(BLOCK);
     let of_part = |values: &[f64]| {
@@ -337,7 +336,7 @@ fn repeats_of_repeats(values: &[f64]) -> f64 {
     *parts.select_nth_unstable_by(rank, f64::total_cmp).1
 }
 
-/// Factors of the terms by least squares and the sum of squares left over.
+/// Coefficients of the terms by least squares, and the residual sum of squares.
 fn fit<const N: usize>(
     rows: impl Iterator<Item = usize> + Clone,
     terms: impl Fn(usize) -> SVector<f64, N>,
@@ -362,7 +361,7 @@ fn line(values: &[f64]) -> (f64, f64, f64) {
     (mean, slope, squares / values.len() as f64)
 }
 
-/// About their own mean.
+/// Variance about the mean.
 fn variance(values: &[f64]) -> f64 {
     let mean = mean(values);
     let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();

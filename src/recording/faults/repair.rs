@@ -9,11 +9,12 @@ use crate::imu::Sensor;
 use crate::recording::ColumnFacts;
 use crate::units::DEGREE;
 
-/// A whole move, from rest to rest, may hide in a longer hole, and nothing at its edges would tell of it, s.
+/// Longest hole that is bridged, s: a longer one may hide a whole move from dwell to dwell, without any sign at its
+/// edges.
 const LONGEST: f64 = 0.5;
-/// A hole is short against one that is this many times as long.
+/// A hole is short compared with one this many times as long.
 const SHORT: usize = 8;
-/// An attitude that may be wrong by more is beyond a linear filter, rad.
+/// Largest attitude error that a linear filter can handle, rad.
 const WORST_ANGLE: f64 = 0.2 * DEGREE;
 
 /// The rows of a file without duplicates. Columns are gyro x, y, z and accelerometer x, y, z of the
@@ -21,25 +22,25 @@ const WORST_ANGLE: f64 = 0.2 * DEGREE;
 pub struct Rows<'a> {
     pub columns: [Vec<f64>; 6],
     pub facts: &'a [ColumnFacts; 6],
-    /// In the file's quantity.
+    /// Full scale of each column, in the file's quantity.
     pub full_scale: [Option<f64>; 6],
     /// Whether rows are whole pulses, the remainder being carried into the next.
     pub pulses: bool,
     /// The body axis of each column.
     pub body_axes: [usize; 6],
-    /// Rad and m/s for one of the file's quantity.
+    /// One unit of the file's quantity in rad or m/s.
     pub units: [f64; 6],
     /// Line of each row.
     pub lines: Vec<u64>,
     /// Sample of each row, increasing from zero.
     pub numbers: Vec<usize>,
-    /// s
+    /// Sample period, s.
     pub period: f64,
     /// Rows before each duplicate, and its line.
     pub duplicates: Vec<(usize, u64)>,
 }
 
-/// The samples, and what was done to have them all.
+/// The complete samples, with faults and bridges.
 pub struct Repaired {
     /// As in [`Rows`], a value for each sample.
     pub columns: [Vec<f64>; 6],
@@ -54,7 +55,7 @@ impl Repaired {
         faults.chain(self.bridges.iter_mut().map(|bridge| &mut bridge.samples))
     }
 
-    /// Whether no fault has this sample.
+    /// Whether this sample is free of faults.
     pub fn is_sound(&self, sample: usize) -> bool {
         let concerns =
             |fault: &Fault| fault.kind != FaultKind::Duplicate && fault.samples.contains(&sample);
@@ -110,7 +111,7 @@ impl Rows<'_> {
         faults
     }
 
-    /// Bridges the holes that columns share, short ones first; what cannot be bridged stays a fault that is not.
+    /// Bridges the holes that columns share, short ones first; the remaining faults are marked as not bridged.
     fn fill(
         &self,
         Holes { of, mut sound }: Holes,
@@ -158,14 +159,14 @@ impl Rows<'_> {
         bridges
     }
 
-    /// Variance of the rounding of a sum of samples. It stays within a step: of the sum where the remainder
-    /// is carried, else of each sample.
+    /// Variance of the rounding of a sum of samples: within one step for the whole sum if the remainder is carried,
+    /// else within one step for each sample.
     fn rounding(&self, column: usize, samples: usize) -> f64 {
         let step = self.facts[column].step.unwrap_or(0.0);
         step * step * if self.pulses { 1.0 } else { samples as f64 }
     }
 
-    /// The faults of columns: what is impossible, and what the other values show.
+    /// The faults of columns: impossible values, and faults that the other values reveal.
     fn find_beside(&self, impossible: &Impossible) -> Vec<Found> {
         if impossible.is_empty() {
             return find(&self.columns, self.facts, &self.full_scale, self.pulses);
@@ -193,7 +194,7 @@ impl Rows<'_> {
         found
     }
 
-    /// The samples of rows that follow one another.
+    /// The samples of consecutive rows.
     fn samples(&self, rows: &Range<usize>) -> Range<usize> {
         self.numbers[rows.start]..self.numbers[rows.end - 1] + 1
     }
@@ -214,13 +215,13 @@ impl Rows<'_> {
 }
 
 impl Fault {
-    /// Kind, axis and time.
+    /// Sort key: kind, axis and time.
     pub fn order(&self) -> (usize, Option<(usize, usize)>, usize) {
         let axis = self.axis.map(|(sensor, axis)| (sensor as usize, axis));
         (self.kind as usize, axis, self.samples.start)
     }
 
-    /// Whether it leaves samples of an axis unknown.
+    /// Whether the fault affects samples of this axis.
     fn concerns(&self, sensor: Sensor, axis: usize) -> bool {
         self.kind != FaultKind::Duplicate && self.axis.is_none_or(|of| of == (sensor, axis))
     }
@@ -229,11 +230,11 @@ impl Fault {
 /// Columns with the same holes.
 struct Holes {
     of: Vec<usize>,
-    /// Which samples are what the instrument sensed.
+    /// Whether each sample is usable.
     sound: Vec<bool>,
 }
 
-/// Columns with holes, those with the same ones together: rows that are missing lack all of them.
+/// Groups columns with the same holes: missing rows affect all columns.
 fn holes_of_columns(faults: &[Fault], body_axes: &[usize; 6], samples: usize) -> Vec<Holes> {
     let mut all: Vec<Holes> = Vec::new();
     for (k, &axis) in body_axes.iter().enumerate() {
@@ -253,7 +254,7 @@ fn holes_of_columns(faults: &[Fault], body_axes: &[usize; 6], samples: usize) ->
     all
 }
 
-/// Values of rows at their samples; between them anything.
+/// Places the values of rows at their samples; values in between are arbitrary.
 fn placed(rows: Vec<f64>, numbers: &[usize]) -> Vec<f64> {
     let count = numbers.last().map_or(0, |last| last + 1);
     if count == rows.len() {

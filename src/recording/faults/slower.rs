@@ -1,4 +1,4 @@
-//! Parts of a record in which rows come at a lower rate: each lacks a row, or as many as all others there.
+//! Parts of a record with a lower rate of rows: the same number of rows is missing at each place.
 
 use std::f64::consts::LN_2;
 use std::ops::Range;
@@ -7,18 +7,18 @@ use super::chance::Limit;
 use super::{Fault, FaultKind};
 use crate::recording::ImuSamples;
 
-/// A part of a record in which rows come at a lower rate.
+/// A part of a record with a lower rate of rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slower {
     /// From the first sample without a row to the last.
     pub samples: Range<usize>,
-    /// Of the row before them.
+    /// Line of the row before them.
     pub line: u64,
-    /// Samples from one row to the next.
+    /// Number of samples from one row to the next.
     pub step: usize,
-    /// Places between rows …
+    /// Number of places between rows …
     pub places: usize,
-    /// … and those of them that are bridged.
+    /// … and of those that are bridged.
     pub bridged: usize,
 }
 
@@ -35,8 +35,8 @@ impl Slower {
 }
 
 impl ImuSamples {
-    /// Where holes of one length lie between single rows, in a longer succession than chance makes even where every
-    /// other row is missing by it.
+    /// Parts in which holes of one length alternate with single rows, for longer than chance allows even if every other
+    /// row is missing at random.
     pub fn slower(&self) -> Vec<Slower> {
         let of_kind = |fault: &&Fault| fault.kind == FaultKind::Missing;
         let mut holes: Vec<&Fault> = self.faults.iter().filter(of_kind).collect();

@@ -1,29 +1,28 @@
-//! Single samples that neither side leads to.
+//! Spikes: single samples that fit neither side.
 
 use rayon::prelude::*;
 
 use super::chance::Limit;
 use super::mean_and_slope;
 
-/// Samples of a line that is carried on to the next one: few follow a motion, many average noise.
+/// Numbers of samples of the lines that are extrapolated to the next sample: few follow a motion, many average noise.
 const LINES: [usize; 5] = [2, 4, 8, 16, 32];
-/// Samples on either side that a line carried on is compared with, which gives its error.
+/// Number of samples on either side with which an extrapolated line is compared to measure its error.
 const TRIALS: usize = 64;
-/// Samples on either side that give the size of second differences.
+/// Number of samples on either side from which the magnitude of second differences is taken.
 const AROUND: usize = 32;
-/// Fewer samples of a side tell nothing.
+/// Fewest samples of a side that are used.
 const FEWEST: usize = TRIALS / 4;
-/// Samples of a side that are looked at.
+/// Number of samples of a side that are examined.
 const SIDE: usize = TRIALS + LINES[LINES.len() - 1];
 
-/// For each column the rows that a line from either side misses by more than that of a flawless record would.
-/// `steps` are what values of the columns differ by at least.
+/// For each column, the rows that lines from both sides miss by more than in a faultless record. `steps` are the
+/// smallest differences of values in the columns.
 ///
-/// A sample belongs to the motion if what lies before or what lies after leads to it, or to something
-/// between both: then a turn began or ended there. The error of a line is measured on the samples
-/// around, so that it has in it noise, grid and motion. The limit follows the tail that second
-/// differences of the whole column have. A knock is motion as well: it lasts longer than a sample, or
-/// other axes have it.
+/// A sample belongs to the motion if the line from before or from after fits it, or if it lies between the two: then a
+/// turn started or ended there. The error of a line is measured on the surrounding samples, and therefore includes
+/// noise, grid and motion. The limit follows the tail of the second differences of the whole column. A knock is
+/// motion, too: it lasts longer than a sample, or shows on other axes.
 pub fn spikes(columns: &[&[f64]; 6], steps: &[f64], limit: Limit) -> [Vec<usize>; 6] {
     if columns[0].len() < 2 * TRIALS {
         return [const { Vec::new() }; 6];
@@ -56,18 +55,18 @@ pub fn spikes(columns: &[&[f64]; 6], steps: &[f64], limit: Limit) -> [Vec<usize>
     })
 }
 
-/// σ of what rounding does to a value: by itself 1/√12 steps, if the rest is carried on 1/√6.
+/// σ of rounding: 1/√12 steps for independent values, 1/√6 if the remainder is carried into the next value.
 fn grid(step: f64) -> f64 {
     step / 6f64.sqrt()
 }
 
 /// Second differences of a column.
 struct Bends {
-    /// Magnitude at each row over its σ around, as it would be of white noise.
+    /// Magnitude at each row relative to the σ of its surroundings, assuming white noise.
     relative: Vec<f64>,
     /// The quantile that few of them exceed.
     outer: f64,
-    /// What a sound one does not.
+    /// The limit that no faultless value exceeds.
     limit: f64,
 }
 
@@ -111,8 +110,8 @@ impl Bends {
     }
 }
 
-/// How far a row lies outside of what its two sides lead to, in σ of the line with the smallest; zero if
-/// any line leads to it.
+/// Distance of a row from the range predicted by lines from its two sides, in σ of the most accurate line; zero if
+/// any line fits it.
 fn stands_out(column: &[f64], row: usize, grid: f64) -> f64 {
     let before: Vec<f64> = column[..row].iter().rev().take(SIDE).copied().collect();
     let after: Vec<f64> = column[row + 1..].iter().take(SIDE).copied().collect();
@@ -144,17 +143,17 @@ fn stands_out(column: &[f64], row: usize, grid: f64) -> f64 {
     best
 }
 
-/// A line leads to a sample if it comes within this many of its σ.
+/// A line fits a sample if it comes within this many σ of it.
 const LEADS: f64 = 1.0;
 
-/// σ beyond which a tenth of normal variates lies.
+/// σ beyond which a tenth of normal variates lie, two-sided.
 const TENTH: f64 = 1.645;
 
 /// A line through the nearest samples of a side, which are in order of their distance.
 struct Line {
-    /// At the sample before the nearest.
+    /// Value extrapolated to the sample before the nearest.
     next: f64,
-    /// Towards it, a sample.
+    /// Slope towards that sample, per sample.
     slope: f64,
     /// σ of `next` against the sample there, measured along the side.
     error: f64,
@@ -177,7 +176,7 @@ impl Line {
     }
 }
 
-/// Value of a line through these at the place before the first, and its slope towards there.
+/// Value, at the place before the first, of a line through these values, and its slope towards that place.
 fn carried_on(values: &[f64]) -> (f64, f64) {
     let (mean, slope) = mean_and_slope(values);
     (mean - slope * 0.5 * (values.len() as f64 + 1.0), -slope)

@@ -1,25 +1,25 @@
-//! Samples in few bits each.
+//! Compressed samples.
 //!
-//! A sample is a whole number of steps of its axis; what a step does not hold is carried into the next sample,
-//! as an instrument does that counts pulses, so that sums stay within half a step of what they were. Frames of
-//! samples are coded one by one: differences of the order that needs the fewest bits, all of the same width (the
-//! fixed predictors of lossless audio coders; Robinson, SHORTEN, 1994).
+//! A sample is a whole number of steps of its axis. The remainder is carried into the next sample, as in an
+//! instrument that counts pulses, so that sums stay within half a step of their true values. Each frame of samples
+//! is coded by differences of the order that needs the fewest bits, all of the same width (the fixed predictors of
+//! lossless audio coders; Robinson, SHORTEN, 1994).
 
 use std::ops::Range;
 
 use nalgebra::Vector3;
 
-/// Samples that are unpacked together.
+/// Number of samples in a frame.
 const FRAME: usize = 256;
 /// Differences of orders below this are tried.
 const ORDERS: usize = 3;
-/// So many bytes can be read at once behind the last bit.
+/// Number of bytes that can be read at once behind the last bit.
 const PADDING: usize = 16;
 
 /// Samples of three axes, packed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Packed {
-    /// What a step of each axis is.
+    /// Step of each axis.
     steps: Vector3<f64>,
     frames: Vec<Box<[u8]>>,
     len: usize,
@@ -30,12 +30,12 @@ impl Packed {
         self.len
     }
 
-    /// What a step is, on average over the axes.
+    /// Mean step of the axes.
     pub fn step(&self) -> f64 {
         self.steps.abs().mean()
     }
 
-    /// Some that follow one another, which must be there.
+    /// A range of samples, which must exist.
     pub fn part(&self, samples: Range<usize>) -> Vec<Vector3<f64>> {
         let mut part = Vec::with_capacity(samples.len());
         let mut axes = [[0i64; FRAME]; 3];
@@ -60,12 +60,12 @@ impl Packed {
     }
 }
 
-/// Packs samples of three axes as they come.
+/// Packs samples of three axes one by one.
 #[derive(Debug)]
 pub struct Packer {
-    /// What a step of each axis is, in the quantity that comes.
+    /// Step of each axis, in the input quantity.
     steps: [f64; 3],
-    /// What the steps so far do not hold, in steps.
+    /// Remainder of the samples so far, in steps.
     carried: [f64; 3],
     pending: [Vec<i64>; 3],
     frames: Vec<Box<[u8]>>,
@@ -73,7 +73,7 @@ pub struct Packer {
 }
 
 impl Packer {
-    /// Of axes that have these steps.
+    /// A packer for axes with these steps.
     pub fn new(steps: [f64; 3]) -> Self {
         Self {
             steps,
@@ -84,7 +84,7 @@ impl Packer {
         }
     }
 
-    /// Packs one more.
+    /// Packs one more sample.
     pub fn push(&mut self, sample: [f64; 3]) {
         for (axis, value) in sample.into_iter().enumerate() {
             let steps = value / self.steps[axis] + self.carried[axis];
@@ -108,7 +108,7 @@ impl Packer {
         self.frames.push(frame.into_boxed_slice());
     }
 
-    /// What was packed, with what a unit of the quantity that came is, by axis.
+    /// The packed samples; `units` is the value of one unit of the input quantity, for each axis.
     pub fn finish(mut self, units: [f64; 3]) -> Packed {
         if !self.pending[0].is_empty() {
             self.flush();
@@ -122,19 +122,19 @@ impl Packer {
     }
 }
 
-/// Frames in which noise is measured.
+/// Length of the frames in which noise is measured.
 const QUIET: usize = 64;
-/// The quietest part of them shows the noise of the axis.
+/// Quantile of the frames that gives the noise of the axis.
 const AT_REST: f64 = 0.1;
-/// Steps in a σ of the noise: what packing adds to a sample is a fortieth of its variance, and to a sum over
-/// samples no more than half a step.
+/// Steps per σ of the noise: packing adds at most a fortieth to the variance of a sample, and at most half a step
+/// to a sum over samples.
 const STEPS_OF_NOISE: f64 = 4.0;
-/// The same in a step of the grid on which values stand.
+/// Packing steps per step of the values' grid.
 const STEPS_OF_GRID: f64 = 16.0;
-/// Steps in the largest value where nothing shows noise.
+/// Steps up to the largest value, if no noise is found.
 const STEPS_OF_RANGE: f64 = 4_294_967_296.0;
 
-/// What a step has to be for an axis that gives these values, so that packing costs nothing beside its noise.
+/// Largest step for an axis with these values such that the packing error is negligible against its noise.
 pub fn finest_step(values: &[f64]) -> f64 {
     let bend = |three: &[f64]| (three[0] - 2.0 * three[1] + three[2]).powi(2);
     let of_frame = |frame: &[f64]| {
@@ -158,14 +158,14 @@ pub fn finest_step(values: &[f64]) -> f64 {
     if step > 0.0 { step } else { 1.0 }
 }
 
-/// Differences of the next order, behind as many numbers as they begin with.
+/// Replaces numbers by differences of the next order, after as many starting values.
 fn differences(numbers: &mut [i64], order: usize) {
     for k in (order..numbers.len()).rev() {
         numbers[k] = numbers[k].wrapping_sub(numbers[k - 1]);
     }
 }
 
-/// Bits that the numbers from `order` on take, and the smallest of them.
+/// Number of bits for the numbers from `order` on, and the smallest of them.
 fn width(numbers: &[i64], order: usize) -> (u32, i64) {
     let rest = numbers.get(order..).unwrap_or_default();
     let (Some(&low), Some(&high)) = (rest.iter().min(), rest.iter().max()) else {
@@ -211,7 +211,7 @@ fn encode(numbers: &[i64], frame: &mut Vec<u8>) {
     }
 }
 
-/// Fills in the numbers of one axis, and gives what follows in the frame.
+/// Decodes the numbers of one axis, and returns the remainder of the frame.
 fn decoded<'a>(frame: &'a [u8], numbers: &mut [i64]) -> &'a [u8] {
     let number = |at: usize| {
         let bytes = frame

@@ -23,7 +23,7 @@ pub fn document(accuracy: &Accuracy) -> Document {
         count(accuracy.trials.len()),
         accuracy.study.scenario.name
     ));
-    document.conclusions.heading = "What holds".to_owned();
+    document.conclusions.heading = "Conclusions".to_owned();
     document.warnings.heading = "To be noted".to_owned();
     verdict::say(&mut document, accuracy);
     document.both(facts(accuracy));
@@ -102,17 +102,17 @@ fn terms(accuracy: &Accuracy) -> String {
         named(&on)
     };
     match &left_out[..] {
-        [] => format!("beside K, E and D: {on}"),
+        [] => format!("in addition to K, E and D: {on}"),
         left_out => {
             format!(
-                "beside K, E and D: {on}; simulated but not modelled: {}",
+                "in addition to K, E and D: {on}; simulated but not modelled: {}",
                 named(left_out)
             )
         }
     }
 }
 
-/// Median and largest number of passes; none if no run gave an estimate.
+/// Median and largest number of passes; `None` if no run gave an estimate.
 pub(super) fn passes(accuracy: &Accuracy) -> Option<(f64, usize)> {
     let mut passes: Vec<usize> = accuracy
         .filtered()

@@ -57,7 +57,7 @@ pub fn bound(accuracy: &Accuracy) -> Table {
     let cells = |of: &Compared| against_bound(of.figures, of.unit_value);
     Table::new("EKF against the Cramér–Rao bound", columns(AGAINST_BOUND))
         .sections(sections(accuracy, cells))
-        .note("RMS over all runs and the parameters of a group; σ: what the filter claims.")
+        .note("RMS over all runs and the parameters of a group; σ: as stated by the filter.")
         .note("Position: horizontal, after 40 h from perfect alignment; flight: the trajectory of that name.")
         .note("Bound: Bayesian, from a pass linearised at the truth. Interval: bootstrap over runs.")
 }
@@ -68,9 +68,12 @@ pub fn auxiliary(accuracy: &Accuracy) -> Table {
         let (unit, in_si) = unit(*term);
         [cells![title(*term), unit], against_bound(of, in_si)].concat()
     };
-    Table::new("Error terms beside K, E and D", columns(AGAINST_BOUND))
-        .section(accuracy.error_terms.iter().map(row))
-        .note("RMS over all runs and the parameters of a term.")
+    Table::new(
+        "Error terms in addition to K, E and D",
+        columns(AGAINST_BOUND),
+    )
+    .section(accuracy.error_terms.iter().map(row))
+    .note("RMS over all runs and the parameters of a term.")
 }
 
 pub fn gain(accuracy: &Accuracy) -> Table {
@@ -173,7 +176,7 @@ const SIGMAS_99: f64 = 2.576;
 /// Something whose error is compared, with how it is shown.
 pub struct Compared<'a> {
     pub(super) title: String,
-    /// The triad; none of a position.
+    /// The triad; `None` for a position.
     pub(super) sensor: Option<Sensor>,
     /// Symbol of the unit.
     pub(super) unit: &'static str,

@@ -1,4 +1,4 @@
-//! What holds of the report of any study.
+//! Properties of the report of any study.
 
 use std::sync::OnceLock;
 

@@ -49,8 +49,7 @@ pub fn warnings(analysis: &NoiseAnalysis) -> Vec<String> {
         for (axis, letter) in triad.axes.iter().zip(AXES) {
             match &axis.identified {
                 None if axis.is_constant => warnings.push(format!(
-                    "{name} {letter}: its samples do not vary but for rounding, so nothing is known of its \
-                     noise."
+                    "{name} {letter}: its samples vary by rounding only, so its noise is not observed."
                 )),
                 None => warnings.push(format!(
                     "{name} {letter}: no process describes its deviations."

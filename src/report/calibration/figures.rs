@@ -214,7 +214,7 @@ impl Report<'_> {
     }
 }
 
-/// A level of so many σ, dashed beyond one.
+/// A horizontal line at a given number of σ, dashed beyond 1σ.
 fn bound(y: f64) -> Series {
     let sign = if y < 0.0 { '−' } else { '+' };
     let series = Series::level(y).label(format!("{sign}{}σ", y.abs()));
@@ -231,7 +231,7 @@ fn sentence(name: &str, nis: &Nis) -> String {
     format!("NIS of {name} {mean} (95 % interval {low}–{high}, {scalars} scalars).")
 }
 
-/// Correlations of the estimated parameters; none if nothing was estimated.
+/// Correlations of the estimated parameters; `None` if nothing was estimated.
 fn correlation(estimate: &Estimate) -> Option<Plot> {
     let indices: Vec<usize> = estimate.estimated().collect();
     let sigma = estimate.sigma();
@@ -365,7 +365,7 @@ fn differences(closed: &Estimate, filter: &Estimate) -> Plot {
 
 /// Nearer to the plumb line than this an axis has no azimuth worth drawing.
 const STEEP: f64 = 80.0 * DEGREE;
-/// An azimuth may run so far past ±180° before it goes on at the other end, °.
+/// Azimuth up to which a curve may run past ±180° before it continues at the other end, °.
 const PAST: f64 = 190.0;
 
 /// Elevation and azimuth of the body axes from the table, and body rates from the gyros.

@@ -1,4 +1,4 @@
-//! What holds of every report, whatever it was given.
+//! Properties of every report.
 
 use std::fs;
 use std::path::Path;

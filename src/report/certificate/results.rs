@@ -79,7 +79,7 @@ fn nominal(certificate: &Certificate, sensor: Sensor, input: &str) -> String {
     let unit = unit.map_or("output", |unit| unit.get(sensor).as_str());
     let nominal = certificate.provenance.nominal.get(sensor);
     let of = nominal.map(|scale| plain(to_twelve_digits(scale)));
-    // What is no rate is told per second.
+    // Outputs that are not rates are stated per second.
     let per = match unit.contains('/') || unit == "g" {
         true => "",
         false => " per second",

@@ -9,7 +9,7 @@ use crate::run::Run;
 use crate::run::motion::{LabelCheck, Rest, Turn, Verdict};
 use crate::survey::Survey;
 
-/// Faults beyond so many are not listed one by one.
+/// Largest number of faults listed one by one.
 const LISTED: usize = 20;
 
 pub fn log_columns(run: &Run) -> Table {
@@ -98,7 +98,7 @@ pub fn faults(run: &Run) -> Table {
     }
 }
 
-/// The file's column in which a fault is; none if it is in whole rows.
+/// The file's column in which a fault is; `None` if it is in whole rows.
 pub fn column_of<'r>(run: &'r Run, fault: &Fault) -> Option<&'r str> {
     let (sensor, axis) = fault.axis?;
     Some(&run.recording.imu.log.as_ref()?.columns.get(sensor)[axis].name)

@@ -20,7 +20,7 @@ const DIRECTIONS: usize = 9;
 /// An instrument whose temperature spans less, K, has soaked.
 const SOAKED: f64 = 1.0;
 const MICROSECOND: f64 = 1e-6;
-/// Beyond so many places only their number is said.
+/// Largest number of places that are named; beyond it only their number is given.
 const NAMED: usize = 4;
 
 /// A degree sign behind a number.

@@ -19,7 +19,7 @@ pub fn document(experiment: &Experiment) -> Document {
     let instruments = count(experiment.trials.len());
     let title = format!("The turntable experiment with {instruments} simulated instruments");
     let mut document = Document::new(title);
-    document.conclusions.heading = "What holds".to_owned();
+    document.conclusions.heading = "Conclusions".to_owned();
     document.warnings.heading = "To be noted".to_owned();
     say(&mut document, experiment);
     document.both(facts(experiment));
@@ -200,7 +200,7 @@ fn compared(
     let judged = match () {
         () if low > 1.0 => "the EKF is better",
         () if high < 1.0 => "the closed form is better",
-        () => "no significant difference with so many instruments",
+        () => "no significant difference with this number of instruments",
     };
     let text = format!(
         "{}, {} h: median {} nmile after {}, {} after {}, ratio {by} ({interval}): {judged}.",
@@ -214,7 +214,7 @@ fn compared(
     Some((low > 1.0, text))
 }
 
-/// What makes most of what is left.
+/// The largest contribution to the remaining navigation error.
 fn limit(experiment: &Experiment, situation: Situation) -> Option<String> {
     let navigated = navigated(experiment, situation)?;
     let most = |budget: &Budget| {

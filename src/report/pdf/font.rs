@@ -1,6 +1,6 @@
 //! Fonts of a printed page: which glyph shows a character, and how wide it is.
 //!
-//! The two are Noto Sans (SIL Open Font License 1.1, see the file beside them), cut down to Latin, Greek,
+//! Both are Noto Sans (SIL Open Font License 1.1, see the file next to the fonts), cut down to Latin, Greek,
 //! Cyrillic and a few signs.
 
 use krilla::text::{Font, GlyphId, KrillaGlyph};

@@ -70,7 +70,7 @@ pub struct Panel {
     pub shading: Vec<Range<f64>>,
     /// Short texts above the curves where there is room for them.
     pub tags: Vec<(f64, String)>,
-    /// In so many lines.
+    /// Number of lines over which the tags are spread.
     pub tag_lines: usize,
     /// Lines of text in an upper corner.
     pub notes: Vec<String>,
@@ -156,7 +156,7 @@ impl Panel {
         self
     }
 
-    /// Short texts above the curves in up to so many lines.
+    /// Adds short texts above the curves, in up to `lines` lines.
     pub fn tagged(mut self, lines: usize, tags: impl IntoIterator<Item = (f64, String)>) -> Self {
         self.tag_lines = lines;
         self.tags = tags.into_iter().collect();

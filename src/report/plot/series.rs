@@ -30,7 +30,7 @@ pub enum Shape {
         tops: Vec<Point>,
         /// Half the width of a bar.
         half: f64,
-        /// Height at which they stand; none: the foot of the axis.
+        /// Height at which they stand; `None` for the foot of the axis.
         base: Option<f64>,
         /// Whether they are shaded.
         filled: bool,
@@ -260,8 +260,8 @@ pub type Point = (f64, f64);
 /// Points that a line keeps at most; a panel is a hundredth as wide in pixels.
 const MOST: usize = 1 << 17;
 
-/// A line of at most as many points as are of use: where there are more, of so many that follow one another the
-/// lowest and the highest.
+/// A line thinned to the useful number of points: each group of consecutive points is replaced by its lowest and its
+/// highest.
 pub fn thinned(points: impl IntoIterator<Item = Point>) -> Vec<Point> {
     let mut line = Vec::new();
     // Of these, from this place of the line on, two will stay.

@@ -1,4 +1,4 @@
-//! What holds of every figure.
+//! Properties of every figure.
 
 use super::super::plot::{Axis, Mark, Panel, Plot, Series};
 use super::*;

@@ -244,7 +244,7 @@ mod tests {
             "a slip gives the paper's figures: E_zy of the wrong sign",
             "Gyros, three-angle form (Eq. 10): not reproduced as stated, but under another reading: angles \
              ±0.2°, 48 h. With angles ±0.2° all agree but position",
-            "Accelerometers, six-angle form (Eq. 8): zero but for rounding",
+            "Accelerometers, six-angle form (Eq. 8): zero except for rounding",
             "Accelerometers, three-angle form (Eq. 10): reproduced as stated",
         ] {
             assert!(text.contains(expected), "no {expected:?} in\n{text}");

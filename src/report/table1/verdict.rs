@@ -55,7 +55,7 @@ pub fn sentence(column: &Column) -> String {
     match &column.verdict {
         Verdict::Reproduced => "reproduced as stated.".to_owned(),
         Verdict::Zero => {
-            "zero but for rounding, as K C comes back exactly; the paper's figures are \
+            "zero except for rounding, because K C is recovered exactly; the paper's figures are \
                           rounding in its own program."
                 .to_owned()
         }
@@ -76,7 +76,7 @@ pub fn sentence(column: &Column) -> String {
         Verdict::NotReproducible(slip) => {
             let mut text = "not reproducible by a correct program".to_owned();
             if column.published.form.holds(InstallationForm::General) {
-                text.push_str(", which gives zero as K C comes back exactly");
+                text.push_str(", which gives zero because K C is recovered exactly");
             }
             match slip {
                 Some(slip) => text.push_str(&format!(

@@ -13,20 +13,20 @@ use crate::run::{Dwell, Run};
 use crate::statistics::{SIGMA_OF_MEDIAN, median, median_of_axes};
 use crate::units::{DEGREE, PPM};
 
-/// Between two readings a table that turns by less has turned the shorter way, rad.
+/// Below this angle between two readings, a table is taken to have turned the shorter way, rad.
 const SHORTER_WAY: f64 = 1.0;
 
 /// A move from one dwell to the next.
 struct Move {
-    /// How far it goes by the gyros and by the table, one way and the other, rad.
+    /// Total angle according to the gyros and to the table, both senses of rotation counted, rad.
     gyros: f64,
     table: f64,
-    /// When, by the table, and by how much later by the gyros, s.
+    /// Mean time according to the table, and delay of the gyros, s.
     time: f64,
     late: f64,
-    /// By how much the ways of the same move may differ, rad.
+    /// Tolerance for the difference of the two angles of one move, rad.
     tolerance: f64,
-    /// By how much a bias that dwells tell makes them differ, rad.
+    /// Difference that the uncertainty of the bias from dwells causes, rad.
     zero: f64,
     /// The longest time between two readings, s.
     interval: f64,
@@ -46,11 +46,10 @@ fn way(steps: impl Iterator<Item = (f64, f64, f64)>, noise: f64, zero: f64) -> [
     [all, moment / all.max(f64::MIN_POSITIVE), fastest]
 }
 
-/// Moves that the gyros make by another angle than the table, or at another time; else a scale that all of them
-/// contradict.
+/// Reports moves for which gyros and table differ in angle or in time; else a scale factor that contradicts all moves
+/// together.
 ///
-/// Rows that one log has lost, clocks that drift apart and a log of another run all show there, however the
-/// samples are stamped.
+/// This shows rows that one log has lost, clocks that drift apart and a log of another run, whatever the time stamps.
 pub fn clock(run: &Run) -> Option<String> {
     let moves = moves(run, run.recording.table.as_ref()?);
     let is_another = |m: &&Move| (m.gyros - m.table).abs() > m.tolerance;
@@ -75,7 +74,7 @@ pub fn clock(run: &Run) -> Option<String> {
     }
 }
 
-/// What moves at other times have in common: an offset, a jump, or a drift of the clocks.
+/// The common cause of time differences: an offset, a jump, or a drift of the clocks.
 fn other_times(moves: &[Move], resolved: f64, period: f64) -> Option<String> {
     let by = |late: f64| match late > 0.0 {
         true => format!("{late:.2} s later"),
@@ -123,8 +122,8 @@ fn other_times(moves: &[Move], resolved: f64, period: f64) -> Option<String> {
     ))
 }
 
-/// A scale that all moves together contradict: what differs from the table in each of them alike. A method
-/// that does without turns would not tell.
+/// A gyro scale factor that contradicts all moves together: their angles differ from the table's in the same ratio.
+/// Methods that do not use turns would not notice it.
 fn scale(run: &Run, moves: &[Move]) -> Option<String> {
     // The first and the last may be cut by the end of a log.
     let moves = moves.get(1..moves.len().saturating_sub(1))?;
@@ -144,8 +143,8 @@ fn scale(run: &Run, moves: &[Move]) -> Option<String> {
     })
 }
 
-/// Mean rates of the gyros while the table stands, the middle one of each axis: their biases, with a part of
-/// Earth rate, and how far off these may be, rad/s. The prior's may be wrong; stands are where the clocks are.
+/// Median over the table's dwells of the mean gyro rates: the biases plus a part of Earth rate, and their
+/// uncertainty, rad/s. The prior's biases may be wrong; dwells are placed by the table's clock, which may be off.
 fn bias_at_rest(run: &Run, stands: &[Dwell]) -> (Vector3<f64>, f64) {
     let prior = &run.instrument.prior.gyro;
     let known = stands
@@ -159,9 +158,9 @@ fn bias_at_rest(run: &Run, stands: &[Dwell]) -> (Vector3<f64>, f64) {
     (bias, SIGMAS * sigma.min(prior.bias_sigma.norm()))
 }
 
-/// Moves that both logs resolve, from the middle of one standstill of the table to that of the next, and what there
-/// is before the first and behind the last of what both logs cover. Two moves in one would be wrong in time by what
-/// the scale factors of their axes differ.
+/// Moves that both logs resolve, each from the middle of one standstill of the table to the middle of the next, and
+/// the spans before the first and after the last that both logs cover. Two moves taken as one would have a time error
+/// if the scale factors of their axes differ.
 fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
     let imu = &run.recording.imu;
     let stands = standstills(run, table);
@@ -181,7 +180,7 @@ fn moves(run: &Run, table: &TableLog) -> Vec<Move> {
     moves.collect()
 }
 
-/// What both logs say of these samples; none where readings are too far apart, or nothing turns.
+/// The move over these samples according to both logs; `None` if readings are too far apart, or nothing turns.
 fn of_samples(
     run: &Run,
     table: &TableLog,

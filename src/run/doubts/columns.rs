@@ -1,4 +1,4 @@
-//! Columns that no instrument gives.
+//! Columns that no working instrument produces.
 
 use nalgebra::Vector3;
 use statrs::function::erf::erf;
@@ -8,10 +8,10 @@ use crate::recording::Series;
 use crate::run::Run;
 use crate::statistics::FALSE_ALARM;
 
-/// Axes that give the same as another in every row.
+/// Reports axes whose values equal those of another axis in every row.
 ///
-/// Two axes have noise of their own, so not even two that sense the same are alike. One that never changes may
-/// be at rest under coarse pulses.
+/// Each axis has its own noise, so even two axes with the same input differ. An axis that never changes is not
+/// reported: it may be at rest with coarse pulses.
 pub fn copied(run: &Run) -> Option<String> {
     let pairs = listed(run, |sensor, rows| {
         let alike = |&(one, other): &(usize, usize)| {
@@ -28,8 +28,8 @@ pub fn copied(run: &Run) -> Option<String> {
     ))
 }
 
-/// Axes that never change, though the noise that is stated would have them leave a step of the grid on which
-/// the other axes of their triad lie.
+/// Reports axes that never change, although the stated noise exceeds the resolution of the other axes of the
+/// triad.
 pub fn dead(run: &Run) -> Option<String> {
     let imu = &run.recording.imu;
     let axes = listed(run, |sensor, rows| {
@@ -49,7 +49,7 @@ pub fn dead(run: &Run) -> Option<String> {
     ))
 }
 
-/// What is found in both triads; `None` if nothing is.
+/// The findings of both triads; `None` if there are none.
 fn listed(run: &Run, of: impl Fn(Sensor, &Series) -> Vec<String>) -> Option<String> {
     let of_triad = |sensor| of(sensor, run.recording.imu.of(sensor));
     let all: Vec<String> = Sensor::ALL.into_iter().flat_map(of_triad).collect();

@@ -1,10 +1,10 @@
-//! A table log that does not reach over the IMU's log.
+//! A table log that does not cover the IMU's log.
 
 use crate::recording::nanoseconds;
 use crate::run::Run;
 
-/// A table log that begins after the IMU's, or ends before it, by more than its longest pause. Beyond that the
-/// table may have moved unseen.
+/// Reports a table log that starts after the IMU's, or ends before it, by more than its longest pause. Outside it,
+/// the table may have moved unobserved.
 pub fn coverage(run: &Run) -> Option<String> {
     let table = run.recording.table.as_ref()?;
     let (first, last) = (*table.time.first()?, *table.time.last()?);

@@ -1,11 +1,11 @@
-//! Stated gravity that is not that of the place.
+//! Stated gravity that does not fit the site.
 
 use crate::earth::{ANOMALY_SIGMA, normal_gravity};
 use crate::run::Run;
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 use crate::units::{DEGREE, MILLIGAL};
 
-/// Gravity further from normal gravity than anomalies and its own σ make likely.
+/// Reports gravity that differs from normal gravity by more than anomalies and its σ explain.
 pub fn anomaly(run: &Run) -> Option<String> {
     let site = &run.site;
     let off = site.gravity - normal_gravity(site.latitude, site.height);

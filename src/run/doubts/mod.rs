@@ -1,4 +1,4 @@
-//! Checks of a run as it is read: what may be true, but is so unusual that the reader points at it.
+//! Checks of a run when it is read: facts that may be true, but are so unusual that they are reported.
 
 mod clock;
 mod columns;
@@ -9,7 +9,7 @@ mod quaternions;
 use super::Run;
 
 impl Run {
-    /// What the checks point at, a few sentences each, in the order in which the reader shows them.
+    /// The reports of all checks, a few sentences each, in the order in which the reader shows them.
     pub fn doubts(&self) -> Vec<String> {
         let checks: [fn(&Self) -> Option<String>; 5] = [
             gravity::anomaly,
@@ -21,7 +21,8 @@ impl Run {
         checks.iter().filter_map(|check| check(self)).collect()
     }
 
-    /// In which other order, or of which inverse, the table's quaternions are, in a sentence, if gravity shows it.
+    /// A sentence on the true order of the table's quaternions, or on their inverse, if gravity contradicts the stated
+    /// one.
     pub fn table_quaternions(&self) -> Option<String> {
         quaternions::order(self)
     }

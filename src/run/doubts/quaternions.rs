@@ -8,16 +8,16 @@ use crate::run::Run;
 use crate::run::motion::rests;
 use crate::statistics::FALSE_ALARM;
 
-/// The attitude that a reading means, from the one that it was taken for.
+/// Maps the attitude as read to the attitude under another order of the columns.
 type Reading = fn(&Matrix3<f64>) -> Matrix3<f64>;
 
-/// Quaternions that hold gravity where the accelerometers do only if their columns are in another order, or
-/// if they take East-North-Up to the body.
+/// Reports quaternions that agree with the accelerometers' gravity only if their columns are in another order, or
+/// if they rotate East-North-Up to the body.
 ///
-/// Specific force at rest is up along body axes, except for errors within the prior σ. The likelihoods of two
-/// hypotheses differ by their sums of squared residuals, from which the variance is taken. The order as
-/// it is stated has the accelerometers' axes swapped and reversed in any way on its side, because these are
-/// stated, too, and another check tests them.
+/// Specific force at rest points up, except for errors within the prior σ. The likelihood ratio of two hypotheses
+/// follows from their sums of squared residuals, with the variance estimated from each sum. For the stated order,
+/// the best of all 48 axis orders of the accelerometers is used, because these are also only stated, and another
+/// check tests them.
 pub fn order(run: &Run) -> Option<String> {
     let table = run.recording.table.as_ref()?;
     if !table.axes.is_empty() {
@@ -65,7 +65,7 @@ pub fn order(run: &Run) -> Option<String> {
     })
 }
 
-/// The attitude if the columns taken for w, x, y, z are x, y, z, w.
+/// The attitude if the columns read as w, x, y, z are x, y, z, w.
 fn w_last(attitude: &Matrix3<f64>) -> Matrix3<f64> {
     let q = quaternion(attitude);
     let columns = Quaternion::new(q.k, q.w, q.i, q.j);

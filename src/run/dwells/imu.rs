@@ -1,4 +1,4 @@
-//! Standstills in what the instrument itself says.
+//! Standstills found in the output of the instrument.
 
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, SQRT_2};
 use std::ops::Range;
@@ -15,10 +15,10 @@ use crate::units::DEG_PER_H;
 
 /// Length of the windows whose means are compared, s.
 const WINDOW: f64 = 0.25;
-/// Windows in a row that make a standstill: after a hand has let go a sensor still swings.
+/// Fewest consecutive windows of a standstill: after a hand has let go, a sensor still swings.
 const FEWEST: usize = 4;
-/// A standstill of so many seconds between two moves is found wherever it lies: a window may lie across either end
-/// of it, the next one has not the same beside it, and the one after that is left out as too gentle a move.
+/// A standstill of this many seconds between two moves is always found. Its ends cut up to one window in all; at each
+/// end, the next window differs from its neighbour, and the one after is dropped because it may be a gentle move.
 pub const LONG_ENOUGH: f64 = (1 + 2 * 2 + FEWEST) as f64 * WINDOW;
 /// Output at rest is within this many σ of its noise …
 pub const STILL_SIGMAS: f64 = 6.0;
@@ -26,10 +26,10 @@ pub const STILL_SIGMAS: f64 = 6.0;
 pub const STILL_RATE: f64 = 100.0 * DEG_PER_H;
 /// … and specific force within this, m/s²: a turn of 0.02°.
 const STILL_FORCE: f64 = 3e-3;
-/// False-alarm rate of the test that ends a standstill where a window differs from the windows beside it: an axis
-/// has begun to turn, or still settles. A false alarm costs a window.
+/// False-alarm rate of the test that ends a standstill at a window that differs from its neighbours: an axis
+/// has started to turn, or still settles. A false alarm costs a window.
 const SETTLED: f64 = 0.01;
-/// Windows beside it.
+/// Number of neighbouring windows it is compared with.
 const BESIDE: usize = 2 * FEWEST;
 /// A bias that warms moves by less than [`STILL_RATE`] in this time, s.
 const WARMING: f64 = 20.0;
@@ -38,7 +38,7 @@ const BIAS_SIGMAS: f64 = 6.0;
 
 /// Mean output of a triad over each window.
 struct Windows {
-    /// Not a number where samples are missing, so that nothing is at rest or steady there.
+    /// NaN where samples are missing, so that no window counts as at rest or steady there.
     means: Vec<Vector3<f64>>,
     /// 1σ per axis of their noise.
     sigma: f64,
@@ -69,8 +69,8 @@ impl Windows {
         }
     }
 
-    /// Whether the gyros are at rest in each window, of those that may be. Their output at rest is what most windows say
-    /// that a bias could make; from the nearest of these on it is followed both ways as it warms.
+    /// Whether the gyros are at rest in each candidate window. Their output at rest is the median of windows that a
+    /// bias could explain; from the window nearest to it, its drift with warm-up is tracked in both directions.
     fn at_rest(&self, run: &Run, rate: f64, may_be: impl Fn(usize) -> bool) -> Vec<bool> {
         let prior = &run.instrument.prior.gyro;
         let limit = (prior.bias_sigma * BIAS_SIGMAS).add_scalar(ROTATION_RATE + rate);
@@ -100,7 +100,7 @@ impl Windows {
         still
     }
 
-    /// The part of a standstill at whose ends the output is what it is beside them.
+    /// The part of a standstill at whose ends the output agrees with its neighbouring windows.
     fn settled(&self, standstill: Range<usize>) -> Range<usize> {
         let Range { mut start, mut end } = standstill;
         let limit = chi_square_limit(3.0, SETTLED);
@@ -120,7 +120,7 @@ impl Windows {
     }
 }
 
-/// Samples during which the gyros say what they say at rest and the accelerometers do not change.
+/// Samples during which the gyros give their output at rest and the accelerometers do not change.
 pub fn standstills(run: &Run) -> Vec<Range<usize>> {
     let imu = &run.recording.imu;
     let length = samples_of(WINDOW, imu.period);

@@ -1,5 +1,5 @@
-//! Where the instrument is at rest: dwells, found from the table's readings or, without a table, from the
-//! instrument itself.
+//! Dwells, during which the instrument is at rest: found from the table's readings or, without a table, from the
+//! output of the instrument.
 
 pub mod imu;
 pub mod table;
@@ -14,15 +14,15 @@ use crate::recording::{LabelledMotion, Segment};
 use crate::units::DEGREE;
 use imu::{STILL_RATE, STILL_SIGMAS};
 
-/// Gyros that integrate to less than this, beyond their noise and the drift of their bias, have not turned, rad.
+/// Integrals of the gyros below this, beyond their noise and the drift of their bias, are not a turn, rad.
 const STILL_ANGLE: f64 = 0.1 * DEGREE;
 
 impl Run {
     /// The dwells, in order.
     ///
-    /// The gyros check the standstills of a table's log: one during which they turn is not a dwell (two
-    /// readings may miss a full turn). Two between which they do not turn are one (a wild reading, or a knock,
-    /// parted them).
+    /// The gyros check the standstills of a table's log. A standstill during which they turn is not a dwell (two
+    /// readings may miss a full turn). Two standstills without a turn in between are merged (a wild reading or a
+    /// knock separated them).
     pub fn dwells(&self, aiding: Aiding) -> Vec<Dwell> {
         let imu = &self.recording.imu;
         if !imu.continuous && !self.recording.segments.is_empty() {
@@ -56,12 +56,12 @@ impl Run {
         dwells
     }
 
-    /// Dwells of a recording of sections laid end to end: sections labelled as positions, because between
-    /// sections nothing is known; in a section whose label is neither position nor turn, its standstills.
+    /// Dwells of a recording of concatenated sections: the sections labelled as positions, because nothing is known
+    /// between sections; in a section whose label is neither position nor turn, its standstills.
     fn labelled_dwells(&self) -> Vec<Dwell> {
         let standstills = imu::standstills(self);
         let within = |segment: &Segment| {
-            // A row at the edge of a section may be of the one beside it.
+            // A row at the edge of a section may belong to the adjacent one.
             let samples = segment.samples.start + 1..segment.samples.end.saturating_sub(1);
             let dwell = |standstill| Dwell::of(common(standstill, &samples));
             let is_long = |dwell: &Dwell| dwell.duration(&self.recording.imu) >= SHORTEST;
@@ -78,8 +78,8 @@ impl Run {
         inside.filter(|dwell| !dwell.samples.is_empty()).collect()
     }
 
-    /// The longest of these standstills within some samples, where it turns in the others by more than a
-    /// position that is set by hand may be off.
+    /// The longest of these standstills within some samples, if the instrument turns in the remaining samples by more
+    /// than the uncertainty of a position set by hand.
     pub fn standing_in(
         &self,
         samples: &Range<usize>,
@@ -121,8 +121,8 @@ impl Run {
         self.turns_beyond(increments, at_rest, |_| limit)
     }
 
-    /// Whether the sum of the first increments of the gyros, with their mean at rest as zero, is ever beyond the
-    /// limit for their number.
+    /// Whether the running sum of gyro increments, minus their mean at rest, ever exceeds the limit for the number of
+    /// samples.
     fn turns_beyond(
         &self,
         increments: impl Iterator<Item = Vector3<f64>>,

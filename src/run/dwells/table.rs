@@ -12,29 +12,29 @@ use crate::units::ARCSEC;
 const STANDING_SIGMAS: f64 = 6.0;
 /// … or this much, whatever the noise.
 const STANDING_ANGLE: f64 = 2.0 * ARCSEC;
-/// What is cut off at both ends, s: a table that starts smoothly has moved before two readings show
-/// it, and one that stops still rings.
+/// Time cut off at both ends, s: a table that starts smoothly has moved before two readings show
+/// it, and a table that has stopped still rings.
 const MARGIN: f64 = 0.2;
-/// A table that creeps, or takes up its next position before it turns, shows it in the mean of this
-/// long a stretch at an end of the dwell, s …
+/// Length of the stretch at an end of a dwell whose mean reveals creep, or an early start of the next
+/// move, s …
 const CREEP_STRETCH: f64 = 1.0;
 /// … by this many σ.
 const CREEP_SIGMAS: f64 = 5.0;
-/// Readings at least this far apart tell a slow turn from a standstill, however dense the log, s.
+/// Least time between readings that are compared to distinguish a slow turn from a standstill in a dense log, s.
 const APART: f64 = 0.05;
 
-/// How far two means of readings may differ, the sum of whose variances is this part of that of a reading.
+/// Limit for the difference of two means of readings whose variances add up to `share` times that of a reading.
 fn limit(run: &Run, share: f64) -> f64 {
     STANDING_ANGLE.max(STANDING_SIGMAS * run.table.reading_sigma * share.sqrt())
 }
 
-/// Whether two dwells are at one position, as far as readings tell.
+/// Whether two dwells are at one position according to the readings.
 pub fn same_reading(run: &Run, before: &Position, after: &Position) -> bool {
     let share = 1.0 / before.readings.len() as f64 + 1.0 / after.readings.len() as f64;
     log(&(after.attitude * before.attitude.transpose())).norm() < limit(run, share)
 }
 
-/// Stretches of the log whose readings stay.
+/// Stretches of the log with constant readings.
 pub fn standstills(run: &Run, table: &TableLog) -> Vec<Dwell> {
     // Two readings of three components each.
     let limit = limit(run, 6.0);
@@ -78,7 +78,7 @@ fn dwell(run: &Run, table: &TableLog, standing: Range<usize>) -> Option<Dwell> {
     (dwell.duration(imu) >= SHORTEST).then_some(dwell)
 }
 
-/// Cuts off the ends of a standstill at which the mean of the readings is not that of its middle.
+/// Cuts off the ends of a standstill whose mean reading differs from that of the middle.
 fn settled(table: &TableLog, reading_sigma: f64, standing: Range<usize>) -> Range<usize> {
     let Range { mut start, mut end } = standing;
     let quarter = standing.len() / 4;

@@ -1,4 +1,4 @@
-//! Labelled sections against what the record shows.
+//! Comparison of labelled sections with the record.
 
 use std::fmt;
 use std::ops::Range;
@@ -15,53 +15,53 @@ use crate::run::dwells::imu::standstills;
 use crate::run::turning::tolerance;
 use crate::units::DEGREE;
 
-/// A label's axis further than this from the plumb line is another one, rad.
+/// An axis farther than this from the plumb line contradicts its label, rad.
 const OTHER_AXIS: f64 = 30.0 * DEGREE;
-/// A section of a position may move for this part of its time.
+/// Largest part of its time for which a section labelled as a position may move.
 const MOVING: f64 = 0.05;
-/// A section that begins or ends at a faster rate begins or ends within a turn, rad/s …
+/// A section with a faster rate at its start or end starts or ends within a turn, rad/s …
 const TURNING: f64 = 15.0 * DEGREE;
-/// … unless hardly more of the turn is beyond, up to the rests around it, rad.
+/// … unless less than this of the turn lies outside, up to the dwells around it, rad.
 const LOST: f64 = 3.0 * DEGREE;
 /// Length of its ends, s.
 const END: f64 = 0.1;
 
-/// A section and what was found in it.
+/// A section with the result of its check.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LabelCheck {
     /// The section.
     pub segment: Segment,
-    /// What the record says of it.
+    /// Verdict of the record on it.
     pub verdict: Verdict,
-    /// What label and record disagree in, after `section … `.
+    /// Disagreement of label and record, worded to follow `section … `.
     pub disagreement: Option<String>,
-    /// The samples in which the record does what the label says, if there are any.
+    /// The samples in which the record agrees with the label, if there are any.
     pub as_labelled: Option<Range<usize>>,
 }
 
-/// What the record says of a section.
+/// Motion of a section according to the record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Verdict {
-    /// The label is no position and no turn.
+    /// The label is neither a position nor a turn.
     Unknown,
     /// It is a position.
     Position {
-        /// Angle between up and what the label says, rad.
+        /// Angle between the measured and the labelled up direction, rad.
         off: f64,
-        /// Time for which it moves, s.
+        /// Time for which the section moves, s.
         moving: f64,
     },
     /// It is a turn.
     Turn {
-        /// Found about the axis of the label, rad.
+        /// Measured angle about the labelled axis, rad.
         angle: f64,
-        /// Angle between the axis found and the label's, rad.
+        /// Angle between the measured and the labelled axis, rad.
         off: f64,
     },
 }
 
 impl fmt::Display for LabelCheck {
-    /// What label and record disagree in, and whether the section is used nevertheless.
+    /// The disagreement of label and record, and whether the section is used nevertheless.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Segment { label, start, .. } = &self.segment;
         let said = self.disagreement.as_deref().unwrap_or_default();
@@ -73,7 +73,7 @@ impl fmt::Display for LabelCheck {
     }
 }
 
-/// Every labelled section against what the record does at these rests.
+/// Checks every labelled section against the record, given its dwells.
 pub fn checks(run: &Run, rests: &[Rest]) -> Vec<LabelCheck> {
     let standstills = standstills(run);
     let record = Record {
@@ -100,7 +100,7 @@ pub fn checks(run: &Run, rests: &[Rest]) -> Vec<LabelCheck> {
     run.recording.segments.iter().map(check).collect()
 }
 
-/// What labels are held against.
+/// The data with which labels are compared.
 struct Record<'a> {
     run: &'a Run,
     rests: &'a [Rest],
@@ -175,7 +175,7 @@ impl Record<'_> {
         (verdict, Some(words), None)
     }
 
-    /// Some samples and those between them and the rests before and after.
+    /// Extends some samples to the dwells before and after.
     fn to_rests(&self, samples: &Range<usize>) -> Range<usize> {
         let mut dwells = self.rests.iter().map(|rest| &rest.dwell.samples);
         let before = dwells.clone().rfind(|dwell| dwell.start < samples.start);
@@ -184,7 +184,7 @@ impl Record<'_> {
             ..after.map_or(samples.end, |dwell| dwell.start.max(samples.end))
     }
 
-    /// Time of some samples that is in no dwell, s. In a record of sections dwells follow from labels.
+    /// Time of some samples outside all dwells, s. In a record of sections, dwells follow from labels.
     fn moving(&self, samples: &Range<usize>) -> f64 {
         let dwells = self.rests.iter().map(|rest| &rest.dwell.samples);
         let standing: usize = dwells.map(|dwell| common(dwell, samples).len()).sum();

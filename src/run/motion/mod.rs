@@ -1,5 +1,5 @@
-//! What the instrument does in a record, by nominal scales and prior biases: where it rests, how it turns,
-//! and whether that is what labels say. Shared by what looks at a record and what estimates from it.
+//! Motion of the instrument in a record, from nominal scales and prior biases: dwells, turns, and their agreement
+//! with labels. Shared by the checks of a record and by the estimators.
 
 mod label;
 mod rest;

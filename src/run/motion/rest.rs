@@ -1,4 +1,4 @@
-//! Where the instrument stands, and which way up.
+//! Dwells of the instrument, with the axis that points up.
 
 use nalgebra::Vector3;
 
@@ -8,21 +8,21 @@ use crate::units::DEGREE;
 /// An axis within this angle of the plumb line is up or down, rad.
 const UPRIGHT: f64 = 10.0 * DEGREE;
 
-/// A dwell, by nominal scales and prior biases.
+/// A dwell, evaluated with nominal scales and prior biases.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rest {
-    /// Its samples, and what the table says of it.
+    /// Its samples, and the table's position.
     pub dwell: Dwell,
     /// Mean specific force along body axes, m/s².
     pub force: Vector3<f64>,
-    /// Which axis is up.
+    /// The axis that points up.
     pub up: Up,
 }
 
 /// The axis nearest to the plumb line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Up {
-    /// Right, front or up of the body.
+    /// Index of the body axis: right, front or up.
     pub axis: usize,
     /// Whether it points down.
     pub down: bool,
@@ -48,14 +48,14 @@ impl Up {
 }
 
 impl Rest {
-    /// Angle between gravity as the accelerometers see it and as the table holds the instrument, rad.
+    /// Angle between the directions of gravity according to the accelerometers and to the table, rad.
     pub fn off_table(&self) -> Option<f64> {
         let attitude = self.dwell.position.as_ref()?.attitude;
         Some(self.force.angle(&attitude.tr_mul(&Vector3::z())))
     }
 }
 
-/// Where it stands, in order.
+/// The dwells, in order.
 pub fn rests(run: &Run) -> Vec<Rest> {
     let rest = |dwell: Dwell| {
         let force = dwell.force(run);

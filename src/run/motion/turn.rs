@@ -1,4 +1,4 @@
-//! What the instrument does between two rests.
+//! Turns of the instrument between two dwells.
 
 use std::ops::Range;
 
@@ -12,42 +12,42 @@ use crate::run::Run;
 use crate::run::turning::{SMALLEST, steps};
 use crate::units::DEGREE;
 
-/// Turns about one axis go along it for this part of their way at least …
+/// A turn counts as single-axis if the integrals of the rates reach this part of the total angle …
 const ALONG: f64 = 0.95;
-/// … and do what their integrals do at once, within this, rad …
+/// … and the rotation agrees with the single rotation by these integrals within this, rad …
 const ONE_AXIS: f64 = 1.0 * DEGREE;
-/// … and this part of the way.
+/// … plus this part of the total angle.
 const APART: f64 = 0.02;
-/// Turns about an axis within this angle of a body axis are about that.
+/// A turn about an axis within this angle of a body axis is assigned to that body axis.
 const NEAR_AXIS: f64 = 15.0 * DEGREE;
 
-/// A turn, by nominal scales, with the gyros' output at the rest before as zero.
+/// A turn, evaluated with nominal scales; the gyros' zero is their output in the dwell before.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Turn {
     /// Its samples.
     pub samples: Range<usize>,
     /// Unit vector along body axes, in their positive half.
     pub axis: Vector3<f64>,
-    /// rad, right-handed about the axis; over a turn about several axes, of the one that does the same.
+    /// Angle, right-handed about the axis, rad; of a turn about several axes, that of the equivalent single rotation.
     pub angle: f64,
     /// Integrals of the rates about each body axis, rad.
     pub sum: Vector3<f64>,
-    /// Whether it is about one axis all the way.
+    /// Whether it is about one axis throughout.
     pub single: bool,
     /// Fastest rate about any body axis, rad/s.
     pub fastest: f64,
-    /// `C` from the body axes after to those before.
+    /// `C` from the body axes after the turn to those before.
     pub rotation: Matrix3<f64>,
-    /// The rest before it, by its place among the rests; the next one comes after.
+    /// Index of the dwell before it; the next dwell follows it.
     pub from: Option<usize>,
-    /// Angle between up as the gyros carry it over the turn and as the accelerometers see it after, rad.
+    /// Angle between the up direction propagated by the gyros and that of the accelerometers after the turn, rad.
     pub off_gravity: Option<f64>,
-    /// Angle between the turn by the gyros and by the table, rad.
+    /// Angle between the turns according to the gyros and to the table, rad.
     pub off_table: Option<f64>,
 }
 
 impl Turn {
-    /// Of these samples, with this output as zero, rad/s.
+    /// The turn over these samples, with `zero` the gyros' output at rest, rad/s.
     pub fn of(run: &Run, samples: Range<usize>, zero: &Vector3<f64>) -> Self {
         let imu = &run.recording.imu;
         let mut attitude = Matrix3::identity();
@@ -79,14 +79,14 @@ impl Turn {
         }
     }
 
-    /// The body axis that it is about, if it is about one.
+    /// The body axis of the turn, if it is about one.
     pub fn body_axis(&self) -> Option<usize> {
         let axis = self.axis.iamax();
         (self.single && self.axis[axis] > NEAR_AXIS.cos()).then_some(axis)
     }
 }
 
-/// Gyros at rest near a sample, rad/s.
+/// The gyros' output at rest near a sample, rad/s.
 pub fn zero(run: &Run, rests: &[Rest], sample: usize) -> Vector3<f64> {
     let apart = |rest: &&Rest| {
         let Range { start, end } = rest.dwell.samples;
@@ -98,7 +98,7 @@ pub fn zero(run: &Run, rests: &[Rest], sample: usize) -> Vector3<f64> {
     })
 }
 
-/// What turns from rest to rest, or in sections labelled as turns.
+/// The turns from dwell to dwell, or in sections labelled as turns.
 pub fn turns(run: &Run, rests: &[Rest]) -> Vec<Turn> {
     let imu = &run.recording.imu;
     let turn = |samples: Range<usize>| {

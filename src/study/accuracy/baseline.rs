@@ -12,32 +12,32 @@ use crate::run::Dwell;
 use crate::simulation::{Scenario, Simulated};
 use crate::turntable::Table;
 
-/// The closed form's runs. It is also made from the first part of every dwell, as if the table had
-/// stood for less time.
+/// The runs of the closed form. It is also evaluated on the first part of every dwell, as if the dwells
+/// were shorter.
 #[derive(Debug, Clone)]
 pub struct Baseline {
-    /// What is simulated for it.
+    /// The simulated scenario.
     pub scenario: Scenario,
-    /// Length of its own run, s.
+    /// Length of the run, s.
     pub table_time: f64,
-    /// Time during which the table stands in it, s.
+    /// Total time of the dwells in it, s.
     standing: f64,
-    /// Part of each dwell that makes its table time that of the filter; one if the filter takes more
-    /// than the whole, none if it takes less than the moves between the positions.
+    /// Part of each dwell for which the table time equals that of the filter; one if the filter takes more
+    /// than the whole run, `None` if it takes less than the moves between the positions.
     equal: Option<f64>,
 }
 
-/// Parts of a dwell in the curve against time: this many, evenly.
+/// Number of equal steps of the part of a dwell in the curve against time.
 const PARTS: usize = 12;
 
 impl Baseline {
-    /// Place of the whole dwells among the parts.
+    /// Index of the whole dwells among the parts.
     pub(super) const OWN_TIME: usize = PARTS - 1;
-    /// Place of the filter's time among them.
+    /// Index of the filter's time among them.
     pub(super) const EQUAL_TIME: usize = PARTS;
 
-    /// For a scenario: its instrument and table on the paper's positions, and where the table has too
-    /// few axes for them, a table with three axes and the same errors. Its axes are square: the
+    /// The baseline of a scenario: its instrument and table on the paper's positions; if the table has too
+    /// few axes, a table with three axes and the same errors. The axes are orthogonal, because the
     /// positions are given as turns about body axes.
     pub(super) fn new(scenario: &Scenario) -> Result<Self, StudyError> {
         let filter_time = scenario.duration()?;
@@ -60,7 +60,7 @@ impl Baseline {
         })
     }
 
-    /// Table time of the runs that are compared with the filter at its own time, s.
+    /// Table time of the closed form in the comparison at equal time, s.
     pub fn equal_time(&self) -> Option<f64> {
         self.equal.map(|part| self.time_of(part))
     }
@@ -78,7 +78,7 @@ impl Baseline {
         (0..PARTS).map(|number| (number, self.time_of(Self::part(number))))
     }
 
-    /// Errors of the closed form in one of its runs for every part and for the filter's time; `None` where it
+    /// Errors of the closed form in one of its runs, for every part and for the filter's time; `None` if it
     /// fails.
     pub(super) fn errors(
         &self,

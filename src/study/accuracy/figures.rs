@@ -1,4 +1,4 @@
-//! Root mean squares of an error over the runs, by every method, and their ratios.
+//! Root mean square errors over the runs, for every method, and their ratios.
 
 use super::trial::{Filtered, Trial};
 use crate::calibration::{AUXILIARY, AuxiliaryKind, AuxiliaryVector, ErrorTerm};
@@ -9,7 +9,7 @@ use crate::study::Ratio;
 pub struct Figures {
     /// RMS error of the filter.
     pub filter: f64,
-    /// RMS of the σ that the filter claims.
+    /// RMS of the σ stated by the filter.
     pub claimed: f64,
     /// RMS of the Bayesian Cramér–Rao bound.
     pub bound: f64,
@@ -19,13 +19,13 @@ pub struct Figures {
     pub closed_form: Option<f64>,
     /// Closed form in its own time over filter.
     pub gain: Option<Ratio>,
-    /// RMS error of the closed form in the filter's time; none if that is too short for it.
+    /// RMS error of the closed form in the filter's time; `None` if that is too short.
     pub closed_form_in_equal_time: Option<f64>,
     /// Closed form in the filter's time over filter.
     pub gain_in_equal_time: Option<Ratio>,
 }
 
-/// Mean squares of one run; none where a method gave nothing.
+/// Mean squares of one run; `None` if a method failed.
 #[derive(Default)]
 pub struct Squares {
     pub filter: Option<f64>,
@@ -66,7 +66,7 @@ impl Figures {
     }
 }
 
-/// Of each term that has a bound in any run and that the filter estimated.
+/// Figures of each error term that has a bound in any run and was estimated by the filter.
 pub fn of_error_terms(trials: &[Trial]) -> Vec<(ErrorTerm, Figures)> {
     let has_sigma = |&k: &usize| trials.iter().any(|trial| trial.auxiliary_bound[k] > 0.0);
     let of_term = |term: ErrorTerm| {
@@ -92,7 +92,7 @@ pub fn of_error_terms(trials: &[Trial]) -> Vec<(ErrorTerm, Figures)> {
     ErrorTerm::ALL.into_iter().filter_map(of_term).collect()
 }
 
-/// Root of the mean; NaN of none.
+/// Root of the mean; NaN for no values.
 pub fn rms(squares: &[f64]) -> f64 {
     (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }

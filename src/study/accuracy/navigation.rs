@@ -1,5 +1,5 @@
-//! What the calibrations are worth: position errors after the paper's 40 h of navigation from perfect
-//! alignment, and whether they lie within the σ that the filter's covariance predicts of them.
+//! Navigation accuracy of the calibrations: position errors after the paper's 40 h of navigation from perfect
+//! alignment, compared with the σ predicted from the filter's covariance.
 
 use nalgebra::{Matrix2, SMatrix, Vector2};
 use statrs::distribution::{Binomial, DiscreteCDF};
@@ -19,66 +19,66 @@ const TRAJECTORY: &str = "flight";
 /// Probability outside the interval of a count, half on each side.
 const OUTSIDE: f64 = 0.01;
 
-/// How the body moves.
+/// Motion of the body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Journey {
-    /// It stands level at the scenario's site, heading North.
+    /// Standing level at the scenario's site, heading North.
     Standing,
-    /// It follows the embedded trajectory `flight`, moved to the latitude of the site.
+    /// The embedded trajectory `flight`, moved to the latitude of the site.
     Flight,
 }
 
 /// Horizontal position errors, computed minus true, east and north in m, at the end of a mission.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Position {
-    /// Of the filter, with the covariance that it predicts.
+    /// Error of the filter, with its predicted covariance.
     pub filter: Option<(Vector2<f64>, Matrix2<f64>)>,
     /// Covariance of the bound.
     pub bound: Matrix2<f64>,
-    /// Of the closed form in its own time.
+    /// Error of the closed form in its own time.
     pub closed_form: Option<Vector2<f64>>,
-    /// Of the closed form in the filter's time.
+    /// Error of the closed form in the filter's time.
     pub closed_form_in_equal_time: Option<Vector2<f64>>,
 }
 
-/// What the calibrations are worth in one mission.
+/// Navigation accuracy of the calibrations in one mission.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NavigationAccuracy {
-    /// How the body moved.
+    /// Motion of the body.
     pub journey: Journey,
-    /// Of every run, in order.
+    /// Position errors of every run, in order.
     pub positions: Vec<Position>,
     /// Horizontal position errors in m; σ and bound are roots of the trace of their covariance.
     pub figures: Figures,
-    /// Each of [`Region::ALL`]; none if no run gave an estimate with a covariance that is regular.
+    /// Containment in each of [`Region::ALL`]; empty if no run gave an estimate with a regular covariance.
     pub containment: Vec<Containment>,
 }
 
-/// A region that the predicted covariance marks out.
+/// A region defined by the predicted covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Region {
     /// East within ±1σ.
     East,
     /// North within ±1σ.
     North,
-    /// Both within the ellipse of this many σ.
+    /// East and north within the ellipse of this many σ.
     Ellipse(f64),
 }
 
-/// How many runs have their error within a region.
+/// Number of runs with errors within a region.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Containment {
     /// The region.
     pub region: Region,
-    /// Runs whose error lies within it.
+    /// Number of runs with errors within it.
     pub within: usize,
-    /// Runs.
+    /// Number of runs.
     pub runs: usize,
-    /// 99 % interval of the number within, if the covariance is true (binomial).
+    /// 99 % interval of the number within, if the covariance is correct (binomial).
     pub interval: (usize, usize),
 }
 
-/// A mission, followed once: what the linear model says of one instrument of the grade holds for all.
+/// Linear model of a mission, computed once: the model of one instrument is valid for all of its grade.
 pub struct Way {
     journey: Journey,
     by_parameter: SMatrix<f64, 2, PARAMETERS>,
@@ -105,7 +105,7 @@ impl Journey {
 }
 
 impl Way {
-    /// Of a mission; the inner error if it cannot be navigated.
+    /// The model of a mission; the inner error if it cannot be navigated.
     pub(super) fn of(
         journey: Journey,
         scenario: &Scenario,
@@ -123,7 +123,7 @@ impl Way {
         }))
     }
 
-    /// What the calibrations of these runs are worth.
+    /// Navigation accuracy of the calibrations of these runs.
     pub(super) fn worth(self, trials: &[Trial]) -> NavigationAccuracy {
         let positions: Vec<Position> = trials.iter().map(|trial| self.of_trial(trial)).collect();
         let filtered: Vec<_> = positions.iter().filter_map(|p| p.filter).collect();
@@ -156,7 +156,7 @@ impl Way {
         }
     }
 
-    /// From parameter errors, estimate minus truth; the linear model has them the other way round.
+    /// Position error from parameter errors, estimate minus truth; the linear model uses the opposite sign.
     fn position(&self, error: &ParameterVector) -> Vector2<f64> {
         -self.by_parameter * error
     }
@@ -174,8 +174,8 @@ impl Position {
         }
     }
 
-    /// The filter's error in units of its predicted σ: east, and what north differs from that which
-    /// east lets expect. Both are independent and standard normal if the covariance is true.
+    /// The filter's error in units of its predicted σ: east, and the deviation of north from its expectation
+    /// given east. Both are independent and standard normal if the covariance is correct.
     pub fn whitened(&self) -> Option<Vector2<f64>> {
         let (error, covariance) = self.filter?;
         whitened(&error, &covariance)
@@ -195,7 +195,7 @@ impl Region {
         Self::Ellipse(2.45),
     ];
 
-    /// Probability of an error within it if the covariance is true.
+    /// Probability of an error within it, if the covariance is correct.
     pub fn probability(self) -> f64 {
         match self {
             Self::East | Self::North => erf(0.5f64.sqrt()),

@@ -18,9 +18,9 @@ use crate::simulation::Runs;
 pub struct Trial {
     /// Its number, the stream of its random numbers.
     pub run: u64,
-    /// Why the filter failed; none if it did not.
+    /// Reason for failure of the filter; `None` if it did not fail.
     pub failure: Option<String>,
-    /// What the filter gave; a run that did not converge gives its last pass.
+    /// Results of the filter; for a run that did not converge, those of its last pass.
     pub filtered: Option<Filtered>,
     /// σ of the bound.
     pub bound: ParameterVector,
@@ -28,28 +28,28 @@ pub struct Trial {
     pub(super) bound_covariance: ParameterMatrix,
     /// σ of the bound at each of the [`moments`].
     pub(super) bound_track: Vec<ParameterVector>,
-    /// σ of the bound of constants beside the parameters, zero where they are none.
+    /// σ of the bound of the auxiliary constants; zero for constants without a bound.
     pub auxiliary_bound: AuxiliaryVector,
-    /// What the error terms did to the filter; of the first run only.
+    /// Effect of the error terms on the filter; for the first run only.
     pub effects: Vec<ErrorTermTest>,
-    /// Error of the closed form for each part of its dwells; none where it failed.
+    /// Error of the closed form for each part of its dwells; `None` if it failed.
     pub(super) closed_form: Vec<Option<ParameterVector>>,
 }
 
-/// What the filter gave in one run.
+/// Results of the filter in one run.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Filtered {
     /// Error of each parameter.
     pub error: ParameterVector,
-    /// σ that it claims.
+    /// Stated σ of each parameter.
     pub sigma: ParameterVector,
-    /// Covariance that it claims.
+    /// Stated covariance of the parameters.
     pub(super) covariance: ParameterMatrix,
-    /// Error of each constant beside the parameters that was estimated, zero for others.
+    /// Error of each estimated auxiliary constant; zero for others.
     pub auxiliary_error: AuxiliaryVector,
-    /// σ that it claims of them.
+    /// Stated σ of the auxiliary constants.
     pub auxiliary_sigma: AuxiliaryVector,
-    /// NEES/n of the parameters and the constants beside them.
+    /// NEES/n of the parameters and the auxiliary constants.
     pub nees: Option<Nees>,
     /// Number of passes.
     pub passes: usize,
@@ -57,9 +57,9 @@ pub struct Filtered {
     pub velocity: Nis,
     /// NIS of table attitude.
     pub table: Nis,
-    /// Observations that the gate left out.
+    /// Number of observations rejected by the gate.
     pub rejected: usize,
-    /// Whether the data reject the form.
+    /// Test of the installation form.
     pub form_test: Option<FormTest>,
     /// Error at each of the [`moments`] of the last pass.
     pub(super) track: Vec<ParameterVector>,
@@ -68,13 +68,13 @@ pub struct Filtered {
 /// Number of moments in the curve against time.
 const MOMENTS: usize = 40;
 
-/// Times at which errors are kept, s; the last is the end of a run of this duration.
+/// Times at which errors are stored, s; the last is the end of a run of this duration.
 pub fn moments(duration: f64) -> impl Iterator<Item = f64> {
     (1..=MOMENTS).map(move |k| duration * k as f64 / MOMENTS as f64)
 }
 
 impl AccuracyStudy {
-    /// One run, of the filter's simulated runs and of the baseline's.
+    /// One run of the filter and one of the baseline.
     pub(super) fn trial(
         &self,
         baseline: &Baseline,
@@ -132,7 +132,7 @@ impl AccuracyStudy {
         })
     }
 
-    /// The filter's form if it can hold the truth, else the general one, which is what could be had.
+    /// The filter's form if it can represent the truth, else the general form, for the bound.
     fn bound_form(&self, truth: &PerSensor<Triad>) -> InstallationForm {
         if self.form.holds(truth.gyro.form) {
             self.form
@@ -177,7 +177,7 @@ impl Filtered {
     }
 }
 
-/// NEES of the parameters, in the general form, and the constants beside them together.
+/// Joint NEES of the parameters, in the general form, and the auxiliary constants.
 fn whole_nees(
     outcome: &Outcome,
     estimate: &Estimate,
@@ -192,8 +192,8 @@ fn whole_nees(
     nees(&error, &covariance, &Vec::from_iter(0..error.len()))
 }
 
-/// What a history says at each of the moments, in the general form. It holds no correlations, which
-/// to first order the change of form does not need.
+/// The values of a history at each of the moments, in the general form. The history has no correlations; to first
+/// order, the change of form does not need them.
 fn track(
     history: &[Epoch],
     form: InstallationForm,

@@ -1,26 +1,26 @@
-//! Which group of parameters makes how much of the position error.
+//! Contribution of each group of parameters to the position error.
 
 use super::{ByParameter, Calibrated};
 use crate::calibration::{Group, PARAMETERS, ParameterMatrix};
 
-/// What the claimed covariance, averaged over all instruments, says of the position error at the end.
+/// Budget of the final position error from the stated covariance, averaged over all instruments.
 ///
 /// Errors of groups are correlated: the filter knows many sums better than their terms. A group's
-/// share is the covariance of what it makes with what all make, over the variance of the whole,
+/// share is the covariance of its contribution with the total, over the variance of the total,
 ///
 /// ```text
 /// share_g = tr(S_g P_g· Sᵀ) / tr(S P Sᵀ)
 /// ```
 ///
-/// so the cross terms of two groups go half to each and all shares together are one; a share below
-/// zero belongs to a group that makes up for another.
+/// so the cross terms of two groups are divided equally between them, and all shares add up to one. A
+/// negative share belongs to a group that compensates another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Budget {
-    /// Root of the mean square of the position error that is claimed, m.
+    /// Stated RMS position error, m.
     pub claimed: f64,
-    /// That of the errors there were, m.
+    /// Actual RMS position error, m.
     pub actual: f64,
-    /// Each of [`Group::all`].
+    /// The part of each of [`Group::all`].
     pub parts: Vec<Part>,
 }
 
@@ -29,7 +29,7 @@ pub struct Budget {
 pub struct Part {
     /// The group.
     pub group: Group,
-    /// Root of the mean square of what it would make alone, m.
+    /// RMS position error of this group alone, m.
     pub alone: f64,
     /// Its share of the variance, as in [`Budget`].
     pub share: f64,

@@ -1,4 +1,4 @@
-//! The methods, and what each makes of an instrument.
+//! The methods, and their calibrations of an instrument.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +12,7 @@ use crate::models::ModelError;
 use crate::simulation::{Scenario, Simulated};
 use crate::turntable::TableError;
 
-/// What estimates, and on which path.
+/// An estimator with its path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Estimator {
     /// The closed form on the paper's static positions.
@@ -26,9 +26,9 @@ pub enum Estimator {
 /// An estimator in an installation form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Method {
-    /// What estimates.
+    /// The estimator.
     pub estimator: Estimator,
-    /// In which form.
+    /// The installation form.
     pub form: InstallationForm,
 }
 
@@ -51,12 +51,12 @@ impl Method {
 pub struct Trial {
     /// Its number, the stream of its random numbers.
     pub run: u64,
-    /// What each of [`Method::all`] made of it, or why it failed.
+    /// Calibration by each of [`Method::all`], or the reason for failure.
     pub calibrations: Vec<Result<Calibrated, String>>,
 }
 
 impl Trial {
-    /// What a method made of it, by the method's place.
+    /// Calibration by a method, given by its index.
     pub(super) fn of(&self, place: usize) -> Option<&Calibrated> {
         self.calibrations.get(place)?.as_ref().ok()
     }
@@ -67,15 +67,15 @@ impl Trial {
 pub struct Calibrated {
     /// Errors, true − estimated.
     pub error: ParameterVector,
-    /// The covariance that it claims.
+    /// The stated covariance.
     pub covariance: ParameterMatrix,
-    /// False if the method says that it did not converge.
+    /// False if the method reports that it did not converge.
     pub converged: bool,
-    /// Whether the method says that the data reject its installation form.
+    /// Whether the method reports that the data reject its installation form.
     pub rejects_form: bool,
 }
 
-/// What is simulated for each estimator.
+/// The simulated scenario of each estimator.
 pub struct Scenarios(Vec<(Estimator, Scenario)>);
 
 impl Scenarios {

@@ -1,5 +1,5 @@
-//! What the noise of the instrument does while it aligns itself and navigates: alike after every
-//! calibration, so it is kept apart.
+//! Effect of the instrument's noise during alignment and navigation. It is the same after every calibration
+//! and therefore treated separately.
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 use rand::{RngExt, SeedableRng};
@@ -13,13 +13,13 @@ use crate::navigation::{ErrorMatrix, Instant, NavigationError, Solution};
 use crate::study::experiment::Spread;
 use crate::study::navigation::{INTERVAL, Mission, Motion, NavigationStudyError};
 
-/// How long an instrument stands to align itself, s.
+/// Duration of self-alignment at rest, s.
 pub const ALIGNMENT_TIME: f64 = 600.0;
-/// Step in s for a body that stands, and for one that moves: noise has no direction, so a turn need
-/// not be followed finely.
+/// Step for a body at rest, and for a moving one, s: noise is isotropic, so turns need no fine
+/// steps.
 const STANDING_STEP: f64 = 10.0;
 const MOVING_STEP: f64 = 1.0;
-/// Draws that make a distribution of a covariance.
+/// Number of draws for the distribution of the length of an error.
 const DRAWS: usize = 20_000;
 
 type Inputs = SVector<f64, INPUTS>;
@@ -34,9 +34,9 @@ struct Covariance {
 
 /// Variances of the noise of the sensed rate and force.
 struct Variances {
-    /// Of the integral over a second.
+    /// Variance of the integral over a second.
     white: Inputs,
-    /// Of the Gauss–Markov bias.
+    /// Variance of the Gauss–Markov bias.
     bias: Inputs,
     correlation_time: Inputs,
 }
@@ -56,8 +56,8 @@ impl Variances {
     }
 }
 
-/// Covariance of the horizontal position error at the end, east and north, m². Where the instrument
-/// aligned itself, `aligned` is the errors at the start by those of the sensed rate and force.
+/// Covariance of the final horizontal position error, east and north, m². If the instrument aligned
+/// itself, `aligned` gives the errors at the start per error of the sensed rate and force.
 pub fn position(
     mission: &Mission,
     aligned: Option<InputMatrix>,
@@ -96,7 +96,7 @@ pub fn position(
     Ok(by_state * covariance.errors * by_state.transpose())
 }
 
-/// The linear model over a step, with what noise adds.
+/// The linear model over a step, with process noise.
 struct Step {
     errors: ErrorMatrix,
     input: InputMatrix,
@@ -138,7 +138,7 @@ impl Covariance {
     }
 }
 
-/// How the length of a normal vector with this covariance is distributed.
+/// Distribution of the length of a normal vector with this covariance.
 pub fn spread(covariance: &Matrix2<f64>) -> Spread {
     let eigen = covariance.symmetric_eigen();
     let sigma = eigen.eigenvalues.map(|v| v.max(0.0).sqrt());
@@ -147,10 +147,10 @@ pub fn spread(covariance: &Matrix2<f64>) -> Spread {
     Spread::of((0..DRAWS).map(|_| Vector2::new(sigma.x * draw(), sigma.y * draw()).norm()))
 }
 
-/// Errors at the start of a body that stands and levels itself by its accelerometers and finds North
-/// by its gyros, by errors of the sensed rate (rad/s) and specific force (m/s²) along body axes.
+/// Errors at the start of a body at rest that levels itself with its accelerometers and finds North with
+/// its gyros, per error of the sensed rate (rad/s) and specific force (m/s²) along body axes.
 ///
-/// The attitude taken makes the sensed force point up and the sensed rate have no part to the East.
+/// The computed attitude makes the sensed force point up, and gives the sensed rate no East component.
 /// With `C_computed = (I − [φ×]) C` and sensed `u + δu`, δu in East-North-Up, to first order
 ///
 /// ```text

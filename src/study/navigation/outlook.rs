@@ -1,4 +1,4 @@
-//! What a calibration makes of a mission where the truth may not be known.
+//! Predicted navigation errors of a calibration; the truth may be unknown.
 
 use nalgebra::SVector;
 
@@ -10,7 +10,7 @@ use crate::navigation::NavigationError;
 use crate::navigation::error_model::STATES;
 use crate::units::DEGREE;
 
-/// What is known of the navigation error at one moment.
+/// Navigation error at one moment: predicted, and actual if known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outlook {
     /// Time since the start, s.
@@ -18,27 +18,26 @@ pub struct Outlook {
     /// Its 1σ predicted from the calibration's covariance, in the order of
     /// [`NavigationError::to_vector`].
     pub sigma: SVector<f64, STATES>,
-    /// The actual error; none where the truth is not known.
+    /// The actual error; `None` if the truth is not known.
     pub error: Option<NavigationError>,
 }
 
-/// An attitude error up to which errors add to each other, rad: beyond it the linear model, by which σ are
-/// predicted, is off by more than a hundredth of them.
+/// Largest attitude error for which the linear model is valid, rad: beyond it, predicted σ are wrong by more than 1 %.
 const SMALL: f64 = DEGREE;
-/// A position error up to which gravity and the frame are those of the true position, as a part of the
+/// Largest position error for which gravity and the frame are those of the true position, relative to the
 /// Earth's radius.
 const NEAR: f64 = 0.01;
-/// Whole durations, s: seconds, minutes, hours.
+/// Round durations, s: seconds, minutes, hours.
 const DURATIONS: [f64; 17] = [
     1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 1800.0, 3600.0, 7200.0,
     14_400.0, 36_000.0, 144_000.0,
 ];
-/// At least so many moments make a curve.
+/// Fewest moments of a curve.
 const MOMENTS: f64 = 20.0;
 
 impl Mission {
-    /// Standing level at a site for as long as suits the grade: up to the longest whole duration after which every
-    /// estimate's predicted errors are still small, hours for one of navigation grade and seconds for a poor one.
+    /// Standing level at a site, for a duration that suits the grade: the longest round duration after which the
+    /// predicted errors of every estimate are still small, from seconds (low grade) to hours (navigation grade).
     ///
     /// # Errors
     /// As for [`Self::navigate`].
@@ -54,7 +53,7 @@ impl Mission {
         ))
     }
 
-    /// Standing level for so many seconds.
+    /// Standing level for `duration` seconds.
     fn lasting(site: &Site, duration: f64) -> Self {
         let interval = INTERVAL.min(duration / MOMENTS);
         Self {
@@ -63,7 +62,7 @@ impl Mission {
         }
     }
 
-    /// The longest whole duration after which an estimate's predicted errors are small; the shortest if none is.
+    /// The longest round duration after which an estimate's predicted errors are small; the shortest if there is none.
     fn useful(site: &Site, estimate: &Estimate) -> Result<f64, NavigationStudyError> {
         let small = |moment: &Outlook| {
             let attitude = moment.sigma.fixed_rows::<3>(0).amax();
@@ -87,7 +86,7 @@ impl Mission {
         Ok(useful)
     }
 
-    /// What an estimate leads to, at the start and after each interval. The truth may have any
+    /// Navigation errors of an estimate, at the start and after each interval. The truth may have any
     /// installation form.
     ///
     /// # Errors

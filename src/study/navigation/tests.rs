@@ -188,7 +188,7 @@ fn what_the_linear_model_predicts_of_each_error_is_what_navigation_does() {
     }
 }
 
-/// Whether so many of so many runs are within the 99 % interval of a probability.
+/// Whether this number of hits among these runs is within the 99 % interval of a probability.
 fn as_claimed(hits: usize, runs: usize, probability: f64) -> bool {
     let binomial = Binomial::new(probability, runs as u64).unwrap();
     let hits = hits as u64;

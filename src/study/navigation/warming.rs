@@ -1,4 +1,4 @@
-//! Navigation while the instrument warms up: errors of parameters that change with temperature.
+//! Navigation during warm-up: errors of parameters that change with temperature.
 
 use nalgebra::{DMatrix, Vector3};
 use thiserror::Error;
@@ -12,7 +12,7 @@ use crate::imu::{InstallationForm, Nominal, PerSensor, ThermalState, Triad};
 use crate::navigation::error_model::STATES;
 use crate::navigation::{ErrorMatrix, ErrorVector, Instant, Linearisation, Sensitivity};
 
-/// How an instrument warms up: `to + (from − to) exp(−t/τ)`.
+/// Warm-up of an instrument: `to + (from − to) exp(−t/τ)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Warming {
     /// Temperature at the start, °C.
@@ -31,7 +31,7 @@ impl Warming {
     }
 }
 
-/// A calibration and the truth, one of which at least changes with temperature; both in the general form and in one
+/// A calibration and the truth, of which at least one depends on temperature; both in the general form and in one
 /// body frame.
 #[derive(Debug, Clone)]
 pub struct WarmingPair {
@@ -39,15 +39,15 @@ pub struct WarmingPair {
     calibration: Changing,
 }
 
-/// Why calibrations cannot be navigated with while they warm up.
+/// Errors of navigation during warm-up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum WarmingError {
-    /// Another installation form than the general one.
+    /// The installation form is not general.
     #[error(
         "calibration and truth must be of the general installation form to be navigated with at a changing temperature; calibrate with --installation general"
     )]
     Form,
-    /// Two body frames.
+    /// The body frames differ.
     #[error(
         "calibration and truth must have one body frame to be navigated with at a changing temperature; one is fixed by the table, the other by the accelerometers"
     )]
@@ -57,14 +57,14 @@ pub enum WarmingError {
         "the temperature leaves the range in which the polynomials of calibration or truth hold; navigate within it"
     )]
     Outside,
-    /// A covariance or a coefficient of what is no parameter.
+    /// A covariance or a coefficient has an unknown parameter name.
     #[error(
-        "the covariance or temperature.coefficients names what is no parameter; correct the file"
+        "the covariance or temperature.coefficients has an unknown parameter name; correct the file"
     )]
     Unknown,
 }
 
-/// An estimate that may change with temperature, normalised.
+/// An estimate that may depend on temperature, normalised.
 #[derive(Debug, Clone)]
 struct Changing {
     estimate: Estimate,
@@ -113,10 +113,10 @@ impl Changing {
 }
 
 impl WarmingPair {
-    /// From records.
+    /// A pair from records.
     ///
     /// # Errors
-    /// [`WarmingError`] where they do not fit each other.
+    /// [`WarmingError`] if they are not compatible.
     pub fn of_records(
         calibration: &Calibration,
         truth: &Calibration,
@@ -144,8 +144,8 @@ impl WarmingPair {
 }
 
 impl Mission {
-    /// Navigates while the instrument warms up: errors and their predicted covariance at the start and after each
-    /// interval, in which the temperature is that of its middle.
+    /// Navigates during warm-up: errors and their predicted covariance at the start and after each
+    /// interval. The temperature of an interval is that at its middle.
     ///
     /// # Errors
     /// As for [`Self::navigate`].
@@ -197,7 +197,7 @@ impl Mission {
         Ok(epochs)
     }
 
-    /// What errors of the parameters do to navigation, or those of their coefficients of a function.
+    /// Sensitivity of navigation to the parameters, or to their coefficients of one function.
     fn exposure_warming(
         &self,
         pair: &WarmingPair,

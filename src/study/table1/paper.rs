@@ -1,4 +1,4 @@
-//! The paper's table as printed (Zhao, Jiang, Li 2016, Table 1), and the readings of it.
+//! The paper's table as printed (Zhao, Jiang, Li 2016, Table 1), and its possible readings.
 
 use nalgebra::Vector3;
 
@@ -15,20 +15,20 @@ pub const HOURS: f64 = 40.0;
 /// tan L = 1.0276.
 pub const LATITUDE_DEG: f64 = 45.78;
 
-/// One of the four columns of figures, mean and standard deviation, with the ways to read it.
+/// One of the four columns of figures, mean and standard deviation, with its possible readings.
 #[derive(Debug, PartialEq)]
 pub struct Published {
-    /// Whose calibration errors navigation is given; the other triad is ideal.
+    /// The triad with calibration errors; the other triad is ideal.
     pub sensor: Sensor,
-    /// The simplified model that the triad is calibrated by.
+    /// The simplified form used for calibration.
     pub form: InstallationForm,
     /// The paper's figures of attitude and of velocity and position.
     pub figures: [u8; 2],
     mean: ByQuantity<f64>,
     std: ByQuantity<f64>,
-    /// As the paper states it.
+    /// The reading that the paper states.
     pub stated: Reading,
-    /// Other ways to read it.
+    /// Other readings.
     pub others: &'static [Reading],
 }
 
@@ -128,7 +128,7 @@ pub static TABLE: [Published; 4] = [
     },
 ];
 
-/// A navigation error; inside in rad, m/s and m.
+/// A navigation error; internally in rad, m/s and m.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// Pitch.
@@ -156,7 +156,7 @@ impl Quantity {
         Self::Position,
     ];
 
-    /// Name, unit that the paper gives it in, one of that unit in rad, m/s or m, key in JSON.
+    /// Name, unit in the paper, value of that unit in rad, m/s or m, and key in JSON.
     fn entry(self) -> (&'static str, &'static str, f64, &'static str) {
         match self {
             Self::Pitch => ("pitch", "°", DEGREE, "pitch_deg"),
@@ -172,12 +172,12 @@ impl Quantity {
         self.entry().0
     }
 
-    /// The unit that the paper gives it in.
+    /// Its unit in the paper.
     pub fn unit(self) -> &'static str {
         self.entry().1
     }
 
-    /// One of that unit in rad, m/s or m.
+    /// Value of that unit in rad, m/s or m.
     pub fn unit_value(self) -> f64 {
         self.entry().2
     }
@@ -188,25 +188,25 @@ impl Quantity {
     }
 }
 
-/// A way to read the paper.
+/// A reading of the paper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reading {
-    /// What it takes the paper to mean.
+    /// Its description.
     pub name: &'static str,
-    /// What becomes of the entries of `K C`.
+    /// Treatment of the entries of `K C`.
     pub installation: Installation,
-    /// The installation angles are this many times those drawn.
+    /// Factor applied to the drawn installation angles.
     pub angles: f64,
-    /// Length of the runs in h, where it is not that of the study.
+    /// Length of the runs in h, if it differs from that of the study.
     pub hours: Option<f64>,
-    /// What it would mean if this reading gave the paper's figures.
+    /// Meaning of agreement with the paper's figures under this reading.
     pub kind: Kind,
 }
 
-/// How a reading stands to the paper's text.
+/// Relation of a reading to the paper's text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// What the text says.
+    /// The text as written.
     Stated,
     /// A correct program under another assumption.
     Assumption,
@@ -214,10 +214,10 @@ pub enum Kind {
     Slip,
 }
 
-/// What becomes of the ratios `R_mn = A_mn / A_mm` of `A = K C` from six positions.
+/// Treatment of the ratios `R_mn = A_mn / A_mm` of `A = K C` from six positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Installation {
-    /// What the form's closed form makes of them: all six, or half differences of the pairs.
+    /// Closed form of the installation form: all six ratios, or half differences of the pairs.
     OfForm,
     /// Three angles from the entries above the diagonal.
     Upper,
@@ -228,7 +228,7 @@ pub enum Installation {
 }
 
 impl Reading {
-    /// The drawn triad as this reading has it.
+    /// The drawn triad under this reading.
     pub(super) fn drawn(&self, triad: &Triad) -> Triad {
         Triad {
             angles: triad.angles * self.angles,

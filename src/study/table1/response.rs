@@ -1,4 +1,4 @@
-//! What constant sensor errors make of the navigation of a body that stands.
+//! Effect of constant sensor errors on the navigation of a body at rest.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
@@ -12,7 +12,7 @@ use crate::navigation::{NavigationError, Sensitivity, Solution};
 const STEP: f64 = 30.0;
 /// Pitch, roll, heading; velocity and position, east and north.
 const OUTPUTS: usize = 7;
-/// Where these are in [`NavigationError::to_vector`].
+/// Their indices in [`NavigationError::to_vector`].
 const ROWS: [usize; OUTPUTS] = [0, 1, 2, 3, 4, 6, 7];
 
 /// Mean and standard deviation (`n − 1`), rad, m/s or m.
@@ -25,7 +25,7 @@ pub struct Moments {
 }
 
 impl Moments {
-    /// Of some values; not a number for less than two.
+    /// Moments of some values; NaN for fewer than two.
     pub(super) fn of(values: impl Iterator<Item = f64> + Clone) -> Self {
         let n = values.clone().count() as f64;
         let mean = values.clone().sum::<f64>() / n;
@@ -37,7 +37,7 @@ impl Moments {
     }
 }
 
-/// A standing body at the ellipsoid, level and heading north.
+/// A body at rest on the ellipsoid, level and heading north.
 pub fn standing(latitude: f64) -> Solution {
     Solution {
         attitude: Matrix3::identity(),
@@ -48,10 +48,10 @@ pub fn standing(latitude: f64) -> Solution {
     }
 }
 
-/// Navigation errors by each of the three errors of a triad, at evenly spaced times.
+/// Navigation errors per each of the three errors of a triad, at evenly spaced times.
 ///
-/// Standing still under constant sensor errors the linear error model has constant coefficients: its
-/// response to each unit error is found once, exactly at each output, and every sample is a linear
+/// At rest under constant sensor errors, the linear error model has constant coefficients: its
+/// response to each unit error is computed once, exactly at each output, and every sample is a linear
 /// combination of the responses.
 pub struct Response {
     step: f64,
@@ -59,8 +59,8 @@ pub struct Response {
 }
 
 impl Response {
-    /// Over a time in s, height held and alignment perfect; `None` where roll and heading of the body
-    /// are not apart.
+    /// Response over a time in s, with height held and perfect alignment; `None` if roll and heading of the
+    /// body are not distinguishable.
     pub(super) fn new(truth: &Solution, duration: f64) -> Option<Self> {
         let steps = (duration / STEP).ceil().max(1.0);
         let step = duration / steps;
@@ -93,7 +93,7 @@ impl Response {
         [pitch, roll, heading, velocity.sqrt(), position.sqrt()]
     }
 
-    /// Places of about this many outputs, evenly spaced from the first on.
+    /// Indices of about this many outputs, evenly spaced from the first on.
     pub(super) fn thinned(&self, outputs: usize) -> impl Iterator<Item = usize> {
         let count = self.by_sensor.gyro.len();
         (0..count).step_by(count.div_ceil(outputs.max(1)))
@@ -104,7 +104,7 @@ impl Response {
         self.step * output as f64
     }
 
-    /// Errors at an output: of attitude with their sign, of velocity and position as norms.
+    /// Errors at an output: attitude with sign, velocity and position as norms.
     pub(super) fn errors(
         &self,
         sensor: Sensor,
@@ -118,7 +118,7 @@ impl Response {
     }
 }
 
-/// Sizes of the angles, squared norms of velocity and position.
+/// Magnitudes of the angles, squared norms of velocity and position.
 #[inline]
 fn sizes(outputs: &SVector<f64, OUTPUTS>) -> ByQuantity<f64> {
     let square = |first: usize| outputs[first].powi(2) + outputs[first + 1].powi(2);

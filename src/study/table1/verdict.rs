@@ -1,4 +1,4 @@
-//! Whether the paper's figures are reproduced.
+//! Verdicts on the reproduction of the paper's figures.
 
 use super::paper::{ByQuantity, Kind, Published, Reading, SAMPLES};
 use super::response::Moments;
@@ -6,21 +6,21 @@ use super::response::Moments;
 /// Two means agree if they differ by no more than this many standard errors of their difference: 99 %
 /// of the normal distribution.
 pub const AGREEMENT: f64 = 2.576;
-/// A figure that ought to be zero is rounding if it is less than this part of the same figure of the
+/// A figure that should be zero counts as rounding if it is below this part of the same figure of the
 /// three-angle form.
 const ROUNDING: f64 = 1e-6;
 
-/// What can be said of one of the paper's four columns.
+/// Verdict on one of the paper's four columns.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Verdict {
     /// All five means agree as stated.
     Reproduced,
-    /// Both are zero but for rounding.
+    /// Both are zero except for rounding.
     Zero,
-    /// All five agree under another reading that a correct program may have.
+    /// All five means agree under another reading that a correct program may implement.
     UnderAnotherReading(&'static Reading),
-    /// They do not agree under any reading of a correct program; the mistake under which they do, if
-    /// one is known.
+    /// They agree under no reading of a correct program; contains the mistake under which they agree, if
+    /// known.
     NotReproducible(Option<&'static Reading>),
 }
 

@@ -1,9 +1,9 @@
-//! Causes of what a record shows beyond its model: what happened once (a wrong position of the table, a turn that the gyros
-//! did not sense, a step of biases), and error terms.
+//! Causes of deviations of a record from its model: single events (a wrong position of the table, a turn that the
+//! gyros did not sense, a step of biases), and error terms.
 //!
-//! They are looked for before noise is estimated, which would become large to explain them. What each one would do to the
-//! estimate follows from its score and information beside the constants, without another pass (Rao 1948, "Large sample
-//! tests of statistical hypotheses", Mathematical Proceedings of the Cambridge Philosophical Society 44(1)).
+//! They are searched before noise is estimated, which would grow to explain them. The effect of each on the estimate
+//! follows from its score and information, without another pass (Rao 1948, "Large sample tests of statistical
+//! hypotheses", Mathematical Proceedings of the Cambridge Philosophical Society 44(1)).
 
 mod score;
 pub mod settling;
@@ -28,35 +28,35 @@ use tried::Tried;
 /// Components of a disturbance.
 const COMPONENTS: usize = 3;
 
-/// A cause, with what shows it.
+/// A cause with its evidence.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FoundCause {
-    /// Which.
+    /// The cause.
     pub cause: Cause,
-    /// When it began, s; of an error term zero.
+    /// Start time, s; zero for an error term.
     time: f64,
-    /// Its components; of an error term zero.
+    /// Its components; zero for an error term.
     value: Vector3<f64>,
-    /// χ² if it is none, and its degrees of freedom …
+    /// χ² under the null hypothesis, and its degrees of freedom …
     square: f64,
     degrees: f64,
-    /// … how many times as wide chance is as the noise says …
+    /// … scale of χ² by chance, relative to the noise …
     chance: f64,
-    /// … and what its significance stays below if it is chance.
+    /// … and the limit of its significance under the null hypothesis.
     limit: f64,
 }
 
-/// What may be the cause of what was solved.
+/// Possible causes in a solved problem.
 pub struct Causes {
-    /// The likeliest first: the one that explains most of those beyond chance; before it Earth rate, which widens what all
-    /// positions show, if it explains more where chance is as the noise says.
+    /// The significant causes, the one that explains most first. Earth rate, which widens the scatter of all positions,
+    /// precedes it if it explains more with the scale of the noise.
     pub likeliest: Vec<FoundCause>,
-    /// How many times as wide as the noise says half of all positions and half of all slips are, at least one.
+    /// Scale of chance relative to the noise, from the medians over all positions and all slips; at least one.
     pub chance: f64,
 }
 
 impl Causes {
-    /// Of what was solved.
+    /// Finds the possible causes in a solved problem.
     ///
     /// # Errors
     /// As of a pass.
@@ -110,13 +110,13 @@ fn explains_most(causes: impl Iterator<Item = FoundCause>) -> Option<FoundCause>
     beyond.max_by(|a, b| a.explained().total_cmp(&b.explained()))
 }
 
-/// How wide chance is: as half of these show, if that is wider than the noise says.
+/// Scale of chance: that of the median of these, if it is larger than the noise.
 fn chance<'a>(all: impl Iterator<Item = &'a FoundCause>) -> f64 {
     let mut ratios: Vec<f64> = all.map(|of| of.square / of.degrees).collect();
     median(&mut ratios).unwrap_or(1.0).max(1.0)
 }
 
-/// Positions of the table, by the innovations of those of its readings that are no outliers.
+/// Positions of the table, tested by the innovations of its readings without outliers.
 fn of_readings(innovations: &[Innovation]) -> Vec<FoundCause> {
     let dwells = innovations.chunk_by(|one, other| one.dwell == other.dwell);
     let sound = chi_square_limit(COMPONENTS as f64, FALSE_ALARM);
@@ -181,7 +181,7 @@ fn by_score(
     Ok((all, candidates.collect()))
 }
 
-/// All that may have happened once and is not estimated already.
+/// All possible single events that are not estimated already.
 fn disturbances(problem: &Problem) -> Vec<Disturbance> {
     let table = problem.model.aiding == Aiding::Table;
     let all = problem.dwells().enumerate().flat_map(|(dwell, of)| {
@@ -199,7 +199,7 @@ fn disturbances(problem: &Problem) -> Vec<Disturbance> {
     all.filter(|of| !estimated.contains(of)).collect()
 }
 
-/// When a disturbance happened, s: in the middle of the move before its dwell or, of a position, as the dwell begins.
+/// Time of a disturbance, s: the middle of the move before its dwell or, for a position, the start of the dwell.
 fn time_of(problem: &Problem, disturbance: Disturbance) -> f64 {
     let times = problem.stretches().iter().flat_map(|stretch| {
         let imu = &stretch.run.recording.imu;
@@ -239,7 +239,7 @@ impl FoundCause {
         }
     }
 
-    /// As what is left with it taken in shows: chance is as wide as that beside what lasts throughout.
+    /// A lasting cause (Earth rate) gets the chance level found while it is estimated; other causes are unchanged.
     pub fn beside_what_it_leaves(self, left: &Causes) -> Self {
         match self.is_lasting() {
             true => self.beside(left.chance, self.limit),
@@ -247,28 +247,28 @@ impl FoundCause {
         }
     }
 
-    /// What it explains beyond what chance does, in squares of noise.
+    /// Explained χ² beyond chance, in squares of noise.
     fn explained(&self) -> f64 {
         self.square - self.chance * self.degrees
     }
 
-    /// −2 ln of the probability that as much is chance.
+    /// −2 ln of the p-value.
     fn significance(&self) -> f64 {
         -2.0 * ln_survival(self.degrees, self.square / self.chance)
     }
 
-    /// Whether it is beyond chance.
+    /// Whether it is significant.
     pub fn is_beyond(&self) -> bool {
         self.significance() > self.limit
     }
 
-    /// Whether it is what all positions show, by no more numbers than one of them has: Earth rate.
+    /// Whether it affects all positions, with no more components than a single one: Earth rate.
     fn is_lasting(&self) -> bool {
         let is = |of: Disturbance| of.kind == DisturbanceKind::EarthRate;
         matches!(self.cause, Cause::Disturbance(of) if is(of))
     }
 
-    /// The problem with it: readings of a wrong position are left out, all else is estimated.
+    /// The problem with this cause included: readings of a wrong position are dropped, other causes are estimated.
     pub fn taken_into<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
         let mut model = problem.model.clone();
         match self.cause {
@@ -285,7 +285,7 @@ impl FoundCause {
         problem.with_model(model)
     }
 
-    /// What it is, when, and what became of it.
+    /// The finding on it: kind, time and treatment.
     pub fn finding(&self) -> Finding {
         let Self { time, limit, .. } = self;
         let significance = self.significance();
@@ -310,7 +310,7 @@ impl FoundCause {
         Finding::new(kind, format!("{text} {tested}."), figures)
     }
 
-    /// Kind and words of the finding of a disturbance.
+    /// Kind and text of the finding on a disturbance.
     fn of_disturbance(&self, disturbance: Disturbance) -> (Kind, String) {
         let time = self.time;
         let number = disturbance.dwell + 1;

@@ -1,21 +1,21 @@
-//! Score and information of constants that are not estimated, beside those that are.
+//! Score and information of constants that are not estimated, given the estimated ones.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::calibration::checks::error_term_test::Evidence;
 use crate::calibration::{Constant, Disturbance, ErrorTerm, Prior, Reduction};
 
-/// What explains a record better than its model.
+/// A cause that explains a record better than its model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cause {
-    /// Something happened once.
+    /// A single event.
     Disturbance(Disturbance),
-    /// An error term is there.
+    /// An error term.
     Term(ErrorTerm),
 }
 
 impl Cause {
-    /// What a constant is of, if it is of a cause.
+    /// The cause to which a constant belongs, if any.
     pub fn of(constant: &Constant) -> Option<Self> {
         match *constant {
             Constant::Disturbance(of, _) => Some(Self::Disturbance(of)),
@@ -24,17 +24,17 @@ impl Cause {
     }
 }
 
-/// Scores of the constants that are not estimated, beside those that are.
+/// Scores of the constants that are not estimated, given the estimated ones.
 pub struct Scores {
     constants: Vec<Constant>,
-    /// 1σ of each before the data.
+    /// Prior 1σ of each.
     sigma: DVector<f64>,
     score: DVector<f64>,
     information: DMatrix<f64>,
 }
 
 impl Scores {
-    /// Of those that are off; none where rounding has the last word.
+    /// Scores of the constants that `is_off` selects; `None` if rounding makes the information matrix singular.
     pub fn new(
         reduction: &Reduction,
         prior: &Prior,
@@ -66,8 +66,8 @@ impl Scores {
         })
     }
 
-    /// χ² of a cause if it is none, its degrees of freedom and its components; none where the data do not show it, or
-    /// not all of what happened once. An error term is of its usual size, and without components.
+    /// χ² of a cause under the null hypothesis, its degrees of freedom and its components; `None` if the cause is not
+    /// observed, or a single event only in part. An error term has its usual size, and no components.
     pub fn explained_by(&self, cause: Cause) -> Option<(f64, f64, Vector3<f64>)> {
         let constants = self.constants.iter().enumerate();
         let of = constants.filter(|(_, constant)| Cause::of(constant) == Some(cause));

@@ -1,4 +1,4 @@
-//! How long the attitude settles after a stop, from the mean over all stops.
+//! Settling time of the attitude after a stop, from the mean over all stops.
 
 use nalgebra::Vector3;
 use serde_json::json;
@@ -11,12 +11,12 @@ use crate::calibration::{
 use crate::run::Aiding;
 use crate::statistics::{FALSE_ALARM, chi_square_limit, median};
 
-/// A table settles within this time, s: what lasts longer is something else.
+/// Longest settling time of a table, s: a longer effect has another cause.
 const LONGEST: f64 = 3.0;
 
-/// Steps of a dwell in which the attitude of a table settles after a stop: so many of its readings are off those in the
-/// time after them beyond chance, which is as wide as half of all show. What the gyros sensed is taken off; whether a
-/// gate let the readings in does not count. A hand never settles.
+/// Number of steps at the start of a dwell in which a table settles: its readings there differ significantly from the
+/// later ones. The median over all steps gives the chance level. The rotation that the gyros sensed is subtracted;
+/// readings count whether or not a gate accepted them. Zero without a table.
 ///
 /// # Errors
 /// As of navigation.
@@ -52,9 +52,9 @@ pub fn settling(solved: &Solved) -> Result<usize, CalibrationError> {
     Ok(beyond.last().map_or(0, |(step, _)| step + 1))
 }
 
-/// A reading of the table less what the gyros sensed since the dwell began.
+/// A reading of the table minus the rotation that the gyros sensed since the start of the dwell.
 struct Reading {
-    /// Steps of the dwell before it.
+    /// Number of steps of the dwell before it.
     step: usize,
     time: f64,
     residual: Vector3<f64>,
@@ -79,8 +79,8 @@ fn readings(problem: &Problem, stretch: &Stretch, part: &Rest) -> Vec<Reading> {
     readings
 }
 
-/// The squares, over their variance, of what readings at the begin of a dwell are off the mean of those in a time after
-/// them that is the same for all, with the steps before each.
+/// Normalised squared deviations of readings at the start of a dwell from the mean of later readings, which cover the
+/// same time for all; each with the number of steps before it.
 fn off_the_later_ones(readings: &[Reading]) -> Vec<(usize, f64)> {
     let (Some(first), Some(last)) = (readings.first(), readings.last()) else {
         return Vec::new();
@@ -100,12 +100,12 @@ fn off_the_later_ones(readings: &[Reading]) -> Vec<(usize, f64)> {
     with_all.filter_map(square).collect()
 }
 
-/// Whether this many steps are longer than a table settles.
+/// Whether this many steps exceed the settling time of a table.
 pub fn is_longer(problem: &Problem, steps: usize) -> bool {
     problem.duration_of_steps(steps) > LONGEST
 }
 
-/// The finding that says so.
+/// The finding on settling.
 pub fn finding(problem: &Problem, steps: usize) -> Option<Finding> {
     let seconds = problem.duration_of_steps(steps);
     let text = format!(

@@ -1,4 +1,4 @@
-//! Uncertainty by biases that may vary without the record showing it.
+//! Uncertainty due to biases that may vary unobserved.
 
 use rayon::prelude::*;
 use serde_json::json;
@@ -14,25 +14,24 @@ use crate::calibration::{
 use crate::imu::{GaussMarkov, Noise, Sensor};
 use crate::run::Aiding;
 
-/// A growth that rounds to once as large is not a finding.
+/// Least growth of σ that is reported.
 const SAID: f64 = 1.05;
-/// Where σ of a varying bias is tried, in 1σ of its logarithm about the usual one.
+/// Values tried for σ of a varying bias, in 1σ of its logarithm around the usual value.
 const SIGMAS: [f64; 5] = [-2.0, -1.0, 0.0, 1.0, 2.0];
 
-/// What the covariance of an estimate lacks for biases of a triad that may vary though its record does not
-/// call for it; absent if the noise is the stated one, where biases of both triads vary in it, or where a table is
-/// read, whose attitudes show how biases vary.
+/// Addition to the covariance of an estimate for biases that may vary although the record does not show it; `None` if
+/// the stated noise is used, if the biases of both triads vary in the model already, or if a table is read, whose
+/// attitudes show bias variation.
 ///
-/// A short record hardly shows a bias that varies slowly, and the likelihood that chose the noise takes the simpler
-/// model. Where the data contradict the stated noise, nobody stated that biases are constant: that those of a triad
-/// vary then has the same probability before the data as that they do not, with σ lognormal about the usual one, as any
-/// stated figure is about its own. The mean square error of the estimate averages these
-/// models by their probabilities after the data (Hoeting, Madigan, Raftery, Volinsky 1999; see
-/// [`super::test_error_terms`]). The sizes count: with the usual one alone σ of an accelerometer bias of a record
-/// held by hand is half as large.
+/// A short record hardly shows a slowly varying bias, and the likelihood that selected the noise prefers the simpler
+/// model. If the data contradict the stated noise, its statement of constant biases is not reliable either. Constant
+/// and varying biases of a triad then have equal prior probabilities, with σ lognormal around the usual value, as for
+/// any stated figure. The mean square error of the estimate averages these models by their posterior probabilities
+/// (Hoeting, Madigan, Raftery, Volinsky 1999; see [`super::test_error_terms`]). Several values of σ are needed: with
+/// the usual one alone, σ of an accelerometer bias of a record by hand is half as large.
 ///
 /// # Errors
-/// [`CalibrationError`] where the problem is not the one of the outcome.
+/// [`CalibrationError`] if the problem is not the one of the outcome.
 pub fn bias_variation(
     problem: &Problem,
     outcome: &Outcome,
@@ -60,7 +59,7 @@ pub fn bias_variation(
     Ok(Some(of_sensors.into_iter().sum()))
 }
 
-/// The finding where that widens the largest σ by so much.
+/// The finding, with the growth of the σ that grew most.
 pub fn biases_may_vary(growth: f64) -> Option<Finding> {
     let text = format!(
         "You stated no bias instability, and this record is too short to measure it. turncal assumed a typical value, \
@@ -71,7 +70,7 @@ pub fn biases_may_vary(growth: f64) -> Option<Finding> {
     (growth >= SAID).then(|| Finding::new(Kind::BiasesMayVary, text, figures))
 }
 
-/// The same of biases of one triad.
+/// The same for the biases of one triad.
 fn of_one(
     problem: &Problem,
     outcome: &Outcome,

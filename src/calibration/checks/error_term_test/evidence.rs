@@ -1,30 +1,30 @@
-//! Probability that errors which are not there explain as much by chance.
+//! Probability that an absent error term explains as much by chance.
 
 use nalgebra::DMatrix;
 
 use crate::statistics::{chi_square_limit, ln_survival};
 
-/// Data that take a smaller share of a prior variance show nothing but rounding.
+/// If data remove a smaller share of a prior variance, it is only rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// What parameters explain of the data, against what they explain by chance.
+/// Improvement of the fit by some parameters, compared with chance.
 ///
-/// By chance the cost falls by `Σ w_k χ²₁`, w_k the share of the prior variance that the data take in the
-/// k-th of independent directions. It is taken for `w χ²` of `Σ w_k / w` states with w the largest: the mean
-/// is right, and the tail as thick as that of the direction that is seen best. Source: MacKay 1992,
-/// "Bayesian interpolation", Neural Computation 4(3), for the number of states that data determine.
+/// By chance, the cost falls by `Σ w_k χ²₁`, with w_k the share of the prior variance that the data remove in the
+/// k-th independent direction. This is approximated by `w χ²` of `Σ w_k / w` states with w the largest share: the
+/// mean is exact, and the tail is that of the best observed direction. Source: MacKay 1992, "Bayesian
+/// interpolation", Neural Computation 4(3), for the number of states that data determine.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Evidence {
-    /// By how much the cost falls with them.
+    /// Decrease of the cost with them.
     pub gain: f64,
-    /// Share of the prior variance that the data take in the direction that they show best.
+    /// Share of the prior variance that the data remove in the best observed direction.
     share: f64,
-    /// States that the data determine.
+    /// Number of states that the data determine.
     states: f64,
 }
 
 impl Evidence {
-    /// Of parameters with this gain and covariance, each over its σ before the data.
+    /// Evidence of parameters with this gain and covariance, each parameter in units of its prior σ.
     pub fn new(gain: f64, over_prior: &DMatrix<f64>) -> Self {
         let taken = DMatrix::identity(over_prior.nrows(), over_prior.ncols()) - over_prior;
         let share = taken.symmetric_eigenvalues().max();
@@ -36,18 +36,18 @@ impl Evidence {
         }
     }
 
-    /// The χ² that it is by chance, and its degrees of freedom; none where the data show nothing of it.
+    /// The gain as a χ² under the null hypothesis, and its degrees of freedom; `None` if the term is not observed.
     pub fn chi_square(&self) -> Option<(f64, f64)> {
         (self.states > 0.0).then(|| (self.gain / self.share, self.states))
     }
 
-    /// −2 ln of the chance of so much by chance alone; zero where the data show nothing of it.
+    /// −2 ln of the p-value; zero if the term is not observed.
     pub fn significance(&self) -> f64 {
         let square = self.chi_square();
         square.map_or(0.0, |(square, states)| -2.0 * ln_survival(states, square))
     }
 
-    /// Limit of the gain that chance exceeds with this probability; infinite where the data show nothing of it.
+    /// Limit that the gain exceeds by chance with this probability; infinite if the term is not observed.
     pub fn limit(&self, chance: f64) -> f64 {
         match self.states > 0.0 {
             true => self.share * chi_square_limit(self.states, chance),

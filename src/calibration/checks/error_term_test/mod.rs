@@ -1,7 +1,7 @@
-//! What each error term costs in σ, what it explains of the data, and which one explains them best.
+//! Test of every error term: its cost in σ, its improvement of the fit, and the best explanation.
 //!
-//! One reduction answers for all constant ones, whichever are on (see [`crate::calibration::reduction`]). Varying
-//! biases are not constant; they take a reduction of their own.
+//! One reduction serves all constant terms, in any combination (see [`crate::calibration::reduction`]). Varying
+//! biases are not constant and need a reduction of their own.
 
 mod bias_variation;
 mod evidence;
@@ -22,32 +22,33 @@ pub use evidence::Evidence;
 pub use terms_on::UnmodelledEffect;
 use terms_on::{Explanation, TermsOn, With, seen_and_left_off};
 
-/// An error term against the same calibration without it.
+/// Comparison of a calibration with and without an error term.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ErrorTermTest {
     /// The error term.
     pub term: ErrorTerm,
-    /// Whether it was on in the calibration; if not, it was tried with its usual σ.
+    /// Whether it was on in the calibration; if not, it was tested with its usual σ.
     pub on: bool,
-    /// RMS σ of each of [`Group::all`] with it over that without it; absent if the group has
+    /// RMS σ of each of [`Group::all`] with the term over that without it; `None` if the group has
     /// no σ.
     pub sigma_factors: [Option<f64>; 6],
-    /// By how much the cost, −2 ln of likelihood and prior, falls with it; for varying biases, which
-    /// are not constant, −2 ln of the likelihood of the whole record.
+    /// Decrease of the cost, −2 ln of likelihood and prior, with the term; for varying biases, which
+    /// are not constant, decrease of −2 ln of the likelihood of the whole record.
     pub gain: f64,
-    /// Limit of the gain at this term's share of the false-alarm rate: χ² with as many degrees as it has states
-    /// that the data show; a ratio of likelihoods exceeds 1/p with no more chance than p.
+    /// Limit of the gain at this term's share of the false-alarm rate: χ² with as many degrees of freedom as the
+    /// term has observed states; for varying biases, from the rule that a likelihood ratio exceeds 1/p with probability
+    /// p at most.
     pub limit: f64,
-    /// −2 ln of the chance of such a gain if its errors are not there: what terms of any number of states
-    /// are compared by.
+    /// −2 ln of the p-value of the gain, by which terms with different numbers of states
+    /// are compared.
     pub significance: f64,
-    /// What it is to the record.
+    /// Its role as an explanation of the record.
     pub role: Role,
     /// Cost per scalar observation, which is NIS, without it …
     pub without: f64,
     /// … and with it.
     pub with: f64,
-    /// What leaving it off may have done to the estimate; absent if it is on, or not constant.
+    /// Possible effect on the estimate of leaving it off; `None` if it is on, or not constant.
     #[serde(skip)]
     pub left_off: Option<UnmodelledEffect>,
 }
@@ -55,21 +56,21 @@ pub struct ErrorTermTest {
 /// Test result for an error term that is off.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Role {
-    /// Nothing: it is on, or the record does not show it, or another explains what it would.
+    /// None: it is on, or not observed, or another term explains the same.
     None,
-    /// The likeliest explanation of what the record shows.
+    /// The likeliest explanation of the record.
     Likeliest,
-    /// An explanation that cannot be told from the likeliest.
+    /// An explanation that cannot be distinguished from the likeliest.
     Alternative,
-    /// Significant, too, where the likeliest is on.
+    /// Still significant with the likeliest on.
     Further,
 }
 
-/// Two explanations are told apart if one is this many times likelier.
+/// Two explanations are distinguished if one is this many times likelier.
 const ODDS: f64 = 20.0;
 
 impl ErrorTermTest {
-    /// Of a calibration with it and one without, not yet judged.
+    /// The comparison of a calibration with the term and one without, before the roles are decided.
     fn new(term: ErrorTerm, on: bool, with: &Posterior, without: &Posterior) -> Self {
         let factor = |group: Group| {
             let of_group = (0..PARAMETERS).filter(|&i| Group::of(i) == group);
@@ -93,14 +94,14 @@ impl ErrorTermTest {
         }
     }
 
-    /// Whether the data show it. What lowers the cost by less than one is worth less than 1σ.
+    /// Whether the term is significant. A decrease of the cost by less than one corresponds to less than 1σ.
     pub fn significant(&self) -> bool {
         self.gain > self.limit.max(1.0)
     }
 
-    /// Of error terms that are off and that the data show, the likeliest, with those that cannot be told
-    /// from it and those that are also significant with it on. `growth` is that of σ by leaving them off;
-    /// none where σ do not include it.
+    /// Finding about the likeliest disabled error term that the data show, with the terms that cannot be
+    /// distinguished from it and those that remain significant with it on. `growth` is the factor by which
+    /// σ were widened because these terms are off; `None` if σ do not include it.
     pub fn most_significant(tests: &[Self], growth: Option<f64>) -> Option<Finding> {
         let likeliest = tests.iter().find(|test| test.role == Role::Likeliest)?;
         let names = |role: Role| -> Vec<&str> {
@@ -135,18 +136,18 @@ impl ErrorTermTest {
     }
 }
 
-/// The effect of every error term that the runs of a problem can hold, and what the covariance of the estimate lacks
-/// for those that are not estimated and for which the data speak.
+/// The effect of every error term that the runs of a problem can show, and the addition to the covariance of the
+/// estimate for terms that are not estimated although the data support them.
 ///
-/// Where the noise was learnt, terms are tried with the stated noise, too: errors that are not modelled
-/// look like noise to a fit of noise alone. One that explains more than the learnt noise does is the cause.
+/// If the noise was estimated, terms are also tested with the stated noise, because a fit of noise alone treats
+/// unmodelled errors as noise. A term that explains more than the estimated noise is the cause.
 ///
 /// Source: for the test, Van Trees, *Detection, Estimation, and Modulation Theory*, part I, §2.5; for
 /// conditioning, Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and
 /// Navigation*, §1.4.14.
 ///
 /// # Errors
-/// [`CalibrationError`] where the problem is not the one of the outcome.
+/// [`CalibrationError`] if the problem is not the one of the outcome.
 pub fn test_error_terms(
     problem: &Problem,
     outcome: &Outcome,
@@ -171,21 +172,21 @@ pub fn test_error_terms(
     Ok((of_record.tests, left_off))
 }
 
-/// −2 ln of the chance that stated noise which is right gives as much to the learnt one.
+/// −2 ln of the p-value of the estimated noise, if the stated noise is correct.
 fn significance_of_noise(outcome: &Outcome) -> f64 {
     let noise = &outcome.noise;
     let ratio = noise.test.map_or(0.0, |test| test.ratio);
     -2.0 * ln_survival(noise.sources.len().max(1) as f64, ratio)
 }
 
-/// Biases that vary are not constant.
+/// Varying biases, the only term that is not constant.
 const VARYING: ErrorTerm = ErrorTerm::GaussMarkovBias;
 
-/// All terms with one noise.
+/// The tests of all terms with one noise model.
 struct Tested<'a> {
     tests: Vec<ErrorTermTest>,
     terms: TermsOn<'a>,
-    /// Where biases vary if they do not in the model, and the other way round.
+    /// The posterior with varying biases if they are constant in the model, and vice versa.
     otherwise: Posterior,
 }
 
@@ -227,7 +228,7 @@ impl<'a> Tested<'a> {
         Ok(tested)
     }
 
-    /// The test of a constant term, with costs of the whole record.
+    /// The test of a constant term, with the costs of the whole record.
     fn constant(&self, term: ErrorTerm, on: bool, chance: f64) -> Option<ErrorTermTest> {
         let (terms, own) = (&self.terms, &self.terms.own);
         let other = match on {
@@ -247,7 +248,7 @@ impl<'a> Tested<'a> {
         })
     }
 
-    /// The same of biases that vary.
+    /// The same for varying biases.
     fn varying(&self, on: bool, chance: f64) -> ErrorTermTest {
         let (own, otherwise) = (&self.terms.own.posterior, &self.otherwise);
         let (with, without) = match on {
@@ -263,8 +264,8 @@ impl<'a> Tested<'a> {
         }
     }
 
-    /// Gives each test its role: the likeliest explanation first, then what is significant once it is on, until
-    /// nothing is.
+    /// Gives each test its role: the likeliest explanation first, then terms that are significant with it on, until
+    /// none is.
     fn decide(&mut self, chance: f64) {
         let Self { tests, terms, .. } = self;
         let shown = tests.iter_mut().filter(|t| !t.on && t.significant());
@@ -300,8 +301,8 @@ impl<'a> Tested<'a> {
         }
     }
 
-    /// What the covariance of the estimate lacks for terms that are off. How likely each is, and which others are
-    /// there, may come from a test with another noise.
+    /// Addition to the covariance of the estimate for terms that are off. The probability of each, and the other terms
+    /// that are present, may come from a test with another noise model.
     fn left_off(&self, weights: &Self) -> Option<ParameterMatrix> {
         let terms = |which: &dyn Fn(&ErrorTermTest) -> bool| -> Vec<ErrorTerm> {
             let tests = weights.tests.iter().filter(|test| which(test));

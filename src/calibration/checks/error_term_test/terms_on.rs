@@ -1,4 +1,4 @@
-//! A calibration with error terms on that were off, or off that were on, from one reduction.
+//! Calibrations with other error terms on or off, from one reduction.
 
 use nalgebra::DMatrix;
 
@@ -8,33 +8,33 @@ use crate::calibration::{
     Posterior, Prior, Problem, Reduction,
 };
 
-/// 1σ of what an error term that is not estimated changes each parameter by: in no covariance.
+/// 1σ of the change of each parameter by an error term that is not estimated; not part of any covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UnmodelledEffect {
-    /// Where its own parameters have their usual σ around zero.
+    /// If its own parameters have their usual σ around zero.
     pub usual: ParameterVector,
-    /// RMS where they are also as the record shows them.
+    /// RMS if the record's evidence of them is used as well.
     pub shown: ParameterVector,
 }
 
-/// A term as an explanation of what a record shows.
+/// A term as an explanation of a record.
 pub struct Explanation {
-    /// ln of the likelihood with it, and with others that are on, over that without any.
+    /// ln of the likelihood ratio of the model with this term and the others that are on to the model without any.
     pub ln_likelihood_ratio: f64,
-    /// The same over that with the others alone.
+    /// The same relative to the model with the others only.
     pub of_term: f64,
-    /// Mean square by which all of them change the parameters.
+    /// Mean square change of the parameters by all of them.
     pub added: ParameterMatrix,
 }
 
-/// What the covariance of an estimate lacks for error terms that are not estimated and for which the data speak;
-/// absent if they speak for none of `tried`.
+/// Addition to the covariance of an estimate for error terms that are not estimated although the data support them;
+/// `None` if they support none of `tried`.
 ///
-/// With a term the estimate would be `θ + Δ`, with the covariance `P + P_b`; so the mean square error of `θ` is
-/// `P + P_b + Δ Δᵀ`. Explanations, and that there is none, count as much as each is likely (Hoeting, Madigan,
-/// Raftery, Volinsky 1999, "Bayesian model averaging: a tutorial", Statistical Science 14(4)). Before the data it
-/// has the same probability that there is a term as that there is none, and all terms have the same. A term that
-/// the data make less likely than it was counts as none.
+/// With a term, the estimate would be `θ + Δ` with the covariance `P + P_b`, so the mean square error of `θ` is
+/// `P + P_b + Δ Δᵀ`. Explanations, including that of no term, are weighted by their probabilities (Hoeting, Madigan,
+/// Raftery, Volinsky 1999, "Bayesian model averaging: a tutorial", Statistical Science 14(4)). A priori, one term and
+/// no term are equally probable, and so are all terms. A term that the data make less likely than its prior
+/// is ignored.
 pub fn seen_and_left_off(explanations: &[Explanation], tried: usize) -> Option<ParameterMatrix> {
     let spoken_for = explanations.iter().filter(|of| of.of_term > 0.0);
     let spoken_for: Vec<&Explanation> = spoken_for.collect();
@@ -52,16 +52,16 @@ pub fn seen_and_left_off(explanations: &[Explanation], tried: usize) -> Option<P
     Some(sum / weights)
 }
 
-/// What a calibrated record says of every constant that it can hold, whatever is on.
+/// Information of a calibrated record on every constant that it can show, for any choice of terms.
 pub struct TermsOn<'a> {
     model: &'a Model,
     at: &'a Linearisation,
     reduction: Reduction,
-    /// With what the model has on.
+    /// Prior and posterior with the terms of the model.
     pub own: With,
 }
 
-/// What is known of the constants before and with the data.
+/// Prior and posterior of the constants.
 pub struct With {
     prior: Prior,
     pub posterior: Posterior,
@@ -81,7 +81,7 @@ impl<'a> TermsOn<'a> {
         })
     }
 
-    /// With these terms on beside those of the model, each with its usual σ.
+    /// With these terms on in addition to those of the model, each with its usual σ.
     pub fn with(&self, terms: &[ErrorTerm]) -> With {
         let mut model = self.model.clone();
         terms.iter().for_each(|&term| model.switch_on(term));
@@ -102,7 +102,7 @@ impl<'a> TermsOn<'a> {
         of_term.map(|(place, _)| place).collect()
     }
 
-    /// Covariance of the constants of a term that is on, each over its σ before the data.
+    /// Covariance of the constants of a term that is on, each in units of its prior σ.
     fn over_prior(&self, term: ErrorTerm, With { prior, posterior }: &With) -> DMatrix<f64> {
         let of = self.of(term);
         DMatrix::from_fn(of.len(), of.len(), |i, j| {
@@ -110,7 +110,7 @@ impl<'a> TermsOn<'a> {
         })
     }
 
-    /// What a term that is off changes the parameters by; absent if the reduction does not have it.
+    /// Change of the parameters by a term that is off; `None` if the reduction does not include it.
     pub fn left_off(&self, term: ErrorTerm) -> Option<UnmodelledEffect> {
         let (of, with) = (self.of(term), self.with(&[term]));
         let own = &self.own.posterior;
@@ -128,14 +128,14 @@ impl<'a> TermsOn<'a> {
         })
     }
 
-    /// What a term explains, with it and without; absent if the reduction does not have it.
+    /// Evidence of a term from the calibrations with and without it; `None` if the reduction does not include it.
     pub fn evidence(&self, term: ErrorTerm, with: &With, without: &With) -> Option<Evidence> {
         let over_prior = self.over_prior(term, with);
         let gain = without.posterior.cost - with.posterior.cost;
         (!over_prior.is_empty()).then(|| Evidence::new(gain, &over_prior))
     }
 
-    /// A term of its usual size as an explanation where these others are on; absent if the data show less of it than
+    /// A term of its usual size as an explanation with these others on; `None` if the data determine less of it than
     /// they leave open.
     pub fn explanation(&self, term: ErrorTerm, others: &[ErrorTerm]) -> Option<Explanation> {
         let alone = self.over_prior(term, &self.with(&[term]));

@@ -1,19 +1,19 @@
-//! Kinds of findings: how each is called, how much it weighs in the verdict, and what it means.
+//! Kinds of findings: their names, their levels and their meanings.
 
-/// How much a finding weighs in the verdict.
+/// Severity of a finding, which determines the verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
     /// The values may not be used.
     Failed,
-    /// The values may be used by whoever has read the finding.
+    /// The values may be used if the finding is taken into account.
     Care,
-    /// The result includes it.
+    /// The result already accounts for it.
     Note,
 }
 
 macro_rules! kinds {
     ($($variant:ident = $code:literal $name:literal $level:ident: $explanation:literal)*) => {
-        /// What a finding is about.
+        /// Subject of a finding.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         pub enum Kind {
             $(#[doc = $explanation] $variant,)*
@@ -33,12 +33,12 @@ macro_rules! kinds {
                 match self { $(Self::$variant => $name,)* }
             }
 
-            /// How much it weighs in the verdict.
+            /// Its severity.
             pub fn level(self) -> Level {
                 match self { $(Self::$variant => Level::$level,)* }
             }
 
-            /// What it means, where it comes from and what to do.
+            /// Its meaning, cause and remedy.
             pub fn explanation(self) -> &'static str {
                 match self { $(Self::$variant => $explanation,)* }
             }
@@ -143,7 +143,7 @@ kinds! {
         "Labels of sections contradict gravity or the gyros. The finding says which, and whether the section was used. \
          Correct the label in the file of [segments]."
     SectionsLost = "W28" "sections-lost" Care:
-        "A labelled section lacks so many rows that it was not used. Record it again, or remove it from [segments]."
+        "A labelled section was skipped: too many rows are missing. Record it again, or remove it from [segments]."
     ResidualsLarge = "W29" "residuals-large" Care:
         "The closed form leaves larger residuals than stated noise and table errors explain. turncal widened σ by as much. \
          The finding names the interval with the largest residual: look there for a bump, a wrong label or attitude; else \
@@ -159,7 +159,7 @@ kinds! {
 }
 
 impl Kind {
-    /// By its name or its code.
+    /// The kind with this name or code.
     pub fn named(text: &str) -> Option<Self> {
         let is_named = |of: &&Self| of.name() == text || of.code().eq_ignore_ascii_case(text);
         Self::ALL.iter().find(is_named).copied()

@@ -1,4 +1,4 @@
-//! What a calibration engineer must know before using the figures.
+//! Findings: facts that a calibration engineer must know before using the figures.
 
 pub mod kind;
 pub mod verdict;
@@ -11,15 +11,15 @@ use serde_json::Value;
 use crate::imu::Sensor;
 use kind::{Kind, Level};
 
-/// What a check found: what is wrong, what it means for the result and what to do, with its figures.
+/// A finding of a check: the problem, its meaning for the result and the remedy, with figures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
     /// The code of its kind, such as `W04`.
     #[serde(default)]
     pub code: String,
-    /// What kind of finding, such as `not-observed`.
+    /// The name of its kind, such as `not-observed`.
     pub kind: String,
-    /// In words.
+    /// Its text.
     pub text: String,
     /// Its figures by name.
     #[serde(default)]
@@ -27,7 +27,7 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// Of a kind, in these words and with these figures.
+    /// A finding of this kind, with text and figures.
     pub fn new(kind: Kind, text: String, figures: Value) -> Self {
         Self {
             code: kind.code().to_owned(),
@@ -37,19 +37,19 @@ impl Finding {
         }
     }
 
-    /// What the reader of the files found and mended, or what they state without effect.
+    /// A fault that the reader of the files repaired, or a statement without effect.
     pub fn of_recording(note: String) -> Self {
         let figures = serde_json::json!({ "note": note });
         Self::new(Kind::Recording, note, figures)
     }
 
-    /// What hardly fits a record of what is stated of it.
+    /// A statement that hardly fits the record.
     pub fn of_statement(doubt: String) -> Self {
         let figures = serde_json::json!({ "doubt": doubt });
         Self::new(Kind::StatementDoubted, doubt, figures)
     }
 
-    /// How much it weighs. Kinds of another version are read with care.
+    /// Its severity. Unknown kinds, from another version, have the level of care.
     pub fn level(&self) -> Level {
         Kind::named(&self.kind).map_or(Level::Care, Kind::level)
     }
@@ -59,7 +59,7 @@ impl Finding {
         self.kind == kind.name()
     }
 
-    /// What is wrong, in the first sentence of its words, and what to do, in the last.
+    /// The problem, in the first sentence of the text, and the remedy, in the last.
     pub fn headline(&self) -> (&str, Option<&str>) {
         match self.text.split_once(". ") {
             Some((first, rest)) => (first, rest.rsplit(". ").next()),
@@ -74,7 +74,7 @@ impl fmt::Display for Finding {
     }
 }
 
-/// A triad at the beginning of a sentence.
+/// Name of a triad at the start of a sentence.
 pub fn triad_name(sensor: Sensor) -> &'static str {
     match sensor {
         Sensor::Gyro => "Gyro",
@@ -82,7 +82,7 @@ pub fn triad_name(sensor: Sensor) -> &'static str {
     }
 }
 
-/// How much σ were widened: in percent below a factor of two, else as a factor.
+/// The widening of σ in words: in percent below a factor of two, else as a factor.
 pub fn widened_by(growth: f64) -> String {
     match growth < 2.0 {
         true => format!("by up to {:.0} %", 100.0 * (growth - 1.0)),

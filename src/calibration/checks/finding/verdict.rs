@@ -1,4 +1,4 @@
-//! Whether a calibration may be used, by its findings or by a specification.
+//! Verdict on a calibration, from its findings or from a specification.
 
 use std::fmt;
 
@@ -10,19 +10,19 @@ use super::kind::Level;
 /// Whether a calibration may be used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Word {
-    /// It converged, its σ agree with its residuals, and all that was asked for is determined.
+    /// It converged, its σ agree with its residuals, and all requested parameters are determined.
     #[serde(rename = "good")]
     Good,
-    /// The same, but for what its reasons say.
+    /// As good, with the restrictions that its reasons state.
     #[serde(rename = "use with care")]
     UseWithCare,
     /// Its values may not be used.
     #[serde(rename = "failed")]
     Failed,
-    /// Every limit of a specification is kept.
+    /// Every limit of a specification is met.
     #[serde(rename = "pass")]
     Pass,
-    /// No limit is certainly exceeded, and some may be.
+    /// No limit is exceeded with certainty, but some may be.
     #[serde(rename = "undecided")]
     Undecided,
     /// A limit is exceeded.
@@ -31,7 +31,7 @@ pub enum Word {
 }
 
 impl Word {
-    /// As a class of a page's style.
+    /// Its CSS class on a page.
     pub fn class(self) -> &'static str {
         match self {
             Self::Good | Self::Pass => "good",
@@ -54,17 +54,17 @@ impl fmt::Display for Word {
     }
 }
 
-/// A word, and the codes of the findings that are the reason for it.
+/// A word, with the codes of the findings that cause it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Verdict {
     /// The word.
     pub word: Word,
-    /// Codes such as `W07`; none of what is good.
+    /// Codes such as `W07`; empty for a good result.
     pub reasons: Vec<String>,
 }
 
 impl Verdict {
-    /// As severe as the most severe finding.
+    /// The verdict of the most severe finding.
     pub fn of(findings: &[Finding]) -> Self {
         let worst = findings.iter().map(Finding::level).min();
         let worst = worst.unwrap_or(Level::Note);

@@ -1,9 +1,9 @@
-//! What a path showed of the parameters, and what it left as it was.
+//! Observability: which combinations of parameters a path determined.
 //!
-//! In units of its prior σ everything known beforehand is a unit sphere. There the eigenvectors of the
-//! posterior covariance are the directions that the run saw independently of each other; the root of
-//! an eigenvalue is the part of the prior σ that is left (Ham and Brown 1983, "Observability,
-//! eigenvalues, and Kalman filtering", IEEE Trans. AES-19).
+//! In units of the prior σ, the prior covariance is a unit sphere. There, the eigenvectors of the
+//! posterior covariance are the independently observed directions; the root of an eigenvalue is the
+//! remaining part of the prior σ (Ham and Brown 1983, "Observability, eigenvalues, and Kalman
+//! filtering", IEEE Trans. AES-19).
 
 mod not_observed;
 
@@ -14,16 +14,16 @@ use crate::calibration::{Estimate, OBSERVED_BELOW, PARAMETERS, ParameterVector, 
 use crate::imu::InstallationForm;
 pub use not_observed::{not_observed, not_observed_by_path, temperature_not_seen};
 
-/// Directions left with the same part of their σ, to this part of it, are one space, in which the
-/// simplest directions are as good as any.
+/// Directions whose remaining σ agree to this part of it form one space, for which the simplest basis may
+/// be chosen.
 const ALIKE: f64 = 0.01;
 /// A component is named if its square is at least this part of the whole.
 const NAMED: f64 = 0.1;
-/// From this correlation on, what is not known of a direction is not known of the attitude either.
+/// From this correlation on, an unobserved direction is reported as tied to the attitude.
 const TIED: f64 = 0.7;
-/// A turn below this, rad, leaves a pair of directions as it is.
+/// Rotations of a pair of directions below this count as converged, rad.
 const SETTLED: f64 = 1e-9;
-/// Pairs are turned at most this many times each; they settle within ten.
+/// Most rotations of each pair; they converge within ten.
 const SWEEPS: usize = 100;
 
 /// Covariance of each parameter error δθ with each component of the initial attitude error φ₀ in
@@ -33,7 +33,7 @@ pub type AttitudeCovariance = SMatrix<f64, PARAMETERS, 3>;
 /// Independent directions of the parameters, the least observed first.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Observability {
-    /// As many as there are estimated parameters.
+    /// One direction for each estimated parameter.
     pub directions: Vec<Direction>,
 }
 
@@ -42,11 +42,11 @@ pub struct Observability {
 pub struct Direction {
     /// Posterior over prior σ of the combination, from 0 (known) to 1 (not observed).
     pub remaining: f64,
-    /// Components worth naming, the largest first and positive; squares of all sum to one.
+    /// The major components, the largest first and positive; the squares of all sum to one.
     pub parts: Vec<Part>,
-    /// Whether the parts not named make up more than one that is.
+    /// Whether the omitted components together exceed one of the major ones.
     pub others: bool,
-    /// Components of the initial attitude whose error goes with the combination's.
+    /// Components of the initial attitude with errors correlated to that of the combination.
     pub attitude: Vec<AttitudePart>,
 }
 
@@ -59,7 +59,7 @@ pub struct Part {
     pub component: f64,
 }
 
-/// A component of the initial attitude that goes with a direction.
+/// A component of the initial attitude that is correlated with a direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AttitudePart {
     /// `tilt about East`, `tilt about North` or `heading`.
@@ -69,7 +69,7 @@ pub struct AttitudePart {
 }
 
 impl Observability {
-    /// Of an estimate, from the σ that its parameters had before.
+    /// Observability of an estimate, relative to the prior σ of its parameters.
     pub(in crate::calibration) fn new(
         estimate: &Estimate,
         prior_sigma: &ParameterVector,
@@ -118,7 +118,7 @@ impl Observability {
             .take_while(|direction| direction.remaining > OBSERVED_BELOW)
     }
 
-    /// Combinations of parameters that were not observed though each parameter was, in words.
+    /// Descriptions of unobserved combinations of parameters that are observed individually.
     pub(in crate::calibration) fn combinations(
         &self,
         form: InstallationForm,
@@ -132,8 +132,8 @@ impl Observability {
 }
 
 impl Direction {
-    /// Such as `gyro scale z with gyro bias z` or `gyro installation xy against gyro installation yx`:
-    /// with what has the same sign, against what has the other.
+    /// A description such as `gyro scale z with gyro bias z` or `gyro installation xy against gyro installation
+    /// yx`: `with` for the same sign, `against` for the opposite sign.
     pub fn words(&self, form: InstallationForm) -> String {
         let mut text = String::new();
         let mut say = |sign: f64, name: &str| {
@@ -156,9 +156,9 @@ impl Direction {
     }
 }
 
-/// Turns directions within the space that they span until the fourth powers of their components are
-/// as large as can be, so that each has few (quartimax: Neuhaus and Wrigley 1954, "The quartimax
-/// method", Brit. J. Stat. Psych. 7).
+/// Rotates directions within the space that they span to maximise the fourth powers of their components,
+/// so that each has few components (quartimax: Neuhaus and Wrigley 1954, "The quartimax method", Brit. J.
+/// Stat. Psych. 7).
 fn simplify(directions: &mut [Vec<f64>]) {
     for _ in 0..SWEEPS {
         let mut largest = 0f64;

@@ -1,4 +1,5 @@
-//! What the data do not determine: parameters, combinations of them, the heading, change with temperature.
+//! Findings on quantities that the data do not determine: parameters, combinations of parameters, the heading,
+//! temperature dependence.
 
 use serde_json::json;
 
@@ -6,7 +7,7 @@ use crate::calibration::FindingKind as Kind;
 use crate::calibration::{Finding, Outcome, auxiliary_name, parameter_name};
 use crate::units::DEGREE;
 
-/// What a filter's run along its path does not determine.
+/// All findings on quantities that the path of a filter's run does not determine.
 pub fn not_observed_by_path(outcome: &Outcome) -> Vec<Finding> {
     let path = "this path";
     let (form, hidden) = (outcome.estimate.form(), outcome.unobserved());
@@ -22,7 +23,7 @@ pub fn not_observed_by_path(outcome: &Outcome) -> Vec<Finding> {
     findings.into_iter().flatten().collect()
 }
 
-/// Parameters that kept more than half of their prior σ, if there are any.
+/// The finding on parameters that kept more than half of their prior σ, if any.
 pub fn not_observed(by: &str, parameters: Vec<String>) -> Option<Finding> {
     let text = format!(
         "Not determined by {by} (σ is still more than half of the prior): {}. Add positions or turns that excite \
@@ -33,7 +34,7 @@ pub fn not_observed(by: &str, parameters: Vec<String>) -> Option<Finding> {
     (!parameters.is_empty()).then(|| Finding::new(Kind::NotObserved, text, figures))
 }
 
-/// Parameters whose change with temperature the recordings do not show, if there are any.
+/// The finding on parameters whose temperature dependence the recordings do not show, if any.
 pub fn temperature_not_seen(parameters: Vec<String>) -> Option<Finding> {
     let text = format!(
         "The temperature dependence of these parameters is unknown: {}. Their σ are valid only at the recorded \
@@ -44,7 +45,7 @@ pub fn temperature_not_seen(parameters: Vec<String>) -> Option<Finding> {
     (!parameters.is_empty()).then(|| Finding::new(Kind::TemperatureNotSeen, text, figures))
 }
 
-/// Combinations of parameters that were not observed though each of them was, if there are any.
+/// The finding on unobserved combinations of parameters that are observed individually, if any.
 fn combinations(combinations: Vec<String>) -> Option<Finding> {
     let text = format!(
         "Not determined by this path, though each parameter alone was: {}. Add positions or turns that separate \
@@ -56,7 +57,7 @@ fn combinations(combinations: Vec<String>) -> Option<Finding> {
     any.then(|| Finding::new(Kind::CombinationsNotObserved, text, figures))
 }
 
-/// The heading with its 1σ after the run, rad.
+/// The finding on the heading, with its 1σ after the run, rad.
 fn heading(sigma_rad: f64) -> Finding {
     let text = format!(
         "Heading could not be determined (σ = {:.1}°): the gyros are too noisy to sense Earth rate, or their biases \
@@ -68,7 +69,7 @@ fn heading(sigma_rad: f64) -> Finding {
     Finding::new(Kind::HeadingNotObserved, text, figures)
 }
 
-/// Second order and asymmetry of the accelerometers cannot be told apart.
+/// The finding that second order and asymmetry of the accelerometers cannot be distinguished.
 fn even_terms() -> Finding {
     let text = "Second order and asymmetry of the accelerometers have the same effect in dwells with an axis up or \
                 down. Add dwells between them, such as at 45°, or leave one of the two terms off.";

@@ -1,4 +1,4 @@
-//! Batch least squares: the linear problem of the last held pass once more, without a Kalman filter.
+//! Batch least squares: solves the linear problem of the last pass with held linearisation without a Kalman filter.
 //!
 //! Every fact is a row of unit variance: what was known before, each observation, each independent
 //! source of noise in a stretch. The rows are reduced stretch by stretch with Householder's QR.
@@ -195,8 +195,8 @@ impl<'a> Batch<'a> {
     }
 }
 
-/// `[R | z]`: the unknowns x obey `R x = z` but for independent errors of unit variance, R upper
-/// triangular. Unknowns in order: attitude of the dwell (three, none of a table without position error),
+/// `[R | z]`: the unknowns x obey `R x = z` up to independent errors of unit variance, R upper
+/// triangular. Unknowns in order: attitude of the dwell (three; zero for a table without position error),
 /// navigation errors now,
 /// parameter errors that are estimated, in units of their prior σ, and initial attitude error.
 struct Information {

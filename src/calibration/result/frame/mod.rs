@@ -1,4 +1,4 @@
-//! Calibrations brought to the general form, one body frame and one nominal scale, so that they can
+//! Conversion of calibrations to the general form, one body frame and one nominal scale, so that they can
 //! be subtracted.
 //!
 //! The same instrument has another `C` in every body frame: `K C u = K (C Rᵀ)(R u)`. In the
@@ -22,18 +22,18 @@ use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, 
 /// A calibration in the general form, in a given body frame, normalised by given nominal scales.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Canonical {
-    /// What it is called in tables and messages.
+    /// Its name in tables and messages.
     pub name: String,
-    /// What fixes the body axes.
+    /// The body frame.
     pub body_frame: BodyFrame,
     /// Both triads, in the general form.
     pub triads: PerSensor<Triad>,
-    /// Covariance of their parameters, zero rows and columns where not estimated; none if the record
-    /// claims no σ at all.
+    /// Covariance of their parameters, with zero rows and columns for parameters not estimated; `None` if the record
+    /// states no σ.
     pub covariance: Option<ParameterMatrix>,
-    /// Whether the record gives correlations; if not, the covariance takes its σ for independent.
+    /// Whether the record gives correlations; if not, its errors are treated as independent.
     pub correlated: bool,
-    /// Constants beside the parameters by name, which no body frame changes to first order.
+    /// Auxiliary constants by name, which to first order do not depend on the body frame.
     pub constants: BTreeMap<String, TermRecord>,
     /// False only if the record says that its method did not converge.
     pub converged: bool,
@@ -89,7 +89,7 @@ impl Canonical {
         to_vector(&self.triads)
     }
 
-    /// 1σ of each parameter, zero where not estimated; none if no σ is claimed.
+    /// 1σ of each parameter, zero if not estimated; `None` if no σ is stated.
     pub fn sigma(&self) -> Option<ParameterVector> {
         let covariance = self.covariance.as_ref()?;
         Some(covariance.diagonal().map(|v| v.max(0.0).sqrt()))
@@ -97,8 +97,8 @@ impl Canonical {
 }
 
 impl Estimate {
-    /// The same calibration in the general form; what the form held fixed gets the covariance that
-    /// follows from its own parameters.
+    /// The same estimate in the general form; parameters that the form fixed get the covariance that
+    /// follows from the form's parameters.
     pub fn in_general_form(&self) -> Self {
         let j = self.to_general_form(BodyFrame::Table);
         Self {

@@ -19,7 +19,7 @@ use crate::statistics::median;
 /// Sensitivities from a tenth to ten times the stated one are tried, which is beyond the next two ranges of an
 /// instrument; units are told apart by their nominal scale as run.toml is read …
 const WIDEST: f64 = 10.0;
-/// … each this many times the one before: what is left of a turn between two is linear.
+/// … each this many times the one before: a residual turn between two of them is in the linear range.
 const STEP: f64 = 1.1;
 /// Within the widest tolerance of data sheets, 10 %, a stated sensitivity is right however small its prior, half way to
 /// the next range it is wrong however large. Between these it may be this many σ of its prior off.
@@ -60,7 +60,7 @@ impl Contradiction {
         if mounting.is_none() && (stated.is_explained || !misses) {
             return None;
         }
-        // Three quarters of a turn are a quarter the other way: of what is as likely, axes are named.
+        // Three quarters of a turn equal a quarter the other way: of equally likely hypotheses, the axes are named.
         let least = mounting.as_ref().map_or(beyond_chance, |mounting| {
             let axes = (TooSmall::CARELESS, mounting.orders);
             sum(&parts(problem, run, &measured, axes)) + TOLD_APART.ln()
@@ -176,7 +176,7 @@ fn factors(log_likelihood: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
     tried
 }
 
-/// A run as it is if these gyros are so many times as sensitive as stated.
+/// The run if the sensitivity of these gyros is `factor` times the stated one.
 fn less_sensitive(run: &Run, axes: Axes, factor: f64) -> Run {
     let mut run = run.clone();
     let by = Vector3::from_fn(|axis, _| match axes {

@@ -77,7 +77,7 @@ impl Sensitivity {
                 AXES[axis]
             ),
         });
-        // A row that lasts so many times as long turns as far by so many times the rate.
+        // If a row lasts longer by a factor, the same turn takes a rate smaller by that factor.
         let lasts = match (self.output, self.sensor) {
             (Some(Output::Rate), Sensor::Gyro) => Some(factor.recip()),
             (Some(Output::Pulse | Output::Increment), Sensor::Accel) => Some(factor),

@@ -1,4 +1,4 @@
-//! The list that tells what turncal wrote into a directory from what a user put beside it.
+//! The list that distinguishes files that turncal wrote into a directory from files that a user added.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
@@ -29,7 +29,7 @@ pub fn of_names<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     lines.flat_map(|line| [line, "\n"]).collect()
 }
 
-/// What the list of a directory names, itself among it; none without a list.
+/// What the list of a directory names, itself among it; `None` without a list.
 fn listed(directory: &Path) -> Option<BTreeSet<String>> {
     let file = directory.join(FILE);
     let text = match fs::symlink_metadata(&file) {

@@ -1,4 +1,4 @@
-//! What a user states of a log beside it.
+//! Facts that a user states about a log in options.
 
 mod kalibr;
 
@@ -29,7 +29,7 @@ pub struct Stated {
     pub noise: Option<PerSensor<Noise>>,
 }
 
-/// A unit in a word of `run.toml` or as files spell it, or so many of it: `deg/s`, `1/131 deg/s`, `0.061 mg`.
+/// A unit spelt as in `run.toml` or in log files, or a multiple of it: `deg/s`, `1/131 deg/s`, `0.061 mg`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StatedUnit(pub(super) Unit);
 

@@ -119,7 +119,7 @@ fn one_attitude_leaves_the_zero_open_and_motion_without_rest_the_scale() {
             "# scale =  # TODO: counts for one rad/s",
         ],
     );
-    assert!(text.contains("if it says nothing at zero"), "{text}");
+    assert!(text.contains("if its zero offset is zero"), "{text}");
     let text = draft(HEADER, |k, _| {
         let t = k as f64 * 0.01;
         let (level, turned) = (0.9 * t, 1.7 * t);

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// Turns of 60° to 140° about each axis in turn, each in so many seconds after two of rest.
+/// Turns of 60° to 140° about x, y and z in sequence, each after a dwell of two seconds.
 struct Turned {
     rate: f64,
     turns: usize,

@@ -22,7 +22,7 @@ pub struct Topics {
 }
 
 impl Topics {
-    /// Adds a number of a topic, which may be known by another: a recorder begins anew, or several programs publish.
+    /// Adds a number for a topic. A topic may have several: a recorder restarts, or several programs publish.
     pub fn add(&mut self, number: u32, topic: &str, reader: impl FnOnce() -> Reader) {
         if self.of_number.contains_key(&number) {
             return;

@@ -7,7 +7,7 @@ use crate::formats::streams::bytes::Broken;
 /// Chunks are of some megabytes; what claims more is damaged or a bomb.
 const LONGEST: u64 = 1 << 27;
 
-/// Unpacks a chunk of so many bytes by the method that the file names.
+/// Unpacks a chunk into `size` bytes by the method that the file names.
 pub fn unpack(method: &str, packed: &[u8], size: u64, offset: u64) -> Result<Vec<u8>, Broken> {
     if size > LONGEST {
         return Err(Broken::new(

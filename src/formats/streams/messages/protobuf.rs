@@ -20,7 +20,7 @@ pub struct Message {
 }
 
 impl Message {
-    /// By a set of descriptors; none if they lack a type.
+    /// By a set of descriptors; `None` if they lack a type.
     pub fn parse(name: &str, set: &[u8]) -> Option<Self> {
         let descriptor = DescriptorPool::decode(set)
             .ok()?

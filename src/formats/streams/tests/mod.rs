@@ -273,7 +273,7 @@ fn mutated(bytes: &[u8], rng: &mut ChaCha8Rng) -> Vec<u8> {
     bytes
 }
 
-/// Reads so many mutated files, each of which must end.
+/// Reads `count` mutated files; each read must terminate.
 fn endure(seeds: &[Vec<u8>], count: u64, seed: u64) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut slowest = 0.0f64;

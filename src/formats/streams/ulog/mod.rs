@@ -152,8 +152,8 @@ impl Ulog {
         }
     }
 
-    /// The devices that are selected first: they were when logging began, but samples of others stand before the
-    /// message that says so. What is damaged is told where it is read.
+    /// The devices selected at the start of the log: samples of other devices may precede the message that selects
+    /// them. Damage is reported later, when the messages are read.
     fn first_selected(&mut self) -> PerSensor<Option<f64>> {
         while !self.parameters.have_selected() && matches!(self.advance(), Ok(Some(_))) {}
         self.parameters.selected

@@ -1,27 +1,27 @@
-//! One way to fill a hole, and the error that it makes where there is no hole.
+//! One way to fill a hole, and its error on intact stretches.
 
 use std::ops::Range;
 
 use nalgebra::{Matrix4, Vector4};
 
-/// Intact stretches that are filled as the hole is, on either side at most …
+/// Most intact stretches on either side on which a fill is tested …
 const TRIALS: usize = 16;
-/// … and on both together at least.
+/// … and fewest on both sides together.
 const FEWEST_TRIALS: usize = 8;
-/// A change across the hole that is this many times the largest across intact stretches is not known
-/// from them.
+/// If the change across the hole exceeds this many times the largest across intact stretches, they do not represent
+/// it.
 const UNTRIED: f64 = 2.0;
 
 /// A polynomial through neighbours by least squares.
 pub struct Fill {
     hole: Range<usize>,
-    /// Neighbours that follow one another, all those before the hole first.
+    /// Runs of consecutive neighbours; those before the hole come first.
     runs: Vec<Range<usize>>,
-    /// How many of the runs are before the hole.
+    /// Number of runs before the hole.
     before: usize,
-    /// Of each neighbour in the sum over the hole.
+    /// Weight of each neighbour in the sum over the hole.
     weights: Vec<f64>,
-    /// By how many samples later or earlier intact stretches near by are.
+    /// Offsets of the nearby intact stretches, in samples.
     shifts: Vec<isize>,
     degree: usize,
     inverse: Matrix4<f64>,
@@ -29,7 +29,7 @@ pub struct Fill {
 }
 
 impl Fill {
-    /// Of this degree through the nearest of the neighbours before and after a hole, each outwards.
+    /// A polynomial of this degree through the neighbours before and after a hole, each listed outwards.
     pub fn new(
         degree: usize,
         sides: [&[usize]; 2],
@@ -94,7 +94,7 @@ impl Fill {
         }
     }
 
-    /// By how much later the same samples are all sound, for as many places on either side as are tried.
+    /// Offsets at which hole and neighbours are all usable, up to [`TRIALS`] on either side.
     fn intact(&self, sound: &[bool]) -> Vec<isize> {
         let is_sound = |run: &Range<usize>, shift| {
             let start = run.start.checked_add_signed(shift);
@@ -116,8 +116,8 @@ impl Fill {
         of_side(-1).chain(of_side(1)).collect()
     }
 
-    /// Mean square of the sum's error over intact stretches near by, every other and the rest; none if the
-    /// first is more than `most`.
+    /// Mean square error of the sum over nearby intact stretches, of the even and of the odd ones; `None` if the
+    /// first exceeds `most`.
     pub fn measured(&self, axis: &[f64], most: f64) -> Option<[f64; 2]> {
         let count = self.shifts.len();
         let change = self.change(axis, 0).abs();
@@ -146,12 +146,12 @@ impl Fill {
         Some(halves.map(|half| half.max(sudden)))
     }
 
-    /// Sum over the hole as it is filled.
+    /// Sum of the filled values over the hole.
     pub fn sum(&self, axis: &[f64]) -> f64 {
         self.sum_after(axis, 0)
     }
 
-    /// The same of a hole `shift` samples later.
+    /// The same for a hole `shift` samples later.
     fn sum_after(&self, axis: &[f64], shift: isize) -> f64 {
         let (mut weights, mut sum) = (self.weights.as_slice(), 0.0);
         for run in &self.runs {
@@ -162,8 +162,8 @@ impl Fill {
         sum
     }
 
-    /// Mean of the neighbours after the hole less that of those before, `shift` samples later; zero where there
-    /// are none on a side.
+    /// Mean of the neighbours after the hole minus the mean of those before, `shift` samples later; zero if one
+    /// side has none.
     fn change(&self, axis: &[f64], shift: isize) -> f64 {
         let (before, after) = self.runs.split_at(self.before);
         let mean = |runs: &[Range<usize>]| {
@@ -181,7 +181,7 @@ fn later(run: &Range<usize>, shift: isize) -> Range<usize> {
     start..start + run.len()
 }
 
-/// Runs of samples that follow one another, of increasing samples.
+/// Groups increasing samples into runs of consecutive ones.
 fn runs<'a>(samples: impl Iterator<Item = &'a usize>) -> Vec<Range<usize>> {
     let mut runs: Vec<Range<usize>> = Vec::new();
     for &k in samples {
@@ -193,7 +193,7 @@ fn runs<'a>(samples: impl Iterator<Item = &'a usize>) -> Vec<Range<usize>> {
     runs
 }
 
-/// Sums that are formed beside each other, so that none waits for another.
+/// Number of sums that are formed in parallel, so that none waits for another.
 const BESIDE: usize = 4;
 
 fn product(weights: &[f64], values: &[f64]) -> f64 {

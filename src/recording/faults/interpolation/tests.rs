@@ -86,9 +86,9 @@ fn a_hole_too_long_is_filled_but_not_vouched_for() {
     assert!((axis[550] - 550.0).abs() < 1e-9);
 }
 
-/// Means over many single holes in pulses at this mean rate a row, with normal noise of so many pulses a row,
-/// what is left over being carried on: of the error, of its square, and of the variance stated; and how many
-/// holes there were.
+/// Means over many single holes of the error, its square and the stated variance, and the number of holes. The data
+/// are pulses of this mean rate per row with normal noise of `sigma` pulses per row; the remainder of each row is
+/// carried into the next.
 fn pulses(rate: f64, sigma: f64) -> ([f64; 3], f64) {
     const ROWS: usize = 120_000;
     let mut random = ChaCha8Rng::seed_from_u64(5);

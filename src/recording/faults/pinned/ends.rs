@@ -1,5 +1,5 @@
-//! Samples at an end of an axis' range: where a register ends, where spikes meet, where a motion stops and goes back,
-//! where noise or a motion that continues would not have repeated the value.
+//! Samples at an end of an axis' range. Signs of an end are: the end of a register, a common value of several spikes, a
+//! motion that stops and returns, and repeated values that noise or continued motion would not give.
 
 use std::ops::Range;
 
@@ -7,11 +7,11 @@ use super::{Axis, repeats_at_best};
 use crate::recording::faults::chance::Limit;
 use crate::statistics::median;
 
-/// Registers that a column may come from. The extreme of a column is at the end of these by chance once in
-/// 2¹⁵ columns or less; those of shorter ones are values as any other.
+/// Possible register widths of a column. The extreme of a column equals the end of such a register by chance in at
+/// most one of 2¹⁵ columns; the ends of shorter registers are ordinary values.
 const BITS: [i32; 3] = [16, 24, 32];
 
-/// Rows of an axis whose value is at the end of its range, or beyond; `stuck` are those that repeat a value.
+/// Rows of an axis with values at the end of its range, or beyond; `stuck` lists the rows that repeat a value.
 pub fn saturated(
     triad: [&Axis; 3],
     axis: usize,
@@ -48,11 +48,11 @@ pub fn saturated(
     })
 }
 
-/// Whether this value of an axis comes in a row more often than the axis lets it, by its noise or by its motion. Gives
-/// the σ of the noise that reaches the value; zero of a motion that is cut off there.
+/// Whether an axis repeats this value more often in a row than its noise or its motion allows. Returns the σ of the
+/// noise that reaches the value; zero for a motion that is clipped there.
 ///
-/// How much less than usual, or than beside, an axis may change while it has the value is seen on the other axes of
-/// the triad: at rest, and in a turn as even as a table's, they are as silent.
+/// An axis may be quieter than usual, or than its neighbouring rows, at rest or in the steady turn of a table. Then
+/// the other axes of the triad are as quiet, and noise and motion are scaled down by their example.
 fn pinned(triad: [&Axis; 3], axis: usize, end: f64, limit: Limit) -> Option<f64> {
     let own = triad[axis];
     let of_run = |run: &Range<usize>| {
@@ -90,7 +90,7 @@ impl Axis<'_> {
         [self.facts.smallest, self.facts.largest]
     }
 
-    /// What a register says at zero: the middle of its range if it has no sign.
+    /// Value of the register at zero: the middle of its range if it is unsigned.
     fn zero(&self) -> f64 {
         let [smallest, largest] = self.extremes();
         let unsigned = |bits: i32| {
@@ -122,20 +122,20 @@ impl Axis<'_> {
         })
     }
 
-    /// Single samples that no motion leads to differ from one another, unless they are where the range
-    /// ends.
+    /// Whether several spikes have this value: spikes differ from one another, unless they are at the end of the
+    /// range.
     fn is_reached_by_spikes(&self, end: f64, spikes: &[usize]) -> bool {
         spikes.iter().filter(|&&k| self.values[k] == end).count() >= 2
     }
 
-    /// Whether an axis is stuck there, with a truth that comes from one side and goes back to it.
+    /// Whether the axis is stuck at this end while the true value comes from one side and returns to it.
     fn stops_motion(&self, end: f64, stuck: &[Range<usize>]) -> bool {
         let mut at_end = stuck.iter().filter(|run| self.values[run.start] == end);
         at_end.any(|run| !self.is_level(run))
     }
 
-    /// Whether a run lies on a level that continues beside it, as that of a steady turn; at the end of a range
-    /// the truth comes from one side and goes back there.
+    /// Whether the values before and after a run lie at its level, as in a steady turn; at the end of a range
+    /// the true value comes from one side and returns to it.
     fn is_level(&self, run: &Range<usize>) -> bool {
         let value = self.values[run.start];
         let before = &self.values[run.start.saturating_sub(1 + BESIDE)..run.start - 1];
@@ -151,8 +151,9 @@ impl Axis<'_> {
         })
     }
 
-    /// Rows at an end. With noise of this σ where it holds an axis at rest also the rows between that noise takes from
-    /// beyond it into the range, because their mean is off; and without those that noise takes to it from within.
+    /// Rows at an end. If an axis at rest is clipped there with noise of this σ, the rows in between are included:
+    /// noise moves them from beyond the end into the range, so their mean is biased. Rows that noise moves to the end
+    /// from within the range are excluded.
     fn at_end(&self, noise: Option<f64>, is_end: impl Fn(f64) -> bool) -> Vec<Range<usize>> {
         let is_cut = |rows: Range<usize>| {
             let end = self.values[rows.end];
@@ -180,18 +181,18 @@ impl Axis<'_> {
     }
 }
 
-/// σ of noise that takes no row this far from the truth.
+/// Noise moves no row farther than this from the true value, σ.
 const FAR: f64 = 5.0;
-/// Noise that takes one row in this many to an end takes the mean from the truth by less than the hundredth part of its
-/// σ, where it is cut off there.
+/// If noise reaches an end in fewer than one row in this many, clipping biases the mean by less than a hundredth of
+/// its σ.
 const SELDOM: usize = 64;
-/// Rows between two at an end. Were it fewer, chance would part rows that are SELDOM apart on average, and the rest
-/// of noise would be chosen by its sign.
+/// Most rows between two rows at an end. With fewer, chance would separate rows that are SELDOM apart on average, and
+/// the remaining noise would be selected by its sign.
 const APART: usize = 8 * SELDOM;
 
-/// Rows beside a run whose mean is compared with it.
+/// Number of rows next to a run whose mean is compared with it.
 const BESIDE: usize = 16;
-/// σ within which they agree: a steady turn has its axis at the end of what the record holds as well.
+/// σ within which they agree: in a steady turn, too, an axis may be at the extreme of the record.
 const AGREE: f64 = 3.0;
 
 #[cfg(test)]
