@@ -6,6 +6,7 @@ use crate::calibration::checks::observability::AttitudeCovariance;
 use crate::calibration::constants::parameters;
 pub use crate::calibration::filter::Gate;
 use crate::calibration::filter::Judge;
+use crate::calibration::reduction::Keeping;
 use crate::calibration::{
     Auxiliary, CalibrationError, Constant, Innovation, Linearisation, Model, PARAMETERS, Posterior,
     Prior, Problem, Reduction, Script, Thermal, auxiliary_vector,
@@ -33,7 +34,7 @@ pub fn pass(
 ) -> Result<PassResult, CalibrationError> {
     let limit = problem.gate_limit();
     let mut judge = Judge::new(gate, limit);
-    let reduction = script.follow(problem, &mut judge, true)?;
+    let reduction = script.follow(problem, &mut judge, Keeping::Innovations)?;
     let prior = Prior::new(&reduction.constants, &problem.model, script.at);
     let innovations = judge.innovations;
     let cost = |of: &Innovation| if of.accepted { of.distance() } else { limit };

@@ -16,7 +16,7 @@ use crate::calibration::{
     Coefficient, Constant, Difference, Known, Linearisation, ParameterVector, Posterior, Prior,
     from_vector, to_vector,
 };
-pub use script::{Moves, Script};
+pub use script::{Keeping, Moves, Script};
 
 /// Whitened rows of all dwells, and the dependent states.
 #[derive(Debug, Clone)]
@@ -57,32 +57,39 @@ pub struct Epoch {
     pub sigma: ParameterVector,
 }
 
+/// The rows of several parts.
+fn stacked(parts: &[Part]) -> DMatrix<f64> {
+    let count = parts.iter().map(|part| part.rows.nrows()).sum();
+    let columns = parts.first().map_or(0, |part| part.rows.ncols());
+    let mut all = DMatrix::zeros(count, columns);
+    let mut first = 0;
+    for Part { rows, .. } in parts {
+        all.rows_mut(first, rows.nrows()).copy_from(rows);
+        first += rows.nrows();
+    }
+    all
+}
+
+/// One triangle of the rows of several parts; `None` without parts.
+fn folded(parts: &[Part]) -> Option<Part> {
+    let last = parts.last()?;
+    Some(Part {
+        dwell: last.dwell,
+        time: last.time,
+        rows: triangle(&stacked(parts)),
+    })
+}
+
 impl Reduction {
     /// The rows of each dwell.
     pub fn dwells(&self) -> impl Iterator<Item = DMatrix<f64>> + '_ {
         let dwells = self.parts.chunk_by(|one, other| one.dwell == other.dwell);
-        dwells.map(|parts| self.stacked(parts))
-    }
-
-    fn stacked(&self, parts: &[Part]) -> DMatrix<f64> {
-        let count = parts.iter().map(|part| part.rows.nrows()).sum();
-        let mut all = DMatrix::zeros(count, self.constants.len() + 1);
-        let mut first = 0;
-        for Part { rows, .. } in parts {
-            all.rows_mut(first, rows.nrows()).copy_from(rows);
-            first += rows.nrows();
-        }
-        all
+        dwells.map(stacked)
     }
 
     /// One triangle of all rows, which suffices if no dwell is evaluated separately.
     pub fn folded(mut self) -> Self {
-        let rows = triangle(&self.stacked(&self.parts));
-        self.parts = vec![Part {
-            dwell: 0,
-            time: self.parts.last().map_or(0.0, |part| part.time),
-            rows,
-        }];
+        self.parts = folded(&self.parts).into_iter().collect();
         self
     }
 

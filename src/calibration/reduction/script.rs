@@ -1,7 +1,7 @@
 //! Events of a record at one linearisation point: navigation runs once, the filter runs for every trial of noise or of
 //! a variance.
 
-use super::{Part, Smoothed};
+use super::{Part, Smoothed, folded};
 use crate::calibration::filter::{DwellFilters, Filter, Gate, Judge, Since, Taken, dwell_filters};
 use crate::calibration::record::{Event, Rest, events};
 use crate::calibration::{
@@ -83,7 +83,18 @@ impl<'a> Script<'a> {
         accepted: &[bool],
     ) -> Result<Reduction, CalibrationError> {
         let mut judge = Judge::new(Gate::As(accepted), f64::INFINITY);
-        self.follow(problem, &mut judge, false)
+        self.follow(problem, &mut judge, Keeping::Parts)
+    }
+
+    /// The same in one triangle, if no dwell is evaluated separately: memory does not grow with the record.
+    pub fn fold(
+        &self,
+        problem: &Problem,
+        accepted: &[bool],
+    ) -> Result<Reduction, CalibrationError> {
+        let mut judge = Judge::new(Gate::As(accepted), f64::INFINITY);
+        let reduction = self.follow(problem, &mut judge, Keeping::Folded)?;
+        Ok(reduction.folded())
     }
 
     /// Runs a filter through the record, with or without innovations.
@@ -91,15 +102,16 @@ impl<'a> Script<'a> {
         &self,
         problem: &Problem,
         judge: &mut Judge,
-        with_innovations: bool,
+        keeping: Keeping,
     ) -> Result<Reduction, CalibrationError> {
         let filter = Filter::new(&problem.model, problem.one_gravity());
         let prior = Prior::new(&filter.layout.constants, &problem.model, self.at);
         let mut follower = Follower {
             dwells: dwell_filters(&filter),
-            known: with_innovations.then(|| Known::new(prior)),
+            known: (keeping == Keeping::Innovations).then(|| Known::new(prior)),
             filter,
             parts: Vec::new(),
+            keeping,
             dwell: 0,
         };
         let (mut attitudes, mut own) = (Vec::new(), Vec::new());
@@ -153,6 +165,20 @@ impl<'a> Script<'a> {
     }
 }
 
+/// Rows are folded when there are this many times as many as columns.
+const FOLDED: usize = 4;
+
+/// What a filter keeps on its way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Keeping {
+    /// The rows of each part of a dwell.
+    Parts,
+    /// The same, and current information on the constants for innovations.
+    Innovations,
+    /// One triangle.
+    Folded,
+}
+
 /// A filter on its way through a record.
 struct Follower {
     filter: Filter,
@@ -160,6 +186,7 @@ struct Follower {
     /// Current information on the constants, if innovations are computed.
     known: Option<Known>,
     parts: Vec<Part>,
+    keeping: Keeping,
     /// Number of dwells that have ended.
     dwell: usize,
 }
@@ -238,6 +265,11 @@ impl Follower {
             rows,
         });
         self.dwell += usize::from(rest.last);
+        let rows: usize = self.parts.iter().map(|part| part.rows.nrows()).sum();
+        let columns = self.filter.layout.constants.len() + 1;
+        if self.keeping == Keeping::Folded && rows > FOLDED * columns {
+            self.parts = folded(&self.parts).into_iter().collect();
+        }
         Ok(())
     }
 }

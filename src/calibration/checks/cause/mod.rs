@@ -162,7 +162,7 @@ fn by_score(
     terms.iter().for_each(|&term| model.switch_on(term));
     let all = everywhere + terms.len();
     let (with, at) = (problem.with_model(model), &iterated.estimate);
-    let reduction = Script::new(&with, priors, at)?.reduce(&with, &iterated.held.accepted())?;
+    let reduction = Script::new(&with, priors, at)?.fold(&with, &iterated.held.accepted())?;
     let prior = Prior::new(&reduction.constants, &with.model, at);
     let once = disturbances.into_iter().map(Cause::Disturbance);
     let causes: Vec<Cause> = once.chain(terms.into_iter().map(Cause::Term)).collect();

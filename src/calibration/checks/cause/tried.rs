@@ -6,7 +6,7 @@ use crate::calibration::{Innovation, Problem};
 
 /// Half as many dwells at most are tried because of their innovations, and as many evenly: every constant that is tried
 /// is a column of every row, so that a day of dwells would take its square in memory.
-const HALF: usize = 40;
+const HALF: usize = 20;
 
 /// The dwells in which causes are looked for: all, or in long records those of the largest innovations and, as a sample of
 /// chance, some evenly over the record.
