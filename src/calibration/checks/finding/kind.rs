@@ -16,7 +16,7 @@ macro_rules! kinds {
         /// Subject of a finding.
         #[derive(Debug, Clone, Copy, PartialEq, Eq)]
         pub enum Kind {
-            $(#[doc = $explanation] $variant,)*
+            $(#[doc = concat!($code, ", `", $name, "`.")] $variant,)*
         }
 
         impl Kind {
