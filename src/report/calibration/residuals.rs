@@ -19,8 +19,8 @@ pub fn figure(quality: &Quality) -> Plot {
         let scaled = |points: Vec<Point>| points.into_iter().map(move |(time, y)| (time, y / size));
         Panel::new(
             format!("{name}, {unit}"),
-            Axis::linear("time, s"),
-            Axis::linear("").including([0.0]),
+            Axis::linear("time, s").room(0.03, 0.03),
+            Axis::linear("").including([0.0]).room(0.06, 0.06),
         )
         .with(Series::zero())
         .with(Series::marks(Mark::Dot, scaled(fitted)).key("in the fit"))
