@@ -1,7 +1,7 @@
 //! The certificate as a Digital Calibration Certificate: PTB's DCC 3.3.0 with D-SI 2.2.1 quantities.
 //!
-//! Values are in SI: scale factors relative to nominal, angles in rad, biases in rad/s and m/s², each with its
-//! expanded uncertainty, and the covariance of all of them.
+//! Values are in SI: scale factors relative to nominal, angles in rad, biases in rad/s and m/s², each a quantity of its
+//! own with its expanded uncertainty; the covariance of all of them follows.
 
 use std::fmt::Write;
 
@@ -106,22 +106,41 @@ impl Xml {
         self.element("dcc:influenceCondition", |xml| {
             xml.words("dcc:name", name);
             xml.element("dcc:data", |xml| {
+                let expanded = (condition.uncertainty > 0.0).then_some(Expanded {
+                    uncertainty: condition.uncertainty,
+                    coverage_factor: 2.0,
+                    distribution: "normal",
+                });
                 xml.element("dcc:quantity", |xml| {
-                    xml.element("si:real", |xml| {
-                        xml.leaf("si:value", &number(condition.value));
-                        xml.leaf("si:unit", unit);
-                        if condition.uncertainty > 0.0 {
-                            xml.element("si:expandedUnc", |xml| {
-                                xml.leaf("si:uncertainty", &number(condition.uncertainty));
-                                xml.leaf("si:coverageFactor", "2");
-                                xml.leaf("si:coverageProbability", &number(PROBABILITY));
-                            });
-                        }
-                    });
+                    xml.real(condition.value, unit, expanded)
                 });
             });
         });
     }
+
+    /// A value with its unit and, where it has one, its uncertainty.
+    fn real(&mut self, value: f64, unit: &str, expanded: Option<Expanded>) {
+        self.element("si:real", |xml| {
+            xml.leaf("si:value", &number(value));
+            xml.leaf("si:unit", unit);
+            let Some(expanded) = expanded else { return };
+            xml.element("si:measurementUncertaintyUnivariate", |xml| {
+                xml.element("si:expandedMU", |xml| {
+                    xml.leaf("si:valueExpandedMU", &number(expanded.uncertainty));
+                    xml.leaf("si:coverageFactor", &number(expanded.coverage_factor));
+                    xml.leaf("si:coverageProbability", &number(PROBABILITY));
+                    xml.leaf("si:distribution", expanded.distribution);
+                });
+            });
+        });
+    }
+}
+
+/// An expanded uncertainty.
+struct Expanded {
+    uncertainty: f64,
+    coverage_factor: f64,
+    distribution: &'static str,
 }
 
 /// A number with all its digits.
@@ -289,11 +308,10 @@ fn measured(xml: &mut Xml, certificate: &Certificate) {
             xml.words("dcc:name", "Parameters");
             xml.words("dcc:description", &description(certificate));
             xml.element("dcc:data", |xml| {
-                let covariance = Some(&certificate.covariance[..]);
-                quantities(xml, "", &certificate.results, covariance);
-                if !certificate.terms.is_empty() {
-                    quantities(xml, "error terms: ", &certificate.terms, None);
+                for of in certificate.results.iter().chain(&certificate.terms) {
+                    quantity(xml, of);
                 }
+                together(xml, &certificate.results, &certificate.covariance);
             });
         });
     });
@@ -335,52 +353,36 @@ fn description(certificate: &Certificate) -> String {
     text
 }
 
-/// Parameters by name, and their values.
-fn quantities(xml: &mut Xml, of: &str, results: &[Measured], covariance: Option<&[Vec<f64>]>) {
-    xml.element("dcc:quantity", |xml| {
-        xml.words(
-            "dcc:name",
-            &format!("{of}names, in the order of the values"),
-        );
-        let names = results.iter().map(|of| of.name.as_str());
-        xml.leaf("dcc:charsXMLList", &names.collect::<Vec<_>>().join(" "));
-    });
-    xml.element("dcc:quantity", |xml| {
-        xml.words("dcc:name", &format!("{of}values"));
-        values(xml, results, covariance);
+/// One parameter as readers of certificates look for it.
+fn quantity(xml: &mut Xml, of: &Measured) {
+    xml.with("dcc:quantity", " refType=\"basic_measuredValue\"", |xml| {
+        xml.words("dcc:name", &of.name);
+        let expanded = Expanded {
+            uncertainty: of.expanded,
+            coverage_factor: of.coverage_factor,
+            distribution: of.degrees_of_freedom.map_or("normal", |_| "t"),
+        };
+        xml.real(of.value, of.quantity.si_unit(), Some(expanded));
     });
 }
 
-/// The values with their expanded uncertainties and, where it is known, their covariance.
-fn values(xml: &mut Xml, results: &[Measured], covariance: Option<&[Vec<f64>]>) {
-    let list = |of: &dyn Fn(&Measured) -> String| -> String {
-        results.iter().map(of).collect::<Vec<_>>().join(" ")
-    };
-    xml.element("si:realListXMLList", |xml| {
-        xml.leaf("si:valueXMLList", &list(&|of| number(of.value)));
-        xml.leaf(
-            "si:unitXMLList",
-            &list(&|of| of.quantity.si_unit().to_owned()),
+/// All parameters in the order of the quantities before, with their covariance.
+fn together(xml: &mut Xml, results: &[Measured], covariance: &[Vec<f64>]) {
+    let list =
+        |of: &dyn Fn(&Measured) -> String| results.iter().map(of).collect::<Vec<_>>().join(" ");
+    xml.element("dcc:quantity", |xml| {
+        xml.words(
+            "dcc:name",
+            "All parameters, in the order above, with their covariance",
         );
-        xml.element("si:expandedUncXMLList", |xml| {
-            xml.leaf("si:uncertaintyXMLList", &list(&|of| number(of.expanded)));
+        xml.element("si:realListXMLList", |xml| {
+            xml.leaf("si:valueXMLList", &list(&|of| number(of.value)));
             xml.leaf(
-                "si:coverageFactorXMLList",
-                &list(&|of| number(of.coverage_factor)),
+                "si:unitXMLList",
+                &list(&|of| of.quantity.si_unit().to_owned()),
             );
-            xml.leaf(
-                "si:coverageProbabilityXMLList",
-                &list(&|_| number(PROBABILITY)),
-            );
-            let distribution = |of: &Measured| match of.degrees_of_freedom {
-                Some(_) => "t".to_owned(),
-                None => "normal".to_owned(),
-            };
-            xml.leaf("si:distributionXMLList", &list(&distribution));
-        });
-        if let Some(covariance) = covariance {
             ellipsoid(xml, results, covariance);
-        }
+        });
     });
 }
 

@@ -145,10 +145,10 @@ fn error_terms_are_results_with_their_uncertainty_and_stand_in_the_model() {
         assert!(text.contains(needed), "no {needed} in {text}");
     }
     for needed in [
-        "<dcc:charsXMLList>gyro.g_sensitivity.xy</dcc:charsXMLList>",
-        "<si:valueXMLList>5e-9</si:valueXMLList>",
-        "<si:unitXMLList>\\radian\\second\\metre\\tothe{-1}</si:unitXMLList>",
-        "<si:uncertaintyXMLList>1e-9</si:uncertaintyXMLList>",
+        "<dcc:content>gyro.g_sensitivity.xy</dcc:content>",
+        "<si:value>5e-9</si:value>",
+        "<si:unit>\\radian\\second\\metre\\tothe{-1}</si:unit>",
+        "<si:valueExpandedMU>1e-9</si:valueExpandedMU>",
     ] {
         assert!(xml.contains(needed), "{needed}");
     }

@@ -4,7 +4,8 @@ use clap::CommandFactory;
 use clap_complete::Shell;
 
 use super::Cli;
-use super::output::print;
+
+use crate::cli::terminal::print;
 
 /// Prints a shell-completion script
 ///

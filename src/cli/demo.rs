@@ -5,22 +5,23 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use rayon::prelude::*;
-use turncal::calibration::{self, ClosedForm, Estimate, Options, Problem};
+use turncal::calibration::{
+    self, Assessment, ClosedForm, Estimate, Method, Options, Problem, Solution,
+};
 use turncal::imu::{PerSensor, Triad};
 use turncal::models::{self, Place};
-use turncal::report::Facts;
 use turncal::report::calibration::{self as of_calibration, Report};
 use turncal::report::demo::{self, Flown};
+use turncal::report::{Document, Facts};
 use turncal::run::{Dwell, Run};
 use turncal::simulation::{Scenario, Simulated};
 use turncal::study::navigation::{FORTY_HOURS, Mission, Motion};
 
-use super::calibrate::solve;
-use super::calibrated::{dwell_times, navigate, note, stamp, write_report};
-use super::input::seed;
-use super::output::{Overwrite, show_brief};
-use super::progress::Activity;
+use super::calibrate::{dwell_times, navigate, note, solve, stamp, write_report};
 use super::simulate::{simulated, write};
+
+use crate::cli::arguments::{Overwrite, seed};
+use crate::cli::terminal::{Activity, show_brief};
 
 /// Simulates a calibration and compares it with the truth
 ///
@@ -54,76 +55,37 @@ impl Demo {
         let (turning, standing) = (turning?, standing?);
         let still = Problem::new(&standing.run, &Options::default());
         let whole = calibration::six_position(&still)?;
-        let run = &turning.run;
-        let problem = Problem::new(run, &Options::default());
-        let mut solution = solve(&problem, calibration::Method::Ekf, &activity)?;
+        let problem = Problem::new(&turning.run, &Options::default());
+        let mut solution = solve(&problem, Method::Ekf, &activity)?;
         if !solution.converged() {
             bail!("the demonstration did not converge; take another --seed");
         }
-
-        let minutes = |run: &Run| run.recording.imu.duration() / 60.0;
-        let (table_time, whole_time) = (minutes(run), minutes(&standing.run));
-        let closed_form = cut(&still, table_time / whole_time)?;
-        let note = format!(
-            "{}; the first part of each dwell, as if the table had been driven for the {table_time:.0} min of \
-             the filter's run",
-            note(&closed_form)
-        );
-        let dwells = dwell_times(&problem);
-        activity.next("navigating");
         let assessment = solution.assess(&problem)?;
-        let methods = [
-            ("closed form", &closed_form.estimate),
-            ("EKF", solution.estimate()),
-        ];
-        let navigation = navigate(run, &methods, Some(&turning.truth));
-        let estimates = [&closed_form.estimate, solution.estimate(), &whole.estimate];
-        let missions = fly(run, &estimates, &turning.truth)?;
-        let names = [
-            format!("closed form, {table_time:.0} min"),
-            format!("EKF, {table_time:.0} min"),
-            format!("closed form, {whole_time:.0} min"),
-        ];
-        let findings = solution.findings(&assessment);
-        let report = Report {
-            title: "turncal demo",
-            run,
-            aiding: problem.model.aiding,
-            body_frame: problem.model.aiding.body_frame(),
-            outcome: solution.outcome(),
-            findings: &findings,
-            effects: &assessment.error_terms,
-            budget: assessment.budget.as_ref(),
-            predicted: None,
-            quality: Some(&assessment.quality),
-            true_terms: &BTreeMap::new(),
-            closed_form: Some(of_calibration::ClosedForm {
-                estimate: &closed_form.estimate,
-                note: &note,
-            }),
-            truth: Some(&turning.truth),
-            dwells: &dwells,
-            navigation: navigation.as_deref(),
-        };
-        let mut document = report.document();
-        demo::add(&mut document, &names, &missions);
+        activity.next("navigating");
+        let mut document = document(
+            (&problem, &solution, &assessment),
+            (&still, &whole),
+            &turning,
+        )?;
+
         activity.next("writing");
         let root = directory.path();
         write(&turning, &root)?;
-        let method = |name: &str| -> anyhow::Result<PathBuf> {
-            let path = root.join(name);
-            std::fs::create_dir(&path)
+        let [filtered, closed] = ["ekf", "six-position"].map(|method| root.join(method));
+        for path in [&filtered, &closed] {
+            std::fs::create_dir(path)
                 .with_context(|| format!("cannot create {}", path.display()))?;
-            Ok(path)
-        };
-        let (filtered, closed) = (method("ekf")?, method("six-position")?);
+        }
         write(&standing, &closed)?;
-        let mut record = solution.calibration(&problem, &assessment);
-        stamp(&mut record, &root.join("run.toml"));
-        record.write(&filtered.join("calibration.json"), false)?;
-        let mut record = whole.record(&still, &whole.quality(&still)?);
-        stamp(&mut record, &closed.join("run.toml"));
-        record.write(&closed.join("calibration.json"), false)?;
+        let of_filter = solution.calibration(&problem, &assessment);
+        let of_closed_form = whole.record(&still, &whole.quality(&still)?);
+        for (mut record, of, path) in [
+            (of_filter, &root, filtered),
+            (of_closed_form, &closed, closed.clone()),
+        ] {
+            stamp(&mut record, &of.join("run.toml"));
+            record.write(&path.join("calibration.json"), false)?;
+        }
         write_report(&document, &root.join("report"))?;
         directory.commit()?;
         drop(activity);
@@ -135,6 +97,61 @@ impl Demo {
         document.brief.push(files.into());
         show_brief(&document)
     }
+}
+
+/// The report on the filter's calibration, beside the closed form in the same time and in its whole time.
+fn document(
+    (problem, solution, assessment): (&Problem, &Solution, &Assessment),
+    (still, whole): (&Problem, &ClosedForm),
+    turning: &Simulated,
+) -> anyhow::Result<Document> {
+    let run = problem.run();
+    let minutes = |run: &Run| run.recording.imu.duration() / 60.0;
+    let (table_time, whole_time) = (minutes(run), minutes(still.run()));
+    let closed_form = cut(still, table_time / whole_time)?;
+    let note = format!(
+        "{}; the first part of each dwell, as if the table had been driven for the {table_time:.0} min of the \
+         filter's run",
+        note(&closed_form)
+    );
+    let methods = [
+        ("closed form", &closed_form.estimate),
+        ("EKF", solution.estimate()),
+    ];
+    let navigation = navigate(run, &methods, Some(&turning.truth));
+    let report = Report {
+        title: "turncal demo",
+        run,
+        aiding: problem.model.aiding,
+        body_frame: problem.model.aiding.body_frame(),
+        outcome: solution.outcome(),
+        findings: &solution.findings(assessment),
+        effects: &assessment.error_terms,
+        budget: assessment.budget.as_ref(),
+        predicted: None,
+        quality: Some(&assessment.quality),
+        true_terms: &BTreeMap::new(),
+        closed_form: Some(of_calibration::ClosedForm {
+            estimate: &closed_form.estimate,
+            note: &note,
+        }),
+        truth: Some(&turning.truth),
+        dwells: &dwell_times(problem),
+        navigation: navigation.as_deref(),
+    };
+    let mut document = report.document();
+    let estimates = [&closed_form.estimate, solution.estimate(), &whole.estimate];
+    let names = [
+        format!("closed form, {table_time:.0} min"),
+        format!("EKF, {table_time:.0} min"),
+        format!("closed form, {whole_time:.0} min"),
+    ];
+    demo::add(
+        &mut document,
+        &names,
+        &fly(run, &estimates, &turning.truth)?,
+    );
+    Ok(document)
 }
 
 /// The static positions that the paper's closed form takes.

@@ -4,7 +4,7 @@ use comfy_table::{ContentArrangement, Table, presets};
 use serde::Serialize;
 use turncal::models::Embedded;
 
-use super::output::{columns, print};
+use crate::cli::terminal::{columns, print};
 
 /// Shows the embedded scenarios, instruments, installations, tables, paths and trajectories
 ///

@@ -7,7 +7,8 @@ use clap_mangen::Man;
 use turncal::formats::write_whole;
 
 use super::Cli;
-use super::output::print;
+
+use crate::cli::terminal::print;
 
 /// Writes the manual pages
 ///

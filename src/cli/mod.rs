@@ -1,43 +1,21 @@
 //! Commands: each parses its arguments, calls the library and says what came of it.
 
-mod allan;
-mod apply;
+mod arguments;
 mod calibrate;
-mod calibrated;
-#[cfg(feature = "certificate")]
-mod certificate;
-mod check;
-mod compare;
 mod completions;
-mod convert;
 mod demo;
-mod error_term;
-mod estimation;
-mod explain;
-mod export;
-mod init;
-mod input;
 mod list;
-mod lot;
+mod log;
 mod man;
-mod merge;
-mod names;
-mod navigate;
-mod noise;
-mod output;
-mod progress;
-mod sharding;
-mod signals;
+mod result;
 mod simulate;
-mod source;
 mod study;
+mod terminal;
 #[cfg(test)]
 mod tests;
-mod threads;
 
-pub use lot::NotMet;
-pub use signals::leave_nothing_behind;
-pub use threads::with_threads;
+pub use calibrate::NotMet;
+pub use terminal::{leave_nothing_behind, with_threads};
 
 use clap::{Parser, Subcommand};
 
@@ -56,7 +34,13 @@ With a log of your own:
 With a turntable:
   turncal init imu.csv -o run.toml
   turncal check run.toml
-  turncal calibrate run.toml"
+  turncal calibrate run.toml
+
+Advanced (each with --help):
+  merge        parts of a job that --shard split, as one result
+  study        Monte Carlo studies: accuracy, table1, experiment
+  completions  a shell-completion script
+  man          the manual pages"
 )]
 pub struct Cli {
     #[command(subcommand)]
@@ -68,22 +52,26 @@ enum Command {
     Demo(demo::Demo),
     Simulate(simulate::Simulate),
     Calibrate(calibrate::Calibrate),
-    Compare(compare::Compare),
-    Navigate(navigate::Navigate),
-    Apply(apply::Apply),
-    Export(export::Export),
+    Compare(result::compare::Compare),
+    Navigate(result::navigate::Navigate),
+    Apply(result::apply::Apply),
+    Export(result::export::Export),
     #[cfg(feature = "certificate")]
-    Certificate(certificate::Certificate),
+    Certificate(result::certificate::Certificate),
+    #[command(hide = true)]
     Study(study::Study),
-    Merge(merge::Merge),
-    Init(init::Init),
-    Convert(convert::Convert),
-    Check(check::Check),
-    Explain(explain::Explain),
-    Allan(allan::Allan),
-    Noise(noise::Noise),
+    #[command(hide = true)]
+    Merge(calibrate::Merge),
+    Init(log::init::Init),
+    Convert(log::convert::Convert),
+    Check(log::check::Check),
+    Explain(result::explain::Explain),
+    Allan(log::allan::Allan),
+    Noise(log::noise::Noise),
     List(list::List),
+    #[command(hide = true)]
     Completions(completions::Completions),
+    #[command(hide = true)]
     Man(man::Manual),
 }
 

@@ -11,9 +11,8 @@ use turncal::formats::{campaign_text, write_run};
 use turncal::imu::{TERM_PARAMETERS, Term};
 use turncal::simulation::{Scenario, Simulated, SimulatedCampaign};
 
-use super::input::seed;
-use super::output::Overwrite;
-use super::progress::Activity;
+use crate::cli::arguments::{Overwrite, seed};
+use crate::cli::terminal::Activity;
 
 /// Simulates a run directory with known truth from a scenario
 ///

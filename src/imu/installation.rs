@@ -9,14 +9,14 @@ pub const ANGLES: usize = 6;
 /// Definition of the installation matrix by six or three small angles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum InstallationForm {
-    /// Six off-diagonal direction cosines, rows of unit norm: `C_ii = √(1 − C_ij² − C_ik²)`
-    /// (Eqs. 4 and 7).
+    /// Six direction cosines, rows of unit norm: `C_ii = √(1 − C_ij² − C_ik²)` (Eqs. 4 and 7)
     #[default]
     General,
-    /// Six off-diagonal entries, unit diagonal (Eq. 8).
+    /// Six off-diagonal entries, unit diagonal (Eq. 8)
     SixAngle,
-    /// `C = I + [e×]`, `e = (E_yz, E_xz, E_xy)` (Eq. 10).
+    /// Identity plus a cross-product matrix of three angles `E_yz`, `E_xz`, `E_xy` (Eq. 10)
     ThreeAngle,
 }
 

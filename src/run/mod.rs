@@ -73,10 +73,11 @@ impl Run {
 /// Observations of the filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Aiding {
-    /// Zero velocity and the table's attitude.
+    /// Zero velocity in every dwell, and the attitude of the table
     Table,
-    /// Zero velocity only.
+    /// Zero velocity alone; the accelerometers define the body axes
     Velocity,
 }
 

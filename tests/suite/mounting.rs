@@ -84,3 +84,20 @@ fn the_line_that_is_named_puts_a_wrong_mounting_right() {
     assert_eq!(fs::read_to_string(&run).unwrap().trim(), right.trim());
     assert_eq!(calibration(&run, "six-position"), expected);
 }
+
+#[test]
+fn a_gyro_that_is_half_as_sensitive_as_stated_is_named_with_its_axis() {
+    let directory = tempfile::tempdir().unwrap();
+    let run = simulated(directory.path());
+    let right = fs::read_to_string(&run).unwrap();
+    let stated = "[imu.prior.gyro]\nscale = [1.0, ";
+    assert!(right.contains(stated), "{right}");
+    let twice = right.replace(stated, "[imu.prior.gyro]\nscale = [2.0, ");
+    fs::write(&run, twice).unwrap();
+    for method in ["ekf", "six-position"] {
+        let said = turncal(&["calibrate", run.to_str().unwrap(), "--method", method]);
+        let said = said.failure().code(1);
+        let message = String::from_utf8_lossy(&said.get_output().stderr).into_owned();
+        assert!(message.contains("gyro x were 0.5"), "{method}: {message}");
+    }
+}

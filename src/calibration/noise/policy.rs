@@ -4,15 +4,16 @@ use serde::{Deserialize, Serialize};
 
 /// The noise used by the filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum NoisePolicy {
-    /// The stated noise.
+    /// Use the noise that run.toml and models state
     Stated,
-    /// The stated noise, unless the data contradict it (p < 0.001); then the noise estimated from the
-    /// data.
+    /// Use the stated noise; estimate it from the record if the two disagree (p < 0.001)
     #[default]
+    #[cfg_attr(feature = "cli", value(alias = "estimate"))]
     Auto,
-    /// The noise estimated from the data, with the stated noise as prior.
+    /// Estimate the noise from the record, with the stated noise as prior
     Learnt,
 }
 

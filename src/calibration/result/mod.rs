@@ -216,10 +216,11 @@ pub struct GravityRecord {
 /// Method of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Method {
-    /// Extended Kalman filter.
+    /// Extended Kalman filter over the whole run
     Ekf,
-    /// Closed form from static positions.
+    /// Closed form: from the table's positions, else from labelled sections, else from gravity
     SixPosition,
 }
 

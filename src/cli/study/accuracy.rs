@@ -2,19 +2,17 @@
 
 use std::path::Path;
 
+use turncal::calibration::{ErrorTerm, NoisePolicy};
 use turncal::formats::JobKind;
-use turncal::imu::BodyFrame;
+use turncal::imu::InstallationForm;
 use turncal::models::{InstallationModel, Place};
 use turncal::report;
+use turncal::run::Aiding;
 use turncal::simulation::{Scenario, SimulatedCampaign};
 use turncal::study::{AccuracyStudy, CampaignStudy};
 
-use super::super::error_term::TermArgument;
-use super::super::estimation::{Aiding, Installation, Noise};
-use super::super::input::{at_least_two, seed};
-use super::super::output::Delivery;
-use super::super::progress::Runs;
-use super::super::sharding::Sharding;
+use crate::cli::arguments::{Delivery, Sharding, at_least_two, error_term, needs_table, seed};
+use crate::cli::terminal::Runs;
 
 /// Tests the accuracy of the filter and the consistency of its σ
 ///
@@ -44,21 +42,21 @@ pub struct Accuracy {
     #[arg(long, value_enum, default_value_t = Aiding::Table)]
     aiding: Aiding,
     /// Installation form of the filter
-    #[arg(long, value_enum, default_value_t = Installation::General)]
-    installation: Installation,
+    #[arg(long, value_enum, default_value_t)]
+    installation: InstallationForm,
     /// Installation of the simulated instruments: a TOML file or an embedded name [default: the
     /// scenario's]
     #[arg(long, value_name = "MODEL")]
     truth_installation: Option<String>,
     /// Error terms to simulate and to estimate, in addition to those of the scenario
-    #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
-    with: Vec<TermArgument>,
+    #[arg(long, value_name = "TERM", value_parser = error_term(), value_delimiter = ',')]
+    with: Vec<ErrorTerm>,
     /// Error terms to simulate and not to estimate
-    #[arg(long, value_name = "TERM", value_enum, value_delimiter = ',')]
-    unmodelled: Vec<TermArgument>,
+    #[arg(long, value_name = "TERM", value_parser = error_term(), value_delimiter = ',')]
+    unmodelled: Vec<ErrorTerm>,
     /// Noise used by the filter; the noise stated in a scenario is correct
-    #[arg(long, value_enum, default_value_t = Noise::Stated)]
-    noise: Noise,
+    #[arg(long, value_enum, default_value_t = NoisePolicy::Stated)]
+    noise: NoisePolicy,
     /// In a campaign, do not let biases depend on the rate of temperature
     #[arg(long)]
     without_rate: bool,
@@ -80,24 +78,21 @@ impl Accuracy {
             return self.campaign();
         }
         let mut scenario = Scenario::load(&self.scenario)?;
-        scenario.body_frame = match self.aiding {
-            Aiding::Table => BodyFrame::Table,
-            Aiding::Velocity => BodyFrame::Accelerometer,
-        };
+        scenario.body_frame = self.aiding.body_frame();
         if let Some(path) = &self.path {
             scenario = scenario.with_path(path)?;
         }
         if let Some(model) = &self.truth_installation {
             scenario.installation = InstallationModel::load(model, &Place::CommandLine)?;
         }
-        for term in self.with.iter().chain(&self.unmodelled) {
-            term.needs_table(Some(self.aiding));
-            scenario = scenario.with_error_term(term.0);
+        for &term in self.with.iter().chain(&self.unmodelled) {
+            needs_table(term, Some(self.aiding));
+            scenario = scenario.with_error_term(term);
         }
         let study = AccuracyStudy {
-            unmodelled: self.unmodelled.iter().map(|term| term.0).collect(),
-            form: self.installation.into(),
-            noise: self.noise.into(),
+            unmodelled: self.unmodelled.clone(),
+            form: self.installation,
+            noise: self.noise,
             runs: self.runs,
             seed: self.seed.unwrap_or(scenario.seed),
             scenario,
@@ -122,8 +117,8 @@ impl Accuracy {
     fn campaign(&self) -> anyhow::Result<()> {
         let campaign = SimulatedCampaign::load(&self.scenario)?;
         let study = CampaignStudy {
-            form: self.installation.into(),
-            noise: self.noise.into(),
+            form: self.installation,
+            noise: self.noise,
             runs: self.runs,
             seed: self.seed.unwrap_or(campaign.scenario.seed),
             rate: !self.without_rate,

@@ -9,10 +9,8 @@ use turncal::simulation::Scenario;
 use turncal::study::ExperimentStudy;
 use turncal::study::navigation::INTERVAL;
 
-use super::super::input::{at_least_two, hours, seed};
-use super::super::output::Delivery;
-use super::super::progress::Runs;
-use super::super::sharding::Sharding;
+use crate::cli::arguments::{Delivery, Sharding, at_least_two, hours, seed};
+use crate::cli::terminal::Runs;
 
 const HOUR: f64 = 3600.0;
 const SCENARIO: &str = "experiment";

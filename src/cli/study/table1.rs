@@ -5,9 +5,8 @@ use turncal::study::Table1Study;
 use turncal::study::table1::paper;
 use turncal::units::DEGREE;
 
-use super::super::input::{at_least_two, hours, latitude, seed};
-use super::super::output::Delivery;
-use super::super::progress::Activity;
+use crate::cli::arguments::{Delivery, at_least_two, hours, latitude, seed};
+use crate::cli::terminal::Activity;
 
 /// Reproduces the paper's Table 1: navigation errors due to a simplified installation form
 ///

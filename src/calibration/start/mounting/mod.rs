@@ -69,19 +69,23 @@ fn known_from(problem: &Problem, motion: &Motion) -> &'static str {
     }
 }
 
-/// 1σ of the errors of both triads, alike on all axes. Whether a value of the prior goes with the column or
-/// with the place where it is put is not known, so differences between axes and biases that a reversed
+/// 1σ of the errors of both triads, alike on all axes. Where several orders are tried, whether a value of the prior goes
+/// with the column or with the place where it is put is not known, so differences between axes and biases that a reversed
 /// column may not have count as errors. Biases are over gravity and Earth rate.
-fn prior_sigma(run: &Run) -> ParameterVector {
+fn prior_sigma(run: &Run, is_order_known: bool) -> ParameterVector {
     let mut sigma = ParameterVector::zeros();
+    let unknown = f64::from(u8::from(!is_order_known));
     for sensor in Sensor::ALL {
         let prior = run.instrument.prior.get(sensor);
         let nominal = run.instrument.nominal.get(sensor).0.abs();
-        let spread = nominal.max() / nominal.min() - 1.0;
+        let spread = unknown * (nominal.max() / nominal.min() - 1.0);
         for axis in 0..3 {
             for column in 0..4 {
                 sigma[parameter(sensor, 4 * axis + column)] = match column {
-                    3 => prior.bias_sigma.max().hypot(2.0 * prior.bias.amax()) / unit(run, sensor),
+                    3 => {
+                        let reversed = unknown * 2.0 * prior.bias.amax();
+                        prior.bias_sigma.max().hypot(reversed) / unit(run, sensor)
+                    }
                     _ if column == axis => prior.scale_sigma.max().hypot(spread),
                     _ => prior.installation_sigma.max(),
                 };
@@ -116,7 +120,7 @@ impl Hypotheses {
     ) -> Self {
         let model = &problem.model;
         let errors = Errors {
-            sigma: prior_sigma(run),
+            sigma: prior_sigma(run, orders.len() == 1),
             too_small,
         };
         let (each, together) = match run.observed_table(model.aiding) {

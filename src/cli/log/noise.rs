@@ -3,8 +3,8 @@
 use turncal::noise::conventions::{convert, known};
 use turncal::report::conversion;
 
-use super::input::positive;
-use super::output::show;
+use crate::cli::arguments::positive;
+use crate::cli::terminal::show;
 
 /// Converts a noise figure to every convention: data sheets, Kalibr, PSINS, KF-GINS
 ///

@@ -13,9 +13,8 @@ use turncal::report::terminal::printable;
 use turncal::run::Run;
 use turncal::units::PPM;
 
-use super::output::{keep, stream};
-use super::progress::Activity;
-use super::source::{OfLog, run_or_log};
+use crate::cli::arguments::{OfLog, keep, run_or_log};
+use crate::cli::terminal::{Activity, stream};
 
 /// A scale factor that deviates by more than this many σ of the run is hardly one of its instrument.
 const SUSPECT_SIGMAS: f64 = 10.0;

@@ -5,9 +5,8 @@ use std::path::PathBuf;
 use turncal::report::check;
 use turncal::survey::Survey;
 
-use super::output::Delivery;
-use super::progress::Activity;
-use super::source::{OfLog, run_or_log};
+use crate::cli::arguments::{Delivery, OfLog, run_or_log};
+use crate::cli::terminal::Activity;
 
 /// Describes the content of a run, and the parameters that each method could observe
 ///
@@ -40,6 +39,10 @@ impl Check {
         activity.next("looking at the run");
         let survey = Survey::of(&run);
         drop(activity);
-        begun.deliver(&check::document(&run, &survey))
+        begun.deliver(&check::document(&run, &survey))?;
+        if !self.delivery.json() {
+            tell!("\nnext: turncal calibrate {}", self.run.display());
+        }
+        Ok(())
     }
 }

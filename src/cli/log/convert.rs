@@ -4,9 +4,8 @@ use std::path::PathBuf;
 
 use turncal::formats::draft::Draft;
 
-use super::output::Overwrite;
-use super::progress::Activity;
-use super::source::OfLog;
+use crate::cli::arguments::{OfLog, Overwrite};
+use crate::cli::terminal::Activity;
 
 /// Writes the log of another program as a plain run directory
 ///

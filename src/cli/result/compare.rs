@@ -6,9 +6,8 @@ use clap::error::ErrorKind;
 use turncal::calibration::{Named, compare};
 use turncal::report::comparison;
 
-use super::input::at_temperature;
-use super::names::short_names;
-use super::output::Delivery;
+use crate::cli::arguments::{Delivery, at_temperature};
+use crate::cli::terminal::short_names;
 
 /// Compares calibrations, parameter by parameter, with their σ
 ///

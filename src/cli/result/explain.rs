@@ -4,7 +4,7 @@ use anyhow::bail;
 use turncal::calibration::{FindingKind, Level};
 use turncal::report::wrapped;
 
-use super::output::{columns, print};
+use crate::cli::terminal::{columns, print};
 
 /// Explains a finding: its meaning, its cause and the remedy
 #[derive(Debug, clap::Args)]

@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 use turncal::formats::draft::Draft;
 use turncal::formats::write_whole;
 
-use super::output::{keep, print};
-use super::progress::Activity;
-use super::source::{OfLog, show_found};
+use crate::cli::arguments::{OfLog, keep, show_found};
+use crate::cli::terminal::{Activity, print};
 
 /// Writes a draft of run.toml for a log without one
 ///

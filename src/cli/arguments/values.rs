@@ -1,6 +1,6 @@
 //! What arguments must be, said in the field's words.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::Context;
 use turncal::calibration::result::Calibration;
@@ -8,25 +8,6 @@ use turncal::study::navigation::INTERVAL;
 use turncal::study::{Shard, ShardError};
 
 const HOUR: f64 = 3600.0;
-
-/// The path of a run.toml; if a directory is given instead, the error names the file in it.
-pub fn run_file(text: &str) -> Result<PathBuf, String> {
-    let path = Path::new(text);
-    let inside = path.join("run.toml");
-    if inside.is_file() {
-        return Err(format!("this is a directory; give {}", inside.display()));
-    }
-    let log = [
-        ".csv", ".csv.gz", ".txt", ".tsv", ".dat", ".log", ".bag", ".bin", ".mat", ".mcap", ".npy",
-        ".npz", ".ulg",
-    ];
-    if path.is_file() && log.iter().any(|end| text.ends_with(end)) {
-        return Err(format!(
-            "this is a log, expected the run.toml that describes it; turncal init {text} drafts one"
-        ));
-    }
-    Ok(path.into())
-}
 
 /// A part i/M of a job.
 pub fn shard(text: &str) -> Result<Shard, String> {

@@ -1,11 +1,19 @@
 //! `turncal calibrate`
 
+mod calibrated;
+mod lot;
+mod merge;
+
+pub use calibrated::{dwell_times, navigate, note, stamp, write_report};
+pub use lot::NotMet;
+pub use merge::Merge;
+
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::error::ErrorKind;
-use turncal::calibration::{self, AtRest, Finding, Problem, Solution, Together};
+use turncal::calibration::{AtRest, Finding, Method, Problem, Solution, Together};
 use turncal::formats::{Campaign, Opened};
 use turncal::recording::Recording;
 use turncal::report::terminal::printable;
@@ -13,13 +21,10 @@ use turncal::report::{self, Facts};
 use turncal::run::Run;
 use turncal::study::Shard;
 
-use super::calibrated::{Calibrated, read_truth, write_report};
-use super::estimation::{Estimation, Method};
-use super::input::shard;
-use super::lot;
-use super::output::{Overwrite, print, show, show_brief};
-use super::progress::Activity;
-use super::source::{OfLog, run_or_log};
+use crate::cli::arguments::{Estimation, OfLog, Overwrite, run_or_log, shard};
+use crate::cli::terminal::{Activity, print, show, show_brief};
+
+use calibrated::{Calibrated, read_truth};
 
 /// Highest order of the polynomials of outputs at rest.
 const HIGHEST_ORDER_AT_REST: usize = 5;
@@ -74,7 +79,7 @@ pub struct Calibrate {
     #[arg(long, value_name = "FILE", conflicts_with = "truth")]
     specification: Option<PathBuf>,
     /// Calibrate part i of M of a lot, to be merged with the others
-    #[arg(long, value_name = "i/M", value_parser = shard, requires = "output", conflicts_with_all = ["json", "truth"])]
+    #[arg(long, value_name = "i/M", value_parser = shard, requires = "output", conflicts_with_all = ["json", "truth"], help_heading = "Advanced")]
     shard: Option<Shard>,
     /// Print the calibration, or the evaluation of the lot, as one JSON document and nothing else
     #[arg(long)]
@@ -204,15 +209,12 @@ impl Calibrate {
             Method::Ekf => format!("{name}-calibration"),
             Method::SixPosition => format!("{name}-calibration-six-position"),
         });
-        let inputs: Vec<&Path> = { [Some(path), self.truth.as_deref()].into_iter() }
-            .flatten()
-            .collect();
-        let directory = target.as_deref();
-        let directory = directory.map(|target| self.overwrite.directory(target, &inputs));
-        let directory = directory.transpose()?;
+        let inputs = Vec::from_iter([Some(path), self.truth.as_deref()].into_iter().flatten());
+        let begin = |target: &PathBuf| self.overwrite.directory(target, &inputs);
+        let directory = target.as_ref().map(begin).transpose()?;
 
         // What was found in the files may be why.
-        let mut solution = solve(problem, self.estimation.method.into(), &activity)
+        let mut solution = solve(problem, self.estimation.method, &activity)
             .inspect_err(|_| say(&run.recording))?;
         let calibrated = Calibrated::new(problem, &mut solution)?.of_files(path);
         activity.next("writing");
@@ -290,11 +292,7 @@ fn say(recording: &Recording) {
 }
 
 /// Solves a problem, the passes being shown.
-pub fn solve(
-    problem: &Problem,
-    method: calibration::Method,
-    activity: &Activity,
-) -> anyhow::Result<Solution> {
+pub fn solve(problem: &Problem, method: Method, activity: &Activity) -> anyhow::Result<Solution> {
     let name = &problem.run().recording.name;
     activity.next(format!("calibrating {name}"));
     let solution = problem.solve(method, &|pass| {

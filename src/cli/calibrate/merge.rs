@@ -11,7 +11,8 @@ use turncal::report::terminal::printable;
 use turncal::study::{AccuracyStudy, ExperimentStudy};
 
 use super::lot;
-use super::output::Delivery;
+
+use crate::cli::arguments::Delivery;
 
 /// Merges the parts of a sharded job; the result is identical to a single run
 ///

@@ -9,8 +9,9 @@ use turncal::formats::digest_of_bytes;
 use turncal::lot::Specification;
 use turncal::report::certificate;
 
-use super::lot::NotMet;
-use super::output::{Overwrite, print};
+use crate::cli::NotMet;
+use crate::cli::arguments::Overwrite;
+use crate::cli::terminal::print;
 
 /// Writes a calibration certificate as PDF/A-3, with a Digital Calibration Certificate in it
 ///
@@ -53,7 +54,7 @@ pub struct Certificate {
 impl Certificate {
     pub fn run(&self) -> anyhow::Result<()> {
         let (Some(path), Some(laboratory)) = (&self.calibration, &self.laboratory) else {
-            return print(include_bytes!("../certificate/draft.toml"));
+            return print(include_bytes!("../../certificate/draft.toml"));
         };
         let read = |path: &Path| -> anyhow::Result<Vec<u8>> {
             std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))

@@ -16,11 +16,9 @@ use turncal::run::Run;
 use turncal::study::Shard;
 
 use super::calibrated::{Calibrated, write_report};
-use super::estimation::Estimation;
-use super::output::show;
-use super::progress::Runs;
-use super::source::OfLog;
-use super::threads::piece_by_piece;
+
+use crate::cli::arguments::{Estimation, OfLog};
+use crate::cli::terminal::{Runs, piece_by_piece, show};
 
 /// Written where no directory is named.
 pub const DIRECTORY: &str = "lot-calibration";
@@ -41,7 +39,7 @@ impl Request<'_> {
     pub fn run(&self) -> anyhow::Result<()> {
         let names = unit_names(self.runs)?;
         let specification = self.specification.map(Specification::read).transpose()?;
-        let mut words = self.estimation.in_words();
+        let mut words = serde_json::to_value(self.estimation)?;
         if *self.of_log != OfLog::default() {
             words["of_log"] = format!("{:?}", self.of_log).into();
         }
@@ -136,7 +134,7 @@ impl Request<'_> {
         let run = self.of_log.open(path)?.run;
         let problem = self.estimation.problem(&run, path)?;
         let method = self.estimation.method;
-        let mut solution = problem.solve(method.into(), UNWATCHED)?;
+        let mut solution = problem.solve(method, UNWATCHED)?;
         let calibrated = Calibrated::new(&problem, &mut solution)?.of_files(path);
         let document =
             calibrated.document((&problem, &run.recording.name), &solution, method, None);

@@ -6,9 +6,8 @@ use anyhow::Context;
 use turncal::noise::{NoiseAnalysis, Stretch};
 use turncal::report::allan;
 
-use super::output::Delivery;
-use super::progress::Activity;
-use super::source::{OfLog, run_or_log};
+use crate::cli::arguments::{Delivery, OfLog, run_or_log};
+use crate::cli::terminal::Activity;
 
 /// Allan deviation of a stationary record, and the noise figures that it shows
 ///

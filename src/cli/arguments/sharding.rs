@@ -6,15 +6,14 @@ use serde::Serialize;
 use turncal::formats::{Job, JobKind, Part, part_is_there, write_part};
 use turncal::study::Shard;
 
-use super::input::shard;
-use super::output::Delivery;
-use super::progress::Runs;
+use super::{Delivery, shard};
+use crate::cli::terminal::Runs;
 
 /// The part of a study that is to be made.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub struct Sharding {
     /// Make part i of M of the runs into DIR, for turncal merge
-    #[arg(long, value_name = "i/M", value_parser = shard, requires = "output", conflicts_with = "json")]
+    #[arg(long, value_name = "i/M", value_parser = shard, requires = "output", conflicts_with = "json", help_heading = "Advanced")]
     shard: Option<Shard>,
 }
 

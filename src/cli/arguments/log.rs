@@ -7,7 +7,7 @@ use turncal::formats::draft::{Found, KalibrImu, Stated, StatedUnit};
 use turncal::imu::Sensor;
 use turncal::report::terminal::printable;
 
-use super::input::{latitude, positive};
+use super::{latitude, positive};
 
 /// What is stated of a log that has no run.toml.
 #[derive(Debug, Clone, PartialEq, Default, clap::Args)]

@@ -8,8 +8,8 @@ use anyhow::{Context, bail};
 use rayon::prelude::*;
 use turncal::calibration::result::{InputFile, TermRecord};
 use turncal::calibration::{
-    Assessment, Calibration, ClosedForm, Estimate, Problem, Reference, Solution, in_body_frame,
-    triads_of,
+    Assessment, Calibration, ClosedForm, Estimate, Method, Problem, Reference, Solution,
+    in_body_frame, triads_of,
 };
 use turncal::formats::input_digests;
 use turncal::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
@@ -18,8 +18,6 @@ use turncal::report::calibration::{self as of_calibration, Navigated, Report};
 use turncal::run::{Aiding, Run};
 use turncal::study::navigation::{Mission, NavigationStudyError};
 use turncal::survey::{self, Expected};
-
-use super::estimation::Method;
 
 /// A true calibration, in the general form, with its error terms.
 pub struct Truth {

@@ -14,10 +14,8 @@ use turncal::report::navigation::Navigation;
 use turncal::study::navigation::{INTERVAL, Mission, Motion, Pair, Warming, WarmingPair};
 use turncal::units::DEGREE;
 
-use super::input::{at_temperature, hours, latitude, number};
-use super::names::short_names;
-use super::output::Delivery;
-use super::progress::Activity;
+use crate::cli::arguments::{Delivery, at_temperature, hours, latitude, number};
+use crate::cli::terminal::{Activity, short_names};
 
 const HOUR: f64 = 3600.0;
 /// Pitch beyond which roll and heading cannot be told apart, degrees.

@@ -1,0 +1,71 @@
+//! Error terms as arguments.
+
+use anyhow::bail;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::error::ErrorKind;
+use turncal::calibration::{ErrorTerm, Problem};
+use turncal::run::Aiding;
+use turncal::turntable::AxisError;
+
+/// Parses the name of an error term.
+pub fn error_term() -> impl TypedValueParser<Value = ErrorTerm> {
+    let value = |term: ErrorTerm| {
+        let value = PossibleValue::new(term.name()).help(help(term));
+        match term {
+            ErrorTerm::GaussMarkovBias => value.alias("wandering-bias"),
+            _ => value,
+        }
+    };
+    PossibleValuesParser::new(ErrorTerm::ALL.map(value)).map(|name| {
+        let mut all = ErrorTerm::ALL.into_iter();
+        all.find(|term| term.name() == name)
+            .unwrap_or(ErrorTerm::GaussMarkovBias)
+    })
+}
+
+fn help(term: ErrorTerm) -> &'static str {
+    match term {
+        ErrorTerm::GaussMarkovBias => "Gauss–Markov biases",
+        ErrorTerm::TableBase => "Level and north of the table",
+        ErrorTerm::TableAxes(AxisError::Tilt) => "Non-orthogonality of the table's axes",
+        ErrorTerm::TableAxes(AxisError::Wobble) => {
+            "Wobble of the table's axes, once and twice a turn"
+        }
+        ErrorTerm::TableAxes(AxisError::Encoder) => {
+            "Errors of the table's encoders, once and twice a turn"
+        }
+        ErrorTerm::Instrument(term) => term.entry().help,
+    }
+}
+
+/// Ends the program, with its status for wrong usage, if this is an error of the table and the table is
+/// not observed.
+pub fn needs_table(term: ErrorTerm, aiding: Option<Aiding>) {
+    let of_table = matches!(term, ErrorTerm::TableBase | ErrorTerm::TableAxes(_));
+    if of_table && aiding == Some(Aiding::Velocity) {
+        let message = format!(
+            "--aiding velocity does not observe the table, so {} makes no difference; leave one of them \
+             out\n",
+            term.name()
+        );
+        clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
+    }
+}
+
+/// Switches an error term on in a problem.
+pub fn switch_on(term: ErrorTerm, problem: &mut Problem) -> anyhow::Result<()> {
+    if !problem.model.can_have(term) {
+        bail!(
+            "{}: --with {} needs {}; leave it out, or add that to the run",
+            problem.run().recording.name,
+            term.name(),
+            match problem.model.aiding {
+                Aiding::Table =>
+                    "the angles of the table's axes in the table's log, not a quaternion",
+                Aiding::Velocity => "the table's log",
+            }
+        );
+    }
+    problem.model.switch_on(term);
+    Ok(())
+}

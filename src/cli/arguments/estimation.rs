@@ -1,0 +1,95 @@
+//! How a run is estimated, alike for one run and for a lot.
+
+use anyhow::Context;
+use clap::error::ErrorKind;
+use serde::{Serialize, Serializer};
+use turncal::calibration::{
+    CalibrationError, ErrorTerm, Method, NoisePolicy, Options, Problem, Together,
+};
+use turncal::imu::InstallationForm;
+use turncal::run::{Aiding, Run};
+
+use super::error_term::{error_term, needs_table, switch_on};
+
+/// Arguments that say how.
+#[derive(Debug, Clone, Serialize, clap::Args)]
+pub struct Estimation {
+    /// Estimation method
+    #[arg(long, value_enum, default_value_t = Method::Ekf)]
+    pub method: Method,
+    /// Form of the installation matrix
+    #[arg(long, value_enum, default_value_t)]
+    installation: InstallationForm,
+    /// Observations of the filter [default: table if the run has its log, else velocity]
+    #[arg(long, value_enum)]
+    aiding: Option<Aiding>,
+    /// Error terms to estimate, in addition to those that the run switches on [default: those that the data support]
+    #[arg(long, value_name = "TERM", value_parser = error_term(), value_delimiter = ',')]
+    #[serde(serialize_with = "names")]
+    with: Vec<ErrorTerm>,
+    /// Noise used by the filter
+    #[arg(long, value_enum, default_value_t)]
+    noise: NoisePolicy,
+}
+
+impl Estimation {
+    /// Ends the program where arguments exclude each other.
+    pub fn check(&self) {
+        if let (Method::SixPosition, Some(term)) = (self.method, self.with.first()) {
+            let message = format!(
+                "--with {}: --method six-position estimates scale factors, installation and biases only; \
+                 leave --with out, or estimate it by --method ekf\n",
+                term.name()
+            );
+            clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
+        }
+        for &term in &self.with {
+            needs_table(term, self.aiding);
+        }
+    }
+
+    /// The problem that a run poses.
+    pub fn problem<'a>(&self, run: &'a Run, path: &std::path::Path) -> anyhow::Result<Problem<'a>> {
+        if self.aiding == Some(Aiding::Table) && run.recording.table.is_none() {
+            return Err(CalibrationError::NoTable).with_context(|| path.display().to_string());
+        }
+        let mut problem = Problem::new(run, &self.options());
+        for &term in &self.with {
+            switch_on(term, &mut problem)?;
+        }
+        Ok(problem)
+    }
+
+    /// The problem that recordings of one instrument pose together.
+    pub fn together<'a>(
+        &self,
+        runs: &[&'a Run],
+        together: &Together,
+    ) -> anyhow::Result<Problem<'a>> {
+        if matches!(self.method, Method::SixPosition) {
+            anyhow::bail!(
+                "--method six-position: the closed form is of one recording at one temperature; leave it out, or \
+                 calibrate each run by itself"
+            );
+        }
+        let mut problem = Problem::together(runs, &self.options(), together)?;
+        for &term in &self.with {
+            switch_on(term, &mut problem)?;
+        }
+        Ok(problem)
+    }
+
+    fn options(&self) -> Options {
+        let mut options = Options::default()
+            .installation(self.installation)
+            .noise(self.noise);
+        options.auto_terms = self.with.is_empty();
+        options.aiding = self.aiding;
+        options
+    }
+}
+
+/// Error terms by the names of the command line.
+fn names<S: Serializer>(terms: &[ErrorTerm], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(terms.iter().map(|term| term.name()))
+}

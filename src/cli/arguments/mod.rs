@@ -1,0 +1,15 @@
+//! What commands have in common: their inputs, how they estimate, where results go.
+
+mod delivery;
+mod error_term;
+mod estimation;
+mod log;
+mod sharding;
+mod values;
+
+pub use delivery::{Delivery, Overwrite, keep};
+pub use error_term::{error_term, needs_table};
+pub use estimation::Estimation;
+pub use log::{OfLog, run_or_log, show_found};
+pub use sharding::Sharding;
+pub use values::{at_least_two, at_temperature, hours, latitude, number, positive, seed, shard};

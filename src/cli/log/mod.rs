@@ -1,0 +1,7 @@
+//! Commands that look at a log.
+
+pub mod allan;
+pub mod check;
+pub mod convert;
+pub mod init;
+pub mod noise;

@@ -1,0 +1,59 @@
+//! Standard output.
+
+use std::io::{self, BufWriter, IsTerminal, Write};
+
+use turncal::calibration::Word;
+use turncal::report::{self, Document, terminal};
+
+/// Prints a document as text as wide as the terminal, or as JSON.
+pub fn show(document: &Document, json: bool) -> anyhow::Result<()> {
+    let text = match json {
+        true => report::json(document),
+        false => terminal::text(document, columns().map(usize::from)),
+    };
+    print(text.as_bytes())
+}
+
+/// Prints what one screen has room for of a document.
+pub fn show_brief(document: &Document) -> anyhow::Result<()> {
+    let text = terminal::brief(document, columns().map(usize::from));
+    let is_plain = !io::stdout().is_terminal() || std::env::var_os("NO_COLOR").is_some();
+    let coloured = document.verdict.as_ref().filter(|_| !is_plain);
+    let text = match coloured {
+        Some((word, _)) => text.replacen(&word.to_string(), &in_colour(*word), 1),
+        None => text,
+    };
+    print(text.as_bytes())
+}
+
+/// A verdict as a terminal shows it in its colour.
+fn in_colour(word: Word) -> String {
+    let colour = match word {
+        Word::Good | Word::Pass => 32,
+        Word::UseWithCare | Word::Undecided => 33,
+        Word::Failed | Word::Fail => 31,
+    };
+    format!("\u{1b}[1;{colour}m{word}\u{1b}[0m")
+}
+
+/// How wide standard output is: that of its terminal, else what COLUMNS says, else without limit.
+pub fn columns() -> Option<u16> {
+    let terminal = terminal_size::terminal_size_of(io::stdout()).map(|(width, _)| width.0);
+    terminal.or_else(|| std::env::var("COLUMNS").ok()?.parse().ok())
+}
+
+/// Writes to standard output. A reader that has seen enough, such as `head`, is no failure.
+pub fn print(bytes: &[u8]) -> anyhow::Result<()> {
+    stream(|stdout| stdout.write_all(bytes))
+}
+
+/// The same for what is too long to be held.
+pub fn stream(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> anyhow::Result<()> {
+    let mut stdout = BufWriter::new(io::stdout().lock());
+    match write(&mut stdout).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(anyhow::Error::new(error).context("cannot write to standard output"))
+        }
+        _ => Ok(()),
+    }
+}
