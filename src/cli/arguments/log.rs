@@ -76,6 +76,17 @@ pub fn show_found(path: &Path, found: &[Found]) {
     }
 }
 
+/// The path of a run.toml, where a log would say too little.
+pub fn run_file(text: &str) -> Result<PathBuf, String> {
+    let path = run_or_log(text)?;
+    match path.is_file() && path.extension().is_none_or(|end| end != "toml") {
+        true => Err(format!(
+            "this is a log, expected the run.toml that describes it; turncal init {text} drafts one"
+        )),
+        false => Ok(path),
+    }
+}
+
 /// The path of a run.toml or a log, or `-`; if a run's directory is given instead, the error names the file in it.
 pub fn run_or_log(text: &str) -> Result<PathBuf, String> {
     let path = Path::new(text);

@@ -7,7 +7,7 @@ use turncal::formats::export;
 use turncal::formats::write_whole;
 use turncal::run::Run;
 
-use crate::cli::arguments::{at_temperature, keep, run_or_log};
+use crate::cli::arguments::{at_temperature, keep, run_file};
 use crate::cli::terminal::print;
 
 /// Exports a calibration for other programs (Kalibr, PX4, ROS, C, …)
@@ -29,7 +29,7 @@ pub struct Export {
     #[arg(long, value_enum)]
     format: export::Format,
     /// A run of the same instrument, for noise figures, sample rate and nominal scales
-    #[arg(long, value_name = "RUN.toml", value_parser = run_or_log)]
+    #[arg(long, value_name = "RUN.toml", value_parser = run_file)]
     run: Option<PathBuf>,
     /// Calibration temperature, °C [default: its reference; c, px4 and ardupilot contain the temperature dependence]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
