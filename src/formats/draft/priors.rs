@@ -4,9 +4,10 @@
 use nalgebra::Vector3;
 
 use super::Draft;
-use super::text::{Page, seven};
+use super::text::seven;
 use super::units::short;
 use crate::formats::instrument::{USUAL_BIAS, USUAL_INSTALLATION, USUAL_SCALE};
+use crate::formats::schema::page::Page;
 use crate::imu::Sensor;
 use crate::units::{ARCSEC, DEG_PER_SQRT_H, DEGREE, MICRO_G_PER_SQRT_HZ, PPM};
 

@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 use super::FEWEST_ROWS;
 use super::columns::{self, Columns, by_stem};
 use super::name::Name;
-use super::text::{Page, quoted, word_or_number};
+use super::text::{quoted, word_or_number};
 use super::time;
 use crate::formats::clock::{Breaks, Clock, TimeUnit};
 use crate::formats::csv_file::CsvFile;
 use crate::formats::error::list;
 use crate::formats::joined::{Joined, Part};
 use crate::formats::rows::LogRows;
+use crate::formats::schema::page::Page;
 use crate::formats::source::Source;
 use crate::formats::streams::{self, Column, Found, Stream};
 use crate::formats::{FileError, Place, Sheet};
@@ -184,7 +185,7 @@ impl Streams {
     pub fn write(&self, page: &mut Page) {
         if self.written.is_none() {
             self.listed.iter().for_each(|line| page.remark(line));
-            page.plain("stream", quoted(&self.gyro));
+            page.field("stream", self.gyro.as_str());
         }
         if let Some((accel, time)) = self.accel.as_ref().zip(self.time.as_ref()) {
             let (time, unit) = &time.accel;

@@ -9,7 +9,7 @@ use crate::attitude;
 use crate::formats::clock::{Clock, Stamp};
 use crate::formats::error::FileError;
 use crate::formats::rows::LogRows;
-use crate::formats::schema::{Angle, Document, TableColumns, TurntableFile};
+use crate::formats::schema::{AXIS_ERRORS, Angle, Document, TableColumns, TurntableFile};
 use crate::recording::{ImuSamples, TableLog};
 use crate::turntable::{AxisAngles, AxisError, TableAccuracy, TableGeometry, axis_angles};
 use crate::units::{ARCSEC, DEGREE};
@@ -151,7 +151,8 @@ fn geometry(
 ) -> Result<TableGeometry, FileError> {
     let sigma = |stated: Option<Angle>| stated.map_or(0.0, |sigma| sigma.0 * ARCSEC);
     let mut axes = TableGeometry::default().axes;
-    for (kind, (key, stated)) in AxisError::ALL.into_iter().zip(fields.axis_errors()) {
+    let stated = AXIS_ERRORS.into_iter().zip(fields.axis_errors());
+    for (kind, (key, stated)) in AxisError::ALL.into_iter().zip(stated) {
         if stated.is_some() && angles == 0 {
             return Err(document.wrong(
                 &format!("turntable.{key}"),

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
+use super::page::Page;
 use super::{Celsius, Document, NonNegative};
 use crate::calibration::{DayToDay, Group, TemperatureOptions, Together};
 use crate::formats::error::FileError;
@@ -28,20 +29,20 @@ pub struct Campaign {
     pub together: Together,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CampaignFile {
     /// Groups of parameters that each recording has for itself.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default)]
     own: Vec<String>,
     temperature: Option<TemperatureFile>,
     recording: Vec<RecordingFile>,
     /// 1σ from one recording to the next.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(default)]
     day_to_day: BTreeMap<String, NonNegative>,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RecordingFile {
     run: PathBuf,
@@ -49,7 +50,7 @@ struct RecordingFile {
 }
 
 /// Whether parameters follow temperature, and how.
-#[derive(Clone, Copy, Serialize, Deserialize)]
+#[derive(Clone, Copy, Deserialize)]
 #[serde(
     untagged,
     deny_unknown_fields,
@@ -153,34 +154,27 @@ impl Campaign {
 }
 
 /// The `campaign.toml` of recordings with these paths, relative to it, that differ from day to day by this 1σ.
-pub fn campaign_text(paths: &[String], day_to_day: &DayToDay) -> Result<String, toml::ser::Error> {
-    let lines = Group::all().filter_map(|group| {
+pub fn campaign_text(paths: &[String], day_to_day: &DayToDay) -> String {
+    let mut page = Page::of(FORMAT, "");
+    for path in paths {
+        page.text += "\n[[recording]]\n";
+        page.field("run", path.as_str());
+    }
+    let of_groups = Group::all().filter_map(|group| {
         let (key, unit) = DayToDay::key(group);
         let first = *group.parameters(InstallationForm::General).first()?;
         Some((key, day_to_day.parameters[first] / unit))
     });
     let mounting = (MOUNTING.to_owned(), day_to_day.mounting / ARCSEC);
-    let lines = lines.chain([mounting]).filter(|&(_, sigma)| sigma > 0.0);
-    let recording = |path: &String| RecordingFile {
-        run: path.into(),
-        temperature_degc: None,
-    };
-    let file = CampaignFile {
-        own: Vec::new(),
-        temperature: None,
-        recording: paths.iter().map(recording).collect(),
-        day_to_day: lines
-            .map(|(key, sigma)| (key, three_digits(sigma)))
-            .collect(),
-    };
-    let text = toml::to_string(&file)?;
-    let comment = "\n# 1σ from one recording to the next\n[day_to_day]";
-    let text = text.replace("\n[day_to_day]", comment);
-    Ok(format!("format = \"{FORMAT}\"\n\n{text}"))
-}
-
-fn three_digits(value: f64) -> NonNegative {
-    NonNegative(format!("{value:.2e}").parse().unwrap_or(value))
+    let lines = of_groups.chain([mounting]).filter(|of| of.1 > 0.0);
+    let lines: BTreeMap<String, f64> = lines.collect();
+    if !lines.is_empty() {
+        page.table("day_to_day", "1σ from one recording to the next");
+    }
+    for (key, sigma) in lines {
+        page.field(&key, format!("{sigma:.2e}").parse().unwrap_or(sigma));
+    }
+    page.text
 }
 
 /// Notes temperatures that never change where those of other recordings do.

@@ -140,8 +140,8 @@ fn knowledge(
     let axes = imu.body_axes.unwrap_or_default();
     let names = Sensor::ALL.map(|sensor| NoiseKeys::of(sensor).names());
     document.only("imu.noise", imu.noise.keys(), names.as_flattened())?;
-    let (gyro_noise, gyro_in_moves) = noise(document, imu, Sensor::Gyro, notes)?;
-    let (accel_noise, accel_in_moves) = noise(document, imu, Sensor::Accel, notes)?;
+    let (gyro_noise, gyro_in_moves) = noise(document, imu, Sensor::Gyro)?;
+    let (accel_noise, accel_in_moves) = noise(document, imu, Sensor::Accel)?;
     Ok(Instrument {
         prior: PerSensor {
             gyro: prior(document, imu, Sensor::Gyro, gyro, notes)?,
@@ -198,21 +198,10 @@ fn noise(
     document: Document,
     imu: &ImuFile,
     sensor: Sensor,
-    notes: &mut Vec<String>,
 ) -> Result<(Noise, MotionNoise), FileError> {
     let keys = NoiseKeys::of(sensor);
     let get = |name: &str| imu.noise.get(name).map(|value| value.0);
-    let (sigma, sigma_unit) = keys.gauss_markov;
-    let former = get(keys.former).filter(|_| get(sigma).is_none());
-    if former.is_some() {
-        notes.push(format!(
-            "imu.noise.{} is read as the 1σ of a Gauss–Markov bias, not as the floor of the Allan \
-             deviation that data sheets call instability; write {sigma}.",
-            keys.former
-        ));
-    }
-    let key = former.map_or(sigma, |_| keys.former);
-    let time = keys.correlation_time;
+    let ((key, sigma_unit), time) = (keys.gauss_markov, keys.correlation_time);
     let gauss_markov = match (get(key), get(time)) {
         (None, None) => None,
         (Some(sigma), Some(correlation_time)) => {
@@ -233,7 +222,7 @@ fn noise(
             return Err(document.missing(&path, "its correlation time"));
         }
         (None, Some(_)) => {
-            let path = format!("imu.noise.{sigma}");
+            let path = format!("imu.noise.{key}");
             return Err(document.missing(&path, "the 1σ of the Gauss–Markov bias"));
         }
     };
