@@ -101,6 +101,16 @@ impl FileError {
         }
     }
 
+    /// The same of the file as a whole.
+    pub(super) fn of(
+        file: &Path,
+        found: impl fmt::Display,
+        expected: impl fmt::Display,
+        advice: impl fmt::Display,
+    ) -> Self {
+        Self::new(file, Place::File, found, expected, advice)
+    }
+
     /// The system refused to do something with a file.
     pub(super) fn io(file: &Path, doing: &str, error: &std::io::Error, advice: &str) -> Self {
         Self {

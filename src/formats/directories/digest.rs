@@ -29,7 +29,7 @@ struct Named {
 
 impl Inputs {
     fn read(path: &Path) -> Self {
-        let text = small_file::text(path).unwrap_or_default();
+        let text = small_file::text(path, "", "").unwrap_or_default();
         toml::from_str(&text).unwrap_or_default()
     }
 }

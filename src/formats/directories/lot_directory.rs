@@ -11,7 +11,7 @@ use super::digest::{digest_of, digest_of_bytes, input_digests};
 use super::job::{JOB_FILE, Part};
 use super::whole::{WholeDirectory, clear_abandoned, list_anew, write_whole};
 use crate::calibration::result::Calibration;
-use crate::formats::error::{FileError, Place};
+use crate::formats::error::FileError;
 use crate::formats::small_file;
 use crate::imu::PerSensor;
 use crate::lot::{Calibrated, Unit};
@@ -190,9 +190,8 @@ fn check_same(target: &Path, found: &Part, expected: &Part) -> Result<(), FileEr
         (found.shard != expected.shard).then(|| format!("{} and {}", words(found), words(expected)))
     });
     difference.map_or(Ok(()), |difference| {
-        Err(FileError::new(
+        Err(FileError::of(
             target,
-            Place::File,
             format_args!("a lot begun with other options: {difference}"),
             "the job that was begun here, to continue it",
             "Give the same options, choose another directory, or add --force to restart.",
@@ -215,9 +214,8 @@ fn check_units(units: &Path, part: &Part) -> Result<(), FileError> {
         .collect();
     others.sort();
     others.first().map_or(Ok(()), |other| {
-        Err(FileError::new(
+        Err(FileError::of(
             units,
-            Place::File,
             format_args!("unit `{other}`, which is not among the runs given"),
             "units of this lot only",
             "Give its run.toml, too, choose another directory, or add --force to restart.",
@@ -228,17 +226,7 @@ fn check_units(units: &Path, part: &Part) -> Result<(), FileError> {
 impl UnitRecord {
     fn read(directory: &Path) -> Result<Self, FileError> {
         let path = directory.join(UNIT_FILE);
-        let advice = "Calibrate the unit again.";
-        let bytes = small_file::bytes(&path)
-            .map_err(|error| FileError::io(&path, "read the unit", &error, advice))?;
-        let expected = format!("a unit in the format {FORMAT}");
-        let record: Self = serde_json::from_slice(&bytes)
-            .map_err(|error| FileError::new(&path, Place::File, error, &expected, advice))?;
-        if record.format != FORMAT {
-            let found = format_args!("format = {:?}", record.format);
-            return Err(FileError::new(&path, Place::File, found, expected, advice));
-        }
-        Ok(record)
+        small_file::json(&path, "a unit", FORMAT, "Calibrate the unit again.")
     }
 }
 
@@ -246,13 +234,7 @@ fn read_unit(directory: &Path, key: &str) -> Result<Unit, FileError> {
     let record = UnitRecord::read(directory)?;
     let wrong = |found: &str| {
         let (expected, advice) = ("the unit as it was written", "Calibrate it again.");
-        Err(FileError::new(
-            directory,
-            Place::File,
-            found,
-            expected,
-            advice,
-        ))
+        Err(FileError::of(directory, found, expected, advice))
     };
     if record.key != key {
         return wrong("another key");
@@ -295,8 +277,7 @@ fn write_unit(unit: &Unit, key: &str, directory: &Path) -> Result<(), FileError>
         failure: unit.calibrated.as_ref().err().cloned(),
     };
     let refused = |error: std::io::Error| FileError::io(&path, "write it", &error, "Make room.");
-    let mut bytes = serde_json::to_vec_pretty(&record).map_err(|error| refused(error.into()))?;
-    bytes.push(b'\n');
+    let bytes = small_file::pretty(&record).map_err(|error| refused(error.into()))?;
     fs::write(directory.join(UNIT_FILE), bytes).map_err(refused)?;
     if let Some(json) = json {
         fs::write(&path, json).map_err(refused)?;

@@ -18,9 +18,8 @@ use stage::Stage;
 pub use stage::abandon_unfinished;
 
 fn taken(target: &Path) -> FileError {
-    FileError::new(
+    FileError::of(
         target,
-        Place::File,
         "something of this name already",
         "a name that is free",
         "Choose another name, or give --force to replace it.",
@@ -56,9 +55,8 @@ impl WholeDirectory {
                 } else {
                     "file"
                 };
-                return Err(FileError::new(
+                return Err(FileError::of(
                     target,
-                    Place::File,
                     format_args!("a {what} of this name"),
                     "a directory or nothing",
                     format_args!("Choose another name or remove the {what}."),
@@ -74,9 +72,8 @@ impl WholeDirectory {
                 .chain([Path::new(".")])
                 .find(|path| inside(path));
             if let Some(held) = held {
-                return Err(FileError::new(
+                return Err(FileError::of(
                     target,
-                    Place::File,
                     format_args!(
                         "{} in this directory",
                         if held == Path::new(".") {
@@ -151,9 +148,8 @@ fn only_output(directory: &Path) -> Result<(), FileError> {
     let foreign = manifest::foreign(directory)
         .map_err(|error| unwritable(directory, "look into the directory", &error))?;
     foreign.map_or(Ok(()), |foreign| {
-        Err(FileError::new(
+        Err(FileError::of(
             directory,
-            Place::File,
             format_args!(
                 "`{}` in it, which no list of what turncal wrote there (`{}`) names",
                 foreign.display(),
@@ -180,9 +176,8 @@ pub fn write_whole_with(
     match fs::symlink_metadata(path) {
         Ok(_) if !force => return Err(taken(path)),
         Ok(existing) if existing.is_dir() => {
-            return Err(FileError::new(
+            return Err(FileError::of(
                 path,
-                Place::File,
                 "a directory of this name",
                 "a file or nothing",
                 "Choose another name.",

@@ -8,7 +8,7 @@ use std::path::Path;
 use super::Draft;
 use super::streams::{Streams, Written};
 use crate::formats::source::Source;
-use crate::formats::{FileError, Place, write_rows};
+use crate::formats::{FileError, write_rows};
 
 /// Of gyros, and of accelerometers in the same stream.
 const GYRO_FILE: &str = "imu.csv.gz";
@@ -26,13 +26,7 @@ impl Draft {
         let Some(streams) = streams else {
             let advice = "`turncal init` drafts a run.toml for it as it is.";
             let expected = "a log of another program";
-            return Err(FileError::new(
-                log,
-                Place::File,
-                "rows of text",
-                expected,
-                advice,
-            ));
+            return Err(FileError::of(log, "rows of text", expected, advice));
         };
         let source = |stream| Source {
             stream: Some(stream),

@@ -15,7 +15,7 @@ use crate::formats::rows::LogRows;
 use crate::formats::schema::page::Page;
 use crate::formats::source::Source;
 use crate::formats::streams::{self, Column, Found, Stream};
-use crate::formats::{FileError, Place, Sheet};
+use crate::formats::{FileError, Sheet};
 use crate::imu::{Output, PerSensor, Sensor};
 
 /// The streams that hold gyros and accelerometers.
@@ -82,13 +82,7 @@ impl Streams {
         let Some((gyro, accel)) = chosen(&members, wanted) else {
             let advice = "Record the file again.";
             let expected = "streams of samples";
-            return Err(FileError::new(
-                file,
-                Place::File,
-                "no samples",
-                expected,
-                advice,
-            ));
+            return Err(FileError::of(file, "no samples", expected, advice));
         };
         let salvage = damage.is_some();
         let gyro = &members[gyro];
@@ -272,7 +266,7 @@ impl Member {
         let columns = list(columns.map(|column| &*column.name));
         let found = format_args!("the columns {columns}");
         let advice = "Rename the columns or the file, or complete the fields by hand.";
-        FileError::new(&self.file, Place::File, found, expected, advice)
+        FileError::of(&self.file, found, expected, advice)
     }
 
     /// The names of a triad's columns.

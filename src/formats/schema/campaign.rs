@@ -68,19 +68,13 @@ enum TemperatureFile {
 impl Campaign {
     /// Whether a file says that it is one.
     pub fn is_at(path: &Path) -> bool {
-        let Ok(text) = small_file::text(path) else {
-            return false;
-        };
-        let document = Document {
-            file: path,
-            text: &text,
-        };
-        let Ok(table) = document.parse() else {
-            return false;
-        };
-        let format = table.get_ref().get("format");
-        let format = format.and_then(|format| format.get_ref().as_str());
-        format.is_some_and(|format| format.starts_with("turncal-campaign/"))
+        let text = small_file::text(path, "", "").unwrap_or_default();
+        let table = Document::of(path, &text).parse().ok();
+        let format = table.and_then(|table| {
+            let format = table.get_ref().get("format")?.get_ref().as_str()?;
+            Some(format.starts_with("turncal-campaign/"))
+        });
+        format == Some(true)
     }
 
     /// Reads a campaign and its recordings, whose paths are relative to it.
@@ -88,14 +82,8 @@ impl Campaign {
     /// # Errors
     /// [`FileError`] if it or a recording cannot be read, or a value cannot be.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let text = small_file::text(path).map_err(|error| {
-            let advice = "Give the path of a campaign.toml.";
-            FileError::io(path, "read the campaign", &error, advice)
-        })?;
-        let document = Document {
-            file: path,
-            text: &text,
-        };
+        let text = small_file::text(path, "the campaign", "Give the path of a campaign.toml.")?;
+        let document = Document::of(path, &text);
         let mut file: CampaignFile = document.fill(document.of_format(FORMAT)?)?;
         if file.recording.is_empty() {
             return Err(document.missing("recording", ""));
@@ -109,14 +97,7 @@ impl Campaign {
         if let Some(pair) = named.windows(2).find(|pair| pair[0].run == pair[1].run) {
             let advice = "Name every recording once.";
             let found = format_args!("{} twice", pair[0].run.display());
-            let place = crate::formats::error::Place::File;
-            return Err(FileError::new(
-                path,
-                place,
-                found,
-                "each recording once",
-                advice,
-            ));
+            return Err(FileError::of(path, found, "each recording once", advice));
         }
         let temperature = file
             .temperature

@@ -11,7 +11,7 @@ use super::instrument::InstrumentFields;
 use super::{Document, FORMAT, META, Positive, RunFile, StandstillFile};
 use crate::earth::Site;
 use crate::formats::draft::turned_angle;
-use crate::formats::error::{FileError, Place};
+use crate::formats::error::FileError;
 use crate::formats::inputs::segments;
 use crate::formats::inputs::table_log::TableLogFile;
 use crate::formats::small_file;
@@ -33,7 +33,7 @@ impl Run {
 
     /// The same of the text of a `run.toml` that stands, or would stand, beside this file, and was read from `source`.
     pub fn of_text(path: &Path, text: &str, source: Option<&Path>) -> Result<Self, FileError> {
-        let document = Document { file: path, text };
+        let document = Document::of(path, text);
         let file = run_file(document)?;
         let directory = path.parent().unwrap_or(Path::new(""));
         let mut notes = Vec::new();
@@ -88,10 +88,7 @@ impl Run {
     /// [`FileError`] if not even that can be read.
     pub fn read_meta(path: &Path) -> Result<BTreeMap<String, String>, FileError> {
         let text = text_of(path)?;
-        let document = Document {
-            file: path,
-            text: &text,
-        };
+        let document = Document::of(path, &text);
         #[derive(Deserialize)]
         struct Meta {
             #[serde(default)]
@@ -174,8 +171,7 @@ fn other_file(instrument: &InstrumentFields) -> Option<PathBuf> {
 }
 
 fn text_of(path: &Path) -> Result<String, FileError> {
-    let advice = "Give the path of a run.toml.";
-    small_file::text(path).map_err(|error| FileError::io(path, "read the run", &error, advice))
+    small_file::text(path, "the run", "Give the path of a run.toml.")
 }
 
 /// Rates of which nothing tells how long a row lasts, with the period at which they turn the instrument as gravity's
@@ -193,9 +189,8 @@ fn with_found_period(
     };
     let angle = turned_angle(PerSensor::from_fn(rates), imu.period);
     let Some(period) = angle.filter(|&period| period > 0.0) else {
-        return Err(FileError::new(
+        return Err(FileError::of(
             &instrument.log.source.file,
-            Place::File,
             "rows without a time, whose turns do not show how long a row lasts",
             "a time column, or sample_period_s in run.toml",
             "Add sample_period_s to [imu].",

@@ -11,7 +11,7 @@ use toml::Value;
 use super::page::Page;
 use super::{AXIS_ERRORS, FORMAT, META};
 use crate::calibration::Calibration;
-use crate::formats::error::{FileError, Place, list, suggestion};
+use crate::formats::error::{FileError, list, suggestion};
 use crate::formats::inputs::table_log::LETTERS;
 use crate::formats::quantity::{output_word, units};
 use crate::imu::{NoiseKeys, Output, Sensor, Term};
@@ -74,9 +74,8 @@ fn check_words(configuration: &Path, run: &Run, output: Output) -> Result<(), Fi
         let unit = run.instrument.unit.get(sensor);
         let names = || units(sensor, output).map(|(name, _)| name);
         if !names().any(|name| name == unit) {
-            return Err(FileError::new(
+            return Err(FileError::of(
                 configuration,
-                Place::File,
                 format_args!("{}_unit = `{unit}` for this output", sensor.name()),
                 format_args!("one of {}", list(names())),
                 "Change the unit or the output.",
@@ -85,9 +84,8 @@ fn check_words(configuration: &Path, run: &Run, output: Output) -> Result<(), Fi
     }
     let mut fields = run.recording.meta.keys();
     match fields.find(|name| !META.contains(&name.as_str())) {
-        Some(name) => Err(FileError::new(
+        Some(name) => Err(FileError::of(
             configuration,
-            Place::File,
             format_args!("`{name}` among the meta fields"),
             format_args!("one of {}", list(META)),
             suggestion(name, META, "Rename it."),

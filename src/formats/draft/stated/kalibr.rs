@@ -28,10 +28,8 @@ impl KalibrImu {
     /// # Errors
     /// [`FileError`] if the file cannot be read, lacks a noise density, or states a wrong number or a key twice.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let text = small_file::text(path).map_err(|error| {
-            let advice = "Correct the name or add the file.";
-            FileError::io(path, "read the noise figures", &error, advice)
-        })?;
+        let advice = "Correct the name or add the file.";
+        let text = small_file::text(path, "the noise figures", advice)?;
         Self::of_text(path, &text)
     }
 
@@ -106,13 +104,7 @@ fn missing(path: &Path, key: &str, others: &[&str]) -> FileError {
         Some(other) => format!("Rename `{other}`, or add the line."),
         None => "Add the line.".to_owned(),
     };
-    FileError::new(
-        path,
-        Place::File,
-        found,
-        "a noise density of each triad",
-        advice,
-    )
+    FileError::of(path, found, "a noise density of each triad", advice)
 }
 
 #[cfg(test)]
