@@ -12,7 +12,7 @@ use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crate::formats::error::{FileError, Place};
+use crate::formats::error::FileError;
 pub use manifest::FILE as LIST;
 use stage::Stage;
 pub use stage::abandon_unfinished;

@@ -15,8 +15,6 @@ pub struct Columns {
     pub time: Option<usize>,
     /// Nanoseconds beside a time in whole seconds.
     pub nanoseconds: Option<usize>,
-    /// A column that counts rows.
-    pub counter: Option<usize>,
     pub triads: PerSensor<Option<[usize; 3]>>,
     /// Others that might be meant.
     pub others: PerSensor<Vec<[usize; 3]>>,
@@ -91,14 +89,12 @@ impl Columns {
         }
         let is_new = |&sensor: &Sensor| *lacked.get(sensor) && !lacks(&found, sensor);
         let first = |triads: &Vec<[usize; 3]>| triads.first().copied();
-        let counts = |k: &usize| names[*k].is_counter() && forward(*k).0 >= FORWARD;
         Self {
             names: (0..names.len())
                 .map(|k| distinct(&sheet.names, k))
                 .collect(),
             time,
             nanoseconds: split.map(|pair| pair[1]),
-            counter: (0..names.len()).find(counts),
             triads: PerSensor::from_fn(|sensor| first(found.get(sensor))),
             others: PerSensor::from_fn(|sensor| {
                 found.get(sensor).iter().skip(1).copied().collect()

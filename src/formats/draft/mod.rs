@@ -39,6 +39,7 @@ const FEWEST_ROWS: usize = 100;
 const FEWEST_AT_REST: usize = 64;
 
 const NO_COLUMNS: &str = "no names or numbers showed them";
+const AXES_OF_PROGRAM: &str = "as the program that wrote the log has them";
 
 /// What a log shows of the instrument and its record.
 #[derive(Debug, Clone, PartialEq)]
@@ -152,6 +153,7 @@ impl Draft {
             if let Some(time) = &streams.time {
                 draft.clock.unit.clone_from(&time.gyro.1);
                 "as the file says".clone_into(&mut draft.clock.why);
+                draft.clock.certainty = Certainty::Certain;
             }
         }
         draft

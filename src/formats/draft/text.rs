@@ -2,7 +2,7 @@
 
 use super::name::axes_of_program;
 use super::units::short;
-use super::{Draft, NO_COLUMNS};
+use super::{AXES_OF_PROGRAM, Draft, NO_COLUMNS};
 use crate::formats::quantity::output_word;
 use crate::formats::schema::FORMAT;
 use crate::formats::schema::page::Page;
@@ -145,11 +145,7 @@ impl Draft {
 
     fn body_axes(&self, page: &mut Page) {
         if let Some(axes) = self.streams.as_ref().and_then(|streams| streams.axes) {
-            page.line(
-                "body_axes",
-                quoted(axes),
-                "as the program that wrote the log has them",
-            );
+            page.line("body_axes", quoted(axes), AXES_OF_PROGRAM);
             return;
         }
         let mut why = "guessed: x right, y front, z up; else \"frd\" or \"flu\"".to_owned();

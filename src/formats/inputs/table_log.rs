@@ -1,15 +1,14 @@
 //! The turntable's log: readings of the attitude of its mounting face.
 
-use std::path::Path;
-
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
-use super::source::{Source, clock};
+use super::source::Source;
 use crate::attitude;
 use crate::formats::clock::{Clock, Stamp};
 use crate::formats::error::FileError;
 use crate::formats::rows::LogRows;
-use crate::formats::schema::{AXIS_ERRORS, Angle, Document, TableColumns, TurntableFile};
+use crate::formats::schema::instrument::Fields;
+use crate::formats::schema::{AXIS_ERRORS, Angle, TurntableFile};
 use crate::recording::{ImuSamples, TableLog};
 use crate::turntable::{AxisAngles, AxisError, TableAccuracy, TableGeometry, axis_angles};
 use crate::units::{ARCSEC, DEGREE};
@@ -32,76 +31,17 @@ pub struct AttitudeColumns<C> {
     angles: Vec<(C, Vector3<f64>)>,
 }
 
-impl<'a> AttitudeColumns<&'a str> {
-    fn of_fields(document: Document, table: &'a TurntableFile) -> Result<Self, FileError> {
-        let TableColumns {
-            quaternion, angles, ..
-        } = &table.columns;
-        let axes = table.axes.as_ref().or(table.columns.axes.as_ref());
-        let path = |name: &str| match (name, &table.axes) {
-            ("axes", Some(_)) => "turntable.axes".to_owned(),
-            _ => format!("turntable.columns.{name}"),
-        };
-        let angles = match (angles, axes) {
-            (Some(names), Some(letters)) if names.is_empty() || names.len() != letters.len() => {
-                return Err(document.wrong(
-                    &path("angles"),
-                    format_args!(
-                        "an angle for each of {} axes, outermost first",
-                        letters.len()
-                    ),
-                    "Complete `angles` or `axes`.",
-                ));
-            }
-            (Some(names), Some(letters)) => {
-                let pairs = names.iter().zip(letters).map(|(name, letter)| {
-                    let axis = LETTERS.iter().find(|(known, _)| known == letter);
-                    axis.map(|(_, axis)| (name.as_str(), *axis))
-                });
-                pairs.collect::<Option<_>>().ok_or_else(|| {
-                    document.wrong(
-                        &path("axes"),
-                        "`x`, `y` or `z` for each axis",
-                        "Name the axis about which the table turns when all angles are zero.",
-                    )
-                })?
-            }
-            (Some(_), None) => {
-                return Err(document.missing("turntable.axes", "the axes of the angles"));
-            }
-            (None, Some(_)) => {
-                return Err(document.wrong(
-                    &path("axes"),
-                    "it beside the columns of `angles`",
-                    "Name the columns of the angles, or remove the axes.",
-                ));
-            }
-            (None, None) if quaternion.is_none() => {
-                return Err(document.missing(
-                    &path("quaternion"),
-                    "the columns of a quaternion or of `angles`",
-                ));
-            }
-            (None, None) => Vec::new(),
-        };
-        let quaternion = quaternion.as_ref();
-        Ok(Self {
-            quaternion: quaternion.map(|names| names.0.each_ref().map(String::as_str)),
-            angles,
-        })
-    }
-
+impl AttitudeColumns<&str> {
     fn find(&self, csv: &mut LogRows) -> Result<AttitudeColumns<usize>, FileError> {
         let quaternion = self.quaternion.map(|names| {
             let [w, x, y, z] = names.map(|name| csv.column(name));
             Ok::<_, FileError>([w?, x?, y?, z?])
         });
         let angles = self.angles.iter();
+        let angles = angles.map(|&(name, axis)| Ok((csv.column(name)?, axis)));
         Ok(AttitudeColumns {
+            angles: angles.collect::<Result<_, FileError>>()?,
             quaternion: quaternion.transpose()?,
-            angles: angles
-                .map(|&(name, axis)| Ok((csv.column(name)?, axis)))
-                .collect::<Result<_, FileError>>()?,
         })
     }
 }
@@ -143,30 +83,103 @@ impl AttitudeColumns<usize> {
     }
 }
 
-/// What `[turntable]` states of the errors of a table with this number of angles.
-fn geometry(
-    document: Document,
-    fields: &TurntableFile,
-    angles: usize,
-) -> Result<TableGeometry, FileError> {
-    let sigma = |stated: Option<Angle>| stated.map_or(0.0, |sigma| sigma.0 * ARCSEC);
-    let mut axes = TableGeometry::default().axes;
-    let stated = AXIS_ERRORS.into_iter().zip(fields.axis_errors());
-    for (kind, (key, stated)) in AxisError::ALL.into_iter().zip(stated) {
-        if stated.is_some() && angles == 0 {
-            return Err(document.wrong(
-                &format!("turntable.{key}"),
-                "it with `angles` only, for a quaternion does not tell the axes apart",
-                "Remove it, or give the angles of the table's axes, alone or with the quaternion.",
-            ));
+impl<'a> Fields<'a> {
+    /// What `[turntable]` says, if it is there.
+    pub fn table_log(&mut self) -> Result<Option<TableLogFile<'a>>, FileError> {
+        let Some(fields) = &self.run.turntable else {
+            return Ok(None);
+        };
+        let stated = (fields.time_unit, fields.sample_period_s);
+        let attitude = self.attitude(fields)?;
+        if fields.time_sigma_ms.is_some() {
+            let note = "turntable.time_sigma_ms is read but has no effect yet.";
+            self.notes.push(note.to_owned());
         }
-        axes += kind.of_table(angles, sigma(stated));
+        Ok(Some(TableLogFile {
+            source: self.source(&fields.file, &fields.stream, fields.salvage),
+            clock: self.clock("turntable", Some(&fields.columns.time), stated)?,
+            accuracy: TableAccuracy {
+                position_sigma: fields.position_sigma_arcsec.0 * ARCSEC,
+                reading_sigma: fields.reading_sigma_arcsec.0 * ARCSEC,
+                geometry: self.geometry(fields, attitude.angles.len())?,
+            },
+            attitude,
+        }))
     }
-    let level = sigma(fields.level_sigma_arcsec);
-    Ok(TableGeometry {
-        base: Vector3::new(level, level, sigma(fields.north_sigma_arcsec)),
-        axes,
-    })
+
+    fn attitude(&self, table: &'a TurntableFile) -> Result<AttitudeColumns<&'a str>, FileError> {
+        let columns = &table.columns;
+        let (path, axes) = match &table.axes {
+            Some(axes) => ("turntable.axes", Some(axes)),
+            None => ("turntable.columns.axes", columns.axes.as_ref()),
+        };
+        let wrong = |path, expected: &str, advice| Err(self.document.wrong(path, expected, advice));
+        let missing = |path, meaning| Err(self.document.missing(path, meaning));
+        let angles = match (&columns.angles, axes) {
+            (Some(names), Some(letters)) if names.is_empty() || names.len() != letters.len() => {
+                let count = letters.len();
+                return wrong(
+                    "turntable.columns.angles",
+                    &format!("an angle for each of {count} axes, outermost first"),
+                    "Complete `angles` or `axes`.",
+                );
+            }
+            (Some(names), Some(letters)) => {
+                let pairs = names.iter().zip(letters).map(|(name, letter)| {
+                    let axis = LETTERS.iter().find(|(known, _)| known == letter);
+                    axis.map(|(_, axis)| (name.as_str(), *axis))
+                });
+                let Some(pairs) = pairs.collect() else {
+                    return wrong(
+                        path,
+                        "`x`, `y` or `z` for each axis",
+                        "Name the axis about which the table turns when all angles are zero.",
+                    );
+                };
+                pairs
+            }
+            (Some(_), None) => return missing("turntable.axes", "the axes of the angles"),
+            (None, Some(_)) => {
+                return wrong(
+                    path,
+                    "it beside the columns of `angles`",
+                    "Name the columns of the angles, or remove the axes.",
+                );
+            }
+            (None, None) if columns.quaternion.is_none() => {
+                let meaning = "the columns of a quaternion or of `angles`";
+                return missing("turntable.columns.quaternion", meaning);
+            }
+            (None, None) => Vec::new(),
+        };
+        let names = columns.quaternion.as_ref();
+        Ok(AttitudeColumns {
+            quaternion: names.map(|names| names.0.each_ref().map(String::as_str)),
+            angles,
+        })
+    }
+
+    /// What is stated of the errors of a table with this number of angles.
+    fn geometry(&self, fields: &TurntableFile, angles: usize) -> Result<TableGeometry, FileError> {
+        let sigma = |stated: Option<Angle>| stated.map_or(0.0, |sigma| sigma.0 * ARCSEC);
+        let mut axes = TableGeometry::default().axes;
+        let stated = AXIS_ERRORS.into_iter().zip(fields.axis_errors());
+        for (kind, (key, stated)) in AxisError::ALL.into_iter().zip(stated) {
+            if stated.is_some() && angles == 0 {
+                return Err(self.document.wrong(
+                    &format!("turntable.{key}"),
+                    "it with `angles` only, for a quaternion does not tell the axes apart",
+                    "Remove it, or give the angles of the table's axes, alone or with the quaternion.",
+                ));
+            }
+            axes += kind.of_table(angles, sigma(stated));
+        }
+        let level = sigma(fields.level_sigma_arcsec);
+        Ok(TableGeometry {
+            base: Vector3::new(level, level, sigma(fields.north_sigma_arcsec)),
+            axes,
+        })
+    }
 }
 
 /// What `run.toml` says of the file.
@@ -177,31 +190,7 @@ pub struct TableLogFile<'a> {
     pub accuracy: TableAccuracy,
 }
 
-impl<'a> TableLogFile<'a> {
-    /// Of the fields of `[turntable]`; remarks on those without effect go to `notes`.
-    pub fn of_fields(
-        document: Document,
-        fields: &'a TurntableFile,
-        directory: &Path,
-        notes: &mut Vec<String>,
-    ) -> Result<Self, FileError> {
-        let stated = (fields.time_unit, fields.sample_period_s);
-        let attitude = AttitudeColumns::of_fields(document, fields)?;
-        if fields.time_sigma_ms.is_some() {
-            notes.push("turntable.time_sigma_ms is read but has no effect yet.".to_owned());
-        }
-        Ok(Self {
-            source: Source::of_fields(directory, &fields.file, &fields.stream, fields.salvage),
-            clock: clock(document, "turntable", Some(&fields.columns.time), stated)?,
-            accuracy: TableAccuracy {
-                position_sigma: fields.position_sigma_arcsec.0 * ARCSEC,
-                reading_sigma: fields.reading_sigma_arcsec.0 * ARCSEC,
-                geometry: geometry(document, fields, attitude.angles.len())?,
-            },
-            attitude,
-        })
-    }
-
+impl TableLogFile<'_> {
     /// Reads the log of a run with these samples; what the file leaves open goes to `notes`.
     pub fn read(&self, imu: &ImuSamples, notes: &mut Vec<String>) -> Result<TableLog, FileError> {
         let mut csv = self.source.open()?;

@@ -13,7 +13,7 @@ use super::values::{
 use crate::formats::clock::TimeUnit;
 use crate::formats::imu_log::TimeStamp;
 use crate::formats::inputs::temperature::TemperatureUnit;
-use crate::imu::Output;
+use crate::imu::{Output, Sensor};
 
 /// The version of the format.
 pub const FORMAT: &str = "turncal-run/1";
@@ -83,6 +83,40 @@ pub struct ImuFile {
     /// By the names of error terms.
     #[serde(default)]
     pub terms: BTreeMap<String, TermFile>,
+}
+
+/// What `[imu]` says of a triad.
+pub struct TriadFields<'a> {
+    pub columns: Option<&'a Names<3>>,
+    pub unit: Option<&'a str>,
+    pub full_scale: Option<f64>,
+    pub prior: &'a PriorFile,
+}
+
+impl ImuFile {
+    pub fn of(&self, sensor: Sensor) -> TriadFields<'_> {
+        let (columns, prior) = (&self.columns, &self.prior);
+        let (columns, unit, full_scale, prior) = match sensor {
+            Sensor::Gyro => (
+                &columns.gyro,
+                &self.gyro_unit,
+                self.gyro_full_scale,
+                &prior.gyro,
+            ),
+            Sensor::Accel => (
+                &columns.accel,
+                &self.accel_unit,
+                self.accel_full_scale,
+                &prior.accel,
+            ),
+        };
+        TriadFields {
+            columns: columns.as_ref(),
+            unit: unit.as_deref(),
+            full_scale: full_scale.map(|of| of.0),
+            prior,
+        }
+    }
 }
 
 /// What it does not say is as in `[imu]`.
