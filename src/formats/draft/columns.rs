@@ -175,7 +175,7 @@ pub fn have_rows_of_their_own(sheet: &Sheet) -> bool {
 }
 
 /// Whether a column has two different numbers.
-pub fn varies(values: &[f64]) -> bool {
+fn varies(values: &[f64]) -> bool {
     let mut values = values.iter().filter(|value| value.is_finite());
     let first = values.next();
     first.is_some_and(|first| values.any(|value| value != first))

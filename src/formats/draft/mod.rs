@@ -192,7 +192,7 @@ impl Draft {
         self.quantities = Quantities::find(sheet, columns, clock, rows.whole, Some(&motion));
         self.quantities.of_registers(&found, clock.period);
         if self.quantities.has_counts() {
-            self.blocked = rows.unfit(columns, sheet, &found);
+            self.blocked = rows.unfit();
             self.registers = Some(found);
         }
         motion

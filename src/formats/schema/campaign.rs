@@ -112,8 +112,7 @@ impl Campaign {
             *of_run = of_run.take().or(stated.map(Temperature::constant));
             Ok(run)
         });
-        let mut runs: Vec<Run> = runs.collect::<Result<_, FileError>>()?;
-        doubt_stuck(&mut runs);
+        let runs: Vec<Run> = runs.collect::<Result<_, FileError>>()?;
         let mut day_to_day = day_to_day(document, &file.day_to_day)?;
         own_parameters(document, &file.own, &runs, &mut day_to_day)?;
         let temperature = match temperature {
@@ -156,38 +155,6 @@ pub fn campaign_text(paths: &[String], day_to_day: &DayToDay) -> String {
         page.field(&key, format!("{sigma:.2e}").parse().unwrap_or(sigma));
     }
     page.text
-}
-
-/// Notes temperatures that never change where those of other recordings do.
-fn doubt_stuck(runs: &mut [Run]) {
-    let facts = |run: &Run| {
-        run.recording
-            .imu
-            .log
-            .as_ref()
-            .and_then(|log| log.temperature)
-    };
-    let stuck: Vec<Option<f64>> = runs
-        .iter()
-        .map(|run| {
-            facts(run)
-                .filter(|of| of.smallest == of.largest)
-                .map(|of| of.smallest)
-        })
-        .collect();
-    let any_varies = runs
-        .iter()
-        .zip(&stuck)
-        .any(|(run, stuck)| facts(run).is_some() && stuck.is_none());
-    for (run, stuck) in runs.iter_mut().zip(stuck).filter(|_| any_varies) {
-        if let Some(value) = stuck {
-            run.recording.notes.push(format!(
-                "The temperature of {} is {value} °C in every row, that of other recordings varies: is its sensor stuck? \
-                 Say temperature_degc beside the recording in the campaign, and leave the column out of its run.toml.",
-                run.recording.name
-            ));
-        }
-    }
 }
 
 /// How parameters follow temperature; `None` if they do not.

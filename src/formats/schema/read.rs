@@ -101,6 +101,20 @@ impl Run {
     }
 }
 
+/// Refuses a `run.toml` that [`Run::read`] would refuse, whatever is in the files that it names.
+pub fn check(document: Document) -> Result<(), FileError> {
+    let run = run_file(document)?;
+    let mut fields = Fields {
+        document,
+        run: &run,
+        directory: Path::new(""),
+        notes: Vec::new(),
+    };
+    fields.site()?;
+    fields.instrument()?;
+    fields.table_log().map(drop)
+}
+
 /// The fields of a `run.toml`.
 fn run_file(document: Document) -> Result<RunFile, FileError> {
     fill(document, document.of_format(FORMAT)?)
@@ -208,17 +222,13 @@ impl InstrumentFields<'_> {
         let (ppm, sigma) = (off.abs() / PPM, prior / PPM);
         let period = nanoseconds(imu.period);
         let way = if off > 0.0 { "more" } else { "less" };
-        let judged = match off.abs() <= prior {
-            true => format!("within its prior σ of {sigma:.2} ppm."),
-            false => format!(
-                "beyond its prior σ of {sigma:.2} ppm: if the instrument's clock is right and the stamps are not, leave \
-                 the time column out."
-            ),
-        };
-        Some(format!(
-            "Stamps come every {period} s, {ppm:.2} ppm {way} than sample_period_s says; stamps are taken, and the scale \
-             of the {triad} is by as much another, {judged}"
-        ))
+        (off.abs() > prior).then(|| {
+            format!(
+                "Stamps come every {period} s, {ppm:.2} ppm {way} than sample_period_s says; stamps are taken, and the \
+                 scale of the {triad} is by as much another, beyond its prior σ of {sigma:.2} ppm: if the instrument's \
+                 clock is right and the stamps are not, leave the time column out."
+            )
+        })
     }
 }
 

@@ -9,11 +9,12 @@ use nalgebra::Vector3;
 use toml::Value;
 
 use super::page::Page;
-use super::{AXIS_ERRORS, FORMAT, META};
+use super::read::check;
+use super::{AXIS_ERRORS, Document, FORMAT};
 use crate::calibration::Calibration;
-use crate::formats::error::{FileError, list, suggestion};
+use crate::formats::error::FileError;
 use crate::formats::inputs::table_log::LETTERS;
-use crate::formats::quantity::{output_word, units};
+use crate::formats::quantity::output_word;
 use crate::imu::{NoiseKeys, Output, Sensor, Term};
 use crate::recording::{ImuSamples, Segment, TableLog, nanoseconds};
 use crate::run::Run;
@@ -36,7 +37,6 @@ pub fn write_run(
     truth: Option<&Calibration>,
 ) -> Result<(), FileError> {
     let configuration = directory.join("run.toml");
-    check_words(&configuration, run, output)?;
     let write = |name: &str, content: &dyn Fn(&mut dyn Write) -> io::Result<()>| {
         let path = directory.join(name);
         let written = File::create(&path).and_then(|file| write_rows(&path, file, content));
@@ -50,6 +50,7 @@ pub fn write_run(
         })
     };
     let toml = configuration_text(run, output);
+    check(Document::of(&configuration, &toml))?;
     write("run.toml", &|file| file.write_all(toml.as_bytes()))?;
     write("imu.csv.gz", &|file| imu_rows(file, run, output))?;
     if let Some(table) = &run.recording.table {
@@ -66,32 +67,6 @@ pub fn write_run(
         write("truth.json", &|file| file.write_all(&bytes))?;
     }
     Ok(())
-}
-
-/// Units must be of this output, and meta fields among those that [`Run::read`] knows.
-fn check_words(configuration: &Path, run: &Run, output: Output) -> Result<(), FileError> {
-    for sensor in Sensor::ALL {
-        let unit = run.instrument.unit.get(sensor);
-        let names = || units(sensor, output).map(|(name, _)| name);
-        if !names().any(|name| name == unit) {
-            return Err(FileError::of(
-                configuration,
-                format_args!("{}_unit = `{unit}` for this output", sensor.name()),
-                format_args!("one of {}", list(names())),
-                "Change the unit or the output.",
-            ));
-        }
-    }
-    let mut fields = run.recording.meta.keys();
-    match fields.find(|name| !META.contains(&name.as_str())) {
-        Some(name) => Err(FileError::of(
-            configuration,
-            format_args!("`{name}` among the meta fields"),
-            format_args!("one of {}", list(META)),
-            suggestion(name, META, "Rename it."),
-        )),
-        None => Ok(()),
-    }
 }
 
 /// Writes rows into a file, compressed if the name ends in `.gz`.
