@@ -94,10 +94,7 @@ impl Opened {
         };
         let written = written
             .and_then(|file: PathBuf| fs::write(&path, log.draft.to_toml(&file.to_string_lossy())));
-        written.map_err(|error| {
-            let advice = "Make room or choose another place.";
-            FileError::io(&path, "write the run", &error, advice)
-        })
+        written.map_err(|error| FileError::unwritten(&path, &error))
     }
 }
 

@@ -276,7 +276,7 @@ fn write_unit(unit: &Unit, key: &str, directory: &Path) -> Result<(), FileError>
         calibration_sha256: json.as_deref().map(digest_of_bytes),
         failure: unit.calibrated.as_ref().err().cloned(),
     };
-    let refused = |error: std::io::Error| FileError::io(&path, "write it", &error, "Make room.");
+    let refused = |error: std::io::Error| FileError::unwritten(&path, &error);
     let bytes = small_file::pretty(&record).map_err(|error| refused(error.into()))?;
     fs::write(directory.join(UNIT_FILE), bytes).map_err(refused)?;
     if let Some(json) = json {

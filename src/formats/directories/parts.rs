@@ -19,8 +19,7 @@ const NAMED: usize = 5;
 pub fn write_part<T: Serialize>(directory: &Path, part: Part, runs: &[T]) -> Result<(), FileError> {
     let write = |name: &str, bytes: &[u8]| {
         let path = directory.join(name);
-        fs::write(&path, bytes)
-            .map_err(|error| FileError::io(&path, "write the part", &error, "Make room."))
+        fs::write(&path, bytes).map_err(|error| FileError::unwritten(&path, &error))
     };
     let results = rmp_serde::to_vec(runs).map_err(|error| {
         let path = directory.join(RESULTS);

@@ -188,13 +188,6 @@ pub fn write_whole_with(
     let stage = Stage::new(path)?;
     File::create_new(stage.new_path())
         .and_then(write)
-        .map_err(|error| {
-            FileError::io(
-                path,
-                "write the file",
-                &error,
-                "Make room or choose another place.",
-            )
-        })?;
+        .map_err(|error| FileError::unwritten(path, &error))?;
     stage.commit(force)
 }

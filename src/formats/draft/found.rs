@@ -103,10 +103,7 @@ impl Draft {
     }
 
     fn triad_found(&self, sensor: Sensor) -> Found {
-        let what = match sensor {
-            Sensor::Gyro => "gyros",
-            Sensor::Accel => "accels",
-        };
+        let what = sensor.pick("gyros", "accels");
         let unit = self.quantities.units.get(sensor);
         let Some(triad) = self.columns.triads.get(sensor) else {
             return Found::new(what, "no columns", Certainty::Unknown, NO_COLUMNS);

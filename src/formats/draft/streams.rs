@@ -271,10 +271,10 @@ impl Member {
 
     /// The names of a triad's columns.
     fn triad(&self, sensor: Sensor) -> Result<[&str; 3], FileError> {
-        let expected = match sensor {
-            Sensor::Gyro => "three columns of the gyros",
-            Sensor::Accel => "three columns of the accelerometers",
-        };
+        let expected = sensor.pick(
+            "three columns of the gyros",
+            "three columns of the accelerometers",
+        );
         let triad = self
             .triads
             .get(sensor)

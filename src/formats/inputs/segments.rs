@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::source::Source;
 use crate::formats::error::FileError;
-use crate::formats::schema::axes::BodyAxes;
+use crate::imu::AxisOrder;
 use crate::recording::{ImuSamples, LabelledMotion, Segment};
 use crate::units::DEGREE;
 
@@ -16,7 +16,7 @@ pub fn read(
     file: &Path,
     imu: &ImuSamples,
     lag: f64,
-    axes: BodyAxes,
+    axes: AxisOrder,
     notes: &mut Vec<String>,
 ) -> Result<Vec<Segment>, FileError> {
     let mut csv = Source::of_file(file).open()?;
@@ -77,10 +77,10 @@ pub fn read(
 }
 
 /// What a label says, its axes being those of the file.
-fn motion_of(label: &str, axes: BodyAxes) -> Option<LabelledMotion> {
+fn motion_of(label: &str, axes: AxisOrder) -> Option<LabelledMotion> {
     let axis = |name: &str| {
         let index = ["x", "y", "z"].into_iter().position(|axis| axis == name)?;
-        Some(axes.vector(Vector3::ith(index, 1.0)))
+        Some(axes.apply(&Vector3::ith(index, 1.0)))
     };
     if let Some(turn) = label.strip_prefix("rot_") {
         let (name, angle) = turn.split_at_checked(1)?;
@@ -106,7 +106,7 @@ mod tests {
 
     #[test]
     fn labels_name_axes_of_the_file() {
-        let frd = BodyAxes::WORDS[1].1;
+        let frd = AxisOrder::FRONT_RIGHT_DOWN;
         let of = |label| motion_of(label, frd);
         let up = |up| Some(LabelledMotion::Stands { up });
         assert_eq!(of("x_up"), up(Vector3::y()));

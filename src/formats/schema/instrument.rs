@@ -12,8 +12,8 @@ use crate::formats::inputs::temperature::{TemperatureColumns, TemperatureUnit};
 use crate::formats::quantity::units;
 use crate::imu::NoiseKeys;
 use crate::imu::{
-    GaussMarkov, Instrument, MotionNoise, Noise, Nominal, Output, PerSensor, Prior, Sensor, Term,
-    TermVector,
+    AxisOrder, GaussMarkov, Instrument, MotionNoise, Noise, Nominal, Output, PerSensor, Prior,
+    Sensor, Term, TermVector,
 };
 use crate::units::{ARCSEC, DEGREE, PPM};
 
@@ -86,7 +86,7 @@ impl<'a> Fields<'a> {
                 TemperatureColumns::of_fields(column, unit)
             }),
             output: imu.output,
-            axes: imu.body_axes.unwrap_or_default(),
+            axes: imu.body_axes.unwrap_or(AxisOrder::IDENTITY),
             stamp: imu.time_stamp,
             continuous: imu.continuous.unwrap_or(true),
             nominal: known.nominal,
@@ -116,7 +116,7 @@ impl<'a> Fields<'a> {
     /// Units, nominal scales, priors, noise and error terms.
     fn knowledge(&mut self) -> Result<Instrument, FileError> {
         let imu = &self.run.imu;
-        let axes = imu.body_axes.unwrap_or_default();
+        let axes = imu.body_axes.unwrap_or(AxisOrder::IDENTITY);
         let unit = PerSensor::try_from_fn(|sensor| self.unit(sensor))?;
         let nominal = PerSensor::try_from_fn(|sensor| self.nominal(sensor, unit.get(sensor)))?;
         let names = Sensor::ALL.map(|sensor| NoiseKeys::of(sensor).names());
@@ -239,12 +239,9 @@ impl<'a> Fields<'a> {
     fn prior(&mut self, sensor: Sensor, nominal: Vector3<f64>) -> Result<Prior, FileError> {
         let (of, axes) = (
             self.run.imu.of(sensor),
-            self.run.imu.body_axes.unwrap_or_default(),
+            self.run.imu.body_axes.unwrap_or(AxisOrder::IDENTITY),
         );
-        let (bias_words, usual_bias) = match sensor {
-            Sensor::Gyro => ("bias ± 2 °/s", USUAL_BIAS.gyro),
-            Sensor::Accel => ("bias ± 1 m/s²", USUAL_BIAS.accel),
-        };
+        let bias_words = sensor.pick("bias ± 2 °/s", "bias ± 1 m/s²");
         let mut assumed = Vec::new();
         let mut sigma = |key: &str, stated: Option<OneOrThree>, most: f64, usual, words| {
             let stated = stated.map(OneOrThree::vector);
@@ -274,7 +271,7 @@ impl<'a> Fields<'a> {
             "bias_sigma",
             of.prior.bias_sigma,
             WIDEST_BIAS * nominal.amax(),
-            nominal.abs() * usual_bias,
+            nominal.abs() * *USUAL_BIAS.get(sensor),
             bias_words,
         )?;
         if !assumed.is_empty() && of.columns.is_some() {
@@ -288,7 +285,7 @@ impl<'a> Fields<'a> {
         Ok(Prior {
             scale_sigma: axes.each(scale_sigma) * PPM,
             installation_sigma: axes.each(installation_sigma) * ARCSEC,
-            bias: axes.vector(bias.component_div(&nominal)),
+            bias: axes.apply(&bias.component_div(&nominal)),
             bias_sigma: axes.each(bias_sigma.component_div(&nominal.abs())),
         })
     }

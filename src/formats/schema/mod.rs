@@ -1,7 +1,6 @@
 //! What users write and turncal writes for them: fields of TOML and JSON files as serde structs, and errors that name
 //! line, column and field.
 
-pub mod axes;
 mod calibration_file;
 mod campaign;
 mod document;

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::axes::BodyAxes;
 use super::values::{
     Angle, Finite, Gravity, Height, Latitude, Longitude, Milligals, Names, NonNegative, OneOrThree,
     Positive,
@@ -13,7 +12,7 @@ use super::values::{
 use crate::formats::clock::TimeUnit;
 use crate::formats::imu_log::TimeStamp;
 use crate::formats::inputs::temperature::TemperatureUnit;
-use crate::imu::{Output, Sensor};
+use crate::imu::{AxisOrder, Output, Sensor};
 
 /// The version of the format.
 pub const FORMAT: &str = "turncal-run/1";
@@ -73,7 +72,7 @@ pub struct ImuFile {
     pub continuous: Option<bool>,
     pub instance: Option<InstanceFile>,
     pub temperature_unit: Option<TemperatureUnit>,
-    pub body_axes: Option<BodyAxes>,
+    pub body_axes: Option<AxisOrder>,
     pub columns: ImuColumns,
     /// By the names of [`crate::imu::NoiseKeys`].
     #[serde(default)]
@@ -96,25 +95,12 @@ pub struct TriadFields<'a> {
 impl ImuFile {
     pub fn of(&self, sensor: Sensor) -> TriadFields<'_> {
         let (columns, prior) = (&self.columns, &self.prior);
-        let (columns, unit, full_scale, prior) = match sensor {
-            Sensor::Gyro => (
-                &columns.gyro,
-                &self.gyro_unit,
-                self.gyro_full_scale,
-                &prior.gyro,
-            ),
-            Sensor::Accel => (
-                &columns.accel,
-                &self.accel_unit,
-                self.accel_full_scale,
-                &prior.accel,
-            ),
-        };
+        let full_scale = sensor.pick(self.gyro_full_scale, self.accel_full_scale);
         TriadFields {
-            columns: columns.as_ref(),
-            unit: unit.as_deref(),
+            columns: sensor.pick(&columns.gyro, &columns.accel).as_ref(),
+            unit: sensor.pick(&self.gyro_unit, &self.accel_unit).as_deref(),
             full_scale: full_scale.map(|of| of.0),
-            prior,
+            prior: sensor.pick(&prior.gyro, &prior.accel),
         }
     }
 }

@@ -4,11 +4,11 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 use serde::de::{Deserializer, Error};
 
-use super::axes::BodyAxes;
 use crate::formats::clock::TimeUnit;
 use crate::formats::error::list;
 use crate::formats::imu_log::TimeStamp;
 use crate::formats::inputs::temperature::TemperatureUnit;
+use crate::imu::AxisOrder;
 
 /// Squares and quotients of such numbers are still numbers.
 fn with_size(value: f64) -> Result<f64, &'static str> {
@@ -109,7 +109,7 @@ macro_rules! by_words {
     )+};
 }
 
-by_words!(BodyAxes, TemperatureUnit, TimeStamp);
+by_words!(AxisOrder, TemperatureUnit, TimeStamp);
 
 /// A word, or what a tick of a clock of its own lasts, s.
 #[derive(Deserialize)]

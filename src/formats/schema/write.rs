@@ -40,14 +40,7 @@ pub fn write_run(
     let write = |name: &str, content: &dyn Fn(&mut dyn Write) -> io::Result<()>| {
         let path = directory.join(name);
         let written = File::create(&path).and_then(|file| write_rows(&path, file, content));
-        written.map_err(|error| {
-            FileError::io(
-                &path,
-                "write the file",
-                &error,
-                "Make room or choose another place.",
-            )
-        })
+        written.map_err(|error| FileError::unwritten(&path, &error))
     };
     let toml = configuration_text(run, output);
     check(Document::of(&configuration, &toml))?;
@@ -73,7 +66,7 @@ pub fn write_run(
 pub fn write_rows(
     name: &Path,
     file: File,
-    rows: &dyn Fn(&mut dyn Write) -> io::Result<()>,
+    rows: impl FnOnce(&mut dyn Write) -> io::Result<()>,
 ) -> io::Result<()> {
     if name.extension().is_some_and(|extension| extension == "gz") {
         // No time of writing in the header, so that the same run gives the same bytes.

@@ -84,10 +84,10 @@ impl KalibrImu {
 
 /// The keys of a triad's white noise, and of the random walk of its bias.
 fn keys(sensor: Sensor) -> [&'static str; 2] {
-    match sensor {
-        Sensor::Gyro => ["gyroscope_noise_density", "gyroscope_random_walk"],
-        Sensor::Accel => ["accelerometer_noise_density", "accelerometer_random_walk"],
-    }
+    sensor.pick(
+        ["gyroscope_noise_density", "gyroscope_random_walk"],
+        ["accelerometer_noise_density", "accelerometer_random_walk"],
+    )
 }
 
 /// A bias that grows like the random walk over times short against its correlation time.
