@@ -127,14 +127,10 @@ impl Draft {
             let breaks = clock.breaks(&numbers, period, FOLLOWED);
             Rows::new(triads, breaks, period)
         });
-        let whole = rows
-            .as_ref()
-            .map_or_else(Default::default, |rows| rows.whole);
         let down = rows.as_ref().and_then(Rows::points_down);
-        let motion = rows.as_ref().map(Rows::motion);
         let mut draft = Self {
             down: down.and_then(|axis| Some(columns.triads.accel?[axis])),
-            quantities: Quantities::find(&sheet, &columns, &clock, whole, motion.as_ref()),
+            quantities: Quantities::unknown(),
             streams,
             instance,
             columns,
@@ -143,11 +139,14 @@ impl Draft {
             registers: None,
             blocked: Vec::new(),
             random_walk: PerSensor::default(),
-            motion,
+            motion: None,
             only,
             stated: stated.clone(),
         };
-        draft.take_rows(rows, &sheet);
+        match rows {
+            Some(rows) => draft.take_rows(rows, &sheet),
+            None => draft.quantities.state(stated),
+        }
         if let Some(streams) = &draft.streams {
             draft.columns.names.clone_from(&streams.names);
             if let Some(time) = &streams.time {
@@ -159,23 +158,19 @@ impl Draft {
         draft
     }
 
-    /// Takes in what rows show of registers and noise.
-    fn take_rows(&mut self, rows: Option<Rows>, sheet: &Sheet) {
-        let looked = rows.zip(self.motion.take()).map(|(mut rows, motion)| {
-            let is_open = motion.angle.is_none() && motion.is_turned;
-            let motion = match self.quantities.has_counts() || is_open {
-                true => self.look_behind(&mut rows, &motion, sheet),
-                false => motion,
-            };
-            (rows, motion)
-        });
-        self.quantities.state(&self.stated);
-        if let Some((rows, motion)) = looked {
-            let random_walk = white_noise(&rows, &motion, &self.quantities, self.clock.period);
-            self.random_walk = random_walk.unwrap_or_default();
-            self.offset = rows.offset;
-            self.motion = Some(motion);
+    /// Takes in what rows show of units, registers and noise.
+    fn take_rows(&mut self, mut rows: Rows, sheet: &Sheet) {
+        let mut motion = rows.motion();
+        self.quantities = Quantities::find(sheet, &self.columns, &self.clock, rows.whole, &motion);
+        let is_open = motion.angle.is_none() && motion.is_turned;
+        if self.quantities.has_counts() || is_open {
+            motion = self.look_behind(&mut rows, &motion, sheet);
         }
+        self.quantities.state(&self.stated);
+        let random_walk = white_noise(&rows, &motion, &self.quantities, self.clock.period);
+        self.random_walk = random_walk.unwrap_or_default();
+        self.offset = rows.offset;
+        self.motion = Some(motion);
     }
 
     /// Takes in what rows show of the registers that they were read from, and says how they move then.
@@ -189,7 +184,7 @@ impl Draft {
             motion.angle = motion.angle.or(turns.angle());
         }
         let (columns, clock) = (&self.columns, &self.clock);
-        self.quantities = Quantities::find(sheet, columns, clock, rows.whole, Some(&motion));
+        self.quantities = Quantities::find(sheet, columns, clock, rows.whole, &motion);
         self.quantities.of_registers(&found, clock.period);
         if self.quantities.has_counts() {
             self.blocked = rows.unfit();
