@@ -114,7 +114,7 @@ impl Draft {
 
     fn of_sheet(mut sheet: Sheet, streams: Option<Streams>, stated: &Stated) -> Self {
         sheet.rate = stated.rate_hz.or(sheet.rate);
-        let only = sheet.goes_on.then(|| columns::rows_of(&sheet));
+        let only = sheet.goes_on.then(|| sheet.rows());
         let instance = match streams {
             Some(_) => None,
             None => retain_instance(&mut sheet),
@@ -215,7 +215,7 @@ pub(super) fn turned_angle(triads: PerSensor<Vec<Vector3<f64>>>, period: f64) ->
 /// Keeps the rows of one of several instruments, and says by which column and number.
 fn retain_instance(sheet: &mut Sheet) -> Option<(usize, f64)> {
     let (column, number) = columns::instance(sheet)?;
-    sheet.retain(|columns, row| columns[column][row] == number);
+    sheet.retain(|of, row| of.columns[column][row] == number);
     Some((column, number))
 }
 
@@ -227,11 +227,11 @@ fn retain_samples(sheet: &mut Sheet, columns: &Columns) {
     let Some(time) = columns.time.filter(|_| !of_triads.is_empty()) else {
         return;
     };
-    sheet.retain(|columns, row| of_triads.iter().any(|&k| columns[k][row].is_finite()));
+    sheet.retain(|of, row| of.has(&of_triads, row));
     // A row that is there twice is one sample.
     let of_samples = [&of_triads[..], &[time]].concat();
-    sheet.retain(|columns, row| {
-        let is_new = |&k: &usize| columns[k][row] != columns[k][row - 1];
+    sheet.retain(|of, row| {
+        let is_new = |&k: &usize| of.columns[k][row] != of.columns[k][row - 1];
         row == 0 || of_samples.iter().any(is_new)
     });
 }

@@ -232,7 +232,7 @@ impl Member {
         let mut sheet = Sheet::read(file, FEWEST_ROWS)?;
         let of_sensor = columns::named(&sheet, sensor);
         if !of_sensor.is_empty() {
-            sheet.retain(|columns, row| of_sensor.iter().any(|&k| columns[k][row].is_finite()));
+            sheet.retain(|of, row| of.has(&of_sensor, row));
         }
         let mut columns = Columns::find(&sheet);
         let unit = time::Clock::find(&sheet, &mut columns).unit;
@@ -421,6 +421,6 @@ fn rows_as_stream(name: &str, sheet: &Sheet) -> Found {
             is_inertial: true,
             ..Stream::default()
         },
-        samples: sheet.columns.first().map_or(0, Vec::len) as u64,
+        samples: sheet.rows() as u64,
     }
 }

@@ -4,8 +4,9 @@ use nalgebra::Vector3;
 
 use super::columns::Columns;
 use super::data_sheet::{Scale, likely_for_g};
-use super::motion::Motion;
+use super::motion::{Motion, TOLERANCE};
 use super::name::{self, Name};
+use super::raw_run::Axes;
 use super::registers::Registers;
 use super::stated::{Stated, StatedUnit};
 use super::time::{Clock, PERIODS};
@@ -290,7 +291,14 @@ impl Quantities {
         Unit {
             word: Some("count"),
             is_shown: measured.is_some(),
-            scale: measured.map(|value| Scale::of_steps(value, self.output)),
+            scale: measured.map(|value| {
+                let axes = Axes {
+                    scale: Vector3::repeat(value),
+                    sigma: TOLERANCE,
+                    by_axis: false,
+                };
+                Scale::of_turns(&axes, None, 1.0, self.output)
+            }),
             ..Unit::open(&why)
         }
     }
@@ -343,7 +351,12 @@ impl Quantities {
                 gyro.word = Some("count");
                 gyro.why = "no known unit fits the turns of gravity".to_owned();
             }
-            gyro.scale = Some(Scale::of_turns(turns, row, self.output));
+            gyro.scale = Some(Scale::of_turns(
+                &turns.axes,
+                Some(turns.moves),
+                row,
+                self.output,
+            ));
             self.opposed = false;
         }
     }

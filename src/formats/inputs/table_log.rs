@@ -22,45 +22,39 @@ pub const LETTERS: [(&str, Vector3<f64>); 3] = [
     ("y", Vector3::new(0.0, 1.0, 0.0)),
     ("z", Vector3::new(0.0, 0.0, 1.0)),
 ];
-/// How a row gives `C_b_n`, and where the table's axes stand; `C` is a column's name or its index.
-pub struct AttitudeColumns<C> {
-    /// `[w, x, y, z]`, body right-front-up to East-North-Up.
-    quaternion: Option<[C; 4]>,
-    /// Angles in degrees about the axes of the table, outermost first. Without a quaternion the attitude is
-    /// `C_b_n = R(axis₁, outer) R(axis₂, middle) R(axis₃, inner)`.
-    angles: Vec<(C, Vector3<f64>)>,
+/// How a row gives `C_b_n`, and where the table's axes stand.
+pub struct AttitudeColumns<'a> {
+    /// Those of a quaternion `[w, x, y, z]`, body right-front-up to East-North-Up, if there is one; then those of angles in
+    /// degrees, outermost first.
+    names: Vec<&'a str>,
+    /// The axes of the angles. Without a quaternion the attitude is `C_b_n = R(axis₁, outer) R(axis₂, middle) R(axis₃,
+    /// inner)`.
+    axes: Vec<Vector3<f64>>,
 }
 
-impl AttitudeColumns<&str> {
-    fn find(&self, csv: &mut LogRows) -> Result<AttitudeColumns<usize>, FileError> {
-        let quaternion = self.quaternion.map(|names| {
-            let [w, x, y, z] = names.map(|name| csv.column(name));
-            Ok::<_, FileError>([w?, x?, y?, z?])
-        });
-        let angles = self.angles.iter();
-        let angles = angles.map(|&(name, axis)| Ok((csv.column(name)?, axis)));
-        Ok(AttitudeColumns {
-            angles: angles.collect::<Result<_, FileError>>()?,
-            quaternion: quaternion.transpose()?,
-        })
-    }
-}
-
-impl AttitudeColumns<usize> {
-    fn reading(&self, csv: &LogRows) -> Result<UnitQuaternion<f64>, FileError> {
-        let Some([w, x, y, z]) = self.quaternion else {
-            let mut c_b_n = Matrix3::identity();
-            for &(column, axis) in &self.angles {
-                c_b_n *= attitude::exp(axis * (csv.number(column)? * DEGREE));
-            }
-            return Ok(attitude::quaternion(&c_b_n));
+impl AttitudeColumns<'_> {
+    /// The attitude that a row says, its columns being at these places, and the angles of the axes; `None` if there is
+    /// only a quaternion.
+    fn reading(
+        &self,
+        csv: &LogRows,
+        places: &[usize],
+    ) -> Result<(UnitQuaternion<f64>, Option<AxisAngles>), FileError> {
+        let values = places.iter().map(|&place| csv.number(place));
+        let values: Vec<f64> = values.collect::<Result<_, FileError>>()?;
+        let (quaternion, angles) = values.split_at(values.len() - self.axes.len());
+        let angles = self.axes.iter().zip(angles);
+        let angles: Vec<_> = angles
+            .map(|(axis, angle)| (*axis, angle * DEGREE))
+            .collect();
+        let &[w, x, y, z] = quaternion else {
+            let turn = |of: Matrix3<f64>, (axis, angle): &(Vector3<f64>, f64)| {
+                of * attitude::exp(axis * *angle)
+            };
+            let c_b_n = angles.iter().fold(Matrix3::identity(), turn);
+            return Ok((attitude::quaternion(&c_b_n), Some(axis_angles(angles))));
         };
-        let quaternion = Quaternion::new(
-            csv.number(w)?,
-            csv.number(x)?,
-            csv.number(y)?,
-            csv.number(z)?,
-        );
+        let quaternion = Quaternion::new(w, x, y, z);
         let norm = quaternion.norm();
         if (norm - 1.0).abs() > NORM_TOLERANCE {
             return Err(csv.error_here(
@@ -69,17 +63,9 @@ impl AttitudeColumns<usize> {
                 "Correct the row, or the order of columns in run.toml: w, x, y, z.",
             ));
         }
-        Ok(UnitQuaternion::from_quaternion(quaternion))
-    }
-
-    /// The angles of the axes; `None` if there is only a quaternion.
-    fn axes(&self, csv: &LogRows) -> Result<Option<AxisAngles>, FileError> {
-        let axes: Result<Vec<_>, FileError> = self
-            .angles
-            .iter()
-            .map(|&(column, axis)| Ok((axis, csv.number(column)? * DEGREE)))
-            .collect();
-        Ok(Some(axes?).filter(|axes| !axes.is_empty()).map(axis_angles))
+        let angles = Some(angles).filter(|angles| !angles.is_empty());
+        let attitude = UnitQuaternion::from_quaternion(quaternion);
+        Ok((attitude, angles.map(axis_angles)))
     }
 }
 
@@ -101,13 +87,13 @@ impl<'a> Fields<'a> {
             accuracy: TableAccuracy {
                 position_sigma: fields.position_sigma_arcsec.0 * ARCSEC,
                 reading_sigma: fields.reading_sigma_arcsec.0 * ARCSEC,
-                geometry: self.geometry(fields, attitude.angles.len())?,
+                geometry: self.geometry(fields, attitude.axes.len())?,
             },
             attitude,
         }))
     }
 
-    fn attitude(&self, table: &'a TurntableFile) -> Result<AttitudeColumns<&'a str>, FileError> {
+    fn attitude(&self, table: &'a TurntableFile) -> Result<AttitudeColumns<'a>, FileError> {
         let columns = &table.columns;
         let (path, axes) = match &table.axes {
             Some(axes) => ("turntable.axes", Some(axes)),
@@ -152,11 +138,10 @@ impl<'a> Fields<'a> {
             }
             (None, None) => Vec::new(),
         };
-        let names = columns.quaternion.as_ref();
-        Ok(AttitudeColumns {
-            quaternion: names.map(|names| names.0.each_ref().map(String::as_str)),
-            angles,
-        })
+        let (of_angles, axes): (Vec<&str>, _) = angles.into_iter().unzip();
+        let quaternion = columns.quaternion.iter().flat_map(|names| &names.0);
+        let names = quaternion.map(String::as_str).chain(of_angles).collect();
+        Ok(AttitudeColumns { names, axes })
     }
 
     /// What is stated of the errors of a table with this number of angles.
@@ -186,7 +171,7 @@ impl<'a> Fields<'a> {
 pub struct TableLogFile<'a> {
     pub source: Source<'a>,
     pub clock: Clock<'a>,
-    pub attitude: AttitudeColumns<&'a str>,
+    pub attitude: AttitudeColumns<'a>,
     pub accuracy: TableAccuracy,
 }
 
@@ -195,16 +180,16 @@ impl TableLogFile<'_> {
     pub fn read(&self, imu: &ImuSamples, notes: &mut Vec<String>) -> Result<TableLog, FileError> {
         let mut csv = self.source.open()?;
         let mut stamps = self.clock.start(&mut csv)?.without_bursts();
-        let columns = self.attitude.find(&mut csv)?;
-
+        let places = self.attitude.names.iter().map(|name| csv.column(name));
+        let places: Vec<usize> = places.collect::<Result<_, FileError>>()?;
         let mut attitude: Vec<UnitQuaternion<f64>> = Vec::new();
         let mut axes = Vec::new();
         while csv.advance()? && !csv.may_be_cut() {
-            let reading = columns.reading(&csv)?;
+            let (reading, angles) = self.attitude.reading(&csv, &places)?;
             // A row twice says nothing new.
             if let Stamp::New(place) = stamps.take(&csv, |other| attitude[other] == reading)? {
                 attitude.insert(place, reading);
-                if let Some(angles) = columns.axes(&csv)? {
+                if let Some(angles) = angles {
                     axes.insert(place, angles);
                 }
             }
