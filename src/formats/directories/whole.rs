@@ -50,38 +50,27 @@ impl WholeDirectory {
                 return Err(taken(target));
             }
             if !existing.is_dir() {
-                let what = if existing.is_symlink() {
-                    "link"
-                } else {
-                    "file"
-                };
-                return Err(FileError::of(
-                    target,
-                    format_args!("a {what} of this name"),
-                    "a directory or nothing",
-                    format_args!("Choose another name or remove the {what}."),
-                ));
+                let is_link = existing.is_symlink();
+                let what = if is_link { "link" } else { "file" };
+                let found = format_args!("a {what} of this name");
+                let advice = format_args!("Choose another name or remove the {what}.");
+                let expected = "a directory or nothing";
+                return Err(FileError::of(target, found, expected, advice));
             }
-            let inside = |path: &Path| match (path.canonicalize(), target.canonicalize()) {
+            let inside = |path: &&Path| match (path.canonicalize(), target.canonicalize()) {
                 (Ok(path), Ok(target)) => path.starts_with(target),
                 _ => false,
             };
-            let held = inputs
-                .iter()
-                .copied()
-                .chain([Path::new(".")])
-                .find(|path| inside(path));
-            if let Some(held) = held {
+            let here = Path::new(".");
+            let mut needed = inputs.iter().copied().chain([here]);
+            if let Some(held) = needed.find(inside) {
+                let name = match held == here {
+                    true => "the current directory".to_owned(),
+                    false => held.display().to_string(),
+                };
                 return Err(FileError::of(
                     target,
-                    format_args!(
-                        "{} in this directory",
-                        if held == Path::new(".") {
-                            "the current directory".into()
-                        } else {
-                            held.display().to_string()
-                        }
-                    ),
+                    format_args!("{name} in this directory"),
                     "a directory that can be replaced",
                     "Choose another name; replacing this one would delete files that are still needed.",
                 ));

@@ -35,29 +35,21 @@ pub fn read(
     while csv.advance()? {
         let start = csv.number(start_column)?;
         let end = csv.number(end_column)?;
+        let wrong = |found: &str, expected: String| {
+            let found = format_args!("{found} from {start} s to {end} s");
+            Err(csv.error_here(found, expected, "Correct or remove the row."))
+        };
         if end <= start {
-            return Err(csv.error_here(
-                format_args!("a segment from {start} s to {end} s"),
-                "an end after the start",
-                "Correct the row.",
-            ));
+            return wrong("a segment", "an end after the start".to_owned());
         }
-        if start < record.0 - slack || end > record.1 + slack {
-            return Err(csv.error_here(
-                format_args!("a segment from {start} s to {end} s"),
-                format_args!(
-                    "times inside the IMU record, {} s to {} s",
-                    record.0, record.1
-                ),
-                "Correct the row.",
-            ));
+        let (first, last) = record;
+        if start < first - slack || end > last + slack {
+            let expected = format!("times inside the IMU record, {first} s to {last} s");
+            return wrong("a segment", expected);
         }
         if row(start) == row(end) {
-            return Err(csv.error_here(
-                format_args!("no sample from {start} s to {end} s"),
-                format_args!("a segment of several samples of {} s", imu.period),
-                "Correct or remove the row.",
-            ));
+            let expected = format!("a segment of several samples of {} s", imu.period);
+            return wrong("no sample", expected);
         }
         let label = csv.text(label_column)?.into_owned();
         segments.push(Segment {
