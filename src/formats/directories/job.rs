@@ -92,27 +92,22 @@ impl Job {
 
     /// How two jobs differ in what decides what a run gives, in words; `None` if they do not.
     pub fn difference(&self, other: &Self) -> Option<String> {
-        let differ = |what: &str, a: String, b: String| Some(format!("{what} {a} and {b}"));
+        let words = |of: &Self| match of.job {
+            JobKind::Lot => "`calibrate` of a lot",
+            JobKind::StudyAccuracy => "`study accuracy`",
+            JobKind::StudyExperiment => "`study experiment`",
+        };
         if self.job != other.job {
-            return differ("jobs", kind(self.job), kind(other.job));
+            return Some(format!("jobs {} and {}", words(self), words(other)));
         }
         if self.version != other.version {
-            let (a, b) = (self.version.clone(), other.version.clone());
-            return differ("turncal", a, b);
+            return Some(format!("turncal {} and {}", self.version, other.version));
         }
         if self.processor != other.processor {
-            let (a, b) = (self.processor.join(" "), other.processor.join(" "));
-            return differ("processors with the features", a, b);
+            let [a, b] = [self, other].map(|of| of.processor.join(" "));
+            return Some(format!("processors with the features {a} and {b}"));
         }
         (self.options != other.options).then(|| of_values("", &self.options, &other.options))
-    }
-}
-
-fn kind(of: JobKind) -> String {
-    match of {
-        JobKind::Lot => "`calibrate` of a lot".to_owned(),
-        JobKind::StudyAccuracy => "`study accuracy`".to_owned(),
-        JobKind::StudyExperiment => "`study experiment`".to_owned(),
     }
 }
 

@@ -59,9 +59,7 @@ pub fn unit_key(job: &str, run: &Path) -> String {
 
 /// A unit in the directory of a part of its lot.
 pub fn read_part_unit(part: &Path, name: &str) -> Result<Unit, FileError> {
-    let directory = part.join(UNITS).join(name);
-    let record = UnitRecord::read(&directory)?;
-    read_unit(&directory, &record.key)
+    Ok(read_unit(&part.join(UNITS).join(name), None)?.0)
 }
 
 impl LotDirectory {
@@ -110,7 +108,8 @@ impl LotDirectory {
 
     /// The unit as it was calibrated before, if nothing that decides its result has changed since.
     pub fn kept(&self, name: &str, key: &str) -> Option<Unit> {
-        read_unit(&self.root.join(UNITS).join(name), key).ok()
+        let unit = read_unit(&self.root.join(UNITS).join(name), Some(key));
+        Some(unit.ok()?.0)
     }
 
     /// Puts a unit in its place; `write` puts further files into its directory.
@@ -133,9 +132,8 @@ impl LotDirectory {
     /// Copies a unit from the directory of a part.
     pub fn copy(&self, part: &Path, name: &str) -> Result<Unit, FileError> {
         let from = part.join(UNITS).join(name);
-        let record = UnitRecord::read(&from)?;
-        let unit = read_unit(&from, &record.key)?;
-        if let Some(kept) = self.kept(name, &record.key) {
+        let (unit, key) = read_unit(&from, None)?;
+        if let Some(kept) = self.kept(name, &key) {
             return Ok(kept);
         }
         let target = self.root.join(UNITS).join(name);
@@ -223,20 +221,16 @@ fn check_units(units: &Path, part: &Part) -> Result<(), FileError> {
     })
 }
 
-impl UnitRecord {
-    fn read(directory: &Path) -> Result<Self, FileError> {
-        let path = directory.join(UNIT_FILE);
-        small_file::json(&path, "a unit", FORMAT, "Calibrate the unit again.")
-    }
-}
-
-fn read_unit(directory: &Path, key: &str) -> Result<Unit, FileError> {
-    let record = UnitRecord::read(directory)?;
+/// A unit, of this key if one is expected, and its key.
+fn read_unit(directory: &Path, key: Option<&str>) -> Result<(Unit, String), FileError> {
+    let path = directory.join(UNIT_FILE);
+    let record: UnitRecord =
+        small_file::json(&path, "a unit", FORMAT, "Calibrate the unit again.")?;
     let wrong = |found: &str| {
         let (expected, advice) = ("the unit as it was written", "Calibrate it again.");
         Err(FileError::of(directory, found, expected, advice))
     };
-    if record.key != key {
+    if key.is_some_and(|key| record.key != key) {
         return wrong("another key");
     }
     let path = directory.join(CALIBRATION_FILE);
@@ -253,11 +247,12 @@ fn read_unit(directory: &Path, key: &str) -> Result<Unit, FileError> {
         }),
         (None, None) => return wrong("neither a calibration nor a failure"),
     };
-    Ok(Unit {
+    let unit = Unit {
         name: record.name,
         meta: record.meta,
         calibrated,
-    })
+    };
+    Ok((unit, record.key))
 }
 
 fn write_unit(unit: &Unit, key: &str, directory: &Path) -> Result<(), FileError> {

@@ -2,7 +2,7 @@
 
 use crate::formats::error::FileError;
 use crate::formats::rows::LogRows;
-use crate::formats::schema::{TemperatureColumn, ThreeColumns};
+use crate::formats::schema::{OneOrThree, TemperatureColumn};
 use crate::imu::PerSensor;
 use crate::recording::{TEMPERATURE_SPACING, Temperature, TemperatureFacts};
 
@@ -62,10 +62,10 @@ impl<'a> TemperatureColumns<'a> {
         all
     }
 
-    fn places(&mut self, columns: &'a ThreeColumns) -> [usize; 3] {
+    fn places(&mut self, columns: &'a OneOrThree<String>) -> [usize; 3] {
         let names = match columns {
-            ThreeColumns::One(name) => [name; 3],
-            ThreeColumns::Three(names) => names.each_ref(),
+            OneOrThree::One(name) => [name; 3],
+            OneOrThree::Three(names) => names.each_ref(),
         };
         names.map(|name| {
             let known = self.names.iter().position(|known| known == name);

@@ -153,16 +153,9 @@ pub enum TimeColumn {
 pub enum TemperatureColumn {
     One(String),
     Triads {
-        gyro: ThreeColumns,
-        accel: ThreeColumns,
+        gyro: OneOrThree<String>,
+        accel: OneOrThree<String>,
     },
-}
-
-#[derive(Deserialize)]
-#[serde(untagged)]
-pub enum ThreeColumns {
-    One(String),
-    Three([String; 3]),
 }
 
 #[derive(Default, Deserialize)]

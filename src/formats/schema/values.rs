@@ -65,12 +65,12 @@ checked!(
     Celsius, "a number from -100 to 100", |v| v.abs() <= 100.0;
 );
 
-/// Three values, or one for all three axes.
+/// A value of each axis, or one for all three.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(untagged, expecting = "three numbers, or one for all axes")]
-pub enum OneOrThree {
-    One(Finite),
-    Three([Finite; 3]),
+pub enum OneOrThree<T = Finite> {
+    One(T),
+    Three([T; 3]),
 }
 
 impl OneOrThree {
