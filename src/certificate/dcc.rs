@@ -8,7 +8,7 @@ use std::fmt::Write;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
-    Certificate, Condition, Contact, Decided, Equipment, Laboratory, Measured, temperature_words,
+    Certificate, Condition, Contact, Decided, Equipment, Item, Measured, temperature_words,
     to_twelve_digits,
 };
 
@@ -183,34 +183,29 @@ fn administrative(xml: &mut Xml, certificate: &Certificate) {
             xml.leaf("dcc:type", "application");
         });
     });
+    let issue = &laboratory.certificate;
     xml.element("dcc:coreData", |xml| {
         xml.leaf("dcc:countryCodeISO3166_1", &laboratory.contact.country);
         xml.leaf("dcc:usedLangCodeISO639_1", "en");
         xml.leaf("dcc:mandatoryLangCodeISO639_1", "en");
-        xml.leaf("dcc:uniqueIdentifier", &laboratory.number);
-        if let Some(day) = laboratory.received {
+        xml.leaf("dcc:uniqueIdentifier", &issue.number);
+        if let Some(day) = issue.received {
             xml.leaf("dcc:receiptDate", &day.to_string());
         }
-        xml.leaf(
-            "dcc:beginPerformanceDate",
-            &laboratory.performed.0.to_string(),
-        );
-        xml.leaf(
-            "dcc:endPerformanceDate",
-            &laboratory.performed.1.to_string(),
-        );
-        xml.leaf("dcc:performanceLocation", laboratory.place.code());
-        xml.leaf("dcc:issueDate", &laboratory.issued.to_string());
+        xml.leaf("dcc:beginPerformanceDate", &issue.begin.to_string());
+        xml.leaf("dcc:endPerformanceDate", &issue.end.to_string());
+        xml.leaf("dcc:performanceLocation", issue.place.code());
+        xml.leaf("dcc:issueDate", &issue.issued.to_string());
     });
-    item(xml, laboratory);
+    item(xml, &laboratory.item);
     xml.element("dcc:calibrationLaboratory", |xml| {
         xml.contact("dcc:contact", &laboratory.contact);
     });
     xml.element("dcc:respPersons", |xml| {
         xml.element("dcc:respPerson", |xml| {
-            let (name, function) = &laboratory.authorised;
-            xml.element("dcc:person", |xml| xml.words("dcc:name", name));
-            xml.leaf("dcc:role", function);
+            let of = &laboratory.authorised;
+            xml.element("dcc:person", |xml| xml.words("dcc:name", &of.name));
+            xml.leaf("dcc:role", &of.function);
             xml.leaf("dcc:mainSigner", "true");
         });
     });
@@ -218,7 +213,7 @@ fn administrative(xml: &mut Xml, certificate: &Certificate) {
     xml.element("dcc:statements", |xml| {
         xml.element("dcc:statement", |xml| {
             xml.words("dcc:name", "metrological traceability");
-            xml.words("dcc:declaration", &laboratory.traceability);
+            xml.words("dcc:declaration", &laboratory.traceability.statement);
         });
         if let Some(conformity) = &certificate.conformity {
             for limit in &conformity.limits {
@@ -229,22 +224,22 @@ fn administrative(xml: &mut Xml, certificate: &Certificate) {
 }
 
 /// What was calibrated.
-fn item(xml: &mut Xml, laboratory: &Laboratory) {
+fn item(xml: &mut Xml, item: &Item) {
     xml.element("dcc:items", |xml| {
         xml.element("dcc:item", |xml| {
-            xml.words("dcc:name", &laboratory.item);
+            xml.words("dcc:name", &item.name);
             xml.words(
                 "dcc:description",
-                &format!("State when received: {}", laboratory.state),
+                &format!("State when received: {}", item.state),
             );
-            if let Some(manufacturer) = &laboratory.manufacturer {
+            if let Some(manufacturer) = &item.manufacturer {
                 xml.element("dcc:manufacturer", |xml| {
                     xml.words("dcc:name", manufacturer)
                 });
             }
-            xml.leaf("dcc:model", &laboratory.model);
+            xml.leaf("dcc:model", &item.model);
             xml.element("dcc:identifications", |xml| {
-                xml.identification("manufacturer", &laboratory.serial, "serial number");
+                xml.identification("manufacturer", &item.serial, "serial number");
             });
         });
     });
@@ -271,7 +266,7 @@ fn measured(xml: &mut Xml, certificate: &Certificate) {
     xml.words("dcc:name", "Calibration of both triads");
     xml.element("dcc:usedMethods", |xml| {
         xml.element("dcc:usedMethod", |xml| {
-            xml.words("dcc:name", &laboratory.procedure);
+            xml.words("dcc:name", &laboratory.method.procedure);
             let equation = certificate.calibration.equation.as_deref();
             xml.words("dcc:description", equation.unwrap_or_default());
             xml.leaf("dcc:norm", "JCGM 100:2008");
@@ -290,16 +285,17 @@ fn measured(xml: &mut Xml, certificate: &Certificate) {
             xml.words("dcc:description", &text);
         });
     });
-    if !laboratory.equipment.is_empty() {
-        equipments(xml, &laboratory.equipment);
+    let equipment = &laboratory.traceability.equipment;
+    if !equipment.is_empty() {
+        equipments(xml, equipment);
     }
     xml.element("dcc:influenceConditions", |xml| {
         xml.condition(
             "temperature of the air",
             "\\degreecelsius",
-            laboratory.temperature,
+            laboratory.conditions.temperature_degc,
         );
-        if let Some(humidity) = laboratory.humidity {
+        if let Some(humidity) = laboratory.conditions.humidity_percent {
             xml.condition("relative humidity", "\\percent", humidity);
         }
     });

@@ -112,7 +112,8 @@ impl Place {
 }
 
 /// A condition with its expanded uncertainty.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Condition {
     /// In the unit of its field.
     pub value: f64,
@@ -121,7 +122,8 @@ pub struct Condition {
 }
 
 /// Equipment used for traceability.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(expecting = "name, serial number and certificate, three texts in quotes")]
 pub struct Equipment {
     /// What it is.
     pub name: String,
@@ -157,50 +159,116 @@ impl DecisionRule {
 }
 
 /// Statements of a laboratory.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Laboratory {
     /// The laboratory.
+    #[serde(rename = "laboratory")]
     pub contact: Contact,
     /// The customer of the calibration.
     pub customer: Contact,
+    /// What identifies the certificate.
+    pub certificate: Issue,
+    /// The calibrated item.
+    pub item: Item,
+    /// The laboratory's own method.
+    pub method: Method,
+    /// The conditions of the calibration.
+    pub conditions: Conditions,
+    /// How results are traceable to the SI.
+    pub traceability: Traceability,
+    /// Who authorises the certificate.
+    pub authorised: Authorised,
+    /// How conformity is decided.
+    #[serde(default)]
+    pub decision: DecisionStated,
+    /// Anything else.
+    pub remarks: Option<String>,
+}
+
+/// Number, days and place of a calibration.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Issue {
     /// Unique number of the certificate.
     pub number: String,
     /// Day of issue.
     pub issued: Day,
     /// Day on which the item was received.
     pub received: Option<Day>,
-    /// First and last day of the calibration.
-    pub performed: (Day, Day),
+    /// First day of the calibration.
+    pub begin: Day,
+    /// Its last day.
+    pub end: Day,
     /// Place of the calibration.
     pub place: Place,
-    /// The calibrated item, such as `inertial measurement unit`.
-    pub item: String,
+}
+
+/// What was calibrated.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Item {
+    /// What it is, such as `inertial measurement unit`.
+    pub name: String,
     /// Its manufacturer.
     pub manufacturer: Option<String>,
     /// Its model.
+    #[serde(default)]
     pub model: String,
     /// Its serial number.
+    #[serde(default)]
     pub serial: String,
     /// Its state when received.
     pub state: String,
+}
+
+/// How it was calibrated.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Method {
     /// The laboratory's own procedure.
     pub procedure: String,
     /// Additions to, deviations or exclusions from it.
     pub deviations: Option<String>,
-    /// Air temperature, °C.
-    pub temperature: Condition,
-    /// Relative humidity, %.
-    pub humidity: Option<Condition>,
-    /// Statement of traceability to the SI, in the laboratory's words.
-    pub traceability: String,
-    /// Equipment that provides the traceability.
+}
+
+/// Conditions of a calibration.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Conditions {
+    /// Air temperature.
+    pub temperature_degc: Condition,
+    /// Relative humidity.
+    pub humidity_percent: Option<Condition>,
+}
+
+/// Traceability to the SI.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Traceability {
+    /// In the laboratory's words.
+    pub statement: String,
+    /// Equipment that provides it.
+    #[serde(default)]
     pub equipment: Vec<Equipment>,
-    /// Name and function of the person who authorises the certificate.
-    pub authorised: (String, String),
-    /// Decision rule for conformity.
+}
+
+/// The person who authorises a certificate.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Authorised {
+    /// Who.
+    pub name: String,
+    /// As what.
+    pub function: String,
+}
+
+/// What is stated of conformity.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DecisionStated {
+    /// Decision rule.
     pub rule: Option<DecisionRule>,
-    /// Anything else.
-    pub remarks: Option<String>,
 }
 
 #[cfg(test)]

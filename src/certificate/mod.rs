@@ -15,7 +15,7 @@ use crate::lot::Specification;
 
 pub use as_found::{AsFound, Change};
 pub use conformity::{Conformity, Decided, Decision};
-pub use laboratory::{Condition, Contact, Day, DecisionRule, Equipment, Laboratory, Place};
+pub use laboratory::*;
 pub use results::{Measured, Quantity, temperature_words, to_twelve_digits};
 
 /// Errors of a certificate.
@@ -100,7 +100,7 @@ impl Certificate {
             results::results(&calibration, &provenance).ok_or(missing("covariance"))?;
         let conformity = match specification {
             Some(specification) => {
-                let rule = laboratory.rule.ok_or(CertificateError::NoRule)?;
+                let rule = laboratory.decision.rule.ok_or(CertificateError::NoRule)?;
                 Some(conformity::conformity(
                     &calibration,
                     &provenance,

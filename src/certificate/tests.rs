@@ -268,7 +268,7 @@ fn what_may_not_be_used_or_is_not_complete_gets_no_certificate() {
     old.provenance = None;
     assert!(refused(old, laboratory(), None).contains("`provenance`"));
     let mut without = laboratory();
-    without.rule = None;
+    without.decision.rule = None;
     let limits = specification(ARCSEC);
     assert!(refused(calibration, without, Some(&limits)).contains("decision.rule"));
 }

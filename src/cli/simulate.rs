@@ -92,7 +92,7 @@ impl Simulate {
         if let Some(truth) = SimulatedCampaign::truth(&simulated) {
             truth.write(&directory.path().join("truth.json"), false)?;
         }
-        let text = campaign_text(&paths, &campaign.day_to_day)?;
+        let text = campaign_text(&paths, &campaign.day_to_day);
         let path = directory.path().join("campaign.toml");
         std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))?;
         directory.commit()?;

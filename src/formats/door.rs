@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 use super::draft::{Draft, Found, Stated};
-use super::error::{FileError, Place};
+use super::error::FileError;
 use crate::run::Run;
 
 /// The log on standard input.
@@ -59,7 +59,7 @@ impl Opened {
         let draft = Draft::of_stream(&file, stream, stated)?;
         show(&draft.found());
         if let Some([found, expected, advice]) = draft.open_question() {
-            return Err(FileError::new(path, Place::File, found, expected, advice));
+            return Err(FileError::of(path, found, expected, advice));
         }
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let run = Run::of_text(&file, &draft.to_toml(&name), None)?;
@@ -94,10 +94,7 @@ impl Opened {
         };
         let written = written
             .and_then(|file: PathBuf| fs::write(&path, log.draft.to_toml(&file.to_string_lossy())));
-        written.map_err(|error| {
-            let advice = "Make room or choose another place.";
-            FileError::io(&path, "write the run", &error, advice)
-        })
+        written.map_err(|error| FileError::unwritten(&path, &error))
     }
 }
 

@@ -101,6 +101,22 @@ impl FileError {
         }
     }
 
+    /// The same of the file as a whole.
+    pub(super) fn of(
+        file: &Path,
+        found: impl fmt::Display,
+        expected: impl fmt::Display,
+        advice: impl fmt::Display,
+    ) -> Self {
+        Self::new(file, Place::File, found, expected, advice)
+    }
+
+    /// The system did not let a file be written.
+    pub(super) fn unwritten(file: &Path, error: &std::io::Error) -> Self {
+        let advice = "Make room or choose another place.";
+        Self::io(file, "write the file", error, advice)
+    }
+
     /// The system refused to do something with a file.
     pub(super) fn io(file: &Path, doing: &str, error: &std::io::Error, advice: &str) -> Self {
         Self {

@@ -5,7 +5,6 @@ mod parts;
 
 use nalgebra::Vector3;
 
-use super::axes::BodyAxes;
 use super::clock::{Clock, Uniform};
 use super::course::place;
 use super::error::FileError;
@@ -13,7 +12,7 @@ use super::joined::{self, Joined, Part};
 use super::rows::LogRows;
 use super::source::Source;
 use super::temperature::TemperatureColumns;
-use crate::imu::{Nominal, Output, PerSensor, Sensor};
+use crate::imu::{AxisOrder, Nominal, Output, PerSensor, Sensor};
 use crate::recording::{
     Bridge, ColumnFacts, Fault, FileColumn, ImuSamples, LogFacts, NamedColumns, Series,
     stretches_between,
@@ -59,7 +58,7 @@ pub struct ImuLog<'a> {
     pub triads: PerSensor<[&'a str; 3]>,
     pub temperature: Option<TemperatureColumns<'a>>,
     pub output: Output,
-    pub axes: BodyAxes,
+    pub axes: AxisOrder,
     pub stamp: TimeStamp,
     pub continuous: bool,
     /// Along right-front-up.
@@ -107,7 +106,7 @@ impl Layout {
         Vector3::from_fn(|axis, _| {
             let k = columns[axis];
             let sign = if self.names[k].reversed { -1.0 } else { 1.0 };
-            let along = log.axes.vector(Vector3::ith(k % 3, sign));
+            let along = log.axes.apply(&Vector3::ith(k % 3, sign));
             log.nominal.get(sensor).0[axis] * along[axis]
         })
     }
@@ -247,7 +246,7 @@ impl ImuLog<'_> {
             time: self.clock_of_rows().column.map(str::to_owned),
             triads: layout.triads(),
             temperature: self.temperature.as_ref().map(|t| t.first().to_owned()),
-            axes: self.axes.order(),
+            axes: self.axes,
         }
     }
 
@@ -292,7 +291,7 @@ impl ImuLog<'_> {
         let mut layout = Layout {
             names: std::array::from_fn(|_| FileColumn::default()),
             places: [None; 6],
-            body_axes: std::array::from_fn(|k| self.axes.body_axis(k % 3)),
+            body_axes: std::array::from_fn(|k| self.axes.inverse().source[k % 3]),
         };
         for (k, name) in names.enumerate().filter(|(_, name)| !name.is_empty()) {
             let (place, column) = csv.signed_column(name)?;

@@ -32,10 +32,10 @@ pub use error::{FileError, Place};
 // By these names the readers of rows know them.
 use inputs::{course, joined, source, temperature};
 pub(crate) use quantity::unit_scale;
+use schema::instrument;
 pub use schema::{Campaign, campaign_text, write_run};
 pub(crate) use schema::{
     Document, Finite, Latitude, NonNegative, OneOrThree, Positive, TermFile, day_to_day,
     term_sigma, write_rows,
 };
-use schema::{axes, instrument};
 pub(crate) use sheet::Sheet;

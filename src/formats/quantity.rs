@@ -15,6 +15,12 @@ pub const OUTPUTS: [(&str, Output); 3] = [
     ("rate", Output::Rate),
 ];
 
+/// The word for what a row holds.
+pub fn output_word(output: Output) -> &'static str {
+    let known = OUTPUTS.iter().find(|(_, known)| *known == output);
+    known.map_or("", |(word, _)| word)
+}
+
 /// What a unit is of.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Of {

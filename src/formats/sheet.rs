@@ -64,10 +64,19 @@ impl Sheet {
         })
     }
 
+    /// The number of rows.
+    pub fn rows(&self) -> usize {
+        self.columns.first().map_or(0, Vec::len)
+    }
+
+    /// Whether one of these columns has a number in a row.
+    pub fn has(&self, columns: &[usize], row: usize) -> bool {
+        columns.iter().any(|&k| self.columns[k][row].is_finite())
+    }
+
     /// Leaves the rows of which this is true.
-    pub fn retain(&mut self, keep: impl Fn(&[Vec<f64>], usize) -> bool) {
-        let rows = 0..self.columns.first().map_or(0, Vec::len);
-        let kept: Vec<bool> = rows.map(|row| keep(&self.columns, row)).collect();
+    pub fn retain(&mut self, keep: impl Fn(&Self, usize) -> bool) {
+        let kept: Vec<bool> = (0..self.rows()).map(|row| keep(self, row)).collect();
         for column in &mut self.columns {
             let mut kept = kept.iter();
             column.retain(|_| kept.next() == Some(&true));

@@ -4,27 +4,65 @@ use std::fs::File;
 use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+
+use super::error::FileError;
+
 /// A file of any length may be named, and a device that never ends.
 const MOST_BYTES: u64 = 1 << 24;
 
-/// All bytes of a file.
-pub fn bytes(path: &Path) -> io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    File::open(path)?
-        .take(MOST_BYTES + 1)
-        .read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > MOST_BYTES {
-        let what = format!(
-            "it is longer than {} MiB, as no file of this kind is",
-            MOST_BYTES >> 20
-        );
-        return Err(io::Error::new(ErrorKind::FileTooLarge, what));
-    }
-    Ok(bytes)
+/// All bytes of a file that holds `what`.
+pub fn bytes(path: &Path, what: &str, advice: &str) -> Result<Vec<u8>, FileError> {
+    let read = || {
+        let mut bytes = Vec::new();
+        let file = File::open(path)?;
+        file.take(MOST_BYTES + 1).read_to_end(&mut bytes)?;
+        if bytes.len() as u64 > MOST_BYTES {
+            let most = MOST_BYTES >> 20;
+            let why = format!("it is longer than {most} MiB, as no file of this kind is");
+            return Err(io::Error::new(ErrorKind::FileTooLarge, why));
+        }
+        Ok(bytes)
+    };
+    read().map_err(|error| FileError::io(path, &format!("read {what}"), &error, advice))
 }
 
-/// The text of a file.
-pub fn text(path: &Path) -> io::Result<String> {
-    String::from_utf8(bytes(path)?)
-        .map_err(|_| io::Error::new(ErrorKind::InvalidData, "it is not text in UTF-8"))
+/// The text of such a file.
+pub fn text(path: &Path, what: &str, advice: &str) -> Result<String, FileError> {
+    String::from_utf8(bytes(path, what, advice)?).map_err(|_| {
+        let error = io::Error::new(ErrorKind::InvalidData, "it is not text in UTF-8");
+        FileError::io(path, &format!("read {what}"), &error, advice)
+    })
+}
+
+/// Such a file of this JSON format.
+pub fn json<T: DeserializeOwned>(
+    path: &Path,
+    what: &str,
+    format: &str,
+    advice: &str,
+) -> Result<T, FileError> {
+    #[derive(Deserialize)]
+    struct Format {
+        format: String,
+    }
+    let bytes = bytes(path, what, advice)?;
+    let wrong = |found: String| {
+        let expected = format_args!("{what} in the format {format}");
+        FileError::of(path, found, expected, advice)
+    };
+    let parsed = serde_json::from_slice(&bytes).map_err(|error| wrong(error.to_string()));
+    let Format { format: found } = parsed?;
+    if found != format {
+        return Err(wrong(format!("format = {found:?}")));
+    }
+    serde_json::from_slice(&bytes).map_err(|error| wrong(error.to_string()))
+}
+
+/// The bytes of a JSON file.
+pub fn pretty(value: &impl serde::Serialize) -> serde_json::Result<Vec<u8>> {
+    let mut bytes = serde_json::to_vec_pretty(value)?;
+    bytes.push(b'\n');
+    Ok(bytes)
 }

@@ -18,6 +18,23 @@ impl AxisOrder {
         reversed: [false; 3],
     };
 
+    /// From front, right, down to right, front, up.
+    pub const FRONT_RIGHT_DOWN: Self = Self {
+        source: [1, 0, 2],
+        reversed: [false, false, true],
+    };
+    /// From front, left, up.
+    pub const FRONT_LEFT_UP: Self = Self {
+        source: [1, 0, 2],
+        reversed: [true, false, false],
+    };
+    /// The words of `run.toml` for a file's axes, brought to right, front, up.
+    pub const WORDS: [(&'static str, Self); 3] = [
+        ("rfu", Self::IDENTITY),
+        ("frd", Self::FRONT_RIGHT_DOWN),
+        ("flu", Self::FRONT_LEFT_UP),
+    ];
+
     /// All 48, the first being the identity.
     pub fn all() -> impl Iterator<Item = Self> {
         const ORDERS: [[usize; 3]; 6] = [
@@ -44,6 +61,12 @@ impl AxisOrder {
     /// Applies the order and signs to a vector.
     pub fn apply(&self, v: &Vector3<f64>) -> Vector3<f64> {
         Vector3::from_fn(|axis, _| self.sign(axis) * v[self.source[axis]])
+    }
+
+    /// One value of each axis, such as a σ or a nominal scale, which no sign changes: a reversed axis turns the sign of
+    /// input and output alike.
+    pub fn each(&self, v: Vector3<f64>) -> Vector3<f64> {
+        Vector3::from(self.source.map(|axis| v[axis]))
     }
 
     /// The order as a matrix.
@@ -95,6 +118,24 @@ impl AxisOrder {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_frame_is_right_handed_and_names_its_axes() {
+        for (word, axes) in AxisOrder::WORDS {
+            assert!(axes.is_rotation(), "{word}");
+            for (letter, axis) in word.chars().zip(0..) {
+                let expected = match letter {
+                    'r' => Vector3::x(),
+                    'f' => Vector3::y(),
+                    'u' => Vector3::z(),
+                    'l' => -Vector3::x(),
+                    _ => -Vector3::z(),
+                };
+                let along = axes.apply(&Vector3::ith(axis, 1.0));
+                assert_eq!(along, expected, "{word}: {letter}");
+            }
+        }
+    }
 
     #[test]
     fn there_are_48_of_which_24_are_rotations() {

@@ -17,8 +17,6 @@ pub struct NoiseKeys {
     pub by_motion: &'static str,
     /// Noise of moves by their duration, and its unit in rad/√s or (m/s)/√s.
     pub by_duration: (&'static str, f64),
-    /// Former key of the bias 1σ; data sheets use this name for the floor of the Allan deviation.
-    pub former: &'static str,
 }
 
 impl NoiseKeys {
@@ -31,7 +29,6 @@ impl NoiseKeys {
                 correlation_time: "gyro_correlation_time_s",
                 by_motion: "attitude_noise_of_moves_by_rate_sqrt_s",
                 by_duration: ("attitude_noise_of_moves_deg_per_sqrt_s", DEGREE),
-                former: "gyro_instability_deg_per_h",
             },
             Sensor::Accel => Self {
                 random_walk: ("velocity_random_walk_ug_per_sqrt_hz", MICRO_G_PER_SQRT_HZ),
@@ -39,19 +36,17 @@ impl NoiseKeys {
                 correlation_time: "accel_correlation_time_s",
                 by_motion: "velocity_noise_of_moves_by_acceleration_sqrt_s",
                 by_duration: ("velocity_noise_of_moves_m_s_per_sqrt_s", 1.0),
-                former: "accel_instability_ug",
             },
         }
     }
     /// All names.
-    pub const fn names(self) -> [&'static str; 6] {
+    pub const fn names(self) -> [&'static str; 5] {
         [
             self.random_walk.0,
             self.gauss_markov.0,
             self.correlation_time,
             self.by_motion,
             self.by_duration.0,
-            self.former,
         ]
     }
 }

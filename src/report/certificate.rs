@@ -10,7 +10,7 @@ use super::pdf::{Attached, Frame, PdfError};
 use crate::calibration::Group;
 use crate::calibration::result::{EQUATION, GravityRecord};
 use crate::certificate::{
-    AsFound, Certificate, Condition, Conformity, Contact, Decision, Quantity, dcc,
+    AsFound, Authorised, Certificate, Condition, Conformity, Contact, Decision, Quantity, dcc,
     temperature_words,
 };
 use crate::imu::ParameterKind;
@@ -58,8 +58,8 @@ const SIGNATURE: usize = 40;
 
 fn frame(certificate: &Certificate) -> Frame {
     let laboratory = &certificate.laboratory;
-    let number = &laboratory.number;
-    let day = laboratory.issued;
+    let number = &laboratory.certificate.number;
+    let day = laboratory.certificate.issued;
     Frame {
         left: laboratory.contact.name.clone(),
         right: format!("Calibration certificate {number}"),
@@ -73,34 +73,35 @@ fn frame(certificate: &Certificate) -> Frame {
 /// Everything that it says, in the order of ISO/IEC 17025, 7.8.2 and 7.8.4.
 pub fn document(certificate: &Certificate) -> Document {
     let laboratory = &certificate.laboratory;
+    let (issue, item) = (&laboratory.certificate, &laboratory.item);
     let mut document = Document::new("Calibration certificate");
-    let mut general = Facts::new("", [("certificate number", laboratory.number.clone())]);
+    let mut general = Facts::new("", [("certificate number", issue.number.clone())]);
     general.push("laboratory", contact(&laboratory.contact));
     general.push("customer", contact(&laboratory.customer));
-    let manufacturer = laboratory.manufacturer.iter();
+    let manufacturer = item.manufacturer.iter();
     let made = manufacturer.map(|name| format!(", {name}"));
-    let item = format!(
+    let words = format!(
         "{}{}, model {}, serial number {}",
-        laboratory.item,
+        item.name,
         made.collect::<String>(),
-        laboratory.model,
-        laboratory.serial
+        item.model,
+        item.serial
     );
-    general.push("item", item);
-    general.push("state when received", laboratory.state.clone());
-    if let Some(day) = laboratory.received {
+    general.push("item", words);
+    general.push("state when received", item.state.clone());
+    if let Some(day) = issue.received {
         general.push("received", day.to_string());
     }
-    let (first, last) = laboratory.performed;
+    let (first, last) = (issue.begin, issue.end);
     let performed = match first == last {
         true => first.to_string(),
         false => format!("{first} to {last}"),
     };
     general.push(
         "calibrated",
-        format!("{performed}, {}", laboratory.place.words()),
+        format!("{performed}, {}", issue.place.words()),
     );
-    general.push("issued", laboratory.issued.to_string());
+    general.push("issued", issue.issued.to_string());
     document.page(general);
     if let Some(conformity) = &certificate.conformity {
         document.page(Block::Text("Conformity".to_owned(), verdict(conformity)));
@@ -138,8 +139,11 @@ fn contact(contact: &Contact) -> String {
 fn method(certificate: &Certificate) -> Facts {
     let (calibration, provenance) = (&certificate.calibration, &certificate.provenance);
     let laboratory = &certificate.laboratory;
-    let mut facts = Facts::new("Method", [("procedure", laboratory.procedure.clone())]);
-    let deviations = laboratory.deviations.clone();
+    let mut facts = Facts::new(
+        "Method",
+        [("procedure", laboratory.method.procedure.clone())],
+    );
+    let deviations = laboratory.method.deviations.clone();
     facts.push(
         "deviations",
         deviations.unwrap_or_else(|| "none".to_owned()),
@@ -210,7 +214,7 @@ fn of_gravity(gravity: GravityRecord) -> String {
 }
 
 fn conditions(certificate: &Certificate) -> Facts {
-    let laboratory = &certificate.laboratory;
+    let conditions = &certificate.laboratory.conditions;
     let with = |condition: Condition, unit: &str| {
         let Condition {
             value: of,
@@ -224,9 +228,9 @@ fn conditions(certificate: &Certificate) -> Facts {
     };
     let mut facts = Facts::new(
         "Conditions",
-        [("air temperature", with(laboratory.temperature, "°C"))],
+        [("air temperature", with(conditions.temperature_degc, "°C"))],
     );
-    if let Some(humidity) = laboratory.humidity {
+    if let Some(humidity) = conditions.humidity_percent {
         facts.push("relative humidity", with(humidity, "%"));
     }
     facts
@@ -332,19 +336,19 @@ fn found(as_found: &AsFound) -> Table {
 
 /// Who authorises the certificate, with room for date and signature.
 fn signature(certificate: &Certificate) -> Facts {
-    let (name, function) = &certificate.laboratory.authorised;
+    let Authorised { name, function } = &certificate.laboratory.authorised;
     let mut facts = Facts::new("Authorisation", [("name", format!("{name}, {function}"))]);
     facts.push("date, signature", "_".repeat(SIGNATURE));
     facts
 }
 
 fn traceability(certificate: &Certificate) -> Facts {
-    let laboratory = &certificate.laboratory;
+    let traceability = &certificate.laboratory.traceability;
     let mut facts = Facts::new(
         "Metrological traceability",
-        [("statement", laboratory.traceability.clone())],
+        [("statement", traceability.statement.clone())],
     );
-    for equipment in &laboratory.equipment {
+    for equipment in &traceability.equipment {
         facts.push(
             &equipment.name,
             format!(

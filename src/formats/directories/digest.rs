@@ -5,34 +5,11 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use sha2::{Digest, Sha256};
+use toml::{Table, Value};
 
 use crate::formats::small_file;
-
-/// Input files named in a run.toml or a campaign.toml, which may be invalid.
-#[derive(Default, Deserialize)]
-#[serde(default)]
-struct Inputs {
-    imu: Named,
-    turntable: Named,
-    segments: Named,
-    recording: Vec<Named>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(default)]
-struct Named {
-    file: Option<String>,
-    run: Option<String>,
-}
-
-impl Inputs {
-    fn read(path: &Path) -> Self {
-        let text = small_file::text(path).unwrap_or_default();
-        toml::from_str(&text).unwrap_or_default()
-    }
-}
 
 /// SHA-256 of a value as JSON, in hexadecimal digits.
 pub fn digest_of(value: &impl Serialize) -> String {
@@ -67,22 +44,31 @@ fn digest_of_file(path: &Path) -> io::Result<String> {
 ///
 /// Of a campaign its file, then those of each recording, in the order of their paths.
 pub fn input_digests(run: &Path) -> Vec<(String, String)> {
-    let recordings = Inputs::read(run).recording.into_iter();
-    let mut recordings: Vec<String> = recordings.filter_map(|named| named.run).collect();
-    if recordings.is_empty() {
+    let file = table_of(run);
+    let recordings = file.get("recording").and_then(Value::as_array);
+    let recordings = recordings.into_iter().flatten();
+    let named = recordings.filter_map(|of| of.get("run")?.as_str());
+    let mut named: Vec<&str> = named.collect();
+    if named.is_empty() {
         return digests_of_run(run);
     }
-    recordings.sort();
+    named.sort_unstable();
     let directory = run.parent().unwrap_or(Path::new(""));
     let mut all = vec![("campaign.toml".to_owned(), digest_or_error(run))];
-    for recording in recordings {
-        let folder = Path::new(&recording).parent().unwrap_or(Path::new(""));
-        let of_recording = digests_of_run(&directory.join(&recording)).into_iter();
+    for recording in named {
+        let folder = Path::new(recording).parent().unwrap_or(Path::new(""));
+        let of_recording = digests_of_run(&directory.join(recording)).into_iter();
         all.extend(
             of_recording.map(|(name, digest)| (folder.join(name).display().to_string(), digest)),
         );
     }
     all
+}
+
+/// The content of a run.toml or a campaign.toml, which may be invalid.
+fn table_of(path: &Path) -> Table {
+    let text = small_file::text(path, "", "").unwrap_or_default();
+    text.parse().unwrap_or_default()
 }
 
 /// The digest of a file, or what the system says where it cannot be read.
@@ -97,16 +83,18 @@ fn digests_of_run(run: &Path) -> Vec<(String, String)> {
     };
     let mut all = vec![(name.into_owned(), digest_or_error(run))];
     let directory = run.parent().unwrap_or(Path::new(""));
-    let Inputs {
+    let of = table_of(run);
+    let imu = of.get("imu");
+    let tables = [
         imu,
-        turntable,
-        segments,
-        ..
-    } = Inputs::read(run);
-    let files = [imu, turntable, segments].into_iter();
-    all.extend(files.filter_map(|named| named.file).map(|file| {
-        let digest = digest_or_error(&directory.join(&file));
-        (file, digest)
+        imu.and_then(|imu| imu.get("accel_from")),
+        of.get("turntable"),
+        of.get("segments"),
+    ];
+    let files = tables.into_iter().flatten();
+    all.extend(files.filter_map(|of| of.get("file")?.as_str()).map(|file| {
+        let digest = digest_or_error(&directory.join(file));
+        (file.to_owned(), digest)
     }));
     all
 }
@@ -129,15 +117,15 @@ mod tests {
     fn inputs_are_all_files_of_a_run_and_change_with_each() {
         let directory = tempfile::tempdir().unwrap();
         let run = directory.path().join("run.toml");
-        let text = "[imu]\nfile = \"a.csv\"\n[turntable]\nfile = \"b.csv\"\n";
+        let text = "[imu]\nfile = \"a.csv\"\naccel_from = { file = \"c.csv\" }\n[turntable]\nfile = \"b.csv\"\n";
         std::fs::write(&run, text).unwrap();
         std::fs::write(directory.path().join("a.csv"), "1").unwrap();
         let first = input_digests(&run);
         let names: Vec<&str> = first.iter().map(|(name, _)| name.as_str()).collect();
-        assert_eq!(names, ["run.toml", "a.csv", "b.csv"]);
+        assert_eq!(names, ["run.toml", "a.csv", "c.csv", "b.csv"]);
         std::fs::write(directory.path().join("b.csv"), "2").unwrap();
         let second = input_digests(&run);
-        assert_eq!(first[..2], second[..2]);
-        assert!(first[2] != second[2]);
+        assert_eq!(first[..3], second[..3]);
+        assert!(first[3] != second[3]);
     }
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::digest::digest_of;
-use crate::formats::error::{FileError, Place};
+use crate::formats::error::FileError;
 use crate::formats::small_file;
 use crate::study::Shard;
 
@@ -92,27 +92,22 @@ impl Job {
 
     /// How two jobs differ in what decides what a run gives, in words; `None` if they do not.
     pub fn difference(&self, other: &Self) -> Option<String> {
-        let differ = |what: &str, a: String, b: String| Some(format!("{what} {a} and {b}"));
+        let words = |of: &Self| match of.job {
+            JobKind::Lot => "`calibrate` of a lot",
+            JobKind::StudyAccuracy => "`study accuracy`",
+            JobKind::StudyExperiment => "`study experiment`",
+        };
         if self.job != other.job {
-            return differ("jobs", kind(self.job), kind(other.job));
+            return Some(format!("jobs {} and {}", words(self), words(other)));
         }
         if self.version != other.version {
-            let (a, b) = (self.version.clone(), other.version.clone());
-            return differ("turncal", a, b);
+            return Some(format!("turncal {} and {}", self.version, other.version));
         }
         if self.processor != other.processor {
-            let (a, b) = (self.processor.join(" "), other.processor.join(" "));
-            return differ("processors with the features", a, b);
+            let [a, b] = [self, other].map(|of| of.processor.join(" "));
+            return Some(format!("processors with the features {a} and {b}"));
         }
         (self.options != other.options).then(|| of_values("", &self.options, &other.options))
-    }
-}
-
-fn kind(of: JobKind) -> String {
-    match of {
-        JobKind::Lot => "`calibrate` of a lot".to_owned(),
-        JobKind::StudyAccuracy => "`study accuracy`".to_owned(),
-        JobKind::StudyExperiment => "`study experiment`".to_owned(),
     }
 }
 
@@ -165,24 +160,14 @@ impl Part {
     pub fn read(directory: &Path) -> Result<Self, FileError> {
         let path = directory.join(JOB_FILE);
         let advice = "Give a directory that turncal wrote for a lot, or with --shard.";
-        let bytes = small_file::bytes(&path)
-            .map_err(|error| FileError::io(&path, "read the job", &error, advice))?;
-        let wrong = |found: String| {
-            let expected = format!("a job in the format {FORMAT}");
-            FileError::new(&path, Place::File, found, expected, advice)
+        let part: Self = small_file::json(&path, "a job", FORMAT, advice)?;
+        let is_whole = match part.shard {
+            Some(shard) => part.holds == shard.runs(part.job.runs),
+            None => true,
         };
-        let part: Self =
-            serde_json::from_slice(&bytes).map_err(|error| wrong(error.to_string()))?;
-        if part.job.format != FORMAT {
-            return Err(wrong(format!("format = {:?}", part.job.format)));
-        }
-        if part.digest != digest_of(&part.job) {
-            return Err(wrong("a job that its digest does not fit".to_owned()));
-        }
-        if let Some(shard) = part.shard
-            && part.holds != shard.runs(part.job.runs)
-        {
-            return Err(wrong(format!("other runs than those of part {shard}")));
+        if part.digest != digest_of(&part.job) || !is_whole {
+            let found = "a job that its digest or its runs do not fit";
+            return Err(FileError::of(&path, found, "it as it was written", advice));
         }
         Ok(part)
     }
@@ -190,9 +175,7 @@ impl Part {
     /// The bytes of its file.
     pub fn to_json(&self) -> Vec<u8> {
         // Names, numbers and texts are all there is: these can always be written.
-        let mut bytes = serde_json::to_vec_pretty(self).unwrap_or_default();
-        bytes.push(b'\n');
-        bytes
+        small_file::pretty(self).unwrap_or_default()
     }
 }
 

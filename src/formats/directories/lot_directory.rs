@@ -11,7 +11,7 @@ use super::digest::{digest_of, digest_of_bytes, input_digests};
 use super::job::{JOB_FILE, Part};
 use super::whole::{WholeDirectory, clear_abandoned, list_anew, write_whole};
 use crate::calibration::result::Calibration;
-use crate::formats::error::{FileError, Place};
+use crate::formats::error::FileError;
 use crate::formats::small_file;
 use crate::imu::PerSensor;
 use crate::lot::{Calibrated, Unit};
@@ -59,9 +59,7 @@ pub fn unit_key(job: &str, run: &Path) -> String {
 
 /// A unit in the directory of a part of its lot.
 pub fn read_part_unit(part: &Path, name: &str) -> Result<Unit, FileError> {
-    let directory = part.join(UNITS).join(name);
-    let record = UnitRecord::read(&directory)?;
-    read_unit(&directory, &record.key)
+    Ok(read_unit(&part.join(UNITS).join(name), None)?.0)
 }
 
 impl LotDirectory {
@@ -110,7 +108,8 @@ impl LotDirectory {
 
     /// The unit as it was calibrated before, if nothing that decides its result has changed since.
     pub fn kept(&self, name: &str, key: &str) -> Option<Unit> {
-        read_unit(&self.root.join(UNITS).join(name), key).ok()
+        let unit = read_unit(&self.root.join(UNITS).join(name), Some(key));
+        Some(unit.ok()?.0)
     }
 
     /// Puts a unit in its place; `write` puts further files into its directory.
@@ -133,9 +132,8 @@ impl LotDirectory {
     /// Copies a unit from the directory of a part.
     pub fn copy(&self, part: &Path, name: &str) -> Result<Unit, FileError> {
         let from = part.join(UNITS).join(name);
-        let record = UnitRecord::read(&from)?;
-        let unit = read_unit(&from, &record.key)?;
-        if let Some(kept) = self.kept(name, &record.key) {
+        let (unit, key) = read_unit(&from, None)?;
+        if let Some(kept) = self.kept(name, &key) {
             return Ok(kept);
         }
         let target = self.root.join(UNITS).join(name);
@@ -190,9 +188,8 @@ fn check_same(target: &Path, found: &Part, expected: &Part) -> Result<(), FileEr
         (found.shard != expected.shard).then(|| format!("{} and {}", words(found), words(expected)))
     });
     difference.map_or(Ok(()), |difference| {
-        Err(FileError::new(
+        Err(FileError::of(
             target,
-            Place::File,
             format_args!("a lot begun with other options: {difference}"),
             "the job that was begun here, to continue it",
             "Give the same options, choose another directory, or add --force to restart.",
@@ -215,9 +212,8 @@ fn check_units(units: &Path, part: &Part) -> Result<(), FileError> {
         .collect();
     others.sort();
     others.first().map_or(Ok(()), |other| {
-        Err(FileError::new(
+        Err(FileError::of(
             units,
-            Place::File,
             format_args!("unit `{other}`, which is not among the runs given"),
             "units of this lot only",
             "Give its run.toml, too, choose another directory, or add --force to restart.",
@@ -225,36 +221,16 @@ fn check_units(units: &Path, part: &Part) -> Result<(), FileError> {
     })
 }
 
-impl UnitRecord {
-    fn read(directory: &Path) -> Result<Self, FileError> {
-        let path = directory.join(UNIT_FILE);
-        let advice = "Calibrate the unit again.";
-        let bytes = small_file::bytes(&path)
-            .map_err(|error| FileError::io(&path, "read the unit", &error, advice))?;
-        let expected = format!("a unit in the format {FORMAT}");
-        let record: Self = serde_json::from_slice(&bytes)
-            .map_err(|error| FileError::new(&path, Place::File, error, &expected, advice))?;
-        if record.format != FORMAT {
-            let found = format_args!("format = {:?}", record.format);
-            return Err(FileError::new(&path, Place::File, found, expected, advice));
-        }
-        Ok(record)
-    }
-}
-
-fn read_unit(directory: &Path, key: &str) -> Result<Unit, FileError> {
-    let record = UnitRecord::read(directory)?;
+/// A unit, of this key if one is expected, and its key.
+fn read_unit(directory: &Path, key: Option<&str>) -> Result<(Unit, String), FileError> {
+    let path = directory.join(UNIT_FILE);
+    let record: UnitRecord =
+        small_file::json(&path, "a unit", FORMAT, "Calibrate the unit again.")?;
     let wrong = |found: &str| {
         let (expected, advice) = ("the unit as it was written", "Calibrate it again.");
-        Err(FileError::new(
-            directory,
-            Place::File,
-            found,
-            expected,
-            advice,
-        ))
+        Err(FileError::of(directory, found, expected, advice))
     };
-    if record.key != key {
+    if key.is_some_and(|key| record.key != key) {
         return wrong("another key");
     }
     let path = directory.join(CALIBRATION_FILE);
@@ -271,11 +247,12 @@ fn read_unit(directory: &Path, key: &str) -> Result<Unit, FileError> {
         }),
         (None, None) => return wrong("neither a calibration nor a failure"),
     };
-    Ok(Unit {
+    let unit = Unit {
         name: record.name,
         meta: record.meta,
         calibrated,
-    })
+    };
+    Ok((unit, record.key))
 }
 
 fn write_unit(unit: &Unit, key: &str, directory: &Path) -> Result<(), FileError> {
@@ -294,9 +271,8 @@ fn write_unit(unit: &Unit, key: &str, directory: &Path) -> Result<(), FileError>
         calibration_sha256: json.as_deref().map(digest_of_bytes),
         failure: unit.calibrated.as_ref().err().cloned(),
     };
-    let refused = |error: std::io::Error| FileError::io(&path, "write it", &error, "Make room.");
-    let mut bytes = serde_json::to_vec_pretty(&record).map_err(|error| refused(error.into()))?;
-    bytes.push(b'\n');
+    let refused = |error: std::io::Error| FileError::unwritten(&path, &error);
+    let bytes = small_file::pretty(&record).map_err(|error| refused(error.into()))?;
     fs::write(directory.join(UNIT_FILE), bytes).map_err(refused)?;
     if let Some(json) = json {
         fs::write(&path, json).map_err(refused)?;

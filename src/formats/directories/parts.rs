@@ -8,7 +8,7 @@ use serde::de::DeserializeOwned;
 
 use super::digest::digest_of_bytes;
 use super::job::{JOB_FILE, Job, Part};
-use crate::formats::error::{FileError, Place, list};
+use crate::formats::error::{FileError, list};
 
 /// Results of the runs of a study, as MessagePack: numbers come back to the bit.
 const RESULTS: &str = "runs.msgpack";
@@ -19,13 +19,12 @@ const NAMED: usize = 5;
 pub fn write_part<T: Serialize>(directory: &Path, part: Part, runs: &[T]) -> Result<(), FileError> {
     let write = |name: &str, bytes: &[u8]| {
         let path = directory.join(name);
-        fs::write(&path, bytes)
-            .map_err(|error| FileError::io(&path, "write the part", &error, "Make room."))
+        fs::write(&path, bytes).map_err(|error| FileError::unwritten(&path, &error))
     };
     let results = rmp_serde::to_vec(runs).map_err(|error| {
         let path = directory.join(RESULTS);
         let expected = "results that can be written";
-        FileError::new(&path, Place::File, error, expected, "Nothing was written.")
+        FileError::of(&path, error, expected, "Nothing was written.")
     })?;
     let part = Part {
         results: Some(digest_of_bytes(&results)),
@@ -75,19 +74,12 @@ impl Parts {
         let Some((first, reference)) = parts.first() else {
             let (found, expected) = ("no part", "all parts of a job");
             let advice = "Name the directories that --shard wrote.";
-            return Err(FileError::new(
-                Path::new("."),
-                Place::File,
-                found,
-                expected,
-                advice,
-            ));
+            return Err(FileError::of(Path::new("."), found, expected, advice));
         };
         for (directory, part) in &parts[1..] {
             if let Some(difference) = difference(&reference.job, &part.job) {
-                return Err(FileError::new(
+                return Err(FileError::of(
                     directory,
-                    Place::File,
                     format_args!(
                         "a part of another job than {}: {difference}",
                         first.display()
@@ -111,9 +103,8 @@ impl Parts {
         held.sort();
         if let Some([(run, other), (_, directory)]) = held.array_windows().find(|[a, b]| a.0 == b.0)
         {
-            return Err(FileError::new(
+            return Err(FileError::of(
                 directory,
-                Place::File,
                 format_args!(
                     "run {} that is in {}, too",
                     self.name(*run),
@@ -136,9 +127,8 @@ impl Parts {
         let given = self.parts.iter().filter_map(|(_, part)| part.shard);
         let given: Vec<String> = given.map(|shard| shard.to_string()).collect();
         let given = list(given.iter().map(String::as_str));
-        Err(FileError::new(
+        Err(FileError::of(
             &first.0,
-            Place::File,
             format_args!("no part with run {words}"),
             format_args!("all {} runs; the parts given are {given}", self.job.runs),
             "Add the missing parts.",
@@ -175,7 +165,7 @@ impl Parts {
                 .map_err(|error| FileError::io(&path, "read the part", &error, advice))?;
             let wrong = |found: String| {
                 let expected = "the results as they were written";
-                FileError::new(&path, Place::File, found, expected, advice)
+                FileError::of(&path, found, expected, advice)
             };
             if part.results.as_deref() != Some(digest_of_bytes(&bytes).as_str()) {
                 return Err(wrong("results that their digest does not fit".to_owned()));

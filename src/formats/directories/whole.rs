@@ -12,15 +12,14 @@ use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crate::formats::error::{FileError, Place};
+use crate::formats::error::FileError;
 pub use manifest::FILE as LIST;
 use stage::Stage;
 pub use stage::abandon_unfinished;
 
 fn taken(target: &Path) -> FileError {
-    FileError::new(
+    FileError::of(
         target,
-        Place::File,
         "something of this name already",
         "a name that is free",
         "Choose another name, or give --force to replace it.",
@@ -51,40 +50,27 @@ impl WholeDirectory {
                 return Err(taken(target));
             }
             if !existing.is_dir() {
-                let what = if existing.is_symlink() {
-                    "link"
-                } else {
-                    "file"
-                };
-                return Err(FileError::new(
-                    target,
-                    Place::File,
-                    format_args!("a {what} of this name"),
-                    "a directory or nothing",
-                    format_args!("Choose another name or remove the {what}."),
-                ));
+                let is_link = existing.is_symlink();
+                let what = if is_link { "link" } else { "file" };
+                let found = format_args!("a {what} of this name");
+                let advice = format_args!("Choose another name or remove the {what}.");
+                let expected = "a directory or nothing";
+                return Err(FileError::of(target, found, expected, advice));
             }
-            let inside = |path: &Path| match (path.canonicalize(), target.canonicalize()) {
+            let inside = |path: &&Path| match (path.canonicalize(), target.canonicalize()) {
                 (Ok(path), Ok(target)) => path.starts_with(target),
                 _ => false,
             };
-            let held = inputs
-                .iter()
-                .copied()
-                .chain([Path::new(".")])
-                .find(|path| inside(path));
-            if let Some(held) = held {
-                return Err(FileError::new(
+            let here = Path::new(".");
+            let mut needed = inputs.iter().copied().chain([here]);
+            if let Some(held) = needed.find(inside) {
+                let name = match held == here {
+                    true => "the current directory".to_owned(),
+                    false => held.display().to_string(),
+                };
+                return Err(FileError::of(
                     target,
-                    Place::File,
-                    format_args!(
-                        "{} in this directory",
-                        if held == Path::new(".") {
-                            "the current directory".into()
-                        } else {
-                            held.display().to_string()
-                        }
-                    ),
+                    format_args!("{name} in this directory"),
                     "a directory that can be replaced",
                     "Choose another name; replacing this one would delete files that are still needed.",
                 ));
@@ -151,9 +137,8 @@ fn only_output(directory: &Path) -> Result<(), FileError> {
     let foreign = manifest::foreign(directory)
         .map_err(|error| unwritable(directory, "look into the directory", &error))?;
     foreign.map_or(Ok(()), |foreign| {
-        Err(FileError::new(
+        Err(FileError::of(
             directory,
-            Place::File,
             format_args!(
                 "`{}` in it, which no list of what turncal wrote there (`{}`) names",
                 foreign.display(),
@@ -180,9 +165,8 @@ pub fn write_whole_with(
     match fs::symlink_metadata(path) {
         Ok(_) if !force => return Err(taken(path)),
         Ok(existing) if existing.is_dir() => {
-            return Err(FileError::new(
+            return Err(FileError::of(
                 path,
-                Place::File,
                 "a directory of this name",
                 "a file or nothing",
                 "Choose another name.",
@@ -193,13 +177,6 @@ pub fn write_whole_with(
     let stage = Stage::new(path)?;
     File::create_new(stage.new_path())
         .and_then(write)
-        .map_err(|error| {
-            FileError::io(
-                path,
-                "write the file",
-                &error,
-                "Make room or choose another place.",
-            )
-        })?;
+        .map_err(|error| FileError::unwritten(path, &error))?;
     stage.commit(force)
 }

@@ -15,8 +15,6 @@ pub struct Columns {
     pub time: Option<usize>,
     /// Nanoseconds beside a time in whole seconds.
     pub nanoseconds: Option<usize>,
-    /// A column that counts rows.
-    pub counter: Option<usize>,
     pub triads: PerSensor<Option<[usize; 3]>>,
     /// Others that might be meant.
     pub others: PerSensor<Vec<[usize; 3]>>,
@@ -63,13 +61,8 @@ impl Columns {
         let of_triads = found.gyro.iter().chain(&found.accel).flatten();
         let of_triads: Vec<usize> = of_triads.copied().collect();
         // Rows of another sensor may have other times.
-        let is_sample = |row: &usize| {
-            of_triads.is_empty()
-                || of_triads
-                    .iter()
-                    .any(|&k| sheet.columns[k][*row].is_finite())
-        };
-        let rows: Vec<usize> = (0..rows_of(sheet)).filter(is_sample).collect();
+        let is_sample = |row: &usize| of_triads.is_empty() || sheet.has(&of_triads, *row);
+        let rows: Vec<usize> = (0..sheet.rows()).filter(is_sample).collect();
         let forward = |k: usize| forward(rows.iter().map(|&row| sheet.columns[k][row]));
         let split = split_time(sheet, &names);
         let time = split
@@ -91,14 +84,12 @@ impl Columns {
         }
         let is_new = |&sensor: &Sensor| *lacked.get(sensor) && !lacks(&found, sensor);
         let first = |triads: &Vec<[usize; 3]>| triads.first().copied();
-        let counts = |k: &usize| names[*k].is_counter() && forward(*k).0 >= FORWARD;
         Self {
             names: (0..names.len())
                 .map(|k| distinct(&sheet.names, k))
                 .collect(),
             time,
             nanoseconds: split.map(|pair| pair[1]),
-            counter: (0..names.len()).find(counts),
             triads: PerSensor::from_fn(|sensor| first(found.get(sensor))),
             others: PerSensor::from_fn(|sensor| {
                 found.get(sensor).iter().skip(1).copied().collect()
@@ -142,10 +133,6 @@ impl Columns {
     }
 }
 
-pub fn rows_of(sheet: &Sheet) -> usize {
-    sheet.columns.first().map_or(0, Vec::len)
-}
-
 /// The name of a column, or its number where others are called so, too, or it has none.
 fn distinct(names: &[String], column: usize) -> String {
     let like = names.iter().filter(|name| **name == names[column]);
@@ -164,11 +151,9 @@ pub fn named(sheet: &Sheet, sensor: Sensor) -> Vec<usize> {
 /// Whether gyros and accelerometers have rows of their own, as their names tell.
 pub fn have_rows_of_their_own(sheet: &Sheet) -> bool {
     let places = PerSensor::from_fn(|sensor| named(sheet, sensor));
-    let is_there =
-        |places: &[usize], row: usize| places.iter().any(|&k| sheet.columns[k][row].is_finite());
     let (mut both, mut one) = (0, 0);
-    for row in 0..rows_of(sheet) {
-        match (is_there(&places.gyro, row), is_there(&places.accel, row)) {
+    for row in 0..sheet.rows() {
+        match (sheet.has(&places.gyro, row), sheet.has(&places.accel, row)) {
             (true, true) => both += 1,
             (false, false) => {}
             _ => one += 1,
@@ -179,7 +164,7 @@ pub fn have_rows_of_their_own(sheet: &Sheet) -> bool {
 }
 
 /// Whether a column has two different numbers.
-pub fn varies(values: &[f64]) -> bool {
+fn varies(values: &[f64]) -> bool {
     let mut values = values.iter().filter(|value| value.is_finite());
     let first = values.next();
     first.is_some_and(|first| values.any(|value| value != first))
@@ -365,7 +350,7 @@ fn by_numbers(
 /// the median.
 fn magnitude(sheet: &Sheet, triad: &[usize; 3]) -> (f64, f64) {
     let at = |row: usize| Vector3::from(triad.map(|k| sheet.columns[k][row]));
-    let samples = (0..rows_of(sheet)).map(at);
+    let samples = (0..sheet.rows()).map(at);
     let samples: Vec<Vector3<f64>> = samples.filter(|sample| sample.sum().is_finite()).collect();
     let zero = offset(&samples).unwrap_or(0.0);
     let sizes = samples.iter().map(|sample| sample.add_scalar(-zero).norm());
@@ -394,6 +379,6 @@ fn quaternion(sheet: &Sheet, time: Option<usize>) -> Option<[usize; 4]> {
     let mut all = places.map(|k| [k, k + 1, k + 2, k + 3]);
     all.find(|four| {
         let fits = |&k: &usize| Some(k) != time && begin(k) == begin(four[0]);
-        four.iter().all(fits) && (0..rows_of(sheet)).all(|row| is_one(four, row))
+        four.iter().all(fits) && (0..sheet.rows()).all(|row| is_one(four, row))
     })
 }

@@ -1,6 +1,5 @@
 //! A log of another program as rows of text, with a draft for them.
 
-use std::cell::RefCell;
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::Path;
@@ -8,7 +7,7 @@ use std::path::Path;
 use super::Draft;
 use super::streams::{Streams, Written};
 use crate::formats::source::Source;
-use crate::formats::{FileError, Place, write_rows};
+use crate::formats::{FileError, write_rows};
 
 /// Of gyros, and of accelerometers in the same stream.
 const GYRO_FILE: &str = "imu.csv.gz";
@@ -26,13 +25,7 @@ impl Draft {
         let Some(streams) = streams else {
             let advice = "`turncal init` drafts a run.toml for it as it is.";
             let expected = "a log of another program";
-            return Err(FileError::new(
-                log,
-                Place::File,
-                "rows of text",
-                expected,
-                advice,
-            ));
+            return Err(FileError::of(log, "rows of text", expected, advice));
         };
         let source = |stream| Source {
             stream: Some(stream),
@@ -46,21 +39,16 @@ impl Draft {
         let accel = streams.accel.is_some().then(|| ACCEL_FILE.to_owned());
         streams.written = Some(Written { accel });
         let path = directory.join("run.toml");
-        fs::write(&path, self.to_toml(GYRO_FILE)).map_err(|error| unwritten(&path, &error))
+        fs::write(&path, self.to_toml(GYRO_FILE))
+            .map_err(|error| FileError::unwritten(&path, &error))
     }
-}
-
-fn unwritten(path: &Path, error: &io::Error) -> FileError {
-    let advice = "Make room or choose another place.";
-    FileError::io(path, "write the file", error, advice)
 }
 
 /// Every column of a stream, with all digits.
 fn rows_as_text(source: &Source, path: &Path) -> Result<(), FileError> {
-    let rows = RefCell::new(source.open()?);
-    let stopped = RefCell::new(None);
+    let mut rows = source.open()?;
+    let mut stopped = Ok(());
     let content = |file: &mut dyn Write| -> io::Result<()> {
-        let mut rows = rows.borrow_mut();
         let mut csv = csv::Writer::from_writer(file);
         csv.write_record(rows.header())?;
         let columns = rows.header().len();
@@ -69,7 +57,7 @@ fn rows_as_text(source: &Source, path: &Path) -> Result<(), FileError> {
                 Ok(true) => {}
                 Ok(false) => break,
                 Err(error) => {
-                    *stopped.borrow_mut() = Some(error);
+                    stopped = Err(error);
                     break;
                 }
             }
@@ -81,7 +69,7 @@ fn rows_as_text(source: &Source, path: &Path) -> Result<(), FileError> {
         }
         csv.flush()
     };
-    let written = File::create(path).and_then(|file| write_rows(path, file, &content));
-    written.map_err(|error| unwritten(path, &error))?;
-    stopped.into_inner().map_or(Ok(()), Err)
+    let written = File::create(path).and_then(|file| write_rows(path, file, content));
+    written.map_err(|error| FileError::unwritten(path, &error))?;
+    stopped
 }

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::motion::TOLERANCE;
 use super::name::Unit;
-use super::raw_run::{Axes, Gravity, Turns};
+use super::raw_run::{Axes, Gravity};
 use super::units::short;
 use crate::formats::unit_scale;
 use crate::imu::{Output, Sensor};
@@ -60,50 +60,40 @@ impl Scale {
         // Zeros that are not known leave room for any figure.
         let others = if is_sure { &PER_G[..] } else { &[] };
         let sheet = |figure: f64| [&[2f64.powf(figure.log2().round())], others].concat();
-        let axes = gravity.axes.times(per_second);
-        let mut found = Self::measured(&axes, "one g", sheet, [&by, &often]);
-        found.value /= STANDARD_GRAVITY;
-        found
+        let one = ("one g", STANDARD_GRAVITY);
+        Self::measured(&gravity.axes, per_second, one, sheet, [&by, &often])
     }
 
-    /// Of the gyros' axes by what they turn, of rows of this length in s or, of increments, one.
-    pub fn of_turns(turns: &Turns, row: f64, output: Output) -> Self {
-        let (sigma, moves) = (percent(turns.axes.sigma), turns.moves);
-        let by = format!(" ± {sigma} % by the turns of gravity over {moves} moves");
-        Self::by_turns(&turns.axes.times(row), output, &by)
-    }
-
-    /// Of one scale that gravity's direction shows from step to step.
-    pub fn of_steps(scale: f64, output: Output) -> Self {
-        let axes = Axes {
-            scale: Vector3::repeat(scale),
-            sigma: TOLERANCE,
-            by_axis: false,
+    /// Of the gyros' axes by what they turn, of rows of this length in s or, of increments, one; by so many moves, or of one
+    /// scale from step to step.
+    pub fn of_turns(axes: &Axes, moves: Option<usize>, row: f64, output: Output) -> Self {
+        let by = match moves {
+            Some(moves) => {
+                let sigma = percent(axes.sigma);
+                format!(" ± {sigma} % by the turns of gravity over {moves} moves")
+            }
+            None => " by the turns of gravity".to_owned(),
         };
-        Self::by_turns(&axes, output, " by the turns of gravity")
-    }
-
-    fn by_turns(axes: &Axes, output: Output, by: &str) -> Self {
         // Pulses are made as each instrument makes them.
         let sheet = |_| match output {
             Output::Rate => PER_DEGREE.to_vec(),
             Output::Pulse | Output::Increment => Vec::new(),
         };
-        let mut found = Self::measured(&axes.times(DEGREE), "1 deg/s", sheet, [by, ""]);
-        found.value /= DEGREE;
-        found
+        Self::measured(axes, row * DEGREE, ("1 deg/s", DEGREE), sheet, [&by, ""])
     }
 
     /// The figures of data sheets where they are as near as sheets allow, else those of the record.
     fn measured(
         axes: &Axes,
-        of: &str,
+        times: f64,
+        (of, one): (&str, f64),
         sheet: impl Fn(f64) -> Vec<f64>,
         [by, often]: [&str; 2],
     ) -> Self {
+        let sizes = times * axes.scale.abs();
         let sizes = match axes.by_axis {
-            true => axes.scale.abs(),
-            false => Vector3::repeat(axes.scale.abs().map(f64::ln).mean().exp()),
+            true => sizes,
+            false => Vector3::repeat(sizes.map(f64::ln).mean().exp()),
         };
         let stated = sizes.map(|size| nearest(&sheet(size), size).unwrap_or(f64::NAN));
         let is_stated = !stated.iter().any(|stated| stated.is_nan());
@@ -121,19 +111,12 @@ impl Scale {
                 true => format!("{} counts for {of}; {measured}{by}", axes.words(&stated)),
                 false => format!("for {of} {measured}{by}; {often}the data sheet knows better"),
             },
-            value: value.zip_map(&axes.scale, f64::copysign),
+            value: value.zip_map(&axes.scale, f64::copysign) / one,
         }
     }
 }
 
 impl Axes {
-    fn times(&self, factor: f64) -> Self {
-        Self {
-            scale: self.scale * factor,
-            ..*self
-        }
-    }
-
     /// One figure where all axes have the same.
     fn words(&self, figures: &Vector3<f64>) -> String {
         let [x, y, z] = <[f64; 3]>::from(*figures);

@@ -2,7 +2,7 @@
 
 use super::motion::Motion;
 use super::units::short;
-use super::{Draft, NO_COLUMNS};
+use super::{AXES_OF_PROGRAM, Draft, NO_COLUMNS};
 use crate::imu::Sensor;
 
 /// How sure something is.
@@ -40,26 +40,16 @@ pub struct Found {
     pub why: String,
 }
 
-/// What is known of one thing, how surely, and why.
-type Evidence = (String, Certainty, String);
-
 impl Draft {
     /// What was found, in the order in which it is shown.
     pub fn found(&self) -> Vec<Found> {
-        let all = [
-            ("time", self.time_found()),
-            ("gyros", self.triad_found(Sensor::Gyro)),
-            ("accels", self.triad_found(Sensor::Accel)),
-            ("axes", self.axes_found()),
-            ("place", self.place_found()),
-        ];
-        let found = all.map(|(what, (value, certainty, why))| Found {
-            what,
-            value,
-            certainty,
-            why,
-        });
-        found.into()
+        vec![
+            self.time_found(),
+            self.triad_found(Sensor::Gyro),
+            self.triad_found(Sensor::Accel),
+            self.axes_found(),
+            self.place_found(),
+        ]
     }
 
     /// The first thing that stands between the draft and a run: what the log has, what is needed, what to do.
@@ -93,36 +83,30 @@ impl Draft {
         Some([found, expected.to_owned(), advice.to_owned()])
     }
 
-    fn time_found(&self) -> Evidence {
+    fn time_found(&self) -> Found {
         let clock = &self.clock;
         let name = self.columns.time.map(|k| self.columns.names[k].as_str());
         let hertz = |rate: f64| format!("{} Hz", short(rate));
-        if let Some(rate) = self.stated.rate_hz {
-            return (hertz(rate), Certainty::Certain, "as stated".to_owned());
-        }
-        let certainty = match clock.why.starts_with("as the file") {
-            true if name.is_some() => Certainty::Certain,
-            _ => Certainty::Guess,
-        };
         let (value, certainty) = match (name, clock.period.map(f64::recip)) {
+            _ if self.stated.rate_hz.is_some() => {
+                let rate = self.stated.rate_hz.map_or(String::new(), hertz);
+                return Found::new("time", rate, Certainty::Certain, "as stated");
+            }
             (Some(name), Some(rate)) => (
                 format!("{name}, {}, {}", clock.unit, hertz(rate)),
-                certainty,
+                clock.certainty,
             ),
-            (None, Some(rate)) => (hertz(rate), certainty),
+            (None, Some(rate)) => (hertz(rate), clock.certainty),
             (_, None) => ("period of the rows".to_owned(), Certainty::Unknown),
         };
-        (value, certainty, clock.why.clone())
+        Found::new("time", value, certainty, &clock.why)
     }
 
-    fn triad_found(&self, sensor: Sensor) -> Evidence {
+    fn triad_found(&self, sensor: Sensor) -> Found {
+        let what = sensor.pick("gyros", "accels");
         let unit = self.quantities.units.get(sensor);
         let Some(triad) = self.columns.triads.get(sensor) else {
-            return (
-                "no columns".to_owned(),
-                Certainty::Unknown,
-                NO_COLUMNS.to_owned(),
-            );
+            return Found::new(what, "no columns", Certainty::Unknown, NO_COLUMNS);
         };
         let names = triad.map(|k| self.columns.names[k].as_str()).join(" ");
         let certainty = match unit.word {
@@ -138,36 +122,45 @@ impl Draft {
         if let Some(down) = self.down.filter(|_| sensor == Sensor::Accel) {
             why += &format!("; at the beginning {}", self.down_words(down));
         }
-        (value, certainty, why)
+        Found::new(what, value, certainty, why)
     }
 
-    fn axes_found(&self) -> Evidence {
+    fn axes_found(&self) -> Found {
         let of_streams = self.streams.as_ref().and_then(|streams| streams.axes);
         let (value, certainty, why) = match of_streams {
-            Some(axes) => (
-                axes,
-                Certainty::Certain,
-                "as the program that wrote the log has them",
-            ),
+            Some(axes) => (axes, Certainty::Certain, AXES_OF_PROGRAM),
             None => ("x right, y front, z up", Certainty::Guess, "please check"),
         };
-        (value.to_owned(), certainty, why.to_owned())
+        Found::new("axes", value, certainty, why)
     }
 
-    fn place_found(&self) -> Evidence {
+    fn place_found(&self) -> Found {
         let stated = &self.stated;
         let latitude = stated.latitude_deg.map(|of| format!("latitude {of}°"));
         let height = stated.height_m.map(|of| format!("height {of} m"));
         let gravity = stated.gravity_m_s2.map(|of| format!("gravity {of} m/s²"));
         let place: Vec<String> = [latitude, height, gravity].into_iter().flatten().collect();
-        let (value, certainty, why) = match place.is_empty() {
-            false => (place.join(", "), Certainty::Certain, "as stated"),
-            true => (
-                "gravity 9.806 ± 0.015 m/s²".to_owned(),
-                Certainty::Unknown,
-                "state --latitude and --height for smaller σ",
-            ),
-        };
-        (value, certainty, why.to_owned())
+        if !place.is_empty() {
+            return Found::new("place", place.join(", "), Certainty::Certain, "as stated");
+        }
+        let gravity = "gravity 9.806 ± 0.015 m/s²";
+        let why = "state --latitude and --height for smaller σ";
+        Found::new("place", gravity, Certainty::Unknown, why)
+    }
+}
+
+impl Found {
+    fn new(
+        what: &'static str,
+        value: impl Into<String>,
+        certainty: Certainty,
+        why: impl AsRef<str>,
+    ) -> Self {
+        Self {
+            what,
+            value: value.into(),
+            certainty,
+            why: why.as_ref().to_owned(),
+        }
     }
 }

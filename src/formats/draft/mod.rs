@@ -39,6 +39,7 @@ const FEWEST_ROWS: usize = 100;
 const FEWEST_AT_REST: usize = 64;
 
 const NO_COLUMNS: &str = "no names or numbers showed them";
+const AXES_OF_PROGRAM: &str = "as the program that wrote the log has them";
 
 /// What a log shows of the instrument and its record.
 #[derive(Debug, Clone, PartialEq)]
@@ -113,7 +114,7 @@ impl Draft {
 
     fn of_sheet(mut sheet: Sheet, streams: Option<Streams>, stated: &Stated) -> Self {
         sheet.rate = stated.rate_hz.or(sheet.rate);
-        let only = sheet.goes_on.then(|| columns::rows_of(&sheet));
+        let only = sheet.goes_on.then(|| sheet.rows());
         let instance = match streams {
             Some(_) => None,
             None => retain_instance(&mut sheet),
@@ -126,14 +127,10 @@ impl Draft {
             let breaks = clock.breaks(&numbers, period, FOLLOWED);
             Rows::new(triads, breaks, period)
         });
-        let whole = rows
-            .as_ref()
-            .map_or_else(Default::default, |rows| rows.whole);
         let down = rows.as_ref().and_then(Rows::points_down);
-        let motion = rows.as_ref().map(Rows::motion);
         let mut draft = Self {
             down: down.and_then(|axis| Some(columns.triads.accel?[axis])),
-            quantities: Quantities::find(&sheet, &columns, &clock, whole, motion.as_ref()),
+            quantities: Quantities::unknown(),
             streams,
             instance,
             columns,
@@ -142,38 +139,38 @@ impl Draft {
             registers: None,
             blocked: Vec::new(),
             random_walk: PerSensor::default(),
-            motion,
+            motion: None,
             only,
             stated: stated.clone(),
         };
-        draft.take_rows(rows, &sheet);
+        match rows {
+            Some(rows) => draft.take_rows(rows, &sheet),
+            None => draft.quantities.state(stated),
+        }
         if let Some(streams) = &draft.streams {
             draft.columns.names.clone_from(&streams.names);
             if let Some(time) = &streams.time {
                 draft.clock.unit.clone_from(&time.gyro.1);
                 "as the file says".clone_into(&mut draft.clock.why);
+                draft.clock.certainty = Certainty::Certain;
             }
         }
         draft
     }
 
-    /// Takes in what rows show of registers and noise.
-    fn take_rows(&mut self, rows: Option<Rows>, sheet: &Sheet) {
-        let looked = rows.zip(self.motion.take()).map(|(mut rows, motion)| {
-            let is_open = motion.angle.is_none() && motion.is_turned;
-            let motion = match self.quantities.has_counts() || is_open {
-                true => self.look_behind(&mut rows, &motion, sheet),
-                false => motion,
-            };
-            (rows, motion)
-        });
-        self.quantities.state(&self.stated);
-        if let Some((rows, motion)) = looked {
-            let random_walk = white_noise(&rows, &motion, &self.quantities, self.clock.period);
-            self.random_walk = random_walk.unwrap_or_default();
-            self.offset = rows.offset;
-            self.motion = Some(motion);
+    /// Takes in what rows show of units, registers and noise.
+    fn take_rows(&mut self, mut rows: Rows, sheet: &Sheet) {
+        let mut motion = rows.motion();
+        self.quantities = Quantities::find(sheet, &self.columns, &self.clock, rows.whole, &motion);
+        let is_open = motion.angle.is_none() && motion.is_turned;
+        if self.quantities.has_counts() || is_open {
+            motion = self.look_behind(&mut rows, &motion, sheet);
         }
+        self.quantities.state(&self.stated);
+        let random_walk = white_noise(&rows, &motion, &self.quantities, self.clock.period);
+        self.random_walk = random_walk.unwrap_or_default();
+        self.offset = rows.offset;
+        self.motion = Some(motion);
     }
 
     /// Takes in what rows show of the registers that they were read from, and says how they move then.
@@ -187,10 +184,10 @@ impl Draft {
             motion.angle = motion.angle.or(turns.angle());
         }
         let (columns, clock) = (&self.columns, &self.clock);
-        self.quantities = Quantities::find(sheet, columns, clock, rows.whole, Some(&motion));
+        self.quantities = Quantities::find(sheet, columns, clock, rows.whole, &motion);
         self.quantities.of_registers(&found, clock.period);
         if self.quantities.has_counts() {
-            self.blocked = rows.unfit(columns, sheet, &found);
+            self.blocked = rows.unfit();
             self.registers = Some(found);
         }
         motion
@@ -218,7 +215,7 @@ pub(super) fn turned_angle(triads: PerSensor<Vec<Vector3<f64>>>, period: f64) ->
 /// Keeps the rows of one of several instruments, and says by which column and number.
 fn retain_instance(sheet: &mut Sheet) -> Option<(usize, f64)> {
     let (column, number) = columns::instance(sheet)?;
-    sheet.retain(|columns, row| columns[column][row] == number);
+    sheet.retain(|of, row| of.columns[column][row] == number);
     Some((column, number))
 }
 
@@ -230,11 +227,11 @@ fn retain_samples(sheet: &mut Sheet, columns: &Columns) {
     let Some(time) = columns.time.filter(|_| !of_triads.is_empty()) else {
         return;
     };
-    sheet.retain(|columns, row| of_triads.iter().any(|&k| columns[k][row].is_finite()));
+    sheet.retain(|of, row| of.has(&of_triads, row));
     // A row that is there twice is one sample.
     let of_samples = [&of_triads[..], &[time]].concat();
-    sheet.retain(|columns, row| {
-        let is_new = |&k: &usize| columns[k][row] != columns[k][row - 1];
+    sheet.retain(|of, row| {
+        let is_new = |&k: &usize| of.columns[k][row] != of.columns[k][row - 1];
         row == 0 || of_samples.iter().any(is_new)
     });
 }

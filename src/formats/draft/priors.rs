@@ -4,9 +4,10 @@
 use nalgebra::Vector3;
 
 use super::Draft;
-use super::text::{Page, seven};
+use super::text::seven;
 use super::units::short;
 use crate::formats::instrument::{USUAL_BIAS, USUAL_INSTALLATION, USUAL_SCALE};
+use crate::formats::schema::page::Page;
 use crate::imu::Sensor;
 use crate::units::{ARCSEC, DEG_PER_SQRT_H, DEGREE, MICRO_G_PER_SQRT_HZ, PPM};
 
@@ -82,12 +83,10 @@ impl Draft {
     }
 
     fn open_scale(&self, sensor: Sensor) -> String {
-        let plain = match sensor {
-            Sensor::Gyro => {
-                "counts for one rad/s by the data sheet: 57.29578 times those for 1 deg/s, often 131, 65.5, 32.8, 16.4"
-            }
-            Sensor::Accel => "counts for one m/s² by the data sheet: those for one g over 9.80665",
-        };
+        let plain = sensor.pick(
+            "counts for one rad/s by the data sheet: 57.29578 times those for 1 deg/s, often 131, 65.5, 32.8, 16.4",
+            "counts for one m/s² by the data sheet: those for one g over 9.80665",
+        );
         let why = match &self.registers {
             Some(found) if !found.has_rests => "; nothing is at rest, so nothing shows it",
             Some(_) if sensor == Sensor::Accel => "; gravity at rest does not show it",
@@ -102,10 +101,7 @@ impl Draft {
     fn bias(&self, page: &mut Page, sensor: Sensor, class: &Class) {
         let offset = *self.offset.get(sensor);
         let per_second = self.quantities.per_second(self.clock.period.unwrap_or(1.0));
-        let usual = match sensor {
-            Sensor::Gyro => class.gyro_bias,
-            Sensor::Accel => class.accel_bias,
-        };
+        let usual = sensor.pick(class.gyro_bias, class.accel_bias);
         let usual = self
             .quantities
             .scale(sensor)

@@ -290,21 +290,6 @@ impl RawRun {
             moves: dwells.len().saturating_sub(1),
         })
     }
-
-    /// The same rows with the columns of its triads exchanged.
-    pub fn exchanged(&self) -> Self {
-        let mut of = self.clone();
-        std::mem::swap(&mut of.rows.gyro, &mut of.rows.accel);
-        let size = |rows: &[Vector3<f64>]| {
-            let mut sizes: Vec<f64> = rows.iter().map(Vector3::norm).collect();
-            median(&mut sizes).unwrap_or(1.0)
-        };
-        of.guess.unit = PerSensor {
-            gyro: size(&of.rows.gyro).recip(),
-            accel: STANDARD_GRAVITY / size(&of.rows.accel),
-        };
-        of
-    }
 }
 
 impl Axes {

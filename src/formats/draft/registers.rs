@@ -2,17 +2,14 @@
 
 use nalgebra::Vector3;
 
-use super::columns::{Columns, varies};
+use super::columns::Columns;
 use super::motion::{Motion, WINDOW, is_whole, mean};
 use super::raw_run::{Gravity, RawRun, Turns};
 use super::units::offset;
-use crate::formats::Sheet;
 use crate::imu::{PerSensor, Sensor};
 
 /// Codes of a register of 16 bits.
 const CODES: f64 = 65_536.0;
-/// So many rests at least tell an accelerometer that is turned from a gyro.
-const FEWEST: usize = 4;
 
 /// Rows of both triads above what registers are made to say at zero.
 pub struct Rows {
@@ -64,28 +61,18 @@ impl Rows {
     }
 
     /// Why columns of counts cannot be taken as they are.
-    pub fn unfit(&self, columns: &Columns, sheet: &Sheet, found: &Registers) -> Vec<String> {
+    pub fn unfit(&self) -> Vec<String> {
         let wrapped = Sensor::ALL
             .into_iter()
             .filter(|&sensor| *self.wrapped.get(sensor));
-        let mut why: Vec<String> = wrapped
-            .map(|sensor| {
-                format!(
-                    "signed numbers of 16 bits are written as unsigned ones in those of {}: take 65536 from what is \
-                     32768 or more, and draft again",
-                    sensor.name()
-                )
-            })
-            .collect();
-        why.extend(constant(columns, sheet).map(|column| {
-            let name = &columns.names[column];
-            format!("{name:?} says the same in all rows, so that no axis is read there")
-        }));
-        why.extend(found.swapped.then(|| {
-            "gravity is in those of gyro, and those of accel are the same at every rest: their names are swapped"
-                .to_owned()
-        }));
-        why
+        let why = |sensor: Sensor| {
+            format!(
+                "signed numbers of 16 bits are written as unsigned ones in those of {}: take 65536 from what is 32768 \
+                 or more, and draft again",
+                sensor.name()
+            )
+        };
+        wrapped.map(why).collect()
     }
 }
 
@@ -95,27 +82,22 @@ pub struct Registers {
     pub has_rests: bool,
     pub gravity: Option<Gravity>,
     pub turns: Option<Turns>,
-    /// Whether what is called gyro is at rest where gravity is, and the other way round.
-    pub swapped: bool,
 }
 
 impl Registers {
     /// Of rows with what they show of their motion.
     pub fn find(rows: &Rows, motion: &Motion) -> Self {
         let found = |mut raw: RawRun| {
-            let (rests, exchanged) = (raw.rests(), raw.exchanged().rests());
-            let swapped = exchanged >= FEWEST && exchanged > 2 * rests;
-            let gravity = raw.gravity().filter(|_| !swapped);
+            let (has_rests, gravity) = (raw.rests() > 0, raw.gravity());
             Self {
-                has_rests: rests > 0,
+                has_rests,
                 turns: gravity.as_ref().and_then(|_| raw.turns()),
                 gravity,
-                swapped,
             }
         };
         let whole = found(RawRun::new(rows, &rows.breaks, motion));
         // Where gyros carry gravity from rest to rest no sections were laid end to end.
-        if whole.swapped || whole.turns.is_some() || motion.cuts.is_empty() {
+        if whole.turns.is_some() || motion.cuts.is_empty() {
             return whole;
         }
         let breaks = [&rows.breaks[..], &motion.cuts].concat();
@@ -168,14 +150,4 @@ fn unwrap(samples: &mut [Vector3<f64>]) -> bool {
             .for_each(|sample| *sample = signed(sample));
     }
     wrapped
-}
-
-/// A column of a triad that says the same in all rows, though another of its triad does not.
-fn constant(columns: &Columns, sheet: &Sheet) -> Option<usize> {
-    let says_the_same = |k: &usize| !varies(&sheet.columns[*k]);
-    Sensor::ALL.iter().find_map(|&sensor| {
-        let triad = (*columns.triads.get(sensor))?;
-        let constant = triad.into_iter().find(says_the_same)?;
-        (!triad.iter().all(says_the_same)).then_some(constant)
-    })
 }

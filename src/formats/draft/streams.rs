@@ -5,16 +5,17 @@ use std::path::{Path, PathBuf};
 use super::FEWEST_ROWS;
 use super::columns::{self, Columns, by_stem};
 use super::name::Name;
-use super::text::{Page, quoted, word_or_number};
+use super::text::{quoted, word_or_number};
 use super::time;
 use crate::formats::clock::{Breaks, Clock, TimeUnit};
 use crate::formats::csv_file::CsvFile;
 use crate::formats::error::list;
 use crate::formats::joined::{Joined, Part};
 use crate::formats::rows::LogRows;
+use crate::formats::schema::page::Page;
 use crate::formats::source::Source;
 use crate::formats::streams::{self, Column, Found, Stream};
-use crate::formats::{FileError, Place, Sheet};
+use crate::formats::{FileError, Sheet};
 use crate::imu::{Output, PerSensor, Sensor};
 
 /// The streams that hold gyros and accelerometers.
@@ -81,13 +82,7 @@ impl Streams {
         let Some((gyro, accel)) = chosen(&members, wanted) else {
             let advice = "Record the file again.";
             let expected = "streams of samples";
-            return Err(FileError::new(
-                file,
-                Place::File,
-                "no samples",
-                expected,
-                advice,
-            ));
+            return Err(FileError::of(file, "no samples", expected, advice));
         };
         let salvage = damage.is_some();
         let gyro = &members[gyro];
@@ -184,7 +179,7 @@ impl Streams {
     pub fn write(&self, page: &mut Page) {
         if self.written.is_none() {
             self.listed.iter().for_each(|line| page.remark(line));
-            page.plain("stream", quoted(&self.gyro));
+            page.field("stream", self.gyro.as_str());
         }
         if let Some((accel, time)) = self.accel.as_ref().zip(self.time.as_ref()) {
             let (time, unit) = &time.accel;
@@ -237,7 +232,7 @@ impl Member {
         let mut sheet = Sheet::read(file, FEWEST_ROWS)?;
         let of_sensor = columns::named(&sheet, sensor);
         if !of_sensor.is_empty() {
-            sheet.retain(|columns, row| of_sensor.iter().any(|&k| columns[k][row].is_finite()));
+            sheet.retain(|of, row| of.has(&of_sensor, row));
         }
         let mut columns = Columns::find(&sheet);
         let unit = time::Clock::find(&sheet, &mut columns).unit;
@@ -271,15 +266,15 @@ impl Member {
         let columns = list(columns.map(|column| &*column.name));
         let found = format_args!("the columns {columns}");
         let advice = "Rename the columns or the file, or complete the fields by hand.";
-        FileError::new(&self.file, Place::File, found, expected, advice)
+        FileError::of(&self.file, found, expected, advice)
     }
 
     /// The names of a triad's columns.
     fn triad(&self, sensor: Sensor) -> Result<[&str; 3], FileError> {
-        let expected = match sensor {
-            Sensor::Gyro => "three columns of the gyros",
-            Sensor::Accel => "three columns of the accelerometers",
-        };
+        let expected = sensor.pick(
+            "three columns of the gyros",
+            "three columns of the accelerometers",
+        );
         let triad = self
             .triads
             .get(sensor)
@@ -426,6 +421,6 @@ fn rows_as_stream(name: &str, sheet: &Sheet) -> Found {
             is_inertial: true,
             ..Stream::default()
         },
-        samples: sheet.columns.first().map_or(0, Vec::len) as u64,
+        samples: sheet.rows() as u64,
     }
 }

@@ -1,56 +1,12 @@
 //! The draft as TOML: its lines, each with the reason, and what they leave open.
 
-use std::fmt::Display;
-
 use super::name::axes_of_program;
 use super::units::short;
-use super::{Draft, NO_COLUMNS};
+use super::{AXES_OF_PROGRAM, Draft, NO_COLUMNS};
+use crate::formats::quantity::output_word;
+use crate::formats::schema::FORMAT;
+use crate::formats::schema::page::Page;
 use crate::imu::{Noise, NoiseKeys, Output, Sensor};
-
-/// Lines of a `run.toml`.
-#[derive(Debug, Default)]
-pub struct Page {
-    pub text: String,
-    /// The fields that a person must complete, each with the reason.
-    pub open: Vec<(String, String)>,
-}
-
-impl Page {
-    /// The header of a table below a remark.
-    pub fn table(&mut self, name: &str, remark: &str) {
-        self.text.push('\n');
-        if !remark.is_empty() {
-            self.remark(remark);
-        }
-        self.text += &format!("[{name}]\n");
-    }
-
-    pub fn line(&mut self, key: &str, value: impl Display, why: impl Display) {
-        self.text += &format!("{key} = {value}  # {why}\n");
-    }
-
-    /// A field that needs no reason.
-    pub fn plain(&mut self, key: &str, value: impl Display) {
-        self.text += &format!("{key} = {value}\n");
-    }
-
-    /// A field that may be left out.
-    pub fn optional(&mut self, key: &str, why: &str) {
-        self.remark(format_args!("{key} =  # {why}"));
-    }
-
-    /// A field, as far as it is known, that must be completed.
-    pub fn open(&mut self, field: &str, why: impl Display) {
-        let gap = if field.is_empty() { "" } else { "  # " };
-        self.remark(format_args!("{field}{gap}TODO: {why}"));
-        let key = field.split('=').next().unwrap_or_default().trim();
-        self.open.push((key.to_owned(), why.to_string()));
-    }
-
-    pub fn remark(&mut self, remark: impl Display) {
-        self.text += &format!("# {remark}\n");
-    }
-}
 
 impl Draft {
     /// The draft as a `run.toml` in which the log is named so. Lines with `TODO` must be completed before it
@@ -60,19 +16,18 @@ impl Draft {
     }
 
     pub(super) fn page(&self, file: &str) -> Page {
-        let mut page = Page::default();
         let of_it = match self.only {
             Some(rows) => format!("the first {rows} rows of the log"),
             None => "the log alone".to_owned(),
         };
-        page.remark(format_args!(
+        let remark = format!(
             "Made from {of_it}. Check what is guessed and complete what is open; `turncal check` then says what the run \
              holds."
-        ));
-        page.plain("format", quoted("turncal-run/1"));
+        );
+        let mut page = Page::of(FORMAT, &remark);
         self.site(&mut page);
         page.table("imu", "");
-        page.plain("file", quoted(file));
+        page.field("file", file);
         if let Some(streams) = &self.streams {
             streams.write(&mut page);
         }
@@ -121,12 +76,8 @@ impl Draft {
 
     fn output_and_units(&self, page: &mut Page) {
         let found = &self.quantities;
-        let output = match found.output {
-            Output::Pulse => "pulse",
-            Output::Increment => "increment",
-            Output::Rate => "rate",
-        };
-        page.line("output", quoted(output), &found.output_why);
+        let output = quoted(output_word(found.output));
+        page.line("output", output, &found.output_why);
         for sensor in self.present() {
             let (key, unit) = (format!("{}_unit", sensor.name()), found.units.get(sensor));
             match unit.word {
@@ -194,11 +145,7 @@ impl Draft {
 
     fn body_axes(&self, page: &mut Page) {
         if let Some(axes) = self.streams.as_ref().and_then(|streams| streams.axes) {
-            page.line(
-                "body_axes",
-                quoted(axes),
-                "as the program that wrote the log has them",
-            );
+            page.line("body_axes", quoted(axes), AXES_OF_PROGRAM);
             return;
         }
         let mut why = "guessed: x right, y front, z up; else \"frd\" or \"flu\"".to_owned();

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::Certainty;
 use super::columns::Columns;
 use super::name::Name;
 use super::text::seven;
@@ -20,8 +21,9 @@ const STATED: f64 = 1.2;
 pub struct Clock {
     /// The word or number for `time_unit`.
     pub unit: String,
-    /// Why it is that.
+    /// Why it is that, and how sure.
     pub why: String,
+    pub certainty: Certainty,
     /// Time from row to row in s, if something tells it.
     pub period: Option<f64>,
     /// Whether that is what the file states, which its times do not tell.
@@ -77,6 +79,10 @@ impl Clock {
                 Some((word, _)) => word.to_owned(),
                 None => format!("{:?}", seven(second)),
             }),
+            certainty: match named {
+                Some(_) if columns.nanoseconds.is_none() => Certainty::Certain,
+                _ => Certainty::Guess,
+            },
             why,
             period: second.map(|second| steps.mean * second).or(stated),
             is_stated: second.is_none() && stated.is_some(),
@@ -96,6 +102,7 @@ impl Clock {
         Self {
             unit: "s".to_owned(),
             why: why.to_owned(),
+            certainty: Certainty::Guess,
             period,
             is_stated: period.is_some(),
             gaps: Vec::new(),

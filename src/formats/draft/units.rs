@@ -4,8 +4,9 @@ use nalgebra::Vector3;
 
 use super::columns::Columns;
 use super::data_sheet::{Scale, likely_for_g};
-use super::motion::Motion;
+use super::motion::{Motion, TOLERANCE};
 use super::name::{self, Name};
+use super::raw_run::Axes;
 use super::registers::Registers;
 use super::stated::{Stated, StatedUnit};
 use super::time::{Clock, PERIODS};
@@ -34,6 +35,15 @@ pub struct Unit {
     pub scale: Option<Scale>,
     /// … and what is likely where nothing does.
     pub likely: Option<String>,
+}
+
+impl Unit {
+    fn open(why: &str) -> Self {
+        Self {
+            why: why.to_owned(),
+            ..Self::default()
+        }
+    }
 }
 
 /// What rows hold.
@@ -120,25 +130,24 @@ struct Rows<'a> {
 }
 
 impl Quantities {
+    /// Where too few rows hold numbers to show anything.
+    pub fn unknown() -> Self {
+        Self {
+            output: Output::Rate,
+            output_why: "as most logs have it".to_owned(),
+            units: PerSensor::from_fn(|_| Unit::open("too few rows hold numbers to show it")),
+            opposed: false,
+        }
+    }
+
     pub fn find(
         sheet: &Sheet,
         columns: &Columns,
         clock: &Clock,
         whole: PerSensor<bool>,
-        motion: Option<&Motion>,
+        motion: &Motion,
     ) -> Self {
-        let mut found = Self {
-            output: Output::Rate,
-            output_why: "as most logs have it".to_owned(),
-            units: PerSensor::from_fn(|_| Unit {
-                why: "too few rows hold numbers to show it".to_owned(),
-                ..Unit::default()
-            }),
-            opposed: false,
-        };
-        let Some(motion) = motion else {
-            return found;
-        };
+        let mut found = Self::unknown();
         found.opposed = motion.angle.is_some_and(|angle| angle < 0.0);
         // The accelerometers tell what rows hold.
         for sensor in [Sensor::Accel, Sensor::Gyro] {
@@ -201,9 +210,8 @@ impl Quantities {
         }
         Unit {
             word: Some(chosen.word),
-            why,
             is_shown: chosen.fits(),
-            ..Unit::default()
+            ..Unit::open(&why)
         }
     }
 
@@ -248,25 +256,21 @@ impl Quantities {
     ) -> Unit {
         let angle = rows.motion.angle.map(f64::abs);
         let row = self.row(rows.period);
-        let open = |why: &str| Unit {
-            why: why.to_owned(),
-            ..Unit::default()
-        };
         let is_bare = !rows.whole && rows.named.is_none();
         match angle {
             // Without a clock each unit needs a period of its own.
             Some(angle) if !row.is_finite() && is_bare => {
                 let Some((word, period)) = usual_period(all, angle) else {
-                    return open("with no time from row to row turns do not show it");
+                    return Unit::open("with no time from row to row turns do not show it");
                 };
                 let rate = short(period.recip());
                 return Unit {
                     word: Some(word),
-                    ..open(&format!("gravity turns as far at about {rate} Hz"))
+                    ..Unit::open(&format!("gravity turns as far at about {rate} Hz"))
                 };
             }
             None if is_bare && self.output != Output::Pulse => {
-                return open(match rows.motion.is_turned {
+                return Unit::open(match rows.motion.is_turned {
                     true => "gravity turns too seldom or too roughly to show it",
                     false => "gravity does not turn, so nothing shows it",
                 });
@@ -287,8 +291,15 @@ impl Quantities {
         Unit {
             word: Some("count"),
             is_shown: measured.is_some(),
-            scale: measured.map(|value| Scale::of_steps(value, self.output)),
-            ..open(&why)
+            scale: measured.map(|value| {
+                let axes = Axes {
+                    scale: Vector3::repeat(value),
+                    sigma: TOLERANCE,
+                    by_axis: false,
+                };
+                Scale::of_turns(&axes, None, 1.0, self.output)
+            }),
+            ..Unit::open(&why)
         }
     }
 
@@ -340,7 +351,12 @@ impl Quantities {
                 gyro.word = Some("count");
                 gyro.why = "no known unit fits the turns of gravity".to_owned();
             }
-            gyro.scale = Some(Scale::of_turns(turns, row, self.output));
+            gyro.scale = Some(Scale::of_turns(
+                &turns.axes,
+                Some(turns.moves),
+                row,
+                self.output,
+            ));
             self.opposed = false;
         }
     }

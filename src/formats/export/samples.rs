@@ -60,6 +60,6 @@ pub fn write_samples(
     force: bool,
 ) -> Result<(), FileError> {
     write_whole_with(path, force, |file| {
-        write_rows(path, file, &|rows| sample_rows(rows, correction, run, fill))
+        write_rows(path, file, |rows| sample_rows(rows, correction, run, fill))
     })
 }

@@ -6,7 +6,6 @@ use super::document::{Document, yaml_list};
 use crate::calibration::result::Calibration;
 use crate::calibration::result::{EQUATION, Method};
 use crate::calibration::{Correction, CorrectionError};
-use crate::formats::axes::BodyAxes;
 use crate::formats::unit_scale;
 use crate::imu::{AxisOrder, PerSensor, Sensor, Term};
 use crate::run::Aiding;
@@ -175,7 +174,7 @@ pub struct Axes {
 impl Axes {
     /// Along front, right, down, as autopilots have it.
     pub fn front_right_down(source: &Source) -> Self {
-        Self::new(source, BodyAxes::Frd.order())
+        Self::new(source, AxisOrder::FRONT_RIGHT_DOWN)
     }
 
     /// Along right, front, up.
@@ -217,11 +216,10 @@ impl Axes {
 
     /// The axes in words.
     fn words(&self) -> &'static str {
-        let of = |axes: BodyAxes| axes.order() == self.order;
-        match (of(BodyAxes::Rfu), of(BodyAxes::Frd), of(BodyAxes::Flu)) {
-            (true, ..) => "right, front, up",
-            (_, true, _) => "front, right, down",
-            (_, _, true) => "front, left, up",
+        match self.order {
+            AxisOrder::IDENTITY => "right, front, up",
+            AxisOrder::FRONT_RIGHT_DOWN => "front, right, down",
+            AxisOrder::FRONT_LEFT_UP => "front, left, up",
             _ => "the axes of the log",
         }
     }

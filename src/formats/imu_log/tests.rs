@@ -59,7 +59,7 @@ fn of_file(file: &std::path::Path) -> ImuLog<'static> {
         },
         temperature: None,
         output: Output::Increment,
-        axes: BodyAxes::Frd,
+        axes: AxisOrder::FRONT_RIGHT_DOWN,
         stamp: TimeStamp::End,
         continuous: true,
         nominal: PerSensor::from_fn(|_| Nominal(Vector3::new(1.0, 2.0, 1.0))),

@@ -179,9 +179,8 @@ fn apart(file: &Path, gyro: &Track, accel: &Track) -> FileError {
         let (first, period) = (track.clock.first, track.clock.period);
         format!("{first} s to {} s", first + last * period)
     };
-    FileError::new(
+    FileError::of(
         file,
-        Place::File,
         format_args!("accelerometers from {}", of(accel)),
         format_args!("times that overlap the gyros', {}", of(gyro)),
         "Bring both streams to one clock, or correct time_unit.",

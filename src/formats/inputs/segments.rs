@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::source::Source;
 use crate::formats::error::FileError;
-use crate::formats::schema::axes::BodyAxes;
+use crate::imu::AxisOrder;
 use crate::recording::{ImuSamples, LabelledMotion, Segment};
 use crate::units::DEGREE;
 
@@ -16,7 +16,7 @@ pub fn read(
     file: &Path,
     imu: &ImuSamples,
     lag: f64,
-    axes: BodyAxes,
+    axes: AxisOrder,
     notes: &mut Vec<String>,
 ) -> Result<Vec<Segment>, FileError> {
     let mut csv = Source::of_file(file).open()?;
@@ -35,29 +35,21 @@ pub fn read(
     while csv.advance()? {
         let start = csv.number(start_column)?;
         let end = csv.number(end_column)?;
+        let wrong = |found: &str, expected: String| {
+            let found = format_args!("{found} from {start} s to {end} s");
+            Err(csv.error_here(found, expected, "Correct or remove the row."))
+        };
         if end <= start {
-            return Err(csv.error_here(
-                format_args!("a segment from {start} s to {end} s"),
-                "an end after the start",
-                "Correct the row.",
-            ));
+            return wrong("a segment", "an end after the start".to_owned());
         }
-        if start < record.0 - slack || end > record.1 + slack {
-            return Err(csv.error_here(
-                format_args!("a segment from {start} s to {end} s"),
-                format_args!(
-                    "times inside the IMU record, {} s to {} s",
-                    record.0, record.1
-                ),
-                "Correct the row.",
-            ));
+        let (first, last) = record;
+        if start < first - slack || end > last + slack {
+            let expected = format!("times inside the IMU record, {first} s to {last} s");
+            return wrong("a segment", expected);
         }
         if row(start) == row(end) {
-            return Err(csv.error_here(
-                format_args!("no sample from {start} s to {end} s"),
-                format_args!("a segment of several samples of {} s", imu.period),
-                "Correct or remove the row.",
-            ));
+            let expected = format!("a segment of several samples of {} s", imu.period);
+            return wrong("no sample", expected);
         }
         let label = csv.text(label_column)?.into_owned();
         segments.push(Segment {
@@ -77,10 +69,10 @@ pub fn read(
 }
 
 /// What a label says, its axes being those of the file.
-fn motion_of(label: &str, axes: BodyAxes) -> Option<LabelledMotion> {
+fn motion_of(label: &str, axes: AxisOrder) -> Option<LabelledMotion> {
     let axis = |name: &str| {
         let index = ["x", "y", "z"].into_iter().position(|axis| axis == name)?;
-        Some(axes.vector(Vector3::ith(index, 1.0)))
+        Some(axes.apply(&Vector3::ith(index, 1.0)))
     };
     if let Some(turn) = label.strip_prefix("rot_") {
         let (name, angle) = turn.split_at_checked(1)?;
@@ -106,7 +98,7 @@ mod tests {
 
     #[test]
     fn labels_name_axes_of_the_file() {
-        let frd = BodyAxes::WORDS[1].1;
+        let frd = AxisOrder::FRONT_RIGHT_DOWN;
         let of = |label| motion_of(label, frd);
         let up = |up| Some(LabelledMotion::Stands { up });
         assert_eq!(of("x_up"), up(Vector3::y()));

@@ -6,7 +6,8 @@ use crate::formats::clock::{Breaks, Clock, TimeUnit};
 use crate::formats::csv_file::CsvFile;
 use crate::formats::error::FileError;
 use crate::formats::rows::LogRows;
-use crate::formats::schema::{Document, ImuFile, Positive, TimeColumn};
+use crate::formats::schema::instrument::Fields;
+use crate::formats::schema::{Positive, TimeColumn};
 use crate::formats::streams::{self, StreamRows};
 
 /// Where rows come from.
@@ -39,82 +40,83 @@ impl Source<'_> {
     }
 }
 
-impl<'a> Source<'a> {
+impl<'a> Fields<'a> {
     /// What a table says of its file.
-    pub fn of_fields(
-        directory: &Path,
+    pub fn source(
+        &self,
         file: &str,
         stream: &'a Option<String>,
         salvage: Option<bool>,
-    ) -> Self {
-        Self {
-            file: directory.join(file),
+    ) -> Source<'a> {
+        Source {
+            file: self.directory.join(file),
             stream: stream.as_deref(),
             salvage: salvage.unwrap_or(false),
         }
     }
-}
 
-/// The clock that a table says of its rows.
-pub fn clock<'a>(
-    document: Document,
-    table: &str,
-    column: Option<&'a TimeColumn>,
-    (unit, period): (Option<TimeUnit>, Option<Positive>),
-) -> Result<Clock<'a>, FileError> {
-    if unit == Some(TimeUnit::Count) && period.is_none() {
-        return Err(document.missing(&format!("{table}.sample_period_s"), "what a count lasts"));
-    }
-    let seconds = TimeUnit::PerSecond(1.0);
-    let (column, nanoseconds) = match column {
-        None => (None, None),
-        Some(TimeColumn::One(column)) => (Some(column.as_str()), None),
-        Some(TimeColumn::SecondsAndNanoseconds([seconds, rest])) => {
-            (Some(seconds.as_str()), Some(rest.as_str()))
+    /// The clock that a table says of its rows.
+    pub fn clock(
+        &self,
+        table: &str,
+        column: Option<&'a TimeColumn>,
+        (unit, period): (Option<TimeUnit>, Option<Positive>),
+    ) -> Result<Clock<'a>, FileError> {
+        if unit == Some(TimeUnit::Count) && period.is_none() {
+            let path = format!("{table}.sample_period_s");
+            return Err(self.document.missing(&path, "what a count lasts"));
         }
-    };
-    if nanoseconds.is_some() && unit.is_some_and(|unit| unit != seconds) {
-        let path = format!("{table}.time_unit");
-        return Err(document.wrong(&path, "`s`", "Choose it, or leave it out."));
+        let seconds = TimeUnit::PerSecond(1.0);
+        let (column, nanoseconds) = match column {
+            None => (None, None),
+            Some(TimeColumn::One(column)) => (Some(column.as_str()), None),
+            Some(TimeColumn::SecondsAndNanoseconds([seconds, rest])) => {
+                (Some(seconds.as_str()), Some(rest.as_str()))
+            }
+        };
+        if nanoseconds.is_some() && unit.is_some_and(|unit| unit != seconds) {
+            let path = format!("{table}.time_unit");
+            let advice = "Choose it, or leave it out.";
+            return Err(self.document.wrong(&path, "`s`", advice));
+        }
+        Ok(Clock {
+            column,
+            nanoseconds,
+            unit: unit.unwrap_or(seconds),
+            period: period.map(|period| period.0),
+            breaks: Breaks::None,
+        })
     }
-    Ok(Clock {
-        column,
-        nanoseconds,
-        unit: unit.unwrap_or(seconds),
-        period: period.map(|period| period.0),
-        breaks: Breaks::None,
-    })
-}
 
-/// Where the accelerometers are, if not in the rows of the gyros, and their clock.
-pub fn accel_from<'a>(
-    document: Document,
-    imu: &'a ImuFile,
-    directory: &Path,
-    gyro: &Source<'a>,
-    of_gyro: Clock<'a>,
-) -> Result<Option<(Source<'a>, Clock<'a>)>, FileError> {
-    let Some(fields) = &imu.accel_from else {
-        return Ok(None);
-    };
-    let source = Source {
-        file: (fields.file.as_ref()).map_or_else(|| gyro.file.clone(), |file| directory.join(file)),
-        stream: fields.stream.as_deref().or(gyro.stream),
-        salvage: fields.salvage.unwrap_or(gyro.salvage),
-    };
-    let stated = (fields.time_unit, fields.sample_period_s);
-    let mut clock = clock(document, "imu.accel_from", fields.time.as_ref(), stated)?;
-    if clock.column.is_none() {
-        (clock.column, clock.nanoseconds) = (of_gyro.column, of_gyro.nanoseconds);
-    }
-    if fields.time_unit.is_none() {
-        clock.unit = of_gyro.unit;
-    }
-    match clock.column {
-        Some(_) => Ok(Some((source, clock))),
-        None => Err(document.missing(
-            "imu.accel_from.time",
-            "the column of its time, for two streams need both",
-        )),
+    /// Where the accelerometers are, if not in the rows of the gyros, and their clock.
+    pub fn accel_from(
+        &self,
+        gyro: &Source<'a>,
+        of_gyro: Clock<'a>,
+    ) -> Result<Option<(Source<'a>, Clock<'a>)>, FileError> {
+        let Some(fields) = &self.run.imu.accel_from else {
+            return Ok(None);
+        };
+        let file = fields.file.as_ref();
+        let source = Source {
+            file: file.map_or_else(|| gyro.file.clone(), |file| self.directory.join(file)),
+            stream: fields.stream.as_deref().or(gyro.stream),
+            salvage: fields.salvage.unwrap_or(gyro.salvage),
+        };
+        let stated = (fields.time_unit, fields.sample_period_s);
+        let mut clock = self.clock("imu.accel_from", fields.time.as_ref(), stated)?;
+        if clock.column.is_none() {
+            (clock.column, clock.nanoseconds) = (of_gyro.column, of_gyro.nanoseconds);
+        }
+        if fields.time_unit.is_none() {
+            clock.unit = of_gyro.unit;
+        }
+        match clock.column {
+            Some(_) => Ok(Some((source, clock))),
+            None => Err(self.document.missing(
+                "imu.accel_from.time",
+                "the column of its time, for two streams need both",
+            )),
+        }
     }
 }

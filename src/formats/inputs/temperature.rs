@@ -2,7 +2,7 @@
 
 use crate::formats::error::FileError;
 use crate::formats::rows::LogRows;
-use crate::formats::schema::{TemperatureColumn, ThreeColumns};
+use crate::formats::schema::{OneOrThree, TemperatureColumn};
 use crate::imu::PerSensor;
 use crate::recording::{TEMPERATURE_SPACING, Temperature, TemperatureFacts};
 
@@ -62,10 +62,10 @@ impl<'a> TemperatureColumns<'a> {
         all
     }
 
-    fn places(&mut self, columns: &'a ThreeColumns) -> [usize; 3] {
+    fn places(&mut self, columns: &'a OneOrThree<String>) -> [usize; 3] {
         let names = match columns {
-            ThreeColumns::One(name) => [name; 3],
-            ThreeColumns::Three(names) => names.each_ref(),
+            OneOrThree::One(name) => [name; 3],
+            OneOrThree::Three(names) => names.each_ref(),
         };
         names.map(|name| {
             let known = self.names.iter().position(|known| known == name);
@@ -88,13 +88,15 @@ impl<'a> TemperatureColumns<'a> {
 
     /// Ready to read a file.
     pub fn start(&self, csv: &mut LogRows) -> Result<Temperatures, FileError> {
-        let places = self.names.iter().map(|name| csv.column(name));
-        let names = self.names.iter().map(|name| (*name).to_owned());
+        let channels = self.names.iter().map(|&name| {
+            Ok(Channel {
+                place: csv.column(name)?,
+                name: name.to_owned(),
+                ..Channel::default()
+            })
+        });
         Ok(Temperatures {
-            channels: places
-                .zip(names)
-                .map(|(place, name)| Ok(Channel::new(place?, name)))
-                .collect::<Result<_, FileError>>()?,
+            channels: channels.collect::<Result<_, FileError>>()?,
             of: self.of,
             unit: self.unit,
             first: None,
@@ -111,15 +113,14 @@ pub struct Temperatures {
     first: Option<f64>,
 }
 
+#[derive(Default)]
 struct Channel {
     place: usize,
     name: String,
     /// Sum and number of values in each span.
     spans: Vec<(f64, u32)>,
-    smallest: f64,
-    largest: f64,
-    sum: f64,
-    count: usize,
+    /// Of all values, the sum in place of the mean.
+    facts: Option<TemperatureFacts>,
     /// Rows without a number, and the line of the first.
     missing: (usize, u64),
     /// The first value that is no temperature, as it stands, and its line.
@@ -150,18 +151,14 @@ impl Temperatures {
     /// What was read, of a file whose stamps are so much later than its first sample's begin, s.
     pub fn read(self, file: &str) -> Read {
         let facts = self.channels.first().and_then(|channel| {
-            (channel.count > 0).then(|| TemperatureFacts {
-                smallest: channel.smallest,
-                mean: channel.sum / channel.count as f64,
-                largest: channel.largest,
-            })
+            let count: f64 = channel.spans.iter().map(|of| f64::from(of.1)).sum();
+            let sums = channel.facts?;
+            let mean = sums.mean / count;
+            Some(TemperatureFacts { mean, ..sums })
         });
-        let notes: Vec<String> = self
-            .channels
-            .iter()
-            .flat_map(|channel| channel.notes(file))
-            .collect();
-        let sound = |channel: &Channel| channel.beyond.is_none() && channel.count > 0;
+        let channels = self.channels.iter();
+        let notes = channels.flat_map(|channel| channel.notes(file)).collect();
+        let sound = |channel: &Channel| channel.beyond.is_none() && channel.facts.is_some();
         let usable = self.channels.iter().all(sound);
         let first = self.first.unwrap_or(0.0);
         let values = self.channels.into_iter().map(Channel::filled).collect();
@@ -177,20 +174,6 @@ impl Temperatures {
 }
 
 impl Channel {
-    fn new(place: usize, name: String) -> Self {
-        Self {
-            place,
-            name,
-            spans: Vec::new(),
-            smallest: f64::INFINITY,
-            largest: f64::NEG_INFINITY,
-            sum: 0.0,
-            count: 0,
-            missing: (0, 0),
-            beyond: None,
-        }
-    }
-
     fn take(&mut self, csv: &LogRows, span: usize, unit: TemperatureUnit) {
         let value = csv
             .number(self.place)
@@ -214,10 +197,14 @@ impl Channel {
         let (sum, count) = &mut self.spans[span];
         *sum += celsius;
         *count += 1;
-        self.smallest = self.smallest.min(celsius);
-        self.largest = self.largest.max(celsius);
-        self.sum += celsius;
-        self.count += 1;
+        let facts = self.facts.get_or_insert(TemperatureFacts {
+            smallest: celsius,
+            mean: 0.0,
+            largest: celsius,
+        });
+        facts.smallest = facts.smallest.min(celsius);
+        facts.largest = facts.largest.max(celsius);
+        facts.mean += celsius;
     }
 
     fn notes(&self, file: &str) -> Vec<String> {

@@ -47,10 +47,8 @@ macro_rules! expect {
 impl Calibration {
     /// Reads and checks a record.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let bytes = small_file::bytes(path).map_err(|error| {
-            let advice = "Give the path of a calibration.json or truth.json.";
-            FileError::io(path, "read the calibration", &error, advice)
-        })?;
+        let advice = "Give the path of a calibration.json or truth.json.";
+        let bytes = small_file::bytes(path, "the calibration", advice)?;
         let record: Self = serde_json::from_slice(&bytes).map_err(|error| {
             let (line, column) = (error.line() as u64, error.column() as u64);
             let at = format!(" at line {line} column {column}");
@@ -73,14 +71,10 @@ impl Calibration {
 
     /// The record as the bytes of its file, `path` being named in errors.
     pub fn to_json(&self, path: &Path) -> Result<Vec<u8>, FileError> {
-        let written = || serde_json::to_vec_pretty(self);
         let expected = "values that JSON can hold".to_owned();
-        let bytes = self
-            .check()
-            .and_then(|()| written().map_err(|error| (error.to_string(), expected)));
-        let mut bytes = bytes.map_err(|wrong| refused(path, &wrong))?;
-        bytes.push(b'\n');
-        Ok(bytes)
+        let written = || small_file::pretty(self).map_err(|error| (error.to_string(), expected));
+        let bytes = self.check().and_then(|()| written());
+        bytes.map_err(|wrong| refused(path, &wrong))
     }
 
     /// Writes the record whole or not at all; an existing file only with `force`.
@@ -213,40 +207,49 @@ impl Calibration {
 
     /// Refuses values beyond what an instrument has.
     fn check_sizes(&self) -> Checked {
-        check_triad("gyro", &self.gyro, &self.gyro)?;
-        check_triad("accel", &self.accel, &self.accel)?;
-        if let Some(sigma) = &self.sigma {
-            check_triad("sigma.gyro", &sigma.gyro, &self.gyro)?;
-            check_triad("sigma.accel", &sigma.accel, &self.accel)?;
+        let mut sizes: Vec<(String, f64, RangeInclusive<f64>)> = Vec::new();
+        let about_zero = |largest: f64| -largest..=largest;
+        let triads = [("gyro", &self.gyro), ("accel", &self.accel)];
+        for (name, of) in triads {
+            let sigma = self.sigma.as_ref();
+            let sigma = sigma.map(|sigma| match name {
+                "gyro" => (format!("sigma.{name}"), &sigma.gyro),
+                _ => (format!("sigma.{name}"), &sigma.accel),
+            });
+            for (name, values) in [(name.to_owned(), of)].into_iter().chain(sigma) {
+                for (i, axis) in AXES.iter().enumerate() {
+                    let (scale, bias) = (of.scale[i].abs(), about_zero(BIAS * of.scale[i].abs()));
+                    let largest = about_zero(*SCALES.end());
+                    sizes.push((format!("{name}.scale.{axis}"), values.scale[i], largest));
+                    sizes.push((format!("|{name}.scale.{axis}|"), scale, SCALES));
+                    sizes.push((format!("{name}.bias.{axis}"), values.bias[i], bias));
+                    for (other, value) in AXES.iter().zip(values.installation[i]) {
+                        let field = format!("{name}.installation.{axis}{other}");
+                        sizes.push((field, value, about_zero(INSTALLATION)));
+                    }
+                }
+            }
         }
         for (name, term) in &self.terms {
             let known = Term::parameter_named(name).and_then(Term::of);
             let largest = known.map_or(TABLE, |term| term.entry().largest);
-            expect!(
-                term.value.abs() <= largest,
-                format!("a value from {:.3} to {largest:.3} in SI", -largest),
-                "terms.{name}.value = {:e}",
-                term.value
-            );
             let sigma = term.sigma.unwrap_or(0.0);
-            expect!(
-                (0.0..=largest).contains(&sigma),
-                format!("a 1σ from 0 to {largest:.3} in SI"),
-                "terms.{name}.sigma = {sigma:e}"
-            );
+            let value = format!("terms.{name}.value");
+            sizes.push((value, term.value, about_zero(largest)));
+            sizes.push((format!("terms.{name}.sigma"), sigma, 0.0..=largest));
         }
-        if let Some(gravity) = &self.gravity {
+        if let Some(of) = &self.gravity {
+            let sigma = 0.0..=STANDARD_GRAVITY;
+            sizes.push(("gravity.m_s2".to_owned(), of.m_s2, GRAVITY));
+            sizes.push(("gravity.sigma_m_s2".to_owned(), of.sigma_m_s2, sigma));
+        }
+        for (name, value, possible) in sizes {
+            let short = |end: &f64| format!("{end:.2e}").parse().unwrap_or(*end);
+            let (least, most): (f64, f64) = (short(possible.start()), short(possible.end()));
             expect!(
-                GRAVITY.contains(&gravity.m_s2),
-                format!("{} to {} m/s²", GRAVITY.start(), GRAVITY.end()),
-                "gravity.m_s2 = {}",
-                gravity.m_s2
-            );
-            expect!(
-                (0.0..=STANDARD_GRAVITY).contains(&gravity.sigma_m_s2),
-                "a 1σ in m/s², zero or above",
-                "gravity.sigma_m_s2 = {}",
-                gravity.sigma_m_s2
+                possible.contains(&value),
+                format!("{least:?} to {most:?} in SI"),
+                "{name} = {value:?}"
             );
         }
         Ok(())
@@ -292,37 +295,9 @@ impl Calibration {
     }
 }
 
-/// Values, or their 1σ, against what an instrument of this triad's scale factors can have.
-fn check_triad(name: &str, values: &TriadRecord, of: &TriadRecord) -> Checked {
-    for (i, axis) in AXES.iter().enumerate() {
-        let (scale, largest) = (of.scale[i], *SCALES.end());
-        expect!(
-            SCALES.contains(&scale.abs()),
-            format!("{:e} to {largest:e} in magnitude", SCALES.start()),
-            "{name}.scale.{axis} = {scale:e}"
-        );
-        let installation = AXES
-            .iter()
-            .zip(values.installation[i])
-            .map(|(other, value)| (format!("installation.{axis}{other}"), value, INSTALLATION));
-        let scale_and_bias = [
-            (format!("scale.{axis}"), values.scale[i], largest),
-            (format!("bias.{axis}"), values.bias[i], BIAS * scale.abs()),
-        ];
-        for (field, value, largest) in installation.chain(scale_and_bias) {
-            expect!(
-                value.abs() <= largest,
-                format!("at most {largest:e} in magnitude"),
-                "{name}.{field} = {value:e}"
-            );
-        }
-    }
-    Ok(())
-}
-
 fn refused(path: &Path, (found, expected): &Wrong) -> FileError {
     let advice = "Correct the file, or write the calibration again.";
-    FileError::new(path, Place::File, found, expected, advice)
+    FileError::of(path, found, expected, advice)
 }
 
 impl TriadRecord {

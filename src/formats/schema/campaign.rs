@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
+use super::page::Page;
 use super::{Celsius, Document, NonNegative};
 use crate::calibration::{DayToDay, Group, TemperatureOptions, Together};
 use crate::formats::error::FileError;
@@ -28,20 +29,20 @@ pub struct Campaign {
     pub together: Together,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CampaignFile {
     /// Groups of parameters that each recording has for itself.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default)]
     own: Vec<String>,
     temperature: Option<TemperatureFile>,
     recording: Vec<RecordingFile>,
     /// 1σ from one recording to the next.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(default)]
     day_to_day: BTreeMap<String, NonNegative>,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RecordingFile {
     run: PathBuf,
@@ -49,7 +50,7 @@ struct RecordingFile {
 }
 
 /// Whether parameters follow temperature, and how.
-#[derive(Clone, Copy, Serialize, Deserialize)]
+#[derive(Clone, Copy, Deserialize)]
 #[serde(
     untagged,
     deny_unknown_fields,
@@ -67,19 +68,13 @@ enum TemperatureFile {
 impl Campaign {
     /// Whether a file says that it is one.
     pub fn is_at(path: &Path) -> bool {
-        let Ok(text) = small_file::text(path) else {
-            return false;
-        };
-        let document = Document {
-            file: path,
-            text: &text,
-        };
-        let Ok(table) = document.parse() else {
-            return false;
-        };
-        let format = table.get_ref().get("format");
-        let format = format.and_then(|format| format.get_ref().as_str());
-        format.is_some_and(|format| format.starts_with("turncal-campaign/"))
+        let text = small_file::text(path, "", "").unwrap_or_default();
+        let table = Document::of(path, &text).parse().ok();
+        let format = table.and_then(|table| {
+            let format = table.get_ref().get("format")?.get_ref().as_str()?;
+            Some(format.starts_with("turncal-campaign/"))
+        });
+        format == Some(true)
     }
 
     /// Reads a campaign and its recordings, whose paths are relative to it.
@@ -87,14 +82,8 @@ impl Campaign {
     /// # Errors
     /// [`FileError`] if it or a recording cannot be read, or a value cannot be.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let text = small_file::text(path).map_err(|error| {
-            let advice = "Give the path of a campaign.toml.";
-            FileError::io(path, "read the campaign", &error, advice)
-        })?;
-        let document = Document {
-            file: path,
-            text: &text,
-        };
+        let text = small_file::text(path, "the campaign", "Give the path of a campaign.toml.")?;
+        let document = Document::of(path, &text);
         let mut file: CampaignFile = document.fill(document.of_format(FORMAT)?)?;
         if file.recording.is_empty() {
             return Err(document.missing("recording", ""));
@@ -108,14 +97,7 @@ impl Campaign {
         if let Some(pair) = named.windows(2).find(|pair| pair[0].run == pair[1].run) {
             let advice = "Name every recording once.";
             let found = format_args!("{} twice", pair[0].run.display());
-            let place = crate::formats::error::Place::File;
-            return Err(FileError::new(
-                path,
-                place,
-                found,
-                "each recording once",
-                advice,
-            ));
+            return Err(FileError::of(path, found, "each recording once", advice));
         }
         let temperature = file
             .temperature
@@ -130,8 +112,7 @@ impl Campaign {
             *of_run = of_run.take().or(stated.map(Temperature::constant));
             Ok(run)
         });
-        let mut runs: Vec<Run> = runs.collect::<Result<_, FileError>>()?;
-        doubt_stuck(&mut runs);
+        let runs: Vec<Run> = runs.collect::<Result<_, FileError>>()?;
         let mut day_to_day = day_to_day(document, &file.day_to_day)?;
         own_parameters(document, &file.own, &runs, &mut day_to_day)?;
         let temperature = match temperature {
@@ -153,66 +134,27 @@ impl Campaign {
 }
 
 /// The `campaign.toml` of recordings with these paths, relative to it, that differ from day to day by this 1σ.
-pub fn campaign_text(paths: &[String], day_to_day: &DayToDay) -> Result<String, toml::ser::Error> {
-    let lines = Group::all().filter_map(|group| {
+pub fn campaign_text(paths: &[String], day_to_day: &DayToDay) -> String {
+    let mut page = Page::of(FORMAT, "");
+    for path in paths {
+        page.text += "\n[[recording]]\n";
+        page.field("run", path.as_str());
+    }
+    let of_groups = Group::all().filter_map(|group| {
         let (key, unit) = DayToDay::key(group);
         let first = *group.parameters(InstallationForm::General).first()?;
         Some((key, day_to_day.parameters[first] / unit))
     });
     let mounting = (MOUNTING.to_owned(), day_to_day.mounting / ARCSEC);
-    let lines = lines.chain([mounting]).filter(|&(_, sigma)| sigma > 0.0);
-    let recording = |path: &String| RecordingFile {
-        run: path.into(),
-        temperature_degc: None,
-    };
-    let file = CampaignFile {
-        own: Vec::new(),
-        temperature: None,
-        recording: paths.iter().map(recording).collect(),
-        day_to_day: lines
-            .map(|(key, sigma)| (key, three_digits(sigma)))
-            .collect(),
-    };
-    let text = toml::to_string(&file)?;
-    let comment = "\n# 1σ from one recording to the next\n[day_to_day]";
-    let text = text.replace("\n[day_to_day]", comment);
-    Ok(format!("format = \"{FORMAT}\"\n\n{text}"))
-}
-
-fn three_digits(value: f64) -> NonNegative {
-    NonNegative(format!("{value:.2e}").parse().unwrap_or(value))
-}
-
-/// Notes temperatures that never change where those of other recordings do.
-fn doubt_stuck(runs: &mut [Run]) {
-    let facts = |run: &Run| {
-        run.recording
-            .imu
-            .log
-            .as_ref()
-            .and_then(|log| log.temperature)
-    };
-    let stuck: Vec<Option<f64>> = runs
-        .iter()
-        .map(|run| {
-            facts(run)
-                .filter(|of| of.smallest == of.largest)
-                .map(|of| of.smallest)
-        })
-        .collect();
-    let any_varies = runs
-        .iter()
-        .zip(&stuck)
-        .any(|(run, stuck)| facts(run).is_some() && stuck.is_none());
-    for (run, stuck) in runs.iter_mut().zip(stuck).filter(|_| any_varies) {
-        if let Some(value) = stuck {
-            run.recording.notes.push(format!(
-                "The temperature of {} is {value} °C in every row, that of other recordings varies: is its sensor stuck? \
-                 Say temperature_degc beside the recording in the campaign, and leave the column out of its run.toml.",
-                run.recording.name
-            ));
-        }
+    let lines = of_groups.chain([mounting]).filter(|of| of.1 > 0.0);
+    let lines: BTreeMap<String, f64> = lines.collect();
+    if !lines.is_empty() {
+        page.table("day_to_day", "1σ from one recording to the next");
     }
+    for (key, sigma) in lines {
+        page.field(&key, format!("{sigma:.2e}").parse().unwrap_or(sigma));
+    }
+    page.text
 }
 
 /// How parameters follow temperature; `None` if they do not.

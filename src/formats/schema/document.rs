@@ -57,6 +57,11 @@ pub struct Document<'a> {
 }
 
 impl<'a> Document<'a> {
+    /// Of a file with this text.
+    pub fn of(file: &'a Path, text: &'a str) -> Self {
+        Self { file, text }
+    }
+
     /// The fields of a document of this format, which is not among them.
     pub fn of_format(self, format: &str) -> Result<Spanned<DeTable<'a>>, FileError> {
         let mut table = self.parse()?;

@@ -4,17 +4,16 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::{Document, ImuFile, Names, OneOrThree, PriorFile, RunFile, TermFile};
+use super::{Document, Names, OneOrThree, RunFile, TermFile};
 use crate::formats::clock::{Breaks, Clock};
 use crate::formats::error::{FileError, list, suggestion};
 use crate::formats::imu_log::ImuLog;
-use crate::formats::inputs::source::{Source, accel_from, clock};
 use crate::formats::inputs::temperature::{TemperatureColumns, TemperatureUnit};
 use crate::formats::quantity::units;
 use crate::imu::NoiseKeys;
 use crate::imu::{
-    GaussMarkov, Instrument, MotionNoise, Noise, Nominal, Output, PerSensor, Prior, Sensor, Term,
-    TermVector,
+    AxisOrder, GaussMarkov, Instrument, MotionNoise, Noise, Nominal, Output, PerSensor, Prior,
+    Sensor, Term, TermVector,
 };
 use crate::units::{ARCSEC, DEGREE, PPM};
 
@@ -35,6 +34,14 @@ const WIDEST_BIAS: f64 = 1e6;
 /// Beyond any error of an angle, ″.
 const HALF_TURN: f64 = 648_000.0;
 
+/// What a `run.toml` says, as it is read; remarks on what is assumed or without effect go to `notes`.
+pub struct Fields<'a> {
+    pub document: Document<'a>,
+    pub run: &'a RunFile,
+    pub directory: &'a Path,
+    pub notes: Vec<String>,
+}
+
 /// What `[imu]` and the tables below it say.
 pub struct InstrumentFields<'a> {
     pub log: ImuLog<'a>,
@@ -43,39 +50,28 @@ pub struct InstrumentFields<'a> {
     pub without_period: bool,
 }
 
-impl<'a> InstrumentFields<'a> {
-    /// Remarks on what is assumed or without effect go to `notes`.
-    pub fn of_file(
-        document: Document,
-        run: &'a RunFile,
-        directory: &Path,
-        notes: &mut Vec<String>,
-    ) -> Result<Self, FileError> {
-        let imu = &run.imu;
-        let known = knowledge(document, imu, notes)?;
-        let mut of_gyro = clock(
-            document,
-            "imu",
-            imu.columns.time.as_ref(),
-            (imu.time_unit, imu.sample_period_s),
-        )?;
-        let source = Source::of_fields(directory, &imu.file, &imu.stream, imu.salvage);
-        let accel_from = accel_from(document, imu, directory, &source, of_gyro)?;
+impl<'a> Fields<'a> {
+    pub fn instrument(&mut self) -> Result<InstrumentFields<'a>, FileError> {
+        let imu = &self.run.imu;
+        let known = self.knowledge()?;
+        let stated = (imu.time_unit, imu.sample_period_s);
+        let mut of_gyro = self.clock("imu", imu.columns.time.as_ref(), stated)?;
+        let source = self.source(&imu.file, &imu.stream, imu.salvage);
+        let accel_from = self.accel_from(&source, of_gyro)?;
         if let (Some(of), Some(_)) = (&imu.instance, &accel_from) {
             let meaning = format!(
                 "one instrument without `{}`, as accel_from needs",
                 of.column
             );
-            return Err(document.missing("imu.stream", &meaning));
+            return Err(self.document.missing("imu.stream", &meaning));
         }
-        of_gyro.breaks = match run.turntable.is_some() || run.segments.is_some() {
+        of_gyro.breaks = match self.run.turntable.is_some() || self.run.segments.is_some() {
             _ if accel_from.is_some() => Breaks::None,
             true => Breaks::Pauses,
             false => Breaks::Settings,
         };
-        let without_period = with_usual_period(document, run, &mut of_gyro)?;
-        let columns = &imu.columns;
-        let names = |sensor| match columns_of(imu, sensor) {
+        let without_period = self.with_usual_period(&mut of_gyro)?;
+        let names = |sensor| match imu.of(sensor).columns {
             Some(Names(names)) => names.each_ref().map(String::as_str),
             None => [""; 3],
         };
@@ -85,86 +81,214 @@ impl<'a> InstrumentFields<'a> {
             accel_from,
             instance: (imu.instance.as_ref()).map(|of| (of.column.as_str(), of.number.0)),
             triads: PerSensor::from_fn(names),
-            temperature: columns.temperature.as_ref().map(|column| {
+            temperature: imu.columns.temperature.as_ref().map(|column| {
                 let unit = imu.temperature_unit.unwrap_or(TemperatureUnit::WORDS[0].1);
                 TemperatureColumns::of_fields(column, unit)
             }),
             output: imu.output,
-            axes: imu.body_axes.unwrap_or_default(),
+            axes: imu.body_axes.unwrap_or(AxisOrder::IDENTITY),
             stamp: imu.time_stamp,
             continuous: imu.continuous.unwrap_or(true),
             nominal: known.nominal,
-            full_scale: PerSensor {
-                gyro: imu.gyro_full_scale.map(|of| of.0),
-                accel: imu.accel_full_scale.map(|of| of.0),
-            },
+            full_scale: PerSensor::from_fn(|sensor| imu.of(sensor).full_scale),
         };
-        Ok(Self {
+        Ok(InstrumentFields {
             log,
             known,
             without_period,
         })
     }
-}
 
-/// The usual period where none is stated; how long a row lasts can only be found of rates that stand alone.
-fn with_usual_period(
-    document: Document,
-    run: &RunFile,
-    clock: &mut Clock,
-) -> Result<bool, FileError> {
-    if clock.column.is_some() || clock.period.is_some() {
-        return Ok(false);
+    /// The usual period where none is stated; how long a row lasts can only be found of rates that stand alone.
+    fn with_usual_period(&self, clock: &mut Clock) -> Result<bool, FileError> {
+        if clock.column.is_some() || clock.period.is_some() {
+            return Ok(false);
+        }
+        if self.run.imu.output != Output::Rate || self.run.turntable.is_some() {
+            let meaning = "the name of a column; rows of pulses or increments, or rows with a [turntable], need it, \
+                           or else sample_period_s";
+            return Err(self.document.missing("imu.columns.time", meaning));
+        }
+        clock.period = Some(USUAL_PERIOD);
+        Ok(true)
     }
-    if run.imu.output != Output::Rate || run.turntable.is_some() {
-        let meaning = "the name of a column; rows of pulses or increments, or rows with a [turntable], need it, \
-                       or else sample_period_s";
-        return Err(document.missing("imu.columns.time", meaning));
-    }
-    clock.period = Some(USUAL_PERIOD);
-    Ok(true)
-}
 
-/// Units, nominal scales, priors, noise and error terms.
-fn knowledge(
-    document: Document,
-    imu: &ImuFile,
-    notes: &mut Vec<String>,
-) -> Result<Instrument, FileError> {
-    let unit = PerSensor {
-        gyro: unit(document, imu, Sensor::Gyro, notes)?,
-        accel: unit(document, imu, Sensor::Accel, notes)?,
-    };
-    let gyro = nominal(document, imu, Sensor::Gyro, &unit.gyro)?;
-    let accel = nominal(document, imu, Sensor::Accel, &unit.accel)?;
-    let axes = imu.body_axes.unwrap_or_default();
-    let names = Sensor::ALL.map(|sensor| NoiseKeys::of(sensor).names());
-    document.only("imu.noise", imu.noise.keys(), names.as_flattened())?;
-    let (gyro_noise, gyro_in_moves) = noise(document, imu, Sensor::Gyro, notes)?;
-    let (accel_noise, accel_in_moves) = noise(document, imu, Sensor::Accel, notes)?;
-    Ok(Instrument {
-        prior: PerSensor {
-            gyro: prior(document, imu, Sensor::Gyro, gyro, notes)?,
-            accel: prior(document, imu, Sensor::Accel, accel, notes)?,
-        },
-        nominal: PerSensor {
-            gyro: Nominal(axes.each(gyro)),
-            accel: Nominal(axes.each(accel)),
-        },
-        unit,
-        noise: PerSensor {
-            gyro: gyro_noise,
-            accel: accel_noise,
-        },
-        noise_is_stated: PerSensor::from_fn(|sensor| {
-            imu.noise.contains_key(NoiseKeys::of(sensor).random_walk.0)
-        }),
-        motion_noise: PerSensor {
-            gyro: gyro_in_moves,
-            accel: accel_in_moves,
-        },
-        term_sigma: term_sigma(document, "imu.terms", &imu.terms)?,
-    })
+    /// Units, nominal scales, priors, noise and error terms.
+    fn knowledge(&mut self) -> Result<Instrument, FileError> {
+        let imu = &self.run.imu;
+        let axes = imu.body_axes.unwrap_or(AxisOrder::IDENTITY);
+        let unit = PerSensor::try_from_fn(|sensor| self.unit(sensor))?;
+        let nominal = PerSensor::try_from_fn(|sensor| self.nominal(sensor, unit.get(sensor)))?;
+        let names = Sensor::ALL.map(|sensor| NoiseKeys::of(sensor).names());
+        let names = names.as_flattened();
+        (self.document).only("imu.noise", imu.noise.keys(), names)?;
+        let noise = PerSensor::try_from_fn(|sensor| self.noise(sensor))?;
+        let prior = PerSensor::try_from_fn(|sensor| self.prior(sensor, *nominal.get(sensor)))?;
+        let walk = |sensor| NoiseKeys::of(sensor).random_walk.0;
+        Ok(Instrument {
+            prior,
+            nominal: PerSensor::from_fn(|sensor| Nominal(axes.each(*nominal.get(sensor)))),
+            unit,
+            noise: PerSensor::from_fn(|sensor| noise.get(sensor).0),
+            noise_is_stated: PerSensor::from_fn(|sensor| imu.noise.contains_key(walk(sensor))),
+            motion_noise: PerSensor::from_fn(|sensor| noise.get(sensor).1),
+            term_sigma: term_sigma(self.document, "imu.terms", &imu.terms)?,
+        })
+    }
+
+    /// Noise of a triad at rest and in moves; zero where it is not stated.
+    fn noise(&self, sensor: Sensor) -> Result<(Noise, MotionNoise), FileError> {
+        let keys = NoiseKeys::of(sensor);
+        let get = |name: &str| self.run.imu.noise.get(name).map(|value| value.0);
+        let ((key, sigma_unit), time) = (keys.gauss_markov, keys.correlation_time);
+        let path = |name: &str| format!("imu.noise.{name}");
+        let gauss_markov = match (get(key), get(time)) {
+            (None, None) => None,
+            (Some(sigma), Some(correlation_time)) => {
+                for (name, value) in [(key, sigma), (time, correlation_time)] {
+                    if value <= 0.0 {
+                        let (expected, advice) = ("a number above zero", "Correct this value.");
+                        return Err(self.document.wrong(&path(name), expected, advice));
+                    }
+                }
+                Some(GaussMarkov {
+                    sigma: sigma * sigma_unit,
+                    correlation_time,
+                })
+            }
+            (Some(_), None) => {
+                return Err(self.document.missing(&path(time), "its correlation time"));
+            }
+            (None, Some(_)) => {
+                let meaning = "the 1σ of the Gauss–Markov bias";
+                return Err(self.document.missing(&path(key), meaning));
+            }
+        };
+        let or_zero = |(name, unit): (&str, f64)| get(name).unwrap_or(0.0) * unit;
+        let noise = Noise {
+            random_walk: or_zero(keys.random_walk),
+            gauss_markov,
+        };
+        let of_moves = MotionNoise {
+            by_motion: or_zero((keys.by_motion, 1.0)),
+            by_duration: or_zero(keys.by_duration),
+        };
+        Ok((noise, of_moves))
+    }
+
+    /// The unit of a triad; one of two may be missing from a log.
+    fn unit(&mut self, sensor: Sensor) -> Result<String, FileError> {
+        let (imu, name) = (&self.run.imu, sensor.name());
+        let is_there = |sensor| imu.of(sensor).columns.is_some();
+        if is_there(sensor) {
+            let unit = imu.of(sensor).unit.map(str::to_owned);
+            let path = format!("imu.{name}_unit");
+            let missing = || self.document.missing(&path, "the unit of the file");
+            return unit.ok_or_else(missing);
+        }
+        if imu.accel_from.is_some() || !Sensor::ALL.into_iter().any(is_there) {
+            let path = format!("imu.columns.{name}");
+            return Err(self.document.missing(&path, "the names of three columns"));
+        }
+        let note = format!("The log has no columns of {name}: they are taken to be zero.");
+        self.notes.push(note);
+        Ok("count".to_owned())
+    }
+
+    /// The file's quantity per second for one rad/s or m/s², along the file's axes.
+    fn nominal(&self, sensor: Sensor, unit: &str) -> Result<Vector3<f64>, FileError> {
+        let (imu, document) = (&self.run.imu, self.document);
+        let of = imu.of(sensor);
+        if of.columns.is_none() {
+            return Ok(Vector3::repeat(1.0));
+        }
+        let known = || units(sensor, imu.output);
+        let names = || known().map(|(name, _)| name);
+        let Some((_, of_unit)) = known().find(|(name, _)| *name == unit) else {
+            return Err(document.wrong(
+                &format!("imu.{}_unit", sensor.name()),
+                format_args!("one of {}", list(names())),
+                suggestion(unit, names(), "Choose one of them."),
+            ));
+        };
+        let path = format!("imu.prior.{}.scale", sensor.name());
+        let is_near = |scale: &Vector3<f64>, of_unit: f64| {
+            let mut ratios = scale.iter().map(|s| s.abs() / of_unit);
+            ratios.all(|ratio| (0.5..=2.0).contains(&ratio))
+        };
+        match (of.prior.scale.map(OneOrThree::vector), of_unit) {
+            (None, Some(of_unit)) => Ok(Vector3::repeat(of_unit)),
+            (None, None) => {
+                let meaning =
+                    "counts per second for one rad/s or m/s², for a count has no size of its own";
+                Err(document.missing(&path, meaning))
+            }
+            (Some(scale), _) if scale.iter().any(|&s| s == 0.0) => {
+                Err(document.wrong(&path, "no zeros", "Give the data sheet's scale factor."))
+            }
+            (Some(scale), Some(of_unit)) if !is_near(&scale, of_unit) => Err(document.wrong(
+                &path,
+                format_args!("about {of_unit}, which this unit says for one rad/s or m/s²"),
+                "Correct the scale or the unit, or leave the scale out.",
+            )),
+            (Some(scale), _) => Ok(scale),
+        }
+    }
+
+    /// The prior of a triad of this nominal scale, along right-front-up; what is not stated is wide.
+    fn prior(&mut self, sensor: Sensor, nominal: Vector3<f64>) -> Result<Prior, FileError> {
+        let (of, axes) = (
+            self.run.imu.of(sensor),
+            self.run.imu.body_axes.unwrap_or(AxisOrder::IDENTITY),
+        );
+        let bias_words = sensor.pick("bias ± 2 °/s", "bias ± 1 m/s²");
+        let mut assumed = Vec::new();
+        let mut sigma = |key: &str, stated: Option<OneOrThree>, most: f64, usual, words| {
+            let stated = stated.map(OneOrThree::vector);
+            assumed.extend(stated.is_none().then_some(words));
+            if !stated.iter().flatten().all(|&s| s > 0.0 && s <= most) {
+                let path = format!("imu.prior.{}.{key}", sensor.name());
+                let expected = format_args!("numbers above zero, at most {most}");
+                return Err(self.document.wrong(&path, expected, "Correct this value."));
+            }
+            Ok(stated.unwrap_or(usual))
+        };
+        let scale_sigma = sigma(
+            "scale_sigma_ppm",
+            of.prior.scale_sigma_ppm,
+            WIDEST_SCALE / PPM,
+            Vector3::repeat(USUAL_SCALE / PPM),
+            "scale factor ± 5 %",
+        )?;
+        let installation_sigma = sigma(
+            "installation_sigma_arcsec",
+            of.prior.installation_sigma_arcsec,
+            HALF_TURN,
+            Vector3::repeat(USUAL_INSTALLATION / ARCSEC),
+            "misalignment ± 2°",
+        )?;
+        let bias_sigma = sigma(
+            "bias_sigma",
+            of.prior.bias_sigma,
+            WIDEST_BIAS * nominal.amax(),
+            nominal.abs() * *USUAL_BIAS.get(sensor),
+            bias_words,
+        )?;
+        if !assumed.is_empty() && of.columns.is_some() {
+            self.notes.push(format!(
+                "run.toml does not state everything in [imu.prior.{}]. turncal assumed (1σ): {}.",
+                sensor.name(),
+                assumed.join(", ")
+            ));
+        }
+        let bias = (of.prior.bias).map_or_else(Vector3::zeros, OneOrThree::vector);
+        Ok(Prior {
+            scale_sigma: axes.each(scale_sigma) * PPM,
+            installation_sigma: axes.each(installation_sigma) * ARCSEC,
+            bias: axes.apply(&bias.component_div(&nominal)),
+            bias_sigma: axes.each(bias_sigma.component_div(&nominal.abs())),
+        })
+    }
 }
 
 /// 1σ of the parameters of the terms that a table of them switches on, in SI; zero for the others.
@@ -191,220 +315,4 @@ pub fn term_sigma(
         }
     }
     Ok(sigma)
-}
-
-/// Noise of a triad at rest and in moves; zero where it is not stated.
-fn noise(
-    document: Document,
-    imu: &ImuFile,
-    sensor: Sensor,
-    notes: &mut Vec<String>,
-) -> Result<(Noise, MotionNoise), FileError> {
-    let keys = NoiseKeys::of(sensor);
-    let get = |name: &str| imu.noise.get(name).map(|value| value.0);
-    let (sigma, sigma_unit) = keys.gauss_markov;
-    let former = get(keys.former).filter(|_| get(sigma).is_none());
-    if former.is_some() {
-        notes.push(format!(
-            "imu.noise.{} is read as the 1σ of a Gauss–Markov bias, not as the floor of the Allan \
-             deviation that data sheets call instability; write {sigma}.",
-            keys.former
-        ));
-    }
-    let key = former.map_or(sigma, |_| keys.former);
-    let time = keys.correlation_time;
-    let gauss_markov = match (get(key), get(time)) {
-        (None, None) => None,
-        (Some(sigma), Some(correlation_time)) => {
-            for (name, value) in [(key, sigma), (time, correlation_time)] {
-                if value <= 0.0 {
-                    let path = format!("imu.noise.{name}");
-                    let expected = "a number above zero";
-                    return Err(document.wrong(&path, expected, "Correct this value."));
-                }
-            }
-            Some(GaussMarkov {
-                sigma: sigma * sigma_unit,
-                correlation_time,
-            })
-        }
-        (Some(_), None) => {
-            let path = format!("imu.noise.{time}");
-            return Err(document.missing(&path, "its correlation time"));
-        }
-        (None, Some(_)) => {
-            let path = format!("imu.noise.{sigma}");
-            return Err(document.missing(&path, "the 1σ of the Gauss–Markov bias"));
-        }
-    };
-    let or_zero = |(name, unit): (&str, f64)| get(name).unwrap_or(0.0) * unit;
-    Ok((
-        Noise {
-            random_walk: or_zero(keys.random_walk),
-            gauss_markov,
-        },
-        MotionNoise {
-            by_motion: or_zero((keys.by_motion, 1.0)),
-            by_duration: or_zero(keys.by_duration),
-        },
-    ))
-}
-
-/// The columns of a triad, if it is there.
-fn columns_of(imu: &ImuFile, sensor: Sensor) -> Option<&Names<3>> {
-    match sensor {
-        Sensor::Gyro => imu.columns.gyro.as_ref(),
-        Sensor::Accel => imu.columns.accel.as_ref(),
-    }
-}
-
-/// The unit of a triad; one of two may be missing from a log.
-fn unit(
-    document: Document,
-    imu: &ImuFile,
-    sensor: Sensor,
-    notes: &mut Vec<String>,
-) -> Result<String, FileError> {
-    let [gyro, accel] = Sensor::ALL.map(|sensor| columns_of(imu, sensor).is_some());
-    let (is_there, unit) = match sensor {
-        Sensor::Gyro => (gyro, &imu.gyro_unit),
-        Sensor::Accel => (accel, &imu.accel_unit),
-    };
-    let name = sensor.name();
-    if !is_there && (imu.accel_from.is_some() || !(gyro || accel)) {
-        let path = format!("imu.columns.{name}");
-        return Err(document.missing(&path, "the names of three columns"));
-    }
-    if !is_there {
-        notes.push(format!(
-            "The log has no columns of {name}: they are taken to be zero."
-        ));
-        return Ok("count".to_owned());
-    }
-    let missing = || document.missing(&format!("imu.{name}_unit"), "the unit of the file");
-    unit.clone().ok_or_else(missing)
-}
-
-fn prior_of(imu: &ImuFile, sensor: Sensor) -> &PriorFile {
-    match sensor {
-        Sensor::Gyro => &imu.prior.gyro,
-        Sensor::Accel => &imu.prior.accel,
-    }
-}
-
-/// The file's quantity per second for one rad/s or m/s², along the file's axes.
-fn nominal(
-    document: Document,
-    imu: &ImuFile,
-    sensor: Sensor,
-    unit: &str,
-) -> Result<Vector3<f64>, FileError> {
-    if columns_of(imu, sensor).is_none() {
-        return Ok(Vector3::repeat(1.0));
-    }
-    let known = || units(sensor, imu.output);
-    let names = || known().map(|(name, _)| name);
-    let Some((_, of_unit)) = known().find(|(name, _)| *name == unit) else {
-        return Err(document.wrong(
-            &format!("imu.{}_unit", sensor.name()),
-            format_args!("one of {}", list(names())),
-            suggestion(unit, names(), "Choose one of them."),
-        ));
-    };
-    let path = format!("imu.prior.{}.scale", sensor.name());
-    match (prior_of(imu, sensor).scale.map(OneOrThree::vector), of_unit) {
-        (None, Some(of_unit)) => Ok(Vector3::repeat(of_unit)),
-        (None, None) => Err(document.missing(
-            &path,
-            "counts per second for one rad/s or m/s², for a count has no size of its own",
-        )),
-        (Some(scale), _) if scale.iter().any(|&s| s == 0.0) => {
-            Err(document.wrong(&path, "no zeros", "Give the data sheet's scale factor."))
-        }
-        (Some(scale), Some(of_unit))
-            if !scale
-                .iter()
-                .all(|s| (0.5..=2.0).contains(&(s.abs() / of_unit))) =>
-        {
-            Err(document.wrong(
-                &path,
-                format_args!("about {of_unit}, which this unit says for one rad/s or m/s²"),
-                "Correct the scale or the unit, or leave the scale out.",
-            ))
-        }
-        (Some(scale), _) => Ok(scale),
-    }
-}
-
-/// The prior of a triad of this nominal scale, along right-front-up; what is not stated is wide.
-fn prior(
-    document: Document,
-    imu: &ImuFile,
-    sensor: Sensor,
-    nominal: Vector3<f64>,
-    notes: &mut Vec<String>,
-) -> Result<Prior, FileError> {
-    let (file, axes) = (prior_of(imu, sensor), imu.body_axes.unwrap_or_default());
-    let bias = file.bias.map_or_else(Vector3::zeros, OneOrThree::vector);
-    let mut assumed = Vec::new();
-    let mut sigma = |key: &str, stated: Option<OneOrThree>, most, usual, words| {
-        let path = format!("imu.prior.{}.{key}", sensor.name());
-        let stated = stated_sigma(document, &path, stated, most)?;
-        assumed.extend(stated.is_none().then_some(words));
-        Ok::<_, FileError>(stated.unwrap_or(usual))
-    };
-    let scale_sigma = sigma(
-        "scale_sigma_ppm",
-        file.scale_sigma_ppm,
-        WIDEST_SCALE / PPM,
-        Vector3::repeat(USUAL_SCALE / PPM),
-        "scale factor ± 5 %",
-    )?;
-    let installation_sigma = sigma(
-        "installation_sigma_arcsec",
-        file.installation_sigma_arcsec,
-        HALF_TURN,
-        Vector3::repeat(USUAL_INSTALLATION / ARCSEC),
-        "misalignment ± 2°",
-    )?;
-    let bias_sigma = sigma(
-        "bias_sigma",
-        file.bias_sigma,
-        WIDEST_BIAS * nominal.amax(),
-        nominal.abs() * *USUAL_BIAS.get(sensor),
-        match sensor {
-            Sensor::Gyro => "bias ± 2 °/s",
-            Sensor::Accel => "bias ± 1 m/s²",
-        },
-    )?;
-    if !assumed.is_empty() && columns_of(imu, sensor).is_some() {
-        notes.push(format!(
-            "run.toml does not state everything in [imu.prior.{}]. turncal assumed (1σ): {}.",
-            sensor.name(),
-            assumed.join(", ")
-        ));
-    }
-    Ok(Prior {
-        scale_sigma: axes.each(scale_sigma) * PPM,
-        installation_sigma: axes.each(installation_sigma) * ARCSEC,
-        bias: axes.vector(bias.component_div(&nominal)),
-        bias_sigma: axes.each(bias_sigma.component_div(&nominal.abs())),
-    })
-}
-
-/// A 1σ of each axis, as far as it is stated.
-fn stated_sigma(
-    document: Document,
-    path: &str,
-    stated: Option<OneOrThree>,
-    most: f64,
-) -> Result<Option<Vector3<f64>>, FileError> {
-    let stated = stated.map(OneOrThree::vector);
-    match stated.iter().flatten().all(|&s| s > 0.0 && s <= most) {
-        true => Ok(stated),
-        false => {
-            let expected = format_args!("numbers above zero, at most {most}");
-            Err(document.wrong(path, expected, "Correct this value."))
-        }
-    }
 }

@@ -1,13 +1,13 @@
 //! What users write and turncal writes for them: fields of TOML and JSON files as serde structs, and errors that name
 //! line, column and field.
 
-pub mod axes;
 mod calibration_file;
 mod campaign;
 mod document;
 pub mod instrument;
 #[cfg(feature = "certificate")]
 mod laboratory;
+pub mod page;
 mod read;
 mod run;
 mod specification;
@@ -18,8 +18,5 @@ pub use campaign::{Campaign, campaign_text, day_to_day};
 pub use document::Document;
 pub use instrument::term_sigma;
 pub use run::*;
-pub use values::{
-    Angle, Celsius, Finite, Gravity, Height, Latitude, Longitude, Milligals, Names, NonNegative,
-    OneOrThree, Positive,
-};
+pub use values::{Angle, Celsius, Finite, Latitude, Names, NonNegative, OneOrThree, Positive};
 pub use write::{write_rows, write_run};

@@ -7,13 +7,13 @@ use serde::Deserialize;
 use toml::Spanned;
 use toml::de::DeTable;
 
-use super::instrument::InstrumentFields;
-use super::{Document, FORMAT, META, Positive, RunFile, StandstillFile};
+use super::instrument::{Fields, InstrumentFields};
+use super::{Document, FORMAT, META, RunFile, StandstillFile};
 use crate::earth::Site;
 use crate::formats::draft::turned_angle;
-use crate::formats::error::{FileError, Place};
+use crate::formats::error::FileError;
+use crate::formats::imu_log::ImuLog;
 use crate::formats::inputs::segments;
-use crate::formats::inputs::table_log::TableLogFile;
 use crate::formats::small_file;
 use crate::imu::{Instrument, NoiseKeys, Output, PerSensor, Sensor};
 use crate::noise;
@@ -33,38 +33,40 @@ impl Run {
 
     /// The same of the text of a `run.toml` that stands, or would stand, beside this file, and was read from `source`.
     pub fn of_text(path: &Path, text: &str, source: Option<&Path>) -> Result<Self, FileError> {
-        let document = Document { file: path, text };
+        let document = Document::of(path, text);
         let file = run_file(document)?;
         let directory = path.parent().unwrap_or(Path::new(""));
-        let mut notes = Vec::new();
-        let site = site(document, &file, &mut notes)?;
-        let instrument = InstrumentFields::of_file(document, &file, directory, &mut notes)?;
-        let table_log = file
-            .turntable
-            .as_ref()
-            .map(|fields| TableLogFile::of_fields(document, fields, directory, &mut notes));
-        let table_log = table_log.transpose()?;
+        let mut fields = Fields {
+            document,
+            run: &file,
+            directory,
+            notes: Vec::new(),
+        };
+        let site = fields.site()?;
+        let instrument = fields.instrument()?;
+        let table_log = fields.table_log()?;
+        let mut notes = fields.notes;
         let segments_file = file.segments.as_ref().map(|of| directory.join(&of.file));
 
         // The small files' fields are checked before the large files are read.
         let mut files: Vec<PathBuf> = source.map(Path::to_owned).into_iter().collect();
         files.push(instrument.log.source.file.clone());
-        files.extend(other_file(&instrument));
+        files.extend(other_file(&instrument.log));
         files.extend(table_log.as_ref().map(|log| log.source.file.clone()));
         files.extend(segments_file.clone());
-        let imu = samples(&instrument, &mut notes)?;
-        let known = with_noise(&instrument, &imu, &mut notes);
+        let imu = instrument.samples(&mut notes)?;
+        let known = instrument.with_noise(&imu, &mut notes);
         let table = (table_log.as_ref()).map(|log| log.read(&imu, &mut notes));
         let table = table.transpose()?;
         let log = &instrument.log;
         let segments = segments_file
             .map(|file| segments::read(&file, &imu, log.stamp.lag(), log.axes, &mut notes));
         let segments = segments.transpose()?.unwrap_or_default();
-        let position_sigma = file.segments.and_then(|of| of.position_sigma_deg);
+        let position_sigma = (file.segments.as_ref()).and_then(|of| of.position_sigma_deg);
         let mut run = Self {
             recording: Recording {
                 name: name(path),
-                meta: file.meta,
+                meta: file.meta.clone(),
                 imu,
                 table,
                 segments,
@@ -88,10 +90,7 @@ impl Run {
     /// [`FileError`] if not even that can be read.
     pub fn read_meta(path: &Path) -> Result<BTreeMap<String, String>, FileError> {
         let text = text_of(path)?;
-        let document = Document {
-            file: path,
-            text: &text,
-        };
+        let document = Document::of(path, &text);
         #[derive(Deserialize)]
         struct Meta {
             #[serde(default)]
@@ -100,6 +99,20 @@ impl Run {
         let Meta { meta } = fill(document, document.parse()?)?;
         Ok(meta)
     }
+}
+
+/// Refuses a `run.toml` that [`Run::read`] would refuse, whatever is in the files that it names.
+pub fn check(document: Document) -> Result<(), FileError> {
+    let run = run_file(document)?;
+    let mut fields = Fields {
+        document,
+        run: &run,
+        directory: Path::new(""),
+        notes: Vec::new(),
+    };
+    fields.site()?;
+    fields.instrument()?;
+    fields.table_log().map(drop)
 }
 
 /// The fields of a `run.toml`.
@@ -124,122 +137,99 @@ fn fill<'a, T: Deserialize<'a>>(
     document.fill(table)
 }
 
-/// The samples of the record, and what they show against what is stated.
-fn samples(
-    instrument: &InstrumentFields,
-    notes: &mut Vec<String>,
-) -> Result<ImuSamples, FileError> {
-    let mut imu = instrument.log.read(notes)?;
-    if instrument.without_period {
-        imu = with_found_period(imu, instrument, notes)?;
-    }
-    notes.extend(faults::notes(&imu));
-    notes.extend(clock_note(&imu, instrument));
-    Ok(imu)
-}
-
-/// What is known of the instrument, white noise that is not stated being what the record shows.
-fn with_noise(
-    instrument: &InstrumentFields,
-    imu: &ImuSamples,
-    notes: &mut Vec<String>,
-) -> Instrument {
-    let mut known = instrument.known.clone();
-    let mut found = Vec::new();
-    for sensor in Sensor::ALL {
-        if !known.noise_is_stated.get(sensor) && imu.has(sensor) {
-            let random_walk = noise::white_noise(imu, sensor);
-            known.noise.get_mut(sensor).random_walk = random_walk;
-            let (key, unit) = NoiseKeys::of(sensor).random_walk;
-            found.push(format!(
-                "{key} = {}",
-                format_args!("{:.3}", random_walk / unit)
-            ));
-        }
-    }
-    if !found.is_empty() {
-        notes.push(format!(
-            "You stated no white noise. turncal starts with that of the quieter part of the record ({}) and estimates the \
-             noise from there. State the data sheet's figures in [imu.noise] if you know them.",
-            found.join(", ")
-        ));
-    }
-    known
-}
-
 /// The file of the accelerometers, if it is another than that of the gyros.
-fn other_file(instrument: &InstrumentFields) -> Option<PathBuf> {
-    let (source, _) = instrument.log.accel_from.as_ref()?;
-    (source.file != instrument.log.source.file).then(|| source.file.clone())
+fn other_file(log: &ImuLog) -> Option<PathBuf> {
+    let (source, _) = log.accel_from.as_ref()?;
+    (source.file != log.source.file).then(|| source.file.clone())
 }
 
 fn text_of(path: &Path) -> Result<String, FileError> {
-    let advice = "Give the path of a run.toml.";
-    small_file::text(path).map_err(|error| FileError::io(path, "read the run", &error, advice))
+    small_file::text(path, "the run", "Give the path of a run.toml.")
 }
 
-/// Rates of which nothing tells how long a row lasts, with the period at which they turn the instrument as gravity's
-/// direction turns.
-fn with_found_period(
-    imu: ImuSamples,
-    instrument: &InstrumentFields,
-    notes: &mut Vec<String>,
-) -> Result<ImuSamples, FileError> {
-    let rates = |sensor| {
-        imu.of(sensor)
-            .iter()
-            .map(|sample| sample / imu.period)
-            .collect()
-    };
-    let angle = turned_angle(PerSensor::from_fn(rates), imu.period);
-    let Some(period) = angle.filter(|&period| period > 0.0) else {
-        return Err(FileError::new(
-            &instrument.log.source.file,
-            Place::File,
-            "rows without a time, whose turns do not show how long a row lasts",
-            "a time column, or sample_period_s in run.toml",
-            "Add sample_period_s to [imu].",
+impl InstrumentFields<'_> {
+    /// The samples of the record, and what they show against what is stated.
+    fn samples(&self, notes: &mut Vec<String>) -> Result<ImuSamples, FileError> {
+        let mut imu = self.log.read(notes)?;
+        if self.without_period {
+            imu = self.with_found_period(imu, notes)?;
+        }
+        notes.extend(faults::notes(&imu));
+        notes.extend(self.clock_note(&imu));
+        Ok(imu)
+    }
+
+    /// What is known of the instrument, white noise that is not stated being what the record shows.
+    fn with_noise(&self, imu: &ImuSamples, notes: &mut Vec<String>) -> Instrument {
+        let mut known = self.known.clone();
+        let mut found = Vec::new();
+        for sensor in Sensor::ALL {
+            if !known.noise_is_stated.get(sensor) && imu.has(sensor) {
+                let random_walk = noise::white_noise(imu, sensor);
+                known.noise.get_mut(sensor).random_walk = random_walk;
+                let (key, unit) = NoiseKeys::of(sensor).random_walk;
+                found.push(format!("{key} = {:.3}", random_walk / unit));
+            }
+        }
+        if !found.is_empty() {
+            notes.push(format!(
+                "You stated no white noise. turncal starts with that of the quieter part of the record ({}) and \
+                 estimates the noise from there. State the data sheet's figures in [imu.noise] if you know them.",
+                found.join(", ")
+            ));
+        }
+        known
+    }
+
+    /// Rates of which nothing tells how long a row lasts, with the period at which they turn the instrument as
+    /// gravity's direction turns.
+    fn with_found_period(
+        &self,
+        imu: ImuSamples,
+        notes: &mut Vec<String>,
+    ) -> Result<ImuSamples, FileError> {
+        let rates = |sensor| imu.of(sensor).iter().map(|row| row / imu.period).collect();
+        let angle = turned_angle(PerSensor::from_fn(rates), imu.period);
+        let Some(period) = angle.filter(|&period| period > 0.0) else {
+            return Err(FileError::of(
+                &self.log.source.file,
+                "rows without a time, whose turns do not show how long a row lasts",
+                "a time column, or sample_period_s in run.toml",
+                "Add sample_period_s to [imu].",
+            ));
+        };
+        // The scale factors of the gyros are taken to be right on average.
+        let sigma = self.known.prior.gyro.scale_sigma.norm() / 3.0;
+        let percent = 100.0 * sigma;
+        notes.push(format!(
+            "run.toml does not state sample_period_s, and the log has no time. turncal found {period:.4} s ± \
+             {percent:.1} % from the turns, which widens the σ of the gyro scale factors as much."
         ));
-    };
-    // The scale factors of the gyros are taken to be right on average.
-    let sigma = instrument.known.prior.gyro.scale_sigma.norm() / 3.0;
-    notes.push(format!(
-        "run.toml does not state sample_period_s, and the log has no time. turncal found {:.4} s ± {:.1} % from the turns, \
-         which widens the σ of the gyro scale factors as much.",
-        period,
-        100.0 * sigma
-    ));
-    Ok(imu.with_period(period, sigma))
-}
+        Ok(imu.with_period(period, sigma))
+    }
 
-/// What it means that stamps were taken and not `sample_period_s`.
-///
-/// Rates are integrated over the period to angles, increments of velocity divided by it to specific
-/// force: a scale changes by as much as the period.
-fn clock_note(imu: &ImuSamples, instrument: &InstrumentFields) -> Option<String> {
-    let off = imu.log.as_ref()?.off_stated_period?;
-    let (sensor, triad) = match instrument.log.output {
-        Output::Rate => (Sensor::Gyro, "gyros"),
-        Output::Pulse | Output::Increment => (Sensor::Accel, "accelerometers"),
-    };
-    let sigma = instrument.known.prior.get(sensor).scale_sigma.min();
-    let ppm = |part: f64| format!("{:.2}", part / PPM);
-    let found = format!(
-        "Stamps come every {} s, {} ppm {} than sample_period_s says; stamps are taken, and the scale of the \
-         {triad} is by as much another",
-        nanoseconds(imu.period),
-        ppm(off.abs()),
-        if off > 0.0 { "more" } else { "less" },
-    );
-    Some(if off.abs() <= sigma {
-        format!("{found}, within its prior σ of {} ppm.", ppm(sigma))
-    } else {
-        format!(
-            "{found}, beyond its prior σ of {} ppm: if the instrument's clock is right and the stamps are not, \
-             leave the time column out.",
-            ppm(sigma)
-        )
-    })
+    /// What it means that stamps were taken and not `sample_period_s`.
+    ///
+    /// Rates are integrated over the period to angles, increments of velocity divided by it to specific force: a scale
+    /// changes by as much as the period.
+    fn clock_note(&self, imu: &ImuSamples) -> Option<String> {
+        let off = imu.log.as_ref()?.off_stated_period?;
+        let (sensor, triad) = match self.log.output {
+            Output::Rate => (Sensor::Gyro, "gyros"),
+            Output::Pulse | Output::Increment => (Sensor::Accel, "accelerometers"),
+        };
+        let prior = self.known.prior.get(sensor).scale_sigma.min();
+        let (ppm, sigma) = (off.abs() / PPM, prior / PPM);
+        let period = nanoseconds(imu.period);
+        let way = if off > 0.0 { "more" } else { "less" };
+        (off.abs() > prior).then(|| {
+            format!(
+                "Stamps come every {period} s, {ppm:.2} ppm {way} than sample_period_s says; stamps are taken, and the \
+                 scale of the {triad} is by as much another, beyond its prior σ of {sigma:.2} ppm: if the instrument's \
+                 clock is right and the stamps are not, leave the time column out."
+            )
+        })
+    }
 }
 
 /// The name of the directory of a `run.toml`, else the file's own without its endings.
@@ -263,36 +253,36 @@ const USUAL_HEIGHT: f64 = 500.0;
 /// How much gravity falls with height, (m/s²)/m.
 const FREE_AIR: f64 = 0.3086 * MILLIGAL;
 
-fn site(document: Document, run: &RunFile, notes: &mut Vec<String>) -> Result<Site, FileError> {
-    let file = &run.site;
-    if file.latitude_deg.is_none() && run.turntable.is_some() {
-        let meaning = "a latitude, north positive: with a [turntable], Earth rate must be known";
-        return Err(document.missing("site.latitude_deg", meaning));
-    }
-    let longitude = file.longitude_deg.map_or(0.0, |degrees| degrees.0 * DEGREE);
-    let height = file.height_m.map(|height| height.0);
-    let mut site = match file.latitude_deg {
-        Some(degrees) => {
-            Site::with_normal_gravity(degrees.0 * DEGREE, longitude, height.unwrap_or(0.0))
+impl Fields<'_> {
+    fn site(&mut self) -> Result<Site, FileError> {
+        let file = &self.run.site;
+        if file.latitude_deg.is_none() && self.run.turntable.is_some() {
+            let meaning =
+                "a latitude, north positive: with a [turntable], Earth rate must be known";
+            return Err(self.document.missing("site.latitude_deg", meaning));
         }
-        None => Site::unknown(),
-    };
-    if height.is_none() {
-        site.gravity_sigma = site.gravity_sigma.hypot(FREE_AIR * USUAL_HEIGHT);
+        let longitude = file.longitude_deg.map_or(0.0, |degrees| degrees.0 * DEGREE);
+        let height = file.height_m.map(|height| height.0);
+        let mut site = match file.latitude_deg {
+            Some(degrees) => {
+                Site::with_normal_gravity(degrees.0 * DEGREE, longitude, height.unwrap_or(0.0))
+            }
+            None => Site::unknown(),
+        };
+        if height.is_none() {
+            site.gravity_sigma = site.gravity_sigma.hypot(FREE_AIR * USUAL_HEIGHT);
+        }
+        if let Some(gravity) = &file.gravity_m_s2 {
+            let sigma = stated_gravity_sigma(self.document.written(gravity.span()));
+            site = site.with_gravity(gravity.get_ref().0, sigma);
+        }
+        if let Some(sigma) = file.gravity_sigma_mgal {
+            site.gravity_sigma = sigma.0 * MILLIGAL;
+        }
+        let note = place_note(&site, file.gravity_m_s2.is_some(), height.is_some());
+        self.notes.extend(note);
+        Ok(site)
     }
-    if let Some(gravity) = &file.gravity_m_s2 {
-        let sigma = stated_gravity_sigma(document.written(gravity.span()));
-        site = site.with_gravity(gravity.get_ref().0, sigma);
-    }
-    if let Some(sigma) = file.gravity_sigma_mgal {
-        site.gravity_sigma = sigma.0 * MILLIGAL;
-    }
-    notes.extend(place_note(
-        &site,
-        file.gravity_m_s2.is_some(),
-        height.is_some(),
-    ));
-    Ok(site)
 }
 
 /// What it costs that latitude, height or gravity are not stated.
@@ -307,27 +297,21 @@ fn place_note(site: &Site, has_gravity: bool, has_height: bool) -> Option<String
         (true, false) => ("height", "height_m (--height)"),
         (true, true) => return None,
     };
-    let earth_rate =
-        "estimated Earth rate as an unknown vector, which widens the σ of the gyro biases"
-            .to_owned();
-    let gravity = format!(
-        "assumed a gravity of {:.4} ± {:.4} m/s², which widens the σ of the accelerometer scale factors",
-        site.gravity, site.gravity_sigma
-    );
-    let costs = [
-        (!site.is_known).then_some(earth_rate),
-        (!has_gravity).then_some(gravity),
-    ];
-    let costs = costs
-        .into_iter()
-        .flatten()
-        .collect::<Vec<_>>()
-        .join("; it ");
-    let or_gravity = if has_gravity {
-        ""
-    } else {
-        ", or gravity_m_s2 (--gravity)"
-    };
+    let mut costs = Vec::new();
+    if !site.is_known {
+        let words =
+            "estimated Earth rate as an unknown vector, which widens the σ of the gyro biases";
+        costs.push(words.to_owned());
+    }
+    let mut or_gravity = "";
+    if !has_gravity {
+        costs.push(format!(
+            "assumed a gravity of {:.4} ± {:.4} m/s², which widens the σ of the accelerometer scale factors",
+            site.gravity, site.gravity_sigma
+        ));
+        or_gravity = ", or gravity_m_s2 (--gravity)";
+    }
+    let costs = costs.join("; it ");
     (!costs.is_empty()).then(|| {
         format!("You stated no {missing}. turncal {costs}. State {fields} in [site]{or_gravity}.")
     })
@@ -344,13 +328,13 @@ fn stated_gravity_sigma(written: &str) -> f64 {
 
 fn standstill(file: &StandstillFile) -> Standstill {
     let usual = Standstill::default();
-    let or = |stated: Option<Positive>, usual| stated.map_or(usual, |stated| stated.0);
+    let (turning, position) = (file.turning_deg_per_sqrt_s, file.position_sigma_m);
     Standstill {
         sigma: PerSensor {
-            gyro: (file.attitude_sigma_arcsec.map(|sigma| sigma.0 * ARCSEC)).or(usual.sigma.gyro),
-            accel: (file.velocity_sigma_m_s.map(|sigma| sigma.0)).or(usual.sigma.accel),
+            gyro: file.attitude_sigma_arcsec.map(|sigma| sigma.0 * ARCSEC),
+            accel: file.velocity_sigma_m_s.map(|sigma| sigma.0),
         },
-        turning: (file.turning_deg_per_sqrt_s).map_or(usual.turning, |of| of.0 * DEGREE),
-        position_sigma: or(file.position_sigma_m, usual.position_sigma),
+        turning: turning.map_or(usual.turning, |of| of.0 * DEGREE),
+        position_sigma: position.map_or(usual.position_sigma, |of| of.0),
     }
 }

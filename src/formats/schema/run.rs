@@ -2,10 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use toml::Spanned;
 
-use super::axes::BodyAxes;
 use super::values::{
     Angle, Finite, Gravity, Height, Latitude, Longitude, Milligals, Names, NonNegative, OneOrThree,
     Positive,
@@ -13,7 +12,7 @@ use super::values::{
 use crate::formats::clock::TimeUnit;
 use crate::formats::imu_log::TimeStamp;
 use crate::formats::inputs::temperature::TemperatureUnit;
-use crate::imu::Output;
+use crate::imu::{AxisOrder, Output, Sensor};
 
 /// The version of the format.
 pub const FORMAT: &str = "turncal-run/1";
@@ -30,12 +29,12 @@ pub const META: [&str; 8] = [
     "notes",
 ];
 
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunFile {
     #[serde(default)]
     pub site: SiteFile,
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(default)]
     pub meta: BTreeMap<String, String>,
     pub imu: ImuFile,
     #[serde(default)]
@@ -44,7 +43,7 @@ pub struct RunFile {
     pub segments: Option<SegmentsFile>,
 }
 
-#[derive(Default, Serialize, Deserialize)]
+#[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SiteFile {
     pub latitude_deg: Option<Latitude>,
@@ -55,7 +54,7 @@ pub struct SiteFile {
     pub gravity_sigma_mgal: Option<Milligals>,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ImuFile {
     pub file: String,
@@ -73,7 +72,7 @@ pub struct ImuFile {
     pub continuous: Option<bool>,
     pub instance: Option<InstanceFile>,
     pub temperature_unit: Option<TemperatureUnit>,
-    pub body_axes: Option<BodyAxes>,
+    pub body_axes: Option<AxisOrder>,
     pub columns: ImuColumns,
     /// By the names of [`crate::imu::NoiseKeys`].
     #[serde(default)]
@@ -81,12 +80,33 @@ pub struct ImuFile {
     #[serde(default)]
     pub prior: PriorsFile,
     /// By the names of error terms.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    #[serde(default)]
     pub terms: BTreeMap<String, TermFile>,
 }
 
+/// What `[imu]` says of a triad.
+pub struct TriadFields<'a> {
+    pub columns: Option<&'a Names<3>>,
+    pub unit: Option<&'a str>,
+    pub full_scale: Option<f64>,
+    pub prior: &'a PriorFile,
+}
+
+impl ImuFile {
+    pub fn of(&self, sensor: Sensor) -> TriadFields<'_> {
+        let (columns, prior) = (&self.columns, &self.prior);
+        let full_scale = sensor.pick(self.gyro_full_scale, self.accel_full_scale);
+        TriadFields {
+            columns: sensor.pick(&columns.gyro, &columns.accel).as_ref(),
+            unit: sensor.pick(&self.gyro_unit, &self.accel_unit).as_deref(),
+            full_scale: full_scale.map(|of| of.0),
+            prior: sensor.pick(&prior.gyro, &prior.accel),
+        }
+    }
+}
+
 /// What it does not say is as in `[imu]`.
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AccelFromFile {
     pub file: Option<String>,
@@ -98,14 +118,14 @@ pub struct AccelFromFile {
 }
 
 /// The column that tells instruments apart, and what it says of the one that is meant.
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InstanceFile {
     pub column: String,
     pub number: Finite,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ImuColumns {
     pub time: Option<TimeColumn>,
@@ -114,7 +134,7 @@ pub struct ImuColumns {
     pub temperature: Option<TemperatureColumn>,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(
     untagged,
     expecting = "the name of a column, or those of seconds and nanoseconds"
@@ -124,7 +144,7 @@ pub enum TimeColumn {
     SecondsAndNanoseconds([String; 2]),
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(
     untagged,
     deny_unknown_fields,
@@ -133,26 +153,19 @@ pub enum TimeColumn {
 pub enum TemperatureColumn {
     One(String),
     Triads {
-        gyro: ThreeColumns,
-        accel: ThreeColumns,
+        gyro: OneOrThree<String>,
+        accel: OneOrThree<String>,
     },
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(untagged)]
-pub enum ThreeColumns {
-    One(String),
-    Three([String; 3]),
-}
-
-#[derive(Default, Serialize, Deserialize)]
+#[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PriorsFile {
     pub gyro: PriorFile,
     pub accel: PriorFile,
 }
 
-#[derive(Default, Serialize, Deserialize)]
+#[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PriorFile {
     pub scale: Option<OneOrThree>,
@@ -163,13 +176,13 @@ pub struct PriorFile {
 }
 
 /// 1σ of each parameter of an error term, around zero.
-#[derive(Clone, Copy, Serialize, Deserialize)]
+#[derive(Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TermFile {
     pub sigma: Positive,
 }
 
-#[derive(Default, Serialize, Deserialize)]
+#[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StandstillFile {
     pub velocity_sigma_m_s: Option<Positive>,
@@ -178,7 +191,7 @@ pub struct StandstillFile {
     pub position_sigma_m: Option<Positive>,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TurntableFile {
     pub file: String,
@@ -198,22 +211,26 @@ pub struct TurntableFile {
     pub time_sigma_ms: Option<Positive>,
 }
 
+/// Keys of errors of the axes, in the order of [`crate::turntable::AxisError::ALL`].
+pub const AXIS_ERRORS: [&str; 3] = [
+    "nonorthogonality_sigma_arcsec",
+    "wobble_sigma_arcsec",
+    "encoder_sigma_arcsec",
+];
+
 impl TurntableFile {
-    /// Keys and 1σ of errors of the axes, in the order of [`crate::turntable::AxisError::ALL`].
-    pub fn axis_errors(&self) -> [(&'static str, Option<Angle>); 3] {
+    /// 1σ of errors of the axes, in the same order.
+    pub fn axis_errors(&self) -> [Option<Angle>; 3] {
         [
-            (
-                "nonorthogonality_sigma_arcsec",
-                self.nonorthogonality_sigma_arcsec,
-            ),
-            ("wobble_sigma_arcsec", self.wobble_sigma_arcsec),
-            ("encoder_sigma_arcsec", self.encoder_sigma_arcsec),
+            self.nonorthogonality_sigma_arcsec,
+            self.wobble_sigma_arcsec,
+            self.encoder_sigma_arcsec,
         ]
     }
 }
 
 /// A quaternion `[w, x, y, z]`, or angles about axes, outermost first, or both.
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TableColumns {
     pub time: TimeColumn,
@@ -222,7 +239,7 @@ pub struct TableColumns {
     pub axes: Option<Vec<String>>,
 }
 
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SegmentsFile {
     pub file: String,

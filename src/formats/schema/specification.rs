@@ -41,14 +41,12 @@ enum LimitsFile {
 impl Specification {
     /// Reads and checks a specification.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let text = small_file::text(path).map_err(|error| {
-            let advice = "Give the path of a specification.toml.";
-            FileError::io(path, "read the specification", &error, advice)
-        })?;
-        let document = Document {
-            file: path,
-            text: &text,
-        };
+        let text = small_file::text(
+            path,
+            "the specification",
+            "Give the path of a specification.toml.",
+        )?;
+        let document = Document::of(path, &text);
         let file: SpecificationFile = document.fill(document.of_format(FORMAT)?)?;
         let confidence = file.confidence.unwrap_or(CONFIDENCE);
         if !(0.5..1.0).contains(&confidence) {

@@ -1,15 +1,14 @@
 //! Values that are checked where they are read, so that the error names their line.
 
 use nalgebra::Vector3;
+use serde::Deserialize;
 use serde::de::{Deserializer, Error};
-use serde::ser::Serializer;
-use serde::{Deserialize, Serialize};
 
-use super::axes::BodyAxes;
 use crate::formats::clock::TimeUnit;
 use crate::formats::error::list;
 use crate::formats::imu_log::TimeStamp;
 use crate::formats::inputs::temperature::TemperatureUnit;
+use crate::imu::AxisOrder;
 
 /// Squares and quotients of such numbers are still numbers.
 fn with_size(value: f64) -> Result<f64, &'static str> {
@@ -23,8 +22,8 @@ fn with_size(value: f64) -> Result<f64, &'static str> {
 macro_rules! checked {
     ($($(#[$meta:meta])* $name:ident, $says:literal, $holds:expr;)+) => {$(
         $(#[$meta])*
-        #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-        #[serde(try_from = "f64", into = "f64")]
+        #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+        #[serde(try_from = "f64")]
         pub struct $name(pub f64);
 
         impl TryFrom<f64> for $name {
@@ -36,12 +35,6 @@ macro_rules! checked {
                     true => Ok(Self(value)),
                     false => Err($says),
                 }
-            }
-        }
-
-        impl From<$name> for f64 {
-            fn from(value: $name) -> f64 {
-                value.0
             }
         }
     )+};
@@ -72,12 +65,12 @@ checked!(
     Celsius, "a number from -100 to 100", |v| v.abs() <= 100.0;
 );
 
-/// Three values, or one for all three axes.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+/// A value of each axis, or one for all three.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(untagged, expecting = "three numbers, or one for all axes")]
-pub enum OneOrThree {
-    One(Finite),
-    Three([Finite; 3]),
+pub enum OneOrThree<T = Finite> {
+    One(T),
+    Three([T; 3]),
 }
 
 impl OneOrThree {
@@ -89,15 +82,9 @@ impl OneOrThree {
     }
 }
 
-impl From<Vector3<f64>> for OneOrThree {
-    fn from(v: Vector3<f64>) -> Self {
-        Self::Three([Finite(v.x), Finite(v.y), Finite(v.z)])
-    }
-}
-
 /// So many names of columns.
-#[derive(Clone, Serialize, Deserialize)]
-#[serde(try_from = "Vec<String>", into = "Vec<String>")]
+#[derive(Clone, Deserialize)]
+#[serde(try_from = "Vec<String>")]
 pub struct Names<const N: usize>(pub [String; N]);
 
 impl<const N: usize> TryFrom<Vec<String>> for Names<N> {
@@ -111,12 +98,6 @@ impl<const N: usize> TryFrom<Vec<String>> for Names<N> {
     }
 }
 
-impl<const N: usize> From<Names<N>> for Vec<String> {
-    fn from(names: Names<N>) -> Self {
-        names.0.into()
-    }
-}
-
 /// Types that a table of words stands for.
 macro_rules! by_words {
     ($($name:ident),+) => {$(
@@ -125,20 +106,13 @@ macro_rules! by_words {
                 by_word(&Self::WORDS, &String::deserialize(deserializer)?)
             }
         }
-
-        impl Serialize for $name {
-            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-                let known = Self::WORDS.iter().find(|(_, meaning)| meaning == self);
-                serializer.serialize_str(known.map_or("", |(word, _)| word))
-            }
-        }
     )+};
 }
 
-by_words!(BodyAxes, TemperatureUnit, TimeStamp);
+by_words!(AxisOrder, TemperatureUnit, TimeStamp);
 
 /// A word, or what a tick of a clock of its own lasts, s.
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 #[serde(untagged, expecting = "a unit of time, or what a tick lasts in s")]
 enum TimeUnitFile {
     Tick(Positive),
@@ -152,16 +126,6 @@ impl<'de> Deserialize<'de> for TimeUnit {
             TimeUnitFile::Word(word) => word,
         };
         by_word(&Self::WORDS, &word)
-    }
-}
-
-impl Serialize for TimeUnit {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let known = Self::WORDS.iter().find(|(_, meaning)| meaning == self);
-        match (known, self) {
-            (None, Self::PerSecond(ticks)) => serializer.serialize_f64(ticks.recip()),
-            (known, _) => serializer.serialize_str(known.map_or("", |(word, _)| word)),
-        }
     }
 }
 

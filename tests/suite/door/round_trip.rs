@@ -83,7 +83,10 @@ fn pulses_come_back_exactly() {
 fn a_run_that_could_not_be_read_is_not_written() {
     let directory = tempfile::tempdir().unwrap();
     let error = write_run(directory.path(), &made_run("x"), Output::Pulse, None).unwrap_err();
-    assert!(error.to_string().contains("gyro_unit = `rad`"), "{error}");
+    assert!(
+        error.to_string().contains("imu.gyro_unit = \"rad\""),
+        "{error}"
+    );
     let mut run = made_run("x");
     run.recording
         .meta

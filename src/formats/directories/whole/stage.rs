@@ -8,7 +8,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use super::{FileError, Place, taken, unwritable};
+use super::{FileError, taken, unwritable};
 
 const PREFIX: &str = ".turncal-";
 /// Locked as long as the process lives that made the stage.
@@ -63,9 +63,8 @@ pub struct Stage {
 impl Stage {
     pub fn new(target: &Path) -> Result<Self, FileError> {
         if target.file_name().is_none() {
-            return Err(FileError::new(
+            return Err(FileError::of(
                 target,
-                Place::File,
                 "a path without a name of its own",
                 "the name of something to be written",
                 "Give a name that does not end in `..` or `/`.",
@@ -100,9 +99,8 @@ impl Stage {
                 Err(file.map_or_else(
                     || unwritable(target, "write here", &error),
                     |file| {
-                        FileError::new(
+                        FileError::of(
                             target,
-                            Place::File,
                             format_args!("a file, {}, on the way", file.display()),
                             "directories",
                             "Choose another name.",

@@ -28,10 +28,8 @@ impl KalibrImu {
     /// # Errors
     /// [`FileError`] if the file cannot be read, lacks a noise density, or states a wrong number or a key twice.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let text = small_file::text(path).map_err(|error| {
-            let advice = "Correct the name or add the file.";
-            FileError::io(path, "read the noise figures", &error, advice)
-        })?;
+        let advice = "Correct the name or add the file.";
+        let text = small_file::text(path, "the noise figures", advice)?;
         Self::of_text(path, &text)
     }
 
@@ -86,10 +84,10 @@ impl KalibrImu {
 
 /// The keys of a triad's white noise, and of the random walk of its bias.
 fn keys(sensor: Sensor) -> [&'static str; 2] {
-    match sensor {
-        Sensor::Gyro => ["gyroscope_noise_density", "gyroscope_random_walk"],
-        Sensor::Accel => ["accelerometer_noise_density", "accelerometer_random_walk"],
-    }
+    sensor.pick(
+        ["gyroscope_noise_density", "gyroscope_random_walk"],
+        ["accelerometer_noise_density", "accelerometer_random_walk"],
+    )
 }
 
 /// A bias that grows like the random walk over times short against its correlation time.
@@ -106,13 +104,7 @@ fn missing(path: &Path, key: &str, others: &[&str]) -> FileError {
         Some(other) => format!("Rename `{other}`, or add the line."),
         None => "Add the line.".to_owned(),
     };
-    FileError::new(
-        path,
-        Place::File,
-        found,
-        "a noise density of each triad",
-        advice,
-    )
+    FileError::of(path, found, "a noise density of each triad", advice)
 }
 
 #[cfg(test)]

@@ -51,10 +51,7 @@ impl StatedUnit {
                 .flat_map(|(_, output)| units(sensor, output));
             let words: BTreeSet<&str> = all.map(|(word, _)| word).collect();
             let words: Vec<&str> = words.into_iter().collect();
-            let example = match sensor {
-                Sensor::Gyro => "1/131 deg/s",
-                Sensor::Accel => "1/16384 g",
-            };
+            let example = sensor.pick("1/131 deg/s", "1/16384 g");
             let words = words.join(", ");
             format!("expected one of {words}, or what one count is, such as '{example}'")
         })
