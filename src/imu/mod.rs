@@ -56,6 +56,14 @@ impl Sensor {
             Self::Accel => "accel",
         }
     }
+
+    /// The first for the gyros, the second for the accelerometers.
+    pub(crate) fn pick<T>(self, gyro: T, accel: T) -> T {
+        match self {
+            Self::Gyro => gyro,
+            Self::Accel => accel,
+        }
+    }
 }
 
 /// One value for the gyros and one for the accelerometers.
@@ -70,18 +78,12 @@ pub struct PerSensor<T> {
 impl<T> PerSensor<T> {
     /// The value of one triad.
     pub fn get(&self, sensor: Sensor) -> &T {
-        match sensor {
-            Sensor::Gyro => &self.gyro,
-            Sensor::Accel => &self.accel,
-        }
+        sensor.pick(&self.gyro, &self.accel)
     }
 
     /// A mutable reference to the value of one triad.
     pub fn get_mut(&mut self, sensor: Sensor) -> &mut T {
-        match sensor {
-            Sensor::Gyro => &mut self.gyro,
-            Sensor::Accel => &mut self.accel,
-        }
+        sensor.pick(&mut self.gyro, &mut self.accel)
     }
 
     /// Builds both values from a function of the triad.

@@ -152,10 +152,7 @@ impl Scenario {
             None => Cow::Owned(Drive::new(self, imperfection, terms)?),
         };
         let draw = |sensor: Sensor| {
-            let draws = match sensor {
-                Sensor::Gyro => Draws::GyroTruth,
-                Sensor::Accel => Draws::AccelTruth,
-            };
+            let draws = sensor.pick(Draws::GyroTruth, Draws::AccelTruth);
             self.draw_truth(sensor, &mut draws.generator(seed, instrument))
         };
         let common = PerSensor::from_fn(draw);

@@ -225,6 +225,41 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// Whole numbers of this many bytes.
+    pub fn whole_number(is_signed: bool, size: usize) -> Option<Self> {
+        Some(match (is_signed, size) {
+            (true, 1) => Self::I8,
+            (true, 2) => Self::I16,
+            (true, 4) => Self::I32,
+            (true, 8) => Self::I64,
+            (false, 1) => Self::U8,
+            (false, 2) => Self::U16,
+            (false, 4) => Self::U32,
+            (false, 8) => Self::U64,
+            _ => return None,
+        })
+    }
+
+    /// By the name in C and ROS, such as `uint16_t` and `float32`.
+    #[cfg_attr(
+        not(any(feature = "mcap", feature = "rosbag", feature = "ulog")),
+        allow(dead_code)
+    )]
+    pub fn named(name: &str) -> Option<Self> {
+        match name {
+            "bool" => return Some(Self::U8),
+            "float" | "float32" => return Some(Self::F32),
+            "double" | "float64" => return Some(Self::F64),
+            _ => {}
+        }
+        let name = name.strip_suffix("_t").unwrap_or(name);
+        let (is_signed, bits) = match name.strip_prefix("uint") {
+            Some(bits) => (false, bits),
+            None => (true, name.strip_prefix("int")?),
+        };
+        Self::whole_number(is_signed, bits.parse::<usize>().ok()? / 8)
+    }
+
     /// Bytes.
     pub fn size(self) -> usize {
         match self {

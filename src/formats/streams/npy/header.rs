@@ -117,17 +117,14 @@ fn item_kind(text: &str) -> Option<(Option<(Kind, bool)>, usize)> {
     let kind = match (letter, size) {
         ("f", 4) => Kind::F32,
         ("f", 8) => Kind::F64,
-        ("i", 1) => Kind::I8,
-        ("i", 2) => Kind::I16,
-        ("i", 4) => Kind::I32,
-        ("i" | "M" | "m", 8) => Kind::I64,
-        ("u" | "b", 1) => Kind::U8,
-        ("u", 2) => Kind::U16,
-        ("u", 4) => Kind::U32,
-        ("u", 8) => Kind::U64,
+        ("M" | "m", 8) => Kind::I64,
+        ("b", 1) => Kind::U8,
         // Text is of four bytes a letter.
         ("U", _) => return Some((None, 4 * size)),
-        _ => return Some((None, size)),
+        _ => match Kind::whole_number(letter == "i", size) {
+            Some(kind) if matches!(letter, "i" | "u") => kind,
+            _ => return Some((None, size)),
+        },
     };
     Some((Some((kind, order == ">")), size))
 }
