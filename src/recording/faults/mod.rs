@@ -180,8 +180,7 @@ fn find(
         let spikes = &spikes[column];
         let stuck = axes[column].stuck(limit);
         let triad = [0, 1, 2].map(|axis| &axes[column - column % 3 + axis]);
-        let known = (spikes.as_slice(), stuck.as_slice());
-        let saturated = saturated(triad, column % 3, full_scale[column], known, limit);
+        let saturated = saturated(triad, column % 3, full_scale[column], spikes, limit);
         // The row before a run has its value.
         let free = |rows: &Range<usize>| {
             !saturated
