@@ -1,7 +1,7 @@
 //! The instrument's samples.
 
-mod content;
 mod parts;
+mod reading;
 
 use nalgebra::Vector3;
 
@@ -14,8 +14,8 @@ use super::source::Source;
 use super::temperature::TemperatureColumns;
 use crate::imu::{Nominal, Output, PerSensor, Sensor};
 use crate::recording::{FileColumn, ImuSamples, NamedColumns};
-use content::Reading;
 use parts::Sizes;
+use reading::Reading;
 
 /// Which moment of a sample its time stamp names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

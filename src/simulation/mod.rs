@@ -225,16 +225,11 @@ impl Scenario {
         ];
         Run {
             recording: Recording {
-                name: self.name.clone(),
                 meta: meta
                     .map(|(key, value)| (key.to_owned(), value.clone()))
                     .into(),
-                imu,
                 table: Some(table),
-                segments: Vec::new(),
-                files: Vec::new(),
-                notes: Vec::new(),
-                doubts: Vec::new(),
+                ..Recording::of(&self.name, imu)
             },
             instrument: self.known_instrument(),
             site: self.site,

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use super::content::Held;
+use super::reading::Held;
 use super::{ImuLog, Layout, sensor};
 use crate::formats::clock::{Line, REACH, Stamps, Uniform, Wander};
 use crate::formats::course::{Even, place, reached};

@@ -201,6 +201,18 @@ impl<'a> Slice<'a> {
         usize::try_from(length).map_err(|_| Broken::new(self.offset(), length, what))
     }
 
+    /// What follows its own length of this many bytes.
+    pub fn measured(&mut self, size: usize, what: &str) -> Result<&'a [u8], Broken> {
+        let length = self.length(size, "a length")?;
+        self.take(length, what)
+    }
+
+    /// The same of a text.
+    pub fn measured_text(&mut self, size: usize, what: &str) -> Result<String, Broken> {
+        let length = self.length(size, "a length")?;
+        self.text(length, what)
+    }
+
     /// A text of this length; what is no UTF-8 in it is replaced.
     pub fn text(&mut self, count: usize, what: &str) -> Result<String, Broken> {
         let bytes = self.take(count, what)?;

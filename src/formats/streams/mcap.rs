@@ -83,8 +83,7 @@ impl Mcap {
         if self.at < self.chunk.len() {
             let mut chunk = Slice::packed(&self.chunk[self.at..], self.offset);
             let kind = chunk.whole(1, "a record's kind")? as u8;
-            let length = chunk.length(8, "a record's length")?;
-            let content = chunk.take(length, "a record of a chunk")?;
+            let content = chunk.measured(8, "a record of a chunk")?;
             self.record.clear();
             self.record.extend_from_slice(content);
             self.at += chunk.position();
@@ -121,10 +120,8 @@ impl Mcap {
         record.take(16, "the times of a chunk")?;
         let size = record.whole(8, "the size of a chunk")?;
         let sum = record.whole(4, "the checksum of a chunk")? as u32;
-        let length = record.length(4, "a length")?;
-        let method = record.text(length, "how a chunk is packed")?;
-        let length = record.length(8, "a length")?;
-        let packed = record.take(length, "a chunk")?;
+        let method = record.measured_text(4, "how a chunk is packed")?;
+        let packed = record.measured(8, "a chunk")?;
         self.chunk = unpack(&method, packed, size, self.offset)?;
         self.at = 0;
         let mut found = flate2::Crc::new();
@@ -144,12 +141,9 @@ impl Mcap {
     fn schema(&mut self) -> Result<(), Broken> {
         let mut record = Slice::packed(&self.record, self.offset);
         let number = record.whole(2, "a schema's number")? as u16;
-        let length = record.length(4, "a length")?;
-        let name = record.text(length, "a schema's name")?;
-        let length = record.length(4, "a length")?;
-        let encoding = record.text(length, "a schema's encoding")?;
-        let length = record.length(4, "a length")?;
-        let data = record.take(length, "a schema")?.to_vec();
+        let name = record.measured_text(4, "a schema's name")?;
+        let encoding = record.measured_text(4, "a schema's encoding")?;
+        let data = record.measured(4, "a schema")?.to_vec();
         let schema = Schema {
             name,
             encoding,
@@ -163,10 +157,8 @@ impl Mcap {
         let mut record = Slice::packed(&self.record, self.offset);
         let number = record.whole(2, "a channel's number")? as u16;
         let schema = record.whole(2, "a schema's number")? as u16;
-        let length = record.length(4, "a length")?;
-        let topic = record.text(length, "a topic")?;
-        let length = record.length(4, "a length")?;
-        let encoding = record.text(length, "an encoding of messages")?;
+        let topic = record.measured_text(4, "a topic")?;
+        let encoding = record.measured_text(4, "an encoding of messages")?;
         let reader = || match self.schemas.get(&schema) {
             Some(schema) => reader(&encoding, schema),
             None if encoding == "json" => Reader::Json(Vec::new()),

@@ -86,9 +86,8 @@ impl Bag {
         if self.at < self.chunk.len() {
             let mut chunk = Slice::packed(&self.chunk[self.at..], self.offset);
             for part in [&mut self.head, &mut self.data] {
-                let length = chunk.length(4, "a length")?;
                 part.clear();
-                part.extend_from_slice(chunk.take(length, "a record of a chunk")?);
+                part.extend_from_slice(chunk.measured(4, "a record of a chunk")?);
             }
             self.at += chunk.position();
             if Head::of(&self.head, self.offset)?.field("op") == Some(&[CHUNK]) {
@@ -136,8 +135,7 @@ impl<'a> Head<'a> {
         let mut slice = Slice::packed(bytes, offset);
         let mut fields = Vec::new();
         while slice.left() > 0 {
-            let length = slice.length(4, "the length of a field")?;
-            let field = slice.take(length, "a field")?;
+            let field = slice.measured(4, "a field")?;
             let equals = field.iter().position(|&byte| byte == b'=');
             let Some(equals) = equals else {
                 return Err(Broken::new(offset, "a field without `=`", "`name=value`"));

@@ -37,8 +37,7 @@ impl Parameters {
     }
 
     pub fn take(&mut self, content: &mut Slice) -> Result<(), Broken> {
-        let length = content.length(1, "the length of a parameter's name")?;
-        let key = content.text(length, "a parameter's name")?;
+        let key = content.measured_text(1, "a parameter's name")?;
         let offset = content.offset();
         let (kind, name) = match key.split_once(' ') {
             Some(("float", name)) => (Kind::F32, name),
