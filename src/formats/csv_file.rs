@@ -1,6 +1,5 @@
 //! Rows of numbers below a line of names, plain or gzipped, read row by row without keeping their text.
 
-mod ahead;
 mod clock_text;
 mod heading;
 mod lines;
@@ -17,7 +16,6 @@ use flate2::read::MultiGzDecoder;
 use super::error::{FileError, Place};
 use super::rows::Rows;
 use crate::room;
-use ahead::Ahead;
 use heading::{Heading, Looks};
 use lines::{LONGEST, Lines, Stop};
 use row::{LONGEST_FIELD, MOST_COLUMNS, Malformed, Row};
@@ -289,24 +287,17 @@ fn source(path: &Path) -> Result<Box<dyn BufRead>, FileError> {
             "Copy what it gives into a file and name that.",
         ));
     }
-    let opened = || {
-        let file = File::open(path).map_err(refused)?;
-        Ok(BufReader::with_capacity(1 << 16, file))
-    };
-    let mut plain = opened()?;
+    let file = File::open(path).map_err(refused)?;
+    let mut plain = BufReader::with_capacity(1 << 16, file);
     let begin = plain
         .fill_buf()
         .map_err(|error| stopped(path, &Stop::System(error)))?;
-    if !begin.starts_with(&GZIP) {
-        return Ok(Box::new(plain));
-    }
-    Ok(match Ahead::of(MultiGzDecoder::new(plain)) {
-        Ok(ahead) => Box::new(ahead),
-        // The system lets no thread be started.
-        Err(_) => Box::new(BufReader::with_capacity(
+    Ok(match begin.starts_with(&GZIP) {
+        true => Box::new(BufReader::with_capacity(
             1 << 16,
-            MultiGzDecoder::new(opened()?),
+            MultiGzDecoder::new(plain),
         )),
+        false => Box::new(plain),
     })
 }
 

@@ -1,24 +1,20 @@
 //! The instrument's samples.
 
-mod content;
 mod parts;
+mod reading;
 
 use nalgebra::Vector3;
 
-use super::clock::{Clock, Uniform};
-use super::course::place;
+use super::clock::Clock;
 use super::error::FileError;
 use super::joined::{self, Joined, Part};
 use super::rows::LogRows;
 use super::source::Source;
 use super::temperature::TemperatureColumns;
 use crate::imu::{AxisOrder, Nominal, Output, PerSensor, Sensor};
-use crate::recording::{
-    Bridge, ColumnFacts, Fault, FileColumn, ImuSamples, LogFacts, NamedColumns, Series,
-    stretches_between,
-};
-use content::Content;
+use crate::recording::{FileColumn, ImuSamples, NamedColumns};
 use parts::Sizes;
+use reading::Reading;
 
 /// Which moment of a sample its time stamp names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -117,27 +113,6 @@ impl Layout {
     }
 }
 
-/// The pulse whose rounding has this RMS error on each axis: an error of integrals between edges is as bounded as
-/// that, and as independent of how long it is summed over.
-fn pulse_of(error: [f64; 3]) -> f64 {
-    12f64.sqrt() * Vector3::from(error).norm() / 3f64.sqrt()
-}
-
-/// What was read.
-pub struct Read {
-    clock: Uniform,
-    facts: [ColumnFacts; 6],
-    /// Rows of the file.
-    rows: usize,
-    /// Samples without a row.
-    missing: usize,
-    faults: Vec<Fault>,
-    bridges: Vec<Bridge>,
-    series: PerSensor<Series>,
-    /// RMS errors of integrals that samples put on another clock have, in the columns' quantity times samples.
-    error: PerSensor<[f64; 3]>,
-}
-
 impl ImuLog<'_> {
     /// What a row's value is to be taken for to be an integral over its sample.
     fn seconds(&self, period: f64) -> f64 {
@@ -154,89 +129,36 @@ impl ImuLog<'_> {
     }
 
     fn read_by(&self, sizes: Sizes, notes: &mut Vec<String>) -> Result<ImuSamples, FileError> {
-        let Content {
-            layout,
-            stamps,
-            read,
-            temperature,
-        } = self.content(sizes, notes, None)?;
-        let missing = read.missing;
-        let mut imu = self.samples(&layout, read);
-        for stretch in &mut imu.stretches {
-            stretch.start = stamps.told(stretch.start);
-        }
-        notes.extend(stamps.notes(&self.source.file, missing));
-        if let Some(temperature) = temperature {
-            let read = temperature.read(&self.source.file.display().to_string());
-            notes.extend(read.notes);
-            imu.temperature = read.temperature;
-            if let Some(log) = &mut imu.log {
-                log.temperature = read.facts;
+        let mut known = None;
+        loop {
+            let mut csv = self.open()?;
+            let layout = self.layout(&mut csv)?;
+            let mut reading = Reading::begin(self, &mut csv, layout.places)?;
+            let parts = reading.all(&mut csv, &layout, sizes, known.as_ref())?;
+            let clock = parts.clock().map_err(|error| csv.placed(error))?;
+            if parts.are_packed() && known.is_none() && clock.wander.is_some() {
+                // Too long to be held: it is read again with the clock that it was found to have.
+                known = clock.wander;
+                continue;
             }
-        }
-        Ok(imu)
-    }
-
-    fn samples(&self, layout: &Layout, read: Read) -> ImuSamples {
-        let Read {
-            clock,
-            facts,
-            rows,
-            missing: _,
-            faults,
-            bridges,
-            series,
-            error,
-        } = read;
-        let period = clock.period;
-        let units = layout.units(self, period);
-        // Pulses are rounded a second time where packed ones are interpolated: what is not whole there stays with the
-        // sum.
-        let roundings: f64 = match self.output {
-            Output::Pulse if series.gyro.is_packed() && !bridges.is_empty() => 2.0,
-            _ => 1.0,
-        };
-        let pulse = PerSensor::from_fn(|sensor| {
-            let step = match self.output {
-                Output::Pulse => self.nominal.get(sensor).0.map(|n| n.abs().recip()).mean(),
-                Output::Increment | Output::Rate => series.get(sensor).step(),
-            };
-            let of_column = |k: usize| error.get(sensor)[k] * units[3 * sensor as usize + k];
-            (step * roundings.sqrt()).hypot(pulse_of([0, 1, 2].map(of_column)))
-        });
-        let lag = self.stamp.lag();
-        let ahead = clock.wander.as_ref();
-        let ahead = ahead.map_or(0.0, |wander| place(wander, lag, 0).ceil());
-        let mut of_axes = PerSensor::<[ColumnFacts; 3]>::default();
-        for (k, facts) in facts.into_iter().enumerate() {
-            of_axes.get_mut(sensor(k))[layout.body_axes[k]] = facts;
-        }
-        ImuSamples {
-            period_sigma: 0.0,
-            stretches: stretches_between(
-                series.gyro.len(),
-                clock.first + (ahead - lag) * period,
-                period,
-                &faults,
-            ),
-            period,
-            continuous: self.continuous,
-            gyro: series.gyro,
-            accel: series.accel,
-            pulse,
-            faults,
-            bridges,
-            temperature: None,
-            log: Some(LogFacts {
-                rows,
-                output: self.output,
-                jitter_rms: clock.jitter_rms,
-                jitter_max: clock.jitter_max,
-                off_stated_period: clock.off_given,
-                columns: of_axes,
-                named: self.named_columns(layout),
-                temperature: None,
-            }),
+            notes.extend(clock.uneven());
+            notes.extend(csv.cut_off("It is left out"));
+            notes.extend_from_slice(csv.remarks());
+            notes.extend(reading.notes());
+            notes.extend(reading.stamps.notes(&self.source.file, parts.missing()));
+            let mut imu = parts.finish(clock, reading.duplicates, csv.integral_error());
+            for stretch in &mut imu.stretches {
+                stretch.start = reading.stamps.told(stretch.start);
+            }
+            if let Some(temperature) = reading.temperature {
+                let read = temperature.read(&self.source.file.display().to_string());
+                notes.extend(read.notes);
+                imu.temperature = read.temperature;
+                if let Some(log) = &mut imu.log {
+                    log.temperature = read.facts;
+                }
+            }
+            return Ok(imu);
         }
     }
 

@@ -45,6 +45,13 @@ pub struct MotionNoise {
     pub by_duration: f64,
 }
 
+impl GaussMarkov {
+    /// The random walk that it resembles over times short against its correlation time, rad/s/√s or m/s²/√s.
+    pub fn walk(&self) -> f64 {
+        self.sigma * (2.0 / self.correlation_time).sqrt()
+    }
+}
+
 impl Noise {
     /// Covariance, on one axis, of the mean outputs over two time spans (start and end, s): (rad/s)² or (m/s²)².
     /// For two equal spans it is the variance of the mean.

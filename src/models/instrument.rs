@@ -6,7 +6,7 @@ use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-use super::thermal::{AccelThermalFile, GyroThermalFile, ThermalVariation};
+use super::thermal::{ThermalFile, ThermalVariation, thermal_variation};
 use super::{ModelError, Place, Room, text};
 use crate::formats::{Finite, NonNegative, Positive, TermFile, term_sigma};
 use crate::imu::{
@@ -126,6 +126,12 @@ impl Instrument {
     pub fn load(name_or_path: &str, named_in: &Place) -> Result<Self, ModelError> {
         let text = text(Room::Imu, name_or_path, named_in)?;
         let InstrumentFile { gyro, accel, terms } = text.parse()?;
+        let warms = gyro.temperature.is_some() || accel.temperature.is_some();
+        let thermal = PerSensor::try_from_fn(|sensor| {
+            let stated = sensor.pick(&gyro.temperature, &accel.temperature);
+            let stated = stated.as_ref().unwrap_or(const { &ThermalFile::new() });
+            thermal_variation(text.document(), sensor, stated)
+        })?;
         Ok(Self {
             name: text.name(),
             pulse: PerSensor {
@@ -159,12 +165,7 @@ impl Instrument {
                 },
             },
             term_sigma: term_sigma(text.document(), "terms", &terms)?,
-            thermal: (gyro.temperature.is_some() || accel.temperature.is_some()).then(|| {
-                PerSensor {
-                    gyro: gyro.temperature.unwrap_or_default().in_si(),
-                    accel: accel.temperature.unwrap_or_default().in_si(),
-                }
-            }),
+            thermal: warms.then_some(thermal),
         })
     }
 
@@ -205,7 +206,7 @@ struct GyroFile {
     gauss_markov: Option<GyroGaussMarkovFile>,
     scale_ppm: SpreadFile,
     bias_deg_per_h: SpreadFile,
-    temperature: Option<GyroThermalFile>,
+    temperature: Option<ThermalFile>,
 }
 
 #[derive(Deserialize)]
@@ -217,7 +218,7 @@ struct AccelFile {
     gauss_markov: Option<AccelGaussMarkovFile>,
     scale_ppm: SpreadFile,
     bias_ug: SpreadFile,
-    temperature: Option<AccelThermalFile>,
+    temperature: Option<ThermalFile>,
 }
 
 #[derive(Deserialize)]

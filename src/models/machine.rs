@@ -62,7 +62,10 @@ pub fn path(
     let file: PathFile = text.parse()?;
     let moves = match (file.axes, file.body) {
         (Some(moves), None) => moves.in_radians(),
-        (None, Some(moves)) => moves.in_radians(site),
+        (None, Some(moves)) => {
+            let moves = moves.in_radians(site);
+            moves.map_err(|message| text.inconsistent(message))?
+        }
         _ => {
             return Err(text
                 .inconsistent("expected either [axes] or [body], whichever the path turns about"));
@@ -196,21 +199,8 @@ struct BodyFile {
 }
 
 #[derive(Deserialize)]
-#[serde(try_from = "BodyStepFields")]
-struct BodyStepFile {
-    rotation: RotationFile,
-    move_s: Option<Positive>,
-    dwell_s: Option<NonNegative>,
-}
-
-enum RotationFile {
-    By([Finite; 3]),
-    Point(BodyAxis, Direction),
-}
-
-#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct BodyStepFields {
+struct BodyStepFile {
     turn_deg: Option<[Finite; 3]>,
     point: Option<BodyAxis>,
     along: Option<Direction>,
@@ -243,43 +233,34 @@ enum Direction {
     EarthRate,
 }
 
-impl TryFrom<BodyStepFields> for BodyStepFile {
-    type Error = &'static str;
-
-    fn try_from(fields: BodyStepFields) -> Result<Self, Self::Error> {
-        let rotation = match (fields.turn_deg, fields.point, fields.along) {
-            (Some(vector), None, None) => RotationFile::By(vector),
-            (None, Some(axis), Some(direction)) => RotationFile::Point(axis, direction),
-            _ => return Err("expected either turn_deg, or point and along"),
-        };
-        Ok(Self {
-            rotation,
-            move_s: fields.move_s,
-            dwell_s: fields.dwell_s,
-        })
-    }
-}
-
 impl BodyFile {
-    fn in_radians(&self, site: &Site) -> Moves {
-        let step = |step: &BodyStepFile| BodyStep {
-            rotation: match step.rotation {
-                RotationFile::By(vector) => {
+    fn in_radians(&self, site: &Site) -> Result<Moves, String> {
+        let step = |(number, step): (usize, &BodyStepFile)| {
+            let rotation = match (step.turn_deg, step.point, step.along) {
+                (Some(vector), None, None) => {
                     Rotation::By(Vector3::from(vector.map(|angle| angle.0 * DEGREE)))
                 }
-                RotationFile::Point(axis, direction) => Rotation::Point {
+                (None, Some(axis), Some(direction)) => Rotation::Point {
                     axis: axis.unit_vector(),
                     along: direction.unit_vector(site),
                 },
-            },
-            duration: step.move_s.unwrap_or(self.move_s).0,
-            acceleration: self.acceleration_deg_per_s2.0 * DEGREE,
-            dwell: step.dwell_s.unwrap_or(self.dwell_s).0,
+                _ => {
+                    return Err(format!(
+                        "step {number}: expected either turn_deg, or point and along"
+                    ));
+                }
+            };
+            Ok(BodyStep {
+                rotation,
+                duration: step.move_s.unwrap_or(self.move_s).0,
+                acceleration: self.acceleration_deg_per_s2.0 * DEGREE,
+                dwell: step.dwell_s.unwrap_or(self.dwell_s).0,
+            })
         };
-        Moves::Body {
+        Ok(Moves::Body {
             start: attitude(self.start_pitch_roll_heading_deg),
-            steps: self.steps.iter().map(step).collect(),
-        }
+            steps: (1..).zip(&self.steps).map(step).collect::<Result<_, _>>()?,
+        })
     }
 }
 

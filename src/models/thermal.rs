@@ -1,9 +1,11 @@
 //! Temperature dependence of the instruments of a grade.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
-use crate::formats::NonNegative;
-use crate::imu::{ParameterKind, Triad, TriadVector};
+use crate::formats::{Document, FileError, NonNegative};
+use crate::imu::{ParameterKind, Sensor, Triad, TriadVector};
 use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
 
 /// 1σ over the instruments of a grade of each parameter's change with temperature.
@@ -41,80 +43,35 @@ impl ThermalVariation {
     }
 }
 
-/// `[gyro.temperature]` of an instrument's file: 1σ of each.
-#[derive(Clone, Copy, Deserialize, Default)]
-#[serde(deny_unknown_fields, default)]
-pub struct GyroThermalFile {
-    scale_ppm_per_k: NonNegative,
-    scale_ppm_per_k2: NonNegative,
-    installation_arcsec_per_k: NonNegative,
-    bias_deg_per_h_per_k: NonNegative,
-    bias_deg_per_h_per_k2: NonNegative,
-    bias_deg_per_h_per_k_per_min: NonNegative,
-}
-
-/// `[accel.temperature]`.
-#[derive(Clone, Copy, Deserialize, Default)]
-#[serde(deny_unknown_fields, default)]
-pub struct AccelThermalFile {
-    scale_ppm_per_k: NonNegative,
-    scale_ppm_per_k2: NonNegative,
-    installation_arcsec_per_k: NonNegative,
-    bias_ug_per_k: NonNegative,
-    bias_ug_per_k2: NonNegative,
-    bias_ug_per_k_per_min: NonNegative,
-}
-
 /// Seconds in a minute: rates are stated per K/min.
 const MINUTE: f64 = 60.0;
 
-/// Scale for 1 K and 1 K² in ppm, installation for 1 K in arc seconds, and bias for 1 K, 1 K² and 1 K/min in this
-/// unit.
-fn in_si(
-    [scale, scale2, installation]: [NonNegative; 3],
-    bias: [NonNegative; 3],
-    unit: f64,
-) -> ThermalVariation {
-    let [bias, bias2, rate] = bias.map(|bias| bias.0 * unit);
-    ThermalVariation {
-        first: [scale.0 * PPM, installation.0 * ARCSEC, bias],
-        second: [scale2.0 * PPM, 0.0, bias2],
+/// `[gyro.temperature]` or `[accel.temperature]` of an instrument's file: 1σ of each, zero where it is not stated.
+pub type ThermalFile = BTreeMap<String, NonNegative>;
+
+/// Scale for 1 K and 1 K² in ppm, installation for 1 K in arc seconds, and bias for 1 K, 1 K² and 1 K/min in °/h or µg.
+pub fn thermal_variation(
+    document: Document,
+    sensor: Sensor,
+    stated: &ThermalFile,
+) -> Result<ThermalVariation, FileError> {
+    let (bias, unit) = sensor.pick(("bias_deg_per_h", DEG_PER_H), ("bias_ug", MICRO_G));
+    let keys = [
+        ("scale_ppm_per_k".to_owned(), PPM),
+        ("scale_ppm_per_k2".to_owned(), PPM),
+        ("installation_arcsec_per_k".to_owned(), ARCSEC),
+        (format!("{bias}_per_k"), unit),
+        (format!("{bias}_per_k2"), unit),
+        (format!("{bias}_per_k_per_min"), unit),
+    ];
+    let known = keys.each_ref().map(|(key, _)| key.as_str());
+    let table = format!("{}.temperature", sensor.name());
+    document.only(&table, stated.keys(), &known)?;
+    let value = |(key, unit): &(String, f64)| stated.get(key).map_or(0.0, |of| of.0 * unit);
+    let [scale, scale2, installation, bias, bias2, rate] = keys.each_ref().map(value);
+    Ok(ThermalVariation {
+        first: [scale, installation, bias],
+        second: [scale2, 0.0, bias2],
         rate: rate * MINUTE,
-    }
-}
-
-impl GyroThermalFile {
-    pub fn in_si(self) -> ThermalVariation {
-        in_si(
-            [
-                self.scale_ppm_per_k,
-                self.scale_ppm_per_k2,
-                self.installation_arcsec_per_k,
-            ],
-            [
-                self.bias_deg_per_h_per_k,
-                self.bias_deg_per_h_per_k2,
-                self.bias_deg_per_h_per_k_per_min,
-            ],
-            DEG_PER_H,
-        )
-    }
-}
-
-impl AccelThermalFile {
-    pub fn in_si(self) -> ThermalVariation {
-        in_si(
-            [
-                self.scale_ppm_per_k,
-                self.scale_ppm_per_k2,
-                self.installation_arcsec_per_k,
-            ],
-            [
-                self.bias_ug_per_k,
-                self.bias_ug_per_k2,
-                self.bias_ug_per_k_per_min,
-            ],
-            MICRO_G,
-        )
-    }
+    })
 }

@@ -68,16 +68,22 @@ impl Recording {
         gyro: impl Into<Series>,
         accel: impl Into<Series>,
     ) -> Result<Self, SampleError> {
-        Ok(Self {
+        let imu = ImuSamples::new(start, period, gyro, accel)?;
+        Ok(Self::of(name, imu))
+    }
+
+    /// These samples alone.
+    pub(crate) fn of(name: &str, imu: ImuSamples) -> Self {
+        Self {
             name: name.to_owned(),
             meta: BTreeMap::new(),
-            imu: ImuSamples::new(start, period, gyro, accel)?,
+            imu,
             table: None,
             segments: Vec::new(),
             files: Vec::new(),
             notes: Vec::new(),
             doubts: Vec::new(),
-        })
+        }
     }
 }
 

@@ -88,10 +88,7 @@ pub enum SampleError {
 impl ImuSamples {
     /// Increments of one triad's output.
     pub fn of(&self, sensor: Sensor) -> &Series {
-        match sensor {
-            Sensor::Gyro => &self.gyro,
-            Sensor::Accel => &self.accel,
-        }
+        sensor.pick(&self.gyro, &self.accel)
     }
 
     /// Whether they are packed, as in long records.

@@ -134,6 +134,14 @@ impl Default for SeriesWriter {
 }
 
 impl SeriesWriter {
+    /// Number of samples so far.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Whole(samples) => samples.len(),
+            Self::Packed(packer) => packer.len(),
+        }
+    }
+
     pub fn push(&mut self, sample: [f64; 3]) {
         match self {
             Self::Whole(samples) => samples.push(sample.into()),

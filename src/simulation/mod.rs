@@ -152,10 +152,7 @@ impl Scenario {
             None => Cow::Owned(Drive::new(self, imperfection, terms)?),
         };
         let draw = |sensor: Sensor| {
-            let draws = match sensor {
-                Sensor::Gyro => Draws::GyroTruth,
-                Sensor::Accel => Draws::AccelTruth,
-            };
+            let draws = sensor.pick(Draws::GyroTruth, Draws::AccelTruth);
             self.draw_truth(sensor, &mut draws.generator(seed, instrument))
         };
         let common = PerSensor::from_fn(draw);
@@ -228,16 +225,11 @@ impl Scenario {
         ];
         Run {
             recording: Recording {
-                name: self.name.clone(),
                 meta: meta
                     .map(|(key, value)| (key.to_owned(), value.clone()))
                     .into(),
-                imu,
                 table: Some(table),
-                segments: Vec::new(),
-                files: Vec::new(),
-                notes: Vec::new(),
-                doubts: Vec::new(),
+                ..Recording::of(&self.name, imu)
             },
             instrument: self.known_instrument(),
             site: self.site,

@@ -351,50 +351,45 @@ impl ChamberFile {
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct TruthFile {
-    gyro: GivenGyroFile,
-    accel: GivenAccelFile,
+    gyro: GivenFile,
+    accel: GivenFile,
 }
 
+/// Biases are those of its triad's unit.
 #[derive(Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-struct GivenGyroFile {
+struct GivenFile {
     scale_ppm: Option<OneOrThree>,
     installation_arcsec: Option<Vec<Finite>>,
     bias_deg_per_h: Option<OneOrThree>,
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct GivenAccelFile {
-    scale_ppm: Option<OneOrThree>,
-    installation_arcsec: Option<Vec<Finite>>,
     bias_ug: Option<OneOrThree>,
 }
 
 impl TruthFile {
     fn in_si(self, form: InstallationForm) -> Result<PerSensor<Given>, String> {
-        let Self { gyro, accel } = self;
-        Ok(PerSensor {
-            gyro: Given {
-                scale: scaled(gyro.scale_ppm, PPM),
-                angles: angles(gyro.installation_arcsec, form)?,
-                bias: scaled(gyro.bias_deg_per_h, DEG_PER_H),
-            },
-            accel: Given {
-                scale: scaled(accel.scale_ppm, PPM),
-                angles: angles(accel.installation_arcsec, form)?,
-                bias: scaled(accel.bias_ug, MICRO_G),
-            },
+        if self.gyro.bias_ug.is_some() || self.accel.bias_deg_per_h.is_some() {
+            return Err(
+                "expected bias_deg_per_h in [truth.gyro] and bias_ug in [truth.accel]".to_owned(),
+            );
+        }
+        PerSensor::try_from_fn(|sensor| {
+            let file = sensor.pick(&self.gyro, &self.accel);
+            let bias = scaled(&file.bias_deg_per_h, DEG_PER_H);
+            Ok(Given {
+                scale: scaled(&file.scale_ppm, PPM),
+                angles: angles(file.installation_arcsec.as_deref(), form)?,
+                bias: bias.or_else(|| scaled(&file.bias_ug, MICRO_G)),
+            })
         })
     }
 }
 
-fn scaled(values: Option<OneOrThree>, unit: f64) -> Option<Vector3<f64>> {
-    values.map(|values| values.vector() * unit)
+fn scaled(values: &Option<OneOrThree>, unit: f64) -> Option<Vector3<f64>> {
+    values.as_ref().map(|values| values.vector() * unit)
 }
 
 fn angles(
-    given: Option<Vec<Finite>>,
+    given: Option<&[Finite]>,
     form: InstallationForm,
 ) -> Result<Option<SVector<f64, ANGLES>>, String> {
     let Some(given) = given else { return Ok(None) };
@@ -407,7 +402,7 @@ fn angles(
         ));
     }
     let mut angles = SVector::<f64, ANGLES>::zeros();
-    for (angle, value) in angles.iter_mut().zip(&given) {
+    for (angle, value) in angles.iter_mut().zip(given) {
         *angle = value.0 * ARCSEC;
     }
     Ok(Some(angles))

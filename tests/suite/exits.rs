@@ -5,14 +5,13 @@ use std::process::Command;
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 use turncal::calibration::result::{Calibration, TermRecord, TestVector};
-use turncal::formats::export::{Exported, Format, write};
 
 use crate::door::made::made_run;
-use crate::export::{comment, divisors, halves, numbers, output, record, yaml};
+use crate::export::{bytes, comment, divisors, halves, numbers, output, record, text_of, yaml};
 use crate::shared::skipped;
 
-fn exported(format: Format) -> Exported {
-    write(&record(), format, None).unwrap()
+fn exported(format: &str) -> (String, Vec<String>) {
+    text_of(&record(), format, None)
 }
 
 /// Right, front, up as front, right, down, and back.
@@ -63,13 +62,13 @@ fn off_by_what_is_left(
 }
 
 fn autopilot(
-    format: Format,
+    format: &'static str,
     [gyro, accel]: [&str; 2],
     words: [&str; 2],
     separator: char,
     name_at: usize,
 ) {
-    let Exported { text, notes, .. } = exported(format);
+    let (text, notes) = exported(format);
     let value = |name: String| -> f64 {
         let mut lines = text.lines().filter(|line| !line.starts_with('#'));
         let line = lines
@@ -108,7 +107,7 @@ fn autopilot(
 #[test]
 fn px4_gives_the_test_vectors_but_for_what_its_file_states() {
     autopilot(
-        Format::Px4,
+        "px4",
         ["CAL_GYRO0_#@", "CAL_ACC0_#@"],
         ["OFF", "SCALE"],
         '\t',
@@ -119,7 +118,7 @@ fn px4_gives_the_test_vectors_but_for_what_its_file_states() {
 #[test]
 fn ardupilot_gives_the_test_vectors_but_for_what_its_file_states() {
     autopilot(
-        Format::ArduPilot,
+        "ardupilot",
         ["INS_GYR@_#", "INS_ACC@_#"],
         ["OFFS", "SCAL"],
         ',',
@@ -161,11 +160,8 @@ fn open_vins_gives_the_test_vectors_in_both_models_and_takes_g_sensitivity_out()
             .terms
             .insert(format!("gyro.g_sensitivity.{name}"), term);
     }
-    for (format, is_lower) in [
-        (Format::OpenVinsKalibr, true),
-        (Format::OpenVinsRpng, false),
-    ] {
-        let text = write(&record, format, None).unwrap().text;
+    for (format, is_lower) in [("open-vins-kalibr", true), ("open-vins-rpng", false)] {
+        let text = text_of(&record, format, None).0;
         let divisors = divisors(&text);
         for vector in &record.test_vectors {
             let [rate, force] = halves(&vector.calibrated);
@@ -188,7 +184,7 @@ fn open_vins_gives_the_test_vectors_in_both_models_and_takes_g_sensitivity_out()
 
 #[test]
 fn ikalibr_measures_the_raw_output_of_the_test_vectors_along_its_own_axes() {
-    let text = exported(Format::IKalibr).text;
+    let text = exported("ikalibr").0;
     let file = yaml(&text);
     let value = |key: String| file[&format!("Intrinsics.ptr_wrapper.data.{key}")][0];
     let bias = |triad: &str| Vector3::from_fn(|k, _| value(format!("{triad}.BIAS.r{k}c0")));
@@ -220,7 +216,7 @@ fn ikalibr_measures_the_raw_output_of_the_test_vectors_along_its_own_axes() {
 
 #[test]
 fn imu_calib_gives_the_specific_force_of_the_test_vectors() {
-    let text = exported(Format::ImuCalib).text;
+    let text = exported("imu-calib").0;
     let file = yaml(&text);
     let matrix = Matrix3::from_row_slice(&file["SM"]);
     let bias = Vector3::from_column_slice(&file["bias"]);
@@ -245,7 +241,7 @@ fn imu_calib_gives_the_specific_force_of_the_test_vectors() {
 #[test]
 fn gazebo_makes_the_raw_output_but_for_what_its_file_states() {
     let record = record();
-    let text = write(&record, Format::Gazebo, None).unwrap().text;
+    let text = text_of(&record, "gazebo", None).0;
     assert!(
         text.starts_with("<!--\n") && text.contains("\n-->\n<imu>\n") && text.ends_with("</imu>\n")
     );
@@ -304,9 +300,7 @@ fn noise_goes_out_as_a_variance_a_sample_and_as_gazebos_deviations() {
         },
         ..record()
     };
-    let text = write(&record, Format::RosCovariance, Some(&run))
-        .unwrap()
-        .text;
+    let text = text_of(&record, "ros-covariance", Some(&run)).0;
     let file = yaml(&text);
     let (gyro, accel) = (run.instrument.noise.gyro, run.instrument.noise.accel);
     for (key, density) in [
@@ -321,7 +315,7 @@ fn noise_goes_out_as_a_variance_a_sample_and_as_gazebos_deviations() {
         let off = file[key].iter().zip(&expected).map(|(a, b)| (a - b).abs());
         assert!(off.fold(0.0, f64::max) < 1e-12 * variance, "{key}");
     }
-    let text = write(&record, Format::Gazebo, Some(&run)).unwrap().text;
+    let text = text_of(&record, "gazebo", Some(&run)).0;
     let first = |key: &str| -> f64 {
         let (_, rest) = text.split_once(&format!("<{key}>")).unwrap();
         rest.split('<').next().unwrap().parse().unwrap()
@@ -344,7 +338,7 @@ fn noise_goes_out_as_a_variance_a_sample_and_as_gazebos_deviations() {
 
 #[test]
 fn betaflight_takes_whole_counts_off_and_leaves_what_its_file_states() {
-    let Exported { text, .. } = exported(Format::Betaflight);
+    let (text, _) = exported("betaflight");
     let line = text
         .lines()
         .find(|line| line.starts_with("set acc_calibration = "))
@@ -372,10 +366,10 @@ fn betaflight_takes_whole_counts_off_and_leaves_what_its_file_states() {
 
 #[test]
 fn a_matlab_structure_gives_the_test_vectors_in_scipy() {
-    let Exported { binary, .. } = exported(Format::Mat);
+    let (binary, _) = bytes(&record(), "mat", None);
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("calibration.mat");
-    fs::write(&path, binary.unwrap()).unwrap();
+    fs::write(&path, binary).unwrap();
     let raw: Vec<[f64; 6]> = record()
         .test_vectors
         .iter()
@@ -437,7 +431,7 @@ fn lists(text: &str, key: &str) -> Vec<Vec<f64>> {
 
 #[test]
 fn dlio_gives_specific_force_and_leaves_of_the_gyros_what_its_file_states() {
-    let text = exported(Format::Dlio).text;
+    let text = exported("dlio").0;
     let sm = Matrix3::from_row_slice(&lists(&text, "sm")[0]);
     let biases = lists(&text, "bias");
     let [accel, gyro] = [0, 1].map(|k| Vector3::from_column_slice(&biases[k]));
@@ -456,7 +450,7 @@ fn dlio_gives_specific_force_and_leaves_of_the_gyros_what_its_file_states() {
 
 #[test]
 fn inav_takes_whole_counts_and_gains_and_leaves_what_its_file_states() {
-    let text = exported(Format::Inav).text;
+    let text = exported("inav").0;
     let of = |name: &str| {
         let value = |axis: &str| lists(&text, &format!("set {name}_{axis} "))[0][0];
         Vector3::from(["x", "y", "z"].map(value))
@@ -479,7 +473,7 @@ fn inav_takes_whole_counts_and_gains_and_leaves_what_its_file_states() {
 
 #[test]
 fn the_memory_of_a_realsense_gives_the_test_vectors_to_32_bits() {
-    let memory = exported(Format::RealSense).binary.unwrap();
+    let memory = bytes(&record(), "realsense", None).0;
     assert_eq!(memory.len(), 520);
     let whole = |at: usize| u32::from_le_bytes(memory[at..at + 4].try_into().unwrap());
     // Memory, calibration and IMU table, each behind a head with its kind, size and sum.
@@ -494,7 +488,7 @@ fn the_memory_of_a_realsense_gives_the_test_vectors_to_32_bits() {
     let values: Vec<f64> = (0..24)
         .map(|k| f64::from(f32::from_bits(whole(48 + 13 * 4 + 4 * k))))
         .collect();
-    let text = exported(Format::Dlio).text;
+    let text = exported("dlio").0;
     let divisors = divisors(&text);
     for vector in &record().test_vectors {
         for (k, at) in [(1, 0), (0, 12)] {
@@ -509,9 +503,9 @@ fn the_memory_of_a_realsense_gives_the_test_vectors_to_32_bits() {
 
 #[test]
 fn depthai_gives_the_test_vectors_by_one_affine_map_a_triad() {
-    let file: serde_json::Value = serde_json::from_str(&exported(Format::DepthAi).text).unwrap();
+    let file: serde_json::Value = serde_json::from_str(&exported("depthai").0).unwrap();
     let map = |name: &str| -> [[f64; 4]; 3] { serde_json::from_value(file[name].clone()).unwrap() };
-    let divisors = divisors(&exported(Format::Dlio).text);
+    let divisors = divisors(&exported("dlio").0);
     for vector in &record().test_vectors {
         for (k, name) in ["gyroscope", "accelerometer"].into_iter().enumerate() {
             let n = halves(&vector.raw)[k].component_div(&divisors[k]);
@@ -524,10 +518,10 @@ fn depthai_gives_the_test_vectors_by_one_affine_map_a_triad() {
 
 #[test]
 fn slimevr_gives_the_test_vectors_in_counts_but_for_what_its_file_states() {
-    let text = exported(Format::SlimeVr).text;
+    let text = exported("slimevr").0;
     let vector = |key: &str| Vector3::from_column_slice(&lists(&text, key)[0]);
     let inverse = Matrix3::from_row_slice(&lists(&text, ".A_Ainv")[0]);
-    let divisors = divisors(&exported(Format::Dlio).text);
+    let divisors = divisors(&exported("dlio").0);
     for TestVector { raw, calibrated } in &record().test_vectors {
         let [rate, force] = halves(raw);
         let force = (inverse * (force - vector(".A_B"))).component_div(&divisors[1]);

@@ -8,7 +8,7 @@ use std::process;
 use assert_cmd::Command;
 use nalgebra::{Matrix3, Vector3};
 use turncal::calibration::result::{Calibration, TermRecord, TestVector, TriadRecord};
-use turncal::formats::export::{Exported, Format, write};
+use turncal::formats::export::{Format, write};
 use turncal::imu::{BodyFrame, GaussMarkov, Noise, Nominal, PerSensor};
 use turncal::run::Run;
 use turncal::units::{ARCSEC, DEG_PER_H};
@@ -91,8 +91,20 @@ fn with_terms(mut record: Calibration) -> Calibration {
     record
 }
 
-fn exported(record: &Calibration, format: Format) -> Exported {
-    write(record, format, None).unwrap()
+/// The bytes of a file, and what it does not hold.
+pub fn bytes(record: &Calibration, format: &str, run: Option<&Run>) -> (Vec<u8>, Vec<String>) {
+    let exported = write(record, Format::named(format).unwrap(), run).unwrap();
+    (exported.bytes, exported.notes)
+}
+
+/// The text of a file, and what it does not hold.
+pub fn text_of(record: &Calibration, format: &str, run: Option<&Run>) -> (String, Vec<String>) {
+    let (bytes, notes) = bytes(record, format, run);
+    (String::from_utf8(bytes).unwrap(), notes)
+}
+
+fn exported(record: &Calibration, format: &str) -> (String, Vec<String>) {
+    text_of(record, format, None)
 }
 
 /// Equal to 1e-12 of the vector's length.
@@ -138,7 +150,7 @@ fn the_c_header_compiles_without_a_warning_and_gives_the_test_vectors() {
         record.meta.insert(name.to_owned(), notes.to_owned());
     }
     let root = tempfile::tempdir().unwrap();
-    let header = exported(&record, Format::C).text;
+    let header = exported(&record, "c").0;
     fs::write(root.path().join("turncal_calibration.h"), header).unwrap();
     let main = r#"
 #include <stdio.h>
@@ -174,7 +186,7 @@ int main(int argc, char **argv)
 
 #[test]
 fn the_octave_function_gives_the_test_vectors() {
-    let text = exported(&record(), Format::Octave).text;
+    let text = exported(&record(), "octave").0;
     let values = |name: &str| {
         let line = text
             .lines()
@@ -280,7 +292,7 @@ fn kalibr_measures(text: &str, rate: Vector3<f64>, force: Vector3<f64>) -> [Vect
 #[test]
 fn kalibrs_equations_measure_the_raw_output_of_the_test_vectors() {
     let record = record();
-    let text = exported(&record, Format::Kalibr).text;
+    let text = exported(&record, "kalibr").0;
     assert!(text.contains("\n  model: scale-misalignment\n"));
     let divisors = divisors(&text);
     for vector in &record.test_vectors {
@@ -295,7 +307,7 @@ fn kalibrs_equations_measure_the_raw_output_of_the_test_vectors() {
 #[test]
 fn kalibr_holds_g_sensitivity_and_names_the_terms_that_it_does_not_hold() {
     let record = with_terms(record());
-    let Exported { text, notes, .. } = exported(&record, Format::Kalibr);
+    let (text, notes) = exported(&record, "kalibr");
     let divisors = divisors(&text);
     let [rate, force] = halves(&INPUTS[2]);
     let sensed = rate + Vector3::new(3e-7 * force.y, 0.0, -2e-7 * force.z);
@@ -316,7 +328,7 @@ fn along_the_accelerometers_kalibrs_body_is_its_imu() {
     for (i, j) in [(0, 1), (0, 2), (1, 2)] {
         record.accel.installation[i][j] = 0.0;
     }
-    let file = yaml(&exported(&record, Format::Kalibr).text);
+    let file = yaml(&exported(&record, "kalibr").0);
     let identity: Vec<f64> = (0..16).map(|k| f64::from(u8::from(k % 5 == 0))).collect();
     assert_eq!(file["imu0.T_i_b"], identity);
 }
@@ -341,7 +353,7 @@ fn kf_gins_compensates(text: &str, n: [Vector3<f64>; 2]) -> [Vector3<f64>; 2] {
 #[test]
 fn kf_gins_gives_the_test_vectors_but_for_the_misalignment_that_the_file_states() {
     let record = record();
-    let Exported { text, notes, .. } = exported(&record, Format::KfGins);
+    let (text, notes) = exported(&record, "kf-gins");
     // The largest off-diagonal entry, of gyro y.
     assert!(
         notes[0].contains(&format!("{:.1} arcsec", 1.3e-3 / ARCSEC)),
@@ -371,7 +383,7 @@ fn kf_gins_gives_the_test_vectors_but_for_the_misalignment_that_the_file_states(
     for triad in [&mut aligned.gyro, &mut aligned.accel] {
         triad.installation = crate::calibration_file::ALIGNED;
     }
-    let text = exported(&aligned, Format::KfGins).text;
+    let text = exported(&aligned, "kf-gins").0;
     for input in INPUTS {
         let [rate, force] = halves(&input);
         let raw = [output(&aligned.gyro, rate), output(&aligned.accel, force)];
@@ -383,7 +395,7 @@ fn kf_gins_gives_the_test_vectors_but_for_the_misalignment_that_the_file_states(
 
 #[test]
 fn kf_gins_takes_the_sigma_of_biases_and_scale_factors_in_its_units_and_axes() {
-    let file = yaml(&exported(&record(), Format::KfGins).text);
+    let file = yaml(&exported(&record(), "kf-gins").0);
     // Front is y: gyro bias σ 0.06 of 2.06e6 a rad/s.
     let expected = 0.06 / 2.06e6 / DEG_PER_H;
     assert!((file["initbgstd"][0] / expected - 1.0).abs() < 1e-12);
@@ -412,8 +424,8 @@ fn run() -> Run {
 #[test]
 fn a_run_gives_noise_figures_sample_rate_and_nominal_scales() {
     let run = run();
-    let of = |format| write(&record(), format, Some(&run)).unwrap().text;
-    let text = of(Format::Kalibr);
+    let of = |format| text_of(&record(), format, Some(&run)).0;
+    let text = of("kalibr");
     let file = yaml(&text);
     let near = |key: &str, expected: f64| {
         assert!((file[key][0] / expected - 1.0).abs() < 1e-12, "{key}");
@@ -431,7 +443,7 @@ fn a_run_gives_noise_figures_sample_rate_and_nominal_scales() {
     assert_near(accel, expected);
     assert!(rate.norm() > 0.0);
 
-    let file = yaml(&of(Format::KfGins));
+    let file = yaml(&of("kf-gins"));
     let degrees = 180.0 / std::f64::consts::PI;
     assert!((file["imunoise.arw"][2] / (2e-5 * degrees * 60.0) - 1.0).abs() < 1e-12);
     assert!((file["imunoise.vrw"][0] / (5e-5 * 60.0) - 1.0).abs() < 1e-12);
@@ -449,8 +461,8 @@ fn kalibr_measures_any_scale(text: &str, force: Vector3<f64>) -> Vector3<f64> {
 
 #[test]
 fn without_a_run_noise_keys_are_comments_that_say_where_figures_come_from() {
-    for format in [Format::Kalibr, Format::KfGins] {
-        let text = exported(&record(), format).text;
+    for format in ["kalibr", "kf-gins"] {
+        let text = exported(&record(), format).0;
         let keys = yaml(&text);
         assert!(
             keys.keys()
@@ -470,7 +482,7 @@ fn a_calibration_in_a_unit_of_its_own_is_divided_by_that_unit() {
     });
     record.gyro.scale = [57.2, 57.4, 57.1];
     record.accel.scale = [0.102; 3];
-    let divisors = divisors(&exported(&record, Format::Kalibr).text);
+    let divisors = divisors(&exported(&record, "kalibr").0);
     assert_eq!(divisors[0], Vector3::repeat(180.0 / std::f64::consts::PI));
     assert_eq!(divisors[1], Vector3::repeat(1.0 / 9.80665));
 }
@@ -478,7 +490,7 @@ fn a_calibration_in_a_unit_of_its_own_is_divided_by_that_unit() {
 #[test]
 fn text_gives_every_value_and_sigma_by_its_name() {
     let record = with_terms(record());
-    let text = exported(&record, Format::Text).text;
+    let text = exported(&record, "text").0;
     let find = |name: &str| {
         let line = text
             .lines()
@@ -566,6 +578,6 @@ fn wrong_use_of_export_says_what_to_do() {
     assert_eq!(fs::read(&path).unwrap(), before);
     let mut other = run();
     other.instrument.nominal.accel = Nominal(Vector3::repeat(1e3));
-    let error = write(&record(), Format::Kalibr, Some(&other)).unwrap_err();
+    let error = write(&record(), Format::named("kalibr").unwrap(), Some(&other)).unwrap_err();
     assert!(error.to_string().contains("accel x"), "{error}");
 }

@@ -46,9 +46,9 @@ impl Export {
     pub fn run(&self) -> anyhow::Result<()> {
         let record = at_temperature(&self.calibration, self.temperature_degc)?;
         let run = self.run.as_deref().map(Run::read).transpose()?;
-        let exported = export::write(&record, self.format, run.as_ref())
+        let exported = export::write(&record, &self.format, run.as_ref())
             .with_context(|| self.calibration.display().to_string())?;
-        let text = exported.bytes();
+        let text = &exported.bytes;
         match &self.output {
             Some(output) => {
                 let files = run.iter().flat_map(|run| &run.recording.files);

@@ -27,6 +27,9 @@ const ARDUPILOT_FACTOR: f64 = 1e6;
 const COUNTS_PER_G: f64 = 2048.0;
 /// … and for one rad/s of one of ±2000 °/s.
 const COUNTS_PER_RAD_S: f64 = 16.4 / DEGREE;
+/// What autopilots leave off of a change with temperature.
+const OF_TEMPERATURE: &str = "change of scale factors and installation with temperature, of biases with its rate and \
+    of orders above three; biases are those of the sensor's own temperature";
 /// One in INAV's gains.
 const INAV_ONE: f64 = 4096.0;
 
@@ -34,10 +37,10 @@ const INAV_ONE: f64 = 4096.0;
 fn held(axes: &Axes) -> PerSensor<Held> {
     PerSensor::from_fn(|sensor| {
         let triad = axes.triads.get(sensor);
-        let scale = match sensor {
-            Sensor::Gyro => Vector3::repeat(1.0),
-            Sensor::Accel => triad.sensitivity.diagonal().map(f64::recip),
-        };
+        let scale = sensor.pick(
+            Vector3::repeat(1.0),
+            triad.sensitivity.diagonal().map(f64::recip),
+        );
         let rounded = |v: Vector3<f64>| v.map(|value| f64::from(value as f32));
         Held {
             matrix: Matrix3::from_diagonal(&rounded(scale)),
@@ -93,10 +96,7 @@ pub fn px4(source: &Source) -> Exported {
               the instrument is another than number 0, rename them";
     let reads = ("#", "PX4 reads rad/s and m/s^2");
     let mut file = Document::correcting(source, &axes, reads, &held, &[UNCORRECTED, id]);
-    let kind = |sensor| match sensor {
-        Sensor::Gyro => "GYRO",
-        Sensor::Accel => "ACC",
-    };
+    let kind = |sensor: Sensor| sensor.pick("GYRO", "ACC");
     let offset = |sensor, axis: &str| format!("CAL_{}0_{axis}OFF", kind(sensor));
     let scale = |axis: &str| format!("CAL_ACC0_{axis}SCALE");
     parameters(&mut file, &held, offset, scale, px4_line);
@@ -120,7 +120,7 @@ pub fn px4(source: &Source) -> Exported {
         }
         file.line(&format!("1\t1\tTC_{letter}_ENABLE\t1\t6"));
     }
-    file.finish()
+    file.finish().without(OF_TEMPERATURE)
 }
 
 /// ArduPilot's temperature: `n − p(T) + p(T_cal)` before the offsets are taken off, with
@@ -135,10 +135,7 @@ pub fn ardupilot(source: &Source) -> Exported {
     ];
     let reads = ("#", "ArduPilot reads rad/s and m/s^2");
     let mut file = Document::correcting(source, &axes, reads, &held, &notes);
-    let kind = |sensor| match sensor {
-        Sensor::Gyro => "GYR",
-        Sensor::Accel => "ACC",
-    };
+    let kind = |sensor: Sensor| sensor.pick("GYR", "ACC");
     let line = |name: &str, value: f32| format!("{name},{value:?}");
     let offset = |sensor, axis: &str| format!("INS_{}OFFS_{axis}", kind(sensor));
     let scale = |axis: &str| format!("INS_ACCSCAL_{axis}");
@@ -165,17 +162,7 @@ pub fn ardupilot(source: &Source) -> Exported {
         let name = format!("INS_{}1_CALTEMP", kind(sensor));
         file.line(&line(&name, reference as f32));
     }
-    file.finish()
-}
-
-/// What autopilots leave off of a change with temperature.
-pub fn thermal_note(source: &Source) -> Option<String> {
-    source.record.temperature.as_ref()?;
-    Some(
-        "change of scale factors and installation with temperature, of biases with its rate and of orders above three; \
-         biases are those of the sensor's own temperature"
-            .to_owned(),
-    )
+    file.finish().without(OF_TEMPERATURE)
 }
 
 /// Offsets of accelerometers in whole counts.

@@ -56,8 +56,7 @@ pub fn realsense(source: &Source) -> Exported {
     let mut memory = table([2, 0], 0x20, &tables);
     memory.resize(520 - 16, 0xff);
     Exported {
-        binary: Some(table([1, 1], 0x09, &memory)),
-        text: String::new(),
+        bytes: table([1, 1], 0x09, &memory),
         ..document.finish()
     }
 }
@@ -74,11 +73,10 @@ pub fn depthai(source: &Source) -> Exported {
         [0, 1, 2].map(row).into()
     };
     let noise = |sensor| -> Value {
-        let noise = source.run.map(|run| run.instrument.noise.get(sensor));
-        let varying = noise.and_then(|noise| noise.gauss_markov);
+        let varying = source.varying(sensor);
         let axis = json!({
-            "noiseDensity": noise.map_or(0.0, |noise| noise.random_walk),
-            "randomWalk": varying.map_or(0.0, |of| of.sigma * (2.0 / of.correlation_time).sqrt()),
+            "noiseDensity": source.noise(sensor).map_or(0.0, |noise| noise.random_walk),
+            "randomWalk": varying.map_or(0.0, |of| of.walk()),
             "biasStability": varying.map_or(0.0, |of| of.sigma),
         });
         json!({ "x": axis, "y": axis, "z": axis })
@@ -94,7 +92,7 @@ pub fn depthai(source: &Source) -> Exported {
     });
     // JSON has no comments: what is not held is in the notes alone.
     Exported {
-        text: format!("{content:#}\n"),
+        bytes: format!("{content:#}\n").into_bytes(),
         ..document.finish()
     }
 }

@@ -14,11 +14,7 @@ pub fn c(source: &Source) -> Exported {
     let mut file = Document::of_code(source, "//");
     file.line("\n#ifndef TURNCAL_CALIBRATION_H\n#define TURNCAL_CALIBRATION_H\n");
     for sensor in Sensor::ALL {
-        let (name, unit) = (sensor.name(), source.unit(sensor));
-        let input = match sensor {
-            Sensor::Gyro => "rad/s",
-            Sensor::Accel => "m/s^2",
-        };
+        let (name, unit, input) = (sensor.name(), source.unit(sensor), Source::input(sensor));
         file.comment(&format!(
             "{input} along each axis for one {unit} of each output"
         ));
@@ -110,10 +106,7 @@ fn at_temperature(source: &Source, file: &mut Document) {
     }
     for sensor in Sensor::ALL {
         let (name, range) = (sensor.name(), thermal.range.get(sensor));
-        let triad = match sensor {
-            Sensor::Gyro => &source.record.gyro,
-            Sensor::Accel => &source.record.accel,
-        };
+        let triad = source.record.triad(sensor);
         let powers = |parameter: &str| -> Vec<f64> {
             let known = thermal.powers.get(&format!("{name}.{parameter}"));
             let of = |k: usize| known.and_then(|p| p.get(k)).copied().unwrap_or(0.0);

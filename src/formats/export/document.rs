@@ -7,6 +7,9 @@ use crate::imu::{PerSensor, Sensor, Term};
 /// What hardly any format holds.
 pub const SIGMA: &str = "sigma and covariance of the parameters; they are in calibration.json";
 
+pub const TEST_VECTORS: &str =
+    "test vectors, raw -> calibrated, gyros x y z, accelerometers x y z:";
+
 /// A file in the making.
 pub struct Document {
     mark: &'static str,
@@ -20,11 +23,11 @@ impl Document {
     pub fn holding(
         source: &Source,
         mark: &'static str,
-        notes: impl IntoIterator<Item = String>,
+        notes: impl IntoIterator<Item = impl Into<String>>,
         held: fn(Term) -> bool,
     ) -> Self {
-        let notes = notes.into_iter().chain(source.terms_note(held));
-        let mut document = Self::new(source, mark, notes);
+        let notes = notes.into_iter().map(Into::into);
+        let mut document = Self::new(source, mark, notes.chain(source.terms_note(held)));
         for line in source.term_lines(|term| !held(term)) {
             document.comment(&line);
         }
@@ -35,12 +38,12 @@ impl Document {
     pub fn new(
         source: &Source,
         mark: &'static str,
-        notes: impl IntoIterator<Item = String>,
+        notes: impl IntoIterator<Item = impl Into<String>>,
     ) -> Self {
         let mut document = Self {
             mark,
             text: String::new(),
-            notes: notes.into_iter().collect(),
+            notes: notes.into_iter().map(Into::into).collect(),
         };
         for line in source.about() {
             document.comment(&line);
@@ -72,11 +75,11 @@ impl Document {
 
     /// Begins a file of code: it corrects K, E and D, and has terms and test vectors in comments.
     pub fn of_code(source: &Source, mark: &'static str) -> Self {
-        let mut document = Self::holding(source, mark, [SIGMA.to_owned()], |_| false);
+        let mut document = Self::holding(source, mark, [SIGMA], |_| false);
         let vectors = source.test_vectors();
         if !vectors.is_empty() {
             document.comment("");
-            document.comment("test vectors, raw -> calibrated, gyros x y z, accelerometers x y z:");
+            document.comment(TEST_VECTORS);
             vectors.iter().for_each(|line| document.comment(line));
         }
         document
@@ -116,8 +119,7 @@ impl Document {
 
     pub fn finish(self) -> Exported {
         Exported {
-            text: self.text,
-            binary: None,
+            bytes: self.text.into_bytes(),
             notes: self.notes,
         }
     }

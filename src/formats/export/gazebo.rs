@@ -6,8 +6,6 @@
 //!
 //! Source: gz-sensors, `GaussianNoiseModel.cc`; SDFormat 1.6 and later, `noise.sdf`.
 
-use nalgebra::Vector3;
-
 use super::Exported;
 use super::document::Document;
 use super::source::{Axes, Held, Source};
@@ -33,29 +31,23 @@ pub fn write(source: &Source) -> Exported {
         file.line(&format!("  <{name}>"));
         let triad = axes.triads.get(sensor);
         let sigma = source
-            .record
-            .sigma
-            .as_ref()
-            .map(|sigma| sigma.get(sensor).bias);
-        let sigma = Vector3::from(sigma.unwrap_or_default());
+            .sigma(sensor)
+            .map(|sigma| sigma.bias)
+            .unwrap_or_default();
+        let stddev = source.run.zip(source.noise(sensor));
+        let stddev = stddev.map(|(run, noise)| noise.random_walk / run.recording.imu.period.sqrt());
         for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
             file.line(&format!("    <{letter}>\n      <noise type=\"gaussian\">"));
             let mut set =
                 |key: &str, value: f64| file.line(&format!("        <{key}>{value:e}</{key}>"));
             set("mean", 0.0);
-            let noise = source
-                .run
-                .map(|run| (run, run.instrument.noise.get(sensor)));
-            let stddev =
-                noise.map(|(run, noise)| noise.random_walk / run.recording.imu.period.sqrt());
             set("stddev", stddev.unwrap_or(0.0));
             set("bias_mean", triad.bias[axis]);
             let of_record = axes.axis_of_record(axis);
             set("bias_stddev", sigma[of_record] / triad.nominal[axis].abs());
-            if let Some(bias) = noise.and_then(|(_, noise)| noise.gauss_markov) {
-                let tau = bias.correlation_time;
-                set("dynamic_bias_stddev", bias.sigma * (2.0 / tau).sqrt());
-                set("dynamic_bias_correlation_time", tau);
+            if let Some(bias) = source.varying(sensor) {
+                set("dynamic_bias_stddev", bias.walk());
+                set("dynamic_bias_correlation_time", bias.correlation_time);
             }
             file.line(&format!("      </noise>\n    </{letter}>"));
         }

@@ -14,12 +14,18 @@ use super::Exported;
 use super::document::{Document, SIGMA, yaml_list, yaml_number};
 use super::source::{Axes, Source, upper};
 use crate::calibration::result::frame::accelerometer_frame;
-use crate::imu::{Noise, PerSensor, Sensor, Term};
+use crate::imu::{PerSensor, Sensor, Term};
 use crate::units::ARCSEC;
 
 /// What Kalibr and OpenVINS find themselves.
 const BIASES: &str =
     "biases, which it finds itself, so no error is left of them; they are in a comment";
+
+fn begin(source: &Source) -> Document {
+    Document::holding(source, "#", [BIASES, SIGMA], |term| {
+        term == Term::GSensitivity
+    })
+}
 
 fn biases(file: &mut Document, axes: &Axes) {
     for (name, sensor) in [
@@ -42,12 +48,11 @@ pub fn write(source: &Source) -> Exported {
         accel: lower(triads.accel.sensitivity * imu_b.transpose()),
     };
     let of_force = triads.gyro.sensitivity * axes.g_sensitivity * (gyro_imu * imu_b).transpose();
-    let notes = [BIASES, SIGMA].map(str::to_owned);
-    let mut file = Document::holding(source, "#", notes, |term| term == Term::GSensitivity);
+    let mut file = begin(source);
     axes.introduce(&mut file, "Kalibr reads rad/s and m/s^2, here");
     file.comment("measured = M C_i_b f + bias");
     file.comment("measured = M C_gyro_i C_i_b w + A C_gyro_i C_i_b f + bias");
-    let turned = turn(&imu_b) / ARCSEC;
+    let turned = crate::attitude::log(&imu_b).norm() / ARCSEC;
     file.comment(&format!(
         "T_i_b takes the body frame above to the axes of the accelerometers, {turned:.1} arcsec \
          away; what takes it for the identity gets u along those"
@@ -73,11 +78,6 @@ fn lower(mut matrix: Matrix3<f64>) -> Matrix3<f64> {
     matrix
 }
 
-/// Angle of a rotation, rad.
-fn turn(rotation: &Matrix3<f64>) -> f64 {
-    crate::attitude::log(rotation).norm()
-}
-
 /// A matrix row by row below its name, which is indented.
 fn matrix(file: &mut Document, name: &str, matrix: &Matrix3<f64>) {
     let indent = " ".repeat(name.len() - name.trim_start().len());
@@ -88,10 +88,7 @@ fn matrix(file: &mut Document, name: &str, matrix: &Matrix3<f64>) {
 }
 
 fn noise(file: &mut Document, source: &Source) {
-    let missing = match source.run {
-        Some(_) => "[imu.noise] of the run does not state it",
-        None => "`turncal allan` finds it; or export with --run RUN.toml",
-    };
+    let missing = source.no_noise();
     let mut key = |name: &str, value: Option<f64>, unit: &str| match value {
         Some(value) => file.line(&format!("  {name}: {}  # {unit}", yaml_number(value))),
         None => file.line(&format!("  # {name}:   # {unit}: {missing}")),
@@ -100,12 +97,8 @@ fn noise(file: &mut Document, source: &Source) {
         ("gyroscope", Sensor::Gyro, "rad/s"),
         ("accelerometer", Sensor::Accel, "m/s^2"),
     ] {
-        let noise: Option<&Noise> = source.run.map(|run| run.instrument.noise.get(sensor));
-        // Over times short against its correlation time a Gauss–Markov bias walks like this.
-        let walk = noise
-            .and_then(|noise| noise.gauss_markov)
-            .map(|bias| bias.sigma * (2.0 / bias.correlation_time).sqrt());
-        let density = noise.map(|noise| noise.random_walk);
+        let walk = source.varying(sensor).map(|bias| bias.walk());
+        let density = source.noise(sensor).map(|noise| noise.random_walk);
         key(
             &format!("{name}_noise_density"),
             density,
@@ -122,11 +115,18 @@ fn noise(file: &mut Document, source: &Source) {
     file.line("  # rostopic: /imu0  # the topic of your recording");
 }
 
-/// Which triangle intrinsics are kept in.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Model {
-    Kalibr,
-    Rpng,
+/// A triangle and the rotation before it.
+type Split = (Matrix3<f64>, Matrix3<f64>);
+
+pub fn open_vins_kalibr(source: &Source) -> Exported {
+    open_vins(source, "kalibr", |a| {
+        let rotation = accelerometer_frame(a);
+        (lower(a * rotation.transpose()), rotation)
+    })
+}
+
+pub fn open_vins_rpng(source: &Source) -> Exported {
+    open_vins(source, "rpng", upper)
 }
 
 /// OpenVINS' IMU intrinsics, in its models `kalibr` and `rpng`.
@@ -137,25 +137,11 @@ pub enum Model {
 /// calls `A C_gyro_i`; the comment in OpenVINS' example files says otherwise.
 ///
 /// Source: OpenVINS, `VioManagerOptions::print_and_load_state` and `Propagator::predict_and_compute`.
-pub fn open_vins(source: &Source, model: Model) -> Exported {
+fn open_vins(source: &Source, name: &str, split: fn(&Matrix3<f64>) -> Split) -> Exported {
     let axes = Axes::log(source);
-    let parts = PerSensor::from_fn(|sensor| {
-        let a = axes.triads.get(sensor).sensitivity;
-        match model {
-            Model::Kalibr => {
-                let rotation = accelerometer_frame(&a);
-                (lower(a * rotation.transpose()), rotation)
-            }
-            Model::Rpng => upper(&a),
-        }
-    });
+    let parts = PerSensor::from_fn(|sensor| split(&axes.triads.get(sensor).sensitivity));
     let of_force = axes.triads.gyro.sensitivity * axes.g_sensitivity;
-    let name = match model {
-        Model::Kalibr => "kalibr",
-        Model::Rpng => "rpng",
-    };
-    let notes = [BIASES, SIGMA].map(str::to_owned);
-    let mut file = Document::holding(source, "#", notes, |term| term == Term::GSensitivity);
+    let mut file = begin(source);
     file.begin("%YAML:1.0");
     axes.introduce(&mut file, "OpenVINS reads rad/s and m/s^2, here");
     file.comment(&format!(

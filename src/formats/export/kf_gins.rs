@@ -11,7 +11,6 @@ use nalgebra::{Matrix3, Vector3};
 use super::Exported;
 use super::document::{Document, yaml_list, yaml_number};
 use super::source::{Axes, Normalised, Source};
-use crate::calibration::result::TriadRecord;
 use crate::imu::{PerSensor, Sensor};
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, PPM};
 
@@ -77,28 +76,15 @@ fn sigma(file: &mut Document, source: &Source, axes: &Axes) {
     file.comment(
         "1 sigma of the calibration; biases that change from switch-on to switch-on need more",
     );
-    let bias = |sigma: &TriadRecord| sigma.bias;
-    let scale = |sigma: &TriadRecord| sigma.scale;
-    type Values = fn(&TriadRecord) -> [f64; 3];
-    for (key, sensor, values, unit, name) in [
-        (
-            "initbgstd",
-            Sensor::Gyro,
-            bias as Values,
-            DEG_PER_H,
-            "deg/h",
-        ),
-        ("initbastd", Sensor::Accel, bias, MILLIGAL, "mGal"),
-        ("initsgstd", Sensor::Gyro, scale, PPM, "ppm"),
-        ("initsastd", Sensor::Accel, scale, PPM, "ppm"),
+    for (key, sensor, is_bias, unit, name) in [
+        ("initbgstd", Sensor::Gyro, true, DEG_PER_H, "deg/h"),
+        ("initbastd", Sensor::Accel, true, MILLIGAL, "mGal"),
+        ("initsgstd", Sensor::Gyro, false, PPM, "ppm"),
+        ("initsastd", Sensor::Accel, false, PPM, "ppm"),
     ] {
-        let of_record = source
-            .record
-            .sigma
-            .as_ref()
-            .map(|sigma| values(sigma.get(sensor)));
         let nominal = axes.triads.get(sensor).nominal;
-        let sigma = of_record.map(|of| {
+        let sigma = source.sigma(sensor).map(|sigma| {
+            let of = if is_bias { sigma.bias } else { sigma.scale };
             Vector3::from_fn(|k, _| of[axes.axis_of_record(k)] / nominal[k].abs() / unit)
         });
         match sigma.filter(|sigma| sigma.iter().all(|&s| s > 0.0)) {
@@ -111,20 +97,14 @@ fn sigma(file: &mut Document, source: &Source, axes: &Axes) {
 }
 
 fn noise(file: &mut Document, source: &Source) {
-    let missing = match source.run {
-        Some(_) => "[imu.noise] of the run does not state it",
-        None => "`turncal allan` finds it; or export with --run RUN.toml",
-    };
+    let missing = source.no_noise();
     // A key without children is no mapping, so without figures it is a comment, too.
     file.line(match source.run {
         Some(_) => "imunoise:",
         None => "# imunoise:",
     });
-    let noise = source.run.map(|run| run.instrument.noise);
-    let of = |sensor| noise.as_ref().map(|noise| noise.get(sensor));
-    let varying = |sensor| of(sensor).and_then(|noise| noise.gauss_markov);
-    let walk = |sensor, unit: f64| of(sensor).map(|noise| noise.random_walk / unit);
-    let sigma = |sensor, unit: f64| varying(sensor).map(|bias| bias.sigma / unit);
+    let walk = |sensor, unit: f64| source.noise(sensor).map(|noise| noise.random_walk / unit);
+    let sigma = |sensor, unit: f64| source.varying(sensor).map(|bias| bias.sigma / unit);
     for (name, value, unit) in [
         ("arw", walk(Sensor::Gyro, DEG_PER_SQRT_H), "deg/sqrt(h)"),
         (
@@ -142,7 +122,9 @@ fn noise(file: &mut Document, source: &Source) {
     }
     file.line("#  gsstd: [ , , ]  # ppm: 1σ by which scale factors vary, from the data sheet");
     file.line("#  asstd: [ , , ]  # ppm: the same");
-    let times = Sensor::ALL.map(varying).into_iter().flatten();
+    let times = Sensor::ALL
+        .iter()
+        .filter_map(|&sensor| source.varying(sensor));
     let shortest = times.map(|bias| bias.correlation_time).reduce(f64::min);
     file.line(&match shortest {
         Some(time) => format!(

@@ -30,21 +30,12 @@ pub fn write(source: &Source) -> Exported {
         ("about", text("", &source.about().join("; "))),
     ];
     for sensor in Sensor::ALL {
-        let record = match sensor {
-            Sensor::Gyro => &source.record.gyro,
-            Sensor::Accel => &source.record.accel,
-        };
-        let sigma = source
-            .record
-            .sigma
-            .as_ref()
-            .map(|sigma| triad(sigma.get(sensor)));
-        let mut of_triad = triad(record);
+        let mut of_triad = triad(source.record.triad(sensor));
         let matrix = source.correction.matrix.get(sensor);
         of_triad.push(("correction", numbers("", 3, matrix.as_slice())));
         of_triad.push(("unit", text("", &source.unit(sensor))));
-        if let Some(sigma) = sigma {
-            of_triad.push(("sigma", structure("", &sigma)));
+        if let Some(sigma) = source.sigma(sensor) {
+            of_triad.push(("sigma", structure("", &triad(sigma))));
         }
         fields.push((sensor.name(), structure("", &of_triad)));
     }
@@ -61,8 +52,7 @@ pub fn write(source: &Source) -> Exported {
     file.extend([0x00, 0x01, b'I', b'M']);
     file.extend(structure("turncal", &fields));
     Exported {
-        text: String::new(),
-        binary: Some(file),
+        bytes: file,
         notes: terms.into_iter().collect(),
     }
 }

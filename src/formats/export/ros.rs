@@ -11,8 +11,8 @@ use crate::imu::{PerSensor, Sensor};
 /// Row-major about x, y, z: the variance of a sample, density² × rate.
 pub fn covariance(source: &Source) -> Exported {
     let notes = [
-        "scale, misalignment and bias; publish what `turncal apply` writes, whose errors they are not".to_owned(),
-        "wander of biases, which is not white; `turncal allan` finds it".to_owned(),
+        "scale, misalignment and bias; publish what `turncal apply` writes, whose errors they are not",
+        "wander of biases, which is not white; `turncal allan` finds it",
     ];
     let mut file = Document::new(source, "#", notes);
     file.comment("");

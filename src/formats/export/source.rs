@@ -3,13 +3,11 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::document::{Document, yaml_list};
-use crate::calibration::result::Calibration;
-use crate::calibration::result::{EQUATION, Method};
+use crate::calibration::result::{Calibration, EQUATION, Method, TriadRecord};
 use crate::calibration::{Correction, CorrectionError};
 use crate::formats::unit_scale;
-use crate::imu::{AxisOrder, PerSensor, Sensor, Term};
-use crate::run::Aiding;
-use crate::run::Run;
+use crate::imu::{AxisOrder, GaussMarkov, Noise, PerSensor, Sensor, Term};
+use crate::run::{Aiding, Run};
 use crate::units::{ARCSEC, DEGREE, PPM, STANDARD_GRAVITY};
 
 /// A calibration and, perhaps, a run of its instrument.
@@ -51,8 +49,12 @@ impl<'a> Source<'a> {
     }
 
     fn row_unit(&self, sensor: Sensor) -> Option<&str> {
-        let unit = self.record.unit.as_ref()?;
-        Some(unit.get(sensor))
+        Some(self.record.unit.as_ref()?.get(sensor))
+    }
+
+    /// The unit of `u`.
+    pub fn input(sensor: Sensor) -> &'static str {
+        sensor.pick("rad/s", "m/s^2")
     }
 
     /// Whose calibration this is, what `N` and `u` are.
@@ -99,6 +101,30 @@ impl<'a> Source<'a> {
                 .to_owned(),
         ]);
         lines
+    }
+
+    /// σ of a triad's parameters.
+    pub fn sigma(&self, sensor: Sensor) -> Option<&TriadRecord> {
+        let sigma = self.record.sigma.as_ref();
+        sigma.map(|sigma| sigma.get(sensor))
+    }
+
+    /// The noise that the run states.
+    pub fn noise(&self, sensor: Sensor) -> Option<&Noise> {
+        self.run.map(|run| run.instrument.noise.get(sensor))
+    }
+
+    /// Its bias that varies.
+    pub fn varying(&self, sensor: Sensor) -> Option<GaussMarkov> {
+        self.noise(sensor)?.gauss_markov
+    }
+
+    /// Why a figure of noise is missing.
+    pub fn no_noise(&self) -> &'static str {
+        match self.run {
+            Some(_) => "[imu.noise] of the run does not state it",
+            None => "`turncal allan` finds it; or export with --run RUN.toml",
+        }
     }
 
     /// A triad in rad/s or m/s². Without a run the nominal scale is that of the unit; for counts the
@@ -305,14 +331,14 @@ impl Remainder {
         let mut across = self.errors;
         across.fill_diagonal(0.0);
         let worst = self.largest();
-        let (name, example) = match self.sensor {
-            Sensor::Gyro => ("gyros", format!("{:.3} deg/s at 100 deg/s", 100.0 * worst)),
-            Sensor::Accel => ("accelerometers", format!("{:.3} mg at 1 g", 1e3 * worst)),
-        };
-        let bias = match self.sensor {
-            Sensor::Gyro => format!("{:.3} deg/h", self.constant.amax() / DEGREE * 3600.0),
-            Sensor::Accel => format!("{:.3} mg", 1e3 * self.constant.amax() / STANDARD_GRAVITY),
-        };
+        let (name, example) = self.sensor.pick(
+            ("gyros", format!("{:.3} deg/s at 100 deg/s", 100.0 * worst)),
+            ("accelerometers", format!("{:.3} mg at 1 g", 1e3 * worst)),
+        );
+        let bias = self.sensor.pick(
+            format!("{:.3} deg/h", self.constant.amax() / DEGREE * 3600.0),
+            format!("{:.3} mg", 1e3 * self.constant.amax() / STANDARD_GRAVITY),
+        );
         format!(
             "{name}: the residual error is up to {:.1} ppm of scale and {:.1} arcsec of misalignment, together \
              {example} in any direction, and {bias} of bias",

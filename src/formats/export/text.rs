@@ -3,13 +3,12 @@
 use nalgebra::Vector3;
 
 use super::Exported;
-use super::document::Document;
+use super::document::{Document, TEST_VECTORS};
 use super::source::Source;
-use crate::calibration::result::TriadRecord;
 use crate::imu::{AXES, Sensor, Term};
 
 pub fn write(source: &Source) -> Exported {
-    let covariance = "covariance of the parameters; it is in calibration.json".to_owned();
+    let covariance = "covariance of the parameters; it is in calibration.json";
     let mut file = Document::new(source, "#", [covariance]);
     file.line(&format!(
         "\n{:<26}{:>25}{:>12}  unit",
@@ -25,10 +24,7 @@ pub fn write(source: &Source) -> Exported {
         row(&mut file, name, term.value, term.sigma, unit);
     }
     for sensor in Sensor::ALL {
-        let input = match sensor {
-            Sensor::Gyro => "rad/s",
-            Sensor::Accel => "m/s^2",
-        };
+        let input = Source::input(sensor);
         let matrix = source.correction.matrix.get(sensor);
         for (i, j) in (0..9).map(|k| (k / 3, k % 3)) {
             let name = format!("{}.correction.{}{}", sensor.name(), AXES[i], AXES[j]);
@@ -38,26 +34,19 @@ pub fn write(source: &Source) -> Exported {
     }
     let vectors = source.test_vectors();
     if !vectors.is_empty() {
-        file.line("\ntest vectors, raw -> calibrated, gyros x y z, accelerometers x y z:");
+        file.line(&format!("\n{TEST_VECTORS}"));
         vectors.iter().for_each(|line| file.line(line));
     }
     file.finish()
 }
 
 fn triad(file: &mut Document, source: &Source, sensor: Sensor) {
-    let of = |record: &super::Calibration| -> TriadRecord {
-        match sensor {
-            Sensor::Gyro => record.gyro,
-            Sensor::Accel => record.accel,
-        }
-    };
-    let values = of(source.record);
-    let sigma = source.record.sigma.map(|sigma| *sigma.get(sensor));
+    let (values, sigma) = (source.record.triad(sensor), source.sigma(sensor));
     let (name, unit) = (sensor.name(), source.unit(sensor));
-    let (input, in_words, factor) = match sensor {
-        Sensor::Gyro => ("rad/s", "deg/h", crate::units::DEG_PER_H),
-        Sensor::Accel => ("m/s^2", "ug", crate::units::MICRO_G),
-    };
+    let (input, in_words, factor) = sensor.pick(
+        ("rad/s", "deg/h", crate::units::DEG_PER_H),
+        ("m/s^2", "ug", crate::units::MICRO_G),
+    );
     for (i, axis) in AXES.iter().enumerate() {
         let sigma = sigma.map(|s| s.scale[i]);
         let unit = format!("{unit} per {input}");

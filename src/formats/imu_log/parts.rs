@@ -2,14 +2,19 @@
 
 use std::ops::Range;
 
-use super::content::Held;
-use super::{ImuLog, Layout, Read};
-use crate::formats::clock::{Line, REACH, Stamps, Wander};
-use crate::formats::course::{Even, reached};
+use nalgebra::Vector3;
+
+use super::reading::Held;
+use super::{ImuLog, Layout, sensor};
+use crate::formats::clock::{Line, REACH, Stamps, Uniform, Wander};
+use crate::formats::course::{Even, place, reached};
 use crate::formats::error::FileError;
 use crate::imu::{Output, PerSensor, Sensor};
 use crate::recording::faults::{Repaired, Rows};
-use crate::recording::{Bridge, ColumnFacts, Fault, FaultKind, Packer, SeriesWriter, finest_step};
+use crate::recording::{
+    Bridge, ColumnFacts, Fault, FaultKind, ImuSamples, LogFacts, Packer, SeriesWriter, finest_step,
+    stretches_between,
+};
 
 /// How many rows are held.
 #[derive(Debug, Clone, Copy)]
@@ -62,14 +67,14 @@ impl<'a> Parts<'a> {
         layout: Layout,
         size: Option<usize>,
         (held, stamps): (&Held, &Stamps),
-        known: Option<Wander>,
+        known: Option<&Wander>,
     ) -> Result<Self, FileError> {
         // Rows further on may belong before the last ones.
         let open = if size.is_some() { REACH } else { 0 };
         let settled = &stamps.of_rows[..stamps.of_rows.len().saturating_sub(open)];
         let (clock, numbers) = Line::new(&log.source.file, settled, log.clock.period)?;
         let wander = match size {
-            Some(_) => known,
+            Some(_) => known.cloned(),
             None => clock.clone().finish()?.wander,
         };
         let step = |column: usize| match log.output {
@@ -273,31 +278,95 @@ impl<'a> Parts<'a> {
         self.taken -= rows;
     }
 
-    /// What the log is, all of its rows being taken.
-    pub fn finish(mut self, duplicates: usize) -> Result<Read, FileError> {
-        let clock = self.clock.finish()?;
-        let mut facts = self.facts.unwrap_or_default();
-        for (facts, unit) in facts
-            .iter_mut()
-            .zip(self.layout.units(self.log, clock.period))
-        {
-            facts.unit = unit;
+    /// Whether rows were packed as they came.
+    pub fn are_packed(&self) -> bool {
+        self.size.is_some()
+    }
+
+    /// The clock that all rows shared.
+    pub fn clock(&self) -> Result<Uniform, FileError> {
+        self.clock.clone().finish()
+    }
+
+    /// Samples without a row.
+    pub fn missing(&self) -> usize {
+        self.next - self.rows
+    }
+
+    /// What the log is, all of its rows being taken; `integral_error` is that of its accelerometers, in their quantity
+    /// times s.
+    pub fn finish(
+        mut self,
+        clock: Uniform,
+        duplicates: usize,
+        integral_error: [f64; 3],
+    ) -> ImuSamples {
+        let mut error = self.onto_the_even_clock();
+        let (log, layout, period) = (self.log, &self.layout, clock.period);
+        let units = layout.units(log, period);
+        let seconds = log.seconds(period);
+        for (error, of_both) in error.accel.iter_mut().zip(integral_error) {
+            *error = error.hypot(of_both / seconds);
         }
-        let seconds = self.log.seconds(clock.period);
-        let mut series = PerSensor::default();
-        for (sensor, writer) in Sensor::ALL
-            .into_iter()
-            .zip([self.series.gyro, self.series.accel])
-        {
-            let nominal = self.layout.body_nominal(self.log, sensor);
-            *series.get_mut(sensor) = writer.finish(seconds, nominal);
+        let PerSensor { gyro, accel } = self.series;
+        let gyro = gyro.finish(seconds, layout.body_nominal(log, Sensor::Gyro));
+        let accel = accel.finish(seconds, layout.body_nominal(log, Sensor::Accel));
+        // Pulses are rounded a second time where packed ones are interpolated: what is not whole there stays with the
+        // sum.
+        let roundings: f64 = match log.output {
+            Output::Pulse if gyro.is_packed() && !self.bridges.is_empty() => 2.0,
+            _ => 1.0,
+        };
+        let pulse = PerSensor::from_fn(|sensor| {
+            let step = match log.output {
+                Output::Pulse => log.nominal.get(sensor).0.map(|n| n.abs().recip()).mean(),
+                Output::Increment | Output::Rate => sensor.pick(&gyro, &accel).step(),
+            };
+            let of_column = |k: usize| error.get(sensor)[k] * units[3 * sensor as usize + k];
+            (step * roundings.sqrt()).hypot(pulse_of([0, 1, 2].map(of_column)))
+        });
+        let mut columns = PerSensor::<[ColumnFacts; 3]>::default();
+        let facts = self.facts.unwrap_or_default().into_iter().zip(units);
+        for (k, (facts, unit)) in facts.enumerate() {
+            columns.get_mut(sensor(k))[layout.body_axes[k]] = ColumnFacts { unit, ..facts };
         }
+        let lag = log.stamp.lag();
+        let ahead = clock.wander.as_ref();
+        let ahead = ahead.map_or(0.0, |wander| place(wander, lag, 0).ceil());
+        let begin = clock.first + (ahead - lag) * period;
+        ImuSamples {
+            period_sigma: 0.0,
+            stretches: stretches_between(gyro.len(), begin, period, &self.faults),
+            period,
+            continuous: log.continuous,
+            gyro,
+            accel,
+            pulse,
+            faults: self.faults,
+            bridges: self.bridges,
+            temperature: None,
+            log: Some(LogFacts {
+                rows: self.rows + duplicates,
+                output: log.output,
+                jitter_rms: clock.jitter_rms,
+                jitter_max: clock.jitter_max,
+                off_stated_period: clock.off_given,
+                columns,
+                named: log.named_columns(layout),
+                temperature: None,
+            }),
+        }
+    }
+
+    /// Puts faults and bridges, in order, where samples are that were put on an even clock; RMS errors of the integrals
+    /// of these, in the columns' quantity times samples.
+    fn onto_the_even_clock(&mut self) -> PerSensor<[f64; 3]> {
         let mut error = PerSensor::default();
         if let Some((wander, even)) = &self.even {
             error = PerSensor::from_fn(|sensor| even.get(sensor).error());
             let of_faults = self.faults.iter_mut().map(|fault| &mut fault.samples);
             let of_bridges = self.bridges.iter_mut().map(|bridge| &mut bridge.samples);
-            let count = series.gyro.len();
+            let count = self.series.gyro.len();
             for samples in of_faults.chain(of_bridges) {
                 let of = reached(wander, self.log.stamp.lag(), samples);
                 *samples = of.start.min(count)..of.end.min(count);
@@ -307,15 +376,12 @@ impl<'a> Parts<'a> {
         self.faults.shrink_to_fit();
         Bridge::sort(&mut self.bridges);
         self.bridges.shrink_to_fit();
-        Ok(Read {
-            clock,
-            facts,
-            rows: self.rows + duplicates,
-            missing: self.next - self.rows,
-            faults: self.faults,
-            bridges: self.bridges,
-            series,
-            error,
-        })
+        error
     }
+}
+
+/// The pulse whose rounding has this RMS error on each axis: an error of integrals between edges is as bounded as
+/// that, and as independent of how long it is summed over.
+fn pulse_of(error: [f64; 3]) -> f64 {
+    12f64.sqrt() * Vector3::from(error).norm() / 3f64.sqrt()
 }

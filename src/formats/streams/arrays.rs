@@ -40,9 +40,22 @@ pub struct Field {
 
 impl Array {
     /// Items, where they can be counted.
-    pub fn items(&self) -> Option<usize> {
+    fn items(&self) -> Option<usize> {
         let mut sizes = self.shape.iter();
         sizes.try_fold(1usize, |all, &size| all.checked_mul(size))
+    }
+
+    /// The same if its items fit into this many bytes.
+    pub fn within(self, bytes: u64, name: &str) -> Result<Self, Broken> {
+        let needed = self.items().and_then(|all| all.checked_mul(self.size));
+        if needed.is_some_and(|needed| needed as u64 <= bytes) {
+            return Ok(self);
+        }
+        Err(Broken::new(
+            self.offset,
+            format_args!("{bytes} bytes of the array `{name}`"),
+            format_args!("items of {} bytes by its shape {:?}", self.size, self.shape),
+        ))
     }
 
     /// Its columns, by how they are read: the longest dimension, of equal ones the first, counts rows.

@@ -201,6 +201,18 @@ impl<'a> Slice<'a> {
         usize::try_from(length).map_err(|_| Broken::new(self.offset(), length, what))
     }
 
+    /// What follows its own length of this many bytes.
+    pub fn measured(&mut self, size: usize, what: &str) -> Result<&'a [u8], Broken> {
+        let length = self.length(size, "a length")?;
+        self.take(length, what)
+    }
+
+    /// The same of a text.
+    pub fn measured_text(&mut self, size: usize, what: &str) -> Result<String, Broken> {
+        let length = self.length(size, "a length")?;
+        self.text(length, what)
+    }
+
     /// A text of this length; what is no UTF-8 in it is replaced.
     pub fn text(&mut self, count: usize, what: &str) -> Result<String, Broken> {
         let bytes = self.take(count, what)?;
@@ -225,6 +237,41 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// Whole numbers of this many bytes.
+    pub fn whole_number(is_signed: bool, size: usize) -> Option<Self> {
+        Some(match (is_signed, size) {
+            (true, 1) => Self::I8,
+            (true, 2) => Self::I16,
+            (true, 4) => Self::I32,
+            (true, 8) => Self::I64,
+            (false, 1) => Self::U8,
+            (false, 2) => Self::U16,
+            (false, 4) => Self::U32,
+            (false, 8) => Self::U64,
+            _ => return None,
+        })
+    }
+
+    /// By the name in C and ROS, such as `uint16_t` and `float32`.
+    #[cfg_attr(
+        not(any(feature = "mcap", feature = "rosbag", feature = "ulog")),
+        allow(dead_code)
+    )]
+    pub fn named(name: &str) -> Option<Self> {
+        match name {
+            "bool" => return Some(Self::U8),
+            "float" | "float32" => return Some(Self::F32),
+            "double" | "float64" => return Some(Self::F64),
+            _ => {}
+        }
+        let name = name.strip_suffix("_t").unwrap_or(name);
+        let (is_signed, bits) = match name.strip_prefix("uint") {
+            Some(bits) => (false, bits),
+            None => (true, name.strip_prefix("int")?),
+        };
+        Self::whole_number(is_signed, bits.parse::<usize>().ok()? / 8)
+    }
+
     /// Bytes.
     pub fn size(self) -> usize {
         match self {

@@ -160,10 +160,7 @@ fn note(done: &mut Vec<Done>, applied: Option<&Applied>, sample: u64) -> bool {
 }
 
 fn words(program: &str, sensor: Sensor, done: &Done) -> String {
-    let triad = match sensor {
-        Sensor::Gyro => "gyros",
-        Sensor::Accel => "accelerometers",
-    };
+    let triad = sensor.pick("gyros", "accelerometers");
     let varies = match done.varies {
         true => ", which change within the log",
         false => "",

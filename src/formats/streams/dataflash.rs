@@ -133,10 +133,7 @@ impl Format {
     /// What of it is corrected.
     fn undo(&self) -> Undo {
         let corrected = PerSensor::from_fn(|sensor| {
-            let names = match sensor {
-                Sensor::Gyro => ["GyrX", "GyrY", "GyrZ"],
-                Sensor::Accel => ["AccX", "AccY", "AccZ"],
-            };
+            let names = sensor.pick(["GyrX", "GyrY", "GyrZ"], ["AccX", "AccY", "AccZ"]);
             Corrected::rates(&self.columns, names).filter(|_| self.is_inertial())
         });
         Undo::new("ArduPilot", corrected)
@@ -291,10 +288,7 @@ impl DataFlash {
 
 /// What ArduPilot's parameters of an instance, from 0, say.
 fn applied(parameters: &BTreeMap<String, f64>, sensor: Sensor, instance: u8) -> Option<Applied> {
-    let kind = match sensor {
-        Sensor::Gyro => "GYR",
-        Sensor::Accel => "ACC",
-    };
+    let kind = sensor.pick("GYR", "ACC");
     // A damaged log may have an instance 255.
     let number = u16::from(instance) + 1;
     let stem = match (number, sensor) {
@@ -311,16 +305,10 @@ fn applied(parameters: &BTreeMap<String, f64>, sensor: Sensor, instance: u8) -> 
         }
     };
     let offset = axes("OFFS")?;
-    let scale = match sensor {
-        Sensor::Gyro => None,
-        Sensor::Accel => axes("SCAL"),
-    };
+    let scale = sensor.pick(None, axes("SCAL"));
     let is_on = |name: &str| parameters.get(name).is_some_and(|&value| value != 0.0);
     Some(Applied {
-        name: match sensor {
-            Sensor::Gyro => format!("{stem}OFFS"),
-            Sensor::Accel => format!("{stem}OFFS and {stem}SCAL"),
-        },
+        name: sensor.pick(format!("{stem}OFFS"), format!("{stem}OFFS and {stem}SCAL")),
         offset,
         // Zero stands for a scale that was never calibrated.
         scale: scale

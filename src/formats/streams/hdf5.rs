@@ -7,8 +7,8 @@
 use std::io::{self, Cursor, Read};
 
 use hdf5_pure::{
-    Chunk, Dataset, Datatype, DatatypeByteOrder, Error, File, FixedPointLayout,
-    FloatingPointLayout, FormatError, Group, Layout, ReadSeekSource,
+    Chunk, Dataset, Datatype, DatatypeByteOrder, Error, File, FloatingPointLayout, FormatError,
+    Group, Layout, ReadSeekSource,
 };
 
 use super::Log;
@@ -191,7 +191,10 @@ fn kind(item: &Datatype) -> Option<(Kind, bool)> {
             size,
             byte_order,
             layout,
-        } => (whole(*size, layout)?, byte_order),
+        } if layout.bit_offset == 0 && u32::from(layout.bit_precision) == 8 * size => (
+            Kind::whole_number(layout.signed, *size as usize)?,
+            byte_order,
+        ),
         _ => return None,
     };
     match order {
@@ -199,25 +202,6 @@ fn kind(item: &Datatype) -> Option<(Kind, bool)> {
         DatatypeByteOrder::BigEndian => Some((kind, true)),
         DatatypeByteOrder::Vax => None,
     }
-}
-
-/// The kind of a whole number that fills its bytes.
-fn whole(size: u32, layout: &FixedPointLayout) -> Option<Kind> {
-    let bits = u32::from(layout.bit_precision);
-    if layout.bit_offset != 0 || bits != 8 * size {
-        return None;
-    }
-    Some(match (layout.signed, bits) {
-        (true, 8) => Kind::I8,
-        (true, 16) => Kind::I16,
-        (true, 32) => Kind::I32,
-        (true, 64) => Kind::I64,
-        (false, 8) => Kind::U8,
-        (false, 16) => Kind::U16,
-        (false, 32) => Kind::U32,
-        (false, 64) => Kind::U64,
-        _ => return None,
-    })
 }
 
 /// The bytes of a dataset.

@@ -188,18 +188,8 @@ impl<'a> Element<'a> {
             open: Box::new(open),
             offset: self.offset,
         };
-        let needed = array.items().and_then(|all| all.checked_mul(array.size));
-        if needed.is_none_or(|needed| needed > left) {
-            return Err(Broken::new(
-                self.offset,
-                format_args!("{left} bytes of the array `{}`", array.fields[0].name),
-                format_args!(
-                    "items of {} bytes by its shape {:?}",
-                    array.size, array.shape
-                ),
-            ));
-        }
-        Ok(Some(array))
+        let name = array.fields[0].name.clone();
+        array.within(left as u64, &name).map(Some)
     }
 
     /// A number from zero on; zero if there is none.

@@ -5,11 +5,11 @@
 
 use std::collections::BTreeMap;
 
+use super::Log;
 use super::bytes::{Broken, Input, Slice};
 use super::messages::packed::unpack;
 use super::messages::ros::Encoding;
-use super::messages::{Reader, Topics, json, protobuf};
-use super::{Log, Stream};
+use super::messages::{MessageLog, Messages, Reader, Topics, protobuf};
 
 const MAGIC: u64 = 8;
 const SCHEMA: u8 = 3;
@@ -20,17 +20,16 @@ const DATA_END: u8 = 15;
 
 pub fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
     input.skip(MAGIC, "the first bytes")?;
-    Ok(Box::new(Mcap {
+    let messages = Mcap {
         input,
         schemas: BTreeMap::new(),
-        topics: Topics::default(),
         chunk: Vec::new(),
         at: 0,
         record: Vec::new(),
         offset: 0,
-        current: None,
         is_ended: false,
-    }))
+    };
+    Ok(Box::new(MessageLog::new(messages, Topics::default())))
 }
 
 struct Schema {
@@ -42,36 +41,25 @@ struct Schema {
 struct Mcap {
     input: Input,
     schemas: BTreeMap<u16, Schema>,
-    topics: Topics,
     /// Records of the chunk that is read, and how far it is.
     chunk: Vec<u8>,
     at: usize,
     record: Vec<u8>,
     /// Where the record, or the chunk that it is in, is.
     offset: u64,
-    /// Stream, time and place in the record of the message.
-    current: Option<(usize, u64)>,
     is_ended: bool,
 }
 
 /// Bytes of a message before its data: channel, number, two times.
 const BEFORE_DATA: usize = 22;
 
-impl Log for Mcap {
-    fn streams(&self) -> &[Stream] {
-        &self.topics.streams
-    }
-
-    fn advance(&mut self) -> Result<Option<usize>, Broken> {
+impl Messages for Mcap {
+    fn advance(&mut self, topics: &mut Topics) -> Result<Option<(u32, u64)>, Broken> {
         while let Some(kind) = self.next_record()? {
             match kind {
                 SCHEMA => self.schema()?,
-                CHANNEL => self.channel()?,
-                MESSAGE => {
-                    if let Some(stream) = self.message()? {
-                        return Ok(Some(stream));
-                    }
-                }
+                CHANNEL => self.channel(topics)?,
+                MESSAGE => return self.message().map(Some),
                 CHUNK => self.open_chunk()?,
                 DATA_END => self.is_ended = true,
                 _ => {}
@@ -80,12 +68,8 @@ impl Log for Mcap {
         Ok(None)
     }
 
-    fn values(&mut self, row: &mut Vec<f64>) -> Result<(), Broken> {
-        let Some((stream, time)) = self.current else {
-            return Ok(());
-        };
-        let data = self.record.get(BEFORE_DATA..).unwrap_or_default();
-        self.topics.readers[stream].values(time, data, self.offset, row)
+    fn data(&self) -> &[u8] {
+        self.record.get(BEFORE_DATA..).unwrap_or_default()
     }
 
     fn offset(&self) -> u64 {
@@ -99,8 +83,7 @@ impl Mcap {
         if self.at < self.chunk.len() {
             let mut chunk = Slice::packed(&self.chunk[self.at..], self.offset);
             let kind = chunk.whole(1, "a record's kind")? as u8;
-            let length = chunk.length(8, "a record's length")?;
-            let content = chunk.take(length, "a record of a chunk")?;
+            let content = chunk.measured(8, "a record of a chunk")?;
             self.record.clear();
             self.record.extend_from_slice(content);
             self.at += chunk.position();
@@ -137,10 +120,8 @@ impl Mcap {
         record.take(16, "the times of a chunk")?;
         let size = record.whole(8, "the size of a chunk")?;
         let sum = record.whole(4, "the checksum of a chunk")? as u32;
-        let length = record.length(4, "a length")?;
-        let method = record.text(length, "how a chunk is packed")?;
-        let length = record.length(8, "a length")?;
-        let packed = record.take(length, "a chunk")?;
+        let method = record.measured_text(4, "how a chunk is packed")?;
+        let packed = record.measured(8, "a chunk")?;
         self.chunk = unpack(&method, packed, size, self.offset)?;
         self.at = 0;
         let mut found = flate2::Crc::new();
@@ -160,12 +141,9 @@ impl Mcap {
     fn schema(&mut self) -> Result<(), Broken> {
         let mut record = Slice::packed(&self.record, self.offset);
         let number = record.whole(2, "a schema's number")? as u16;
-        let length = record.length(4, "a length")?;
-        let name = record.text(length, "a schema's name")?;
-        let length = record.length(4, "a length")?;
-        let encoding = record.text(length, "a schema's encoding")?;
-        let length = record.length(4, "a length")?;
-        let data = record.take(length, "a schema")?.to_vec();
+        let name = record.measured_text(4, "a schema's name")?;
+        let encoding = record.measured_text(4, "a schema's encoding")?;
+        let data = record.measured(4, "a schema")?.to_vec();
         let schema = Schema {
             name,
             encoding,
@@ -175,14 +153,12 @@ impl Mcap {
         Ok(())
     }
 
-    fn channel(&mut self) -> Result<(), Broken> {
+    fn channel(&self, topics: &mut Topics) -> Result<(), Broken> {
         let mut record = Slice::packed(&self.record, self.offset);
         let number = record.whole(2, "a channel's number")? as u16;
         let schema = record.whole(2, "a schema's number")? as u16;
-        let length = record.length(4, "a length")?;
-        let topic = record.text(length, "a topic")?;
-        let length = record.length(4, "a length")?;
-        let encoding = record.text(length, "an encoding of messages")?;
+        let topic = record.measured_text(4, "a topic")?;
+        let encoding = record.measured_text(4, "an encoding of messages")?;
         let reader = || match self.schemas.get(&schema) {
             Some(schema) => reader(&encoding, schema),
             None if encoding == "json" => Reader::Json(Vec::new()),
@@ -190,28 +166,18 @@ impl Mcap {
                 "messages of encoding `{encoding}` without a schema are not read"
             )),
         };
-        self.topics.add(number.into(), &topic, reader);
+        topics.add(number.into(), &topic, reader);
         Ok(())
     }
 
-    fn message(&mut self) -> Result<Option<usize>, Broken> {
+    /// Channel and time of a message.
+    fn message(&self) -> Result<(u32, u64), Broken> {
         let mut record = Slice::packed(&self.record, self.offset);
         let channel = record.whole(2, "a channel's number")? as u16;
         record.take(4, "a message's number")?;
         let time = record.whole(8, "a time")?;
         record.take(8, "a time")?;
-        let stream = self.topics.stream(channel.into(), self.offset)?;
-        let Topics {
-            streams, readers, ..
-        } = &mut self.topics;
-        if let Reader::Json(columns) = &mut readers[stream]
-            && columns.is_empty()
-        {
-            *columns = json::columns(&self.record[BEFORE_DATA..], self.offset)?;
-            streams[stream] = readers[stream].stream(&streams[stream].name);
-        }
-        self.current = Some((stream, time));
-        Ok(Some(stream))
+        Ok((channel.into(), time))
     }
 }
 

@@ -102,74 +102,32 @@ struct Format {
 
 type Open = fn(Input) -> Result<Box<dyn Log>, Broken>;
 
-macro_rules! reader {
-    ($feature:literal, $open:path) => {{
-        #[cfg(feature = $feature)]
-        let open: Option<Open> = Some($open);
-        #[cfg(not(feature = $feature))]
-        let open: Option<Open> = None;
-        open
-    }};
+/// A row a format: feature, reader, name, and what its files begin with.
+macro_rules! formats {
+    ($($feature:literal $open:path, $name:literal, $begins:expr;)*) => {
+        [$(Format {
+            name: $name,
+            feature: $feature,
+            begins: &$begins,
+            #[cfg(feature = $feature)]
+            open: Some($open),
+            #[cfg(not(feature = $feature))]
+            open: None,
+        }),*]
+    };
 }
 
-fn formats() -> [Format; 9] {
-    [
-        Format {
-            name: "a PX4 ULog file",
-            feature: "ulog",
-            begins: &[b"ULog\x01\x12\x35"],
-            open: reader!("ulog", ulog::open),
-        },
-        Format {
-            name: "an ArduPilot DataFlash log",
-            feature: "dataflash",
-            begins: &[b"\xa3\x95\x80"],
-            open: reader!("dataflash", dataflash::open),
-        },
-        Format {
-            name: "a MAT file",
-            feature: "mat",
-            begins: &[b"MATLAB 5.0 MAT-file"],
-            open: reader!("mat", mat::open),
-        },
-        Format {
-            name: "an HDF5 file, as MAT files of version 7.3 are",
-            feature: "hdf5",
-            begins: &[b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3 MAT-file"],
-            open: reader!("hdf5", hdf5::open),
-        },
-        Format {
-            name: "an MCAP file",
-            feature: "mcap",
-            begins: &[b"\x89MCAP0\r\n"],
-            open: reader!("mcap", mcap::open),
-        },
-        Format {
-            name: "a ROS 1 bag",
-            feature: "rosbag",
-            begins: &[b"#ROSBAG V2.0\n"],
-            open: reader!("rosbag", rosbag::open),
-        },
-        Format {
-            name: "a ROS 2 bag",
-            feature: "rosbag",
-            begins: &[b"SQLite format 3\0"],
-            open: reader!("rosbag", rosbag2::open),
-        },
-        Format {
-            name: "a NumPy array",
-            feature: "npy",
-            begins: &[b"\x93NUMPY"],
-            open: reader!("npy", npy::open_array),
-        },
-        Format {
-            name: "a ZIP archive of NumPy arrays",
-            feature: "npy",
-            begins: &[b"PK\x03\x04"],
-            open: reader!("npy", npy::open_archive),
-        },
-    ]
-}
+static FORMATS: [Format; 9] = formats! {
+    "ulog" ulog::open, "a PX4 ULog file", [b"ULog\x01\x12\x35"];
+    "dataflash" dataflash::open, "an ArduPilot DataFlash log", [b"\xa3\x95\x80"];
+    "mat" mat::open, "a MAT file", [b"MATLAB 5.0 MAT-file"];
+    "hdf5" hdf5::open, "an HDF5 file, as MAT files of version 7.3 are", [b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3 MAT-file"];
+    "mcap" mcap::open, "an MCAP file", [b"\x89MCAP0\r\n"];
+    "rosbag" rosbag::open, "a ROS 1 bag", [b"#ROSBAG V2.0\n"];
+    "rosbag" rosbag2::open, "a ROS 2 bag", [b"SQLite format 3\0"];
+    "npy" npy::open_array, "a NumPy array", [b"\x93NUMPY"];
+    "npy" npy::open_archive, "a ZIP archive of NumPy arrays", [b"PK\x03\x04"];
+};
 
 /// What files begin with that turncal does not read, what they are, and what to do.
 const CLOSED: [(&[u8], &str, &str); 2] = [
@@ -210,7 +168,7 @@ pub fn open(path: &Path) -> Result<Option<Box<dyn Log>>, FileError> {
         let expected = "rows of text, or a log of a program that turncal knows";
         return Err(FileError::new(path, Place::File, found, expected, advice));
     }
-    let Some(format) = formats().into_iter().find(|format| format.is_of(&begin)) else {
+    let Some(format) = FORMATS.iter().find(|format| format.is_of(&begin)) else {
         return Ok(None);
     };
     let Some(open) = format.open else {

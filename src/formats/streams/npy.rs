@@ -128,29 +128,24 @@ impl Member {
 
     /// The array, and what of it is left out.
     fn array(self, file: &File) -> Result<(Array, Option<String>), Broken> {
-        let header = Header::read(&mut self.open(file), self.offset)?;
-        let left_out = header.left_out(&self.name);
+        let header = Header::read(&mut self.open(file), &self.name, self.offset)?;
+        let left_out = header.left_out();
         let (size, begin, offset) = (self.size, header.begin, self.offset);
-        let name = self.name.clone();
-        let file = file.clone();
+        let (name, file) = (self.name.clone(), file.clone());
         let open: Open = Box::new(move |skip| {
             let mut bytes = self.open(&file);
             io::copy(&mut bytes.by_ref().take(begin + skip), &mut io::sink())?;
             Ok(bytes)
         });
-        let array = header.array(&name, open, offset);
-        let needed = array.items().and_then(|all| all.checked_mul(array.size));
-        if needed.is_none_or(|needed| needed as u64 > size.saturating_sub(begin)) {
-            return Err(Broken::new(
-                offset,
-                format_args!("{} bytes of the array `{name}`", size.saturating_sub(begin)),
-                format_args!(
-                    "items of {} bytes by its shape {:?}",
-                    array.size, array.shape
-                ),
-            ));
-        }
-        Ok((array, left_out))
+        let array = Array {
+            shape: header.shape,
+            first_is_fastest: header.first_is_fastest,
+            size: header.size,
+            fields: header.fields,
+            open,
+            offset,
+        };
+        Ok((array.within(size.saturating_sub(begin), &name)?, left_out))
     }
 }
 

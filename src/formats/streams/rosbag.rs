@@ -3,11 +3,11 @@
 //! Source: wiki.ros.org/Bags/Format/2.0: a line of the version, then records of a head (fields `name=value`) and
 //! data; chunks hold connections and messages, packed.
 
+use super::Log;
 use super::bytes::{Broken, Input, Slice};
 use super::messages::packed::unpack;
 use super::messages::ros::Encoding;
-use super::messages::{Reader, Topics};
-use super::{Log, Stream};
+use super::messages::{MessageLog, Messages, Reader, Topics};
 
 const FIRST_LINE: u64 = 13;
 const MESSAGE: u8 = 2;
@@ -16,21 +16,19 @@ const CONNECTION: u8 = 7;
 
 pub fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
     input.skip(FIRST_LINE, "the first line")?;
-    Ok(Box::new(Bag {
+    let messages = Bag {
         input,
-        topics: Topics::default(),
         chunk: Vec::new(),
         at: 0,
         head: Vec::new(),
         data: Vec::new(),
         offset: 0,
-        current: None,
-    }))
+    };
+    Ok(Box::new(MessageLog::new(messages, Topics::default())))
 }
 
 struct Bag {
     input: Input,
-    topics: Topics,
     /// Records of the chunk that is read, and how far it is.
     chunk: Vec<u8>,
     at: usize,
@@ -38,16 +36,10 @@ struct Bag {
     data: Vec<u8>,
     /// Where the record, or the chunk that it is in, is.
     offset: u64,
-    /// Stream and time of the message.
-    current: Option<(usize, u64)>,
 }
 
-impl Log for Bag {
-    fn streams(&self) -> &[Stream] {
-        &self.topics.streams
-    }
-
-    fn advance(&mut self) -> Result<Option<usize>, Broken> {
+impl Messages for Bag {
+    fn advance(&mut self, topics: &mut Topics) -> Result<Option<(u32, u64)>, Broken> {
         while self.next_record()? {
             let head = Head::of(&self.head, self.offset)?;
             let kind = head.field("op").and_then(|op| op.first()).copied();
@@ -56,9 +48,7 @@ impl Log for Bag {
                     let connection = head.whole("conn", 4)? as u32;
                     let time = head.whole("time", 8)?;
                     let (seconds, nanoseconds) = (time & 0xffff_ffff, time >> 32);
-                    let stream = self.topics.stream(connection, self.offset)?;
-                    self.current = Some((stream, seconds * 1_000_000_000 + nanoseconds));
-                    return Ok(Some(stream));
+                    return Ok(Some((connection, seconds * 1_000_000_000 + nanoseconds)));
                 }
                 Some(CHUNK) => {
                     let size = head.whole("size", 4)?;
@@ -67,7 +57,7 @@ impl Log for Bag {
                     self.chunk = unpack(&method, &self.data, size, self.offset)?;
                     self.at = 0;
                 }
-                Some(CONNECTION) => self.connection()?,
+                Some(CONNECTION) => self.connection(topics)?,
                 Some(_) => {}
                 None => {
                     return Err(Broken::new(
@@ -81,11 +71,8 @@ impl Log for Bag {
         Ok(None)
     }
 
-    fn values(&mut self, row: &mut Vec<f64>) -> Result<(), Broken> {
-        let Some((stream, time)) = self.current else {
-            return Ok(());
-        };
-        self.topics.readers[stream].values(time, &self.data, self.offset, row)
+    fn data(&self) -> &[u8] {
+        &self.data
     }
 
     fn offset(&self) -> u64 {
@@ -99,9 +86,8 @@ impl Bag {
         if self.at < self.chunk.len() {
             let mut chunk = Slice::packed(&self.chunk[self.at..], self.offset);
             for part in [&mut self.head, &mut self.data] {
-                let length = chunk.length(4, "a length")?;
                 part.clear();
-                part.extend_from_slice(chunk.take(length, "a record of a chunk")?);
+                part.extend_from_slice(chunk.measured(4, "a record of a chunk")?);
             }
             self.at += chunk.position();
             if Head::of(&self.head, self.offset)?.field("op") == Some(&[CHUNK]) {
@@ -121,7 +107,7 @@ impl Bag {
         Ok(true)
     }
 
-    fn connection(&mut self) -> Result<(), Broken> {
+    fn connection(&self, topics: &mut Topics) -> Result<(), Broken> {
         let head = Head::of(&self.head, self.offset)?;
         let number = head.whole("conn", 4)? as u32;
         let text =
@@ -133,7 +119,7 @@ impl Bag {
             described.field("message_definition"),
         );
         let reader = || Reader::of_ros(&text(kind), &text(definition), Encoding::Ros1);
-        self.topics.add(number, &topic, reader);
+        topics.add(number, &topic, reader);
         Ok(())
     }
 }
@@ -149,8 +135,7 @@ impl<'a> Head<'a> {
         let mut slice = Slice::packed(bytes, offset);
         let mut fields = Vec::new();
         while slice.left() > 0 {
-            let length = slice.length(4, "the length of a field")?;
-            let field = slice.take(length, "a field")?;
+            let field = slice.measured(4, "a field")?;
             let equals = field.iter().position(|&byte| byte == b'=');
             let Some(equals) = equals else {
                 return Err(Broken::new(offset, "a field without `=`", "`name=value`"));

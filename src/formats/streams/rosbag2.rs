@@ -4,10 +4,10 @@
 
 use std::collections::BTreeMap;
 
+use super::Log;
 use super::bytes::{Broken, Input};
-use super::messages::{Reader, Topics, ros::Encoding};
+use super::messages::{MessageLog, Messages, Reader, Topics, ros::Encoding};
 use super::sqlite::{Database, Row, Table};
-use super::{Log, Stream};
 
 /// The definition of `sensor_msgs/msg/Imu`, which earlier bags lack.
 const IMU: &str = "std_msgs/Header header
@@ -37,9 +37,8 @@ float64 z
 struct Bag {
     database: Database,
     messages: Table,
-    topics: Topics,
-    /// Stream and row of the message.
-    current: Option<(usize, Row)>,
+    /// The row of the message.
+    current: Row,
 }
 
 pub fn open(input: Input) -> Result<Box<dyn Log>, Broken> {
@@ -71,39 +70,29 @@ pub fn open(input: Input) -> Result<Box<dyn Log>, Broken> {
         topics.add(number, &row.get("name").text(), reader);
     }
     let messages = database.table("messages")?;
-    Ok(Box::new(Bag {
+    let messages = Bag {
         messages: messages.ok_or_else(|| missing("messages"))?,
         database,
-        topics,
-        current: None,
-    }))
+        current: Row::default(),
+    };
+    Ok(Box::new(MessageLog::new(messages, topics)))
 }
 
-impl Log for Bag {
-    fn streams(&self) -> &[Stream] {
-        &self.topics.streams
-    }
-
-    fn advance(&mut self) -> Result<Option<usize>, Broken> {
+impl Messages for Bag {
+    fn advance(&mut self, _: &mut Topics) -> Result<Option<(u32, u64)>, Broken> {
         let Some(row) = self.database.next(&mut self.messages)? else {
             return Ok(None);
         };
-        let topic = row.get("topic_id").whole().unwrap_or(0) as u32;
-        let stream = self.topics.stream(topic, row.offset)?;
-        self.current = Some((stream, row));
-        Ok(Some(stream))
+        self.current = row;
+        let whole = |column| self.current.get(column).whole().unwrap_or(0);
+        Ok(Some((whole("topic_id") as u32, whole("timestamp") as u64)))
     }
 
-    fn values(&mut self, row: &mut Vec<f64>) -> Result<(), Broken> {
-        let Some((stream, message)) = &self.current else {
-            return Ok(());
-        };
-        let time = message.get("timestamp").whole().unwrap_or(0) as u64;
-        let data = message.get("data").bytes();
-        self.topics.readers[*stream].values(time, data, message.offset, row)
+    fn data(&self) -> &[u8] {
+        self.current.get("data").bytes()
     }
 
     fn offset(&self) -> u64 {
-        self.current.as_ref().map_or(0, |(_, row)| row.offset)
+        self.current.offset
     }
 }

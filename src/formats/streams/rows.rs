@@ -106,19 +106,14 @@ impl StreamRows {
         log.values(&mut row)
             .map_err(|broken| broken.of(file, CUT_OFF))?;
         let found = &log.streams()[stream];
+        let columns = found.columns.iter();
+        let columns = columns.map(|column| (column.name.clone(), column.unit.to_owned()));
+        let (names, units) = columns.unzip();
         Ok(Self {
             file: file.to_owned(),
             name: found.name.clone(),
-            names: found
-                .columns
-                .iter()
-                .map(|column| column.name.clone())
-                .collect(),
-            units: found
-                .columns
-                .iter()
-                .map(|column| column.unit.to_owned())
-                .collect(),
+            names,
+            units,
             log,
             stream,
             salvage,
@@ -233,24 +228,20 @@ impl Rows for StreamRows {
 
 /// A log of which no stream with samples can be meant.
 fn no_stream(file: &Path, log: &dyn Log, with_samples: &[usize], name: Option<&str>) -> FileError {
-    let names: Vec<&str> = with_samples
-        .iter()
-        .map(|&k| &*log.streams()[k].name)
-        .collect();
-    let (found, expected) = match (names.is_empty(), name) {
-        (true, _) => ("no samples".to_owned(), "streams of samples".to_owned()),
-        (false, Some(name)) => (
-            format!("the streams {}", list(names.iter().copied())),
-            format!("a stream `{name}` with samples"),
-        ),
-        (false, None) => (
-            format!("the streams {}", list(names.iter().copied())),
-            "one stream, or `stream` in run.toml".to_owned(),
+    let names = || with_samples.iter().map(|&k| &*log.streams()[k].name);
+    let (found, expected) = match name {
+        _ if with_samples.is_empty() => ("no samples".to_owned(), "streams of samples".to_owned()),
+        name => (
+            format!("the streams {}", list(names())),
+            name.map_or_else(
+                || "one stream, or `stream` in run.toml".to_owned(),
+                |name| format!("a stream `{name}` with samples"),
+            ),
         ),
     };
     let advice = suggestion(
         name.unwrap_or_default(),
-        names.iter().copied(),
+        names(),
         "Name one of them; `turncal init FILE` shows the content of each.",
     );
     FileError::new(file, Place::File, found, expected, advice)

@@ -38,6 +38,7 @@ impl Value {
 }
 
 /// Values by the names of the table's columns.
+#[derive(Default)]
 pub struct Row {
     columns: Vec<String>,
     values: Vec<Value>,

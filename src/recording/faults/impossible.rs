@@ -3,8 +3,8 @@
 
 use std::ops::Range;
 
-use super::ranges;
 use super::repair::Rows;
+use super::{FaultKind, Found, ranges};
 use crate::units::STANDARD_GRAVITY;
 
 /// Beyond the range of any gyro, rad/s (57,000 °/s).
@@ -12,70 +12,51 @@ const FASTEST: f64 = 1000.0;
 /// Beyond the specific force of any instrument on a table, m/s² (1,000 g).
 const LARGEST_FORCE: f64 = 1e4;
 
-/// Rows whose values are impossible.
-#[derive(Default)]
-pub struct Impossible {
-    /// Rows beyond the range of any instrument by nominal scales, for each column.
-    pub beyond: [Vec<Range<usize>>; 6],
-    /// Rows of zeros in all columns, although gravity exceeds the smallest step.
-    pub zero: Vec<Range<usize>>,
+/// Rows beyond the range of any instrument by nominal scales, and rows of zeros in all columns although gravity exceeds
+/// the smallest step, in order. None of a kind if most rows are impossible, because then a unit is wrong.
+pub fn impossible(rows: &Rows) -> Vec<Found> {
+    let count = rows.columns[0].len();
+    let found = |kind, column, is: &dyn Fn(usize) -> bool| {
+        let found = ranges(count, is);
+        let are_few = 2 * found.iter().map(Range::len).sum::<usize>() < count;
+        let found = found.into_iter().filter(move |_| are_few);
+        found.map(move |rows| Found { kind, column, rows })
+    };
+    let beyond = (0..6).flat_map(|k| {
+        let largest = if k < 3 { FASTEST } else { LARGEST_FORCE };
+        let limit = (largest * rows.period / rows.units[k]).abs();
+        let column = &rows.columns[k];
+        found(FaultKind::Beyond, Some(k), &|row| column[row].abs() > limit)
+    });
+    // With a fraction carried on, a sample of up to a step on each axis can be zero.
+    let shows = |k: usize| {
+        let step = if rows.pulses {
+            1.0
+        } else {
+            rows.facts[k].step.unwrap_or(0.0)
+        };
+        let gravity = (STANDARD_GRAVITY * rows.period / rows.units[k]).abs();
+        gravity > 3f64.sqrt() * step
+    };
+    let are_shown = (3..6).all(shows);
+    let zero = found(FaultKind::Zero, None, &|row| {
+        are_shown && rows.columns.iter().all(|column| column[row] == 0.0)
+    });
+    let mut all: Vec<Found> = beyond.chain(zero).collect();
+    all.sort_by_key(|found| found.rows.start);
+    all
 }
 
-impl Impossible {
-    /// Finds impossible rows; none in a column of which most rows are impossible, because then its unit is wrong.
-    pub fn find(rows: &Rows) -> Self {
-        let count = rows.columns[0].len();
-        let few =
-            |ranges: &Vec<Range<usize>>| 2 * ranges.iter().map(Range::len).sum::<usize>() < count;
-        let beyond = std::array::from_fn(|k| {
-            let largest = if k < 3 { FASTEST } else { LARGEST_FORCE };
-            let limit = (largest * rows.period / rows.units[k]).abs();
-            let found = ranges(count, |row| rows.columns[k][row].abs() > limit);
-            Some(found).filter(few).unwrap_or_default()
-        });
-        // With a fraction carried on, a sample of up to a step on each axis can be zero.
-        let shows = |k: usize| {
-            let step = if rows.pulses {
-                1.0
-            } else {
-                rows.facts[k].step.unwrap_or(0.0)
-            };
-            let gravity = (STANDARD_GRAVITY * rows.period / rows.units[k]).abs();
-            gravity > 3f64.sqrt() * step
-        };
-        let zero = match (3..6).all(shows) {
-            true => ranges(count, |row| {
-                rows.columns.iter().all(|column| column[row] == 0.0)
-            }),
-            false => Vec::new(),
-        };
-        Self {
-            beyond,
-            zero: Some(zero).filter(few).unwrap_or_default(),
+/// Columns in which each impossible value is replaced by the value before it.
+pub fn without(columns: &[Vec<f64>; 6], impossible: &[Found]) -> [Vec<f64>; 6] {
+    let mut without = columns.clone();
+    for found in impossible {
+        let beside = found.rows.start.checked_sub(1);
+        let beside = beside.unwrap_or(found.rows.end);
+        for column in found.columns() {
+            let value = without[column].get(beside).copied().unwrap_or(0.0);
+            without[column][found.rows.clone()].fill(value);
         }
     }
-
-    pub fn is_empty(&self) -> bool {
-        self.zero.is_empty() && self.beyond.iter().all(Vec::is_empty)
-    }
-
-    /// All impossible rows of a column.
-    pub fn of_column(&self, column: usize) -> impl Iterator<Item = &Range<usize>> {
-        self.beyond[column].iter().chain(&self.zero)
-    }
-
-    /// Columns in which each impossible value is replaced by the value before it.
-    pub fn without(&self, columns: &[Vec<f64>; 6]) -> [Vec<f64>; 6] {
-        let mut without = columns.clone();
-        for (k, column) in without.iter_mut().enumerate() {
-            let mut found: Vec<_> = self.of_column(k).cloned().collect();
-            found.sort_by_key(|rows| rows.start);
-            for rows in found {
-                let beside = rows.start.checked_sub(1).unwrap_or(rows.end);
-                let value = column.get(beside).copied().unwrap_or(0.0);
-                column[rows].fill(value);
-            }
-        }
-        without
-    }
+    without
 }

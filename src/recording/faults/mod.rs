@@ -149,11 +149,18 @@ impl ImuSamples {
     }
 }
 
-/// Faulty rows of one column.
+/// Faulty rows of one column, or whole rows.
 struct Found {
     kind: FaultKind,
-    column: usize,
+    column: Option<usize>,
     rows: Range<usize>,
+}
+
+impl Found {
+    /// The columns that it concerns.
+    fn columns(&self) -> Range<usize> {
+        self.column.map_or(0..6, |column| column..column + 1)
+    }
 }
 
 /// Looks for saturated and stuck values and spikes in the columns of gyro x, y, z and accelerometer
@@ -180,8 +187,7 @@ fn find(
         let spikes = &spikes[column];
         let stuck = axes[column].stuck(limit);
         let triad = [0, 1, 2].map(|axis| &axes[column - column % 3 + axis]);
-        let known = (spikes.as_slice(), stuck.as_slice());
-        let saturated = saturated(triad, column % 3, full_scale[column], known, limit);
+        let saturated = saturated(triad, column % 3, full_scale[column], spikes, limit);
         // The row before a run has its value.
         let free = |rows: &Range<usize>| {
             !saturated
@@ -197,6 +203,7 @@ fn find(
             .into_iter()
             .map(|rows| (FaultKind::Saturated, rows));
         let found = saturated.chain(kinds);
+        let column = Some(column);
         let found = found.map(|(kind, rows)| Found { kind, column, rows });
         found.collect::<Vec<_>>()
     };
@@ -224,20 +231,19 @@ fn mean_and_slope(values: &[f64]) -> (f64, f64) {
     let middle = 0.5 * (count - 1.0);
     let moments = values.iter().enumerate();
     let moment: f64 = moments.map(|(k, value)| (k as f64 - middle) * value).sum();
-    (
-        mean(values),
-        moment * 12.0 / (count * (count * count - 1.0)),
-    )
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
+    let mean = values.iter().sum::<f64>() / count;
+    (mean, moment * 12.0 / (count * (count * count - 1.0)))
 }
 
 /// Runs of rows or samples for which `is` is true.
 pub fn ranges(count: usize, is: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
+    consecutive((0..count).filter(|&row| is(row)))
+}
+
+/// Increasing numbers as runs of consecutive ones.
+fn consecutive(rows: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
     let mut ranges: Vec<Range<usize>> = Vec::new();
-    for row in (0..count).filter(|&row| is(row)) {
+    for row in rows {
         match ranges.last_mut() {
             Some(last) if last.end == row => last.end += 1,
             _ => ranges.push(row..row + 1),

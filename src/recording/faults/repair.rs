@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::impossible::Impossible;
+use super::impossible::{impossible, without};
 use super::interpolation::Hole;
 use super::{Bridge, Fault, FaultKind, Found, find, ranges};
 use crate::imu::Sensor;
@@ -70,9 +70,7 @@ fn sensor(column: usize) -> Sensor {
 impl Rows<'_> {
     /// Looks for faults and bridges them.
     pub fn repair(mut self) -> Repaired {
-        let impossible = Impossible::find(&self);
-        let found = self.find_beside(&impossible);
-        let mut faults = self.faults(&impossible, &found);
+        let mut faults = self.faults(&self.found());
         let mut columns = std::mem::take(&mut self.columns).map(|rows| placed(rows, &self.numbers));
         let mut bridges = Vec::new();
         for holes in holes_of_columns(&faults, &self.body_axes, columns[0].len()) {
@@ -87,7 +85,7 @@ impl Rows<'_> {
     }
 
     /// Every fault, in order of kind, axis and time.
-    fn faults(&self, impossible: &Impossible, found: &[Found]) -> Vec<Fault> {
+    fn faults(&self, found: &[Found]) -> Vec<Fault> {
         let fault = |kind, axis, rows: &Range<usize>| Fault {
             kind,
             axis,
@@ -95,18 +93,16 @@ impl Rows<'_> {
             line: self.lines[rows.start],
             bridged: true,
         };
-        let zero = impossible.zero.iter();
-        let zero = zero.map(|rows| fault(FaultKind::Zero, None, rows));
         let duplicates = self.duplicates.iter().map(|&(row, line)| Fault {
             line,
             ..fault(FaultKind::Duplicate, None, &(row - 1..row))
         });
-        let of_columns = found.iter().map(|Found { kind, column, rows }| {
-            let axis = (sensor(*column), self.body_axes[*column]);
-            fault(*kind, Some(axis), rows)
+        let found = found.iter().map(|Found { kind, column, rows }| {
+            let axis = column.map(|column| (sensor(column), self.body_axes[column]));
+            fault(*kind, axis, rows)
         });
         let mut faults = self.missing();
-        faults.extend(zero.chain(duplicates).chain(of_columns));
+        faults.extend(duplicates.chain(found));
         faults.sort_by_key(Fault::order);
         faults
     }
@@ -166,31 +162,29 @@ impl Rows<'_> {
         step * step * if self.pulses { 1.0 } else { samples as f64 }
     }
 
-    /// The faults of columns: impossible values, and faults that the other values reveal.
-    fn find_beside(&self, impossible: &Impossible) -> Vec<Found> {
+    /// Impossible values, and faults that the other values reveal.
+    fn found(&self) -> Vec<Found> {
+        let impossible = impossible(self);
         if impossible.is_empty() {
             return find(&self.columns, self.facts, &self.full_scale, self.pulses);
         }
-        let columns = impossible.without(&self.columns);
+        let columns = without(&self.columns, &impossible);
         let facts = std::array::from_fn(|k| {
             let ColumnFacts { name, unit, .. } = &self.facts[k];
             ColumnFacts::of(name, &columns[k], *unit)
         });
         let mut found = find(&columns, &facts, &self.full_scale, self.pulses);
-        for (column, values) in columns.iter().enumerate() {
-            let mut marked = vec![false; values.len()];
-            for rows in impossible.of_column(column) {
-                marked[rows.clone()].fill(true);
+        let mut marked = columns.each_ref().map(|values| vec![false; values.len()]);
+        for other in &impossible {
+            for column in other.columns() {
+                marked[column][other.rows.clone()].fill(true);
             }
-            let is_marked = |rows: &Range<usize>| marked[rows.clone()].contains(&true);
-            found.retain(|other| other.column != column || !is_marked(&other.rows));
-            let beyond = impossible.beyond[column].iter().cloned();
-            found.extend(beyond.map(|rows| Found {
-                kind: FaultKind::Beyond,
-                column,
-                rows,
-            }));
         }
+        found.retain(|other| {
+            let mut columns = other.columns();
+            !columns.any(|column| marked[column][other.rows.clone()].contains(&true))
+        });
+        found.extend(impossible);
         found
     }
 

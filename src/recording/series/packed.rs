@@ -84,6 +84,10 @@ impl Packer {
         }
     }
 
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
     /// Packs one more sample.
     pub fn push(&mut self, sample: [f64; 3]) {
         for (axis, value) in sample.into_iter().enumerate() {

@@ -10,14 +10,71 @@ pub mod ros;
 use std::collections::BTreeMap;
 
 use super::bytes::Broken;
-use super::{Column, Stream};
+use super::{Column, Log, Stream};
 use ros::Encoding;
+
+/// A format of messages, each with the number of its topic and the time at which it was logged.
+pub trait Messages {
+    /// Goes to the next message, and adds the topics described before it; number and time in ns, `None` at the end of
+    /// the file.
+    fn advance(&mut self, topics: &mut Topics) -> Result<Option<(u32, u64)>, Broken>;
+
+    /// The content of the message.
+    fn data(&self) -> &[u8];
+
+    /// Where it is in the file.
+    fn offset(&self) -> u64;
+}
+
+/// A log of messages, whose topics are its streams.
+pub struct MessageLog<M> {
+    messages: M,
+    topics: Topics,
+    /// Stream and time of the message.
+    current: (usize, u64),
+}
+
+impl<M> MessageLog<M> {
+    pub fn new(messages: M, topics: Topics) -> Self {
+        Self {
+            messages,
+            topics,
+            current: (0, 0),
+        }
+    }
+}
+
+impl<M: Messages> Log for MessageLog<M> {
+    fn streams(&self) -> &[Stream] {
+        &self.topics.streams
+    }
+
+    fn advance(&mut self) -> Result<Option<usize>, Broken> {
+        let Some((number, time)) = self.messages.advance(&mut self.topics)? else {
+            return Ok(None);
+        };
+        let (data, offset) = (self.messages.data(), self.messages.offset());
+        let stream = self.topics.stream(number, data, offset)?;
+        self.current = (stream, time);
+        Ok(Some(stream))
+    }
+
+    fn values(&mut self, row: &mut Vec<f64>) -> Result<(), Broken> {
+        let (stream, time) = self.current;
+        let reader = &self.topics.readers[stream];
+        reader.values(time, self.messages.data(), self.messages.offset(), row)
+    }
+
+    fn offset(&self) -> u64 {
+        self.messages.offset()
+    }
+}
 
 /// The topics of a log, by the numbers that its messages have.
 #[derive(Default)]
 pub struct Topics {
-    pub streams: Vec<Stream>,
-    pub readers: Vec<Reader>,
+    streams: Vec<Stream>,
+    readers: Vec<Reader>,
     of_number: BTreeMap<u32, usize>,
 }
 
@@ -37,12 +94,21 @@ impl Topics {
         self.of_number.insert(number, stream);
     }
 
-    /// The stream of a message.
-    pub fn stream(&self, number: u32, offset: u64) -> Result<usize, Broken> {
-        self.of_number.get(&number).copied().ok_or_else(|| {
+    /// The stream of a message, whose columns its first message may show.
+    #[cfg_attr(not(feature = "mcap"), allow(unused_variables))]
+    fn stream(&mut self, number: u32, data: &[u8], offset: u64) -> Result<usize, Broken> {
+        let stream = self.of_number.get(&number).copied().ok_or_else(|| {
             let found = format_args!("a message of channel {number}");
             Broken::new(offset, found, "a channel that was described before it")
-        })
+        })?;
+        #[cfg(feature = "mcap")]
+        if let Reader::Json(columns) = &mut self.readers[stream]
+            && columns.is_empty()
+        {
+            *columns = json::columns(data, offset)?;
+            self.streams[stream] = self.readers[stream].stream(&self.streams[stream].name);
+        }
+        Ok(stream)
     }
 }
 
@@ -71,7 +137,7 @@ impl Reader {
     }
 
     /// The stream of a topic.
-    pub fn stream(&self, topic: &str) -> Stream {
+    fn stream(&self, topic: &str) -> Stream {
         let mut columns = vec![Column::new(LOG_TIME, "s")];
         let mut remarks = Vec::new();
         match self {
@@ -92,7 +158,7 @@ impl Reader {
     }
 
     /// The values of a message that was logged at this time in ns.
-    pub fn values(
+    fn values(
         &self,
         time: u64,
         bytes: &[u8],

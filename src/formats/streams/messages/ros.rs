@@ -9,7 +9,7 @@
 mod definition;
 
 use crate::formats::streams::Column;
-use crate::formats::streams::bytes::{Broken, Kind};
+use crate::formats::streams::bytes::{Broken, Kind, Slice};
 use definition::Parser;
 
 /// Longer arrays of numbers are no columns.
@@ -78,12 +78,9 @@ impl Message {
     /// The numbers of a message whose bytes begin at this place of the file.
     pub fn values(&self, bytes: &[u8], offset: u64, row: &mut Vec<f64>) -> Result<(), Broken> {
         let mut reader = Reader {
-            bytes,
-            at: 0,
+            bytes: Slice::packed(bytes, offset),
             begin: 0,
-            offset,
             widest: 1,
-            big_endian: false,
         };
         if self.encoding == Encoding::Cdr {
             reader.encapsulation()?;
@@ -93,57 +90,42 @@ impl Message {
 }
 
 struct Reader<'a> {
-    bytes: &'a [u8],
-    at: usize,
+    bytes: Slice<'a>,
     /// From where on alignment counts.
     begin: usize,
-    /// Of the message in the file.
-    offset: u64,
     /// The widest alignment.
     widest: usize,
-    big_endian: bool,
 }
 
 impl Reader<'_> {
     fn encapsulation(&mut self) -> Result<(), Broken> {
-        let kind = self.bytes.get(1).copied();
-        (self.big_endian, self.widest) = match kind {
-            Some(0) => (true, 8),
-            Some(1) => (false, 8),
-            Some(6) => (true, 4),
-            Some(7) => (false, 4),
+        let head = self.bytes.take(4, "the head of a message")?;
+        (self.bytes.big_endian, self.widest) = match head[1] {
+            0 => (true, 8),
+            1 => (false, 8),
+            6 => (true, 4),
+            7 => (false, 4),
             _ => {
                 return Err(Broken::new(
-                    self.offset,
-                    format_args!("a message that begins with {:02x?}", self.bytes.get(..4)),
+                    self.bytes.offset(),
+                    format_args!("a message that begins with {head:02x?}"),
                     "the four bytes of CDR: 0, then 0, 1, 6 or 7",
                 ));
             }
         };
-        (self.at, self.begin) = (4, 4);
+        self.begin = 4;
         Ok(())
     }
 
     fn number(&mut self, kind: Kind) -> Result<f64, Broken> {
         let width = kind.size().min(self.widest);
-        let off = (self.at - self.begin) % width;
+        let off = (self.bytes.position() - self.begin) % width;
         if off > 0 {
-            self.at += width - off;
+            self.pass(width - off)?;
         }
-        let rest = self.bytes.get(self.at..).unwrap_or_default();
-        let number = kind
-            .number(rest, self.big_endian)
-            .ok_or_else(|| self.short())?;
-        self.at += kind.size();
-        Ok(number)
-    }
-
-    fn short(&self) -> Broken {
-        Broken::new(
-            self.offset,
-            format_args!("a message of {} bytes", self.bytes.len()),
-            "one as long as its definition says",
-        )
+        let bytes = self.bytes.take(kind.size(), "a number")?;
+        let number = kind.number(bytes, self.bytes.big_endian);
+        Ok(number.unwrap_or(f64::NAN))
     }
 
     fn length(&mut self) -> Result<usize, Broken> {
@@ -151,12 +133,9 @@ impl Reader<'_> {
     }
 
     fn pass(&mut self, bytes: usize) -> Result<(), Broken> {
-        let end = self
-            .at
-            .checked_add(bytes)
-            .filter(|&end| end <= self.bytes.len());
-        self.at = end.ok_or_else(|| self.short())?;
-        Ok(())
+        self.bytes
+            .take(bytes, "a field of its definition")
+            .map(|_| ())
     }
 
     /// Reads all fields; numbers that are columns are added to the row.
@@ -173,14 +152,11 @@ impl Reader<'_> {
             {
                 // All at once; the first aligns them.
                 self.number(*kind)?;
-                let rest = (count - 1)
-                    .checked_mul(kind.size())
-                    .ok_or_else(|| self.short())?;
-                self.pass(rest)?;
+                self.pass((count - 1).saturating_mul(kind.size()))?;
                 continue;
             }
             for _ in 0..count {
-                let before = self.at;
+                let before = self.bytes.position();
                 match &field.kind {
                     FieldKind::Number(kind) => {
                         let number = self.number(*kind)?;
@@ -197,7 +173,7 @@ impl Reader<'_> {
                     FieldKind::Message(fields) => self.message(fields, row.as_deref_mut())?,
                 }
                 // Items of no bytes need not be counted out.
-                if self.at == before {
+                if self.bytes.position() == before {
                     break;
                 }
             }

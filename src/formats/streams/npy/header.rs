@@ -4,32 +4,27 @@ use std::io::Read;
 
 use serde::Deserialize;
 
-use super::super::arrays::{Array, Field, Open};
+use super::super::arrays::Field;
 use super::super::bytes::{Broken, Kind, Slice};
 use super::LONGEST_HEADER;
 
+/// Longer arrays within an item are no columns.
+const MOST_NUMBERS: usize = 64;
+
 pub struct Header {
-    /// Of each item of the array.
-    fields: Vec<Numbers>,
-    /// Bytes of an item.
-    size: usize,
-    first_is_fastest: bool,
-    shape: Vec<usize>,
+    /// The numbers in each item of the array, and its size in bytes.
+    pub fields: Vec<Field>,
+    pub size: usize,
+    /// Names of what is no number.
+    left_out: Vec<String>,
+    pub first_is_fastest: bool,
+    pub shape: Vec<usize>,
     /// Bytes before the first item.
     pub begin: u64,
 }
 
-/// A number, or an array of numbers, in each item.
-struct Numbers {
-    name: Option<String>,
-    /// None where it is no number.
-    kind: Option<(Kind, bool)>,
-    place: usize,
-    count: usize,
-}
-
 impl Header {
-    pub fn read(file: &mut dyn Read, offset: u64) -> Result<Self, Broken> {
+    pub fn read(file: &mut dyn Read, name: &str, offset: u64) -> Result<Self, Broken> {
         let mut take = |count: u64, what: &str| {
             let mut bytes = Vec::new();
             match file.take(count).read_to_end(&mut bytes) {
@@ -60,52 +55,69 @@ impl Header {
                 "a Python dictionary of `descr`, `fortran_order` and `shape`",
             ));
         };
-        let (fields, size) = fields(&head.descr).ok_or_else(|| wrong("a type of numbers"))?;
-        Ok(Self {
-            fields,
-            size,
+        let mut header = Self {
+            fields: Vec::new(),
+            size: 0,
+            left_out: Vec::new(),
             first_is_fastest: head.fortran_order,
             shape: head.shape,
             begin: 8 + width + length,
-        })
-    }
-
-    /// The array of numbers that is read by `open`.
-    pub fn array(self, name: &str, open: Open, offset: u64) -> Array {
-        let fields = self.fields.iter().filter_map(|field| {
-            let (kind, big_endian) = field.kind?;
-            let own = field.name.as_deref().unwrap_or(name);
-            Some((0..field.count).map(move |index| Field {
-                name: match field.count {
-                    1 => own.to_owned(),
-                    _ => format!("{own}[{index}]"),
-                },
-                kind,
-                big_endian,
-                place: field.place + index * kind.size(),
-            }))
-        });
-        Array {
-            fields: fields.flatten().collect(),
-            shape: self.shape,
-            first_is_fastest: self.first_is_fastest,
-            size: self.size,
-            open,
-            offset,
-        }
+        };
+        let described = header.describe(name, &head.descr);
+        described.ok_or_else(|| wrong("a type of numbers"))?;
+        Ok(header)
     }
 
     /// What is no number and is left out, in a sentence.
-    pub fn left_out(&self, name: &str) -> Option<String> {
-        let no_numbers = self.fields.iter().filter(|field| field.kind.is_none());
-        let names = no_numbers.map(|field| format!("`{}`", field.name.as_deref().unwrap_or(name)));
-        let names: Vec<String> = names.collect();
-        let are = match names.len() {
+    pub fn left_out(&self) -> Option<String> {
+        let are = match self.left_out.len() {
             0 => return None,
             1 => "holds text and is",
             _ => "hold text and are",
         };
-        Some(format!("{} {are} left out.", names.join(", ")))
+        Some(format!("{} {are} left out.", self.left_out.join(", ")))
+    }
+
+    fn describe(&mut self, name: &str, items: &Descr) -> Option<()> {
+        match items {
+            Descr::One(kind) => self.add(name, kind, &[])?,
+            Descr::Fields(fields) => {
+                for field in fields {
+                    match field {
+                        Named::Number(name, kind) => self.add(name, kind, &[])?,
+                        Named::Array(name, kind, shape) => self.add(name, kind, shape)?,
+                    }
+                }
+            }
+        }
+        self.size = self.size.max(1);
+        Some(())
+    }
+
+    /// Adds a number, or an array of numbers, in each item.
+    fn add(&mut self, name: &str, kind: &str, shape: &[usize]) -> Option<()> {
+        // The unit of a time follows in brackets.
+        let (kind, size) = item_kind(kind.split_once('[').map_or(kind, |(kind, _)| kind))?;
+        let mut sizes = shape.iter();
+        let count = sizes.try_fold(1usize, |all, size| all.checked_mul(*size))?;
+        let end = self.size.checked_add(size.checked_mul(count)?)?;
+        match kind {
+            None => self.left_out.push(format!("`{name}`")),
+            Some((kind, big_endian)) if count <= MOST_NUMBERS => {
+                self.fields.extend((0..count).map(|index| Field {
+                    name: match count {
+                        1 => name.to_owned(),
+                        _ => format!("{name}[{index}]"),
+                    },
+                    kind,
+                    big_endian,
+                    place: self.size + index * size,
+                }));
+            }
+            Some(_) => {}
+        }
+        self.size = end;
+        Some(())
     }
 }
 
@@ -117,56 +129,16 @@ fn item_kind(text: &str) -> Option<(Option<(Kind, bool)>, usize)> {
     let kind = match (letter, size) {
         ("f", 4) => Kind::F32,
         ("f", 8) => Kind::F64,
-        ("i", 1) => Kind::I8,
-        ("i", 2) => Kind::I16,
-        ("i", 4) => Kind::I32,
-        ("i" | "M" | "m", 8) => Kind::I64,
-        ("u" | "b", 1) => Kind::U8,
-        ("u", 2) => Kind::U16,
-        ("u", 4) => Kind::U32,
-        ("u", 8) => Kind::U64,
+        ("M" | "m", 8) => Kind::I64,
+        ("b", 1) => Kind::U8,
         // Text is of four bytes a letter.
         ("U", _) => return Some((None, 4 * size)),
-        _ => return Some((None, size)),
+        _ => match Kind::whole_number(letter == "i", size) {
+            Some(kind) if matches!(letter, "i" | "u") => kind,
+            _ => return Some((None, size)),
+        },
     };
     Some((Some((kind, order == ">")), size))
-}
-
-/// The numbers of an item and its size in bytes.
-fn fields(descr: &Descr) -> Option<(Vec<Numbers>, usize)> {
-    // The unit of a time follows in brackets.
-    let item = |text: &str| item_kind(text.split_once('[').map_or(text, |(kind, _)| kind));
-    let list = match descr {
-        Descr::One(text) => {
-            let (kind, size) = item(text)?;
-            let field = Numbers {
-                name: None,
-                kind,
-                place: 0,
-                count: 1,
-            };
-            return Some((vec![field], size.max(1)));
-        }
-        Descr::Fields(list) => list,
-    };
-    let (mut fields, mut place) = (Vec::new(), 0usize);
-    for field in list {
-        let (name, kind, shape) = match field {
-            Named::Number(name, kind) => (name, kind, &[][..]),
-            Named::Array(name, kind, shape) => (name, kind, &shape[..]),
-        };
-        let (kind, size) = item(kind)?;
-        let mut sizes = shape.iter();
-        let count = sizes.try_fold(1usize, |all, size| all.checked_mul(*size))?;
-        fields.push(Numbers {
-            name: Some(name.clone()),
-            kind,
-            place,
-            count: if count > 64 { 0 } else { count },
-        });
-        place = place.checked_add(size.checked_mul(count)?)?;
-    }
-    Some((fields, place.max(1)))
 }
 
 /// A head by the name that makes it a TOML document.

@@ -11,7 +11,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::bytes::{Broken, Input};
-use super::{Log, formats};
+use super::{FORMATS, Log};
 use write::{Messages, SAMPLES, sample};
 
 /// Columns of time, gyros and accelerometers; what a program's corrections, undone, add to the first gyro and the
@@ -125,7 +125,7 @@ fn fixtures() -> Vec<Fixture> {
 }
 
 fn open(bytes: Vec<u8>) -> Result<Option<Box<dyn Log>>, Broken> {
-    let format = formats().into_iter().find(|format| format.is_of(&bytes));
+    let format = FORMATS.iter().find(|format| format.is_of(&bytes));
     let Some(open) = format.and_then(|format| format.open) else {
         return Ok(None);
     };

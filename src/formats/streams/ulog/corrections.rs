@@ -37,8 +37,7 @@ impl Parameters {
     }
 
     pub fn take(&mut self, content: &mut Slice) -> Result<(), Broken> {
-        let length = content.length(1, "the length of a parameter's name")?;
-        let key = content.text(length, "a parameter's name")?;
+        let key = content.measured_text(1, "a parameter's name")?;
         let offset = content.offset();
         let (kind, name) = match key.split_once(' ') {
             Some(("float", name)) => (Kind::F32, name),
@@ -70,10 +69,7 @@ impl Parameters {
     /// What is applied to a device of this number, else to the selected or the only one.
     pub fn applied(&self, sensor: Sensor, device: Option<f64>) -> Option<Applied> {
         let device = device.or(*self.selected.get(sensor));
-        let (kind, temperature) = match sensor {
-            Sensor::Gyro => ("GYRO", "TC_G_ENABLE"),
-            Sensor::Accel => ("ACC", "TC_A_ENABLE"),
-        };
+        let (kind, temperature) = sensor.pick(("GYRO", "TC_G_ENABLE"), ("ACC", "TC_A_ENABLE"));
         let named = |number: usize| format!("CAL_{kind}{number}");
         let mut known = (0..CALIBRATIONS).filter(|&number| {
             let id = self.value(&format!("{}_ID", named(number)));

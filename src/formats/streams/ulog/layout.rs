@@ -83,22 +83,12 @@ impl Layout {
         formats: &BTreeMap<String, String>,
         depth: usize,
     ) -> Result<(), Wrong> {
-        let kind = match kind {
-            "int8_t" => Kind::I8,
-            "uint8_t" | "bool" => Kind::U8,
-            "int16_t" => Kind::I16,
-            "uint16_t" => Kind::U16,
-            "int32_t" => Kind::I32,
-            "uint32_t" => Kind::U32,
-            "int64_t" => Kind::I64,
-            "uint64_t" => Kind::U64,
-            "float" => Kind::F32,
-            "double" => Kind::F64,
-            "char" => {
-                self.length += 1;
-                return Ok(());
-            }
-            nested => return self.add(topic, &format!("{name}."), nested, formats, depth + 1),
+        if kind == "char" {
+            self.length += 1;
+            return Ok(());
+        }
+        let Some(kind) = Kind::named(kind) else {
+            return self.add(topic, &format!("{name}."), kind, formats, depth + 1);
         };
         if !name.contains("_padding") {
             let unit = unit(topic, &name);

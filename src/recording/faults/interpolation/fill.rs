@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use nalgebra::{Matrix4, Vector4};
 
+use crate::recording::faults::consecutive;
+
 /// Most intact stretches on either side on which a fill is tested …
 const TRIALS: usize = 16;
 /// … and fewest on both sides together.
@@ -37,9 +39,9 @@ impl Fill {
         sound: &[bool],
     ) -> Option<Self> {
         let [before, after] = sides;
-        let runs_before = runs(before.iter().rev());
-        let number_before = runs_before.len();
-        let runs: Vec<_> = runs_before.into_iter().chain(runs(after.iter())).collect();
+        let mut runs = consecutive(before.iter().rev().copied());
+        let number_before = runs.len();
+        runs.extend(consecutive(after.iter().copied()));
         let first = hole.start.min(runs.first()?.start);
         let last = hole.end.max(runs.last()?.end - 1);
         let mut fill = Self {
@@ -179,18 +181,6 @@ impl Fill {
 fn later(run: &Range<usize>, shift: isize) -> Range<usize> {
     let start = run.start.wrapping_add_signed(shift);
     start..start + run.len()
-}
-
-/// Groups increasing samples into runs of consecutive ones.
-fn runs<'a>(samples: impl Iterator<Item = &'a usize>) -> Vec<Range<usize>> {
-    let mut runs: Vec<Range<usize>> = Vec::new();
-    for &k in samples {
-        match runs.last_mut() {
-            Some(run) if run.end == k => run.end += 1,
-            _ => runs.push(k..k + 1),
-        }
-    }
-    runs
 }
 
 /// Number of sums that are formed in parallel, so that none waits for another.

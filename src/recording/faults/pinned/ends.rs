@@ -1,5 +1,5 @@
-//! Samples at an end of an axis' range. Signs of an end are: the end of a register, a common value of several spikes, a
-//! motion that stops and returns, and repeated values that noise or continued motion would not give.
+//! Samples at an end of an axis' range. Signs of an end are: the end of a register, a common value of several spikes, and
+//! repeated values that noise or continued motion would not give.
 
 use std::ops::Range;
 
@@ -11,12 +11,12 @@ use crate::statistics::median;
 /// most one of 2¹⁵ columns; the ends of shorter registers are ordinary values.
 const BITS: [i32; 3] = [16, 24, 32];
 
-/// Rows of an axis with values at the end of its range, or beyond; `stuck` lists the rows that repeat a value.
+/// Rows of an axis with values at the end of its range, or beyond.
 pub fn saturated(
     triad: [&Axis; 3],
     axis: usize,
     full_scale: Option<f64>,
-    (spikes, stuck): (&[usize], &[Range<usize>]),
+    spikes: &[usize],
     limit: Limit,
 ) -> Vec<Range<usize>> {
     let own = triad[axis];
@@ -33,10 +33,7 @@ pub fn saturated(
     }
     let sure: [bool; 2] = std::array::from_fn(|k| {
         let end = extremes[k];
-        pinned[k].is_some()
-            || own.is_register_end(end)
-            || own.is_reached_by_spikes(end, spikes)
-            || own.stops_motion(end, stuck)
+        pinned[k].is_some() || own.is_register_end(end) || own.is_reached_by_spikes(end, spikes)
     });
     // The range is symmetric except for a step.
     let [smallest, largest] = extremes;
@@ -128,29 +125,6 @@ impl Axis<'_> {
         spikes.iter().filter(|&&k| self.values[k] == end).count() >= 2
     }
 
-    /// Whether the axis is stuck at this end while the true value comes from one side and returns to it.
-    fn stops_motion(&self, end: f64, stuck: &[Range<usize>]) -> bool {
-        let mut at_end = stuck.iter().filter(|run| self.values[run.start] == end);
-        at_end.any(|run| !self.is_level(run))
-    }
-
-    /// Whether the values before and after a run lie at its level, as in a steady turn; at the end of a range
-    /// the true value comes from one side and returns to it.
-    fn is_level(&self, run: &Range<usize>) -> bool {
-        let value = self.values[run.start];
-        let before = &self.values[run.start.saturating_sub(1 + BESIDE)..run.start - 1];
-        let after = &self.values[run.end..self.values.len().min(run.end + BESIDE)];
-        let step = self.facts.step.unwrap_or(0.0);
-        [before, after].into_iter().all(|side| {
-            let count = side.len().max(1) as f64;
-            let off = side.iter().map(|other| value - other).sum::<f64>() / count;
-            // Half of the squared changes from row to row is the variance of white noise, whatever the level.
-            let changes = side.windows(2).map(|pair| (pair[1] - pair[0]).powi(2));
-            let variance = 0.5 * changes.sum::<f64>() / count + step * step / 12.0;
-            off * off <= AGREE * AGREE * variance
-        })
-    }
-
     /// Rows at an end. If an axis at rest is clipped there with noise of this σ, the rows in between are included:
     /// noise moves them from beyond the end into the range, so their mean is biased. Rows that noise moves to the end
     /// from within the range are excluded.
@@ -190,11 +164,6 @@ const SELDOM: usize = 64;
 /// the remaining noise would be selected by its sign.
 const APART: usize = 8 * SELDOM;
 
-/// Number of rows next to a run whose mean is compared with it.
-const BESIDE: usize = 16;
-/// σ within which they agree: in a steady turn, too, an axis may be at the extreme of the record.
-const AGREE: f64 = 3.0;
-
 #[cfg(test)]
 mod tests {
     use rand::SeedableRng;
@@ -223,13 +192,7 @@ mod tests {
         };
         let axis = Axis::of(values, &facts, step.unwrap_or(0.0), false);
         let silent = Axis::of(&rest, &facts, 1.0, false);
-        saturated(
-            [&axis, &silent, &silent],
-            0,
-            full_scale,
-            (&spikes, &[]),
-            limit,
-        )
+        saturated([&axis, &silent, &silent], 0, full_scale, &spikes, limit)
     }
 
     /// A slow swing with a little noise, on a grid of one.

@@ -107,19 +107,10 @@ impl Parser {
 
     fn field(&mut self, package: &str, kind: &str, place: &Place) -> Result<FieldKind, String> {
         let number = match kind {
-            "bool" | "byte" | "char" | "uint8" => Some(Kind::U8),
-            "int8" => Some(Kind::I8),
-            "int16" => Some(Kind::I16),
-            "uint16" => Some(Kind::U16),
-            "int32" => Some(Kind::I32),
-            "uint32" => Some(Kind::U32),
-            "int64" => Some(Kind::I64),
-            "uint64" => Some(Kind::U64),
-            "float32" => Some(Kind::F32),
-            "float64" => Some(Kind::F64),
-            _ => None,
+            "byte" | "char" => "uint8",
+            kind => kind,
         };
-        if let Some(kind) = number {
+        if let Some(kind) = Kind::named(number) {
             self.add(place, unit(place.path));
             return Ok(FieldKind::Number(kind));
         }

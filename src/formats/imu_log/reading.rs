@@ -1,7 +1,7 @@
 //! The rows of a file: those that are samples, in order of time, all of them held or packed as they come.
 
 use super::parts::{Parts, Sizes};
-use super::{ImuLog, Layout, Read};
+use super::{ImuLog, Layout};
 use crate::formats::clock::{REACH, Stamp, Stamps, Wander};
 use crate::formats::error::FileError;
 use crate::formats::rows::LogRows;
@@ -10,14 +10,6 @@ use crate::imu::Output;
 
 /// Fewer samples than this are no record of a turntable: not one dwell can be told from a turn.
 const FEWEST_SAMPLES: usize = 100;
-
-/// What the file holds.
-pub struct Content {
-    pub layout: Layout,
-    pub stamps: Stamps,
-    pub read: Read,
-    pub temperature: Option<Temperatures>,
-}
 
 /// Rows that are held, without duplicates.
 #[derive(Default)]
@@ -60,16 +52,16 @@ impl Held {
 }
 
 /// A file as far as it is read.
-struct Reading<'a> {
+pub struct Reading<'a> {
     log: &'a ImuLog<'a>,
     /// Of the values of a sample in a row.
     places: [Option<usize>; 6],
     /// The column that tells instruments apart, and what it says of this one.
     instance: Option<(usize, f64)>,
-    stamps: Stamps,
-    temperature: Option<Temperatures>,
+    pub stamps: Stamps,
+    pub temperature: Option<Temperatures>,
     held: Held,
-    duplicates: usize,
+    pub duplicates: usize,
     /// Rows without any value.
     blank: usize,
     /// Rows without some.
@@ -77,7 +69,7 @@ struct Reading<'a> {
 }
 
 impl<'a> Reading<'a> {
-    fn begin(
+    pub fn begin(
         log: &'a ImuLog<'a>,
         csv: &mut LogRows,
         places: [Option<usize>; 6],
@@ -147,7 +139,7 @@ impl<'a> Reading<'a> {
     }
 
     /// What was made of rows that are no samples, a sentence each.
-    fn notes(&self) -> impl Iterator<Item = String> {
+    pub fn notes(&self) -> impl Iterator<Item = String> {
         let file = self.log.source.file.display();
         let blank = (self.blank > 0).then(|| {
             format!(
@@ -180,93 +172,45 @@ impl<'a> Reading<'a> {
     }
 }
 
-impl Reading<'_> {
-    /// Reads all rows, and whether they are packed.
-    fn all(
+impl<'a> Reading<'a> {
+    /// Reads all rows; how the samples of a long log wander may be known.
+    pub fn all(
         &mut self,
         csv: &mut LogRows,
         layout: &Layout,
         sizes: Sizes,
-        known: &mut Option<Wander>,
-    ) -> Result<(Read, bool), FileError> {
+        known: Option<&Wander>,
+    ) -> Result<Parts<'a>, FileError> {
+        let begin = |reading: &Self, csv: &LogRows, size: Option<usize>| {
+            let rows = (&reading.held, &reading.stamps);
+            let parts = Parts::new(reading.log, layout.clone(), size, rows, known);
+            parts.map_err(|error| csv.placed(error))
+        };
         let mut parts: Option<Parts> = None;
         while csv.advance()? && !csv.may_be_cut() {
             self.take(csv)?;
             if parts.is_none() && self.held.len() == sizes.long {
                 csv.pack();
-                parts = Some(self.parts(csv, layout, Some(sizes.part), known.take())?);
+                parts = Some(begin(self, csv, Some(sizes.part))?);
             }
             if let Some(parts) = parts.as_mut().filter(|parts| parts.is_full(&self.held)) {
                 let taken = parts.take(&mut self.held, &mut self.stamps, false);
                 taken.map_err(|error| csv.placed(error))?;
             }
         }
-        let is_long = parts.is_some();
-        if !is_long && self.held.len() < FEWEST_SAMPLES {
-            return Err(self.too_few(csv));
-        }
         let mut parts = match parts {
             Some(parts) => parts,
-            None => self.parts(csv, layout, None, None)?,
+            None if self.held.len() < FEWEST_SAMPLES => return Err(self.too_few(csv)),
+            None => begin(self, csv, None)?,
         };
         let taken = parts.take(&mut self.held, &mut self.stamps, true);
         self.held = Held::default();
-        let read = taken.and_then(|()| parts.finish(self.duplicates));
-        Ok((read.map_err(|error| csv.placed(error))?, is_long))
-    }
-}
-
-impl<'a> Reading<'a> {
-    fn parts(
-        &self,
-        csv: &LogRows,
-        layout: &Layout,
-        size: Option<usize>,
-        known: Option<Wander>,
-    ) -> Result<Parts<'a>, FileError> {
-        let rows = (&self.held, &self.stamps);
-        let parts = Parts::new(self.log, layout.clone(), size, rows, known);
-        parts.map_err(|error| csv.placed(error))
+        taken.map_err(|error| csv.placed(error))?;
+        Ok(parts)
     }
 }
 
 impl ImuLog<'_> {
-    /// Reads the file; one too long to be held, and whose clock wanders, a second time with the clock that it was
-    /// found to have.
-    pub fn content(
-        &self,
-        sizes: Sizes,
-        notes: &mut Vec<String>,
-        mut known: Option<Wander>,
-    ) -> Result<Content, FileError> {
-        let mut csv = self.open()?;
-        let layout = self.layout(&mut csv)?;
-        let mut reading = Reading::begin(self, &mut csv, layout.places)?;
-        let is_first = known.is_none();
-        let (mut read, is_long) = reading.all(&mut csv, &layout, sizes, &mut known)?;
-        if is_long && is_first && read.clock.wander.is_some() {
-            // What was read is let go of before it is read again.
-            drop((csv, reading));
-            let wander = read.clock.wander.clone();
-            drop(read);
-            return self.content(sizes, notes, wander);
-        }
-        let seconds = self.seconds(read.clock.period);
-        for (error, of_both) in read.error.accel.iter_mut().zip(csv.integral_error()) {
-            *error = error.hypot(of_both / seconds);
-        }
-        notes.extend(read.clock.uneven());
-        notes.extend(csv.cut_off("It is left out"));
-        notes.extend_from_slice(csv.remarks());
-        notes.extend(reading.notes());
-        Ok(Content {
-            read,
-            layout,
-            stamps: reading.stamps,
-            temperature: reading.temperature,
-        })
-    }
-
     /// A number of a row as it stands.
     fn value(&self, csv: &LogRows, column: usize) -> Result<f64, FileError> {
         let value = csv.number(column)?;
