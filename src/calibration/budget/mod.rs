@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use crate::calibration::budget::curvature::curvature;
 use crate::calibration::constants::of_parameters;
 use crate::calibration::{
-    CalibrationError, Layout, Outcome, PARAMETERS, ParameterMatrix, Prior, Problem, Source,
+    CalibrationError, Layout, Outcome, PARAMETERS, ParameterMatrix, Prior, Problem,
 };
 use crate::imu::{MotionNoise, Sensor};
 use crate::run::{Aiding, Run};
@@ -186,31 +186,13 @@ impl BudgetSource {
             return (scores as f64 / parameters as f64).max(1.0);
         }
         let learnt = outcome.noise.sources.iter();
-        let of_own = learnt.filter(|figures| self.learnt().contains(&figures.source));
+        let of_own = learnt.filter(|figures| figures.source.in_budget() == self);
         let freedoms = of_own.filter_map(|figures| {
             let [_, high] = figures.interval?;
             let relative = (high / figures.used).ln() / END_OF_INTERVAL;
             (figures.used > 0.0 && relative > 0.0).then(|| (0.5 / relative.powi(2)).max(1.0))
         });
         freedoms.fold(f64::INFINITY, f64::min)
-    }
-
-    /// The noise figures of this source that are estimated from a record, if any.
-    fn learnt(self) -> &'static [Source] {
-        match self {
-            Self::White(Sensor::Gyro) => &[Source::AngleRandomWalk],
-            Self::White(Sensor::Accel) => &[Source::VelocityRandomWalk],
-            Self::Moves(Sensor::Gyro) => &[Source::GyroMotion, Source::GyroMoving],
-            Self::Moves(Sensor::Accel) => &[Source::AccelMotion, Source::AccelMoving],
-            Self::Wander(Sensor::Gyro) => &[Source::GyroGaussMarkov],
-            Self::Wander(Sensor::Accel) => &[Source::AccelGaussMarkov],
-            Self::VelocityAtRest => &[Source::Velocity],
-            Self::AttitudeAtRest => &[Source::Attitude],
-            Self::RotationAtRest => &[Source::RotationAtRest],
-            Self::TablePosition => &[Source::TablePosition],
-            Self::TableReading => &[Source::TableReading],
-            _ => &[],
-        }
     }
 }
 

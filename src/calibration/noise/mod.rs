@@ -12,7 +12,6 @@ mod learn;
 mod likelihood_ratio;
 mod policy;
 mod report;
-mod run_toml;
 mod source;
 
 pub use by_hand::{BY_HAND, ByHand, Parts};
