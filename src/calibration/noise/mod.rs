@@ -13,6 +13,7 @@ mod likelihood_ratio;
 mod policy;
 mod report;
 mod source;
+pub mod variances;
 
 pub use by_hand::{BY_HAND, ByHand, Parts};
 pub use fit::LOG_SIGMA;
