@@ -18,10 +18,9 @@ use rayon::prelude::*;
 use crate::calibration::budget::curvature::curvature;
 use crate::calibration::constants::of_parameters;
 use crate::calibration::{
-    CalibrationError, Layout, Outcome, PARAMETERS, ParameterMatrix, Prior, Problem,
+    CalibrationError, Layout, Outcome, PARAMETERS, ParameterMatrix, Prior, Problem, Source,
 };
-use crate::imu::{MotionNoise, Sensor};
-use crate::run::{Aiding, Run};
+use crate::run::Run;
 use crate::statistics::student_limit;
 pub use record::{BudgetPartRecord, BudgetRecord, LeftOffRecord};
 pub use source::BudgetSource;
@@ -144,34 +143,27 @@ impl Budget {
 }
 
 impl Problem<'_> {
-    /// The noise sources of its reduction.
+    /// The noise sources of its reduction: those that it states, and those whose floor is never zero.
     fn sources(&self) -> BTreeSet<BudgetSource> {
-        let model = &self.model;
-        let layout = Layout::new(model, self.one_gravity());
-        let mut all: BTreeSet<_> = layout.sources.into_iter().collect();
-        all.insert(BudgetSource::Pulses);
-        for sensor in Sensor::ALL {
-            all.insert(BudgetSource::White(sensor));
-            if *model.motion_noise.get(sensor) != MotionNoise::default() {
-                all.insert(BudgetSource::Moves(sensor));
-            }
-        }
-        all.insert(BudgetSource::VelocityAtRest);
-        match model.aiding {
-            Aiding::Table => all.insert(BudgetSource::TableReading),
-            Aiding::Velocity => {
-                all.insert(BudgetSource::AttitudeAtRest);
-                all.insert(BudgetSource::RotationAtRest)
-            }
-        };
+        let layout = Layout::new(&self.model, self.one_gravity());
+        let noise = Source::ALL.into_iter();
+        let noise = noise.filter(|source| source.sigma(self) > 0.0);
         let bridged = |run: &Run| {
             let imu = &run.recording.imu;
             imu.bridged(&(0..imu.len())).next().is_some()
         };
-        if self.runs().any(bridged) {
-            all.insert(BudgetSource::Interpolated);
-        }
-        all
+        let interpolated = self.runs().any(bridged);
+        let always = [
+            BudgetSource::Pulses,
+            BudgetSource::VelocityAtRest,
+            BudgetSource::AttitudeAtRest,
+        ];
+        let states = layout.sources.into_iter();
+        states
+            .chain(noise.map(Source::in_budget))
+            .chain(always)
+            .chain(interpolated.then_some(BudgetSource::Interpolated))
+            .collect()
     }
 }
 

@@ -5,8 +5,7 @@ use serde_json::json;
 
 use crate::calibration::FindingKind as Kind;
 use crate::calibration::{
-    AttitudePrior, CalibrationError, Finding, Iterated, Linearisation, Prior, Problem, Script,
-    in_general_form,
+    CalibrationError, Finding, Linearisation, Prior, Script, Solved, in_general_form,
 };
 use crate::imu::InstallationForm;
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
@@ -50,9 +49,12 @@ impl FormTest {
 /// *Detection, Estimation, and Modulation Theory*, part I, §2.5). `None` for a form with as many angles as the
 /// general one, which no data can reject.
 pub fn form_test(
-    restricted: &Problem,
-    priors: &[AttitudePrior],
-    iterated: &Iterated,
+    Solved {
+        problem: restricted,
+        priors,
+        iterated,
+        ..
+    }: &Solved,
 ) -> Result<Option<FormTest>, CalibrationError> {
     let general = InstallationForm::General;
     let angles = |form: InstallationForm| 2 * form.angle_names().len();

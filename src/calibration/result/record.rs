@@ -11,15 +11,13 @@ use super::{
     FORMAT, FORMAT_WITH_TEMPERATURE, GravityRecord, Method, NisRecord, NoiseRecord, TermRecord,
     TestVector, TriadRecord, rows,
 };
-use crate::calibration::parameters::factor;
+use crate::calibration::parameters::{factor, stacked};
 use crate::calibration::{
     Auxiliary, Budget, ClosedForm, ErrorTermTest, Estimate, Finding, Nis, Outcome, PARAMETERS,
     ParameterMatrix, ParameterVector, Problem, Quality, Verdict, auxiliary_name, from_vector,
     parameter_name,
 };
-use crate::imu::{
-    BodyFrame, InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad,
-};
+use crate::imu::{BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
 use crate::run::Run;
 
 /// Inputs of the test vectors: rad/s, then m/s².
@@ -171,14 +169,10 @@ impl AtRest {
     /// of all biases; the rest is the prior.
     pub fn record(&self, run: &Run) -> Calibration {
         let (triads, sigma) = self.triads(run);
-        let sigma = [sigma.gyro, sigma.accel];
-        let variances = ParameterMatrix::from_fn(|i, j| match i == j {
-            true => sigma[i / PER_TRIAD][i % PER_TRIAD].powi(2),
-            false => 0.0,
-        });
+        let variances = stacked(&sigma).map(|sigma| sigma.powi(2));
         let estimate = Estimate {
             triads,
-            covariance: variances,
+            covariance: ParameterMatrix::from_diagonal(&variances),
         };
         let record = Calibration {
             format: FORMAT_WITH_TEMPERATURE.to_owned(),
