@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::calibration::FindingKind as Kind;
 use crate::calibration::{
-    CalibrationError, Finding, Linearisation, Prior, Script, Solved, in_general_form,
+    CalibrationError, Finding, FindingKind as Kind, Linearisation, Prior, Script, Solved,
+    in_general_form,
 };
 use crate::imu::InstallationForm;
 use crate::statistics::{FALSE_ALARM, chi_square_limit};

@@ -3,11 +3,10 @@
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 
-use crate::calibration::FindingKind as Kind;
 use crate::calibration::start::mounting::is_beyond_tolerance;
 use crate::calibration::{
-    Estimate, Finding, Model, ParameterMatrix, from_vector, parameter, parameter_name,
-    sensor_and_parameter,
+    Estimate, Finding, FindingKind as Kind, Model, ParameterMatrix, from_vector, parameter,
+    parameter_name, sensor_and_parameter,
 };
 use crate::imu::{AXES, ParameterKind, PerSensor, Sensor, Triad};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};

@@ -12,10 +12,9 @@ use nalgebra::{Matrix3, Vector3};
 use serde_json::json;
 
 use super::finding::{triad_name, widened_by};
-use crate::calibration::FindingKind as Kind;
 use crate::calibration::estimate::largest_growth;
 use crate::calibration::start::equations::{Common, Equations, Rows, of, of_parameters};
-use crate::calibration::{Finding, ParameterMatrix, Problem, parameter};
+use crate::calibration::{Finding, FindingKind as Kind, ParameterMatrix, Problem, parameter};
 use crate::imu::{Output, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::run::{Aiding, Run};
 use crate::units::DEGREE;

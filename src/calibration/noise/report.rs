@@ -7,8 +7,7 @@ use serde_json::json;
 
 use super::policy::NoisePolicy;
 use super::source::Source;
-use crate::calibration::FindingKind as Kind;
-use crate::calibration::{Finding, Problem};
+use crate::calibration::{Finding, FindingKind as Kind, Problem};
 use crate::imu::{NoiseKeys, PerSensor};
 use crate::number::three_digits;
 

@@ -7,9 +7,9 @@ use nalgebra::Vector3;
 use super::at_rest::AtRest;
 use super::thermal_record::{RecordingRecord, ThermalRecord};
 use super::{
-    BlockRecord, Calibration, ConsistencyRecord, DirectionRecord, EQUATION, EQUATION_WITH_TERMS,
-    FORMAT, FORMAT_WITH_TEMPERATURE, GravityRecord, Method, NisRecord, NoiseRecord, TermRecord,
-    TestVector, TriadRecord, rows,
+    BlockRecord, Calibration, ConsistencyRecord, EQUATION, EQUATION_WITH_TERMS, FORMAT,
+    FORMAT_WITH_TEMPERATURE, GravityRecord, Method, NisRecord, NoiseRecord, TermRecord, TestVector,
+    TriadRecord, rows,
 };
 use crate::calibration::parameters::{factor, stacked};
 use crate::calibration::{
@@ -59,7 +59,7 @@ impl Outcome {
             consistency: Some(self.consistency_record()),
             quality: Some(quality.clone()),
             blocks: tests.iter().map(BlockRecord::from).collect(),
-            observability: self.direction_records(),
+            observability: self.observability.directions.clone(),
             noise: Some(self.noise_record()),
             equation: Some(equation.to_owned()),
             provenance: Some(problem.provenance()),
@@ -82,22 +82,6 @@ impl Outcome {
             attitude: some(consistency.attitude),
             dwells: self.dwell_scatter,
         }
-    }
-
-    fn direction_records(&self) -> Vec<DirectionRecord> {
-        let form = self.estimate.form();
-        let directions = self.observability.directions.iter();
-        let record = directions.map(|direction| {
-            let parts = direction.parts.iter();
-            let named =
-                parts.map(|part| Some((parameter_name(form, part.parameter)?, part.component)));
-            DirectionRecord {
-                remaining: direction.remaining,
-                words: direction.words(form),
-                parts: named.flatten().collect(),
-            }
-        });
-        record.collect()
     }
 
     fn noise_record(&self) -> NoiseRecord {

@@ -12,10 +12,9 @@ mod tried;
 use nalgebra::Vector3;
 use serde_json::json;
 
-use crate::calibration::FindingKind as Kind;
 use crate::calibration::{
-    CalibrationError, Constant, Disturbance, DisturbanceKind, ErrorTerm, Finding, Innovation,
-    Observation, Prior, Problem, Script, Solved,
+    CalibrationError, Constant, Disturbance, DisturbanceKind, ErrorTerm, Finding,
+    FindingKind as Kind, Innovation, Observation, Prior, Problem, Script, Solved,
 };
 use crate::imu::Sensor;
 use crate::run::{Aiding, Dwell};

@@ -80,7 +80,7 @@ mod tests {
             let sizes = match dwell {
                 // What a move left, and what lasts though no innovation is large.
                 73 => [5.0, 0.1, -0.1, 0.0],
-                91 => [1.5, 1.5, 1.5, 1.5],
+                91 => [0.0, 1.5, 1.5, 1.5],
                 // A single one in the middle says nothing of the move, and next to nothing of what lasts.
                 31 => [0.0, 1.0, -1.0, 0.0],
                 _ => [chance, -chance, chance, -chance],

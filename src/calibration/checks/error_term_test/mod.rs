@@ -11,10 +11,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::finding::widened_by;
-use crate::calibration::FindingKind as Kind;
 use crate::calibration::{
-    CalibrationError, ErrorTerm, Finding, Group, Outcome, PARAMETERS, ParameterMatrix, Posterior,
-    Problem,
+    CalibrationError, ErrorTerm, Finding, FindingKind as Kind, Group, Outcome, PARAMETERS,
+    ParameterMatrix, Posterior, Problem,
 };
 use crate::statistics::{FALSE_ALARM, ln_survival};
 pub use bias_variation::{bias_variation, biases_may_vary};
