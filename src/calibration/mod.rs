@@ -41,7 +41,7 @@ pub use checks::finding::kind::{Kind as FindingKind, Level};
 pub use checks::finding::verdict::{Verdict, Word};
 pub use checks::form::FormTest;
 pub use checks::innovation::{Consistency, Innovation, Nis, Observation, mean_square_interval};
-pub use checks::observability::{AttitudePart, Direction, Observability, Part};
+pub use checks::observability::{Direction, Observability};
 pub use checks::quality::{DwellResidual, Measures, Quality, Spread};
 pub use checks::recordings::RecordingDifference;
 use constants::{Constant, Known, Posterior, Prior};

@@ -5,13 +5,12 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use crate::calibration::budget::source::BudgetSource;
+use crate::calibration::parameters::stacked;
 use crate::calibration::record::standstill::FLOOR;
-use crate::calibration::{
-    DayToDay, Disturbance, ErrorTerm, Options, ParameterVector, parameter, to_vector,
-};
+use crate::calibration::{DayToDay, Disturbance, ErrorTerm, Options, ParameterVector, to_vector};
 use crate::imu::{
-    GaussMarkov, InstallationForm, MotionNoise, Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor,
-    Term, TermVector, ThermalModel,
+    GaussMarkov, InstallationForm, MotionNoise, Noise, PerSensor, Sensor, Term, TermVector,
+    ThermalModel,
 };
 use crate::navigation::ProcessNoise;
 use crate::run::{Aiding, Run};
@@ -169,12 +168,7 @@ impl Model {
     fn set_form(&mut self, run: &Run, form: InstallationForm) {
         self.form = form;
         self.prior_mean = to_vector(&run.instrument.prior_mean(form));
-        let sigma = run.instrument.prior_sigma(form, self.aiding.body_frame());
-        for sensor in Sensor::ALL {
-            self.prior_sigma
-                .fixed_rows_mut::<PER_TRIAD>(parameter(sensor, 0))
-                .copy_from(sigma.get(sensor));
-        }
+        self.prior_sigma = stacked(&run.instrument.prior_sigma(form, self.aiding.body_frame()));
     }
 
     /// Whether an error term is on.
@@ -204,21 +198,22 @@ impl Model {
     /// run does not support it.
     pub fn switch_on(&mut self, term: ErrorTerm) {
         if !self.has(term) && self.can_have(term) {
-            self.set(term, 1.0);
+            self.set(term, true);
         }
     }
 
     /// Switches an error term off.
     pub fn switch_off(&mut self, term: ErrorTerm) {
-        self.set(term, 0.0);
+        self.set(term, false);
     }
 
-    /// Sets an error term to its usual σ times this: one or zero.
-    fn set(&mut self, term: ErrorTerm, times: f64) {
+    /// Sets an error term to its usual σ or to zero.
+    fn set(&mut self, term: ErrorTerm, on: bool) {
+        let times = f64::from(u8::from(on));
         match term {
             ErrorTerm::GaussMarkovBias => {
                 for noise in [&mut self.noise.gyro, &mut self.noise.accel] {
-                    noise.gauss_markov = (times > 0.0).then(|| usual_variation(noise));
+                    noise.gauss_markov = on.then(|| usual_variation(noise));
                 }
             }
             ErrorTerm::TableBase => {

@@ -130,21 +130,9 @@ impl<'a> Navigator<'a> {
     /// The same with these parameters of error terms on, and values of all of them, zero where off.
     pub fn with_terms(mut self, on: Vec<usize>, values: TermVector) -> Self {
         self.on = on;
-        self.set_terms(values);
-        self
-    }
-
-    /// Continues with other values of the error terms.
-    pub fn set_terms(&mut self, values: TermVector) {
         self.shifted = values != TermVector::zeros();
         self.terms = values;
-    }
-
-    /// Continues with other triads; `None` if the sensitivity of one is singular.
-    pub fn set_triads(&mut self, triads: &PerSensor<Triad>) -> Option<()> {
-        self.instrument = instruments(triads, self.imu.period)?;
-        self.triads = *triads;
-        Some(())
+        self
     }
 
     /// Increments along body axes of sample `k`, corrected by the triads (Eq. 11) and, at about this

@@ -12,7 +12,7 @@ use super::calibration::{ClosedForm, Navigated, Report};
 use crate::calibration::result::TermRecord;
 use crate::calibration::*;
 use crate::calibration::{
-    AttitudePrior, Direction, Linearisation, Observability, ParameterMatrix, ParameterVector, Part,
+    AttitudePrior, Direction, Linearisation, Observability, ParameterMatrix, ParameterVector,
     sensor_and_parameter,
 };
 use crate::imu::*;
@@ -130,16 +130,15 @@ fn innovations(dwells: &[Range<f64>], rng: &mut ChaCha8Rng) -> Vec<Innovation> {
 
 /// One direction that the observations hardly tell of.
 fn observability() -> Observability {
-    let part = |parameter, component| Part {
-        parameter,
-        component,
+    let part = |index, component| {
+        let name = parameter_name(InstallationForm::General, index);
+        (name.unwrap(), component)
     };
     Observability {
         directions: vec![Direction {
             remaining: 0.002,
-            parts: vec![part(2, 0.8), part(11, -0.6)],
-            others: false,
-            attitude: Vec::new(),
+            words: "gyro scale z against gyro bias z".to_owned(),
+            parts: [part(2, 0.8), part(11, -0.6)].into(),
         }],
     }
 }

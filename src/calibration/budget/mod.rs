@@ -20,8 +20,7 @@ use crate::calibration::constants::of_parameters;
 use crate::calibration::{
     CalibrationError, Layout, Outcome, PARAMETERS, ParameterMatrix, Prior, Problem, Source,
 };
-use crate::imu::{MotionNoise, Sensor};
-use crate::run::{Aiding, Run};
+use crate::run::Run;
 use crate::statistics::student_limit;
 pub use record::{BudgetPartRecord, BudgetRecord, LeftOffRecord};
 pub use source::BudgetSource;
@@ -144,34 +143,27 @@ impl Budget {
 }
 
 impl Problem<'_> {
-    /// The noise sources of its reduction.
+    /// The noise sources of its reduction: those that it states, and those whose floor is never zero.
     fn sources(&self) -> BTreeSet<BudgetSource> {
-        let model = &self.model;
-        let layout = Layout::new(model, self.one_gravity());
-        let mut all: BTreeSet<_> = layout.sources.into_iter().collect();
-        all.insert(BudgetSource::Pulses);
-        for sensor in Sensor::ALL {
-            all.insert(BudgetSource::White(sensor));
-            if *model.motion_noise.get(sensor) != MotionNoise::default() {
-                all.insert(BudgetSource::Moves(sensor));
-            }
-        }
-        all.insert(BudgetSource::VelocityAtRest);
-        match model.aiding {
-            Aiding::Table => all.insert(BudgetSource::TableReading),
-            Aiding::Velocity => {
-                all.insert(BudgetSource::AttitudeAtRest);
-                all.insert(BudgetSource::RotationAtRest)
-            }
-        };
+        let layout = Layout::new(&self.model, self.one_gravity());
+        let noise = Source::ALL.into_iter();
+        let noise = noise.filter(|source| source.sigma(self) > 0.0);
         let bridged = |run: &Run| {
             let imu = &run.recording.imu;
             imu.bridged(&(0..imu.len())).next().is_some()
         };
-        if self.runs().any(bridged) {
-            all.insert(BudgetSource::Interpolated);
-        }
-        all
+        let interpolated = self.runs().any(bridged);
+        let always = [
+            BudgetSource::Pulses,
+            BudgetSource::VelocityAtRest,
+            BudgetSource::AttitudeAtRest,
+        ];
+        let states = layout.sources.into_iter();
+        states
+            .chain(noise.map(Source::in_budget))
+            .chain(always)
+            .chain(interpolated.then_some(BudgetSource::Interpolated))
+            .collect()
     }
 }
 
@@ -186,31 +178,13 @@ impl BudgetSource {
             return (scores as f64 / parameters as f64).max(1.0);
         }
         let learnt = outcome.noise.sources.iter();
-        let of_own = learnt.filter(|figures| self.learnt().contains(&figures.source));
+        let of_own = learnt.filter(|figures| figures.source.in_budget() == self);
         let freedoms = of_own.filter_map(|figures| {
             let [_, high] = figures.interval?;
             let relative = (high / figures.used).ln() / END_OF_INTERVAL;
             (figures.used > 0.0 && relative > 0.0).then(|| (0.5 / relative.powi(2)).max(1.0))
         });
         freedoms.fold(f64::INFINITY, f64::min)
-    }
-
-    /// The noise figures of this source that are estimated from a record, if any.
-    fn learnt(self) -> &'static [Source] {
-        match self {
-            Self::White(Sensor::Gyro) => &[Source::AngleRandomWalk],
-            Self::White(Sensor::Accel) => &[Source::VelocityRandomWalk],
-            Self::Moves(Sensor::Gyro) => &[Source::GyroMotion, Source::GyroMoving],
-            Self::Moves(Sensor::Accel) => &[Source::AccelMotion, Source::AccelMoving],
-            Self::Wander(Sensor::Gyro) => &[Source::GyroGaussMarkov],
-            Self::Wander(Sensor::Accel) => &[Source::AccelGaussMarkov],
-            Self::VelocityAtRest => &[Source::Velocity],
-            Self::AttitudeAtRest => &[Source::Attitude],
-            Self::RotationAtRest => &[Source::RotationAtRest],
-            Self::TablePosition => &[Source::TablePosition],
-            Self::TableReading => &[Source::TableReading],
-            _ => &[],
-        }
     }
 }
 

@@ -5,8 +5,7 @@ use serde_json::json;
 
 use super::finding::triad_name;
 use super::residuals::Residuals;
-use crate::calibration::Finding;
-use crate::calibration::FindingKind as Kind;
+use crate::calibration::{Finding, FindingKind as Kind};
 use crate::imu::{AXES, ParameterKind, Sensor};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 use crate::units::{DEG_PER_H, MICRO_G, PPM};

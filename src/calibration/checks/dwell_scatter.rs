@@ -13,8 +13,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::finding::widened_by;
-use crate::calibration::FindingKind as Kind;
-use crate::calibration::{Finding, Posterior, Prior, Reduction, mean_square_interval};
+use crate::calibration::{
+    Finding, FindingKind as Kind, Posterior, Prior, Reduction, mean_square_interval,
+};
 use crate::statistics::FALSE_ALARM;
 
 /// Directions in which a dwell has less than this part of the total information are ignored: only rounding

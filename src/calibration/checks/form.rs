@@ -3,9 +3,8 @@
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::calibration::FindingKind as Kind;
 use crate::calibration::{
-    AttitudePrior, CalibrationError, Finding, Iterated, Linearisation, Prior, Problem, Script,
+    CalibrationError, Finding, FindingKind as Kind, Linearisation, Prior, Script, Solved,
     in_general_form,
 };
 use crate::imu::InstallationForm;
@@ -50,9 +49,12 @@ impl FormTest {
 /// *Detection, Estimation, and Modulation Theory*, part I, §2.5). `None` for a form with as many angles as the
 /// general one, which no data can reject.
 pub fn form_test(
-    restricted: &Problem,
-    priors: &[AttitudePrior],
-    iterated: &Iterated,
+    Solved {
+        problem: restricted,
+        priors,
+        iterated,
+        ..
+    }: &Solved,
 ) -> Result<Option<FormTest>, CalibrationError> {
     let general = InstallationForm::General;
     let angles = |form: InstallationForm| 2 * form.angle_names().len();

@@ -4,8 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::calibration::Finding;
-use crate::calibration::FindingKind as Kind;
+use crate::calibration::{Finding, FindingKind as Kind};
 use crate::statistics::FALSE_ALARM;
 
 /// Kind of observation.

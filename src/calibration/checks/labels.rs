@@ -2,8 +2,7 @@
 
 use serde_json::{Value, json};
 
-use crate::calibration::Finding;
-use crate::calibration::FindingKind as Kind;
+use crate::calibration::{Finding, FindingKind as Kind};
 use crate::run::motion::LabelCheck;
 
 /// The finding on sections whose labels the record contradicts, if any.

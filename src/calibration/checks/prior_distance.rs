@@ -3,11 +3,10 @@
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 
-use crate::calibration::FindingKind as Kind;
 use crate::calibration::start::mounting::is_beyond_tolerance;
 use crate::calibration::{
-    Estimate, Finding, Model, ParameterMatrix, from_vector, parameter, parameter_name,
-    sensor_and_parameter,
+    Estimate, Finding, FindingKind as Kind, Model, ParameterMatrix, from_vector, parameter,
+    parameter_name, sensor_and_parameter,
 };
 use crate::imu::{AXES, ParameterKind, PerSensor, Sensor, Triad};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
@@ -229,21 +228,54 @@ mod tests {
     use nalgebra::Matrix3;
 
     use super::*;
-    use crate::calibration::Options;
+    use crate::calibration::{Options, Verdict, Word};
     use crate::imu::InstallationForm;
+    use crate::run::Run;
     use crate::simulation::Scenario;
 
-    /// What is found of triads with this sensitivity, which are known to a part of the prior's σ.
-    fn found(sensitivity: PerSensor<Matrix3<f64>>) -> Option<Value> {
-        let run = Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run;
-        let model = Model::new(&run, &Options::default());
+    /// What is found in a run of triads with this sensitivity, which are known to a part of the prior's σ.
+    fn found_in(run: &Run, sensitivity: PerSensor<Matrix3<f64>>) -> Option<Finding> {
+        let model = Model::new(run, &Options::default());
         let triads = PerSensor::from_fn(|sensor| {
             let bias = run.instrument.prior.get(sensor).bias;
             Triad::from_sensitivity(InstallationForm::General, sensitivity.get(sensor), bias)
         });
         let covariance = ParameterMatrix::from_diagonal(&(model.prior_sigma * 0.01).map(|s| s * s));
-        let finding = far_from_prior(&model, &Estimate { triads, covariance })?;
+        far_from_prior(&model, &Estimate { triads, covariance })
+    }
+
+    fn demo() -> Run {
+        Scenario::load("demo").unwrap().simulate(1, 0).unwrap().run
+    }
+
+    fn found(sensitivity: PerSensor<Matrix3<f64>>) -> Option<Value> {
+        let finding = found_in(&demo(), sensitivity)?;
         Some(finding.figures["causes"].clone())
+    }
+
+    #[test]
+    fn a_scale_factor_that_no_careless_prior_explains_fails_the_calibration() {
+        let mut run = demo();
+        let mut word = |prior_sigma: f64, factor: f64| {
+            run.instrument.prior.gyro.scale_sigma = Vector3::repeat(prior_sigma);
+            let (mut gyro, accel) = (Matrix3::identity(), Matrix3::identity());
+            gyro[(1, 1)] = factor;
+            let finding = found_in(&run, PerSensor { gyro, accel })?;
+            let contradicted = finding.is(Kind::PriorContradicted);
+            assert_eq!(contradicted, !finding.is(Kind::FarFromPrior));
+            let word = Verdict::of(&[finding]).word;
+            assert_eq!(contradicted, word == Word::Failed);
+            Some(word)
+        };
+        // Up to 10 % a tight prior is careless, beyond that by up to ten of its σ, and beyond 41 % it never is.
+        assert_eq!(word(1e-3, 1.003), None);
+        assert_eq!(word(1e-3, 1.09), Some(Word::UseWithCare));
+        assert_eq!(word(1e-3, 1.12), Some(Word::Failed));
+        assert_eq!(word(1e-3, 0.88), Some(Word::Failed));
+        assert_eq!(word(0.03, 1.25), Some(Word::UseWithCare));
+        assert_eq!(word(0.03, 1.4), Some(Word::Failed));
+        assert_eq!(word(0.07, 1.4), Some(Word::UseWithCare));
+        assert_eq!(word(0.07, 1.45), Some(Word::Failed));
     }
 
     fn one_degree() -> Matrix3<f64> {

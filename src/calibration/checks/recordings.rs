@@ -3,8 +3,7 @@
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::calibration::Finding;
-use crate::calibration::FindingKind as Kind;
+use crate::calibration::{Finding, FindingKind as Kind};
 
 /// Differences between recordings in a group of parameters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -4,8 +4,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use serde_json::json;
 
 use super::finding::widened_by;
-use crate::calibration::Finding;
-use crate::calibration::FindingKind as Kind;
+use crate::calibration::{Finding, FindingKind as Kind};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 use crate::units::ARCSEC;
 

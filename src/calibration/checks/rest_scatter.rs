@@ -4,9 +4,8 @@ use nalgebra::Matrix3;
 use serde_json::json;
 
 use super::finding::triad_name;
-use crate::calibration::FindingKind as Kind;
 use crate::calibration::record::schedule::step_length;
-use crate::calibration::{Finding, Problem, mean_square_interval};
+use crate::calibration::{Finding, FindingKind as Kind, Problem, mean_square_interval};
 use crate::imu::{AXES, NoiseKeys, PerSensor, Sensor, Triad};
 use crate::number::three_digits;
 use crate::run::{Dwell, Run};

@@ -8,14 +8,14 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use serde_json::json;
 
 use super::finding::{triad_name, widened_by};
-use crate::calibration::FindingKind as Kind;
 use crate::calibration::estimate::largest_growth;
-use crate::calibration::{Finding, ParameterMatrix, Problem, parameter};
-use crate::imu::{Output, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector};
+use crate::calibration::start::equations::{Common, Equations, Rows, of, of_parameters};
+use crate::calibration::{Finding, FindingKind as Kind, ParameterMatrix, Problem, parameter};
+use crate::imu::{Output, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::run::{Aiding, Run};
 use crate::units::DEGREE;
 
@@ -28,14 +28,8 @@ const SAID: f64 = 1.05;
 /// prior. Dwells with means within the same step have the same error. Without a table, accelerometers at rest observe
 /// only the magnitude of gravity.
 pub fn by_rounding(problem: &Problem, triads: &PerSensor<Triad>) -> ParameterMatrix {
-    let mut covariance = ParameterMatrix::zeros();
-    for sensor in Sensor::ALL {
-        let first = parameter(sensor, 0);
-        covariance
-            .view_mut((first, first), (PER_TRIAD, PER_TRIAD))
-            .copy_from(&of_triad(problem, sensor, triads.get(sensor)).unwrap_or_default());
-    }
-    covariance
+    let of = |&sensor: &Sensor| of_triad(problem, sensor, triads);
+    Sensor::ALL.iter().filter_map(of).sum()
 }
 
 /// Findings on triads for which rounding matters; `covariance` is that of the estimate, rounding included.
@@ -70,16 +64,14 @@ pub fn rounded(
     Sensor::ALL.into_iter().filter_map(of).collect()
 }
 
-/// Covariance of a triad's parameters due to rounding errors in means of dwells; `None` if rows are not rounded.
+/// The same of one triad; `None` if rows are not rounded.
 fn of_triad(
     problem: &Problem,
     sensor: Sensor,
-    triad: &Triad,
-) -> Option<SMatrix<f64, PER_TRIAD, PER_TRIAD>> {
+    triads: &PerSensor<Triad>,
+) -> Option<ParameterMatrix> {
+    let triad = triads.get(sensor);
     let correction = triad.correction()?;
-    let response = triad.response();
-    let sigma = &problem.model.prior_sigma;
-    let sigma = sigma.fixed_rows::<PER_TRIAD>(parameter(sensor, 0));
     let recordings = problem.runs().enumerate();
     let means: Vec<Mean> = recordings
         .flat_map(|(recording, run)| of_recording(problem, recording, run, sensor))
@@ -87,8 +79,8 @@ fn of_triad(
     let variance = means.iter().map(|mean| mean.variance.mean()).sum::<f64>();
     let variance = Some(variance / means.len() as f64).filter(|variance| *variance > 0.0)?;
     let along_gravity = sensor == Sensor::Accel && problem.model.aiding == Aiding::Velocity;
-    let mut information = SMatrix::<f64, PER_TRIAD, PER_TRIAD>::identity();
-    let mut of_steps = BTreeMap::<(usize, i64), TriadVector>::new();
+    let mut equations = Equations::of_triads(&problem.model, triads, &[sensor]);
+    let mut numbers = BTreeMap::new();
     for mean in &means {
         let input = match sensor {
             Sensor::Gyro => Vector3::zeros(),
@@ -98,21 +90,21 @@ fn of_triad(
             true => input * input.transpose() / input.norm_squared().max(f64::MIN_POSITIVE),
             false => Matrix3::identity(),
         };
-        let input = input.push(1.0);
-        let columns: [_; PER_TRIAD] =
-            std::array::from_fn(|p| seen * response[p] * input * sigma[p]);
-        let design = SMatrix::<f64, 3, PER_TRIAD>::from_columns(&columns);
-        information += design.transpose() * design / variance;
-        for axis in 0..3 {
-            let error = design.row(axis).transpose() * mean.variance[axis].sqrt() / variance;
-            *of_steps.entry((axis, mean.step[axis])).or_default() += error;
-        }
+        let common = [0, 1, 2].map(|axis| {
+            let next = numbers.len();
+            let number = *numbers.entry((axis, mean.step[axis])).or_insert(next);
+            let mut error = Matrix3::zeros();
+            error[(axis, 0)] = mean.variance[axis].sqrt();
+            (Common::Unit(number), error)
+        });
+        let partials = of(sensor, &(seen * of_parameters(triad, &input)));
+        equations.add(&Rows {
+            common: common.to_vec(),
+            ..Rows::new(partials, Vector3::zeros(), variance)
+        });
     }
-    let information = information.cholesky()?;
-    let errors = of_steps
-        .values()
-        .map(|of| information.solve(of).component_mul(&sigma));
-    Some(errors.map(|error| error * error.transpose()).sum())
+    let by_steps = equations.by_units(&equations.gain()?, numbers.len());
+    Some(equations.whole(&(&by_steps * by_steps.transpose())))
 }
 
 /// Steps of rates along body axes, rad/s or m/s²; zero if there are none, or if rows are integrals, which may carry the

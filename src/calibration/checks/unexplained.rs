@@ -2,9 +2,8 @@
 
 use serde_json::json;
 
-use crate::calibration::FindingKind as Kind;
 use crate::calibration::noise::LOG_SIGMA;
-use crate::calibration::{Finding, Innovation, Nis, Outcome};
+use crate::calibration::{Finding, FindingKind as Kind, Innovation, Nis, Outcome};
 use crate::statistics::chi_square_limit;
 
 /// Probability that a stated figure is wrong by more than the accepted limit.

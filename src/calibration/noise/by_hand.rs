@@ -5,15 +5,9 @@ use nalgebra::{DMatrix, DVector};
 use super::likelihood_ratio::{INTERVAL, limit};
 use super::report::{NoiseReport, SourceFigures, noise_learnt};
 use super::source::Source;
+use super::variances::{Found, Slope, likeliest};
 use crate::calibration::{Finding, Model, Problem};
 use crate::statistics::FALSE_ALARM;
-
-/// Longest step of ln of a variance.
-const LONGEST: f64 = 3.0;
-/// A step of ln of a variance below this part of its σ counts as converged.
-const SETTLED: f64 = 0.01;
-/// Most steps.
-const STEPS: usize = 40;
 
 /// Sources of noise by hand: attitude noise in moves, of both kinds, and in dwells.
 pub const BY_HAND: [Source; 3] = [
@@ -37,17 +31,6 @@ pub struct ByHand {
     ratio: f64,
 }
 
-/// One source.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Found {
-    /// Its index in [`BY_HAND`].
-    place: usize,
-    /// Variance in excess of the stated noise, in SI and radians.
-    variance: f64,
-    /// 1σ of the logarithm of the variance.
-    spread: f64,
-}
-
 impl ByHand {
     /// Adds source after source as long as the improvement is significant, from the errors of the equations before the
     /// data and their covariance due to prior and stated noise.
@@ -56,32 +39,15 @@ impl ByHand {
         covariance: &DMatrix<f64>,
         parts: &Parts,
     ) -> Option<Self> {
-        let none = Likelihood::new(errors, covariance.clone())?;
-        let limit = Self::limit();
-        let (mut found, mut here) = (Vec::<Found>::new(), none.deviance);
-        loop {
-            let left = (0..BY_HAND.len()).filter(|k| found.iter().all(|one| one.place != *k));
-            let more = left.filter_map(|place| {
-                let mut with = found.clone();
-                with.push(Found {
-                    place,
-                    variance: 0.0,
-                    spread: 0.0,
-                });
-                let deviance = fitted(errors, covariance, parts, &mut with)?;
-                Some((with, deviance))
-            });
-            match more.min_by(|(_, one), (_, other)| one.total_cmp(other)) {
-                Some((with, deviance)) if here - deviance > limit => {
-                    (found, here) = (with, deviance);
-                }
-                _ => break,
+        let slope = |found: &[Found], place: usize| {
+            let mut sum = covariance.clone();
+            for one in found {
+                add(&mut sum, &parts[one.place], one.variance);
             }
-        }
-        Some(Self {
-            found,
-            ratio: none.deviance - here,
-        })
+            of_errors(errors, sum, &parts[place])
+        };
+        let (found, ratio) = likeliest(BY_HAND.len(), Self::limit(), slope)?;
+        Some(Self { found, ratio })
     }
 
     /// Limit of −2 ln of the likelihood ratio of one additional source.
@@ -146,79 +112,28 @@ impl ByHand {
     }
 }
 
-/// Sets the variances to their maximum-likelihood values, and returns −2 ln of the likelihood; `None` if one is zero.
-/// The last one starts from zero.
-///
-/// Source: Fisher scoring of the likelihood of components of variance, Patterson and Thompson 1971, Biometrika 58(3);
-/// of one after the other.
-fn fitted(
-    errors: &DVector<f64>,
-    covariance: &DMatrix<f64>,
-    parts: &Parts,
-    found: &mut [Found],
-) -> Option<f64> {
-    for step in 0..STEPS {
-        let mut settled = step > 0;
-        for number in (0..found.len()).rev() {
-            let mut sum = covariance.clone();
-            for one in found.iter() {
-                add(&mut sum, &parts[one.place], one.variance);
-            }
-            let likelihood = Likelihood::new(errors, sum)?;
-            let one = &mut found[number];
-            let (score, information) = likelihood.slope(&parts[one.place]);
-            if one.variance == 0.0 {
-                if score <= 0.0 || information <= 0.0 {
-                    return None;
-                }
-                one.variance = score / information;
-                continue;
-            }
-            one.spread = 1.0 / (one.variance * information.sqrt());
-            let step = score * one.variance * one.spread.powi(2);
-            settled &= step.abs() < SETTLED * one.spread;
-            if settled && number == 0 {
-                return Some(likelihood.deviance);
-            }
-            one.variance *= step.clamp(-LONGEST, LONGEST).exp();
-        }
-    }
-    None
-}
-
 fn add(covariance: &mut DMatrix<f64>, parts: &DVector<f64>, variance: f64) {
     for (k, part) in parts.iter().enumerate() {
         covariance[(k, k)] += part * variance;
     }
 }
 
-/// Errors under a covariance.
-struct Likelihood {
-    /// −2 ln of the likelihood, up to a constant.
-    deviance: f64,
-    inverse: DMatrix<f64>,
-    weighted: DVector<f64>,
-}
-
-impl Likelihood {
-    fn new(errors: &DVector<f64>, covariance: DMatrix<f64>) -> Option<Self> {
-        let factor = covariance.cholesky()?;
-        let weighted = factor.solve(errors);
-        let diagonal = factor.l_dirty().diagonal();
-        Some(Self {
-            deviance: errors.dot(&weighted) + 2.0 * diagonal.map(f64::ln).sum(),
-            inverse: factor.inverse(),
-            weighted,
-        })
-    }
-
-    /// Of ln of the likelihood by a variance that has these parts in the errors: gradient, and expected information.
-    fn slope(&self, parts: &DVector<f64>) -> (f64, f64) {
-        let fit = parts.dot(&self.weighted.component_mul(&self.weighted));
-        let expected = parts.dot(&self.inverse.diagonal());
-        let squares = self.inverse.component_mul(&self.inverse);
-        (0.5 * (fit - expected), 0.5 * parts.dot(&(squares * parts)))
-    }
+/// The likelihood of errors under a covariance, and its slope by a variance that has these parts in them.
+fn of_errors(
+    errors: &DVector<f64>,
+    covariance: DMatrix<f64>,
+    parts: &DVector<f64>,
+) -> Option<Slope> {
+    let factor = covariance.cholesky()?;
+    let weighted = factor.solve(errors);
+    let (diagonal, inverse) = (factor.l_dirty().diagonal(), factor.inverse());
+    let fit = parts.dot(&weighted.component_mul(&weighted));
+    let squares = inverse.component_mul(&inverse);
+    Some(Slope {
+        deviance: errors.dot(&weighted) + 2.0 * diagonal.map(f64::ln).sum(),
+        score: 0.5 * (fit - parts.dot(&inverse.diagonal())),
+        information: 0.5 * parts.dot(&(squares * parts)),
+    })
 }
 
 #[cfg(test)]

@@ -12,8 +12,8 @@ mod learn;
 mod likelihood_ratio;
 mod policy;
 mod report;
-mod run_toml;
 mod source;
+pub mod variances;
 
 pub use by_hand::{BY_HAND, ByHand, Parts};
 pub use fit::LOG_SIGMA;

@@ -7,8 +7,8 @@ use serde_json::json;
 
 use super::policy::NoisePolicy;
 use super::source::Source;
-use crate::calibration::FindingKind as Kind;
-use crate::calibration::{Finding, Problem};
+use crate::calibration::{Finding, FindingKind as Kind, Problem};
+use crate::imu::{NoiseKeys, PerSensor};
 use crate::number::three_digits;
 
 /// The noise used by a calibration, and its origin.
@@ -171,4 +171,42 @@ pub fn noise_learnt(
     );
     let figures = json!({ "ratio": ratio, "limit": limit, "sources": sources });
     Some(Finding::new(Kind::NoiseLearnt, text, figures))
+}
+
+/// Tables of `run.toml` that state noise.
+const TABLES: [&str; 3] = ["imu.noise", "standstill", "turntable"];
+
+impl NoiseReport {
+    /// The lines of `run.toml` that state the estimated noise, each below the table it belongs to; `None` if no
+    /// noise was estimated. `correlation_time` is that of each triad's Gauss–Markov bias in s.
+    pub fn run_toml(&self, correlation_time: PerSensor<Option<f64>>) -> Option<String> {
+        if !self.learnt {
+            return None;
+        }
+        let used = self.sources.iter().filter(|figures| figures.used > 0.0);
+        let lines = used.flat_map(|figures| {
+            let source = figures.source;
+            let (table, (name, unit)) = source.stated_in();
+            let varies = matches!(source, Source::GyroGaussMarkov | Source::AccelGaussMarkov);
+            let time = correlation_time.get(source.triad()).filter(|_| varies);
+            let time = time.map(|time| (NoiseKeys::of(source.triad()).correlation_time, time));
+            let value = figures.used * source.unit().1 / unit;
+            let lines = [(name, value)].into_iter().chain(time);
+            lines.map(move |(name, value)| (table, format!("{name} = {}", rounded(value))))
+        });
+        let lines: Vec<(&str, String)> = lines.collect();
+        let of_table = |table: &str| -> Option<String> {
+            let of_table = lines.iter().filter(|(of, _)| *of == table);
+            let lines: String = of_table.map(|(_, line)| format!("{line}\n")).collect();
+            (!lines.is_empty()).then(|| format!("[{table}]\n{lines}"))
+        };
+        let tables: Vec<String> = TABLES.into_iter().filter_map(of_table).collect();
+        Some(tables.join("\n"))
+    }
+}
+
+/// A TOML number of four digits.
+fn rounded(value: f64) -> String {
+    let rounded: f64 = format!("{value:.3e}").parse().unwrap_or(value);
+    format!("{rounded:?}")
 }

@@ -1,98 +1,90 @@
-//! The sources of noise: their names, and the place of their σ in the model.
+//! The sources of noise: a row for each, and the place of its σ in the model.
 
 use serde::{Deserialize, Serialize};
 
+use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::{Model, Problem};
-use crate::imu::{GaussMarkov, PerSensor, Sensor};
+use crate::imu::{GaussMarkov, NoiseKeys, PerSensor, Sensor};
 use crate::navigation::ProcessNoise;
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ};
 
-/// A source of noise with one σ.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Source {
-    /// Angle random walk.
-    AngleRandomWalk,
-    /// Velocity random walk.
-    VelocityRandomWalk,
-    /// Attitude noise of moves that grows with their speed.
-    GyroMotion,
-    /// Velocity noise of moves that grows with their speed.
-    AccelMotion,
-    /// Attitude noise of moves that grows with their duration.
-    GyroMoving,
-    /// Velocity noise of moves that grows with their duration.
-    AccelMoving,
-    /// White velocity at standstill.
-    Velocity,
-    /// White attitude at standstill, without a table.
-    Attitude,
-    /// Unwanted rotation at rest, without a table.
+const GYRO: NoiseKeys = NoiseKeys::of(Sensor::Gyro);
+const ACCEL: NoiseKeys = NoiseKeys::of(Sensor::Accel);
+
+macro_rules! sources {
+    ($($(#[$attribute:meta])* $variant:ident, $triad:ident, $name:literal in $unit:literal = $value:expr,
+        $table:literal $line:expr, part of $part:ident $(($of:ident))?;)*) => {
+        /// A source of noise with one σ.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+        #[serde(rename_all = "kebab-case")]
+        pub enum Source {
+            $($(#[$attribute])* #[doc = $name] $variant,)*
+        }
+
+        impl Source {
+            /// All sources.
+            pub const ALL: [Self; [$($name),*].len()] = [$(Self::$variant),*];
+
+            /// Its name for reports.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$variant => $name,)* }
+            }
+
+            /// The unit in which its σ is shown, and that unit in SI and radians.
+            pub fn unit(self) -> (&'static str, f64) {
+                match self { $(Self::$variant => ($unit, $value),)* }
+            }
+
+            /// Its triad, or the triad whose random walk is its reference.
+            pub(in crate::calibration) fn triad(self) -> Sensor {
+                match self { $(Self::$variant => Sensor::$triad,)* }
+            }
+
+            /// The table of `run.toml` that states it, the key there, and its unit in SI and radians.
+            pub(in crate::calibration) fn stated_in(self) -> (&'static str, (&'static str, f64)) {
+                match self { $(Self::$variant => ($table, $line),)* }
+            }
+
+            /// Its source in the uncertainty budget.
+            pub(in crate::calibration) fn in_budget(self) -> BudgetSource {
+                match self { $(Self::$variant => BudgetSource::$part $((Sensor::$of))?,)* }
+            }
+        }
+    };
+}
+
+// Noise of moves by speed is over the root of ∫|ω|² dt in rad²/s or ∫|a|² dt in m²/s³.
+sources! {
+    AngleRandomWalk, Gyro, "angle random walk" in "deg/sqrt(h)" = DEG_PER_SQRT_H,
+        "imu.noise" GYRO.random_walk, part of White(Gyro);
+    VelocityRandomWalk, Accel, "velocity random walk" in "ug/sqrt(Hz)" = MICRO_G_PER_SQRT_HZ,
+        "imu.noise" ACCEL.random_walk, part of White(Accel);
+    GyroMotion, Gyro, "attitude noise of moves by rate" in "sqrt(s)" = 1.0,
+        "imu.noise" (GYRO.by_motion, 1.0), part of Moves(Gyro);
+    AccelMotion, Accel, "velocity noise of moves by acceleration" in "sqrt(s)" = 1.0,
+        "imu.noise" (ACCEL.by_motion, 1.0), part of Moves(Accel);
+    GyroMoving, Gyro, "attitude noise of moves by time" in "deg/sqrt(s)" = DEGREE,
+        "imu.noise" GYRO.by_duration, part of Moves(Gyro);
+    AccelMoving, Accel, "velocity noise of moves by time" in "mm/s/sqrt(s)" = 1e-3,
+        "imu.noise" ACCEL.by_duration, part of Moves(Accel);
+    Velocity, Accel, "velocity at standstill" in "mm/s" = 1e-3,
+        "standstill" ("velocity_sigma_m_s", 1.0), part of VelocityAtRest;
+    Attitude, Gyro, "attitude at standstill" in "arcsec" = ARCSEC,
+        "standstill" ("attitude_sigma_arcsec", ARCSEC), part of AttitudeAtRest;
     #[serde(rename = "turning")]
-    RotationAtRest,
-    /// Position error of the table.
-    TablePosition,
-    /// Reading of the table.
-    TableReading,
-    /// Gauss–Markov bias of the gyros.
-    GyroGaussMarkov,
-    /// Gauss–Markov bias of the accelerometers.
-    AccelGaussMarkov,
+    RotationAtRest, Gyro, "turning at standstill" in "deg/sqrt(s)" = DEGREE,
+        "standstill" ("turning_deg_per_sqrt_s", DEGREE), part of RotationAtRest;
+    TablePosition, Gyro, "table position" in "arcsec" = ARCSEC,
+        "turntable" ("position_sigma_arcsec", ARCSEC), part of TablePosition;
+    TableReading, Gyro, "table reading" in "arcsec" = ARCSEC,
+        "turntable" ("reading_sigma_arcsec", ARCSEC), part of TableReading;
+    GyroGaussMarkov, Gyro, "Gauss-Markov bias of the gyros" in "deg/h" = DEG_PER_H,
+        "imu.noise" GYRO.gauss_markov, part of Wander(Gyro);
+    AccelGaussMarkov, Accel, "Gauss-Markov bias of the accelerometers" in "ug" = MICRO_G,
+        "imu.noise" ACCEL.gauss_markov, part of Wander(Accel);
 }
 
 impl Source {
-    /// All sources.
-    pub const ALL: [Self; 13] = [
-        Self::AngleRandomWalk,
-        Self::VelocityRandomWalk,
-        Self::GyroMotion,
-        Self::AccelMotion,
-        Self::GyroMoving,
-        Self::AccelMoving,
-        Self::Velocity,
-        Self::Attitude,
-        Self::RotationAtRest,
-        Self::TablePosition,
-        Self::TableReading,
-        Self::GyroGaussMarkov,
-        Self::AccelGaussMarkov,
-    ];
-
-    /// Its name for reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::AngleRandomWalk => "angle random walk",
-            Self::VelocityRandomWalk => "velocity random walk",
-            Self::GyroMotion => "attitude noise of moves by rate",
-            Self::AccelMotion => "velocity noise of moves by acceleration",
-            Self::GyroMoving => "attitude noise of moves by time",
-            Self::AccelMoving => "velocity noise of moves by time",
-            Self::Velocity => "velocity at standstill",
-            Self::Attitude => "attitude at standstill",
-            Self::RotationAtRest => "turning at standstill",
-            Self::TablePosition => "table position",
-            Self::TableReading => "table reading",
-            Self::GyroGaussMarkov => "Gauss-Markov bias of the gyros",
-            Self::AccelGaussMarkov => "Gauss-Markov bias of the accelerometers",
-        }
-    }
-
-    /// The unit in which its σ is shown, and that unit in SI and radians.
-    pub fn unit(self) -> (&'static str, f64) {
-        match self {
-            Self::AngleRandomWalk => ("deg/sqrt(h)", DEG_PER_SQRT_H),
-            Self::VelocityRandomWalk => ("ug/sqrt(Hz)", MICRO_G_PER_SQRT_HZ),
-            // Over the root of ∫|ω|² dt in rad²/s or ∫|a|² dt in m²/s³.
-            Self::GyroMotion | Self::AccelMotion => ("sqrt(s)", 1.0),
-            Self::GyroMoving | Self::RotationAtRest => ("deg/sqrt(s)", DEGREE),
-            Self::AccelMoving => ("mm/s/sqrt(s)", 1e-3),
-            Self::Velocity => ("mm/s", 1e-3),
-            Self::Attitude | Self::TablePosition | Self::TableReading => ("arcsec", ARCSEC),
-            Self::GyroGaussMarkov => ("deg/h", DEG_PER_H),
-            Self::AccelGaussMarkov => ("ug", MICRO_G),
-        }
-    }
-
     /// Process noise of this source alone with unit σ in SI and radians, if it is gyro noise in moves.
     pub(in crate::calibration) fn alone(self) -> PerSensor<ProcessNoise> {
         let mut noise = PerSensor::<ProcessNoise>::default();
@@ -102,18 +94,6 @@ impl Source {
             _ => {}
         }
         noise
-    }
-
-    /// Its triad, or the triad whose random walk is its reference.
-    pub(in crate::calibration) fn triad(self) -> Sensor {
-        match self {
-            Self::VelocityRandomWalk
-            | Self::AccelMotion
-            | Self::AccelMoving
-            | Self::Velocity
-            | Self::AccelGaussMarkov => Sensor::Accel,
-            _ => Sensor::Gyro,
-        }
     }
 
     /// Whether the run states a nonzero figure for it.

@@ -7,7 +7,9 @@ pub mod group;
 
 use nalgebra::{SMatrix, SVector};
 
-use crate::imu::{InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+use crate::imu::{
+    InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector,
+};
 
 /// Number of parameters of both triads.
 pub const PARAMETERS: usize = 2 * PER_TRIAD;
@@ -34,14 +36,14 @@ pub fn sensor_and_parameter(index: usize) -> (Sensor, usize) {
     }
 }
 
+/// Values of the parameters of each triad as one vector.
+pub fn stacked(each: &PerSensor<TriadVector>) -> ParameterVector {
+    ParameterVector::from_iterator(each.gyro.iter().chain(&each.accel).copied())
+}
+
 /// The parameters of both triads as one vector.
 pub fn to_vector(triads: &PerSensor<Triad>) -> ParameterVector {
-    let mut v = ParameterVector::zeros();
-    for sensor in Sensor::ALL {
-        v.fixed_rows_mut::<PER_TRIAD>(parameter(sensor, 0))
-            .copy_from(&triads.get(sensor).to_vector());
-    }
-    v
+    stacked(&PerSensor::from_fn(|sensor| triads.get(sensor).to_vector()))
 }
 
 /// Both triads from one vector of parameters.

@@ -1,5 +1,5 @@
 use crate::calibration::pass::{Gate, pass};
-use crate::calibration::{ErrorTerm, Options, Outcome, Problem, UNWATCHED, estimate};
+use crate::calibration::{ErrorTerm, Options, Outcome, Problem, Reduction, UNWATCHED, estimate};
 use crate::imu::Term;
 use crate::run::Aiding;
 use crate::simulation::Scenario;
@@ -106,4 +106,27 @@ fn a_term_that_is_off_is_zero_wherever_it_was_linearised() {
     });
     println!("{} of {} σ", apart.amax(), moved.amax());
     assert!(apart.amax() < 1e-2 * moved.amax(), "{}", apart.amax());
+}
+
+#[test]
+fn folded_rows_have_the_sums_of_all_rows() {
+    let run = Scenario::load("demo").unwrap().simulate(3, 0).unwrap().run;
+    let problem = Problem::new(&run, &Options::default());
+    let outcome = estimate(&problem, UNWATCHED).unwrap();
+    let script = outcome.script(&problem).unwrap();
+    let mut accepted = outcome.accepted();
+    // Both leave out the same.
+    accepted[7] = false;
+    let whole = script.reduce(&problem, &accepted).unwrap();
+    let folded = script.fold(&problem, &accepted).unwrap();
+    let rows = |of: &Reduction| of.parts.iter().map(|part| part.rows.nrows()).sum::<usize>();
+    let columns = whole.constants.len() + 1;
+    assert!(rows(&whole) > 5 * columns && rows(&folded) == columns);
+    let scale = whole.squares().map_diagonal(f64::sqrt);
+    let apart = (whole.squares() - folded.squares()).component_div(&(&scale * scale.transpose()));
+    assert!(apart.amax() < 1e-12, "{}", apart.amax());
+    let [all, few] = [&whole, &folded].map(|of| outcome.posterior(&problem, of));
+    assert!((all.deviance - few.deviance).abs() < 1e-6 * all.deviance.abs());
+    let sigma = all.covariance.diagonal().map(f64::sqrt);
+    assert!((all.mean - few.mean).component_div(&sigma).amax() < 1e-6);
 }

@@ -23,7 +23,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use super::budget::BudgetRecord;
 use super::noise::NoiseReport;
 use crate::calibration::result::thermal_record::{RecordingRecord, ThermalRecord};
-use crate::calibration::{DwellScatter, Finding, Quality, Verdict};
+use crate::calibration::{Direction, DwellScatter, Finding, Quality, Verdict};
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
 
@@ -107,7 +107,7 @@ pub struct Calibration {
     pub blocks: Vec<BlockRecord>,
     /// Independent directions of the parameters, the least observed first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub observability: Vec<DirectionRecord>,
+    pub observability: Vec<Direction>,
     /// The noise that was used; `None` if a file states noise of another kind, as a truth may.
     #[serde(
         default,
@@ -284,17 +284,6 @@ pub struct BlockRecord {
     pub nis_without: f64,
     /// … and with it.
     pub nis_with: f64,
-}
-
-/// A combination of parameters, each in units of its prior σ, with its observability in a run.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct DirectionRecord {
-    /// Posterior over prior σ.
-    pub remaining: f64,
-    /// Description, such as `gyro scale z with gyro bias z`.
-    pub words: String,
-    /// Name and component of its major parameters; the squares of all components sum to one.
-    pub parts: BTreeMap<String, f64>,
 }
 
 /// A raw output of both triads with its calibrated value, gyro first.

@@ -7,19 +7,17 @@ use nalgebra::Vector3;
 use super::at_rest::AtRest;
 use super::thermal_record::{RecordingRecord, ThermalRecord};
 use super::{
-    BlockRecord, Calibration, ConsistencyRecord, DirectionRecord, EQUATION, EQUATION_WITH_TERMS,
-    FORMAT, FORMAT_WITH_TEMPERATURE, GravityRecord, Method, NisRecord, NoiseRecord, TermRecord,
-    TestVector, TriadRecord, rows,
+    BlockRecord, Calibration, ConsistencyRecord, EQUATION, EQUATION_WITH_TERMS, FORMAT,
+    FORMAT_WITH_TEMPERATURE, GravityRecord, Method, NisRecord, NoiseRecord, TermRecord, TestVector,
+    TriadRecord, rows,
 };
-use crate::calibration::parameters::factor;
+use crate::calibration::parameters::{factor, stacked};
 use crate::calibration::{
     Auxiliary, Budget, ClosedForm, ErrorTermTest, Estimate, Finding, Nis, Outcome, PARAMETERS,
     ParameterMatrix, ParameterVector, Problem, Quality, Verdict, auxiliary_name, from_vector,
     parameter_name,
 };
-use crate::imu::{
-    BodyFrame, InstallationForm, Nominal, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad,
-};
+use crate::imu::{BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
 use crate::run::Run;
 
 /// Inputs of the test vectors: rad/s, then m/s².
@@ -61,7 +59,7 @@ impl Outcome {
             consistency: Some(self.consistency_record()),
             quality: Some(quality.clone()),
             blocks: tests.iter().map(BlockRecord::from).collect(),
-            observability: self.direction_records(),
+            observability: self.observability.directions.clone(),
             noise: Some(self.noise_record()),
             equation: Some(equation.to_owned()),
             provenance: Some(problem.provenance()),
@@ -84,22 +82,6 @@ impl Outcome {
             attitude: some(consistency.attitude),
             dwells: self.dwell_scatter,
         }
-    }
-
-    fn direction_records(&self) -> Vec<DirectionRecord> {
-        let form = self.estimate.form();
-        let directions = self.observability.directions.iter();
-        let record = directions.map(|direction| {
-            let parts = direction.parts.iter();
-            let named =
-                parts.map(|part| Some((parameter_name(form, part.parameter)?, part.component)));
-            DirectionRecord {
-                remaining: direction.remaining,
-                words: direction.words(form),
-                parts: named.flatten().collect(),
-            }
-        });
-        record.collect()
     }
 
     fn noise_record(&self) -> NoiseRecord {
@@ -171,14 +153,10 @@ impl AtRest {
     /// of all biases; the rest is the prior.
     pub fn record(&self, run: &Run) -> Calibration {
         let (triads, sigma) = self.triads(run);
-        let sigma = [sigma.gyro, sigma.accel];
-        let variances = ParameterMatrix::from_fn(|i, j| match i == j {
-            true => sigma[i / PER_TRIAD][i % PER_TRIAD].powi(2),
-            false => 0.0,
-        });
+        let variances = stacked(&sigma).map(|sigma| sigma.powi(2));
         let estimate = Estimate {
             triads,
-            covariance: variances,
+            covariance: ParameterMatrix::from_diagonal(&variances),
         };
         let record = Calibration {
             format: FORMAT_WITH_TEMPERATURE.to_owned(),

@@ -1,9 +1,10 @@
 //! Differences between recordings beyond the stated ones, estimated from each recording calibrated alone.
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{DMatrix, DVector};
 
 use super::day_to_day::DayToDay;
 use crate::calibration::checks::recordings::recordings_differ;
+use crate::calibration::noise::variances::{Found, Slope, likeliest};
 use crate::calibration::{
     Estimate, Finding, Group, Model, RecordingDifference, SeparateEstimate, from_vector,
     sensor_and_parameter,
@@ -15,13 +16,6 @@ use crate::statistics::{FALSE_ALARM, chi_square_limit};
 const FEWEST: usize = 3;
 /// Least remaining part of the prior variance of a direction; below it, rounding dominates.
 const LEAST_LEFT: f64 = 1e-12;
-/// Halvings of the logarithm of a variance, over this many decades.
-const HALVINGS: usize = 16;
-const DECADES: f64 = 24.0;
-/// Most rounds over the estimated variances, and the decrease of −2 ln of the likelihood that counts as converged.
-const ROUNDS: usize = 20;
-const SETTLED: f64 = 1e-2;
-
 /// The estimated σ of differences between recordings, if they differ by more than stated, and the finding on it.
 ///
 /// Each parameter is a polynomial in temperature plus a difference for each recording, with one σ for all parameters of
@@ -183,13 +177,19 @@ impl RecordingsEvidence {
         })
     }
 
-    /// −2 ln of the likelihood, up to a constant, and its derivative by the variance of each group in excess of the
-    /// stated one. `None` if rounding makes the matrix singular.
-    fn likelihood(&self, variances: &[f64]) -> Option<(f64, Vec<f64>)> {
+    /// The likelihood with variances of some groups in excess of the stated ones, and its slope by that of one; the
+    /// information leaves out what recordings have in common. `None` if rounding makes a matrix singular.
+    fn slope(&self, found: &[Found], group: usize) -> Option<Slope> {
         let mut own = self.stated.clone();
         for (i, &(group, prior)) in self.parameters.iter().enumerate() {
-            own[(i, i)] += variances[group] / prior;
+            let of_group = found.iter().filter(|one| one.place == group);
+            own[(i, i)] += of_group.map(|one| one.variance / prior).sum::<f64>();
         }
+        let parameters = self.parameters.iter().enumerate();
+        let of_group = parameters.filter(|(_, of)| of.0 == group);
+        let (columns, sigma): (Vec<usize>, Vec<f64>) =
+            of_group.map(|(i, of)| (i, of.1.sqrt().recip())).unzip();
+        let scale = DMatrix::from_diagonal(&sigma.into());
         let mut information = DMatrix::from_diagonal(&self.prior);
         let mut right = DVector::zeros(self.prior.len());
         let mut deviance = 0.0;
@@ -199,101 +199,50 @@ impl RecordingsEvidence {
             let covariance =
                 DMatrix::identity(m, m) + &evidence.by_own * &own * evidence.by_own.transpose();
             let root = covariance.cholesky()?.unpack();
-            let by = |of: &DMatrix<f64>| root.solve_lower_triangular(of);
-            let (by_own, by_common) = (by(&evidence.by_own)?, by(&evidence.by_common)?);
+            let by_group = evidence.by_own.select_columns(&columns) * &scale;
+            let by_group = root.solve_lower_triangular(&by_group)?;
+            let by_common = root.solve_lower_triangular(&evidence.by_common)?;
             let values = root.solve_lower_triangular(&evidence.values)?;
             deviance += 2.0 * root.diagonal().map(f64::ln).sum() + values.norm_squared();
             information += by_common.tr_mul(&by_common);
             right += by_common.tr_mul(&values);
-            whitened.push((by_own, by_common, values));
+            whitened.push((by_group, by_common, values));
         }
-        let root: Cholesky<f64, Dyn> = information.cholesky()?;
+        let root = information.cholesky()?;
         let common = root.solve(&right);
         let root = root.unpack();
         deviance += 2.0 * root.diagonal().map(f64::ln).sum() - right.dot(&common);
-        let mut slopes = vec![0.0; self.groups.len()];
-        for (by_own, by_common, values) in &whitened {
-            let unexplained = by_own.tr_mul(&(values - by_common * &common));
-            let told = root.solve_lower_triangular(&by_common.tr_mul(by_own))?;
-            for (i, &(group, prior)) in self.parameters.iter().enumerate() {
-                let expected = by_own.column(i).norm_squared() - told.column(i).norm_squared();
-                slopes[group] += (expected - unexplained[i].powi(2)) / prior;
-            }
+        let (mut score, mut information) = (0.0, 0.0);
+        for (by_group, by_common, values) in &whitened {
+            let unexplained = by_group.tr_mul(&(values - by_common * &common));
+            let told = root.solve_lower_triangular(&by_common.tr_mul(by_group))?;
+            let expected = by_group.tr_mul(by_group) - told.tr_mul(&told);
+            score += 0.5 * (unexplained.norm_squared() - expected.trace());
+            information += 0.5 * expected.norm_squared();
         }
-        Some((deviance, slopes))
-    }
-
-    /// The variance of a group that maximises the likelihood, with the others fixed; zero if any variance lowers it.
-    fn most_likely(&self, group: usize, variances: &[f64]) -> Option<f64> {
-        let mut trial = variances.to_vec();
-        let mut falls = |variance: f64| {
-            trial[group] = variance;
-            Some(self.likelihood(&trial)?.1[group] < 0.0)
-        };
-        if !falls(0.0)? {
-            return Some(0.0);
-        }
-        let of_group = self.parameters.iter().filter(|of| of.0 == group);
-        let mut high = of_group.map(|of| of.1).fold(0.0, f64::max);
-        while falls(high)? {
-            high *= 100.0;
-        }
-        let (mut low, mut high) = (high.log10() - DECADES, high.log10());
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            match falls(10f64.powf(middle))? {
-                true => low = middle,
-                false => high = middle,
-            }
-        }
-        Some(10f64.powf(0.5 * (low + high)))
+        Some(Slope {
+            deviance,
+            score,
+            information,
+        })
     }
 
     /// The groups with a likelihood ratio beyond this limit, with variance and ratio; `None` if there are none.
     fn found(&self, limit: f64) -> Option<Vec<(Group, f64, f64)>> {
-        let mut variances = vec![0.0; self.groups.len()];
-        let deviance = |variances: &[f64]| self.likelihood(variances).map(|of| of.0);
+        let (found, _) = likeliest(self.groups.len(), limit, |found, group| {
+            self.slope(found, group)
+        })?;
+        let deviance = |found: &[Found]| Some(self.slope(found, 0)?.deviance);
         // What −2 ln of the likelihood loses by a group, the others' variances held.
-        let ratio = |group: usize, variances: &[f64]| {
-            let mut without = variances.to_vec();
-            without[group] = 0.0;
-            Some(deviance(&without)? - deviance(variances)?)
+        let of_group = |one: &Found| {
+            let others = found.iter().filter(|other| other.place != one.place);
+            let without: Vec<Found> = others.copied().collect();
+            let ratio = deviance(&without)? - deviance(&found)?;
+            Some((self.groups[one.place], one.variance, ratio))
         };
-        loop {
-            let candidates = (0..variances.len()).filter(|&group| variances[group] == 0.0);
-            let tried = candidates.filter_map(|group| {
-                let mut with = variances.clone();
-                with[group] = self.most_likely(group, &variances)?;
-                Some((ratio(group, &with)?, with))
-            });
-            let Some((_, with)) = tried
-                .filter(|&(ratio, _)| ratio > limit)
-                .max_by(|a, b| a.0.total_cmp(&b.0))
-            else {
-                break;
-            };
-            variances = with;
-            let mut before = deviance(&variances)?;
-            for _ in 0..ROUNDS {
-                for group in 0..variances.len() {
-                    if variances[group] > 0.0 {
-                        variances[group] = self.most_likely(group, &variances)?;
-                    }
-                }
-                let after = deviance(&variances)?;
-                if before - after < SETTLED {
-                    break;
-                }
-                before = after;
-            }
-        }
-        let found = (0..variances.len()).filter(|&group| variances[group] > 0.0);
-        let found = found.filter_map(|group| {
-            let ratio = ratio(group, &variances)?;
-            Some((self.groups[group], variances[group], ratio))
-        });
         // One that came in first may be explained by those after it.
-        let found: Vec<_> = found.filter(|&(.., ratio)| ratio > limit).collect();
+        let each = found.iter().filter_map(of_group);
+        let found: Vec<_> = each.filter(|&(.., ratio)| ratio > limit).collect();
         (!found.is_empty()).then_some(found)
     }
 }
@@ -362,9 +311,17 @@ mod tests {
     #[test]
     fn the_slope_of_the_likelihood_is_its_derivative() {
         let evidence = drawn(2.0, 1);
-        let at = |variance: f64| evidence.likelihood(&[variance]).unwrap();
-        let numeric = (at(2.0 + 1e-4).0 - at(2.0 - 1e-4).0) / 2e-4;
-        assert!((at(2.0).1[0] / numeric - 1.0).abs() < 1e-6);
+        let at = |variance: f64| {
+            let (place, spread) = (0, 0.0);
+            let found = Found {
+                place,
+                variance,
+                spread,
+            };
+            evidence.slope(&[found], 0).unwrap()
+        };
+        let numeric = (at(2.0 + 1e-4).deviance - at(2.0 - 1e-4).deviance) / 2e-4;
+        assert!((-2.0 * at(2.0).score / numeric - 1.0).abs() < 1e-6);
     }
 
     #[test]

@@ -16,16 +16,11 @@ mod temperatures;
 
 use std::sync::Arc;
 
-use super::error::CalibrationError;
-use super::gauss_newton::Progress;
-use super::linearisation::{AttitudePrior, Linearisation};
-use super::noise::NoisePolicy;
-use super::options::Options;
-use super::parameters::{PARAMETERS, from_vector, sensor_and_parameter, to_vector};
-use super::pass::Gate;
-use super::problem::{Problem, Stretch};
-use super::solved::Solved;
-use crate::calibration::{DayToDay, Difference, SeparateEstimate};
+use crate::calibration::{
+    AttitudePrior, CalibrationError, DayToDay, Difference, Gate, Linearisation, NoisePolicy,
+    Options, PARAMETERS, Problem, Progress, SeparateEstimate, Solved, Stretch, from_vector,
+    sensor_and_parameter, to_vector,
+};
 use crate::imu::{PerSensor, ThermalCoefficients, Triad};
 use crate::run::{Aiding, Run};
 pub use repeat::Repeatability;
@@ -119,22 +114,19 @@ pub fn solve<'a>(
     if problem.options.noise != NoisePolicy::Stated
         && let Some((day_to_day, finding)) = between_recordings::learnt(&problem.model, &alone)
     {
-        let mut model = problem.model.clone();
-        model.day_to_day = day_to_day;
-        problem = problem.with_model(model);
+        problem = problem.with(|model| model.day_to_day = day_to_day);
         findings.push(finding);
     }
     let priors: Vec<AttitudePrior> = alone.iter().flat_map(|a| a.priors.clone()).collect();
     let at = start(&problem, &alone);
     let mut solved = Solved::of(&problem, priors, at, Gate::Innovations, progress)?;
     if let Some(thermal) = solved.iterated.held.thermal(&problem.model) {
-        let selected = order::select(&problem, &solved.iterated, &thermal);
+        let selected = order::select(&solved, &thermal);
         findings.extend(selected.finding);
         if selected.model != thermal.model {
-            let mut model = problem.model.clone();
-            model.thermal = Some(Arc::new(selected.model));
+            let problem = problem.with(|model| model.thermal = Some(Arc::new(selected.model)));
             solved.iterated.estimate = selected.at;
-            solved = solved.again(problem.with_model(model), progress)?;
+            solved = solved.again(problem, progress)?;
         }
     }
     Ok(Solved {

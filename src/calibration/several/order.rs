@@ -3,8 +3,8 @@
 use super::thermal::{Coefficient, Thermal};
 use crate::calibration::checks::observability::temperature_not_seen;
 use crate::calibration::constants::Prior;
-use crate::calibration::gauss_newton::Iterated;
-use crate::calibration::{Finding, Group, Linearisation, OBSERVED_BELOW, Problem, parameter_name};
+use crate::calibration::solved::Solved;
+use crate::calibration::{Finding, Group, Linearisation, OBSERVED_BELOW, parameter_name};
 use crate::imu::{InstallationForm, RATE, ThermalModel};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
@@ -19,8 +19,8 @@ pub struct Selected {
 
 /// Removes the highest order of a group of parameters while it is not significant: if its coefficients are zero,
 /// −2 ln of the likelihood ratio is χ² with as many degrees of freedom as there are coefficients (Wilks).
-pub fn select(problem: &Problem, iterated: &Iterated, thermal: &Thermal) -> Selected {
-    let held = &iterated.held;
+pub fn select(solved: &Solved, thermal: &Thermal) -> Selected {
+    let (held, problem) = (&solved.iterated.held, &solved.problem);
     let reduction = held.reduction.clone().folded();
     let known = Prior::new(&reduction.constants, &problem.model, &held.at);
     let with = |model: &ThermalModel| {

@@ -4,14 +4,11 @@ use nalgebra::{DMatrix, DVector, SVector};
 use rayon::prelude::*;
 
 use super::day_to_day::{DayToDay, Difference};
-use crate::calibration::gauss_newton::Iterated;
 use crate::calibration::noise::learn;
-use crate::calibration::pass::Gate;
-use crate::calibration::solved::Solved;
 use crate::calibration::start::attempt::from_coarse_start;
 use crate::calibration::{
-    AttitudePrior, CalibrationError, Estimate, Linearisation, Model, Problem, SeparateEstimate,
-    UNWATCHED, coarse_start, from_vector, parameter, to_vector,
+    AttitudePrior, CalibrationError, Estimate, Gate, Iterated, Linearisation, Model, Problem,
+    SeparateEstimate, Solved, UNWATCHED, coarse_start, from_vector, parameter, to_vector,
 };
 use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalModel, ThermalRange};
 use crate::run::Dwell;
@@ -46,10 +43,10 @@ pub fn each(problem: &Problem) -> Result<Vec<SeparateEstimate>, CalibrationError
 
 /// The problem of a recording without differences between recordings and without temperature dependence.
 fn plain<'a>(recording: &Problem<'a>, model: &Model) -> Problem<'a> {
-    let mut model = model.clone();
-    model.thermal = None;
-    model.day_to_day = DayToDay::default();
-    recording.with_model(model)
+    recording.with_model(model.clone()).with(|model| {
+        model.thermal = None;
+        model.day_to_day = DayToDay::default();
+    })
 }
 
 /// Noise model estimated jointly from recordings that share no parameters. A short recording cannot show its own noise,

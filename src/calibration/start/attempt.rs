@@ -1,11 +1,9 @@
 //! A calibration from the coarse start.
 
 use super::coarse::{CoarseStart, coarse_start};
-use crate::calibration::gauss_newton::Iterated;
-use crate::calibration::pass::{Gate, pass};
-use crate::calibration::reduction::Script;
-use crate::calibration::solved::Solved;
-use crate::calibration::{CalibrationError, NoisePolicy, Problem, Progress};
+use crate::calibration::{
+    CalibrationError, Gate, Iterated, NoisePolicy, Problem, Progress, Script, Solved, pass,
+};
 
 /// Iterates from the coarse start, with the stated noise or, if noise may be estimated, with the noise by hand that the
 /// start shows.

@@ -188,11 +188,12 @@ impl Observed {
         let gain = equations
             .gain()
             .ok_or(CalibrationError::Singular { sensor })?;
-        let unknown = equations.unknown.iter().map(|index| index - first);
-        let mut by_unknowns = DMatrix::zeros(PER_TRIAD, equations.unknown.len());
-        unknown
-            .enumerate()
-            .for_each(|(column, row)| by_unknowns[(row, column)] = 1.0);
+        let unknown: Vec<usize> = equations
+            .unknown
+            .iter()
+            .map(|index| index - first)
+            .collect();
+        let by_unknowns = DMatrix::identity(PER_TRIAD, PER_TRIAD).select_columns(&unknown);
         Ok(self.fit(*triads.get(sensor), &equations, &gain, &by_unknowns))
     }
 

@@ -124,11 +124,11 @@ impl Report<'_> {
 
 /// The directions that the data observed least: all that were not observed, and some that were.
 pub fn weakest(outcome: &Outcome) -> Table {
-    let (form, observability) = (outcome.estimate.form(), &outcome.observability);
+    let observability = &outcome.observability;
     let shown = observability.unobserved().count() + WEAKEST;
     let rows = observability.directions.iter().take(shown);
     Table::new("Least observed directions", ["direction", "prior : σ"])
-        .section(rows.map(|of| vec![of.words(form), improvement(1.0, of.remaining)]))
+        .section(rows.map(|of| vec![of.words.clone(), improvement(1.0, of.remaining)]))
         .note(
             "Combinations of parameters, each in units of its prior σ, that the data observed independently of \
              each other. “With” joins errors of the same sign, “against” errors of opposite sign.",

@@ -12,10 +12,9 @@ mod tried;
 use nalgebra::Vector3;
 use serde_json::json;
 
-use crate::calibration::FindingKind as Kind;
 use crate::calibration::{
-    AttitudePrior, CalibrationError, Constant, Disturbance, DisturbanceKind, ErrorTerm, Finding,
-    Innovation, Iterated, Observation, Prior, Problem, Script,
+    CalibrationError, Constant, Disturbance, DisturbanceKind, ErrorTerm, Finding,
+    FindingKind as Kind, Innovation, Observation, Prior, Problem, Script, Solved,
 };
 use crate::imu::Sensor;
 use crate::run::{Aiding, Dwell};
@@ -60,14 +59,11 @@ impl Causes {
     ///
     /// # Errors
     /// As of a pass.
-    pub fn of(
-        problem: &Problem,
-        priors: &[AttitudePrior],
-        iterated: &Iterated,
-    ) -> Result<Self, CalibrationError> {
-        let read = of_readings(&iterated.held.innovations);
-        let tried = Tried::of(problem, &iterated.held.innovations);
-        let (all, scored) = by_score(problem, (priors, iterated), &tried)?;
+    pub fn of(solved: &Solved) -> Result<Self, CalibrationError> {
+        let innovations = &solved.iterated.held.innovations;
+        let read = of_readings(innovations);
+        let tried = Tried::of(solved.problem.dwells().count(), innovations);
+        let (all, scored) = by_score(solved, &tried)?;
         let limit = -2.0 * (FALSE_ALARM / (read.len() + all).max(1) as f64).ln();
         let of_kind = |kind| {
             let is = |of: &&FoundCause| match of.cause {
@@ -81,16 +77,15 @@ impl Causes {
             [DisturbanceKind::Position, DisturbanceKind::Slip].map(of_kind);
         let of_both = of_positions.max(of_slips);
         // By hand every move is another; that one is worst only tells how wide chance is.
-        let table = problem.model.aiding == Aiding::Table;
+        let table = solved.problem.model.aiding == Aiding::Table;
         let scored = scored.into_iter().filter_map(|of| match of.cause {
             Cause::Disturbance(_) if !table => None,
-            Cause::Disturbance(disturbance) if disturbance.kind == DisturbanceKind::Position => {
-                Some(of.beside(of_positions, limit))
-            }
-            Cause::Disturbance(disturbance) if disturbance.kind == DisturbanceKind::Slip => {
-                Some(of.beside(of_slips, limit))
-            }
-            _ => Some(of.beside(of_both, limit)),
+            Cause::Disturbance(disturbance) => Some(match disturbance.kind {
+                DisturbanceKind::Position => of.beside(of_positions, limit),
+                DisturbanceKind::Slip => of.beside(of_slips, limit),
+                _ => of.beside(of_both, limit),
+            }),
+            Cause::Term(_) => Some(of.beside(of_both, limit)),
         });
         let read = read.iter().map(|of| of.beside(of_read, limit));
         let all: Vec<FoundCause> = read.chain(scored).collect();
@@ -137,11 +132,8 @@ fn of_readings(innovations: &[Innovation]) -> Vec<FoundCause> {
         });
         let square = read.iter().map(|of| of.distance()).sum();
         let degrees = (COMPONENTS * read.len()) as f64;
-        Some(FoundCause::new(
-            cause,
-            largest.time,
-            (square, degrees, Vector3::zeros()),
-        ))
+        let explained = (square, degrees, Vector3::zeros());
+        Some(FoundCause::new(cause, largest.time, explained))
     };
     dwells.filter_map(of_dwell).collect()
 }
@@ -149,8 +141,12 @@ fn of_readings(innovations: &[Innovation]) -> Vec<FoundCause> {
 /// All that may have happened once in the dwells that are tried, then all error terms that are off and that the record can
 /// hold, by their scores; and the number of causes if all dwells were tried.
 fn by_score(
-    problem: &Problem,
-    (priors, iterated): (&[AttitudePrior], &Iterated),
+    Solved {
+        problem,
+        priors,
+        iterated,
+        ..
+    }: &Solved,
     tried: &Tried,
 ) -> Result<(usize, Vec<FoundCause>), CalibrationError> {
     let (mut disturbances, mut model) = (disturbances(problem), problem.model.clone());

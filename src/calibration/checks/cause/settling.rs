@@ -3,10 +3,9 @@
 use nalgebra::Vector3;
 use serde_json::json;
 
-use crate::calibration::FindingKind as Kind;
 use crate::calibration::record::Rest;
 use crate::calibration::{
-    CalibrationError, Finding, Observation, Problem, Script, Solved, Stretch,
+    CalibrationError, Finding, FindingKind as Kind, Observation, Problem, Script, Solved, Stretch,
 };
 use crate::run::Aiding;
 use crate::statistics::{FALSE_ALARM, chi_square_limit, median};

@@ -3,13 +3,12 @@
 use rayon::prelude::*;
 use serde_json::json;
 
-use crate::calibration::FindingKind as Kind;
 use crate::calibration::checks::finding::widened_by;
 use crate::calibration::model::usual_variation;
 use crate::calibration::noise::LOG_SIGMA;
 use crate::calibration::{
-    CalibrationError, ErrorTerm, ErrorTermTest, Finding, Outcome, ParameterMatrix, Posterior,
-    Problem, Role,
+    CalibrationError, ErrorTerm, ErrorTermTest, Finding, FindingKind as Kind, Outcome,
+    ParameterMatrix, Posterior, Problem, Role,
 };
 use crate::imu::{GaussMarkov, Noise, Sensor};
 use crate::run::Aiding;

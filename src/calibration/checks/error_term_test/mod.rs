@@ -11,10 +11,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::finding::widened_by;
-use crate::calibration::FindingKind as Kind;
 use crate::calibration::{
-    CalibrationError, ErrorTerm, Finding, Group, Outcome, PARAMETERS, ParameterMatrix, Posterior,
-    Problem,
+    CalibrationError, ErrorTerm, Finding, FindingKind as Kind, Group, Outcome, PARAMETERS,
+    ParameterMatrix, Posterior, Problem,
 };
 use crate::statistics::{FALSE_ALARM, ln_survival};
 pub use bias_variation::{bias_variation, biases_may_vary};
@@ -187,7 +186,7 @@ struct Tested<'a> {
     tests: Vec<ErrorTermTest>,
     terms: TermsOn<'a>,
     /// The posterior with varying biases if they are constant in the model, and vice versa.
-    otherwise: Posterior,
+    otherwise: With,
 }
 
 impl<'a> Tested<'a> {
@@ -198,8 +197,11 @@ impl<'a> Tested<'a> {
             false => other.switch_on(VARYING),
         });
         // The longer of the two first: a thread that is done with something else can take the other.
-        let (otherwise, terms) = rayon::join(
-            || Ok::<_, CalibrationError>(outcome.posterior(other, &outcome.reduction(other)?)),
+        let (otherwise, terms): (Result<With, CalibrationError>, _) = rayon::join(
+            || {
+                let reduction = outcome.reduction(other)?;
+                Ok(With::new(&reduction, &other.model, &outcome.linearised_at))
+            },
             || TermsOn::new(problem, outcome),
         );
         let mut tested = Self {
@@ -213,10 +215,7 @@ impl<'a> Tested<'a> {
         let chance = FALSE_ALARM / off.max(1) as f64;
         let scalars = 3.0 * outcome.innovations.len() as f64;
         let tests = tried.into_iter().filter_map(|term| {
-            let test = match term {
-                VARYING => tested.varying(model.has(term), chance),
-                _ => tested.constant(term, model.has(term), chance)?,
-            };
+            let test = tested.test(term, model.has(term), chance)?;
             Some(ErrorTermTest {
                 without: test.without / scalars,
                 with: test.with / scalars,
@@ -228,40 +227,35 @@ impl<'a> Tested<'a> {
         Ok(tested)
     }
 
-    /// The test of a constant term, with the costs of the whole record.
-    fn constant(&self, term: ErrorTerm, on: bool, chance: f64) -> Option<ErrorTermTest> {
+    /// The test of a term, with the costs of the whole record; `None` if the reduction does not include it.
+    fn test(&self, term: ErrorTerm, on: bool, chance: f64) -> Option<ErrorTermTest> {
         let (terms, own) = (&self.terms, &self.terms.own);
-        let other = match on {
-            true => terms.without(term),
-            false => terms.with(&[term]),
+        let other = match (term, on) {
+            (VARYING, _) => &self.otherwise,
+            (_, true) => &terms.without(term),
+            (_, false) => &terms.with(&[term]),
         };
         let (with, without) = match on {
-            true => (own, &other),
-            false => (&other, own),
+            true => (own, other),
+            false => (other, own),
         };
+        let of_costs = ErrorTermTest::new(term, on, &with.posterior, &without.posterior);
+        if term == VARYING {
+            let gain = without.posterior.deviance - with.posterior.deviance;
+            return Some(ErrorTermTest {
+                gain,
+                limit: -2.0 * chance.ln(),
+                significance: gain,
+                ..of_costs
+            });
+        }
         let evidence = terms.evidence(term, with, without)?;
         Some(ErrorTermTest {
             limit: evidence.limit(chance),
             significance: evidence.significance(),
             left_off: (!on).then(|| terms.left_off(term)).flatten(),
-            ..ErrorTermTest::new(term, on, &with.posterior, &without.posterior)
+            ..of_costs
         })
-    }
-
-    /// The same for varying biases.
-    fn varying(&self, on: bool, chance: f64) -> ErrorTermTest {
-        let (own, otherwise) = (&self.terms.own.posterior, &self.otherwise);
-        let (with, without) = match on {
-            true => (own, otherwise),
-            false => (otherwise, own),
-        };
-        let gain = without.deviance - with.deviance;
-        ErrorTermTest {
-            gain,
-            limit: -2.0 * chance.ln(),
-            significance: gain,
-            ..ErrorTermTest::new(VARYING, on, with, without)
-        }
     }
 
     /// Gives each test its role: the likeliest explanation first, then terms that are significant with it on, until
@@ -328,12 +322,13 @@ impl<'a> Tested<'a> {
             return None;
         }
         let own = &self.terms.own.posterior;
-        let ratio = 0.5 * (own.deviance - self.otherwise.deviance);
+        let otherwise = &self.otherwise.posterior;
+        let ratio = 0.5 * (own.deviance - otherwise.deviance);
         let of_others = self.terms.with(others).posterior.added_to(own);
         Some(Explanation {
             ln_likelihood_ratio: ratio,
             of_term: ratio,
-            added: self.otherwise.added_to(own) + of_others,
+            added: otherwise.added_to(own) + of_others,
         })
     }
 }

@@ -153,7 +153,7 @@ impl<'a> TermsOn<'a> {
 }
 
 impl With {
-    fn new(reduction: &Reduction, model: &Model, at: &Linearisation) -> Self {
+    pub fn new(reduction: &Reduction, model: &Model, at: &Linearisation) -> Self {
         let prior = Prior::new(&reduction.constants, model, at);
         let posterior = reduction.posterior(&prior);
         Self { prior, posterior }

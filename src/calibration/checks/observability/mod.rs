@@ -7,8 +7,11 @@
 
 mod not_observed;
 
+use std::collections::BTreeMap;
+
 use faer::{Mat, Side};
 use nalgebra::SMatrix;
+use serde::{Deserialize, Serialize};
 
 use crate::calibration::{Estimate, OBSERVED_BELOW, PARAMETERS, ParameterVector, parameter_name};
 use crate::imu::InstallationForm;
@@ -37,35 +40,17 @@ pub struct Observability {
     pub directions: Vec<Direction>,
 }
 
-/// A combination of parameters, each in units of its prior σ.
-#[derive(Debug, Clone, PartialEq)]
+/// A combination of parameters, each in units of its prior σ, with its observability in a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Direction {
     /// Posterior over prior σ of the combination, from 0 (known) to 1 (not observed).
     pub remaining: f64,
-    /// The major components, the largest first and positive; the squares of all sum to one.
-    pub parts: Vec<Part>,
-    /// Whether the omitted components together exceed one of the major ones.
-    pub others: bool,
-    /// Components of the initial attitude with errors correlated to that of the combination.
-    pub attitude: Vec<AttitudePart>,
-}
-
-/// A parameter's share of a direction.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Part {
-    /// Index of the parameter.
-    pub parameter: usize,
-    /// Component of the direction, in units of the prior σ.
-    pub component: f64,
-}
-
-/// A component of the initial attitude that is correlated with a direction.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AttitudePart {
-    /// `tilt about East`, `tilt about North` or `heading`.
-    pub name: &'static str,
-    /// Correlation of its error with the direction's, both true − estimated; heading clockwise.
-    pub correlation: f64,
+    /// A description such as `gyro scale z with gyro bias z` or `gyro installation xy against gyro installation yx`:
+    /// `with` for the same sign, `against` for the opposite sign of parameters and of the initial attitude that is
+    /// correlated with them.
+    pub words: String,
+    /// Name and component of its major parameters, the largest positive; the squares of all components sum to one.
+    pub parts: BTreeMap<String, f64>,
 }
 
 impl Observability {
@@ -103,9 +88,10 @@ impl Observability {
         {
             simplify(alike);
         }
+        let of = (estimate.form(), &estimated[..]);
         let mut directions: Vec<Direction> = directions
             .iter()
-            .map(|v| direction(&estimated, prior_sigma, attitude, v, remaining(v)))
+            .map(|v| direction(of, prior_sigma, attitude, v, remaining(v)))
             .collect();
         directions.sort_by(|a, b| b.remaining.total_cmp(&a.remaining));
         Self { directions }
@@ -118,41 +104,12 @@ impl Observability {
             .take_while(|direction| direction.remaining > OBSERVED_BELOW)
     }
 
-    /// Descriptions of unobserved combinations of parameters that are observed individually.
-    pub(in crate::calibration) fn combinations(
-        &self,
-        form: InstallationForm,
-        hidden: &[usize],
-    ) -> Vec<String> {
+    /// Descriptions of unobserved combinations of parameters, none of which is among these.
+    pub(in crate::calibration) fn combinations(&self, hidden: &[String]) -> Vec<String> {
         self.unobserved()
-            .filter(|d| d.parts.iter().all(|part| !hidden.contains(&part.parameter)))
-            .map(|direction| direction.words(form))
+            .filter(|direction| !direction.parts.keys().any(|name| hidden.contains(name)))
+            .map(|direction| direction.words.clone())
             .collect()
-    }
-}
-
-impl Direction {
-    /// A description such as `gyro scale z with gyro bias z` or `gyro installation xy against gyro installation
-    /// yx`: `with` for the same sign, `against` for the opposite sign.
-    pub fn words(&self, form: InstallationForm) -> String {
-        let mut text = String::new();
-        let mut say = |sign: f64, name: &str| {
-            if !text.is_empty() {
-                text.push_str(if sign < 0.0 { " against " } else { " with " });
-            }
-            text.push_str(name);
-        };
-        for part in &self.parts {
-            let name = parameter_name(form, part.parameter).unwrap_or_default();
-            say(part.component, &name.replace('.', " "));
-        }
-        for part in &self.attitude {
-            say(part.correlation, part.name);
-        }
-        if self.others {
-            text.push_str(" and others");
-        }
-        text
     }
 }
 
@@ -185,7 +142,7 @@ fn simplify(directions: &mut [Vec<f64>]) {
 }
 
 fn direction(
-    estimated: &[usize],
+    (form, estimated): (InstallationForm, &[usize]),
     prior_sigma: &ParameterVector,
     attitude: &AttitudeCovariance,
     v: &[f64],
@@ -195,39 +152,38 @@ fn direction(
     let mut order: Vec<usize> = (0..v.len()).collect();
     order.sort_by(|a, b| component(b).total_cmp(&component(a)));
     let sign = order.first().map_or(1.0, |&n| v[n].signum());
-    let named = |&&n: &&usize| v[n] * v[n] >= NAMED;
-    let parts: Vec<Part> = order
-        .iter()
-        .take_while(named)
-        .map(|&n| Part {
-            parameter: estimated[n],
-            component: sign * v[n],
-        })
-        .collect();
-    let rest = 1.0 - parts.iter().map(|part| part.component.powi(2)).sum::<f64>();
+    let major = order.iter().take_while(|&&n| v[n] * v[n] >= NAMED);
+    let named = major.filter_map(|&n| Some((parameter_name(form, estimated[n])?, sign * v[n])));
+    let parts: Vec<(String, f64)> = named.collect();
+    let rest = 1.0 - parts.iter().map(|part| part.1.powi(2)).sum::<f64>();
     // φ₀ is the rotation from the computed to the true attitude; heading turns the other way.
-    let attitude = [
+    let tied = [
         ("tilt about East", 1.0),
         ("tilt about North", 1.0),
         ("heading", -1.0),
-    ]
-    .into_iter()
-    .enumerate()
-    .map(|(axis, (name, turn))| {
+    ];
+    let tied = tied.into_iter().enumerate().map(|(axis, (name, turn))| {
         let of = |(n, &index): (usize, &usize)| v[n] * attitude[(index, axis)] / prior_sigma[index];
         let covariance: f64 = estimated.iter().enumerate().map(of).sum();
-        AttitudePart {
-            name,
-            correlation: sign * turn * covariance / remaining,
-        }
-    })
-    .filter(|part| part.correlation.abs() >= TIED)
-    .collect();
+        (name.to_owned(), sign * turn * covariance / remaining)
+    });
+    let tied = tied.filter(|(_, correlation)| correlation.abs() >= TIED);
+    let mut words = String::new();
+    for (name, sign) in parts.iter().cloned().chain(tied) {
+        words += match sign < 0.0 {
+            _ if words.is_empty() => "",
+            true => " against ",
+            false => " with ",
+        };
+        words += &name.replace('.', " ");
+    }
+    if rest > NAMED {
+        words += " and others";
+    }
     Direction {
         remaining,
-        others: rest > NAMED,
-        parts,
-        attitude,
+        words,
+        parts: parts.into_iter().collect(),
     }
 }
 

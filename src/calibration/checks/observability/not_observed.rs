@@ -3,19 +3,19 @@
 
 use serde_json::json;
 
-use crate::calibration::FindingKind as Kind;
-use crate::calibration::{Finding, Outcome, auxiliary_name, parameter_name};
+use crate::calibration::{Finding, FindingKind as Kind, Outcome, auxiliary_name, parameter_name};
 use crate::units::DEGREE;
 
 /// All findings on quantities that the path of a filter's run does not determine.
 pub fn not_observed_by_path(outcome: &Outcome) -> Vec<Finding> {
     let path = "this path";
-    let (form, hidden) = (outcome.estimate.form(), outcome.unobserved());
-    let parameters = hidden.iter().filter_map(|&i| parameter_name(form, i));
+    let (form, hidden) = (outcome.estimate.form(), outcome.unobserved().into_iter());
+    let parameters: Vec<String> = hidden.filter_map(|i| parameter_name(form, i)).collect();
+    let together = outcome.observability.combinations(&parameters);
     let constants = outcome.auxiliary.unobserved().filter_map(auxiliary_name);
     let findings = [
-        not_observed(path, parameters.collect()),
-        combinations(outcome.observability.combinations(form, &hidden)),
+        not_observed(path, parameters),
+        combinations(together),
         (!outcome.heading_observed()).then(|| heading(outcome.attitude_sigma.z)),
         not_observed(path, constants.collect()),
         outcome.auxiliary.even_terms_inseparable().then(even_terms),

@@ -63,20 +63,20 @@ impl Sensitivity {
         let name = self.sensor.name();
         let mut causes = Vec::new();
         if self.axes == Axes::All {
-            let named = UNITS.iter().filter(|of| {
-                let half_way = (factor / of.factor).ln().abs() < NEXT_RANGE.ln() / 2.0;
-                of.sensor == self.sensor && of.stated == self.unit && half_way
+            let named = UNITS.iter().filter(|(sensor, stated, _, times)| {
+                let half_way = (factor / times).ln().abs() < NEXT_RANGE.ln() / 2.0;
+                *sensor == self.sensor && *stated == self.unit && half_way
             });
-            causes.extend(named.map(|of| format!("{name}_unit = \"{}\"", of.true_unit)));
+            causes.extend(named.map(|(.., unit, _)| format!("{name}_unit = \"{unit}\"")));
         }
         let times = three_digits(factor);
-        causes.push(match self.axes {
-            Axes::All => format!("prior.{name}.scale, which is {times} times the stated one"),
-            Axes::One(axis) => format!(
-                "prior.{name}.scale of {}, which is {times} times the stated one",
-                AXES[axis]
-            ),
-        });
+        let axis = match self.axes {
+            Axes::All => String::new(),
+            Axes::One(axis) => format!(" of {}", AXES[axis]),
+        };
+        causes.push(format!(
+            "prior.{name}.scale{axis}, which is {times} times the stated one"
+        ));
         // If a row lasts longer by a factor, the same turn takes a rate smaller by that factor.
         let lasts = match (self.output, self.sensor) {
             (Some(Output::Rate), Sensor::Gyro) => Some(factor.recip()),
@@ -124,34 +124,13 @@ impl fmt::Display for Sensitivity {
     }
 }
 
-/// A unit that is stated for another.
-struct Confused {
-    sensor: Sensor,
-    stated: &'static str,
-    true_unit: &'static str,
-    /// How many times as sensitive the triad then is.
-    factor: f64,
-}
-
-const UNITS: [Confused; 6] = [
-    confused(Sensor::Gyro, "rad/s", "deg/s", 1.0 / DEGREE),
-    confused(Sensor::Gyro, "deg/s", "rad/s", DEGREE),
-    confused(Sensor::Gyro, "rad", "deg", 1.0 / DEGREE),
-    confused(Sensor::Gyro, "deg", "rad", DEGREE),
-    confused(Sensor::Accel, "g", "m/s^2", STANDARD_GRAVITY),
-    confused(Sensor::Accel, "m/s^2", "g", 1.0 / STANDARD_GRAVITY),
+/// Units that are stated for another: of a triad, the stated one, the true one, and how many times as sensitive the triad
+/// then is.
+const UNITS: [(Sensor, &str, &str, f64); 6] = [
+    (Sensor::Gyro, "rad/s", "deg/s", 1.0 / DEGREE),
+    (Sensor::Gyro, "deg/s", "rad/s", DEGREE),
+    (Sensor::Gyro, "rad", "deg", 1.0 / DEGREE),
+    (Sensor::Gyro, "deg", "rad", DEGREE),
+    (Sensor::Accel, "g", "m/s^2", STANDARD_GRAVITY),
+    (Sensor::Accel, "m/s^2", "g", 1.0 / STANDARD_GRAVITY),
 ];
-
-const fn confused(
-    sensor: Sensor,
-    stated: &'static str,
-    true_unit: &'static str,
-    factor: f64,
-) -> Confused {
-    Confused {
-        sensor,
-        stated,
-        true_unit,
-        factor,
-    }
-}
