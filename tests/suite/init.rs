@@ -374,3 +374,28 @@ fn nine_shapes_of_one_record_are_one_run_once_the_place_is_filled_in() {
         }
     }
 }
+
+#[test]
+fn a_sensor_brings_the_noise_and_tolerances_of_its_data_sheet() {
+    let place = tempfile::tempdir().unwrap();
+    let run = place.path().join("run");
+    let mut simulate = Command::new(env!("CARGO_BIN_EXE_turncal"));
+    simulate.args(["simulate", "mems", "-o"]).arg(&run);
+    simulate.assert().success();
+    let log = run.join("imu.csv.gz");
+    let log = log.to_str().unwrap();
+    let draft = init(&[log, "--sensor", "bmi088"]).success();
+    let draft = text(&draft.get_output().stdout);
+    for line in [
+        "angle_random_walk_deg_per_sqrt_h = 0.84 ",
+        "velocity_random_walk_ug_per_sqrt_hz = 160.0 ",
+        "scale_sigma_ppm = 10000.0",
+        // 1 °/s.
+        "bias_sigma = 0.0175 ",
+    ] {
+        assert!(draft.contains(line), "{line}:\n{draft}");
+    }
+    let unknown = init(&[log, "--sensor", "bmi008"]).failure().code(1);
+    let message = text(&unknown.get_output().stderr);
+    assert!(message.contains("did you mean \"bmi088\""), "{message}");
+}

@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use turncal::formats::Opened;
-use turncal::formats::draft::{Found, KalibrImu, Stated, StatedUnit};
-use turncal::imu::Sensor;
+use turncal::formats::draft::{Found, KalibrImu, Stated, StatedUnit, Tolerances};
+use turncal::imu::{PerSensor, Sensor};
+use turncal::models::{Instrument, Place};
 use turncal::report::terminal::printable;
 
 use super::{latitude, positive};
@@ -32,6 +33,10 @@ pub struct OfLog {
     /// Unit of the accelerometers: m/s^2, g, or what one count is, such as '1/16384 g'; of increments m/s, g*s
     #[arg(long, value_name = "UNIT", value_parser = |text: &str| StatedUnit::parse(Sensor::Accel, text))]
     accel_unit: Option<StatedUnit>,
+    /// Sensor whose data sheet gives noise and tolerances: a name that turncal list shows, such as bmi088, or a TOML
+    /// file
+    #[arg(long, value_name = "NAME")]
+    sensor: Option<String>,
     /// Noise figures and, without --rate, rows per second, from Kalibr's imu.yaml
     #[arg(long, value_name = "YAML")]
     noise_file: Option<PathBuf>,
@@ -45,6 +50,15 @@ impl OfLog {
     pub fn stated(&self) -> anyhow::Result<(Option<&str>, Stated)> {
         let kalibr = self.noise_file.as_deref();
         let kalibr = kalibr.map(KalibrImu::read).transpose()?;
+        let sensor = self.sensor.as_deref();
+        let sensor = sensor.map(|name| Instrument::load(name, &Place::CommandLine));
+        let sensor = sensor.transpose()?;
+        let of_sensor = sensor.as_ref().map(|of| of.noise);
+        let tolerances = |of: Instrument| Tolerances {
+            scale: PerSensor::from_fn(|sensor| of.variation.get(sensor).scale.sigma()),
+            bias: PerSensor::from_fn(|sensor| of.variation.get(sensor).bias.sigma()),
+            of: of.name,
+        };
         let stated = Stated {
             rate_hz: self.rate.or(kalibr.and_then(|imu| imu.rate_hz)),
             latitude_deg: self.latitude,
@@ -52,7 +66,8 @@ impl OfLog {
             gravity_m_s2: self.gravity,
             gyro_unit: self.gyro_unit,
             accel_unit: self.accel_unit,
-            noise: kalibr.map(|imu| imu.noise),
+            noise: kalibr.map(|imu| imu.noise).or(of_sensor),
+            tolerances: sensor.map(tolerances),
         };
         Ok((self.stream.as_deref(), stated))
     }

@@ -45,7 +45,7 @@ const HIGHEST_ORDER_AT_REST: usize = 5;
 /// everything. Rerun it to process only missing or changed units.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
-  turncal calibrate imu.csv --latitude 48.1 --height 520
+  turncal calibrate imu.csv --latitude 48.1 --sensor bmi088
   turncal calibrate my-run/run.toml
   turncal calibrate my-run/run.toml -o mine --truth my-run/truth.json
   turncal calibrate my-run/run.toml --method six-position

@@ -28,7 +28,7 @@ use columns::Columns;
 pub use found::{Certainty, Found};
 use motion::{FOLLOWED, Motion};
 use registers::{Registers, Rows};
-pub use stated::{KalibrImu, Stated, StatedUnit};
+pub use stated::{KalibrImu, Stated, StatedUnit, Tolerances};
 use streams::Streams;
 use time::Clock;
 use units::Quantities;

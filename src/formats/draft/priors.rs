@@ -64,10 +64,20 @@ impl Draft {
 
     pub(super) fn prior(&self, page: &mut Page, sensor: Sensor) {
         let (class, unit) = (self.class(), self.quantities.units.get(sensor));
-        let remark = format!(
-            "usual of {} instrument: check them against the data sheet; N = scale * installation * u + bias",
-            class.name
+        let stated = self.stated.tolerances.as_ref();
+        let scale_sigma = stated.map_or(class.scale_ppm, |of| of.scale.get(sensor) / PPM);
+        let usual = sensor.pick(class.gyro_bias, class.accel_bias);
+        let bias_sigma = stated.map_or(usual, |of| *of.bias.get(sensor));
+        let from = stated.map_or_else(
+            || {
+                format!(
+                    "usual of {} instrument: check them against the data sheet",
+                    class.name
+                )
+            },
+            |of| format!("of {} by its data sheet", of.of),
         );
+        let remark = format!("{from}; N = scale * installation * u + bias");
         page.table(&format!("imu.prior.{}", sensor.name()), &remark);
         if let Some(scale) = &unit.scale {
             page.line("scale", three(&scale.value), &scale.why);
@@ -75,11 +85,11 @@ impl Draft {
             page.open("scale =", self.open_scale(sensor));
         }
         let off = unit.scale.as_ref().map_or(0.0, |scale| 1e6 * scale.off);
-        let sigma = class.scale_ppm.max(short(off));
+        let sigma = seven(scale_sigma).max(short(off));
         page.plain("scale_sigma_ppm", format_args!("{sigma:?}"));
         let sigma = class.installation / ARCSEC;
         page.plain("installation_sigma_arcsec", format_args!("{sigma:?}"));
-        self.bias(page, sensor, class);
+        self.bias(page, sensor, bias_sigma);
     }
 
     fn open_scale(&self, sensor: Sensor) -> String {
@@ -98,10 +108,9 @@ impl Draft {
         format!("{plain}{why}{likely}")
     }
 
-    fn bias(&self, page: &mut Page, sensor: Sensor, class: &Class) {
+    fn bias(&self, page: &mut Page, sensor: Sensor, usual: f64) {
         let offset = *self.offset.get(sensor);
         let per_second = self.quantities.per_second(self.clock.period.unwrap_or(1.0));
-        let usual = sensor.pick(class.gyro_bias, class.accel_bias);
         let usual = self
             .quantities
             .scale(sensor)

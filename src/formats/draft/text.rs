@@ -329,16 +329,9 @@ fn stated_noise(page: &mut Page, sensor: Sensor, noise: &Noise) {
     line(key, noise.random_walk / unit, "as stated");
     if let Some(bias) = noise.gauss_markov {
         let (key, unit) = keys.gauss_markov;
-        line(
-            key,
-            bias.sigma / unit,
-            "grows at first as the stated random walk",
-        );
-        line(
-            keys.correlation_time,
-            bias.correlation_time,
-            "chosen, because a random walk has none",
-        );
+        line(key, bias.sigma / unit, "as stated");
+        let why = "as stated; chosen for a random walk, which has none";
+        line(keys.correlation_time, bias.correlation_time, why);
     }
 }
 

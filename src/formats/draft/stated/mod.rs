@@ -27,6 +27,19 @@ pub struct Stated {
     pub accel_unit: Option<StatedUnit>,
     /// Noise figures.
     pub noise: Option<PerSensor<Noise>>,
+    /// Tolerances of the instrument as its maker delivers it.
+    pub tolerances: Option<Tolerances>,
+}
+
+/// 1σ of what an instrument of a kind may be off by before calibration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tolerances {
+    /// Of which kind.
+    pub of: String,
+    /// Scale factor, relative.
+    pub scale: PerSensor<f64>,
+    /// Bias, rad/s and m/s².
+    pub bias: PerSensor<f64>,
 }
 
 /// A unit spelt as in `run.toml` or in log files, or a multiple of it: `deg/s`, `1/131 deg/s`, `0.061 mg`.
