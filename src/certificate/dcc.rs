@@ -369,7 +369,7 @@ fn together(xml: &mut Xml, results: &[Measured], covariance: &[Vec<f64>]) {
     xml.element("dcc:quantity", |xml| {
         xml.words(
             "dcc:name",
-            "All parameters, in the order above, with their covariance",
+            "K, E and D, in the order above, with their covariance",
         );
         xml.element("si:realListXMLList", |xml| {
             xml.leaf("si:valueXMLList", &list(&|of| number(of.value)));

@@ -140,9 +140,10 @@ impl Expected {
             Path::TableAiding => Aiding::Table,
             Path::VelocityAiding => Aiding::Velocity,
         };
-        // What the filter ends with, linearised where it would begin.
+        // What the filter ends with, linearised where it would begin, with the noise that shows there.
         let problem = Problem::new(run, &Options::default().aiding(aiding));
         let start = coarse_start(&problem)?;
+        let problem = start.by_hand(&problem).unwrap_or(problem);
         let bound = bound(&problem, &start.at.triads, &TermVector::zeros())?;
         Ok(summary(run, aiding.body_frame(), &bound.estimate))
     }

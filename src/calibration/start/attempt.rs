@@ -14,7 +14,7 @@ pub fn from_coarse_start<'a>(
     let start = coarse_start(problem)?;
     let may_be_learnt = problem.options.noise != NoisePolicy::Stated;
     let by_hand = start.by_hand.as_ref().filter(|_| may_be_learnt);
-    let with_hand = by_hand.map(|by_hand| problem.with_model(by_hand.model(problem)));
+    let with_hand = by_hand.and_then(|_| start.by_hand(problem));
     let noise = by_hand.map(|by_hand| by_hand.report(problem));
     let problem = with_hand.as_ref().unwrap_or(problem);
     // What a hand leaves is not all that is unknown: noise that is estimated decides on outliers.

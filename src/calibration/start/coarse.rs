@@ -40,6 +40,14 @@ pub struct CoarseStart {
     pub(in crate::calibration) by_hand: Option<ByHand>,
 }
 
+impl CoarseStart {
+    /// A problem with the noise of turning and holding by hand that the start shows; `None` if it shows none.
+    pub fn by_hand<'a>(&self, problem: &Problem<'a>) -> Option<Problem<'a>> {
+        let by_hand = self.by_hand.as_ref()?;
+        Some(problem.with_model(by_hand.model(problem)))
+    }
+}
+
 /// Both triads and the initial attitudes by least squares over whole dwells and moves.
 ///
 /// With a table, its attitudes are known. Without, accelerometers follow from `|f| = g` over the
