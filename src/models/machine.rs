@@ -208,20 +208,23 @@ struct BodyStepFile {
     dwell_s: Option<NonNegative>,
 }
 
+/// A body axis such as `-x`, as a unit vector.
 #[derive(Clone, Copy, Deserialize)]
-enum BodyAxis {
-    #[serde(rename = "x")]
-    X,
-    #[serde(rename = "y")]
-    Y,
-    #[serde(rename = "z")]
-    Z,
-    #[serde(rename = "-x")]
-    MinusX,
-    #[serde(rename = "-y")]
-    MinusY,
-    #[serde(rename = "-z")]
-    MinusZ,
+#[serde(try_from = "String")]
+struct BodyAxis(Vector3<f64>);
+
+impl TryFrom<String> for BodyAxis {
+    type Error = &'static str;
+
+    fn try_from(name: String) -> Result<Self, Self::Error> {
+        let (sign, bare) = match name.strip_prefix('-') {
+            Some(bare) => (-1.0, bare),
+            None => (1.0, name.as_str()),
+        };
+        let axis = ["x", "y", "z"].iter().position(|known| *known == bare);
+        let axis = axis.ok_or("expected one of x, y, z, -x, -y, -z")?;
+        Ok(Self(Vector3::ith(axis, sign)))
+    }
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -241,7 +244,7 @@ impl BodyFile {
                     Rotation::By(Vector3::from(vector.map(|angle| angle.0 * DEGREE)))
                 }
                 (None, Some(axis), Some(direction)) => Rotation::Point {
-                    axis: axis.unit_vector(),
+                    axis: axis.0,
                     along: direction.unit_vector(site),
                 },
                 _ => {
@@ -261,19 +264,6 @@ impl BodyFile {
             start: attitude(self.start_pitch_roll_heading_deg),
             steps: (1..).zip(&self.steps).map(step).collect::<Result<_, _>>()?,
         })
-    }
-}
-
-impl BodyAxis {
-    fn unit_vector(self) -> Vector3<f64> {
-        match self {
-            Self::X => Vector3::x(),
-            Self::Y => Vector3::y(),
-            Self::Z => Vector3::z(),
-            Self::MinusX => -Vector3::x(),
-            Self::MinusY => -Vector3::y(),
-            Self::MinusZ => -Vector3::z(),
-        }
     }
 }
 

@@ -253,10 +253,6 @@ impl Kind {
     }
 
     /// By the name in C and ROS, such as `uint16_t` and `float32`.
-    #[cfg_attr(
-        not(any(feature = "mcap", feature = "rosbag", feature = "ulog")),
-        allow(dead_code)
-    )]
     pub fn named(name: &str) -> Option<Self> {
         match name {
             "bool" => return Some(Self::U8),

@@ -20,6 +20,8 @@ pub use ends::saturated;
 const BLOCK: usize = 64;
 /// Part of the blocks that may be quieter than noise at rest: axes stuck for long.
 const STUCK_PART: f64 = 0.1;
+/// Number of rows next to a run whose mean is taken.
+const NEXT: usize = 16;
 /// Parts of the record in which repeats of repeats are counted.
 const PARTS: usize = 32;
 /// Rows on either side of a run that show how a motion continues.
@@ -162,8 +164,8 @@ impl<'a> Axis<'a> {
     /// parabola `a t²` that only touches the value differs by 0.6 of that.
     fn leaves_its_level(&self, run: &Range<usize>, limit: Limit) -> bool {
         // A level may be short.
-        let longest = run.len().max(2 * BLOCK);
-        let mut counts = [BLOCK, longest].into_iter();
+        let longer = Some(run.len()).filter(|&length| length > BLOCK);
+        let mut counts = [BLOCK].into_iter().chain(longer);
         counts.any(|count| self.is_off_level(run, count, limit) == Some(true))
     }
 
@@ -173,38 +175,65 @@ impl<'a> Axis<'a> {
         let value = self.values[first];
         let before = &self.values[first.checked_sub(count)?..first];
         let after = self.values.get(run.end..run.end + count)?;
-        // The value was sound when it came, so that it is one of the level's.
         let (near, half) = (count as f64, count / 2);
+        // A sum of pulses is right to a step; other rows may all be rounded the same way.
+        let (rounded, carry) = if self.pulses { (0.0, 1.0) } else { (0.5, 0.0) };
+        let least = rounded + (run.len() as f64).recip() + near.recip();
+        // Most runs of a working axis are excluded by the means alone.
+        let sum = before.iter().sum::<f64>() + after.iter().sum::<f64>();
+        if (0.5 * sum / near - value).abs() <= least * self.step {
+            return Some(false);
+        }
+        // The value was sound when it came, so that it is one of the level's.
         let has = |side: &[f64]| {
             side.iter().any(|&other| other >= value) && side.iter().any(|&other| other <= value)
         };
         if !has(&before[half..]) || !has(&after[..half]) {
             return Some(false);
         }
-        let [before, after] = [before, after].map(|side| {
-            let (mean, slope, variance) = line(side);
-            let level = (mean - value) / self.step;
+        // Where a motion came to the value or left it, the rows next to the run are on their way.
+        let parts = [
+            &before[..half],
+            &before[half..],
+            &after[..half],
+            &after[half..],
+            &before[count - NEXT..],
+            &after[..NEXT],
+        ];
+        let means = parts.map(|rows| rows.iter().sum::<f64>() / rows.len() as f64);
+        let spread = means
+            .iter()
+            .fold(f64::NEG_INFINITY, |most, mean| mean.max(most))
+            - means
+                .iter()
+                .fold(f64::INFINITY, |least, mean| mean.min(least));
+        let change = (spread / self.step - carry / NEXT as f64).max(0.0);
+        let variances = [before, after].map(|side| {
+            let (mean, _, variance) = line(side);
             // Pulses change by the fraction that they carry, too, which averages out.
-            let fraction = level.rem_euclid(1.0);
-            let carried = if self.pulses {
-                fraction * (1.0 - fraction)
-            } else {
-                0.0
-            };
-            let variance = variance / self.step.powi(2) * (1.0 + (2.0 / near).sqrt());
-            let variance = (variance - carried).max(0.25 * self.of_grid());
-            (level, (slope * near / self.step).abs(), variance)
+            let fraction = ((mean - value) / self.step).rem_euclid(1.0);
+            let carried = carry * fraction * (1.0 - fraction);
+            let (variance, uncertain) = (variance / self.step.powi(2), (2.0 / near).sqrt());
+            let white = (variance - carried).max(0.0) * (1.0 + limit.sigmas * uncertain);
+            white.max(variance * uncertain).max(0.25 * self.of_grid())
         });
-        let off = (0.5 * (before.0 + after.0)).abs();
-        let change = (before.0 - after.0).abs().max(before.1).max(after.1);
-        let length = run.len() as f64;
-        let variance = 0.5 * (before.2 + after.2);
-        let noise = (variance * (1.0 / length + 0.5 / near)).sqrt();
-        Some(off > change + 1.0 / length + 1.0 / near + limit.sigmas * noise)
+        let variance = 0.5 * (variances[0] + variances[1]);
+        let noise = (variance * (1.0 / run.len() as f64 + 0.5 / near)).sqrt();
+        let off = (0.5 * (means[1] + means[2]) - value).abs() / self.step;
+        Some(off > change + least + limit.sigmas * noise)
     }
 
     /// Whether a motion continues across a run as if the run were not there.
     fn interrupts_a_motion(&self, run: &Range<usize>, limit: Limit) -> bool {
+        let goes = |next: &f64| (next - self.values[run.start]).abs();
+        // A slow axis that works goes a step at a time.
+        if self
+            .values
+            .get(run.end)
+            .is_none_or(|next| goes(next) <= self.step)
+        {
+            return false;
+        }
         let mut points = [8, 16, 32, 64].into_iter();
         points
             .any(|points| run.len() <= points && self.leads_past(run, points, limit) == Some(true))
@@ -232,8 +261,7 @@ impl<'a> Axis<'a> {
         });
         let came = (before.iter().rev().nth(1)? - value) / self.step;
         let goes = (after[0] - value) / self.step;
-        // A slow axis that works goes a step at a time.
-        let least = (0.5 * first.abs().min(second.abs())).max(1.0);
+        let least = 0.5 * first.abs().min(second.abs());
         let side = first.signum();
         Some(first * second > 0.0 && side * came < least && side * goes > least)
     }
