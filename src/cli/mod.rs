@@ -8,6 +8,7 @@ mod list;
 mod log;
 mod man;
 mod result;
+mod schema;
 mod simulate;
 mod study;
 mod terminal;
@@ -39,6 +40,7 @@ With a turntable:
 Advanced (each with --help):
   merge        parts of a job that --shard split, as one result
   study        Monte Carlo studies: accuracy, table1, experiment
+  schema       the JSON schema of run.toml
   completions  a shell-completion script
   man          the manual pages"
 )]
@@ -70,6 +72,8 @@ enum Command {
     Noise(log::noise::Noise),
     List(list::List),
     #[command(hide = true)]
+    Schema(schema::Schema),
+    #[command(hide = true)]
     Completions(completions::Completions),
     #[command(hide = true)]
     Man(man::Manual),
@@ -97,6 +101,7 @@ impl Cli {
             Command::Allan(allan) => allan.run(),
             Command::Noise(noise) => noise.run(),
             Command::List(list) => list.run(),
+            Command::Schema(schema) => schema.run(),
             Command::Completions(completions) => completions.run(),
             Command::Man(manual) => manual.run(),
         }

@@ -33,6 +33,8 @@ pub use error::{FileError, Place};
 use inputs::{course, joined, source, temperature};
 pub(crate) use quantity::unit_scale;
 use schema::instrument;
+#[cfg(feature = "cli")]
+pub use schema::json_schema as run_schema;
 pub use schema::{Campaign, campaign_text, write_run};
 pub(crate) use schema::{
     Document, Finite, Latitude, NonNegative, OneOrThree, Positive, TermFile, day_to_day,

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// Quantity of one sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Output {
     /// Whole pulses counted during the sample.

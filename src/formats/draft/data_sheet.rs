@@ -64,7 +64,7 @@ impl Scale {
         Self::measured(&gravity.axes, per_second, one, sheet, [&by, &often])
     }
 
-    /// Of the gyros' axes by what they turn, of rows of this length in s or, of increments, one; by so many moves, or of one
+    /// Of the gyros' axes by what they turn, of rows of this length in s or, of increments, one; over this many moves, or of one
     /// scale from step to step.
     pub fn of_turns(axes: &Axes, moves: Option<usize>, row: f64, output: Output) -> Self {
         let by = match moves {

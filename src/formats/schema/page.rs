@@ -1,4 +1,4 @@
-//! A TOML document that turncal writes, line by line, with what a reader should know of a field beside it.
+//! A TOML document that turncal writes, line by line, each field with a remark for its reader.
 
 use std::fmt::Display;
 

@@ -29,7 +29,9 @@ pub const META: [&str; 8] = [
     "notes",
 ];
 
+/// A run: an instrument's log, what is known of it, and how it was moved
 #[derive(Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct RunFile {
     #[serde(default)]
@@ -44,17 +46,20 @@ pub struct RunFile {
 }
 
 #[derive(Default, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct SiteFile {
     pub latitude_deg: Option<Latitude>,
     pub longitude_deg: Option<Longitude>,
     pub height_m: Option<Height>,
     /// Its digits are its accuracy where none is stated.
+    #[cfg_attr(feature = "cli", schemars(with = "Option<Gravity>"))]
     pub gravity_m_s2: Option<Spanned<Gravity>>,
     pub gravity_sigma_mgal: Option<Milligals>,
 }
 
 #[derive(Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ImuFile {
     pub file: String,
@@ -107,6 +112,7 @@ impl ImuFile {
 
 /// What it does not say is as in `[imu]`.
 #[derive(Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct AccelFromFile {
     pub file: Option<String>,
@@ -119,6 +125,7 @@ pub struct AccelFromFile {
 
 /// The column that tells instruments apart, and what it says of the one that is meant.
 #[derive(Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct InstanceFile {
     pub column: String,
@@ -126,6 +133,7 @@ pub struct InstanceFile {
 }
 
 #[derive(Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ImuColumns {
     pub time: Option<TimeColumn>,
@@ -135,6 +143,7 @@ pub struct ImuColumns {
 }
 
 #[derive(Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(
     untagged,
     expecting = "the name of a column, or those of seconds and nanoseconds"
@@ -145,6 +154,7 @@ pub enum TimeColumn {
 }
 
 #[derive(Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(
     untagged,
     deny_unknown_fields,
@@ -159,6 +169,7 @@ pub enum TemperatureColumn {
 }
 
 #[derive(Default, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct PriorsFile {
     pub gyro: PriorFile,
@@ -166,6 +177,7 @@ pub struct PriorsFile {
 }
 
 #[derive(Default, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct PriorFile {
     pub scale: Option<OneOrThree>,
@@ -177,12 +189,14 @@ pub struct PriorFile {
 
 /// 1σ of each parameter of an error term, around zero.
 #[derive(Clone, Copy, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct TermFile {
     pub sigma: Positive,
 }
 
 #[derive(Default, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct StandstillFile {
     pub velocity_sigma_m_s: Option<Positive>,
@@ -192,6 +206,7 @@ pub struct StandstillFile {
 }
 
 #[derive(Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct TurntableFile {
     pub file: String,
@@ -231,6 +246,7 @@ impl TurntableFile {
 
 /// A quaternion `[w, x, y, z]`, or angles about axes, outermost first, or both.
 #[derive(Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct TableColumns {
     pub time: TimeColumn,
@@ -240,8 +256,23 @@ pub struct TableColumns {
 }
 
 #[derive(Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct SegmentsFile {
     pub file: String,
     pub position_sigma_deg: Option<Positive>,
+}
+
+/// The JSON schema of `run.toml`, for editors that complete and check it.
+#[cfg(feature = "cli")]
+pub fn json_schema() -> serde_json::Value {
+    let mut schema = schemars::schema_for!(RunFile);
+    let format = serde_json::json!({ "const": FORMAT });
+    if let Some(fields) = schema
+        .get_mut("properties")
+        .and_then(|of| of.as_object_mut())
+    {
+        fields.insert("format".to_owned(), format);
+    }
+    schema.to_value()
 }

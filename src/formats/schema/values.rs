@@ -23,6 +23,7 @@ macro_rules! checked {
     ($($(#[$meta:meta])* $name:ident, $says:literal, $holds:expr;)+) => {$(
         $(#[$meta])*
         #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+        #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
         #[serde(try_from = "f64")]
         pub struct $name(pub f64);
 
@@ -67,6 +68,7 @@ checked!(
 
 /// A value of each axis, or one for all three.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(untagged, expecting = "three numbers, or one for all axes")]
 pub enum OneOrThree<T = Finite> {
     One(T),
@@ -84,7 +86,9 @@ impl OneOrThree {
 
 /// So many names of columns.
 #[derive(Clone, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(try_from = "Vec<String>")]
+#[cfg_attr(feature = "cli", schemars(with = "Vec<String>"))]
 pub struct Names<const N: usize>(pub [String; N]);
 
 impl<const N: usize> TryFrom<Vec<String>> for Names<N> {
@@ -104,6 +108,17 @@ macro_rules! by_words {
         impl<'de> Deserialize<'de> for $name {
             fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
                 by_word(&Self::WORDS, &String::deserialize(deserializer)?)
+            }
+        }
+
+        #[cfg(feature = "cli")]
+        impl schemars::JsonSchema for $name {
+            fn schema_name() -> std::borrow::Cow<'static, str> {
+                stringify!($name).into()
+            }
+
+            fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+                schemars::json_schema!({ "enum": Self::WORDS.map(|(word, _)| word) })
             }
         }
     )+};
@@ -126,6 +141,18 @@ impl<'de> Deserialize<'de> for TimeUnit {
             TimeUnitFile::Word(word) => word,
         };
         by_word(&Self::WORDS, &word)
+    }
+}
+
+#[cfg(feature = "cli")]
+impl schemars::JsonSchema for TimeUnit {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "TimeUnit".into()
+    }
+
+    fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        let words = Self::WORDS.map(|(word, _)| word);
+        schemars::json_schema!({ "anyOf": [{ "enum": words }, { "type": "number", "exclusiveMinimum": 0 }] })
     }
 }
 

@@ -74,7 +74,9 @@ pub fn write(
             .language("en".to_owned())
             .creator(concat!("turncal ", env!("CARGO_PKG_VERSION")).to_owned())
             .authors(vec![frame.author.clone()])
-            .keywords(vec!["fonts: Noto Sans, SIL Open Font License 1.1".to_owned()])
+            .keywords(vec![
+                "fonts: Noto Sans, SIL Open Font License 1.1".to_owned(),
+            ])
             .creation_date(day),
     );
     pdf.finish()

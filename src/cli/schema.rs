@@ -1,0 +1,18 @@
+//! `turncal schema`
+
+use turncal::formats::run_schema;
+
+use crate::cli::terminal::print;
+
+/// Prints the JSON schema of run.toml, with which editors complete and check it
+///
+/// Save it and name it in the first line of a run.toml: #:schema ./run.schema.json
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:  turncal schema > run.schema.json")]
+pub struct Schema {}
+
+impl Schema {
+    pub fn run(&self) -> anyhow::Result<()> {
+        print((serde_json::to_string_pretty(&run_schema())? + "\n").as_bytes())
+    }
+}
