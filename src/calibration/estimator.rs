@@ -85,7 +85,7 @@ fn with_causes<'a>(
     progress: Progress,
 ) -> Result<Solved<'a>, CalibrationError> {
     let most = solved.problem.dwells().count() / DWELLS_OF_ONE;
-    let mut causes = Causes::of(&solved)?;
+    let mut causes = causes_of(&solved)?;
     while solved.causes.len() < most {
         let Some((with, left)) = with_one(&solved, &causes, progress)? else {
             break;
@@ -110,7 +110,7 @@ fn with_one<'a>(
         let Some(mut with) = solved.better(solved.clone().again(problem, progress))? else {
             continue;
         };
-        let left = Causes::of(&with)?;
+        let left = causes_of(&with)?;
         let found = found.beside_what_it_leaves(&left);
         if found.is_beyond() {
             with.causes.push(found);
@@ -118,6 +118,10 @@ fn with_one<'a>(
         }
     }
     Ok(None)
+}
+
+fn causes_of(solved: &Solved) -> Result<Causes, CalibrationError> {
+    Causes::of(&solved.problem, &solved.priors, &solved.iterated)
 }
 
 /// Uses the noise estimated from the data, if they contradict the stated noise.

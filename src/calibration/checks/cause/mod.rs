@@ -13,8 +13,8 @@ use nalgebra::Vector3;
 use serde_json::json;
 
 use crate::calibration::{
-    CalibrationError, Constant, Disturbance, DisturbanceKind, ErrorTerm, Finding,
-    FindingKind as Kind, Innovation, Observation, Prior, Problem, Script, Solved,
+    AttitudePrior, CalibrationError, Constant, Disturbance, DisturbanceKind, ErrorTerm, Finding,
+    FindingKind as Kind, Innovation, Iterated, Observation, Prior, Problem, Script,
 };
 use crate::imu::Sensor;
 use crate::run::{Aiding, Dwell};
@@ -59,11 +59,15 @@ impl Causes {
     ///
     /// # Errors
     /// As of a pass.
-    pub fn of(solved: &Solved) -> Result<Self, CalibrationError> {
-        let innovations = &solved.iterated.held.innovations;
+    pub fn of(
+        problem: &Problem,
+        priors: &[AttitudePrior],
+        iterated: &Iterated,
+    ) -> Result<Self, CalibrationError> {
+        let innovations = &iterated.held.innovations;
         let read = of_readings(innovations);
-        let tried = Tried::of(solved.problem.dwells().count(), innovations);
-        let (all, scored) = by_score(solved, &tried)?;
+        let tried = Tried::of(problem.dwells().count(), innovations);
+        let (all, scored) = by_score(problem, (priors, iterated), &tried)?;
         let limit = -2.0 * (FALSE_ALARM / (read.len() + all).max(1) as f64).ln();
         let of_kind = |kind| {
             let is = |of: &&FoundCause| match of.cause {
@@ -77,7 +81,7 @@ impl Causes {
             [DisturbanceKind::Position, DisturbanceKind::Slip].map(of_kind);
         let of_both = of_positions.max(of_slips);
         // By hand every move is another; that one is worst only tells how wide chance is.
-        let table = solved.problem.model.aiding == Aiding::Table;
+        let table = problem.model.aiding == Aiding::Table;
         let scored = scored.into_iter().filter_map(|of| match of.cause {
             Cause::Disturbance(_) if !table => None,
             Cause::Disturbance(disturbance) => Some(match disturbance.kind {
@@ -141,12 +145,8 @@ fn of_readings(innovations: &[Innovation]) -> Vec<FoundCause> {
 /// All that may have happened once in the dwells that are tried, then all error terms that are off and that the record can
 /// hold, by their scores; and the number of causes if all dwells were tried.
 fn by_score(
-    Solved {
-        problem,
-        priors,
-        iterated,
-        ..
-    }: &Solved,
+    problem: &Problem,
+    (priors, iterated): (&[AttitudePrior], &Iterated),
     tried: &Tried,
 ) -> Result<(usize, Vec<FoundCause>), CalibrationError> {
     let (mut disturbances, mut model) = (disturbances(problem), problem.model.clone());

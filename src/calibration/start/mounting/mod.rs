@@ -7,6 +7,7 @@
 //! mounting being likelier than another. A likelihood ratio of X in favour of a wrong hypothesis comes up
 //! at most once in X records.
 
+mod contradiction;
 mod likelihood;
 mod motion;
 mod rivals;
@@ -17,9 +18,10 @@ use crate::calibration::parameters::{ParameterVector, parameter};
 use crate::calibration::problem::Problem;
 use crate::imu::{AxisOrder, PerSensor, Sensor};
 use crate::run::{Aiding, Run};
+pub use contradiction::Contradiction;
 use likelihood::{Errors, Likelihoods, TooSmall, by_gravity, by_labels, by_table};
 use motion::{Motion, unit};
-pub use rivals::{Contradiction, is_beyond_tolerance};
+pub use rivals::is_beyond_tolerance;
 pub use sensitivity::Sensitivity;
 pub use statement::Mounting;
 use statement::{line, prior_differs};

@@ -4,10 +4,9 @@
 //! Each statement has rivals, and the likelihood of the motion under each is its weight, as for axes. Another
 //! sensitivity of the gyros is only looked for where they miss a turn.
 
-use std::fmt;
-
 use nalgebra::{Matrix3, Vector3};
 
+use super::contradiction::Contradiction;
 use super::likelihood::TooSmall;
 use super::motion::Motion;
 use super::sensitivity::{Axes, NEXT_RANGE, Sensitivity};
@@ -26,40 +25,6 @@ const STEP: f64 = 1.1;
 /// the next range it is wrong however large. Between these it may be this many σ of its prior off.
 const CARELESS: f64 = 10.0;
 const WIDEST_TOLERANCE: f64 = 0.1;
-
-/// What `run.toml` states and the record contradicts.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Contradiction {
-    /// Axes that are swapped, reversed or left-handed.
-    Axes(Mounting),
-    /// A triad that is this many times as sensitive as stated.
-    Sensitivity(Sensitivity),
-    /// Quaternions of the table in another order, or of the inverse, in words.
-    Quaternions(String),
-    /// Motion that nothing explains that is tried.
-    Unexplained,
-    /// Columns of gyros named for accelerometers, and the other way round.
-    Exchanged,
-}
-
-impl fmt::Display for Contradiction {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Axes(mounting) => mounting.fmt(f),
-            Self::Sensitivity(sensitivity) => sensitivity.fmt(f),
-            Self::Quaternions(said) => f.write_str(said),
-            Self::Unexplained => f.write_str(
-                "gyros, accelerometers and what run.toml states of the motion do not fit together, nor with other axes \
-                 or sensitivities. turncal check shows the turns: look for logs of two runs or clocks, rows that are \
-                 lost, labels of other sections, a dead axis",
-            ),
-            Self::Exchanged => f.write_str(
-                "the columns of gyros and accelerometers are exchanged: gravity is in the columns that run.toml names \
-                 for the gyros. Exchange gyro and accel in columns of [imu], with their units and [imu.prior]",
-            ),
-        }
-    }
-}
 
 impl Contradiction {
     /// The first run of a problem that contradicts what is stated of it, if there is one.
