@@ -239,9 +239,9 @@ impl<'a> Axis<'a> {
             .any(|points| run.len() <= points && self.leads_past(run, points, limit) == Some(true))
     }
 
-    /// Whether lines through the rows before and through those after lead past the run's value on one side, to which the
-    /// row after the run goes at once, and farther than the run came: a table that stops and turns on leaves its place
-    /// as it came.
+    /// Whether lines through the rows before and through those after lead past the run's value on one side, from which
+    /// the row before the run did not come and to which the row after it goes at once: a table that stops and turns on
+    /// comes to the value and leaves it.
     fn leads_past(&self, run: &Range<usize>, points: usize, limit: Limit) -> Option<bool> {
         let (count, length) = (points as f64, run.len() as f64);
         let value = self.values[run.start];
@@ -259,11 +259,11 @@ impl<'a> Axis<'a> {
             let is_lost = length * off.abs() > 2.0 + limit.sigmas * noise;
             if is_lost { off } else { 0.0 }
         });
-        let came = (before.iter().rev().nth(1)? - value).abs() / self.step;
+        let came = (before.iter().rev().nth(1)? - value) / self.step;
         let goes = (after[0] - value) / self.step;
         let least = 0.5 * first.abs().min(second.abs());
         let side = first.signum();
-        Some(first * second > 0.0 && side * goes > least.max(2.0 * came))
+        Some(first * second > 0.0 && side * came < least && side * goes > least)
     }
 }
 
