@@ -24,6 +24,13 @@ impl Limit {
         }
     }
 
+    /// The limit in σ if σ is itself an estimate with few degrees of freedom, by Wallace's
+    /// approximation of Student's distribution.
+    pub fn of_student(&self, freedom: f64) -> f64 {
+        let exponent = self.sigmas.powi(2) * (freedom - 1.5).max(0.0) / (freedom - 1.0).powi(2);
+        (freedom * exponent.exp_m1()).sqrt()
+    }
+
     /// The quantile that one in a thousand of these values exceeds, and the limit of a statistic with the tail of
     /// these values, in σ of the normal distribution.
     ///
@@ -65,6 +72,7 @@ mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
+    use statrs::distribution::StudentsT;
 
     #[test]
     fn the_limit_of_a_normal_tail_is_that_of_the_normal_distribution() {
@@ -90,5 +98,19 @@ mod tests {
         let limit = Limit::of_rows(values.len());
         let (_, of_tail) = limit.of_tail(&mut values);
         assert!((of_tail / limit.nats - 1.0).abs() < 0.15, "{of_tail}");
+    }
+
+    #[test]
+    fn a_sigma_that_few_values_show_moves_the_limit_out() {
+        // Two-sided quantiles of Student's distribution by its incomplete beta function.
+        let limit = Limit::of_rows(60_000);
+        for freedom in [8.0, 30.0, 200.0] {
+            let student = StudentsT::new(0.0, 1.0, freedom).unwrap();
+            let beyond = 2.0 * student.cdf(-limit.of_student(freedom));
+            assert!(
+                (beyond.ln() / -limit.nats - 1.0).abs() < 0.05,
+                "{freedom}: {beyond:e}"
+            );
+        }
     }
 }

@@ -231,8 +231,14 @@ fn mean_and_slope(values: &[f64]) -> (f64, f64) {
     let middle = 0.5 * (count - 1.0);
     let moments = values.iter().enumerate();
     let moment: f64 = moments.map(|(k, value)| (k as f64 - middle) * value).sum();
-    let mean = values.iter().sum::<f64>() / count;
-    (mean, moment * 12.0 / (count * (count * count - 1.0)))
+    (
+        mean(values),
+        moment * 12.0 / (count * (count * count - 1.0)),
+    )
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
 }
 
 /// Runs of rows or samples for which `is` is true.

@@ -8,10 +8,11 @@ mod ends;
 
 use std::ops::Range;
 
+use nalgebra::{SMatrix, SVector};
 use statrs::function::erf::erf;
 
 use super::chance::Limit;
-use super::mean_and_slope;
+use super::{mean, mean_and_slope};
 use crate::recording::ColumnFacts;
 use crate::statistics::median;
 pub use ends::saturated;
@@ -20,8 +21,10 @@ pub use ends::saturated;
 const BLOCK: usize = 64;
 /// Part of the blocks that may be quieter than noise at rest: axes stuck for long.
 const STUCK_PART: f64 = 0.1;
+/// Number of rows whose sum is nearly free of rounding.
+const SUM: usize = 4;
 /// Number of rows next to a run whose mean is taken.
-const NEXT: usize = 16;
+const NEXT: usize = 4 * SUM;
 /// Parts of the record in which repeats of repeats are counted.
 const PARTS: usize = 32;
 /// Rows on either side of a run that show how a motion continues.
@@ -163,108 +166,135 @@ impl<'a> Axis<'a> {
     /// The rate within the run may differ from the rate next to it by as much as the latter changes in the same time. A
     /// parabola `a t²` that only touches the value differs by 0.6 of that.
     fn leaves_its_level(&self, run: &Range<usize>, limit: Limit) -> bool {
+        let least = 8 * SUM;
+        let most = (run.len() / 2).max(least);
         // A level may be short.
-        let longer = Some(run.len()).filter(|&length| length > BLOCK);
-        let mut counts = [BLOCK].into_iter().chain(longer);
-        counts.any(|count| self.is_off_level(run, count, limit) == Some(true))
+        let shorter = [least, 2 * least].into_iter().filter(|&half| half < most);
+        let mut halves = shorter.chain([most]);
+        halves.any(|half| self.is_off_level(run, half, limit) == Some(true))
     }
 
-    /// The same by this many rows on either side.
-    fn is_off_level(&self, run: &Range<usize>, count: usize, limit: Limit) -> Option<bool> {
+    /// The same, with two halves of this many rows on either side.
+    fn is_off_level(&self, run: &Range<usize>, half: usize, limit: Limit) -> Option<bool> {
         let first = run.start - 1;
+        let before = &self.values[first.checked_sub(2 * half)?..first];
+        let after = self.values.get(run.end..run.end + 2 * half)?;
         let value = self.values[first];
-        let before = &self.values[first.checked_sub(count)?..first];
-        let after = self.values.get(run.end..run.end + count)?;
-        let (near, half) = (count as f64, count / 2);
-        // A sum of pulses is right to a step; other rows may all be rounded the same way.
-        let (rounded, carry) = if self.pulses { (0.0, 1.0) } else { (0.5, 0.0) };
-        let least = rounded + (run.len() as f64).recip() + near.recip();
-        // Most runs of a working axis are excluded by the means alone.
-        let sum = before.iter().sum::<f64>() + after.iter().sum::<f64>();
-        if (0.5 * sum / near - value).abs() <= least * self.step {
-            return Some(false);
-        }
-        // The value was sound when it came, so that it is one of the level's.
-        let has = |side: &[f64]| {
-            side.iter().any(|&other| other >= value) && side.iter().any(|&other| other <= value)
-        };
-        if !has(&before[half..]) || !has(&after[..half]) {
-            return Some(false);
-        }
-        // Where a motion came to the value or left it, the rows next to the run are on their way.
-        let parts = [
+        let halves = [
             &before[..half],
             &before[half..],
             &after[..half],
             &after[half..],
-            &before[count - NEXT..],
-            &after[..NEXT],
         ];
-        let means = parts.map(|rows| rows.iter().sum::<f64>() / rows.len() as f64);
-        let spread = means
-            .iter()
-            .fold(f64::NEG_INFINITY, |most, mean| mean.max(most))
-            - means
-                .iter()
-                .fold(f64::INFINITY, |least, mean| mean.min(least));
-        let change = (spread / self.step - carry / NEXT as f64).max(0.0);
-        let variances = [before, after].map(|side| {
-            let (mean, _, variance) = line(side);
-            // Pulses change by the fraction that they carry, too, which averages out.
-            let fraction = ((mean - value) / self.step).rem_euclid(1.0);
-            let carried = carry * fraction * (1.0 - fraction);
-            let (variance, uncertain) = (variance / self.step.powi(2), (2.0 / near).sqrt());
-            let white = (variance - carried).max(0.0) * (1.0 + limit.sigmas * uncertain);
-            white.max(variance * uncertain).max(0.25 * self.of_grid())
-        });
-        let variance = 0.5 * (variances[0] + variances[1]);
-        let noise = (variance * (1.0 / run.len() as f64 + 0.5 / near)).sqrt();
-        let off = (0.5 * (means[1] + means[2]) - value).abs() / self.step;
-        Some(off > change + least + limit.sigmas * noise)
+        let means = halves.map(mean);
+        let off = (value - 0.5 * (means[1] + means[2])).abs() / self.step;
+        let (length, beside) = (run.len() as f64, half as f64);
+        let least = 1.0 / length + 1.0 / beside;
+        // The value was sound when it came, so that it is one of the level's.
+        let has = |side: &[f64]| {
+            side.iter().any(|&other| other >= value) && side.iter().any(|&other| other <= value)
+        };
+        if off <= least || !has(halves[1]) || !has(halves[2]) {
+            return Some(false);
+        }
+        // Where a motion came to the value or left it, the rows next to the run are on their way.
+        let next = [&before[2 * half - NEXT..], &after[..NEXT]].map(mean);
+        let all = || means.into_iter().chain(next);
+        let spread = all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min);
+        // Sums of pulses are right to a step, so that means may differ by as much without a change.
+        let rounded = match self.pulses {
+            true => 1.0 / beside + 1.0 / NEXT as f64,
+            false => 0.0,
+        };
+        let change = (spread / self.step - rounded).max(0.0);
+        // Rounding averages out in sums, which leaves noise and the rest of the motion.
+        let sums = |side: &[f64]| {
+            let sums = side.chunks_exact(SUM).map(|rows| rows.iter().sum());
+            variance(&sums.collect::<Vec<f64>>())
+        };
+        let variance =
+            halves.map(sums).iter().sum::<f64>() / (4.0 * SUM as f64 * self.step.powi(2));
+        let variance = variance.max(self.of_grid() / SUM as f64);
+        let noise = (variance * (1.0 / length + 0.5 / beside)).sqrt();
+        let freedom = 4.0 * ((half / SUM) as f64 - 1.0);
+        Some(off > change + least + limit.of_student(freedom) * noise)
     }
 
     /// Whether a motion continues across a run as if the run were not there.
     fn interrupts_a_motion(&self, run: &Range<usize>, limit: Limit) -> bool {
-        let goes = |next: &f64| (next - self.values[run.start]).abs();
-        // A slow axis that works goes a step at a time.
-        if self
-            .values
-            .get(run.end)
-            .is_none_or(|next| goes(next) <= self.step)
-        {
+        let value = self.values[run.start];
+        let resumes = self.values.get(run.end).map(|next| (next - value).abs());
+        // Otherwise at most two steps are lost.
+        if resumes.is_none_or(|off| off * run.len() as f64 <= 4.0 * self.step) {
             return false;
         }
-        let mut points = [8, 16, 32, 64].into_iter();
-        points
-            .any(|points| run.len() <= points && self.leads_past(run, points, limit) == Some(true))
+        let mut points = [8, 16, 32, 64]
+            .into_iter()
+            .filter(|points| run.len() <= *points);
+        points.any(|points| self.is_crossed(run, points, limit) == Some(true))
     }
 
-    /// Whether lines through the rows before and through those after lead past the run's value on one side, from which
-    /// the row before the run did not come and to which the row after it goes at once: a table that stops and turns on
-    /// comes to the value and leaves it.
-    fn leads_past(&self, run: &Range<usize>, points: usize, limit: Limit) -> Option<bool> {
+    /// The side of the run's value to which lines through the rows before and through those after extrapolate, if they
+    /// agree. This inexpensive test excludes most runs of a working axis.
+    fn led_past(&self, run: &Range<usize>, points: usize, limit: Limit) -> Option<f64> {
         let (count, length) = (points as f64, run.len() as f64);
-        let value = self.values[run.start];
-        let before = self.values.get(run.start.checked_sub(points)?..run.start)?;
-        let after = self.values.get(run.end..run.end + points)?;
         let apart = 0.5 * (count + length);
-        let spread = count.recip() + 12.0 * apart * apart / count.powi(3);
-        let [first, second] = [(before, apart), (after, -apart)].map(|(rows, forth)| {
-            let (mean, slope, variance) = line(rows);
-            let off = (mean - value + forth * slope) / self.step;
+        let lost = |rows: Option<&[f64]>, forth: f64| {
+            let (mean, slope, variance) = line(rows?);
+            let off = (mean - self.values[run.start] + forth * slope * apart) / self.step;
             let variance = (variance / self.step.powi(2)).max(self.of_grid());
-            // Of the line carried on, and of the rows that are lost.
-            let noise = (variance * length * (spread * length + 1.0)).sqrt();
-            // At most two steps are lost to rounding.
-            let is_lost = length * off.abs() > 2.0 + limit.sigmas * noise;
-            if is_lost { off } else { 0.0 }
-        });
-        let came = (before.iter().rev().nth(1)? - value) / self.step;
-        let goes = (after[0] - value) / self.step;
-        let least = 0.5 * first.abs().min(second.abs());
-        let side = first.signum();
-        Some(first * second > 0.0 && side * came < least && side * goes > least)
+            let spread = count.recip() + 12.0 * apart * apart / count.powi(3);
+            // Of the line carried on, and of the rows.
+            let variance = variance * length * (spread * length + 1.0);
+            is_lost(length * off.abs(), variance, limit).then_some(off.signum())
+        };
+        let before = run.start.checked_sub(points);
+        let before = before.and_then(|begin| self.values.get(begin..run.start));
+        let after = self.values.get(run.end..run.end + points);
+        lost(before, 1.0).filter(|side| lost(after, -1.0) == Some(*side))
     }
+
+    /// Whether a cubic through both sides of a run is more likely than two parabolas that end and start at its value.
+    fn is_crossed(&self, run: &Range<usize>, points: usize, limit: Limit) -> Option<bool> {
+        let side = self.led_past(run, points, limit)?;
+        let before = run.start.checked_sub(points)?..run.start;
+        let after = run.end..run.end + points;
+        let value = self.values[run.start];
+        let in_steps = |k: usize| (self.values[k] - value) / self.step;
+        let middle = 0.5 * (run.start + run.end) as f64;
+        let scale = (points as f64 + 0.5 * run.len() as f64).recip();
+        let powers = |k: usize, from: f64| {
+            let t = (k as f64 - from) * scale;
+            [t, t * t, t * t * t]
+        };
+        let cubic = |k: usize| {
+            let [x, y, z] = powers(k, middle);
+            SVector::from([1.0, x, y, z])
+        };
+        let from = |from: usize| move |k| SVector::from(powers(k, from as f64));
+        // The last sample before the run is sound, too.
+        let last = run.start - 1;
+        let others = (before.start..last).chain(after.clone());
+        let (factors, left_over) = fit(others, cubic, in_steps)?;
+        let off = factors.dot(&cubic(last));
+        let count = 2.0 * points as f64;
+        let rounding = self.of_grid() * count;
+        if off.abs() > limit.sigmas * (left_over.max(rounding) / (count - 1.0)).sqrt() {
+            return Some(false);
+        }
+        let crossed = (left_over + off * off).max(rounding);
+        let (_, stopped) = fit(before, from(last), in_steps)?;
+        let (_, started) = fit(after, from(run.end - 1), in_steps)?;
+        let ratio = points as f64 * ((stopped + started).max(rounding) / crossed).ln();
+        let lost: f64 = run.clone().map(|k| factors.dot(&cubic(k))).sum();
+        let noise = crossed / count * run.len() as f64;
+        Some(ratio > limit.nats && is_lost(lost * side, noise, limit))
+    }
+}
+
+/// Whether the lost steps exceed rounding and an error of this variance.
+fn is_lost(lost: f64, variance: f64, limit: Limit) -> bool {
+    lost > 2.0 + limit.sigmas * variance.sqrt()
 }
 
 /// Stretches of rows each equal to the one before.
@@ -306,6 +336,22 @@ fn repeats_of_repeats(values: &[f64]) -> f64 {
     *parts.select_nth_unstable_by(rank, f64::total_cmp).1
 }
 
+/// Coefficients of the terms by least squares, and the residual sum of squares.
+fn fit<const N: usize>(
+    rows: impl Iterator<Item = usize> + Clone,
+    terms: impl Fn(usize) -> SVector<f64, N>,
+    value: impl Fn(usize) -> f64,
+) -> Option<(SVector<f64, N>, f64)> {
+    let (mut normal, mut right) = (SMatrix::<f64, N, N>::zeros(), SVector::<f64, N>::zeros());
+    for k in rows.clone() {
+        normal += terms(k) * terms(k).transpose();
+        right += terms(k) * value(k);
+    }
+    let factors = normal.cholesky()?.solve(&right);
+    let off = |k: usize| (value(k) - terms(k).dot(&factors)).powi(2);
+    Some((factors, rows.map(off).sum()))
+}
+
 /// Mean and slope of a line through values, and the variance about it.
 fn line(values: &[f64]) -> (f64, f64, f64) {
     let (mean, slope) = mean_and_slope(values);
@@ -313,6 +359,13 @@ fn line(values: &[f64]) -> (f64, f64, f64) {
     let off = |(k, value): (usize, &f64)| (value - mean - slope * (k as f64 - middle)).powi(2);
     let squares: f64 = values.iter().enumerate().map(off).sum();
     (mean, slope, squares / values.len() as f64)
+}
+
+/// Variance about the mean.
+fn variance(values: &[f64]) -> f64 {
+    let mean = mean(values);
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    squares / (values.len() as f64 - 1.0)
 }
 
 #[cfg(test)]
