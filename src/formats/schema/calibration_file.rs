@@ -246,10 +246,15 @@ impl Calibration {
         for (name, value, possible) in sizes {
             let short = |end: &f64| format!("{end:.2e}").parse().unwrap_or(*end);
             let (least, most): (f64, f64) = (short(possible.start()), short(possible.end()));
+            let words = |of: f64| match of.abs() >= 1e6 {
+                true => format!("{of:e}"),
+                false => format!("{of:?}"),
+            };
             expect!(
                 possible.contains(&value),
-                format!("{least:?} to {most:?} in SI"),
-                "{name} = {value:?}"
+                format!("{} to {} in SI", words(least), words(most)),
+                "{name} = {}",
+                words(value)
             );
         }
         Ok(())

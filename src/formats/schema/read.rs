@@ -222,13 +222,17 @@ impl InstrumentFields<'_> {
         let (ppm, sigma) = (off.abs() / PPM, prior / PPM);
         let period = nanoseconds(imu.period);
         let way = if off > 0.0 { "more" } else { "less" };
-        (off.abs() > prior).then(|| {
-            format!(
-                "Stamps come every {period} s, {ppm:.2} ppm {way} than sample_period_s says; stamps are taken, and the \
-                 scale of the {triad} is by as much another, beyond its prior σ of {sigma:.2} ppm: if the instrument's \
-                 clock is right and the stamps are not, leave the time column out."
-            )
-        })
+        let judged = match off.abs() <= prior {
+            true => format!("within its prior σ of {sigma:.2} ppm."),
+            false => format!(
+                "beyond its prior σ of {sigma:.2} ppm: if the instrument's clock is right and the stamps are not, leave \
+                 the time column out."
+            ),
+        };
+        Some(format!(
+            "Stamps come every {period} s, {ppm:.2} ppm {way} than sample_period_s says; stamps are taken, and the scale \
+             of the {triad} is by as much another, {judged}"
+        ))
     }
 }
 

@@ -518,12 +518,12 @@ fn each_wrong_calibration_has_its_message() {
         (
             "\"bias\":[0,0,0]",
             "\"bias\":[0,1e300,0]",
-            "gyro.bias.y = 1e300 & 1000000.0",
+            "gyro.bias.y = 1e300 & 1e6",
         ),
         (
             "\"source\"",
             "\"terms\":{\"accel.time_offset\":{\"value\":1e9}},\"source\"",
-            "terms.accel.time_offset.value = 1000000000.0 & 0.573",
+            "terms.accel.time_offset.value = 1e9 & 0.573",
         ),
         (
             "\"source\"",
