@@ -107,13 +107,10 @@ fn curves(at_rest: &AtRest) -> Plot {
                 .map(|s| (s.temperature, (s.output - of.at_reference.0) / unit))
                 .collect::<Vec<_>>()
         };
-        let at = |k: usize| {
-            range.lowest + (range.highest - range.lowest) * k as f64 / (POINTS - 1) as f64
-        };
         let edge = |factor: f64| {
-            let points = (0..POINTS).map(|k| {
-                let (change, sigma) = of.at(range, at(k));
-                (at(k), (change + factor * sigma) / unit)
+            let points = steps(range.lowest, range.highest, POINTS).map(|temperature| {
+                let (change, sigma) = of.at(range, temperature);
+                (temperature, (change + factor * sigma) / unit)
             });
             points.collect::<Vec<_>>()
         };

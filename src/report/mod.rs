@@ -16,14 +16,12 @@
 //! let panel = Panel::new("square root", Axis::linear("number"), Axis::linear(""))
 //!     .with(Series::line(roots).label("√"));
 //! let plot = Plot::new("roots.svg", "Square roots", (1, 240), [panel]).caption("How roots grow.");
-//! assert!(svg::draw(&plot)?.contains("number"));
+//! assert!(svg::draw(&plot).contains("number"));
 //! let mut document = Document::new("Roots");
 //! document.page(plot);
-//! # Ok::<(), svg::DrawError>(())
 //! ```
 
 pub mod document;
-mod files;
 mod html;
 #[cfg(feature = "certificate")]
 pub mod pdf;
@@ -55,7 +53,7 @@ mod terms;
 mod tests;
 
 pub use document::{Document, Facts};
-pub use files::{ReportError, files, write};
+pub use html::{ReportError, files, write};
 pub use terminal::wrapped;
 
 /// The figures of a document by name as JSON.

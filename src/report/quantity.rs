@@ -122,15 +122,9 @@ impl Quantity {
             false => (Axis::linear("").between(-1.0, 1.0), ""),
         };
         for line in &mut lines {
-            let label = line.label.iter_mut().map(|(at, _)| at);
-            let points = match &mut line.shape {
-                Shape::Line(points) => &mut points[..],
-                _ => &mut [],
-            };
-            points
-                .iter_mut()
-                .chain(label)
-                .for_each(|point| point.1 *= scale);
+            if let Shape::Line(points) = &mut line.shape {
+                points.iter_mut().for_each(|point| point.1 *= scale);
+            }
         }
         let sigma = |sign: f64| -> Vec<Point> {
             sigma.iter().map(|&(t, s)| (t, sign * s * scale)).collect()

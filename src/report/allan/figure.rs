@@ -18,10 +18,7 @@ pub fn figure(analysis: &NoiseAnalysis, sensor: Sensor) -> Plot {
     let triad = analysis.triads.get(sensor);
     let unit = deviation_unit(sensor).1;
     let all = triad.axes.iter().flat_map(|axis| &axis.curve.variance);
-    let all = all.map(|v| v.sqrt() / unit).filter(|y| *y > 0.0);
-    let (low, high) = all.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), y| {
-        (low.min(y), high.max(y))
-    });
+    let (low, high) = positive_range(all.map(|variance| variance.sqrt() / unit));
     let ends = (0.5 * low, 1.8 * high);
     let panels = triad.axes.iter().zip(AXES);
     let panels = panels.map(|(axis, letter)| panel(axis, letter, sensor, ends));

@@ -126,8 +126,8 @@ pub fn figure(budget: &Budget, estimate: &Estimate) -> Plot {
                 *floor += 100.0 * heights(i);
                 (n as f64, low, *floor)
             });
-            let series = Series::new(Shape::Blocks(0.35, blocks.collect())).color(color);
-            series.key(key)
+            let bars = Series::bars(0.35, Fill::Solid, blocks);
+            bars.color(color).key(key)
         };
         for (n, part) in own.iter().enumerate() {
             let of = |i: usize| share(part, estimate, i);

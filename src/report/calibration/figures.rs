@@ -6,7 +6,7 @@ use crate::attitude::matrix;
 use crate::calibration::{
     Epoch, Estimate, Innovation, Nis, Observation, Outcome, ParameterVector, sensor_and_parameter,
 };
-use crate::imu::AXES;
+use crate::imu::{AXES, Sensor};
 use crate::recording::{ImuSamples, TableLog};
 use crate::report::calibration::report::Report;
 use crate::report::prelude::*;
@@ -268,33 +268,18 @@ fn errors(methods: &[(&str, &Estimate)], truth: &ParameterVector) -> Plot {
         if indices.is_empty() {
             return Panel::blank(format!("{}: all fixed", group.title()));
         }
-        let series = methods
-            .iter()
-            .enumerate()
-            .flat_map(|(n, (name, estimate))| {
-                let (error, sigma) = (estimate.vector() - truth, estimate.sigma());
-                let offset = 0.26 * (n as f64 - 0.5 * (methods.len() as f64 - 1.0));
-                let places = || {
-                    indices
-                        .iter()
-                        .enumerate()
-                        .map(|(k, &i)| (k as f64 + offset, i))
-                };
-                let unit = group.unit_value();
-                let (mark, color) = method_mark(name);
-                let whiskers = places().filter(|&(_, i)| sigma[i] > 0.0);
-                let whiskers = whiskers.map(|(x, i)| (x, 0.0, sigma[i] / unit)).collect();
-                let marks = places().map(|(x, i)| (x, error[i].abs() / unit));
-                [
-                    Series::new(Shape::Intervals(whiskers))
-                        .color(color)
-                        .width(1.0),
-                    Series::marks(mark, marks)
-                        .color(color)
-                        .width(2.0)
-                        .key(*name),
-                ]
+        let series = methods.iter().enumerate().map(|(n, (name, estimate))| {
+            let unit = group.unit_value();
+            let (error, sigma) = (estimate.vector() - truth, estimate.sigma() / unit);
+            let offset = beside(n, methods.len(), 0.52);
+            let points = indices.iter().enumerate().map(|(k, &i)| {
+                let at = (k as f64 + offset, error[i].abs() / unit);
+                (at, (0.0, sigma[i]))
             });
+            let (mark, color) = method_mark(name);
+            let marks = Series::whiskers(mark, points).color(color);
+            marks.width(2.0).key(*name)
+        });
         let x = Axis::places(indices.iter().map(|&i| axis_name(form, i)));
         Panel::new(group.titled(), x, Axis::log("")).with_all(series)
     };
@@ -337,12 +322,8 @@ fn differences(closed: &Estimate, filter: &Estimate) -> Plot {
         .chunk_by(|a, b| sensor(a.0) == sensor(b.0))
         .map(|triad| {
             let x = Axis::places(triad.iter().map(|&(i, _)| short_name(form, i)));
-            let stems = triad
-                .iter()
-                .enumerate()
-                .map(|(k, &(_, y))| (k as f64, 0.0, y))
-                .collect();
-            let marks = triad.iter().enumerate().map(|(k, &(_, y))| (k as f64, y));
+            let points = triad.iter().enumerate();
+            let points = points.map(|(k, &(_, y))| ((k as f64, y), (y.min(0.0), y.max(0.0))));
             Panel::new(
                 "closed form minus EKF, σ",
                 x,
@@ -354,8 +335,7 @@ fn differences(closed: &Estimate, filter: &Estimate) -> Plot {
                     .dashed()
                     .label(if y < 0.0 { "−3σ" } else { "+3σ" })
             }))
-            .with(Series::new(Shape::Intervals(stems)).width(1.0))
-            .with(Series::marks(Mark::Dot, marks).width(2.5))
+            .with(Series::whiskers(Mark::Dot, points).width(2.5))
         });
     Plot::new("comparison.svg", "Closed form against EKF", (1, 220), panels).caption(
         "Closed form minus EKF in units of the σ of their difference, as if they had no data in common. Dashed: \
@@ -375,8 +355,8 @@ fn path(report: &Report) -> Plot {
         let dwells = report.dwells.iter().enumerate();
         dwells.map(|(n, dwell)| (0.5 * (dwell.start + dwell.end), (n + 1).to_string()))
     };
-    let panel = |title: &str, y: Axis, line: &dyn Fn(usize) -> Vec<Point>| {
-        let lines = [0, 1, 2].map(|axis| Series::line(line(axis)).axis(axis).label(AXES[axis]));
+    let panel = |title: &str, y: Axis, line: &dyn Fn(usize) -> Series| {
+        let lines = [0, 1, 2].map(|axis| line(axis).axis(axis).label(AXES[axis]));
         Panel::new(title, Axis::linear("time, s").between(start, end), y)
             .shaded(report.dwells)
             .tagged(1, numbers())
@@ -401,20 +381,19 @@ fn path(report: &Report) -> Plot {
     caption += "Rates are the raw gyro outputs about the body axes. Grey: dwells, numbered where there is room.";
     let y = Axis::linear("").including([0.0]).room(0.05, 0.16);
     panels.push(panel("rate about the body axes, °/s", y, &|axis| {
-        rate(&report.run.recording.imu, axis)
+        samples(&report.run.recording.imu, Sensor::Gyro, axis, DEGREE)
     }));
     Plot::new("path.svg", "Path", (1, 240), panels).caption(caption)
 }
 
 /// Elevation of a body axis above the horizon in degrees.
-fn elevation(table: &TableLog, axis: usize) -> Vec<Point> {
+fn elevation(table: &TableLog, axis: usize) -> Series {
     let line = table.time.iter().zip(&table.attitude);
-    line.map(|(&t, attitude)| (t, axis_elevation(&matrix(attitude), axis) / DEGREE))
-        .collect()
+    Series::line(line.map(|(&t, attitude)| (t, axis_elevation(&matrix(attitude), axis) / DEGREE)))
 }
 
 /// Azimuth of a body axis clockwise from North in degrees, interrupted where it jumps and where it is steep.
-fn azimuth(table: &TableLog, axis: usize) -> Vec<Point> {
+fn azimuth(table: &TableLog, axis: usize) -> Series {
     let gap = (f64::NAN, f64::NAN);
     let (mut last, mut line) = (f64::NAN, Vec::new());
     for (&t, attitude) in table.time.iter().zip(&table.attitude) {
@@ -435,71 +414,20 @@ fn azimuth(table: &TableLog, axis: usize) -> Vec<Point> {
         line.push((t, next));
         last = next;
     }
-    line
+    Series::line(line)
 }
 
 fn axis_elevation(c: &Matrix3<f64>, axis: usize) -> f64 {
     c[(2, axis)].clamp(-1.0, 1.0).asin()
 }
 
-/// Mean rate of each sample about a body axis in degrees a second.
-fn rate(imu: &ImuSamples, axis: usize) -> Vec<Point> {
-    let samples = imu.gyro.iter().enumerate();
-    let rate = |(k, angle): (usize, nalgebra::Vector3<f64>)| {
-        (
-            imu.time(k) + 0.5 * imu.period,
-            angle[axis] / imu.period / DEGREE,
-        )
+/// Mean of each sample of a triad along a body axis, in a unit per second.
+pub fn samples(imu: &ImuSamples, sensor: Sensor, axis: usize, unit: f64) -> Series {
+    let of = match sensor {
+        Sensor::Gyro => &imu.gyro,
+        Sensor::Accel => &imu.accel,
     };
-    thinned(samples.map(rate))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::attitude::{from_pitch_roll_heading, quaternion};
-
-    fn table(headings: impl Iterator<Item = f64>) -> TableLog {
-        let attitude: Vec<_> = headings
-            .map(|heading| quaternion(&from_pitch_roll_heading(0.0, 0.0, heading * DEGREE)))
-            .collect();
-        TableLog {
-            time: (0..attitude.len()).map(|k| k as f64).collect(),
-            attitude,
-            axes: Vec::new(),
-        }
-    }
-
-    #[test]
-    fn a_full_turn_in_heading_is_drawn_without_a_jump() {
-        let line = azimuth(&table((0..=36).map(|k| f64::from(k) * 10.0 + 5.0)), 1);
-        let pieces: Vec<&[Point]> = line.split(|point| point.0.is_nan()).collect();
-        assert_eq!(pieces.len(), 2);
-        for piece in &pieces {
-            assert!(piece.is_sorted_by(|a, b| b.1 - a.1 < 11.0 && b.1 > a.1));
-        }
-        let vertical = azimuth(&table((0..=36).map(f64::from)), 2);
-        assert!(
-            vertical.iter().all(|point| point.0.is_nan()),
-            "a vertical axis has no azimuth"
-        );
-    }
-
-    #[test]
-    fn an_azimuth_that_trembles_about_south_stays_on_one_side() {
-        let line = azimuth(&table((0..40).map(|k| 180.0 + f64::from(k % 2) - 0.5)), 1);
-        assert!(
-            line.windows(2)
-                .all(|pair| (pair[1].1 - pair[0].1).abs() < 2.0),
-            "{line:?}"
-        );
-    }
-
-    #[test]
-    fn the_front_axis_points_east_at_a_heading_of_ninety_degrees() {
-        let table = table(std::iter::once(90.0));
-        assert!((azimuth(&table, 1)[0].1 - 90.0).abs() < 1e-9);
-        assert!(elevation(&table, 1)[0].1.abs() < 1e-9);
-        assert!((elevation(&table, 2)[0].1 - 90.0).abs() < 1e-9);
-    }
+    let middle = |k: usize| imu.time(k) + 0.5 * imu.period;
+    let points = (0..of.len()).zip(of.iter());
+    Series::line(points.map(|(k, sample)| (middle(k), sample[axis] / imu.period / unit)))
 }

@@ -2,7 +2,7 @@
 
 mod brief;
 mod budget;
-mod figures;
+pub(super) mod figures;
 mod report;
 mod residuals;
 mod tables;

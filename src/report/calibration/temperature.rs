@@ -126,15 +126,13 @@ fn curves(outcome: &Outcome, thermal: &Thermal) -> Plot {
         let range = thermal.model.range.get(group.sensor());
         let unit = group.unit_value();
         let indices = group.estimated(&outcome.estimate);
-        let temperatures = (0..POINTS).map(|k| {
-            range.lowest + (range.highest - range.lowest) * k as f64 / (POINTS - 1) as f64
-        });
-        let curve: Vec<(f64, ParameterVector, ParameterMatrix)> = temperatures
-            .map(|t| {
-                let (change, covariance) = there(outcome, thermal, t);
-                (t, change, covariance)
-            })
-            .collect();
+        let curve: Vec<(f64, ParameterVector, ParameterMatrix)> =
+            steps(range.lowest, range.highest, POINTS)
+                .map(|t| {
+                    let (change, covariance) = there(outcome, thermal, t);
+                    (t, change, covariance)
+                })
+                .collect();
         let room = 0.03 * (range.highest - range.lowest);
         let x = Axis::linear("temperature, °C").between(range.lowest - room, range.highest + room);
         let title = format!("{}, change", group.titled());
@@ -194,30 +192,18 @@ fn departures(outcome: &Outcome, thermal: &Thermal) -> Plot {
             Axis::linear("").room(0.05, 0.05),
         )
         .with(Series::zero());
-        let count = indices.len().max(2);
         for (n, &i) in indices.iter().enumerate() {
             // Side by side, so that their intervals do not hide each other.
-            let beside = (n as f64 / (count - 1) as f64 - 0.5) * 0.05 * span;
-            let points: Vec<(f64, f64, f64)> = outcome
-                .alone
-                .iter()
-                .filter_map(|alone| {
-                    let estimate: &Estimate = alone.estimate.as_ref()?;
-                    let t = own_temperature(alone, i)?;
-                    let (change, _) = there(outcome, thermal, t);
-                    let off = estimate.vector()[i] - outcome.estimate.vector()[i] - change[i];
-                    Some((t + beside, off / unit, estimate.sigma()[i] / unit))
-                })
-                .collect();
-            let bars = points.iter().map(|&(t, off, s)| (t, off - s, off + s));
-            let marks = points.iter().map(|&(t, off, _)| (t, off));
-            panel = panel
-                .with(Series::new(Shape::Intervals(bars.collect())).nth(n))
-                .with(
-                    Series::marks(Mark::Dot, marks)
-                        .nth(n)
-                        .key(axis_name(form, i)),
-                );
+            let shift = beside(n, indices.len(), 0.06 * span);
+            let points = outcome.alone.iter().filter_map(|alone| {
+                let estimate: &Estimate = alone.estimate.as_ref()?;
+                let t = own_temperature(alone, i)?;
+                let (change, _) = there(outcome, thermal, t);
+                let off = estimate.vector()[i] - outcome.estimate.vector()[i] - change[i];
+                Some((t + shift, off / unit, estimate.sigma()[i] / unit))
+            });
+            let marks = Series::measured(Mark::Dot, points).nth(n);
+            panel = panel.with(marks.key(axis_name(form, i)));
         }
         panel
     };

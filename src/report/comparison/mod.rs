@@ -395,23 +395,13 @@ fn panel(comparison: &Comparison, group: Group) -> Panel {
         })
         .collect();
     let (y, kind) = axis(sides.iter().map(|(_, points)| reach(points)).collect());
-    let spacing = 0.6 / sides.len().max(1) as f64;
-    let series = sides.iter().enumerate().flat_map(|(n, (name, points))| {
-        let x =
-            |place: usize| place as f64 + spacing * (n as f64 - 0.5 * (sides.len() as f64 - 1.0));
-        let bars = points
-            .iter()
-            .enumerate()
-            .filter(|(_, (_, sigma))| *sigma > 0.0);
-        let bars = bars
-            .map(|(k, (d, sigma))| (x(k), d - sigma, d + sigma))
-            .collect();
-        let marks = points.iter().enumerate().map(|(k, point)| (x(k), point.0));
+    let series = sides.iter().enumerate().map(|(n, (name, points))| {
+        let shift = beside(n, sides.len(), 0.6);
+        let points = points.iter().enumerate();
+        let points = points.map(|(k, (off, sigma))| (k as f64 + shift, *off, *sigma));
         let mark = [Mark::Dot, Mark::Ring, Mark::Cross][n % 3];
-        [
-            Series::new(Shape::Intervals(bars)).nth(n).width(1.25),
-            Series::marks(mark, marks).nth(n).width(1.75).label(*name),
-        ]
+        let marks = Series::measured(mark, points).nth(n);
+        marks.width(1.75).label(*name)
     });
     let names = indices
         .iter()
