@@ -10,7 +10,7 @@ use turncal::imu::{PerSensor, Triad};
 use turncal::models::{self, Place};
 use turncal::report::Facts;
 use turncal::report::calibration::{self as of_calibration, Report};
-use turncal::report::demo::{self, Flown};
+use turncal::report::navigation::{Flown, add_missions};
 use turncal::run::{Dwell, Run};
 use turncal::simulation::{Scenario, Simulated};
 use turncal::study::navigation::{FORTY_HOURS, Mission, Motion};
@@ -106,7 +106,7 @@ impl Demo {
             navigation: navigation.as_deref(),
         };
         let mut document = report.document();
-        demo::add(&mut document, &names, &missions);
+        add_missions(&mut document, &names, &missions);
         activity.next("writing");
         let root = directory.path();
         write(&turning, &root)?;

@@ -39,14 +39,11 @@ pub mod certificate;
 pub mod check;
 pub mod comparison;
 pub mod conversion;
-pub mod demo;
 pub mod experiment;
 mod group;
 pub mod lot;
 pub mod navigation;
-mod outlook;
 mod prelude;
-mod quantity;
 pub mod table1;
 mod terms;
 #[cfg(test)]

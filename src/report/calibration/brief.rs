@@ -1,6 +1,6 @@
 //! What one screen has room for: accuracy and where it comes from, the independent check, what the calibration is worth.
 
-use super::super::outlook;
+use super::super::navigation;
 use super::report::Report;
 use super::{budget, tables};
 use crate::calibration::Estimate;
@@ -85,7 +85,7 @@ fn weakest(report: &Report) -> Option<String> {
 
 fn navigation(report: &Report) -> Option<String> {
     match report.navigation {
-        Ok(navigated @ [_, ..]) => Some(outlook::line(navigated)),
+        Ok(navigated @ [_, ..]) => Some(navigation::line(navigated)),
         _ => None,
     }
 }

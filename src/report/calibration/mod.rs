@@ -13,9 +13,9 @@ mod tests;
 use crate::calibration::{Finding, Verdict, Word};
 use crate::imu::{Noise, Sensor};
 use crate::report::prelude::*;
-use crate::report::{outlook, terms};
+use crate::report::{navigation, terms};
 
-pub use super::outlook::Navigated;
+pub use super::navigation::Navigated;
 pub use report::{ClosedForm, Report};
 
 impl Report<'_> {
@@ -58,10 +58,7 @@ impl Report<'_> {
             document.page(budget::left_off(self, estimate));
         }
         document.fold("Navigation");
-        outlook::add(&mut document, self.navigation);
-        if let Some(plot) = outlook::figure(self.navigation.unwrap_or_default()) {
-            document.page(plot);
-        }
+        navigation::add(&mut document, self.navigation);
         document.fold("Figures");
         document.pages(self.figures());
         document.fold("Observability, model, method and run");

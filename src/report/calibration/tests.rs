@@ -327,7 +327,11 @@ fn the_position_error_at_the_end_stands_in_the_summary() {
     let mut made_up = synthetic(InstallationForm::General);
     let end = made_up.navigation[1].outlook.last_mut().unwrap();
     end.error.as_mut().unwrap().position = nalgebra::Vector3::new(3.0, -4.0, 0.0) * 1852.0;
-    end.sigma.fixed_rows_mut::<3>(6).fill(1852.0);
+    end.sigma
+        .as_mut()
+        .unwrap()
+        .fixed_rows_mut::<3>(6)
+        .fill(1852.0);
     let summary = summary(&made_up.report());
     assert!(summary.contains("EKF 5.00 nmile (σ 1.41)"), "{summary}");
 }
