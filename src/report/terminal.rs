@@ -26,13 +26,8 @@ pub fn brief(document: &Document, width: Option<usize>) -> String {
         head.extend(wrapped(&format!("{word}   {of_it}"), "", Some(width)));
     }
     let mut parts = vec![head, findings(&document.findings, width)];
-    for block in &document.brief {
-        parts.push(match block {
-            Block::Facts(of) => facts(of, Some(width)),
-            Block::Table(of) => table(of, Some(width)),
-            _ => continue,
-        });
-    }
+    let brief = document.brief.iter();
+    parts.extend(brief.map(|block| shown(block, Some(width))));
     laid(parts)
 }
 
@@ -88,41 +83,38 @@ fn cut(text: &str, width: usize) -> String {
 /// Lines are at most `width` letters long; without a width, as for a file or a pipe, they are as long as they
 /// are, so that each row and each sentence is one line.
 pub fn text(document: &Document, width: Option<usize>) -> String {
-    let paragraphs = |texts: &[&str]| -> Vec<String> {
-        let texts = texts.iter().filter(|text| !text.is_empty());
-        texts.flat_map(|text| wrapped(text, "", width)).collect()
-    };
-    let lead = document.lead.iter().map(String::as_str);
+    let mut parts = vec![paragraphs(&[&document.title], width)];
     let verdict = document.verdict.as_ref();
     let verdict = verdict.map(|(word, of_it)| format!("{word}   {of_it}"));
-    let lead: Vec<&str> = std::iter::once(document.title.as_str())
-        .chain(verdict.as_deref())
-        .chain(lead)
-        .collect();
-    let mut parts = vec![paragraphs(&lead)];
-    parts.extend(document.brief.iter().filter_map(|block| match block {
-        Block::Facts(of) => Some(facts(of, width)),
-        _ => None,
-    }));
-    for (medium, block) in &document.blocks {
-        if *medium == Medium::Page {
-            continue;
-        }
-        parts.push(match block {
-            Block::Facts(of) => facts(of, width),
-            Block::Table(of) => table(of, width),
-            Block::List(of) => list(of, "  ", width),
-            Block::Text(heading, text) => paragraphs(&[heading, text]),
-            Block::Code(heading, code) => vec![heading.clone(), code.trim_end().to_owned()],
-            Block::Plot(_) | Block::Fold(_) => continue,
-        });
-    }
+    let lead = verdict.iter().chain(&document.lead);
+    parts[0].extend(lead.flat_map(|text| paragraphs(&[text], width)));
+    let brief = document.brief.iter();
+    let blocks = document.blocks.iter();
+    let blocks = blocks.filter(|(medium, _)| *medium != Medium::Page);
+    let all = brief.chain(blocks.map(|(_, block)| block));
+    parts.extend(all.map(|block| shown(block, width)));
     parts.push(list(&document.conclusions, "  ", width));
     parts.push(list(&document.warnings, "! ", width));
     let findings = document.findings.iter();
     let findings = findings.map(|finding| format!("{}  {finding}", finding.code));
     parts.push(list(&List::new("Findings", findings), "  ", width));
     laid(parts)
+}
+
+fn shown(block: &Block, width: Option<usize>) -> Vec<String> {
+    match block {
+        Block::Facts(of) => facts(of, width),
+        Block::Table(of) => table(of, width),
+        Block::List(of) => list(of, "  ", width),
+        Block::Text(heading, text) => paragraphs(&[heading, text], width),
+        Block::Code(heading, code) => vec![heading.clone(), code.trim_end().to_owned()],
+        Block::Plot(_) | Block::Fold(_) => Vec::new(),
+    }
+}
+
+fn paragraphs(texts: &[&str], width: Option<usize>) -> Vec<String> {
+    let texts = texts.iter().filter(|text| !text.is_empty());
+    texts.flat_map(|text| wrapped(text, "", width)).collect()
 }
 
 /// Parts with a line between them.

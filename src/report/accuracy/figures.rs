@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use crate::calibration::{Group, PARAMETERS};
 use crate::report::accuracy::tables;
-use crate::report::accuracy::tables::{compared, journey_name, percent};
+use crate::report::accuracy::tables::{compared, journey_name};
 use crate::report::prelude::*;
 use crate::study::accuracy::{Position, Region};
 use crate::study::{Accuracy, Figures, GroupAccuracy, NavigationAccuracy, Ratio};
@@ -321,13 +321,9 @@ fn of_mission(of: &NavigationAccuracy, cloud: Vec<Point>, reach: f64) -> Panel {
         if n == 0 { series } else { series.dashed() }
     });
     let mut notes = vec![format!("{} runs", count(cloud.len()))];
-    for held in &of.containment {
-        if let Region::Ellipse(sigmas) = held.region {
-            let found = percent(held.within as f64 / held.runs as f64);
-            let claimed = percent(held.region.probability());
-            notes.push(format!("within {sigmas}σ: {found} %, claimed {claimed} %"));
-        }
-    }
+    let ellipses = of.containment.iter();
+    let ellipses = ellipses.filter(|held| matches!(held.region, Region::Ellipse(_)));
+    notes.extend(ellipses.map(tables::held));
     let title = format!("{}: north given east, σ", journey_name(of.journey));
     let x = Axis::linear("east, σ").between(-reach, reach);
     let mut panel = Panel::new(title, x, Axis::linear("").between(-reach, reach))

@@ -25,7 +25,8 @@ pub fn figure(analysis: &NoiseAnalysis, sensor: Sensor) -> Plot {
     Plot::new(file, heading, (3, 440), panels).caption(
         "Overlapping Allan deviation against cluster time, both logarithmic, the same axes for all three. Dots: as \
          measured, with the 95 % interval as a band; black: the sum of what was found; dashed: each process \
-         found, with its slope and coefficient. Where no dashed line is, no slope was found.",
+         found, with its slope and coefficient. Where no dashed line is, no slope was found. Upright line: 1 s, \
+         where random walk is read off; ring: the lowest deviation.",
     )
 }
 
@@ -52,17 +53,35 @@ fn panel(axis: &AxisNoise, letter: char, sensor: Sensor, (low, high): Point) -> 
             let line = line.filter(|(_, y)| (low..=high).contains(y));
             panel = panel.with(Series::line(line).color(Color::Quiet).dashed().width(1.25));
         }
-        let sum = taus
-            .iter()
-            .map(|&tau| (tau, shown(identified.allan_variance(tau))));
+        let sum = taus.iter();
+        let sum = sum.map(|&tau| (tau, shown(identified.allan_variance(tau))));
         panel = panel.with(Series::line(sum).color(Color::Ink).width(1.0));
     }
-    let dots = curve
-        .tau
-        .iter()
-        .zip(&curve.variance)
-        .map(|(&tau, &v)| (tau, shown(v)));
-    panel.with(Series::marks(Mark::Dot, dots.filter(|(_, y)| *y > 0.0)).width(1.25))
+    let dots = curve.tau.iter().zip(&curve.variance);
+    let dots = dots.map(|(&tau, &variance)| (tau, shown(variance)));
+    panel = panel.with(Series::marks(Mark::Dot, dots.filter(|(_, y)| *y > 0.0)).width(1.25));
+    let second = curve.tau.partition_point(|&tau| tau < 1.0);
+    if second > 0 && second < curve.tau.len() {
+        panel = panel
+            .with(
+                Series::new(Shape::Upright(1.0))
+                    .color(Color::Quiet)
+                    .width(0.75),
+            )
+            .with(Series::words((1.0, low), Anchor::AboveLeft, "1 s").color(Color::Quiet));
+    }
+    if let Some((tau, deviation)) = axis.minimum().filter(|_| !axis.is_constant) {
+        let at = (tau, deviation / unit);
+        let words = format!(
+            "lowest: {} {symbol} at {} s",
+            three_digits(at.1),
+            three_digits(tau)
+        );
+        panel = panel
+            .with(Series::marks(Mark::Ring, [at]).color(Color::Ink))
+            .with(Series::words((at.0, at.1 * 0.93), Anchor::Below, words));
+    }
+    panel
 }
 
 /// Such as `N = 0.448 °/√h, slope −½`.
@@ -87,9 +106,6 @@ fn fine(taus: &[f64]) -> Vec<f64> {
     let (Some(first), Some(last)) = (taus.first(), taus.last()) else {
         return Vec::new();
     };
-    let steps = (POINTS * (last / first).log10()).ceil().max(1.0) as i32;
-    let part = |step: i32| f64::from(step) / f64::from(steps);
-    (0..=steps)
-        .map(|step| first * (last / first).powf(part(step)))
-        .collect()
+    let count = (POINTS * (last / first).log10()).ceil().max(1.0) as usize + 1;
+    steps(first.ln(), last.ln(), count).map(f64::exp).collect()
 }

@@ -3,9 +3,7 @@
 use nalgebra::Matrix3;
 
 use crate::attitude::matrix;
-use crate::calibration::{
-    Epoch, Estimate, Innovation, Nis, Observation, Outcome, ParameterVector, sensor_and_parameter,
-};
+use crate::calibration::{Epoch, Estimate, Innovation, Nis, Observation, Outcome, ParameterVector};
 use crate::imu::{AXES, Sensor};
 use crate::recording::{ImuSamples, TableLog};
 use crate::report::calibration::report::Report;
@@ -26,7 +24,6 @@ impl Report<'_> {
         let mut plots = Vec::new();
         plots.extend(match (self.truth_vector(), self.methods().as_slice()) {
             (Some(truth), methods @ [_, ..]) => Some(errors(methods, &truth)),
-            (None, &[(_, closed), (_, filter)]) => Some(differences(closed, filter)),
             _ => None,
         });
         if let Some(outcome) = self.against_time() {
@@ -60,20 +57,16 @@ impl Report<'_> {
                 return Panel::blank(format!("{}: all fixed", group.title()));
             }
             let line = |(n, &i): (usize, &usize)| {
-                let points = history
-                    .iter()
-                    .map(|m| (m.time, m.sigma[i] / group.unit_value()));
-                Series::line(points)
-                    .nth(n)
-                    .label(format!("σ {}", axis_name(form, i)))
+                let points = history.iter();
+                let points = points.map(|m| (m.time, m.sigma[i] / group.unit_value()));
+                let name = format!("σ {}", axis_name(form, i));
+                Series::line(points).nth(n).label(name)
             };
             let error = truth.map(|truth| {
                 let of = |m: &Epoch| Some(group.spread(&(m.estimate - truth), &indices)?.0);
                 let points = history.iter().filter_map(|m| Some((m.time, of(m)?)));
-                Series::line(points)
-                    .color(Color::Ink)
-                    .dashed()
-                    .label("error")
+                let line = Series::line(points).color(Color::Ink);
+                line.dashed().label("error")
             });
             Panel::new(group.titled(), self.time(), Axis::log(""))
                 .shaded(self.dwells)
@@ -87,12 +80,8 @@ impl Report<'_> {
         if truth.is_some() {
             caption += " Dashed: the largest true error in the group; it should end within a few σ of the lines.";
         }
-        let plot = Plot::new(
-            "sigma.svg",
-            "Accuracy against time",
-            (3, 330),
-            Group::all().map(panel),
-        );
+        let (heading, panels) = ("Accuracy against time", Group::all().map(panel));
+        let plot = Plot::new("sigma.svg", heading, (3, 330), panels);
         (!history.is_empty()).then(|| plot.caption(caption))
     }
 
@@ -105,31 +94,23 @@ impl Report<'_> {
         };
         let panel = |group: Group, index: usize| {
             let (unit, indices) = (group.unit_value(), group.estimated(estimate));
-            let of = |history: &[Epoch], of: &dyn Fn(&Epoch) -> f64| {
-                history
-                    .iter()
-                    .map(|m| (m.time, of(m) / unit))
-                    .collect::<Vec<_>>()
+            let of = |of: &dyn Fn(&Epoch) -> f64| -> Vec<Point> {
+                let history = outcome.history.iter();
+                history.map(|m| (m.time, of(m) / unit)).collect()
             };
             let error = |m: &Epoch| m.estimate[index] - reference[index];
-            let sigma = group
-                .spread(&estimate.sigma(), &indices)
-                .map_or(1.0, |x| x.1);
-            let history = &outcome.history;
+            let sigma = group.spread(&estimate.sigma(), &indices);
+            let sigma = sigma.map_or(1.0, |x| x.1);
             let title = format!("{} {}", group.title(), axis_name(estimate.form(), index));
             let y = Axis::symlog(sigma).between(-EXTENT * sigma, EXTENT * sigma);
             Panel::new(format!("{title}, {}", group.unit()), self.time(), y)
                 .shaded(self.dwells)
                 .with(Series::band(
-                    of(history, &|m| -3.0 * m.sigma[index]),
-                    of(history, &|m| 3.0 * m.sigma[index]),
+                    of(&|m| -3.0 * m.sigma[index]),
+                    of(&|m| 3.0 * m.sigma[index]),
                 ))
                 .with(Series::zero())
-                .with(
-                    Series::line(of(history, &error))
-                        .color(Color::Ink)
-                        .width(1.75),
-                )
+                .with(Series::line(of(&error)).color(Color::Ink).width(1.75))
         };
         let mut panels: Vec<Panel> = Vec::new();
         for group in Group::all() {
@@ -156,21 +137,16 @@ impl Report<'_> {
             ("attitude", Observation::Attitude, &consistency.attitude),
         ];
         let of_kind = |kind| {
-            outcome
-                .innovations
-                .iter()
-                .filter(move |i| i.observation == kind)
+            let all = outcome.innovations.iter();
+            all.filter(move |i| i.observation == kind)
         };
-        let kinds = kinds
-            .into_iter()
-            .filter(|(_, kind, _)| of_kind(*kind).next().is_some());
-        let kinds: Vec<(&str, Observation, &Nis)> = kinds.collect();
+        let is_there = |(_, kind, _): &(&str, Observation, &Nis)| of_kind(*kind).next().is_some();
+        let kinds: Vec<(&str, Observation, &Nis)> = kinds.into_iter().filter(is_there).collect();
         let panel = |name: &str, kind: Observation, direction: usize| {
             let point = |i: &Innovation| (i.time, i.whitened[direction].clamp(-EDGE, EDGE));
             let of = |accepted| {
-                of_kind(kind)
-                    .filter(move |i| i.accepted == accepted)
-                    .map(point)
+                let those = of_kind(kind).filter(move |i| i.accepted == accepted);
+                those.map(point)
             };
             let accepted: Vec<_> = of(true).collect();
             let shown = match accepted.len() <= DOTS {
@@ -178,28 +154,22 @@ impl Report<'_> {
                 false => Series::line(self.interrupted_by_turns(&accepted)),
             };
             let title = format!("{name}, {}, σ", ["east", "north", "up"][direction]);
-            Panel::new(
-                title,
-                self.time(),
-                Axis::linear("").between(-EDGE, EDGE).step(2.0),
-            )
-            .shaded(self.dwells)
-            .with(shown.width(1.0))
-            .with_all([-3.0, -1.0, 1.0, 3.0].map(bound))
-            .with(Series::marks(Mark::Cross, of(false)).nth(1))
+            let y = Axis::linear("").between(-EDGE, EDGE).step(2.0);
+            Panel::new(title, self.time(), y)
+                .shaded(self.dwells)
+                .with(shown.width(1.0))
+                .with_all([-3.0, -1.0, 1.0, 3.0].map(bound))
+                .with(Series::marks(Mark::Cross, of(false)).nth(1))
         };
-        let rows = kinds
-            .iter()
-            .flat_map(|&(name, kind, _)| [0, 1, 2].map(|d| panel(name, kind, d)));
+        let rows = kinds.iter();
+        let rows = rows.flat_map(|&(name, kind, _)| [0, 1, 2].map(|d| panel(name, kind, d)));
+        let sentences = kinds.iter().map(|(name, _, nis)| sentence(name, nis));
+        let sentences: Vec<String> = sentences.collect();
         let caption = format!(
             "Innovations of the last pass in units of their own σ; they should look like white noise of unit \
              variance. Solid lines: ±1σ; dashed: ±3σ. Where they are many the line runs through the extremes of \
              each stretch. Crosses: rejected by the gate; at the edge: ±{EDGE}σ or more. {}",
-            kinds
-                .iter()
-                .map(|(name, _, nis)| sentence(name, nis))
-                .collect::<Vec<_>>()
-                .join(" ")
+            sentences.join(" ")
         );
         let plot = Plot::new("innovations.svg", "Innovations", (3, 270), rows);
         (!kinds.is_empty()).then(|| plot.caption(caption))
@@ -300,47 +270,6 @@ fn method_mark(name: &str) -> (Mark, Color) {
         "EKF" => (Mark::Dot, Color::Nth(0)),
         _ => (Mark::Ring, Color::Nth(1)),
     }
-}
-
-/// The difference between both methods in its σ.
-fn differences(closed: &Estimate, filter: &Estimate) -> Plot {
-    let form = filter.form();
-    let difference = closed.vector() - filter.vector();
-    let variance = closed.covariance.diagonal() + filter.covariance.diagonal();
-    let points: Vec<(usize, f64)> = filter
-        .estimated()
-        .filter(|&i| variance[i] > 0.0)
-        .map(|i| (i, difference[i] / variance[i].sqrt()))
-        .collect();
-    let extent = 1.2 * points.iter().map(|point| point.1.abs()).fold(4.0, f64::max);
-    let y = match extent > 24.0 {
-        true => Axis::symlog(1.0),
-        false => Axis::linear(""),
-    };
-    let sensor = |index: usize| sensor_and_parameter(index).0;
-    let panels = points
-        .chunk_by(|a, b| sensor(a.0) == sensor(b.0))
-        .map(|triad| {
-            let x = Axis::places(triad.iter().map(|&(i, _)| short_name(form, i)));
-            let points = triad.iter().enumerate();
-            let points = points.map(|(k, &(_, y))| ((k as f64, y), (y.min(0.0), y.max(0.0))));
-            Panel::new(
-                "closed form minus EKF, σ",
-                x,
-                y.clone().between(-extent, extent),
-            )
-            .with(Series::zero())
-            .with_all([-3.0, 3.0].map(|y| {
-                Series::level(y)
-                    .dashed()
-                    .label(if y < 0.0 { "−3σ" } else { "+3σ" })
-            }))
-            .with(Series::whiskers(Mark::Dot, points).width(2.5))
-        });
-    Plot::new("comparison.svg", "Closed form against EKF", (1, 220), panels).caption(
-        "Closed form minus EKF in units of the σ of their difference, as if they had no data in common. Dashed: \
-         ±3.",
-    )
 }
 
 /// Nearer to the plumb line than this an axis has no azimuth worth drawing.

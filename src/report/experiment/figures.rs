@@ -71,33 +71,29 @@ fn distribution(experiment: &Experiment) -> Plot {
 }
 
 fn boxed(place: f64, worth: &Worth) -> Vec<Series> {
-    let color = color(worth.method.estimator);
     let (below, above) = (place - HALF, place + HALF);
     let at_end = &worth.at_end;
     let [first, third] = [at_end.quartiles.0, at_end.quartiles.1].map(miles);
     let [median, most] = [at_end.median, at_end.below_95].map(miles);
-    let upright = |x: f64| {
-        Series::line([(x, below), (x, above)])
-            .color(color)
-            .width(1.0)
-    };
-    vec![
-        Series::band(
-            vec![(first, below), (third, below)],
-            vec![(first, above), (third, above)],
-        ),
+    let upright = |x: f64| Series::line([(x, below), (x, above)]);
+    let thin = [
         upright(first),
         upright(third),
         upright(most),
-        Series::line([(third, place), (most, place)])
-            .color(color)
-            .width(1.0),
-        Series::marks(Mark::Dot, worth.errors.iter().map(|&e| (miles(e), place)))
-            .color(color)
-            .width(0.5),
+        Series::line([(third, place), (most, place)]),
+    ];
+    let color = color(worth.method.estimator);
+    let dots = worth.errors.iter().map(|&error| (miles(error), place));
+    let dots = Series::marks(Mark::Dot, dots).color(color).width(0.5);
+    let edge = |y: f64| vec![(first, y), (third, y)];
+    let mut all = vec![Series::band(edge(below), edge(above))];
+    all.extend(thin.map(|line| line.color(color).width(1.0)));
+    all.extend([
+        dots,
         upright(median).color(Color::Ink).width(3.0),
         Series::words((median, place), Anchor::Above, nmile(at_end.median)),
-    ]
+    ]);
+    all
 }
 
 fn against_time(experiment: &Experiment) -> Plot {

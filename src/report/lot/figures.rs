@@ -57,7 +57,7 @@ fn limits(lot: &Lot, quantities: &[Quantity]) -> Vec<f64> {
     };
     let of = |quantity: &Quantity| {
         let mut limits = specification.limits.iter();
-        let limit = limits.find(|limit| Quantity::Parameter(limit.parameter) == *quantity)?;
+        let limit = limits.find(|of| Quantity::Parameter(of.parameter) == *quantity)?;
         let at = |sign: f64| {
             let value = limit.nominal + sign * limit.within;
             shown(*quantity, Sample { value, sigma: 0.0 }).0

@@ -47,21 +47,24 @@ pub fn draw(on: &mut Canvas, frame: &Frame, series: &Series) {
             }
         }
         Shape::Bars(half, fill, bars) => {
-            for &(x, low, high) in bars.iter().filter(|bar| bar.2.is_finite()) {
+            for &(x, low, high) in bars.iter().filter(|of| of.2.is_finite() && of.1 != of.2) {
                 let (before, after) = (x - half, x + half);
                 let corners = [(before, low), (before, high), (after, high), (after, low)];
                 let corners = corners.map(|corner| frame.at(corner));
-                on.titled(
-                    &hover(frame, series, (x, high), (low, high)),
-                    |on| match fill {
-                        Fill::Solid => on.area(&corners, color),
-                        Fill::Pale => {
-                            on.area(&corners, BAND);
-                            on.stroke(&corners, color, pen.width)
-                        }
-                        Fill::Open => on.stroke(&corners, color, pen.width),
-                    },
-                )
+                let height = if *fill == Fill::Solid {
+                    high - low
+                } else {
+                    high
+                };
+                let text = hover(frame, series, (x, height), (height, height));
+                on.titled(&text, |on| match fill {
+                    Fill::Solid => on.area(&corners, color),
+                    Fill::Pale => {
+                        on.area(&corners, BAND);
+                        on.stroke(&corners, color, pen.width)
+                    }
+                    Fill::Open => on.stroke(&corners, color, pen.width),
+                })
             }
         }
         Shape::Level(y) => {

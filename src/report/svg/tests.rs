@@ -74,7 +74,7 @@ pub fn assert_sound(figures: &[String]) {
 
 /// Figures that were drawn and found sound.
 pub fn drawn<'a>(plots: impl Iterator<Item = &'a Plot>) -> Vec<String> {
-    let figures: Vec<String> = plots.map(|plot| draw(plot)).collect();
+    let figures: Vec<String> = plots.map(draw).collect();
     assert_sound(&figures);
     figures
 }

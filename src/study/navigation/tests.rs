@@ -1,4 +1,4 @@
-use nalgebra::Vector2;
+use nalgebra::{SVector, Vector2};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
