@@ -353,7 +353,7 @@ mod tests {
             tops.iter()
                 .find(|top| (top.0 - z).abs() < 0.5 * width)
                 .unwrap()
-                .1
+                .2
         };
         assert!((at(0.1) - 2.0 / (5.0 * width)).abs() < 1e-12);
         assert!((at(-0.1) - 1.0 / (5.0 * width)).abs() < 1e-12);

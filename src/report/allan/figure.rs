@@ -36,8 +36,14 @@ fn panel(axis: &AxisNoise, letter: char, sensor: Sensor, (low, high): Point) -> 
     let curve = &axis.curve;
     let title = format!("{} {letter}, {symbol}", sensor.name());
     let y = Axis::log("").between(low, high);
-    let mut panel = Panel::new(title, Axis::log("cluster time τ, s"), y)
-        .noted(axis.found().iter().map(|found| coefficient(found, sensor)));
+    let lowest = axis.minimum().filter(|_| !axis.is_constant);
+    let lowest = lowest.map(|(tau, deviation)| (tau, deviation / unit));
+    let words = lowest.map(|(tau, y)| {
+        let (y, tau) = (three_digits(y), three_digits(tau));
+        format!("lowest {y} {symbol} at {tau} s")
+    });
+    let found = axis.found().iter().map(|found| coefficient(found, sensor));
+    let mut panel = Panel::new(title, Axis::log("cluster time τ, s"), y).noted(found.chain(words));
     if let Some(identified) = &axis.identified {
         let intervals = curve.tau.iter().enumerate().filter_map(|(point, &tau)| {
             let (least, most) = identified.interval(curve, point, 0.95)?;
@@ -70,18 +76,7 @@ fn panel(axis: &AxisNoise, letter: char, sensor: Sensor, (low, high): Point) -> 
             )
             .with(Series::words((1.0, low), Anchor::AboveLeft, "1 s").color(Color::Quiet));
     }
-    if let Some((tau, deviation)) = axis.minimum().filter(|_| !axis.is_constant) {
-        let at = (tau, deviation / unit);
-        let words = format!(
-            "lowest: {} {symbol} at {} s",
-            three_digits(at.1),
-            three_digits(tau)
-        );
-        panel = panel
-            .with(Series::marks(Mark::Ring, [at]).color(Color::Ink))
-            .with(Series::words((at.0, at.1 * 0.93), Anchor::Below, words));
-    }
-    panel
+    panel.with_all(lowest.map(|at| Series::marks(Mark::Ring, [at]).color(Color::Ink)))
 }
 
 /// Such as `N = 0.448 °/√h, slope −½`.

@@ -1,6 +1,6 @@
 //! One series in its frame.
 
-use super::super::plot::{Anchor, Axis, Fill, Mark, Pen, Point, Series, Shape, thinned};
+use super::super::plot::{Anchor, Axis, Fill, Mark, Pen, Point, Series, Shape, Upright, thinned};
 use super::grid::Frame;
 use super::{Canvas, Height, SMALL, rgb};
 use crate::number::three_digits;
@@ -28,45 +28,8 @@ pub fn draw(on: &mut Canvas, frame: &Frame, series: &Series) {
                 on.area(&outline, BAND);
             }
         }
-        Shape::Marks(mark, points) => {
-            let is_hovered = points.len() <= HOVERED;
-            for &(at, ends) in points {
-                if visible(frame, &[at]).is_empty() {
-                    continue;
-                }
-                let drawn = |on: &mut Canvas| {
-                    if ends.0 < ends.1 {
-                        whisker(on, frame, (at.0, ends), color);
-                    }
-                    marked(on, frame.at(at), *mark, pen)
-                };
-                match is_hovered {
-                    true => on.titled(&hover(frame, series, at, ends), drawn),
-                    false => drawn(on),
-                }
-            }
-        }
-        Shape::Bars(half, fill, bars) => {
-            for &(x, low, high) in bars.iter().filter(|of| of.2.is_finite() && of.1 != of.2) {
-                let (before, after) = (x - half, x + half);
-                let corners = [(before, low), (before, high), (after, high), (after, low)];
-                let corners = corners.map(|corner| frame.at(corner));
-                let height = if *fill == Fill::Solid {
-                    high - low
-                } else {
-                    high
-                };
-                let text = hover(frame, series, (x, height), (height, height));
-                on.titled(&text, |on| match fill {
-                    Fill::Solid => on.area(&corners, color),
-                    Fill::Pale => {
-                        on.area(&corners, BAND);
-                        on.stroke(&corners, color, pen.width)
-                    }
-                    Fill::Open => on.stroke(&corners, color, pen.width),
-                })
-            }
-        }
+        Shape::Marks(mark, points) => marks(on, frame, series, *mark, points),
+        Shape::Bars(half, fill, of) => bars(on, frame, series, (*half, *fill), of),
         Shape::Level(y) => {
             let y = frame.at_y(*y);
             on.line(&[(left, y), (right, y)], pen)
@@ -84,6 +47,62 @@ pub fn draw(on: &mut Canvas, frame: &Frame, series: &Series) {
             };
             on.text(text, at, lie, color, SMALL)
         }
+    }
+}
+
+fn marks(
+    on: &mut Canvas,
+    frame: &Frame,
+    series: &Series,
+    mark: Mark,
+    points: &[(Point, (f64, f64))],
+) {
+    let is_hovered = points.len() <= HOVERED;
+    for &(at, ends) in points {
+        if visible(frame, &[at]).is_empty() {
+            continue;
+        }
+        let drawn = |on: &mut Canvas| {
+            if ends.0 < ends.1 {
+                whisker(on, frame, (at.0, ends), rgb(series.pen.color));
+            }
+            marked(on, frame.at(at), mark, series.pen)
+        };
+        match is_hovered {
+            true => on.titled(&hover(frame, series, at, ends), drawn),
+            false => drawn(on),
+        }
+    }
+}
+
+fn bars(
+    on: &mut Canvas,
+    frame: &Frame,
+    series: &Series,
+    (half, fill): (f64, Fill),
+    bars: &[Upright],
+) {
+    let (pen, color) = (series.pen, rgb(series.pen.color));
+    let drawn = |of: &&Upright| of.2.is_finite() && of.1 != of.2;
+    for &(x, low, high) in bars.iter().filter(drawn) {
+        let (before, after) = (x - half, x + half);
+        let corners = [(before, low), (before, high), (after, high), (after, low)];
+        let corners = corners.map(|corner| frame.at(corner));
+        // Of stacked bars the height is what each adds.
+        let height = if fill == Fill::Solid {
+            high - low
+        } else {
+            high
+        };
+        let text = hover(frame, series, (x, height), (height, height));
+        on.titled(&text, |on| match fill {
+            Fill::Solid => on.area(&corners, color),
+            Fill::Pale => {
+                on.area(&corners, BAND);
+                on.stroke(&corners, color, pen.width)
+            }
+            Fill::Open => on.stroke(&corners, color, pen.width),
+        })
     }
 }
 
