@@ -11,7 +11,7 @@ use turncal::calibration::{
 use turncal::imu::{PerSensor, Triad};
 use turncal::models::{self, Place};
 use turncal::report::calibration::{self as of_calibration, Report};
-use turncal::report::demo::{self, Flown};
+use turncal::report::navigation::{Flown, add_missions};
 use turncal::report::{Document, Facts};
 use turncal::run::{Dwell, Run};
 use turncal::simulation::{Scenario, Simulated};
@@ -146,7 +146,7 @@ fn document(
         format!("EKF, {table_time:.0} min"),
         format!("closed form, {whole_time:.0} min"),
     ];
-    demo::add(
+    add_missions(
         &mut document,
         &names,
         &fly(run, &estimates, &turning.truth)?,

@@ -1,8 +1,8 @@
 //! `turncal list`
 
-use comfy_table::{ContentArrangement, Table, presets};
 use serde::Serialize;
 use turncal::models::Embedded;
+use turncal::report::wrapped;
 
 use crate::cli::terminal::{columns, print};
 
@@ -40,19 +40,15 @@ impl List {
             return print((serde_json::to_string_pretty(&entries)? + "\n").as_bytes());
         }
         let widest = entries.iter().map(|entry| entry.name.len()).max();
+        let widest = widest.unwrap_or(0);
+        let indent = " ".repeat(widest + 4);
+        let row = |entry: &Entry| {
+            let row = format!("  {:widest$}  {}", entry.name, entry.description);
+            wrapped(&row, &indent, columns().map(usize::from)).join("\n") + "\n"
+        };
         let of_kind = entries.chunk_by(|a, b| a.kind == b.kind).map(|alike| {
-            let mut table = Table::new();
-            table
-                .load_preset(presets::NOTHING)
-                .set_content_arrangement(ContentArrangement::Dynamic);
-            if let Some(columns) = columns() {
-                table.set_width(columns);
-            }
-            for entry in alike {
-                let name = format!(" {:1$}", entry.name, widest.unwrap_or(0));
-                table.add_row([&name, &entry.description]);
-            }
-            format!("{}:\n{}\n", alike[0].kind, table.trim_fmt())
+            let rows: String = alike.iter().map(row).collect();
+            format!("{}:\n{rows}", alike[0].kind)
         });
         print(of_kind.collect::<Vec<_>>().join("\n").as_bytes())
     }

@@ -7,7 +7,7 @@
 use serde::{Deserialize, Serialize};
 use statrs::function::erf::erfc;
 
-use super::quantity::Sample;
+use super::quantity::{Quantity, Sample};
 
 /// Limits for units, with the required confidence.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -52,6 +52,13 @@ pub struct Check {
     pub probability: Option<f64>,
     /// The result.
     pub verdict: Verdict,
+}
+
+impl Check {
+    /// The parameter that is checked.
+    pub fn quantity(&self) -> Quantity {
+        Quantity::Parameter(self.limit.parameter)
+    }
 }
 
 /// Probability that a value at this distance from the centre of a limit is outside it.

@@ -71,6 +71,13 @@ impl Row {
             .max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))
     }
 
+    /// The check of a quantity, if there is a limit for it.
+    pub fn check_of(&self, quantity: Quantity) -> Option<&Check> {
+        self.checks
+            .iter()
+            .find(|check| check.quantity() == quantity)
+    }
+
     /// A quantity of the unit.
     pub fn sample(&self, quantity: Quantity) -> Option<Sample> {
         let canonical = self.canonical.as_ref().ok()?;

@@ -51,22 +51,18 @@ fn table(at_rest: &AtRest) -> Table {
     let row = |of: &AxisAtRest| {
         let (unit, symbol) = (group(of).unit_value(), group(of).unit());
         let (value, sigma) = of.at_reference;
-        let largest = of
-            .hysteresis
-            .iter()
-            .map(|(_, y)| *y)
-            .max_by(|a, b| a.abs().total_cmp(&b.abs()));
-        vec![
+        let hysteresis = of.hysteresis.iter().map(|(_, y)| *y);
+        let largest = hysteresis.max_by(|a, b| a.abs().total_cmp(&b.abs()));
+        let figures = [of.about_mean, of.residual, of.cross_validated, of.cubic];
+        let mut row = cells![
             name(of),
-            symbol.to_owned(),
+            symbol,
             plus_minus(value / unit, sigma / unit),
-            order(of),
-            three_digits(of.about_mean / unit),
-            three_digits(of.residual / unit),
-            three_digits(of.cross_validated / unit),
-            three_digits(of.cubic / unit),
-            largest.map_or("–".to_owned(), |y| three_digits(y / unit)),
-        ]
+            order(of)
+        ];
+        row.extend(figures.map(|figure| three_digits(figure / unit)));
+        row.push(or_dash(largest, |y| three_digits(y / unit)));
+        row
     };
     let sections = at_rest
         .axes
@@ -74,17 +70,10 @@ fn table(at_rest: &AtRest) -> Table {
         .map(|of| of.iter().map(row).collect::<Vec<_>>());
     Table::new(
         "Outputs against temperature",
-        [
-            "output",
-            "unit",
-            "at the reference ± 1σ",
-            "order",
-            "RMS about\nits mean",
-            "RMS left",
-            "cross-\nvalidated",
-            "of a cubic",
-            "largest\nhysteresis",
-        ],
+        columns(
+            "output | unit | at the reference ± 1σ | order | RMS about its mean | RMS left | cross-validated | \
+             of a cubic | largest hysteresis",
+        ),
     )
     .sections(sections)
     .note(format!(
@@ -107,13 +96,10 @@ fn curves(at_rest: &AtRest) -> Plot {
                 .map(|s| (s.temperature, (s.output - of.at_reference.0) / unit))
                 .collect::<Vec<_>>()
         };
-        let at = |k: usize| {
-            range.lowest + (range.highest - range.lowest) * k as f64 / (POINTS - 1) as f64
-        };
         let edge = |factor: f64| {
-            let points = (0..POINTS).map(|k| {
-                let (change, sigma) = of.at(range, at(k));
-                (at(k), (change + factor * sigma) / unit)
+            let points = steps(range.lowest, range.highest, POINTS).map(|temperature| {
+                let (change, sigma) = of.at(range, temperature);
+                (temperature, (change + factor * sigma) / unit)
             });
             points.collect::<Vec<_>>()
         };
@@ -121,27 +107,19 @@ fn curves(at_rest: &AtRest) -> Plot {
         let title = format!("{}, {}", name(of), group(of).unit());
         Panel::new(title, x, Axis::linear("").room(0.02, 0.02))
             .with(Series::band(edge(-1.0), edge(1.0)))
-            .with(
-                Series::marks(Mark::Dot, marks(false))
-                    .nth(1)
-                    .width(0.5)
-                    .key("heating"),
-            )
-            .with(
-                Series::marks(Mark::Dot, marks(true))
-                    .nth(2)
-                    .width(0.5)
-                    .key("cooling"),
+            .with_all(
+                [(false, 1, "heating"), (true, 2, "cooling")].map(|(cools, n, name)| {
+                    let marks = Series::marks(Mark::Dot, marks(cools)).nth(n);
+                    marks.width(0.5).key(name)
+                }),
             )
             .with(Series::line(edge(0.0)).nth(0).width(2.0))
     };
-    Plot::new(
-        "temperature.svg",
+    let (heading, panels) = (
         "Outputs at rest against temperature",
-        (3, 300),
         at_rest.axes.iter().map(panel),
-    )
-    .caption(
+    );
+    Plot::new("temperature.svg", heading, (3, 300), panels).caption(
         "Change from the output at the reference temperature. Line: polynomial at a temperature that does not change; \
          band: ±1σ of a second about it, by cross-validation. Where heating and cooling lie apart the instrument is not \
          at the temperature of its sensor, or has hysteresis.",
@@ -153,21 +131,16 @@ fn hysteresis(at_rest: &AtRest) -> Plot {
         let unit = group(of).unit_value();
         let points = of.hysteresis.iter().map(|&(t, y)| (t, y / unit));
         let title = format!("{}, {}", name(of), group(of).unit());
-        Panel::new(
-            title,
-            Axis::linear("temperature, °C"),
-            Axis::linear("").room(0.05, 0.05),
-        )
-        .with(Series::zero())
-        .with(Series::line(points))
+        let y = Axis::linear("").room(0.05, 0.05);
+        Panel::new(title, Axis::linear("temperature, °C"), y)
+            .with(Series::zero())
+            .with(Series::line(points))
     };
-    Plot::new(
-        "hysteresis.svg",
+    let (heading, panels) = (
         "Hysteresis: cooling less heating",
-        (3, 220),
         at_rest.axes.iter().map(panel),
-    )
-    .caption(
+    );
+    Plot::new("hysteresis.svg", heading, (3, 220), panels).caption(
         "Mean output while it cools less that while it heats, at the same temperature within 2 K.",
     )
 }

@@ -241,6 +241,21 @@ macro_rules! into_block {
 }
 into_block!(Facts, Table, Plot, List);
 
+/// A text that begins with a capital.
+pub(super) fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters.next().into_iter().flat_map(char::to_uppercase);
+    first.chain(letters).collect()
+}
+
+/// Two objects of JSON as one.
+pub(super) fn joined(mut one: Value, other: Value) -> Value {
+    if let (Value::Object(one), Value::Object(other)) = (&mut one, other) {
+        one.extend(other);
+    }
+    one
+}
+
 /// Placeholder for a missing number.
 pub(super) const NONE: &str = "–";
 

@@ -62,6 +62,12 @@ impl Group {
     }
 }
 
+/// Headings of a table with a column for each group, after that of its rows.
+pub fn group_columns(of_rows: &str) -> Vec<String> {
+    let columns = Group::all().map(|group| format!("{}, {}", group.short(), group.unit()));
+    std::iter::once(of_rows.to_owned()).chain(columns).collect()
+}
+
 /// The end of a parameter's name, such as `x` or `xy`.
 pub fn axis_name(form: InstallationForm, index: usize) -> String {
     parameter_name(form, index)

@@ -1,17 +1,53 @@
-//! A document as a page that needs nothing else.
+//! A document as files: a page that needs nothing else, every figure, and what else it holds.
+
+use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::document::{Block, Document, Facts, List, Medium, Table};
 use super::plot::Plot;
+use super::svg;
 use crate::calibration::{Finding, FindingKind as Kind};
 
 /// The style of every page.
 const STYLE: &str = include_str!("style.css");
 
+/// A file of a report that could not be written.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write {path}: {source}; the directory must exist and be writable", path = path.display())]
+pub struct ReportError {
+    /// The file.
+    pub path: PathBuf,
+    /// What the system said.
+    pub source: io::Error,
+}
+
+/// The files of a document by name: `index.html`, which holds the figures and needs neither other files nor a
+/// network, every figure as an SVG file of its own, and the document's further files.
+pub fn files(document: &Document) -> Vec<(String, String)> {
+    let drawn: Vec<String> = document.plots().map(svg::draw).collect();
+    let page = ("index.html".to_owned(), page(document, &drawn));
+    let figures = document.plots().map(|plot| plot.file.clone()).zip(drawn);
+    let further = document.files.iter().cloned();
+    figures.chain(further).chain([page]).collect()
+}
+
+/// Writes the [`files`] of a document into an existing directory.
+///
+/// # Errors
+/// [`ReportError`] if a file cannot be written.
+pub fn write(document: &Document, directory: &Path) -> Result<(), ReportError> {
+    for (name, text) in files(document) {
+        let path = directory.join(name);
+        fs::write(&path, text).map_err(|source| ReportError { path, source })?;
+    }
+    Ok(())
+}
+
 /// The page: warnings first, then what the figures show, then all else in its order. `drawn` gives the SVG
 /// document of each plot in order.
-pub fn page(document: &Document, drawn: &[String]) -> String {
+pub(super) fn page(document: &Document, drawn: &[String]) -> String {
     let mut drawn = drawn.iter();
     let blocks = document.blocks.iter();
     let shown = blocks.filter(|(medium, _)| *medium != Medium::Terminal);

@@ -1,6 +1,6 @@
 //! A document as text for a terminal of any width.
 
-use comfy_table::{CellAlignment, ContentArrangement, presets};
+use textwrap::core::display_width;
 use textwrap::{Options, WordSplitter};
 
 use super::document::{Block, Document, Facts, List, Medium, Table};
@@ -26,13 +26,8 @@ pub fn brief(document: &Document, width: Option<usize>) -> String {
         head.extend(wrapped(&format!("{word}   {of_it}"), "", Some(width)));
     }
     let mut parts = vec![head, findings(&document.findings, width)];
-    for block in &document.brief {
-        parts.push(match block {
-            Block::Facts(of) => facts(of, Some(width)),
-            Block::Table(of) => table(of, Some(width)),
-            _ => continue,
-        });
-    }
+    let brief = document.brief.iter();
+    parts.extend(brief.map(|block| shown(block, Some(width))));
     laid(parts)
 }
 
@@ -71,12 +66,12 @@ fn findings(all: &[Finding], width: usize) -> Vec<String> {
 
 /// As much of a line as has room.
 fn cut(text: &str, width: usize) -> String {
-    if textwrap::core::display_width(text) <= width {
+    if display_width(text) <= width {
         return text.to_owned();
     }
     let mut room = width.saturating_sub(1);
     let fits = |letter: &char| {
-        let wide = textwrap::core::display_width(letter.encode_utf8(&mut [0; 4]));
+        let wide = display_width(letter.encode_utf8(&mut [0; 4]));
         let is_room = wide <= room;
         room = room.saturating_sub(wide);
         is_room
@@ -88,41 +83,38 @@ fn cut(text: &str, width: usize) -> String {
 /// Lines are at most `width` letters long; without a width, as for a file or a pipe, they are as long as they
 /// are, so that each row and each sentence is one line.
 pub fn text(document: &Document, width: Option<usize>) -> String {
-    let paragraphs = |texts: &[&str]| -> Vec<String> {
-        let texts = texts.iter().filter(|text| !text.is_empty());
-        texts.flat_map(|text| wrapped(text, "", width)).collect()
-    };
-    let lead = document.lead.iter().map(String::as_str);
+    let mut parts = vec![paragraphs(&[&document.title], width)];
     let verdict = document.verdict.as_ref();
     let verdict = verdict.map(|(word, of_it)| format!("{word}   {of_it}"));
-    let lead: Vec<&str> = std::iter::once(document.title.as_str())
-        .chain(verdict.as_deref())
-        .chain(lead)
-        .collect();
-    let mut parts = vec![paragraphs(&lead)];
-    parts.extend(document.brief.iter().filter_map(|block| match block {
-        Block::Facts(of) => Some(facts(of, width)),
-        _ => None,
-    }));
-    for (medium, block) in &document.blocks {
-        if *medium == Medium::Page {
-            continue;
-        }
-        parts.push(match block {
-            Block::Facts(of) => facts(of, width),
-            Block::Table(of) => table(of, width),
-            Block::List(of) => list(of, "  ", width),
-            Block::Text(heading, text) => paragraphs(&[heading, text]),
-            Block::Code(heading, code) => vec![heading.clone(), code.trim_end().to_owned()],
-            Block::Plot(_) | Block::Fold(_) => continue,
-        });
-    }
+    let lead = verdict.iter().chain(&document.lead);
+    parts[0].extend(lead.flat_map(|text| paragraphs(&[text], width)));
+    let brief = document.brief.iter();
+    let blocks = document.blocks.iter();
+    let blocks = blocks.filter(|(medium, _)| *medium != Medium::Page);
+    let all = brief.chain(blocks.map(|(_, block)| block));
+    parts.extend(all.map(|block| shown(block, width)));
     parts.push(list(&document.conclusions, "  ", width));
     parts.push(list(&document.warnings, "! ", width));
     let findings = document.findings.iter();
     let findings = findings.map(|finding| format!("{}  {finding}", finding.code));
     parts.push(list(&List::new("Findings", findings), "  ", width));
     laid(parts)
+}
+
+fn shown(block: &Block, width: Option<usize>) -> Vec<String> {
+    match block {
+        Block::Facts(of) => facts(of, width),
+        Block::Table(of) => table(of, width),
+        Block::List(of) => list(of, "  ", width),
+        Block::Text(heading, text) => paragraphs(&[heading, text], width),
+        Block::Code(heading, code) => vec![heading.clone(), code.trim_end().to_owned()],
+        Block::Plot(_) | Block::Fold(_) => Vec::new(),
+    }
+}
+
+fn paragraphs(texts: &[&str], width: Option<usize>) -> Vec<String> {
+    let texts = texts.iter().filter(|text| !text.is_empty());
+    texts.flat_map(|text| wrapped(text, "", width)).collect()
 }
 
 /// Parts with a line between them.
@@ -136,7 +128,7 @@ fn laid(parts: Vec<Vec<String>>) -> String {
 
 /// Lines of at most `width` letters, all but the first behind an indent; what is laid out is left as it is.
 pub fn wrapped(text: &str, indent: &str, width: Option<usize>) -> Vec<String> {
-    let fits = |width: &usize| textwrap::core::display_width(text) > *width;
+    let fits = |width: &usize| display_width(text) > *width;
     let Some(width) = width.filter(fits) else {
         return vec![text.to_owned()];
     };
@@ -226,7 +218,7 @@ fn cell_width(of: &Table, column: usize) -> usize {
         .iter()
         .flatten()
         .filter_map(|row| row.get(column));
-    let widths = cells.map(|cell| textwrap::core::display_width(cell));
+    let widths = cells.map(|cell| display_width(cell));
     widths.max().unwrap_or(0)
 }
 
@@ -241,49 +233,46 @@ fn heading(of: &Table, column: usize, broken: bool) -> String {
 
 fn column_width(of: &Table, column: usize, broken: bool) -> usize {
     let heading = heading(of, column, broken);
-    let lines = heading.lines().map(textwrap::core::display_width);
+    let lines = heading.lines().map(display_width);
     lines.max().unwrap_or(0).max(cell_width(of, column))
 }
 
-/// Some columns with a rule before each section.
+/// Some columns with a rule before each section: the first to the left, the others to the right.
 fn laid_out(of: &Table, columns: &[usize], broken: bool) -> Vec<String> {
-    let mut table = comfy_table::Table::new();
-    table
-        .load_preset(presets::NOTHING)
-        .set_content_arrangement(ContentArrangement::Disabled)
-        .set_header(columns.iter().map(|&column| heading(of, column, broken)));
-    for row in of.sections.iter().flatten() {
-        table.add_row(
-            columns
-                .iter()
-                .map(|&column| row.get(column).map_or("", String::as_str)),
-        );
-    }
-    let last = columns.len().saturating_sub(1);
-    for (place, column) in table.column_iter_mut().enumerate() {
-        column.set_padding((0, if place == last { 0 } else { GAP as u16 }));
-        if place > 0 {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
-    let shown = table.to_string();
-    let lines: Vec<&str> = shown.lines().collect();
-    let widest = lines
+    let widths = columns
         .iter()
-        .map(|line| textwrap::core::display_width(line))
-        .max();
-    let rule = "─".repeat(widest.unwrap_or(0));
-    // A heading may take several lines, a row takes one.
-    let rows: usize = of.sections.iter().map(Vec::len).sum();
-    let (heading, mut rows) = lines.split_at(lines.len().saturating_sub(rows));
-    let mut laid_out: Vec<String> = heading.iter().map(|&line| line.to_owned()).collect();
+        .map(|&column| column_width(of, column, broken));
+    let widths: Vec<usize> = widths.collect();
+    let line = |cell: &dyn Fn(usize) -> String| {
+        let cells = columns.iter().zip(&widths).enumerate();
+        let cells = cells.map(|(place, (&column, width))| {
+            let cell = cell(column);
+            let free = " ".repeat(width.saturating_sub(display_width(&cell)));
+            match place {
+                0 => cell + &free,
+                _ => free + &cell,
+            }
+        });
+        cells.collect::<Vec<_>>().join(&" ".repeat(GAP))
+    };
+    let heading = |column: usize, n: usize| {
+        let heading = heading(of, column, broken);
+        heading.lines().nth(n).unwrap_or_default().to_owned()
+    };
+    let heights = columns
+        .iter()
+        .map(|&column| self::heading(of, column, broken).lines().count());
+    let heading_lines = 0..heights.max().unwrap_or(0).max(1);
+    let mut lines: Vec<String> = heading_lines
+        .map(|n| line(&|column| heading(column, n)))
+        .collect();
+    let wide = widths.iter().sum::<usize>() + GAP * widths.len().saturating_sub(1);
     for section in &of.sections {
-        let (these, others) = rows.split_at(section.len().min(rows.len()));
-        laid_out.push(rule.clone());
-        laid_out.extend(these.iter().map(|&line| line.to_owned()));
-        rows = others;
+        lines.push("─".repeat(wide));
+        let row = |row: &Vec<String>| line(&|column| row.get(column).cloned().unwrap_or_default());
+        lines.extend(section.iter().map(row));
     }
-    laid_out
+    lines
 }
 
 /// The text with a 0 for every digit: how a result is shown, whatever its figures are.

@@ -12,11 +12,10 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::navigation::NavigationStudyError;
-use crate::calibration::ErrorTerm;
-use crate::calibration::Nis;
-use crate::calibration::NoisePolicy;
-use crate::calibration::{CalibrationError, ErrorTermTest, Group, mean_square_interval};
-use crate::calibration::{PARAMETERS, ParameterVector};
+use crate::calibration::{
+    CalibrationError, ErrorTerm, ErrorTermTest, Group, Nis, NoisePolicy, PARAMETERS,
+    ParameterVector, mean_square_interval,
+};
 use crate::imu::InstallationForm;
 use crate::models::ModelError;
 use crate::simulation::{Runs, Scenario};
@@ -190,6 +189,20 @@ impl Accuracy {
     /// Results of the filter in the runs in which it did not fail.
     pub fn filtered(&self) -> impl Iterator<Item = &Filtered> {
         filtered(&self.trials)
+    }
+
+    /// The filter's installation form and that of the truth.
+    pub fn forms(&self) -> (InstallationForm, InstallationForm) {
+        (self.study.form, self.study.scenario.installation.form)
+    }
+
+    /// NIS over all runs of each kind of observation that there was.
+    pub fn nis(&self) -> impl Iterator<Item = (&'static str, &Nis)> {
+        let kinds = [
+            ("zero velocity", &self.velocity),
+            ("table attitude", &self.table),
+        ];
+        kinds.into_iter().filter(|(_, nis)| nis.count > 0)
     }
 
     /// Runs that failed, with the reason.

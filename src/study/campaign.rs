@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::accuracy::{Figures, Squares, StudyError};
 use crate::calibration::{
-    CalibrationError, Coefficient, Group, NoisePolicy, Options, Outcome, PARAMETERS, Problem,
+    CalibrationError, Coefficient, Group, Nees, NoisePolicy, Options, Outcome, PARAMETERS, Problem,
     UNWATCHED, estimate, mean_square_interval, nees, thermal_bound, to_vector,
 };
 use crate::imu::{InstallationForm, ParameterKind, PerSensor, ThermalCoefficients, Triad};
@@ -44,12 +44,12 @@ pub struct CampaignAccuracy {
 /// One campaign.
 #[derive(Debug, Clone)]
 pub struct CampaignTrial {
-    /// NEES of all parameters and coefficients, with the full covariance, and their number.
-    pub nees: (f64, usize),
+    /// NEES of all parameters and coefficients, with the full covariance.
+    pub nees: Nees,
     /// Errors of the parameters at the reference, and of their coefficients.
     pub errors: Vec<ErrorOf>,
-    /// Selected and true order of each group, each with the presence of the rate term.
-    pub orders: [OrderChosen; 6],
+    /// Whether the true order of each of [`Group::all`] was selected, the rate term included.
+    pub order_is_right: Vec<bool>,
 }
 
 /// An error of one campaign.
@@ -61,15 +61,6 @@ pub struct ErrorOf {
     pub function: Option<usize>,
     /// Squared error, stated σ² and squared bound, normalised.
     pub squares: [f64; 3],
-}
-
-/// Selected and true order of a group.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct OrderChosen {
-    /// Selected order, and whether the rate term is on.
-    pub chosen: (usize, bool),
-    /// The same of the truth.
-    pub truth: (usize, bool),
 }
 
 impl CampaignStudy {
@@ -140,18 +131,14 @@ fn truth(outcome: &Outcome, simulated: &[Simulated]) -> PerSensor<Triad> {
         .first()
         .map(|one| (one.common, one.thermal.as_ref()));
     let (common, thermal) = base.unwrap_or((outcome.estimate.triads, None));
-    let at = match (thermal, &outcome.thermal) {
-        (Some(truth), Some(of)) => {
-            let reference = |sensor| of.model.range.get(sensor).reference;
-            PerSensor::from_fn(|sensor| *truth.at(&common, reference(sensor), 0.0).get(sensor))
-        }
-        (Some(truth), None) => {
-            let mean = mean_temperature(simulated);
-            truth.at(&common, mean, 0.0)
-        }
-        _ => common,
-    };
-    PerSensor::from_fn(|sensor| at.get(sensor).in_form(form))
+    PerSensor::from_fn(|sensor| {
+        let at = match (thermal, &outcome.thermal) {
+            (Some(truth), Some(of)) => truth.at(&common, of.model.range.get(sensor).reference, 0.0),
+            (Some(truth), None) => truth.at(&common, mean_temperature(simulated), 0.0),
+            _ => common,
+        };
+        at.get(sensor).in_form(form)
+    })
 }
 
 fn mean_temperature(simulated: &[Simulated]) -> f64 {
@@ -211,48 +198,43 @@ fn compare(
         }
     });
     Some(CampaignTrial {
-        nees: (nees.mean * nees.count as f64, nees.count),
+        nees,
         errors: errors.collect(),
-        orders: orders(outcome, simulated),
+        order_is_right: Group::all()
+            .map(|group| order(outcome, group) == true_order(simulated, group))
+            .collect(),
     })
 }
 
-/// The selected and the true order of each group.
-fn orders(outcome: &Outcome, simulated: &[Simulated]) -> [OrderChosen; 6] {
-    let form = outcome.estimate.form();
+/// The selected order of a group, and whether its biases follow the rate.
+fn order(outcome: &Outcome, group: Group) -> (usize, bool) {
+    let parameters = group.parameters(outcome.estimate.form());
+    let first = parameters.first().copied().unwrap_or(0);
     let thermal = outcome.thermal.as_ref();
-    let groups: Vec<Group> = Group::all().collect();
-    std::array::from_fn(|g| {
-        let first = groups[g].parameters(form).first().copied().unwrap_or(0);
-        OrderChosen {
-            chosen: thermal.map_or((0, false), |t| t.order(first)),
-            truth: simulated
-                .first()
-                .and_then(|one| one.thermal.as_ref())
-                .map_or((0, false), |t| true_order(t, groups[g])),
-        }
-    })
+    thermal.map_or((0, false), |thermal| thermal.order(first))
 }
 
-/// Order of a group's true polynomials, and whether its biases follow the rate.
-fn true_order(truth: &ThermalTruth, group: Group) -> (usize, bool) {
-    let by = truth.by.get(group.sensor());
+/// The same of the truth.
+fn true_order(simulated: &[Simulated], group: Group) -> (usize, bool) {
+    let truth = simulated.first().and_then(|one| one.thermal.as_ref());
     let first = match group.kind() {
         ParameterKind::Scale => 0,
         ParameterKind::Installation => 3,
         ParameterKind::Bias => Triad::ideal(InstallationForm::General).to_vector().len() - 3,
     };
-    let there = |k: usize| by[k][first] != 0.0;
-    let order = if there(1) { 2 } else { usize::from(there(0)) };
-    (order, there(2))
+    truth.map_or((0, false), |truth| {
+        let there = |k: usize| truth.by.get(group.sensor())[k][first] != 0.0;
+        let order = if there(1) { 2 } else { usize::from(there(0)) };
+        (order, there(2))
+    })
 }
 
 impl CampaignAccuracy {
     /// NEES/n over all campaigns with its 99 % interval; `None` without campaigns.
     pub fn anees(&self) -> Option<(f64, (f64, f64))> {
-        let (sum, count) = self.trials.iter().fold((0.0, 0), |(sum, count), trial| {
-            (sum + trial.nees.0, count + trial.nees.1)
-        });
+        let all = || self.trials.iter().map(|trial| trial.nees);
+        let count = all().map(|nees| nees.count).sum();
+        let sum: f64 = all().map(|nees| nees.mean * nees.count as f64).sum();
         (count > 0).then(|| (sum / count as f64, mean_square_interval(count, 0.01)))
     }
 
@@ -279,15 +261,10 @@ impl CampaignAccuracy {
     /// Number of campaigns in which the true order of a group was selected, and number of all campaigns.
     pub fn right_orders(&self, group: Group) -> (usize, usize) {
         let place = Group::all().position(|g| g == group).unwrap_or(0);
-        let right = |trial: &&CampaignTrial| {
-            let OrderChosen { chosen, truth } = trial.orders[place];
-            chosen == truth
-        };
+        let right = |trial: &&CampaignTrial| trial.order_is_right[place];
         (self.trials.iter().filter(right).count(), self.trials.len())
     }
-}
 
-impl CampaignAccuracy {
     /// `None`, for parameters at the reference, followed by the temperature functions of any campaign.
     pub fn functions(&self) -> Vec<Option<usize>> {
         let all = self.trials.iter().flat_map(|trial| &trial.errors);

@@ -4,7 +4,7 @@
 mod outlook;
 mod warming;
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, SMatrix, Vector3};
 use thiserror::Error;
 
 use crate::attitude::from_pitch_roll_heading;
@@ -65,17 +65,6 @@ pub struct Epoch {
     pub time: f64,
     /// The actual error.
     pub error: NavigationError,
-    /// The predicted covariance, in the order of [`NavigationError::to_vector`]; `None` if the
-    /// calibration states no σ.
-    pub covariance: Option<ErrorMatrix>,
-}
-
-impl Epoch {
-    /// Predicted 1σ of each error, in the order of [`NavigationError::to_vector`].
-    pub fn sigma(&self) -> Option<SVector<f64, STATES>> {
-        let covariance = self.covariance.as_ref()?;
-        Some(covariance.diagonal().map(|v| v.max(0.0).sqrt()))
-    }
 }
 
 /// Sensitivity of navigation errors to the parameters of both triads at one moment.
@@ -207,11 +196,11 @@ impl Mission {
     ///
     /// # Errors
     /// If the mission leads to a pole or the calibration is singular.
-    pub fn navigate(&self, pair: &Pair) -> Result<Vec<Epoch>, NavigationStudyError> {
-        let mut moments = self.errors(pair)?;
+    pub fn navigate(&self, pair: &Pair) -> Result<Vec<Outlook>, NavigationStudyError> {
+        let mut moments = outlook::known(&self.errors(pair)?);
         if let Some(covariance) = &pair.covariance {
             for (moment, exposure) in moments.iter_mut().zip(self.exposure(&pair.truth)?) {
-                moment.covariance = Some(exposure.covariance(covariance));
+                moment.sigma = Some(outlook::sigma(&exposure.covariance(covariance)));
             }
         }
         Ok(moments)
@@ -351,7 +340,6 @@ fn moment(time: f64, errors: &NonlinearError, truth: &Solution) -> Epoch {
     Epoch {
         time,
         error: NavigationError::of(&errors.computed(truth), truth),
-        covariance: None,
     }
 }
 

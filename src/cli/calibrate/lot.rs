@@ -165,7 +165,7 @@ pub fn deliver(
 ) -> anyhow::Result<()> {
     let document = report::lot::document(lot);
     if let Some((directory, _)) = directory {
-        let mut files = report::files(&document)?;
+        let mut files = report::files(&document);
         files.push(("lot.json".to_owned(), report::json(&document)));
         directory.finish(&files)?;
     }

@@ -64,7 +64,9 @@ impl Laboratory {
             ("temperature_degc", Some(conditions.temperature_degc)),
             ("humidity_percent", conditions.humidity_percent),
         ] {
-            let is_sound = |of: &Condition| of.value.is_finite() && of.uncertainty >= 0.0;
+            let is_sound = |of: &Condition| {
+                of.value.is_finite() && of.uncertainty.is_finite() && of.uncertainty >= 0.0
+            };
             if !of.as_ref().is_none_or(is_sound) {
                 let expected = "a finite value, and an uncertainty that is zero or above";
                 let path = format!("conditions.{name}");

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use crate::calibration::{Group, PARAMETERS};
 use crate::report::accuracy::tables;
-use crate::report::accuracy::tables::{compared, journey_name, percent};
+use crate::report::accuracy::tables::{compared, journey_name};
 use crate::report::prelude::*;
 use crate::study::accuracy::{Position, Region};
 use crate::study::{Accuracy, Figures, GroupAccuracy, NavigationAccuracy, Ratio};
@@ -42,22 +42,18 @@ fn by_compared(accuracy: &Accuracy, title: String, y: Axis) -> Panel {
     Panel::new(title, x, y).with(Series::level(1.0).width(1.5))
 }
 
-fn whiskers(ratios: &[(f64, Ratio)], shift: f64) -> Series {
-    let of = ratios
-        .iter()
-        .map(|(x, ratio)| (x + shift, ratio.interval.0, ratio.interval.1));
-    Series::new(Shape::Intervals(of.collect()))
-        .color(Color::Ink)
-        .width(1.25)
-}
-
-/// The value beyond its interval, away from 1.
-fn words(x: f64, ratio: &Ratio) -> Series {
-    let [text, _] = with_interval(ratio.value, ratio.interval);
-    match ratio.value >= 1.0 {
-        true => Series::words((x, ratio.interval.1), (0.0, -5.0), Anchor::Above, text),
-        false => Series::words((x, ratio.interval.0), (0.0, 5.0), Anchor::Below, text),
-    }
+/// A mark at each ratio with its interval, and its value beyond that, away from 1.
+fn with_values(ratios: &[(f64, Ratio)], shift: f64) -> Vec<Series> {
+    let at = |&(x, ratio): &(f64, Ratio)| ((x + shift, ratio.value), ratio.interval);
+    let values = ratios.iter().map(|(x, ratio)| {
+        let [text, _] = with_interval(ratio.value, ratio.interval);
+        match ratio.value >= 1.0 {
+            true => Series::words((x + shift, ratio.interval.1), Anchor::Above, text),
+            false => Series::words((x + shift, ratio.interval.0), Anchor::Below, text),
+        }
+    });
+    let marks = Series::whiskers(Mark::Dot, ratios.iter().map(at)).width(3.0);
+    std::iter::once(marks).chain(values).collect()
 }
 
 /// RMS error over bound.
@@ -79,11 +75,8 @@ fn ratio(accuracy: &Accuracy) -> Plot {
             "",
         ),
     };
-    let marks = ratios.iter().map(|(x, ratio)| (*x, ratio.value));
     let panel = by_compared(accuracy, format!("RMS error / RMS bound{kind}"), y)
-        .with(whiskers(&ratios, 0.0))
-        .with(Series::marks(Mark::Dot, marks).width(3.0))
-        .with_all(ratios.iter().map(|(x, ratio)| words(*x, ratio)));
+        .with_all(with_values(&ratios, 0.0));
     Plot::new("ratio.svg", "Error over bound", (1, 400), [panel]).caption(
         "RMS error of the EKF over the Cramér–Rao bound, of each group of parameters and of the position after 40 \
          h; bars: its 99 % interval. A bar that crosses the line at 1 says that nothing shows the filter to be \
@@ -97,24 +90,15 @@ fn gain(accuracy: &Accuracy) -> Plot {
     let title = "RMS error of closed form / RMS error of EKF".to_owned();
     let mut panel = by_compared(accuracy, title, y);
     let equal: fn(&Figures) -> Option<Ratio> = |f| f.gain_in_equal_time;
-    for (of, shift, filled) in [
-        ((|f| f.gain) as fn(&Figures) -> _, -0.17, true),
-        (equal, 0.17, false),
-    ] {
+    let own: fn(&Figures) -> Option<Ratio> = |f| f.gain;
+    for (of, shift, fill) in [(own, -0.17, Fill::Pale), (equal, 0.17, Fill::Open)] {
         let ratios = ratios(accuracy, of);
-        let bars = Shape::Bars {
-            tops: ratios
-                .iter()
-                .map(|(x, ratio)| (x + shift, ratio.value))
-                .collect(),
-            half: 0.13,
-            base: Some(1.0),
-            filled,
-        };
+        let bars = ratios
+            .iter()
+            .map(|(x, ratio)| (x + shift, 1.0, ratio.value));
         panel = panel
-            .with(Series::new(bars).width(1.25))
-            .with(whiskers(&ratios, shift))
-            .with_all(ratios.iter().map(|(x, ratio)| words(x + shift, ratio)));
+            .with(Series::bars(0.13, fill, bars).width(1.25))
+            .with_all(with_values(&ratios, shift));
     }
     let equal = match accuracy.baseline.equal_time() {
         Some(time) => format!(" Right, open: closed form in {}.", minutes(time)),
@@ -153,22 +137,15 @@ fn of_group_against_time(of: &GroupAccuracy) -> Panel {
         true => ("EKF, bound", None),
         false => ("EKF", Some("bound")),
     };
-    let named = |series: Series, name: Option<&str>| match name {
-        Some(name) => series.label(name),
-        None => series,
-    };
+    let mut bound = Series::line(bound).color(Color::Ink).dashed().width(1.25);
+    bound.label = of_bound.map(str::to_owned);
+    let rings = Series::marks(Mark::Ring, closed.clone()).nth(1).width(1.25);
     let title = of.group.titled();
     Panel::new(title, Axis::log("table time, min"), Axis::log(""))
-        .with(named(Series::line(filter).width(1.75), Some(of_filter)))
-        .with(named(
-            Series::line(bound).color(Color::Ink).dashed().width(1.25),
-            of_bound,
-        ))
-        .with(Series::line(closed.clone()).nth(1).width(1.0))
-        .with(named(
-            Series::marks(Mark::Ring, closed).nth(1).width(1.25),
-            Some("closed form"),
-        ))
+        .with(Series::line(filter).width(1.75).label(of_filter))
+        .with(bound)
+        .with(Series::line(closed).nth(1).width(1.0))
+        .with(rings.label("closed form"))
 }
 
 /// Half the width of the axis of errors in σ, unless more than one in twenty lies beyond.
@@ -176,7 +153,7 @@ const REACH: f64 = 5.0;
 const BEYOND: f64 = 0.05;
 const BINS: usize = 24;
 /// Points of a curve.
-const CURVE: usize = 300;
+const CURVE: usize = 301;
 /// Runs this many times above the upper end of the interval of NEES make its axis logarithmic.
 const FAR_NEES: f64 = 4.0;
 /// The least half width of the axes of positions, in σ.
@@ -188,9 +165,9 @@ pub fn errors(accuracy: &Accuracy) -> Plot {
         let values = normalised(accuracy, group);
         let reach = reach(&values);
         let normal = |z: f64| (-0.5 * z * z).exp() / TAU.sqrt();
-        let curve = (0..=CURVE).map(|k| reach * (2.0 * k as f64 / CURVE as f64 - 1.0));
-        let tops = histogram(&values, reach);
-        let highest = tops.iter().map(|top| top.1).fold(0.0, f64::max);
+        let curve = steps(-reach, reach, CURVE);
+        let bars = histogram(&values, reach);
+        let highest = bars.iter().map(|bar| bar.2).fold(0.0, f64::max);
         // Errors far beyond their σ are lower than the curve by far: it leaves the panel then.
         let top = if reach > REACH {
             highest
@@ -204,16 +181,10 @@ pub fn errors(accuracy: &Accuracy) -> Plot {
             format!("RMS {}", tables::factor(mean_square.sqrt())),
         ];
         notes.extend((beyond > 0).then(|| format!("{} beyond ±{REACH}", count(beyond))));
-        let bars = Shape::Bars {
-            tops,
-            half: reach / BINS as f64,
-            base: Some(0.0),
-            filled: true,
-        };
         let x = Axis::linear("error / σ").between(-reach, reach);
         let y = Axis::linear("").between(0.0, 1.08 * top);
         Panel::new(format!("{}: density", group.title()), x, y)
-            .with(Series::new(bars).width(0.75))
+            .with(Series::bars(reach / BINS as f64, Fill::Pale, bars).width(0.75))
             .with(Series::line(curve.map(|z| (z, normal(z)))).color(Color::Ink))
             .noted(notes)
     });
@@ -245,8 +216,8 @@ fn reach(values: &[f64]) -> f64 {
     }
 }
 
-/// Middles and densities of the bins of a histogram over ±`reach`, as a density of all values.
-fn histogram(values: &[f64], reach: f64) -> Vec<Point> {
+/// Middle, foot and density of the bins of a histogram over ±`reach`, as a density of all values.
+fn histogram(values: &[f64], reach: f64) -> Vec<Upright> {
     let mut counts = [0usize; BINS];
     for z in values {
         let place = (z / reach + 1.0) * 0.5 * BINS as f64;
@@ -257,7 +228,7 @@ fn histogram(values: &[f64], reach: f64) -> Vec<Point> {
     let width = 2.0 * reach / BINS as f64;
     let density = |n: usize| n as f64 / (values.len().max(1) as f64 * width);
     let bins = counts.into_iter().enumerate();
-    bins.map(|(k, n)| ((k as f64 + 0.5) * width - reach, density(n)))
+    bins.map(|(k, n)| ((k as f64 + 0.5) * width - reach, 0.0, density(n)))
         .collect()
 }
 
@@ -344,19 +315,15 @@ fn of_mission(of: &NavigationAccuracy, cloud: Vec<Point>, reach: f64) -> Panel {
         Region::East | Region::North => None,
     });
     let circles = ellipses.enumerate().map(|(n, sigmas)| {
-        let angles = (0..=CURVE).map(|k| TAU * k as f64 / CURVE as f64);
+        let angles = steps(0.0, TAU, CURVE);
         let circle = angles.map(|angle| (sigmas * angle.cos(), sigmas * angle.sin()));
         let series = Series::line(circle).color(Color::Ink);
         if n == 0 { series } else { series.dashed() }
     });
     let mut notes = vec![format!("{} runs", count(cloud.len()))];
-    for held in &of.containment {
-        if let Region::Ellipse(sigmas) = held.region {
-            let found = percent(held.within as f64 / held.runs as f64);
-            let claimed = percent(held.region.probability());
-            notes.push(format!("within {sigmas}σ: {found} %, claimed {claimed} %"));
-        }
-    }
+    let ellipses = of.containment.iter();
+    let ellipses = ellipses.filter(|held| matches!(held.region, Region::Ellipse(_)));
+    notes.extend(ellipses.map(tables::held));
     let title = format!("{}: north given east, σ", journey_name(of.journey));
     let x = Axis::linear("east, σ").between(-reach, reach);
     let mut panel = Panel::new(title, x, Axis::linear("").between(-reach, reach))
@@ -386,7 +353,7 @@ mod tests {
             tops.iter()
                 .find(|top| (top.0 - z).abs() < 0.5 * width)
                 .unwrap()
-                .1
+                .2
         };
         assert!((at(0.1) - 2.0 / (5.0 * width)).abs() < 1e-12);
         assert!((at(-0.1) - 1.0 / (5.0 * width)).abs() < 1e-12);

@@ -44,7 +44,8 @@ const REASONS: usize = 3;
 
 pub(super) fn facts(accuracy: &Accuracy) -> Facts {
     let (study, scenario) = (&accuracy.study, &accuracy.study.scenario);
-    let (form, truth) = (study.form.name(), scenario.installation.form.name());
+    let (form, truth) = accuracy.forms();
+    let (form, truth) = (form.name(), truth.name());
     let what = format!(
         "{}: instrument {}, table {}, path {}, latitude {}°",
         scenario.name,
@@ -58,10 +59,8 @@ pub(super) fn facts(accuracy: &Accuracy) -> Facts {
         _ => "zero velocity and table attitude",
     };
     let mut facts = Facts::new("The study", [("scenario", what)]);
-    facts.push(
-        "runs",
-        format!("{}, seed {}", count(accuracy.trials.len()), study.seed),
-    );
+    let runs = format!("{}, seed {}", count(accuracy.trials.len()), study.seed);
+    facts.push("runs", runs);
     let forms = format!("filter {form}, truth {truth}; compared in the general form");
     facts.push("installation", forms);
     facts.push("aiding", aiding);
@@ -79,10 +78,8 @@ pub(super) fn facts(accuracy: &Accuracy) -> Facts {
     facts.push("rejected observations", rejected);
     if let (rejections, tested @ 1..) = accuracy.rejections() {
         let (rejections, tested) = (count(rejections), count(tested));
-        facts.push(
-            "form",
-            format!("the data reject {form} in {rejections} of {tested} runs"),
-        );
+        let words = format!("the data reject {form} in {rejections} of {tested} runs");
+        facts.push("form", words);
     }
     facts
 }
@@ -92,32 +89,24 @@ fn terms(accuracy: &Accuracy) -> String {
     let (scenario, unmodelled) = (&accuracy.study.scenario, &accuracy.study.unmodelled);
     let there = ErrorTerm::ALL.into_iter().filter(|&b| scenario.has(b));
     let (left_out, on): (Vec<_>, Vec<_>) = there.partition(|block| unmodelled.contains(block));
-    let named = |blocks: &[ErrorTerm]| {
-        let titles: Vec<&str> = blocks.iter().map(|&block| title(block)).collect();
-        titles.join(", ")
+    let named = |blocks: &[ErrorTerm]| match blocks {
+        [] => "none".to_owned(),
+        blocks => blocks
+            .iter()
+            .map(|&block| title(block))
+            .collect::<Vec<_>>()
+            .join(", "),
     };
-    let on = if on.is_empty() {
-        "none".to_owned()
-    } else {
-        named(&on)
-    };
-    match &left_out[..] {
-        [] => format!("in addition to K, E and D: {on}"),
-        left_out => {
-            format!(
-                "in addition to K, E and D: {on}; simulated but not modelled: {}",
-                named(left_out)
-            )
-        }
+    let mut text = format!("in addition to K, E and D: {}", named(&on));
+    if !left_out.is_empty() {
+        text += &format!("; simulated but not modelled: {}", named(&left_out));
     }
+    text
 }
 
 /// Median and largest number of passes; `None` if no run gave an estimate.
 pub(super) fn passes(accuracy: &Accuracy) -> Option<(f64, usize)> {
-    let mut passes: Vec<usize> = accuracy
-        .filtered()
-        .map(|filtered| filtered.passes)
-        .collect();
+    let mut passes: Vec<usize> = accuracy.filtered().map(|of| of.passes).collect();
     passes.sort_unstable();
     let most = *passes.last()?;
     let [low, high] = [(passes.len() - 1) / 2, passes.len() / 2].map(|k| passes[k] as f64);
@@ -126,10 +115,8 @@ pub(super) fn passes(accuracy: &Accuracy) -> Option<(f64, usize)> {
 
 /// Number of observations that the gate rejected, and in how many runs.
 pub(super) fn rejected(accuracy: &Accuracy) -> (usize, usize) {
-    let rejected = accuracy.filtered().map(|filtered| filtered.rejected);
-    rejected.fold((0, 0), |(all, runs), of| {
-        (all + of, runs + usize::from(of > 0))
-    })
+    let rejected = || accuracy.filtered().map(|filtered| filtered.rejected);
+    (rejected().sum(), rejected().filter(|of| *of > 0).count())
 }
 
 fn table_time(accuracy: &Accuracy) -> String {
@@ -148,19 +135,16 @@ fn failures(accuracy: &Accuracy) -> String {
     let reasons = accuracy.failures().take(REASONS);
     let reasons = reasons.map(|(run, reason)| format!("run {run}: {reason}"));
     let more = if failed > REASONS { "; …" } else { "" };
+    let reasons = reasons.collect::<Vec<_>>().join("; ");
     match failed {
         0 => "none".to_owned(),
-        _ => format!(
-            "{} ({}{more})",
-            count(failed),
-            reasons.collect::<Vec<_>>().join("; ")
-        ),
+        _ => format!("{} ({reasons}{more})", count(failed)),
     }
 }
 
 pub(super) fn data(accuracy: &Accuracy) -> Value {
     let study = &accuracy.study;
-    let (form, truth) = (study.form, study.scenario.installation.form);
+    let (form, truth) = accuracy.forms();
     let (rejections, tested) = accuracy.rejections();
     let failures = accuracy
         .failures()
@@ -188,17 +172,9 @@ pub(super) fn data(accuracy: &Accuracy) -> Value {
     for of in &accuracy.groups {
         data[of.group.key()] = figures(accuracy, &of.figures, of.group.unit_value());
     }
-    let terms = accuracy.error_terms.iter().map(|(term, of)| {
-        let data = json!({
-            "ekf_rms": of.filter,
-            "claimed_rms": of.claimed,
-            "bound_rms": of.bound,
-            "ratio": of.ratio.map(|r| r.value),
-            "ratio_interval": of.ratio.map(|r| r.interval),
-        });
-        (term.name().to_owned(), data)
-    });
-    data["blocks"] = Value::Object(terms.collect::<Map<_, _>>());
+    let terms = accuracy.error_terms.iter();
+    let terms = terms.map(|(term, of)| (term.name().to_owned(), against_bound(of, 1.0)));
+    data["blocks"] = Value::Object(terms.collect());
     let effects: Vec<BlockRecord> = accuracy.effects.iter().map(BlockRecord::from).collect();
     data["block_effects"] = json!(effects);
     data["navigation"] = navigation(accuracy);
@@ -220,7 +196,7 @@ fn nis(nis: &Nis) -> Option<Value> {
 
 /// One for each mission, or why it cannot be navigated from the scenario's site.
 fn navigation(accuracy: &Accuracy) -> Value {
-    let mission = |journey, reason: Option<String>, position: Option<Value>, containment: Value| {
+    let mission = |journey| {
         json!({
             "mission": match journey {
                 Journey::Standing => "standing",
@@ -228,24 +204,21 @@ fn navigation(accuracy: &Accuracy) -> Value {
             },
             "hours": f64::from(FORTY_HOURS) * INTERVAL / 3600.0,
             "latitude_deg": accuracy.study.scenario.site.latitude / DEGREE,
-            "not_navigated": reason,
-            "position_nmile": position,
-            "containment": containment,
+            "not_navigated": null,
+            "position_nmile": null,
+            "containment": [],
         })
     };
     let navigated = accuracy.navigation.iter().map(|of| {
-        let position = figures(accuracy, &of.figures, NAUTICAL_MILE);
-        let containment = of.containment.iter().map(containment).collect();
-        mission(of.journey, None, Some(position), containment)
+        let mut data = mission(of.journey);
+        data["position_nmile"] = figures(accuracy, &of.figures, NAUTICAL_MILE);
+        data["containment"] = of.containment.iter().map(containment).collect();
+        data
     });
-    let others = accuracy.not_navigated.iter();
-    let others = others.map(|(journey, reason)| {
-        mission(
-            *journey,
-            Some(reason.to_string()),
-            None,
-            Value::Array(Vec::new()),
-        )
+    let others = accuracy.not_navigated.iter().map(|(journey, reason)| {
+        let mut data = mission(*journey);
+        data["not_navigated"] = reason.to_string().into();
+        data
     });
     navigated.chain(others).collect()
 }
@@ -268,13 +241,18 @@ fn containment(of: &Containment) -> Value {
     })
 }
 
-fn figures(accuracy: &Accuracy, of: &Figures, unit: f64) -> Value {
+fn against_bound(of: &Figures, unit: f64) -> Value {
     json!({
         "ekf_rms": of.filter / unit,
         "claimed_rms": of.claimed / unit,
         "bound_rms": of.bound / unit,
         "ratio": of.ratio.map(|r| r.value),
         "ratio_interval": of.ratio.map(|r| r.interval),
+    })
+}
+
+fn figures(accuracy: &Accuracy, of: &Figures, unit: f64) -> Value {
+    let gain = json!({
         "six_position_rms": of.closed_form.map(|rms| rms / unit),
         "gain": of.gain.map(|r| r.value),
         "gain_interval": of.gain.map(|r| r.interval),
@@ -284,5 +262,6 @@ fn figures(accuracy: &Accuracy, of: &Figures, unit: f64) -> Value {
         "ekf_table_time_s": accuracy.table_time,
         "six_position_table_time_s": accuracy.baseline.table_time,
         "six_position_equal_table_time_s": accuracy.baseline.equal_time(),
-    })
+    });
+    joined(against_bound(of, unit), gain)
 }

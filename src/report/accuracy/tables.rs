@@ -122,15 +122,11 @@ pub fn consistency(accuracy: &Accuracy) -> Table {
             NONE,
         ]
     });
-    let nis = [
-        ("NIS zero velocity", &accuracy.velocity),
-        ("NIS table attitude", &accuracy.table),
-    ];
-    let nis = nis.into_iter().filter(|(_, nis)| nis.count > 0);
+    let nis = accuracy.nis().map(|(name, nis)| nis_row(name, nis));
     Table::new("Consistency", columns(
 "| mean | 95 % interval | 99.8 % interval | numbers | lag-one correlation | 99 % if white",
 ))
-        .section(nees.into_iter().chain(nis.map(|(name, nis)| nis_row(name, nis))))
+        .section(nees.into_iter().chain(nis))
         .note("NEES/n: squared errors over the claimed covariance; NIS: squared innovations over theirs.")
         .note("Both are one if σ are true; the intervals are χ².")
 }
@@ -138,7 +134,7 @@ pub fn consistency(accuracy: &Accuracy) -> Table {
 fn nis_row(name: &str, nis: &Nis) -> Vec<String> {
     let white = white_within(nis);
     cells![
-        name,
+        format!("NIS {name}"),
         mean(nis.mean, nis.interval),
         NONE,
         interval(nis.interval),
@@ -146,6 +142,13 @@ fn nis_row(name: &str, nis: &Nis) -> Vec<String> {
         value(nis.lag_one, white),
         format!("±{}", value(white, white)),
     ]
+}
+
+/// How often an error lies in a region, and how often it should.
+pub fn held(of: &Containment) -> String {
+    let found = percent(of.within as f64 / of.runs as f64);
+    let claimed = percent(of.region.probability());
+    format!("{} {found} % (claimed {claimed} %)", region_name(of.region))
 }
 
 /// Whether position errors lie within their predicted σ.
@@ -213,7 +216,7 @@ pub fn journey_name(journey: Journey) -> &'static str {
 }
 
 /// A region in words.
-pub fn region_name(region: Region) -> String {
+fn region_name(region: Region) -> String {
     match region {
         Region::East => "east within 1σ".to_owned(),
         Region::North => "north within 1σ".to_owned(),

@@ -3,54 +3,57 @@
 use std::cmp::Ordering;
 
 use super::tables;
-use super::tables::{compared, journey_name, percent, region_name, white_within};
+use super::tables::{compared, journey_name, white_within};
 use crate::calibration::{ErrorTermTest, Nis};
 use crate::imu::Output;
 use crate::report::prelude::*;
-use crate::study::accuracy::Containment;
-use crate::study::{Accuracy, Figures, NavigationAccuracy, Ratio};
+use crate::study::{Accuracy, Figures, Ratio};
 
 /// Fewer runs than this make a rough interval.
 const FEW: usize = 30;
 /// NIS that whole pulses leave a filter, whose noise is taken for Gaussian.
-const PULSES: (f64, f64) = (0.9, 1.1);
+const PULSES: std::ops::RangeInclusive<f64> = 0.9..=1.1;
 
 /// Every sentence, the most important first.
 pub fn say(document: &mut Document, accuracy: &Accuracy) {
-    let mut say = |(good, text): (bool, String)| document.say(good, text);
-    say(convergence(accuracy));
-    say(against_bound(accuracy));
-    say(nees(accuracy));
-    let nis = [
-        ("zero velocity", &accuracy.velocity),
-        ("table attitude", &accuracy.table),
+    let mut sentences = vec![
+        convergence(accuracy),
+        against_bound(accuracy),
+        nees(accuracy),
     ];
-    let nis = nis.into_iter().filter(|(_, nis)| nis.count > 0);
-    nis.clone()
-        .for_each(|(name, nis)| say(innovations(accuracy, name, nis)));
-    nis.for_each(|(name, nis)| say(whiteness(name, nis)));
-    accuracy
-        .navigation
-        .iter()
-        .filter_map(containment)
-        .for_each(&mut say);
-    for (journey, reason) in &accuracy.not_navigated {
+    for (name, nis) in accuracy.nis() {
+        sentences.extend(innovations(accuracy, name, nis));
+    }
+    let warn = |text: String| (false, text);
+    for of in &accuracy.navigation {
+        let not_held = of.containment.iter().filter(|held| !held.as_claimed());
+        let not_held: Vec<String> = not_held.map(tables::held).collect();
+        sentences.extend((!not_held.is_empty()).then(|| {
+            warn(format!(
+                "After 40 h, {}, the position error does not lie within its predicted σ as often as claimed: {}.",
+                journey_name(of.journey),
+                not_held.join(", ")
+            ))
+        }));
+    }
+    sentences.extend(accuracy.not_navigated.iter().map(|(journey, reason)| {
         let journey = journey_name(*journey);
-        say((
-            false,
-            format!("Not navigated from this site, {journey}: {reason}."),
-        ));
-    }
-    form(accuracy).into_iter().for_each(&mut say);
-    if let Some(advice) = ErrorTermTest::most_significant(&accuracy.effects, None) {
-        say((false, format!("In the first run: {advice}")));
-    }
-    gain(accuracy).into_iter().for_each(&mut say);
+        warn(format!(
+            "Not navigated from this site, {journey}: {reason}."
+        ))
+    }));
+    sentences.extend(form(accuracy));
+    let advice = ErrorTermTest::most_significant(&accuracy.effects, None);
+    sentences.extend(advice.map(|advice| warn(format!("In the first run: {advice}"))));
+    sentences.extend(gain(accuracy));
     let runs = accuracy.trials.len();
-    if runs < FEW {
-        let text =
-            format!("{runs} runs are few: the intervals of the ratios are rough below {FEW}.");
-        say((false, text));
+    sentences.extend((runs < FEW).then(|| {
+        warn(format!(
+            "{runs} runs are few: the intervals of the ratios are rough below {FEW}."
+        ))
+    }));
+    for (good, text) in sentences {
+        document.say(good, text);
     }
 }
 
@@ -68,38 +71,33 @@ fn convergence(accuracy: &Accuracy) -> (bool, String) {
     (false, text)
 }
 
-/// On which side of 1 an interval lies.
-fn beside_one(ratio: &Ratio) -> Ordering {
-    match ratio.interval {
-        (low, _) if low > 1.0 => Ordering::Greater,
-        (_, high) if high < 1.0 => Ordering::Less,
-        _ => Ordering::Equal,
+/// Where a number lies from its interval.
+fn side(of: f64, (low, high): (f64, f64)) -> (Ordering, &'static str) {
+    match of {
+        of if of < low => (Ordering::Less, "below"),
+        of if of > high => (Ordering::Greater, "above"),
+        _ => (Ordering::Equal, "within"),
     }
 }
 
-/// What has a ratio that is chosen, named with it.
+/// What has a ratio on a chosen side of 1, named with it.
 fn named(
     accuracy: &Accuracy,
     of: impl Fn(&Figures) -> Option<Ratio>,
-    chosen: impl Fn(&Ratio) -> bool,
+    chosen: impl Fn(Ordering) -> bool,
 ) -> String {
-    let all = compared(accuracy).into_iter();
-    let all = all.filter_map(|compared| Some((compared.title, of(compared.figures)?)));
-    let named = all
-        .filter(|(_, ratio)| chosen(ratio))
-        .map(|(title, ratio)| {
-            let [by, interval] = with_interval(ratio.value, ratio.interval);
-            format!("{title} {by} ({interval})")
-        });
+    let named = compared(accuracy).into_iter().filter_map(|compared| {
+        let ratio = of(compared.figures)?;
+        let [by, interval] = with_interval(ratio.value, ratio.interval);
+        let is_chosen = chosen(side(1.0, ratio.interval).0.reverse());
+        is_chosen.then(|| format!("{} {by} ({interval})", compared.title))
+    });
     named.collect::<Vec<_>>().join(", ")
 }
 
 fn against_bound(accuracy: &Accuracy) -> (bool, String) {
     let of = |figures: &Figures| figures.ratio;
-    let (form, truth) = (
-        accuracy.study.form,
-        accuracy.study.scenario.installation.form,
-    );
+    let (form, truth) = accuracy.forms();
     if !form.holds(truth) {
         let text = format!(
             "The {} form cannot hold the truth, which is {}. The bound is that of the general form; against \
@@ -110,7 +108,7 @@ fn against_bound(accuracy: &Accuracy) -> (bool, String) {
         );
         return (false, text);
     }
-    let outside = named(accuracy, of, |ratio| beside_one(ratio).is_ne());
+    let outside = named(accuracy, of, Ordering::is_ne);
     if outside.is_empty() {
         let text = "RMS error over bound is 1 within its 99 % interval everywhere: nothing shows the filter to \
                     be worse than the best there can be.";
@@ -124,109 +122,66 @@ fn against_bound(accuracy: &Accuracy) -> (bool, String) {
 }
 
 fn nees(accuracy: &Accuracy) -> (bool, String) {
-    let Some(anees) = accuracy.anees else {
+    let Some(of) = accuracy.anees else {
         let text = "No run gave an estimate: nothing can be said of its σ.";
         return (false, text.to_owned());
     };
-    let within = |(low, high): (f64, f64)| (low..=high).contains(&anees.mean);
-    let mean = tables::mean(anees.mean, anees.interval_95);
-    let (inner, outer) = (interval(anees.interval_95), interval(anees.interval_998));
-    if within(anees.interval_95) {
-        let text = format!(
+    let mean = tables::mean(of.mean, of.interval_95);
+    let (inner, outer) = (interval(of.interval_95), interval(of.interval_998));
+    let is_inside = side(of.mean, of.interval_95).0.is_eq();
+    let text = match side(of.mean, of.interval_998) {
+        _ if is_inside => format!(
             "ANEES {mean} lies within its 95 % interval {inner}: the claimed σ are true, correlations included."
-        );
-        return (true, text);
-    }
-    if within(anees.interval_998) {
-        let text = format!(
+        ),
+        (Ordering::Equal, _) => format!(
             "ANEES {mean} lies outside its 95 % interval {inner}, as in one study of twenty, but within that \
              of 99.8 %, {outer}."
-        );
-        return (true, text);
-    }
-    let (side, size) = if anees.mean > 1.0 {
-        ("above", "small")
-    } else {
-        ("below", "large")
+        ),
+        (_, side) => format!(
+            "ANEES {mean} lies {side} its 99.8 % interval {outer}: the claimed σ are too {}; errors are {} times \
+             them.",
+            if of.mean > 1.0 { "small" } else { "large" },
+            tables::factor(of.mean.sqrt())
+        ),
     };
-    let factor = tables::factor(anees.mean.sqrt());
-    let text = format!(
-        "ANEES {mean} lies {side} its 99.8 % interval {outer}: the claimed σ are too {size}; errors are \
-         {factor} times them."
-    );
-    (false, text)
+    (side(of.mean, of.interval_998).0.is_eq(), text)
 }
 
-fn innovations(accuracy: &Accuracy, name: &str, nis: &Nis) -> (bool, String) {
-    let (low, high) = nis.interval;
-    let (mean, shown) = (tables::mean(nis.mean, nis.interval), interval(nis.interval));
-    if (low..=high).contains(&nis.mean) {
-        return (
-            true,
-            format!("NIS of {name} {mean} lies within its 99.8 % interval {shown}."),
+/// What innovations are that are not as large or not as white as they should be.
+fn innovations(accuracy: &Accuracy, name: &str, nis: &Nis) -> Vec<(bool, String)> {
+    let mut sentences = Vec::new();
+    if let (Ordering::Less | Ordering::Greater, side) = side(nis.mean, nis.interval) {
+        let mut text = format!(
+            "NIS of {name} {} lies {side} its 99.8 % interval {}: innovations are {} times as large as the filter \
+             takes them to be.",
+            tables::mean(nis.mean, nis.interval),
+            interval(nis.interval),
+            tables::factor(nis.mean.sqrt())
         );
+        let is_pulse = accuracy.study.scenario.output == Output::Pulse;
+        let pulses = is_pulse && PULSES.contains(&nis.mean);
+        if pulses {
+            text += " Whole pulses are not Gaussian noise: 0.9 to 1.1 is expected of them.";
+        }
+        sentences.push((pulses, text));
     }
-    let side = if nis.mean > high { "above" } else { "below" };
-    let factor = tables::factor(nis.mean.sqrt());
-    let mut text = format!(
-        "NIS of {name} {mean} lies {side} its 99.8 % interval {shown}: innovations are {factor} times as large \
-         as the filter takes them to be."
-    );
-    let pulses = accuracy.study.scenario.output == Output::Pulse
-        && (PULSES.0..=PULSES.1).contains(&nis.mean);
-    if pulses {
-        text += " Whole pulses are not Gaussian noise: 0.9 to 1.1 is expected of them.";
-    }
-    (pulses, text)
-}
-
-fn whiteness(name: &str, nis: &Nis) -> (bool, String) {
     let within = white_within(nis);
-    let (lag, limit) = (value(nis.lag_one, within), value(within, within));
-    let white = nis.lag_one.abs() <= within;
-    let (lies, are) = if white {
-        ("within", "white")
-    } else {
-        ("outside", "not white")
-    };
-    let text = format!(
-        "Lag-one correlation of the innovations of {name} {lag} lies {lies} ±{limit} (99 %): they are {are}."
-    );
-    (white, text)
-}
-
-fn containment(of: &NavigationAccuracy) -> Option<(bool, String)> {
-    let runs = count(of.containment.first()?.runs);
-    let good = of.containment.iter().all(Containment::as_claimed);
-    let shown = of
-        .containment
-        .iter()
-        .filter(|held| good || !held.as_claimed());
-    let shares = shown.map(|held| {
-        let found = percent(held.within as f64 / held.runs as f64);
-        let claimed = percent(held.region.probability());
-        format!(
-            "{} {found} % (claimed {claimed} %)",
-            region_name(held.region)
-        )
-    });
-    let text = format!(
-        "After 40 h, {}, the position error {} within its predicted σ as often as claimed in {runs} runs: {}.",
-        journey_name(of.journey),
-        if good { "lies" } else { "does not lie" },
-        shares.collect::<Vec<_>>().join(", ")
-    );
-    Some((good, text))
+    if nis.lag_one.abs() > within {
+        let text = format!(
+            "Lag-one correlation of the innovations of {name} {} lies outside ±{} (99 %): they are not white.",
+            value(nis.lag_one, within),
+            value(within, within)
+        );
+        sentences.push((false, text));
+    }
+    sentences
 }
 
 fn form(accuracy: &Accuracy) -> Option<(bool, String)> {
     let (rejections, tested @ 1..) = accuracy.rejections() else {
         return None;
     };
-    let (form, truth) = (
-        accuracy.study.form,
-        accuracy.study.scenario.installation.form,
-    );
+    let (form, truth) = accuracy.forms();
     let mut text = format!(
         "The data reject the {} form against the general one in {} of {} runs.",
         form.name(),
@@ -247,22 +202,16 @@ fn gain(accuracy: &Accuracy) -> Vec<(bool, String)> {
     let closed = minutes(accuracy.baseline.table_time);
     let sides = [Ordering::Greater, Ordering::Equal, Ordering::Less].into_iter();
     let sentences = sides.filter_map(|side| {
-        let named = named(accuracy, |f| f.gain, |ratio| beside_one(ratio) == side);
-        let than = format!("than the closed form in {closed}");
-        let text = match side {
-            _ if named.is_empty() => return None,
-            Ordering::Greater => {
-                format!("In {filter} the EKF is more accurate {than}, by a factor of: {named}.")
-            }
-            Ordering::Equal => format!(
-                "There is no significant difference between the EKF in {filter} and the closed form in {closed}; \
-                 the gain is: {named}."
-            ),
-            Ordering::Less => {
-                format!("In {filter} the EKF is less accurate {than}; the gain is: {named}.")
-            }
+        let named = named(accuracy, |f| f.gain, |of| of == side);
+        let judged = match side {
+            Ordering::Greater => "is more accurate than",
+            Ordering::Equal => "does not differ significantly from",
+            Ordering::Less => "is less accurate than",
         };
-        Some((side.is_ge(), text))
+        let text = format!(
+            "In {filter} the EKF {judged} the closed form in {closed}; the gain is: {named}."
+        );
+        (!named.is_empty()).then_some((side.is_ge(), text))
     });
     sentences.collect()
 }

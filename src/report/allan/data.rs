@@ -112,12 +112,8 @@ pub fn noise_table(analysis: &NoiseAnalysis) -> String {
             comment,
         } in fields
         {
-            let comment = if comment.is_empty() {
-                comment
-            } else {
-                format!("  # {comment}")
-            };
-            text += &format!("{key} = {}{comment}\n", four_digits(value));
+            let mark = if comment.is_empty() { "" } else { "  # " };
+            text += &format!("{key} = {}{mark}{comment}\n", four_digits(value));
         }
     }
     text
@@ -125,12 +121,10 @@ pub fn noise_table(analysis: &NoiseAnalysis) -> String {
 
 /// The same fields to all digits.
 pub fn fields(analysis: &NoiseAnalysis) -> Map<String, Value> {
-    let fields = Sensor::ALL
-        .into_iter()
-        .flat_map(|sensor| of_triad(analysis, sensor));
-    fields
-        .map(|field| (field.key.to_owned(), field.value.into()))
-        .collect()
+    let fields = Sensor::ALL.map(|sensor| of_triad(analysis, sensor));
+    let fields = fields.into_iter().flatten();
+    let fields = fields.map(|field| (field.key.to_owned(), field.value.into()));
+    fields.collect()
 }
 
 fn of_triad(analysis: &NoiseAnalysis, sensor: Sensor) -> Vec<Field> {
@@ -155,14 +149,11 @@ fn of_triad(analysis: &NoiseAnalysis, sensor: Sensor) -> Vec<Field> {
         correlation_time: time_key,
         ..
     } = NoiseKeys::of(sensor);
-    let correlation_time = of.correlation_time;
+    let stands_for = in_place_of(analysis, sensor);
     fields.push(Field {
         key,
         value: of.sigma / unit,
-        comment: format!(
-            "1σ of a Gauss–Markov process{}",
-            in_place_of(analysis, sensor)
-        ),
+        comment: format!("1σ of a Gauss–Markov process{stands_for}"),
     });
     let open = match figures.correlation_is_open {
         true => "as long as the record can show; σ grows with its root",
@@ -170,7 +161,7 @@ fn of_triad(analysis: &NoiseAnalysis, sensor: Sensor) -> Vec<Field> {
     };
     fields.push(Field {
         key: time_key,
-        value: correlation_time,
+        value: of.correlation_time,
         comment: open.to_owned(),
     });
     fields

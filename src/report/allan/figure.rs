@@ -18,17 +18,15 @@ pub fn figure(analysis: &NoiseAnalysis, sensor: Sensor) -> Plot {
     let triad = analysis.triads.get(sensor);
     let unit = deviation_unit(sensor).1;
     let all = triad.axes.iter().flat_map(|axis| &axis.curve.variance);
-    let all = all.map(|v| v.sqrt() / unit).filter(|y| *y > 0.0);
-    let (low, high) = all.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), y| {
-        (low.min(y), high.max(y))
-    });
+    let (low, high) = positive_range(all.map(|variance| variance.sqrt() / unit));
     let ends = (0.5 * low, 1.8 * high);
     let panels = triad.axes.iter().zip(AXES);
     let panels = panels.map(|(axis, letter)| panel(axis, letter, sensor, ends));
     Plot::new(file, heading, (3, 440), panels).caption(
         "Overlapping Allan deviation against cluster time, both logarithmic, the same axes for all three. Dots: as \
          measured, with the 95 % interval as a band; black: the sum of what was found; dashed: each process \
-         found, with its slope and coefficient. Where no dashed line is, no slope was found.",
+         found, with its slope and coefficient. Where no dashed line is, no slope was found. Upright line: 1 s, \
+         where random walk is read off; ring: the lowest deviation.",
     )
 }
 
@@ -38,8 +36,14 @@ fn panel(axis: &AxisNoise, letter: char, sensor: Sensor, (low, high): Point) -> 
     let curve = &axis.curve;
     let title = format!("{} {letter}, {symbol}", sensor.name());
     let y = Axis::log("").between(low, high);
-    let mut panel = Panel::new(title, Axis::log("cluster time τ, s"), y)
-        .noted(axis.found().iter().map(|found| coefficient(found, sensor)));
+    let lowest = axis.minimum().filter(|_| !axis.is_constant);
+    let lowest = lowest.map(|(tau, deviation)| (tau, deviation / unit));
+    let words = lowest.map(|(tau, y)| {
+        let (y, tau) = (three_digits(y), three_digits(tau));
+        format!("lowest {y} {symbol} at {tau} s")
+    });
+    let found = axis.found().iter().map(|found| coefficient(found, sensor));
+    let mut panel = Panel::new(title, Axis::log("cluster time τ, s"), y).noted(found.chain(words));
     if let Some(identified) = &axis.identified {
         let intervals = curve.tau.iter().enumerate().filter_map(|(point, &tau)| {
             let (least, most) = identified.interval(curve, point, 0.95)?;
@@ -55,17 +59,24 @@ fn panel(axis: &AxisNoise, letter: char, sensor: Sensor, (low, high): Point) -> 
             let line = line.filter(|(_, y)| (low..=high).contains(y));
             panel = panel.with(Series::line(line).color(Color::Quiet).dashed().width(1.25));
         }
-        let sum = taus
-            .iter()
-            .map(|&tau| (tau, shown(identified.allan_variance(tau))));
+        let sum = taus.iter();
+        let sum = sum.map(|&tau| (tau, shown(identified.allan_variance(tau))));
         panel = panel.with(Series::line(sum).color(Color::Ink).width(1.0));
     }
-    let dots = curve
-        .tau
-        .iter()
-        .zip(&curve.variance)
-        .map(|(&tau, &v)| (tau, shown(v)));
-    panel.with(Series::marks(Mark::Dot, dots.filter(|(_, y)| *y > 0.0)).width(1.25))
+    let dots = curve.tau.iter().zip(&curve.variance);
+    let dots = dots.map(|(&tau, &variance)| (tau, shown(variance)));
+    panel = panel.with(Series::marks(Mark::Dot, dots.filter(|(_, y)| *y > 0.0)).width(1.25));
+    let second = curve.tau.partition_point(|&tau| tau < 1.0);
+    if second > 0 && second < curve.tau.len() {
+        panel = panel
+            .with(
+                Series::new(Shape::Upright(1.0))
+                    .color(Color::Quiet)
+                    .width(0.75),
+            )
+            .with(Series::words((1.0, low), Anchor::AboveLeft, "1 s").color(Color::Quiet));
+    }
+    panel.with_all(lowest.map(|at| Series::marks(Mark::Ring, [at]).color(Color::Ink)))
 }
 
 /// Such as `N = 0.448 °/√h, slope −½`.
@@ -90,9 +101,6 @@ fn fine(taus: &[f64]) -> Vec<f64> {
     let (Some(first), Some(last)) = (taus.first(), taus.last()) else {
         return Vec::new();
     };
-    let steps = (POINTS * (last / first).log10()).ceil().max(1.0) as i32;
-    let part = |step: i32| f64::from(step) / f64::from(steps);
-    (0..=steps)
-        .map(|step| first * (last / first).powf(part(step)))
-        .collect()
+    let count = (POINTS * (last / first).log10()).ceil().max(1.0) as usize + 1;
+    steps(first.ln(), last.ln(), count).map(f64::exp).collect()
 }

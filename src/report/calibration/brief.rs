@@ -1,9 +1,9 @@
 //! What one screen has room for: accuracy and where it comes from, the independent check, what the calibration is worth.
 
-use super::super::outlook;
+use super::super::navigation;
 use super::report::Report;
 use super::{budget, tables};
-use crate::calibration::Estimate;
+use crate::calibration::{Estimate, ParameterVector};
 use crate::report::prelude::*;
 
 /// Adds what one screen has room for.
@@ -26,7 +26,7 @@ pub fn add(document: &mut Document, report: &Report) {
     document.brief.push(facts.into());
 }
 
-/// RMS σ of each group, beside what was to be expected and what makes most of it.
+/// RMS σ and error of each group, beside what was to be expected and what makes most of it.
 fn accuracy(report: &Report, estimate: &Estimate) -> Table {
     let both = match report.methods()[..] {
         [(_, closed), (_, _)] => Some(closed),
@@ -36,33 +36,33 @@ fn accuracy(report: &Report, estimate: &Estimate) -> Table {
     let mut columns = vec!["Accuracy (RMS of a group)", "1σ"];
     columns.extend(truth.map(|_| "error"));
     columns.extend(both.map(|_| "closed form 1σ"));
+    columns.extend(both.and(truth).map(|_| "closed form error"));
     columns.extend(report.predicted.map(|_| "predicted 1σ"));
     columns.extend(report.budget.map(|_| "mostly from"));
     let row = |group: Group| {
-        let with_unit = |value: Option<f64>| match value {
-            Some(value) => format!("{} {}", sigma(value), group.unit()),
-            None => NONE.to_owned(),
+        let with_unit = |value: Option<f64>| {
+            or_dash(value, |value| format!("{} {}", sigma(value), group.unit()))
         };
-        let indices = group.estimated(estimate);
-        let of =
-            |of: &Estimate| with_unit(group.spread(&of.sigma(), &group.estimated(of)).map(|x| x.1));
-        let mut row = vec![group.title(), of(estimate)];
-        row.extend(truth.as_ref().map(|truth| {
-            let error = group.spread(&(estimate.vector() - truth), &indices);
-            with_unit(error.map(|x| x.1))
-        }));
-        row.extend(both.map(of));
+        let mut row = vec![group.title()];
+        for of in std::iter::once(estimate).chain(both) {
+            let rms = |v: &ParameterVector| Some(group.spread(v, &group.estimated(of))?.1);
+            row.push(with_unit(rms(&of.sigma())));
+            row.extend(truth.map(|truth| with_unit(rms(&(of.vector() - truth)))));
+        }
         row.extend(report.predicted.map(|predicted| {
             let of_group = predicted.sigma.iter().find(|(of, _)| *of == group);
             with_unit(of_group.and_then(|(_, sigma)| Some((*sigma)? / group.unit_value())))
         }));
-        let source = |of| budget::largest(of, &indices).unwrap_or(NONE.to_owned());
+        let source =
+            |of| budget::largest(of, &group.estimated(estimate)).unwrap_or(NONE.to_owned());
         row.extend(report.budget.map(source));
         row
     };
     let mut table = Table::new("", columns).section(Group::all().map(row));
-    // A narrow terminal does without the last columns.
-    table.optional = (2..table.columns.len()).collect();
+    // A narrow terminal does without the last columns, but first without the error that was not to be lowered.
+    let (first, others): (Vec<_>, Vec<_>) =
+        (2..table.columns.len()).partition(|column| table.columns[*column] == "closed form error");
+    table.optional = [others, first].concat();
     table
 }
 
@@ -85,7 +85,7 @@ fn weakest(report: &Report) -> Option<String> {
 
 fn navigation(report: &Report) -> Option<String> {
     match report.navigation {
-        Ok(navigated @ [_, ..]) => Some(outlook::line(navigated)),
+        Ok(navigated @ [_, ..]) => Some(navigation::line(navigated)),
         _ => None,
     }
 }

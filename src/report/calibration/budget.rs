@@ -18,23 +18,23 @@ const NAMED: f64 = 1e-3;
 
 /// RMS of a group's standard uncertainties by source, and together.
 pub fn table(budget: &Budget, estimate: &Estimate) -> Table {
-    let columns = Group::all().map(|group| format!("{}, {}", group.short(), group.unit()));
-    let columns = std::iter::once("source".to_owned()).chain(columns);
     let row = |name: &str, u: ParameterVector, freedom: &str| {
-        let cells = Group::all().map(|group| {
+        let mut row = vec![name.to_owned()];
+        row.extend(Group::all().map(|group| {
             let spread = group.spread(&u, &group.estimated(estimate));
             or_dash(spread.map(|of| of.1), three_digits)
-        });
-        let mut row = vec![name.to_owned()];
-        row.extend(cells);
+        }));
         row.push(freedom.to_owned());
         row
     };
     let root = |part: &BudgetPart| part.covariance.diagonal().map(|v| v.max(0.0).sqrt());
     let parts = shown(budget, estimate);
     let rows = parts.iter().map(|part| {
-        let freedom = part.degrees_of_freedom;
-        row(&part.source.name(), root(part), &finite(freedom))
+        let freedom = match part.degrees_of_freedom {
+            freedom if freedom.is_finite() => sigma(freedom),
+            _ => "∞".to_owned(),
+        };
+        row(&part.source.name(), root(part), &freedom)
     });
     let combined = budget.covariance().diagonal().map(f64::sqrt);
     let factors = Group::all().map(|group| {
@@ -44,7 +44,8 @@ pub fn table(budget: &Budget, estimate: &Estimate) -> Table {
     let mut coverage = vec!["coverage factor k, 95.45 %".to_owned()];
     coverage.extend(factors.map(|k| or_dash(k, |k| value(k, 0.1))));
     coverage.push(String::new());
-    Table::new("Uncertainty budget", columns.chain(["ν".to_owned()]))
+    let columns = [group_columns("source"), vec!["ν".to_owned()]].concat();
+    Table::new("Uncertainty budget", columns)
         .section(rows)
         .section([
             row("combined standard uncertainty", combined, ""),
@@ -61,25 +62,14 @@ pub fn table(budget: &Budget, estimate: &Estimate) -> Table {
         )
 }
 
-fn finite(freedom: f64) -> String {
-    match freedom.is_finite() {
-        true => sigma(freedom),
-        false => "∞".to_owned(),
-    }
-}
-
 /// The sources that add anything worth naming, the largest first.
 fn shown<'a>(budget: &'a Budget, estimate: &Estimate) -> Vec<&'a BudgetPart> {
-    let largest = |part: &BudgetPart| {
-        let shares = estimate.estimated().map(|i| share(part, estimate, i));
-        shares.fold(0.0, f64::max)
-    };
-    let total = |part: &BudgetPart| -> f64 {
-        let shares = estimate.estimated().map(|i| share(part, estimate, i));
-        shares.sum()
-    };
+    let shares = |part| estimate.estimated().map(move |i| share(part, estimate, i));
     let parts = budget.parts.iter();
-    let mut parts: Vec<_> = parts.filter(|part| largest(part) >= NAMED).collect();
+    let mut parts: Vec<&BudgetPart> = parts
+        .filter(|part| shares(part).any(|share| share >= NAMED))
+        .collect();
+    let total = |part| shares(part).sum::<f64>();
     parts.sort_by(|a, b| total(b).total_cmp(&total(a)));
     parts
 }
@@ -126,8 +116,8 @@ pub fn figure(budget: &Budget, estimate: &Estimate) -> Plot {
                 *floor += 100.0 * heights(i);
                 (n as f64, low, *floor)
             });
-            let series = Series::new(Shape::Blocks(0.35, blocks.collect())).color(color);
-            series.key(key)
+            let bars = Series::bars(0.35, Fill::Solid, blocks);
+            bars.color(color).key(key)
         };
         for (n, part) in own.iter().enumerate() {
             let of = |i: usize| share(part, estimate, i);
@@ -171,28 +161,19 @@ pub fn unseen(report: &Report, estimate: &Estimate) -> Option<String> {
     };
     let mut unseen: Vec<_> = report.effects.iter().filter_map(worst).collect();
     unseen.sort_by(|a, b| b.2.total_cmp(&a.2));
-    let named = unseen.iter().take(NAMED_TERMS);
-    let mut named: Vec<String> = named
-        .map(|(term, group, times)| {
-            let (name, group, times) = (term.name(), group.short(), three_digits(*times));
-            format!("{name} (may change {group} by {times} σ)")
-        })
-        .collect();
-    named.extend(match unseen.len() - named.len() {
-        0 => None,
-        more => Some(format!("{more} more")),
+    let named = unseen.iter().take(NAMED_TERMS).map(|(term, group, times)| {
+        let (name, group, times) = (term.name(), group.short(), three_digits(*times));
+        format!("{name} (may change {group} by {times} σ)")
     });
-    (!named.is_empty()).then(|| {
-        format!(
-            "{}: not visible in this record, so not in σ",
-            named.join(", ")
-        )
-    })
+    let mut named: Vec<String> = named.collect();
+    let more = unseen.len() - named.len();
+    named.extend((more > 0).then(|| format!("{more} more")));
+    let named = named.join(", ");
+    (!named.is_empty()).then(|| format!("{named}: not visible in this record, so not in σ"))
 }
 
 /// What is in no sum: error terms that are not estimated.
 pub fn left_off(report: &Report, estimate: &Estimate) -> Table {
-    let columns = Group::all().map(|group| format!("{}, {}", group.short(), group.unit()));
     let cell = |group: Group, of: &ParameterVector| {
         let spread = group.spread(of, &group.estimated(estimate));
         or_dash(spread.map(|of| of.1), sigma)
@@ -211,7 +192,7 @@ pub fn left_off(report: &Report, estimate: &Estimate) -> Table {
     };
     Table::new(
         "Error terms that are not estimated: what they may add",
-        std::iter::once("term".to_owned()).chain(columns),
+        group_columns("term"),
     )
     .section(report.effects.iter().filter_map(row))
     .note(format!(

@@ -3,10 +3,8 @@
 use nalgebra::Matrix3;
 
 use crate::attitude::matrix;
-use crate::calibration::{
-    Epoch, Estimate, Innovation, Nis, Observation, Outcome, ParameterVector, sensor_and_parameter,
-};
-use crate::imu::AXES;
+use crate::calibration::{Epoch, Estimate, Innovation, Nis, Observation, Outcome, ParameterVector};
+use crate::imu::{AXES, Sensor};
 use crate::recording::{ImuSamples, TableLog};
 use crate::report::calibration::report::Report;
 use crate::report::prelude::*;
@@ -26,7 +24,6 @@ impl Report<'_> {
         let mut plots = Vec::new();
         plots.extend(match (self.truth_vector(), self.methods().as_slice()) {
             (Some(truth), methods @ [_, ..]) => Some(errors(methods, &truth)),
-            (None, &[(_, closed), (_, filter)]) => Some(differences(closed, filter)),
             _ => None,
         });
         if let Some(outcome) = self.against_time() {
@@ -60,20 +57,16 @@ impl Report<'_> {
                 return Panel::blank(format!("{}: all fixed", group.title()));
             }
             let line = |(n, &i): (usize, &usize)| {
-                let points = history
-                    .iter()
-                    .map(|m| (m.time, m.sigma[i] / group.unit_value()));
-                Series::line(points)
-                    .nth(n)
-                    .label(format!("σ {}", axis_name(form, i)))
+                let points = history.iter();
+                let points = points.map(|m| (m.time, m.sigma[i] / group.unit_value()));
+                let name = format!("σ {}", axis_name(form, i));
+                Series::line(points).nth(n).label(name)
             };
             let error = truth.map(|truth| {
                 let of = |m: &Epoch| Some(group.spread(&(m.estimate - truth), &indices)?.0);
                 let points = history.iter().filter_map(|m| Some((m.time, of(m)?)));
-                Series::line(points)
-                    .color(Color::Ink)
-                    .dashed()
-                    .label("error")
+                let line = Series::line(points).color(Color::Ink);
+                line.dashed().label("error")
             });
             Panel::new(group.titled(), self.time(), Axis::log(""))
                 .shaded(self.dwells)
@@ -87,12 +80,8 @@ impl Report<'_> {
         if truth.is_some() {
             caption += " Dashed: the largest true error in the group; it should end within a few σ of the lines.";
         }
-        let plot = Plot::new(
-            "sigma.svg",
-            "Accuracy against time",
-            (3, 330),
-            Group::all().map(panel),
-        );
+        let (heading, panels) = ("Accuracy against time", Group::all().map(panel));
+        let plot = Plot::new("sigma.svg", heading, (3, 330), panels);
         (!history.is_empty()).then(|| plot.caption(caption))
     }
 
@@ -105,31 +94,23 @@ impl Report<'_> {
         };
         let panel = |group: Group, index: usize| {
             let (unit, indices) = (group.unit_value(), group.estimated(estimate));
-            let of = |history: &[Epoch], of: &dyn Fn(&Epoch) -> f64| {
-                history
-                    .iter()
-                    .map(|m| (m.time, of(m) / unit))
-                    .collect::<Vec<_>>()
+            let of = |of: &dyn Fn(&Epoch) -> f64| -> Vec<Point> {
+                let history = outcome.history.iter();
+                history.map(|m| (m.time, of(m) / unit)).collect()
             };
             let error = |m: &Epoch| m.estimate[index] - reference[index];
-            let sigma = group
-                .spread(&estimate.sigma(), &indices)
-                .map_or(1.0, |x| x.1);
-            let history = &outcome.history;
+            let sigma = group.spread(&estimate.sigma(), &indices);
+            let sigma = sigma.map_or(1.0, |x| x.1);
             let title = format!("{} {}", group.title(), axis_name(estimate.form(), index));
             let y = Axis::symlog(sigma).between(-EXTENT * sigma, EXTENT * sigma);
             Panel::new(format!("{title}, {}", group.unit()), self.time(), y)
                 .shaded(self.dwells)
                 .with(Series::band(
-                    of(history, &|m| -3.0 * m.sigma[index]),
-                    of(history, &|m| 3.0 * m.sigma[index]),
+                    of(&|m| -3.0 * m.sigma[index]),
+                    of(&|m| 3.0 * m.sigma[index]),
                 ))
                 .with(Series::zero())
-                .with(
-                    Series::line(of(history, &error))
-                        .color(Color::Ink)
-                        .width(1.75),
-                )
+                .with(Series::line(of(&error)).color(Color::Ink).width(1.75))
         };
         let mut panels: Vec<Panel> = Vec::new();
         for group in Group::all() {
@@ -156,21 +137,16 @@ impl Report<'_> {
             ("attitude", Observation::Attitude, &consistency.attitude),
         ];
         let of_kind = |kind| {
-            outcome
-                .innovations
-                .iter()
-                .filter(move |i| i.observation == kind)
+            let all = outcome.innovations.iter();
+            all.filter(move |i| i.observation == kind)
         };
-        let kinds = kinds
-            .into_iter()
-            .filter(|(_, kind, _)| of_kind(*kind).next().is_some());
-        let kinds: Vec<(&str, Observation, &Nis)> = kinds.collect();
+        let is_there = |(_, kind, _): &(&str, Observation, &Nis)| of_kind(*kind).next().is_some();
+        let kinds: Vec<(&str, Observation, &Nis)> = kinds.into_iter().filter(is_there).collect();
         let panel = |name: &str, kind: Observation, direction: usize| {
             let point = |i: &Innovation| (i.time, i.whitened[direction].clamp(-EDGE, EDGE));
             let of = |accepted| {
-                of_kind(kind)
-                    .filter(move |i| i.accepted == accepted)
-                    .map(point)
+                let those = of_kind(kind).filter(move |i| i.accepted == accepted);
+                those.map(point)
             };
             let accepted: Vec<_> = of(true).collect();
             let shown = match accepted.len() <= DOTS {
@@ -178,28 +154,22 @@ impl Report<'_> {
                 false => Series::line(self.interrupted_by_turns(&accepted)),
             };
             let title = format!("{name}, {}, σ", ["east", "north", "up"][direction]);
-            Panel::new(
-                title,
-                self.time(),
-                Axis::linear("").between(-EDGE, EDGE).step(2.0),
-            )
-            .shaded(self.dwells)
-            .with(shown.width(1.0))
-            .with_all([-3.0, -1.0, 1.0, 3.0].map(bound))
-            .with(Series::marks(Mark::Cross, of(false)).nth(1))
+            let y = Axis::linear("").between(-EDGE, EDGE).step(2.0);
+            Panel::new(title, self.time(), y)
+                .shaded(self.dwells)
+                .with(shown.width(1.0))
+                .with_all([-3.0, -1.0, 1.0, 3.0].map(bound))
+                .with(Series::marks(Mark::Cross, of(false)).nth(1))
         };
-        let rows = kinds
-            .iter()
-            .flat_map(|&(name, kind, _)| [0, 1, 2].map(|d| panel(name, kind, d)));
+        let rows = kinds.iter();
+        let rows = rows.flat_map(|&(name, kind, _)| [0, 1, 2].map(|d| panel(name, kind, d)));
+        let sentences = kinds.iter().map(|(name, _, nis)| sentence(name, nis));
+        let sentences: Vec<String> = sentences.collect();
         let caption = format!(
             "Innovations of the last pass in units of their own σ; they should look like white noise of unit \
              variance. Solid lines: ±1σ; dashed: ±3σ. Where they are many the line runs through the extremes of \
              each stretch. Crosses: rejected by the gate; at the edge: ±{EDGE}σ or more. {}",
-            kinds
-                .iter()
-                .map(|(name, _, nis)| sentence(name, nis))
-                .collect::<Vec<_>>()
-                .join(" ")
+            sentences.join(" ")
         );
         let plot = Plot::new("innovations.svg", "Innovations", (3, 270), rows);
         (!kinds.is_empty()).then(|| plot.caption(caption))
@@ -268,33 +238,18 @@ fn errors(methods: &[(&str, &Estimate)], truth: &ParameterVector) -> Plot {
         if indices.is_empty() {
             return Panel::blank(format!("{}: all fixed", group.title()));
         }
-        let series = methods
-            .iter()
-            .enumerate()
-            .flat_map(|(n, (name, estimate))| {
-                let (error, sigma) = (estimate.vector() - truth, estimate.sigma());
-                let offset = 0.26 * (n as f64 - 0.5 * (methods.len() as f64 - 1.0));
-                let places = || {
-                    indices
-                        .iter()
-                        .enumerate()
-                        .map(|(k, &i)| (k as f64 + offset, i))
-                };
-                let unit = group.unit_value();
-                let (mark, color) = method_mark(name);
-                let whiskers = places().filter(|&(_, i)| sigma[i] > 0.0);
-                let whiskers = whiskers.map(|(x, i)| (x, 0.0, sigma[i] / unit)).collect();
-                let marks = places().map(|(x, i)| (x, error[i].abs() / unit));
-                [
-                    Series::new(Shape::Intervals(whiskers))
-                        .color(color)
-                        .width(1.0),
-                    Series::marks(mark, marks)
-                        .color(color)
-                        .width(2.0)
-                        .key(*name),
-                ]
+        let series = methods.iter().enumerate().map(|(n, (name, estimate))| {
+            let unit = group.unit_value();
+            let (error, sigma) = (estimate.vector() - truth, estimate.sigma() / unit);
+            let offset = beside(n, methods.len(), 0.52);
+            let points = indices.iter().enumerate().map(|(k, &i)| {
+                let at = (k as f64 + offset, error[i].abs() / unit);
+                (at, (0.0, sigma[i]))
             });
+            let (mark, color) = method_mark(name);
+            let marks = Series::whiskers(mark, points).color(color);
+            marks.width(2.0).key(*name)
+        });
         let x = Axis::places(indices.iter().map(|&i| axis_name(form, i)));
         Panel::new(group.titled(), x, Axis::log("")).with_all(series)
     };
@@ -317,52 +272,6 @@ fn method_mark(name: &str) -> (Mark, Color) {
     }
 }
 
-/// The difference between both methods in its σ.
-fn differences(closed: &Estimate, filter: &Estimate) -> Plot {
-    let form = filter.form();
-    let difference = closed.vector() - filter.vector();
-    let variance = closed.covariance.diagonal() + filter.covariance.diagonal();
-    let points: Vec<(usize, f64)> = filter
-        .estimated()
-        .filter(|&i| variance[i] > 0.0)
-        .map(|i| (i, difference[i] / variance[i].sqrt()))
-        .collect();
-    let extent = 1.2 * points.iter().map(|point| point.1.abs()).fold(4.0, f64::max);
-    let y = match extent > 24.0 {
-        true => Axis::symlog(1.0),
-        false => Axis::linear(""),
-    };
-    let sensor = |index: usize| sensor_and_parameter(index).0;
-    let panels = points
-        .chunk_by(|a, b| sensor(a.0) == sensor(b.0))
-        .map(|triad| {
-            let x = Axis::places(triad.iter().map(|&(i, _)| short_name(form, i)));
-            let stems = triad
-                .iter()
-                .enumerate()
-                .map(|(k, &(_, y))| (k as f64, 0.0, y))
-                .collect();
-            let marks = triad.iter().enumerate().map(|(k, &(_, y))| (k as f64, y));
-            Panel::new(
-                "closed form minus EKF, σ",
-                x,
-                y.clone().between(-extent, extent),
-            )
-            .with(Series::zero())
-            .with_all([-3.0, 3.0].map(|y| {
-                Series::level(y)
-                    .dashed()
-                    .label(if y < 0.0 { "−3σ" } else { "+3σ" })
-            }))
-            .with(Series::new(Shape::Intervals(stems)).width(1.0))
-            .with(Series::marks(Mark::Dot, marks).width(2.5))
-        });
-    Plot::new("comparison.svg", "Closed form against EKF", (1, 220), panels).caption(
-        "Closed form minus EKF in units of the σ of their difference, as if they had no data in common. Dashed: \
-         ±3.",
-    )
-}
-
 /// Nearer to the plumb line than this an axis has no azimuth worth drawing.
 const STEEP: f64 = 80.0 * DEGREE;
 /// Azimuth up to which a curve may run past ±180° before it continues at the other end, °.
@@ -375,8 +284,8 @@ fn path(report: &Report) -> Plot {
         let dwells = report.dwells.iter().enumerate();
         dwells.map(|(n, dwell)| (0.5 * (dwell.start + dwell.end), (n + 1).to_string()))
     };
-    let panel = |title: &str, y: Axis, line: &dyn Fn(usize) -> Vec<Point>| {
-        let lines = [0, 1, 2].map(|axis| Series::line(line(axis)).axis(axis).label(AXES[axis]));
+    let panel = |title: &str, y: Axis, line: &dyn Fn(usize) -> Series| {
+        let lines = [0, 1, 2].map(|axis| line(axis).axis(axis).label(AXES[axis]));
         Panel::new(title, Axis::linear("time, s").between(start, end), y)
             .shaded(report.dwells)
             .tagged(1, numbers())
@@ -401,20 +310,19 @@ fn path(report: &Report) -> Plot {
     caption += "Rates are the raw gyro outputs about the body axes. Grey: dwells, numbered where there is room.";
     let y = Axis::linear("").including([0.0]).room(0.05, 0.16);
     panels.push(panel("rate about the body axes, °/s", y, &|axis| {
-        rate(&report.run.recording.imu, axis)
+        samples(&report.run.recording.imu, Sensor::Gyro, axis, DEGREE)
     }));
     Plot::new("path.svg", "Path", (1, 240), panels).caption(caption)
 }
 
 /// Elevation of a body axis above the horizon in degrees.
-fn elevation(table: &TableLog, axis: usize) -> Vec<Point> {
+fn elevation(table: &TableLog, axis: usize) -> Series {
     let line = table.time.iter().zip(&table.attitude);
-    line.map(|(&t, attitude)| (t, axis_elevation(&matrix(attitude), axis) / DEGREE))
-        .collect()
+    Series::line(line.map(|(&t, attitude)| (t, axis_elevation(&matrix(attitude), axis) / DEGREE)))
 }
 
 /// Azimuth of a body axis clockwise from North in degrees, interrupted where it jumps and where it is steep.
-fn azimuth(table: &TableLog, axis: usize) -> Vec<Point> {
+fn azimuth(table: &TableLog, axis: usize) -> Series {
     let gap = (f64::NAN, f64::NAN);
     let (mut last, mut line) = (f64::NAN, Vec::new());
     for (&t, attitude) in table.time.iter().zip(&table.attitude) {
@@ -435,71 +343,20 @@ fn azimuth(table: &TableLog, axis: usize) -> Vec<Point> {
         line.push((t, next));
         last = next;
     }
-    line
+    Series::line(line)
 }
 
 fn axis_elevation(c: &Matrix3<f64>, axis: usize) -> f64 {
     c[(2, axis)].clamp(-1.0, 1.0).asin()
 }
 
-/// Mean rate of each sample about a body axis in degrees a second.
-fn rate(imu: &ImuSamples, axis: usize) -> Vec<Point> {
-    let samples = imu.gyro.iter().enumerate();
-    let rate = |(k, angle): (usize, nalgebra::Vector3<f64>)| {
-        (
-            imu.time(k) + 0.5 * imu.period,
-            angle[axis] / imu.period / DEGREE,
-        )
+/// Mean of each sample of a triad along a body axis, in a unit per second.
+pub fn samples(imu: &ImuSamples, sensor: Sensor, axis: usize, unit: f64) -> Series {
+    let of = match sensor {
+        Sensor::Gyro => &imu.gyro,
+        Sensor::Accel => &imu.accel,
     };
-    thinned(samples.map(rate))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::attitude::{from_pitch_roll_heading, quaternion};
-
-    fn table(headings: impl Iterator<Item = f64>) -> TableLog {
-        let attitude: Vec<_> = headings
-            .map(|heading| quaternion(&from_pitch_roll_heading(0.0, 0.0, heading * DEGREE)))
-            .collect();
-        TableLog {
-            time: (0..attitude.len()).map(|k| k as f64).collect(),
-            attitude,
-            axes: Vec::new(),
-        }
-    }
-
-    #[test]
-    fn a_full_turn_in_heading_is_drawn_without_a_jump() {
-        let line = azimuth(&table((0..=36).map(|k| f64::from(k) * 10.0 + 5.0)), 1);
-        let pieces: Vec<&[Point]> = line.split(|point| point.0.is_nan()).collect();
-        assert_eq!(pieces.len(), 2);
-        for piece in &pieces {
-            assert!(piece.is_sorted_by(|a, b| b.1 - a.1 < 11.0 && b.1 > a.1));
-        }
-        let vertical = azimuth(&table((0..=36).map(f64::from)), 2);
-        assert!(
-            vertical.iter().all(|point| point.0.is_nan()),
-            "a vertical axis has no azimuth"
-        );
-    }
-
-    #[test]
-    fn an_azimuth_that_trembles_about_south_stays_on_one_side() {
-        let line = azimuth(&table((0..40).map(|k| 180.0 + f64::from(k % 2) - 0.5)), 1);
-        assert!(
-            line.windows(2)
-                .all(|pair| (pair[1].1 - pair[0].1).abs() < 2.0),
-            "{line:?}"
-        );
-    }
-
-    #[test]
-    fn the_front_axis_points_east_at_a_heading_of_ninety_degrees() {
-        let table = table(std::iter::once(90.0));
-        assert!((azimuth(&table, 1)[0].1 - 90.0).abs() < 1e-9);
-        assert!(elevation(&table, 1)[0].1.abs() < 1e-9);
-        assert!((elevation(&table, 2)[0].1 - 90.0).abs() < 1e-9);
-    }
+    let middle = |k: usize| imu.time(k) + 0.5 * imu.period;
+    let points = (0..of.len()).zip(of.iter());
+    Series::line(points.map(|(k, sample)| (middle(k), sample[axis] / imu.period / unit)))
 }

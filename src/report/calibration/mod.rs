@@ -2,7 +2,7 @@
 
 mod brief;
 mod budget;
-mod figures;
+pub(super) mod figures;
 mod report;
 mod residuals;
 mod tables;
@@ -13,9 +13,9 @@ mod tests;
 use crate::calibration::{Finding, Verdict, Word};
 use crate::imu::{Noise, Sensor};
 use crate::report::prelude::*;
-use crate::report::{outlook, terms};
+use crate::report::{navigation, terms};
 
-pub use super::outlook::Navigated;
+pub use super::navigation::Navigated;
 pub use report::{ClosedForm, Report};
 
 impl Report<'_> {
@@ -29,21 +29,16 @@ impl Report<'_> {
         brief::add(&mut document, self);
         document.page(item(self));
         document.pages(self.against_time().and_then(|outcome| self.sigma(outcome)));
-        document.pages(
-            self.quality
-                .filter(|of| !of.dwells.is_empty())
-                .map(residuals::figure),
-        );
+        let quality = self.quality.filter(|of| !of.dwells.is_empty());
+        document.pages(quality.map(residuals::figure));
         document.fold("Every parameter");
-        document.both(self.groups());
         if let Some(estimate) = self.estimate() {
             document.both(self.parameters(estimate));
         }
         document.fold("Residuals, consistency, error terms");
-        document.both(
-            self.quality
-                .map_or_else(Table::default, |of| tables::residuals(of, self.table())),
-        );
+        if let Some(quality) = self.quality {
+            document.both(tables::residuals(quality, self.table()));
+        }
         if let Some(outcome) = self.outcome {
             temperature::add(&mut document, outcome);
             document.page(tables::consistency(outcome));
@@ -58,10 +53,7 @@ impl Report<'_> {
             document.page(budget::left_off(self, estimate));
         }
         document.fold("Navigation");
-        outlook::add(&mut document, self.navigation);
-        if let Some(plot) = outlook::figure(self.navigation.unwrap_or_default()) {
-            document.page(plot);
-        }
+        navigation::add(&mut document, self.navigation);
         document.fold("Figures");
         document.pages(self.figures());
         document.fold("Observability, model, method and run");
@@ -95,16 +87,12 @@ impl Report<'_> {
             },
         ];
         lead.extend(self.outcome.map(|outcome| {
-            format!(
-                "EKF {} after {} passes; NIS with its 95 % interval: {}.",
-                if outcome.converged {
-                    "converged"
-                } else {
-                    "NOT CONVERGED"
-                },
-                outcome.passes.len(),
-                tables::nis(outcome).join(", "),
-            )
+            let converged = match outcome.converged {
+                true => "converged",
+                false => "NOT CONVERGED",
+            };
+            let (passes, nis) = (outcome.passes.len(), tables::nis(outcome).join(", "));
+            format!("EKF {converged} after {passes} passes; NIS with its 95 % interval: {nis}.")
         }));
         let closed_form = self.closed_form;
         lead.extend(closed_form.map(|closed| format!("Closed form: {}.", closed.note)));
@@ -119,17 +107,15 @@ impl Report<'_> {
         let estimate = self.estimate()?;
         let estimated = estimate.estimated().count();
         let hidden = self.outcome.map_or(0, |outcome| outcome.unobserved().len());
+        let determined = estimated - hidden;
         let of_it = match word {
-            Word::Failed => "values and σ may not be used".to_owned(),
-            _ => format!(
-                "{} of {estimated} parameters determined",
-                estimated - hidden
-            ),
+            Word::Failed => "values and σ may not be used",
+            _ => &format!("{determined} of {estimated} parameters determined"),
         };
         let findings = match self.findings.len() {
-            0 => "no findings".to_owned(),
-            1 => "one finding".to_owned(),
-            n => format!("{n} findings"),
+            0 => "no findings",
+            1 => "one finding",
+            n => &format!("{n} findings"),
         };
         Some((word, format!("{of_it}, {findings}")))
     }
@@ -140,9 +126,8 @@ pub(super) fn item(report: &Report) -> Facts {
     let meta = &report.run.recording.meta;
     let first = ["instrument", "serial", "date"];
     let others = meta.keys().map(String::as_str);
-    let names = first
-        .into_iter()
-        .chain(others.filter(|name| !first.contains(name)));
+    let others = others.filter(|name| !first.contains(name));
+    let names = first.into_iter().chain(others);
     let rows = names.filter_map(|name| Some((name, meta.get(name)?.clone())));
     Facts::new("", rows)
 }
@@ -171,20 +156,18 @@ pub(super) fn run(report: &Report) -> Facts {
         facts.push("one pulse", format!("{gyro} ″, {accel} mm/s"));
     }
     for (sensor, input) in [(Sensor::Gyro, "rad/s"), (Sensor::Accel, "m/s²")] {
-        let (name, of, unit) = (
-            sensor.name(),
-            run.instrument.nominal.get(sensor).0,
-            run.instrument.unit.get(sensor),
+        let (name, instrument) = (sensor.name(), &run.instrument);
+        let (of, unit) = (
+            instrument.nominal.get(sensor).0,
+            instrument.unit.get(sensor),
         );
         let scale = format!(
             "{}, {}, {} {unit} per second for 1 {input}",
             of.x, of.y, of.z
         );
         facts.push(&format!("{name} nominal scale"), scale);
-        facts.push(
-            &format!("{name} noise"),
-            noise(sensor, run.instrument.noise.get(sensor)),
-        );
+        let noise = noise(sensor, instrument.noise.get(sensor));
+        facts.push(&format!("{name} noise"), noise);
     }
     facts.push(
         "turntable",
@@ -205,10 +188,8 @@ fn noise(sensor: Sensor, noise: &Noise) -> String {
         Sensor::Gyro => (DEG_PER_SQRT_H, "°/√h", DEG_PER_H, "°/h"),
         Sensor::Accel => (MICRO_G_PER_SQRT_HZ, "µg/√Hz", MICRO_G, "µg"),
     };
-    let mut text = format!(
-        "random walk {} {walk_unit}",
-        sigma(noise.random_walk / walk)
-    );
+    let own = sigma(noise.random_walk / walk);
+    let mut text = format!("random walk {own} {walk_unit}");
     if let Some(of) = noise.gauss_markov {
         let (of_bias, time) = (sigma(of.sigma / bias), sigma(of.correlation_time));
         text += &format!(", Gauss–Markov bias {of_bias} {bias_unit} over {time} s");
@@ -223,10 +204,8 @@ impl Report<'_> {
                        body axes; K: scale factors, given as departure from nominal; E: entries of C beside the \
                        diagonal; D: bias";
         let equation = "N = K C u + D; u = (K C)⁻¹ (N − D)";
-        let mut facts = Facts::new(
-            "Model and method",
-            [("equation", equation), ("symbols", symbols)],
-        );
+        let rows = [("equation", equation), ("symbols", symbols)];
+        let mut facts = Facts::new("Model and method", rows);
         if let Some(estimate) = self.estimate() {
             facts.push("installation form", estimate.form().name());
         }
@@ -239,24 +218,19 @@ impl Report<'_> {
             None => ("zero velocity in dwells", "the IMU's own readings"),
         };
         if let Some(outcome) = self.outcome {
-            let iterations = outcome.passes.len();
-            let velocity = sigma(outcome.velocity_sigma / MILLISECOND);
-            facts.push(
-                "filter",
-                format!(
-                    "error-state EKF, {iterations} Gauss–Newton iterations; velocity in dwells {velocity} \
-                     mm/s (1σ, white)"
-                ),
+            let filter = format!(
+                "error-state EKF, {} Gauss–Newton iterations; velocity in dwells {} mm/s (1σ, white)",
+                outcome.passes.len(),
+                sigma(outcome.velocity_sigma / MILLISECOND)
             );
+            facts.push("filter", filter);
             facts.push("observed", observed);
         }
         if let Some(closed) = self.closed_form {
             facts.push("closed form", closed.note);
         }
-        facts.push(
-            "dwells",
-            format!("{}, found in {found_in}", count(self.dwells.len())),
-        );
+        let dwells = format!("{}, found in {found_in}", count(self.dwells.len()));
+        facts.push("dwells", dwells);
         facts
     }
 }

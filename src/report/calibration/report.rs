@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::super::outlook::Navigated;
+use super::super::navigation::Navigated;
 use crate::calibration::result::TermRecord;
 use crate::calibration::{
     Budget, ErrorTermTest, Estimate, Finding, Outcome, ParameterVector, Quality, to_vector,

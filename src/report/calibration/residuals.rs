@@ -1,12 +1,12 @@
 //! Residuals in each dwell, as a figure.
 
-use super::tables::{ANGLE, FORCE};
+use super::tables::{ANGLE, FORCE, readable};
 use crate::calibration::{DwellResidual, Quality};
 use crate::report::prelude::*;
 
 /// Residuals of gravity's magnitude and direction against time; dwells that were left out of a fit as rings.
 pub fn figure(quality: &Quality) -> Plot {
-    let panel = |name: &str, units: &[(&str, f64)], of: fn(&DwellResidual) -> Option<f64>| {
+    let panel = |name: &str, units, of: fn(&DwellResidual) -> Option<f64>| {
         let points = |dwells: &[DwellResidual]| -> Vec<Point> {
             let residual = |dwell: &DwellResidual| Some((dwell.time, of(dwell)?));
             dwells.iter().filter_map(residual).collect()
@@ -14,8 +14,7 @@ pub fn figure(quality: &Quality) -> Plot {
         let (fitted, left_out) = (points(&quality.dwells), points(&quality.held_out_dwells));
         let all = || fitted.iter().chain(&left_out).map(|point| point.1.abs());
         let largest = all().fold(0.0, f64::max);
-        let fits = units.iter().find(|(_, size)| largest < 1000.0 * size);
-        let (unit, size) = *fits.unwrap_or(&units[units.len() - 1]);
+        let (unit, size) = readable(units, largest);
         let scaled = |points: Vec<Point>| points.into_iter().map(move |(time, y)| (time, y / size));
         Panel::new(
             format!("{name}, {unit}"),

@@ -4,7 +4,6 @@ use super::super::terms;
 use super::super::terms::improvement;
 use super::report::Report;
 use crate::calibration::{Estimate, Measures, Nis, Outcome, Quality, Spread, parameter_name};
-use crate::imu::ParameterKind;
 use crate::recording::TableLog;
 use crate::report::prelude::*;
 
@@ -64,61 +63,6 @@ impl Report<'_> {
         }
         table.optional = optional;
         table
-    }
-
-    /// σ and errors of each group by each method: the answer at a glance.
-    pub(super) fn groups(&self) -> Table {
-        let (methods, truth) = (self.methods(), self.truth_vector());
-        let (mut columns, mut optional) = (cells!["", "unit"], Vec::new());
-        for (name, _) in &methods {
-            columns.push(format!("{name}: RMS σ"));
-            if truth.is_some() {
-                optional.push(columns.len());
-                columns.extend(["RMS error", "largest"].map(str::to_owned));
-            }
-        }
-        let both = <[_; 2]>::try_from(methods.clone()).ok();
-        if both.is_some() {
-            columns.push("σ ratio".to_owned());
-            columns.extend(truth.is_none().then(|| "difference, RMS".to_owned()));
-        }
-        let row = |group: Group| {
-            let mut row = cells![group.title(), group.unit()];
-            for (_, estimate) in &methods {
-                let indices = group.estimated(estimate);
-                let claimed = group.spread(&estimate.sigma(), &indices);
-                row.push(or_dash(claimed.map(|x| x.1), sigma));
-                if let Some(truth) = &truth {
-                    let error = group.spread(&(estimate.vector() - truth), &indices);
-                    row.push(or_dash(error.map(|x| x.1), three_digits));
-                    row.push(or_dash(error.map(|x| x.0), three_digits));
-                }
-            }
-            if let Some([(_, closed), (_, filter)]) = both {
-                let rms = |of: &Estimate| Some(group.spread(&of.sigma(), &group.estimated(of))?.1);
-                let ratio = rms(closed)
-                    .zip(rms(filter))
-                    .map(|(closed, filter)| closed / filter);
-                row.push(or_dash(ratio, three_digits));
-                let difference = closed.vector() - filter.vector();
-                let spread = group.spread(&difference, &group.parameters(closed.form()));
-                let spread = spread.filter(|_| truth.is_none());
-                row.extend(spread.map(|x| three_digits(x.1)));
-            }
-            row
-        };
-        let rows: Vec<_> = Group::all().map(row).collect();
-        let mut table = Table::new("Accuracy of each group", columns)
-            .sections(rows.chunks(ParameterKind::ALL.len()).map(<[_]>::to_vec))
-            .note("RMS σ: root mean square of the 1σ that the method claims in the group.");
-        table.optional = optional;
-        if truth.is_some() {
-            table = table.note("Errors are estimate minus truth.");
-        }
-        match both {
-            Some(_) => table.note("σ ratio: closed form over EKF."),
-            None => table,
-        }
     }
 }
 
@@ -195,11 +139,10 @@ pub fn consistency(outcome: &Outcome) -> Table {
 /// Residuals in dwells that were left out of the fit, in a line.
 pub fn cross_validation(report: &Report) -> Option<String> {
     let held_out = report.quality?.held_out.as_ref()?;
-    let of = |name: &str, spread: &Spread, units: &[(&str, f64)]| {
-        let fits = units.iter().find(|(_, size)| spread.rms < 1000.0 * size);
-        let &(unit, size) = fits.or(units.last()).filter(|_| spread.count > 0)?;
+    let of = |name: &str, spread: &Spread, units: &[(&'static str, f64); 2]| {
+        let (unit, size) = readable(units, spread.rms);
         let [rms, largest] = [spread.rms, spread.largest].map(|x| three_digits(x / size));
-        Some(format!("{name} {rms} {unit} RMS, largest {largest}"))
+        (spread.count > 0).then(|| format!("{name} {rms} {unit} RMS, largest {largest}"))
     };
     let parts = [
         of("|f| − g", &held_out.gravity, &FORCE),
@@ -223,10 +166,9 @@ pub fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
     let of = |m: &Measures| [m.gravity, m.direction, m.turns];
     let held_out = quality.held_out.as_ref().map(of);
     let all = named.into_iter().zip(of(&quality.all)).enumerate();
-    let rows = all.filter_map(|(k, ((name, units), all))| {
-        // The smallest unit in which the figure is below a thousand, else the largest.
-        let fits = units.iter().find(|(_, size)| all.rms < 1000.0 * size);
-        let &(unit, size) = fits.or(units.last()).filter(|_| all.count > 0)?;
+    let all = all.filter(|(_, (_, all))| all.count > 0);
+    let rows = all.map(|(k, ((name, units), all))| {
+        let (unit, size) = readable(&units, all.rms);
         let cells = |of: &Spread| match of.count {
             0 => [NONE; 3].map(str::to_owned),
             n => {
@@ -237,7 +179,7 @@ pub fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
         let mut row = cells![name, unit];
         row.extend(cells(&all));
         row.extend(held_out.iter().flat_map(|of| cells(&of[k])));
-        Some(row)
+        row
     });
     let mut columns = vec!["", "unit", "number", "RMS", "largest"];
     if quality.held_out.is_some() {
@@ -250,6 +192,14 @@ pub fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
              end in them.",
         ),
         false => table,
+    }
+}
+
+/// The smallest unit in which a figure is below a thousand, else the largest.
+pub fn readable(units: &[(&'static str, f64); 2], figure: f64) -> (&'static str, f64) {
+    match figure < 1000.0 * units[0].1 {
+        true => units[0],
+        false => units[1],
     }
 }
 

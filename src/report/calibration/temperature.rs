@@ -41,14 +41,10 @@ fn orders(outcome: &Outcome, thermal: &Thermal) -> Table {
     let form = outcome.estimate.form();
     let highest = thermal.coefficients.iter().filter(|c| c.function != RATE);
     let highest = highest.map(|c| c.function + 1).max().unwrap_or(0);
-    let mut columns = vec!["parameter".to_owned(), "unit".to_owned()];
+    let mut columns = cells!["parameter", "unit"];
     let any_rate = thermal.coefficients.iter().any(|c| c.function == RATE);
     let functions = (0..highest).chain(any_rate.then_some(RATE));
-    columns.extend(
-        functions
-            .clone()
-            .map(|function| function_name(Some(function))),
-    );
+    columns.extend(functions.clone().map(|of| function_name(Some(of))));
     let row = |group: Group, index: usize| {
         let mut row = vec![parameter_name(form, index)?, group.unit().to_owned()];
         let cell = |function: usize| {
@@ -74,11 +70,9 @@ fn orders(outcome: &Outcome, thermal: &Thermal) -> Table {
     };
     let ranges = match range(Sensor::Gyro) == range(Sensor::Accel) {
         true => range(Sensor::Gyro),
-        false => format!(
-            "gyros {}; accelerometers {}",
-            range(Sensor::Gyro),
-            range(Sensor::Accel)
-        ),
+        false => Sensor::ALL
+            .map(|of| format!("{}s {}", of.name(), range(of)))
+            .join("; "),
     };
     Table::new("Change with temperature", columns)
         .sections(Group::all().map(|group| {
@@ -95,22 +89,19 @@ fn orders(outcome: &Outcome, thermal: &Thermal) -> Table {
 fn hysteresis(outcome: &Outcome, thermal: &Thermal) -> Table {
     let form = outcome.estimate.form();
     let rows = thermal.coefficients.iter().enumerate();
-    let rows = rows
-        .filter(|(_, c)| c.function == RATE)
-        .filter_map(|(k, c)| {
-            let group = Group::of(c.index());
-            let (unit, sigma) = (
-                group.unit_value(),
-                thermal.covariance[(k, k)].max(0.0).sqrt(),
-            );
-            let largest = thermal.model.range.get(c.sensor).largest_rate;
-            Some(vec![
-                parameter_name(form, c.index())?,
-                plus_minus(2.0 * thermal.values[k] / unit, 2.0 * sigma / unit),
-                group.unit().to_owned(),
-                three_digits(largest * MINUTE),
-            ])
-        });
+    let rows = rows.filter(|(_, c)| c.function == RATE);
+    let rows = rows.filter_map(|(k, c)| {
+        let group = Group::of(c.index());
+        let of_both = 2.0 / group.unit_value();
+        let sigma = thermal.covariance[(k, k)].max(0.0).sqrt();
+        let largest = thermal.model.range.get(c.sensor).largest_rate;
+        Some(cells![
+            parameter_name(form, c.index())?,
+            plus_minus(of_both * thermal.values[k], of_both * sigma),
+            group.unit(),
+            three_digits(largest * MINUTE),
+        ])
+    });
     Table::new(
         "Hysteresis: heating less cooling at the same temperature",
         columns("parameter | value ± 1σ | unit | at ± K/min"),
@@ -126,14 +117,9 @@ fn curves(outcome: &Outcome, thermal: &Thermal) -> Plot {
         let range = thermal.model.range.get(group.sensor());
         let unit = group.unit_value();
         let indices = group.estimated(&outcome.estimate);
-        let temperatures = (0..POINTS).map(|k| {
-            range.lowest + (range.highest - range.lowest) * k as f64 / (POINTS - 1) as f64
-        });
-        let curve: Vec<(f64, ParameterVector, ParameterMatrix)> = temperatures
-            .map(|t| {
-                let (change, covariance) = there(outcome, thermal, t);
-                (t, change, covariance)
-            })
+        let temperatures = steps(range.lowest, range.highest, POINTS);
+        let curve: Vec<(f64, (ParameterVector, ParameterMatrix))> = temperatures
+            .map(|t| (t, there(outcome, thermal, t)))
             .collect();
         let room = 0.03 * (range.highest - range.lowest);
         let x = Axis::linear("temperature, °C").between(range.lowest - room, range.highest + room);
@@ -141,11 +127,11 @@ fn curves(outcome: &Outcome, thermal: &Thermal) -> Plot {
         let mut panel = Panel::new(title, x, Axis::linear("").room(0.03, 0.03));
         for (n, &i) in indices.iter().enumerate() {
             let edge = |factor: f64| {
-                let of = |(t, change, covariance): &(f64, ParameterVector, ParameterMatrix)| {
+                let points = curve.iter().map(|(t, (change, covariance))| {
                     let sigma = covariance[(i, i)].max(0.0).sqrt();
                     (*t, (change[i] + factor * sigma) / unit)
-                };
-                curve.iter().map(of).collect::<Vec<_>>()
+                });
+                points.collect::<Vec<_>>()
             };
             let marks = outcome.alone.iter().filter_map(|alone| {
                 let estimate = alone.estimate.as_ref()?;
@@ -159,13 +145,8 @@ fn curves(outcome: &Outcome, thermal: &Thermal) -> Plot {
         }
         panel
     };
-    Plot::new(
-        "temperature.svg",
-        "Parameters against temperature",
-        (3, 330),
-        Group::all().map(panel),
-    )
-    .caption(
+    let (heading, panels) = ("Parameters against temperature", Group::all().map(panel));
+    Plot::new("temperature.svg", heading, (3, 330), panels).caption(
         "Change of each parameter from its value at the reference temperature, with its ±1σ band. Rings: what \
          each recording alone says, with stated noise.",
     )
@@ -194,40 +175,23 @@ fn departures(outcome: &Outcome, thermal: &Thermal) -> Plot {
             Axis::linear("").room(0.05, 0.05),
         )
         .with(Series::zero());
-        let count = indices.len().max(2);
         for (n, &i) in indices.iter().enumerate() {
             // Side by side, so that their intervals do not hide each other.
-            let beside = (n as f64 / (count - 1) as f64 - 0.5) * 0.05 * span;
-            let points: Vec<(f64, f64, f64)> = outcome
-                .alone
-                .iter()
-                .filter_map(|alone| {
-                    let estimate: &Estimate = alone.estimate.as_ref()?;
-                    let t = own_temperature(alone, i)?;
-                    let (change, _) = there(outcome, thermal, t);
-                    let off = estimate.vector()[i] - outcome.estimate.vector()[i] - change[i];
-                    Some((t + beside, off / unit, estimate.sigma()[i] / unit))
-                })
-                .collect();
-            let bars = points.iter().map(|&(t, off, s)| (t, off - s, off + s));
-            let marks = points.iter().map(|&(t, off, _)| (t, off));
-            panel = panel
-                .with(Series::new(Shape::Intervals(bars.collect())).nth(n))
-                .with(
-                    Series::marks(Mark::Dot, marks)
-                        .nth(n)
-                        .key(axis_name(form, i)),
-                );
+            let shift = beside(n, indices.len(), 0.06 * span);
+            let points = outcome.alone.iter().filter_map(|alone| {
+                let estimate: &Estimate = alone.estimate.as_ref()?;
+                let t = own_temperature(alone, i)?;
+                let (change, _) = there(outcome, thermal, t);
+                let off = estimate.vector()[i] - outcome.estimate.vector()[i] - change[i];
+                Some((t + shift, off / unit, estimate.sigma()[i] / unit))
+            });
+            let marks = Series::measured(Mark::Dot, points).nth(n);
+            panel = panel.with(marks.key(axis_name(form, i)));
         }
         panel
     };
-    Plot::new(
-        "recordings.svg",
-        "Each recording alone, less all together",
-        (3, 330),
-        Group::all().map(panel),
-    )
-    .caption(
+    let heading = "Each recording alone, less all together";
+    Plot::new("recordings.svg", heading, (3, 330), Group::all().map(panel)).caption(
         "What each recording alone says, ±1σ, less the parameter at its temperature by all together. Two thirds \
          of the intervals should reach zero.",
     )
@@ -236,41 +200,25 @@ fn departures(outcome: &Outcome, thermal: &Thermal) -> Plot {
 /// Innovations of each dwell against temperature and its rate.
 fn residuals(outcome: &Outcome) -> Plot {
     let names = ["East", "North", "Up"];
-    let panel = |title: &str, x: Axis, of: &dyn Fn(usize) -> f64| {
-        let mut panel = Panel::new(title, x, Axis::linear("")).with(Series::zero());
-        for (axis, name) in names.into_iter().enumerate() {
-            let sums = outcome.by_dwell().into_iter();
-            let known = sums.filter(|&(dwell, _)| of(dwell).is_finite());
-            let points = known.map(|(dwell, sums)| (of(dwell), sums[axis]));
-            panel = panel.with(Series::marks(Mark::Ring, points).nth(axis).key(name));
-        }
-        panel
+    let panel = |x: &str, of: &dyn Fn((f64, f64)) -> f64| {
+        let x = Axis::linear(x).room(0.03, 0.03);
+        let marks = names.into_iter().enumerate().map(|(axis, name)| {
+            let points = outcome.by_dwell().into_iter().filter_map(|(dwell, sums)| {
+                let at = outcome.warming.get(dwell).map(|&at| of(at))?;
+                at.is_finite().then_some((at, sums[axis]))
+            });
+            Series::marks(Mark::Ring, points).nth(axis).key(name)
+        });
+        Panel::new("sum over a dwell, σ", x, Axis::linear(""))
+            .with(Series::zero())
+            .with_all(marks)
     };
-    let of = |dwell: usize| {
-        outcome
-            .warming
-            .get(dwell)
-            .copied()
-            .unwrap_or((f64::NAN, f64::NAN))
-    };
-    Plot::new(
-        "residuals-temperature.svg",
-        "Innovations of dwells against temperature",
-        (2, 300),
-        [
-            panel(
-                "sum over a dwell, σ",
-                Axis::linear("temperature, °C").room(0.03, 0.03),
-                &|dwell| of(dwell).0,
-            ),
-            panel(
-                "sum over a dwell, σ",
-                Axis::linear("rate of temperature, K/min").room(0.03, 0.03),
-                &|dwell| of(dwell).1 * MINUTE,
-            ),
-        ],
-    )
-    .caption(
+    let panels = [
+        panel("temperature, °C", &|(temperature, _)| temperature),
+        panel("rate of temperature, K/min", &|(_, rate)| rate * MINUTE),
+    ];
+    let heading = "Innovations of dwells against temperature";
+    Plot::new("residuals-temperature.svg", heading, (2, 300), panels).caption(
         "Sum of the whitened innovations of velocity in each dwell over the root of their number. Without a trend, \
          and mostly within ±2, nothing of temperature is left.",
     )
@@ -283,17 +231,16 @@ fn recordings(outcome: &Outcome) -> Table {
     }
     let row = |(number, alone): (usize, &SeparateEstimate)| {
         let distance = outcome.distance_alone(number);
-        vec![
-            alone.name.clone(),
-            alone
-                .mean_temperature()
-                .map_or(NONE.to_owned(), |t| value(t, 0.01)),
-            match alone.estimate {
-                Some(_) => "yes".to_owned(),
-                None => "no".to_owned(),
+        cells![
+            alone.name.as_str(),
+            or_dash(alone.mean_temperature(), |t| value(t, 0.01)),
+            if alone.estimate.is_some() {
+                "yes"
+            } else {
+                "no"
             },
-            distance.map_or(NONE.to_owned(), |(chi, _)| three_digits(chi)),
-            distance.map_or(NONE.to_owned(), |(_, limit)| three_digits(limit)),
+            or_dash(distance.map(|of| of.0), three_digits),
+            or_dash(distance.map(|of| of.1), three_digits),
         ]
     };
     Table::new(

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::tables::column_of;
+use super::tables::{column_of, columns_of_log};
 use super::words;
 use crate::imu::{AXES, Sensor};
 use crate::recording::{Fault, LabelledMotion};
@@ -17,12 +17,9 @@ pub fn data(run: &Run, survey: &Survey) -> Value {
     for fault in &imu.faults {
         *fault_samples.entry(fault.kind.name()).or_default() += fault.samples.len();
     }
-    let ways: BTreeMap<String, usize> = survey
-        .ways_up()
-        .into_iter()
-        .enumerate()
-        .map(|(way, rests)| (words::way_up(way / 2, way % 2 == 1), rests))
-        .collect();
+    let ways = survey.ways_up().into_iter().enumerate();
+    let ways = ways.map(|(way, rests)| (words::way_up(way / 2, way % 2 == 1), rests));
+    let ways: BTreeMap<String, usize> = ways.collect();
     let mut data = json!({
         "run": run.recording.name,
         "samples": imu.len(),
@@ -63,20 +60,17 @@ fn degrees(angle: f64) -> f64 {
 
 fn log(run: &Run) -> Option<Value> {
     let log = run.recording.imu.log.as_ref()?;
-    let columns = Sensor::ALL.into_iter().flat_map(|sensor| {
-        let columns = log.columns.get(sensor).iter().zip(AXES);
-        columns.map(move |(column, axis)| {
-            json!({
-                "name": column.name,
-                "sensor": sensor.name(),
-                "axis": axis,
-                "smallest": column.smallest,
-                "at_smallest": column.at_smallest,
-                "largest": column.largest,
-                "at_largest": column.at_largest,
-                "step": column.step,
-                "step_si": column.step_rate(run.recording.imu.period),
-            })
+    let columns = columns_of_log(run).map(|(sensor, axis, column)| {
+        json!({
+            "name": column.name,
+            "sensor": sensor.name(),
+            "axis": axis,
+            "smallest": column.smallest,
+            "at_smallest": column.at_smallest,
+            "largest": column.largest,
+            "at_largest": column.at_largest,
+            "step": column.step,
+            "step_si": column.step_rate(run.recording.imu.period),
         })
     });
     let mut data = json!({

@@ -1,5 +1,6 @@
 //! The record: what the gyros and accelerometers say against time, with dwells, turns and faults.
 
+use super::super::calibration::figures::samples;
 use super::words;
 use crate::imu::{AXES, Sensor};
 use crate::report::prelude::*;
@@ -21,16 +22,14 @@ pub fn figure(run: &Run, survey: &Survey) -> Plot {
 
 fn panel(run: &Run, survey: &Survey, sensor: Sensor) -> Panel {
     let imu = &run.recording.imu;
-    let (samples, unit, title) = match sensor {
-        Sensor::Gyro => (&imu.gyro, DEGREE, "angular rate, °/s"),
-        Sensor::Accel => (&imu.accel, 1.0, "specific force, m/s²"),
+    let (unit, title) = match sensor {
+        Sensor::Gyro => (DEGREE, "angular rate, °/s"),
+        Sensor::Accel => (1.0, "specific force, m/s²"),
     };
     // Dashes would be lost in noise.
     let line = |axis: usize| {
-        let middle = |k: usize| imu.time(k) + 0.5 * imu.period;
-        let points = samples.iter().enumerate();
-        let points = points.map(|(k, sample)| (middle(k), sample[axis] / imu.period / unit));
-        Series::line(points).nth(axis).width(1.0).label(AXES[axis])
+        let line = samples(imu, sensor, axis, unit).nth(axis);
+        line.width(1.0).label(AXES[axis])
     };
     let rests = survey.rests.iter();
     let dwells: Vec<_> = rests
@@ -49,17 +48,17 @@ fn panel(run: &Run, survey: &Survey, sensor: Sensor) -> Panel {
         .iter()
         .filter(|fault| fault.axis.is_none_or(|(of, _)| of == sensor));
     let faults: Vec<f64> = faults.map(|fault| imu.time(fault.samples.start)).collect();
-    let lowest = samples
-        .iter()
-        .fold(0.0, |low: f64, sample| low.min(sample.min()));
-    let foot = lowest / imu.period / unit;
     let x = Axis::linear("time, s").between(imu.start(), imu.end());
     let y = Axis::linear("").including([0.0]).room(0.1, 0.3);
+    let lines = [0, 1, 2].map(line);
+    let corners = lines.iter().flat_map(|line| line.shape.corners());
+    let foot = corners.map(|corner| corner.1).fold(0.0, f64::min);
+    let crosses = faults.into_iter().map(|time| (time, foot));
     Panel::new(title, x, y)
         .shaded(&dwells)
         .tagged(3, tags)
-        .with_all([0, 1, 2].map(line))
-        .with(Series::marks(Mark::Cross, faults.into_iter().map(|t| (t, foot))).color(Color::Ink))
+        .with_all(lines)
+        .with(Series::marks(Mark::Cross, crosses).color(Color::Ink))
 }
 
 fn of_turn(run: &Run, turn: &Turn) -> (f64, String) {

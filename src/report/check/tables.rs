@@ -3,7 +3,7 @@
 use super::words::{degrees, direction, of_label, signed, way_up};
 use crate::calibration::Group;
 use crate::imu::{AXES, Sensor};
-use crate::recording::{Fault, LabelledMotion, Slower};
+use crate::recording::{ColumnFacts, Fault, LabelledMotion, Slower};
 use crate::report::prelude::*;
 use crate::run::Run;
 use crate::run::motion::{LabelCheck, Rest, Turn, Verdict};
@@ -13,30 +13,23 @@ use crate::survey::Survey;
 const LISTED: usize = 20;
 
 pub fn log_columns(run: &Run) -> Table {
-    let rows = run.recording.imu.log.iter().flat_map(|log| {
-        Sensor::ALL.into_iter().flat_map(|sensor| {
-            let columns = log.columns.get(sensor).iter().zip(AXES);
-            columns.map(move |(column, axis)| {
-                let (unit, symbol) = match sensor {
-                    Sensor::Gyro => (DEG_PER_H, "°/h"),
-                    Sensor::Accel => (MICRO_G, "µg"),
-                };
-                cells![
-                    column.name.as_str(),
-                    format!("{} {axis}", sensor.name()),
-                    exactly(column.smallest),
-                    count(column.at_smallest),
-                    exactly(column.largest),
-                    count(column.at_largest),
-                    run.instrument.unit.get(sensor).as_str(),
-                    or_dash(column.step, three_digits),
-                    or_dash(column.step_rate(run.recording.imu.period), |rate| format!(
-                        "{} {symbol}",
-                        three_digits(rate / unit)
-                    )),
-                ]
-            })
-        })
+    let rows = columns_of_log(run).map(|(sensor, axis, column)| {
+        let (unit, symbol) = match sensor {
+            Sensor::Gyro => (DEG_PER_H, "°/h"),
+            Sensor::Accel => (MICRO_G, "µg"),
+        };
+        let as_rate = |rate: f64| format!("{} {symbol}", three_digits(rate / unit));
+        cells![
+            column.name.as_str(),
+            format!("{} {axis}", sensor.name()),
+            exactly(column.smallest),
+            count(column.at_smallest),
+            exactly(column.largest),
+            count(column.at_largest),
+            run.instrument.unit.get(sensor).as_str(),
+            or_dash(column.step, three_digits),
+            or_dash(column.step_rate(run.recording.imu.period), as_rate),
+        ]
     });
     Table::new(
         "Columns",
@@ -46,6 +39,17 @@ pub fn log_columns(run: &Run) -> Table {
     )
     .section(rows)
     .note("Body axes are right, front, up. Step: of the grid on which all values lie.")
+}
+
+/// Columns of the log with triad and axis.
+pub fn columns_of_log(run: &Run) -> impl Iterator<Item = (Sensor, char, &ColumnFacts)> {
+    let log = run.recording.imu.log.iter();
+    log.flat_map(|log| {
+        Sensor::ALL.into_iter().flat_map(|sensor| {
+            let columns = log.columns.get(sensor).iter().zip(AXES);
+            columns.map(move |(column, axis)| (sensor, axis, column))
+        })
+    })
 }
 
 /// A whole number as it is, others to four digits.
@@ -60,29 +64,30 @@ fn exactly(x: f64) -> String {
 pub fn faults(run: &Run) -> Table {
     let imu = &run.recording.imu;
     let slower = imu.slower();
-    let row = |fault: &Fault| {
-        let column = column_of(run, fault).unwrap_or("rows");
+    let row = |what: &str, column: &str, (line, start): (u64, usize), samples, bridged: &str| {
+        let at = value(imu.time(start), 0.1);
         cells![
-            fault.kind.name(),
+            what,
             column,
-            count(fault.line as usize),
-            value(imu.time(fault.samples.start), 0.1),
-            count(fault.samples.len()),
-            if fault.bridged { "yes" } else { "no" },
+            count(line as usize),
+            at,
+            count(samples),
+            bridged
         ]
     };
+    let of_fault = |fault: &Fault| {
+        let column = column_of(run, fault).unwrap_or("rows");
+        let bridged = if fault.bridged { "yes" } else { "no" };
+        let (place, samples) = ((fault.line, fault.samples.start), fault.samples.len());
+        row(fault.kind.name(), column, place, samples, bridged)
+    };
     let of_part = |part: &Slower| {
-        cells![
-            "lower rate",
-            "rows",
-            count(part.line as usize),
-            value(imu.time(part.samples.start), 0.1),
-            count(part.missing()),
-            match part.places - part.bridged {
-                0 => "yes".to_owned(),
-                _ => format!("{} of {}", count(part.bridged), count(part.places)),
-            },
-        ]
+        let bridged = match part.places - part.bridged {
+            0 => "yes".to_owned(),
+            _ => format!("{} of {}", count(part.bridged), count(part.places)),
+        };
+        let place = (part.line, part.samples.start);
+        row("lower rate", "rows", place, part.missing(), &bridged)
     };
     let is_beside = |fault: &&Fault| !slower.iter().any(|part| part.holds(fault));
     let beside = || imu.faults.iter().filter(is_beside);
@@ -91,7 +96,7 @@ pub fn faults(run: &Run) -> Table {
         columns("what | column | line | at, s | samples | bridged"),
     )
     .section(slower.iter().map(of_part))
-    .section(beside().take(LISTED).map(row));
+    .section(beside().take(LISTED).map(of_fault));
     match beside().count().saturating_sub(LISTED) {
         0 => table,
         more => table.note(format!("And {} more.", count(more))),
@@ -120,17 +125,9 @@ pub fn dwells(run: &Run, survey: &Survey) -> Table {
         row.extend(after(k).map_or([NONE; 4].map(str::to_owned), moved));
         row
     };
+    #[rustfmt::skip]
     let headings = [
-        "",
-        "from, s",
-        "to, s",
-        "for, s",
-        "|f| − g, mg",
-        "up",
-        "tilt, °",
-        "then about",
-        "by, °",
-        "at, °/s",
+        "", "from, s", "to, s", "for, s", "|f| − g, mg", "up", "tilt, °", "then about", "by, °", "at, °/s",
         "off gravity, °",
     ];
     Table::new("Dwells, and the turns after them", headings)
@@ -159,21 +156,15 @@ fn moved(turn: &Turn) -> [String; 4] {
 
 pub fn labels(survey: &Survey) -> Table {
     let row = |check: &LabelCheck| {
-        let found = match (&check.verdict, check.segment.motion) {
-            (Verdict::Position { off, moving, .. }, _) if *moving > 0.0 => {
-                format!(
-                    "{}° off, moves for {} s",
-                    degrees(*off),
-                    value(*moving, 1.0)
-                )
+        let found = match (check.verdict, check.segment.motion) {
+            (Verdict::Position { off, moving, .. }, _) if moving > 0.0 => {
+                let (off, moving) = (degrees(off), value(moving, 1.0));
+                format!("{off}° off, moves for {moving} s")
             }
-            (Verdict::Position { off, .. }, _) => format!("stationary, {}° off", degrees(*off)),
+            (Verdict::Position { off, .. }, _) => format!("stationary, {}° off", degrees(off)),
             (Verdict::Turn { angle, off, .. }, Some(LabelledMotion::Turns { .. })) => {
-                format!(
-                    "turns by {}°, its axis {}° off",
-                    signed(*angle),
-                    degrees(*off)
-                )
+                let (angle, off) = (signed(angle), degrees(off));
+                format!("turns by {angle}°, its axis {off}° off")
             }
             (Verdict::Unknown | Verdict::Turn { .. }, _) => NONE.to_owned(),
         };
@@ -182,11 +173,7 @@ pub fn labels(survey: &Survey) -> Table {
             value(check.segment.start, 1.0),
             value(check.segment.end, 1.0),
             found,
-            if of_label(check).is_none() {
-                "yes"
-            } else {
-                "no"
-            },
+            of_label(check).map_or("yes", |_| "no"),
         ]
     };
     Table::new(
@@ -197,9 +184,8 @@ pub fn labels(survey: &Survey) -> Table {
 }
 
 pub fn methods(survey: &Survey) -> Table {
-    let groups = Group::all().map(|group| format!("{}, {}", group.short(), group.unit()));
-    let columns = std::iter::once(String::new()).chain(groups);
-    let mut table = Table::new("What each method could observe, 1σ", columns).note(
+    let heading = "What each method could observe, 1σ";
+    let mut table = Table::new(heading, group_columns("")).note(
         "RMS 1σ to be expected in the general form, from the prior's own σ on, linearised where the filter would \
          begin; the closed form's from its equations. Error terms are not in it.",
     );

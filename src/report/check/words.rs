@@ -3,7 +3,7 @@
 use crate::calibration::Contradiction;
 use crate::imu::{AXES, Sensor};
 use crate::report::prelude::*;
-use crate::run::motion::{LabelCheck, Turn};
+use crate::run::motion::{LabelCheck, Rest, Turn};
 use crate::run::{LONG_ENOUGH, Run};
 use crate::survey::{APART, Survey};
 
@@ -123,18 +123,15 @@ pub fn findings(run: &Run, survey: &Survey) -> Vec<String> {
 
 /// What the methods refuse, in a sentence.
 fn of_contradiction(contradiction: &Contradiction) -> String {
-    let said = contradiction.to_string();
-    let mut letters = said.chars();
-    let first = letters.next().map(|letter| letter.to_ascii_uppercase());
-    first.into_iter().chain(letters).collect()
+    capital(&contradiction.to_string())
 }
 
 /// Signs of a wrong unit, scale or frame.
 fn of_units(run: &Run, survey: &Survey) -> Vec<String> {
     let rests = &survey.rests;
     let mut findings = Vec::new();
-    let wrong = |force: f64| (force / run.site.gravity - 1.0).abs() > WRONG_FORCE;
-    let wrong: Vec<usize> = places(rests.iter().map(|rest| wrong(rest.force.norm())));
+    let off = |rest: &Rest| (rest.force.norm() / run.site.gravity - 1.0).abs();
+    let wrong = places(rests, |rest| off(rest) > WRONG_FORCE);
     if let Some(&first) = wrong.first() {
         findings.push(format!(
             "Specific force at rest is {} m/s² in {}, not gravity's {}: correct accel_unit, the scale or the bias in \
@@ -144,11 +141,9 @@ fn of_units(run: &Run, survey: &Survey) -> Vec<String> {
             three_digits(run.site.gravity)
         ));
     }
-    let tilted = places(
-        rests
-            .iter()
-            .map(|rest| rest.off_table().is_some_and(|off| off > WRONG_ANGLE)),
-    );
+    let tilted = places(rests, |rest| {
+        rest.off_table().is_some_and(|off| off > WRONG_ANGLE)
+    });
     if !tilted.is_empty() {
         findings.push(format!(
             "In {} the accelerometers observe another axis up than the table's log: check body_axes, the order of \
@@ -159,46 +154,43 @@ fn of_units(run: &Run, survey: &Survey) -> Vec<String> {
     let far = |turn: &Turn, off: Option<f64>| {
         off.is_some_and(|off| off > WRONG_ANGLE.max(WRONG_PART * turn.angle.abs()))
     };
-    let by_table = places(survey.turns.iter().map(|turn| far(turn, turn.off_table)));
-    let by_gravity = places(survey.turns.iter().map(|turn| far(turn, turn.off_gravity)));
+    let turns = &survey.turns;
     for (wrong, by) in [
-        (by_table, "the table's log"),
-        (by_gravity, "gravity's direction"),
+        (
+            places(turns, |turn| far(turn, turn.off_table)),
+            "the table's log",
+        ),
+        (
+            places(turns, |turn| far(turn, turn.off_gravity)),
+            "gravity's direction",
+        ),
     ] {
         if let Some(&first) = wrong.first() {
-            let turn = &survey.turns[first];
             findings.push(format!(
                 "Gyros and {by} do not turn alike in {} of {} turns (first at {} s): check gyro_unit, scale, signs and \
                  the order of axes.",
                 wrong.len(),
-                survey.turns.len(),
-                value(run.recording.imu.time(turn.samples.start), 1.0)
+                turns.len(),
+                value(run.recording.imu.time(turns[first].samples.start), 1.0)
             ));
         }
     }
     findings
 }
 
-fn places(which: impl Iterator<Item = bool>) -> Vec<usize> {
-    which
-        .enumerate()
-        .filter(|&(_, is)| is)
-        .map(|(place, _)| place)
-        .collect()
+/// Places of those of which something is true.
+fn places<T>(all: &[T], which: impl Fn(&T) -> bool) -> Vec<usize> {
+    (0..all.len()).filter(|&place| which(&all[place])).collect()
 }
 
-/// Such as `dwells 1, 2 and 4`.
+/// Such as `dwells 1, 2 and 4 more`.
 fn dwells(places: &[usize]) -> String {
-    let numbers: Vec<String> = places
-        .iter()
-        .take(NAMED)
-        .map(|k| (k + 1).to_string())
-        .collect();
-    let more = places.len().saturating_sub(NAMED);
+    let numbers = places.iter().take(NAMED).map(|k| (k + 1).to_string());
+    let numbers = numbers.collect::<Vec<_>>().join(", ");
     let word = if places.len() == 1 { "dwell" } else { "dwells" };
-    match more {
-        0 => format!("{word} {}", numbers.join(", ")),
-        more => format!("{word} {} and {more} more", numbers.join(", ")),
+    match places.len().saturating_sub(NAMED) {
+        0 => format!("{word} {numbers}"),
+        more => format!("{word} {numbers} and {more} more"),
     }
 }
 
@@ -222,13 +214,8 @@ fn of_motion(survey: &Survey) -> Vec<String> {
         ));
         return findings;
     }
-    let missing: Vec<String> = survey
-        .ways_up()
-        .iter()
-        .enumerate()
-        .filter(|&(_, &rests)| rests == 0)
-        .map(|(way, _)| way_up(way / 2, way % 2 == 1))
-        .collect();
+    let missing = places(&survey.ways_up(), |rests| *rests == 0).into_iter();
+    let missing: Vec<String> = missing.map(|way| way_up(way / 2, way % 2 == 1)).collect();
     if !missing.is_empty() && survey.directions < DIRECTIONS {
         findings.push(format!(
             "Of the six positions {} are missing, and there are {} directions of up that differ by {}°; the nine \
@@ -238,13 +225,9 @@ fn of_motion(survey: &Survey) -> Vec<String> {
             degrees(APART)
         ));
     }
-    let unturned: Vec<String> = (0..3)
-        .filter(|&axis| {
-            let about = |turn: &Turn| turn.sum[axis].abs() > WORTH;
-            !survey.turns.iter().any(about)
-        })
-        .map(|axis| AXES[axis].to_string())
-        .collect();
+    let turns = |axis: usize| survey.turns.iter().any(|turn| turn.sum[axis].abs() > WORTH);
+    let unturned = (0..3).filter(|&axis| !turns(axis));
+    let unturned: Vec<String> = unturned.map(|axis| AXES[axis].to_string()).collect();
     if !unturned.is_empty() {
         findings.push(format!(
             "Nothing turns by more than {}° about {}: the scale of that gyro shows only in such a turn.",
@@ -257,23 +240,17 @@ fn of_motion(survey: &Survey) -> Vec<String> {
 
 /// Parameters that no method could see.
 fn of_methods(survey: &Survey) -> Vec<String> {
-    let expected = || {
-        survey
-            .methods
-            .iter()
-            .filter_map(|(_, expected)| expected.as_ref().ok())
-    };
-    let Some(first) = expected().next() else {
-        return vec![
-            "No method can calibrate from this run; the table of methods says why.".to_owned(),
-        ];
-    };
-    let always: Vec<&str> = first
-        .unobserved
-        .iter()
-        .filter(|name| expected().all(|other| other.unobserved.contains(name)))
-        .map(String::as_str)
+    let methods = survey.methods.iter();
+    let expected: Vec<_> = methods
+        .filter_map(|(_, expected)| expected.as_ref().ok())
         .collect();
+    let [first, others @ ..] = &expected[..] else {
+        let text = "No method can calibrate from this run; the table of methods says why.";
+        return vec![text.to_owned()];
+    };
+    let by_none = |name: &&String| others.iter().all(|other| other.unobserved.contains(name));
+    let always = first.unobserved.iter().filter(by_none);
+    let always: Vec<&str> = always.map(String::as_str).collect();
     match always.is_empty() {
         true => Vec::new(),
         false => vec![format!(

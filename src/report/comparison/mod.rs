@@ -74,28 +74,17 @@ fn parameters(comparison: &Comparison) -> Table {
             reference_value(comparison, index),
             group.unit()
         ];
+        let finest = finest(comparison, &[index]);
         for side in &comparison.sides {
             let own = side.calibration.sigma().map(|s| s[index]);
-            let finest = finest(comparison, &[index]);
-            row.push(with_sigma(
-                side.difference[index],
-                own,
-                finest,
-                group.unit_value(),
-            ));
-            row.push(flagged(side.z(index)));
+            let difference = with_sigma(side.difference[index], own, finest, group.unit_value());
+            row.extend([difference, flagged(side.z(index))]);
         }
         row
     };
-    let sections = by_triad(|group| {
-        group
-            .among(&comparison.parameters)
-            .into_iter()
-            .map(row)
-            .collect()
-    });
+    let rows = |group: Group| group.among(&comparison.parameters).into_iter().map(row);
     let table = Table::new("Parameters", beside_reference(comparison))
-        .sections(sections)
+        .sections(by_triad(|group| rows(group).collect()))
         .note("Calibrations: difference to the reference ± the 1σ that the calibration claims.")
         .note(format!(
             "z: difference in σ of the difference, ! beyond {FLAGGED}."
@@ -150,7 +139,7 @@ fn with_sigma(of: f64, own: Option<f64>, finest: Option<f64>, unit: f64) -> Stri
 }
 
 fn groups(comparison: &Comparison) -> Table {
-    let mut columns = vec![String::new(), "unit".to_owned()];
+    let mut columns = cells!["", "unit"];
     for side in &comparison.sides {
         let largest = format!("{}: largest", side.calibration.name);
         columns.extend(cells![largest, "RMS", "RMS σ"]);
@@ -181,12 +170,9 @@ fn groups(comparison: &Comparison) -> Table {
 
 fn nees(nees: Option<Nees>) -> [String; 3] {
     nees.map_or([NONE; 3].map(str::to_owned), |nees| {
-        let (low, high) = nees.interval;
-        [
-            value(nees.mean, 0.1),
-            format!("{}…{}", value(low, 0.1), value(high, 0.1)),
-            format!("n = {}", nees.count),
-        ]
+        let [mean, low, high] =
+            [nees.mean, nees.interval.0, nees.interval.1].map(|x| value(x, 0.1));
+        [mean, format!("{low}…{high}"), format!("n = {}", nees.count)]
     })
 }
 
@@ -235,11 +221,8 @@ fn scatter(comparison: &Comparison) -> Table {
         return table;
     };
     let rows = |group: Group| {
-        let of_group = scatter
-            .parameters
-            .iter()
-            .filter(|p| Group::of(p.index) == group);
-        let row = of_group.map(|p| {
+        let all = scatter.parameters.iter();
+        let row = all.filter(|p| Group::of(p.index) == group).map(|p| {
             let unit = group.unit_value();
             let finest = finest(comparison, &[p.index]);
             let mean = with_sigma(p.mean, p.mean_sigma, None, unit);
@@ -265,10 +248,9 @@ fn scatter(comparison: &Comparison) -> Table {
 
 fn chi_square(chi_square: Option<ChiSquare>) -> [String; 3] {
     chi_square.map_or([NONE; 3].map(str::to_owned), |of| {
-        let p = if of.p < 1e-4 {
-            "< 0.0001".to_owned()
-        } else {
-            value(of.p, 0.01)
+        let p = match of.p < 1e-4 {
+            true => "< 0.0001".to_owned(),
+            false => value(of.p, 0.01),
         };
         [
             value(of.value / of.freedom as f64, 0.1),
@@ -303,7 +285,7 @@ pub(super) fn data(comparison: &Comparison) -> Value {
         let parameters = scatter.parameters.iter().map(|of| {
             let group = Group::of(of.index);
             let unit = group.unit_value();
-            let mut data = json!({
+            let data = json!({
                 "name": name(of.index),
                 "group": group.key(),
                 "count": of.count,
@@ -311,10 +293,7 @@ pub(super) fn data(comparison: &Comparison) -> Value {
                 "mean_sigma": of.mean_sigma.map(|sigma| sigma / unit),
                 "standard_deviation": of.deviation / unit,
             });
-            if let (Some(chi), Value::Object(data)) = (of.chi_square, &mut data) {
-                data.extend(chi2(chi));
-            }
-            data
+            joined(data, of.chi_square.map_or(Value::Null, chi2))
         });
         let parameters: Value = parameters.collect();
         data["scatter"] = json!({ "parameters": parameters, "all": scatter.joint.map(chi2) });
@@ -360,12 +339,8 @@ fn parameter(comparison: &Comparison, index: usize) -> Value {
     })
 }
 
-fn chi2(of: ChiSquare) -> Map<String, Value> {
-    Map::from_iter([
-        ("chi2".to_owned(), of.value.into()),
-        ("degrees_of_freedom".to_owned(), of.freedom.into()),
-        ("p".to_owned(), of.p.into()),
-    ])
+fn chi2(of: ChiSquare) -> Value {
+    json!({ "chi2": of.value, "degrees_of_freedom": of.freedom, "p": of.p })
 }
 
 /// Calibrations that reach this many times further than others make an axis logarithmic.
@@ -383,35 +358,24 @@ pub(super) fn figure(comparison: &Comparison) -> Plot {
 
 fn panel(comparison: &Comparison, group: Group) -> Panel {
     let (indices, unit) = (group.among(&comparison.parameters), group.unit_value());
-    let sides: Vec<(&str, Vec<(f64, f64)>)> = comparison
-        .sides
-        .iter()
-        .map(|side| {
-            let sigma = side.calibration.sigma().unwrap_or_default();
-            let points = indices
-                .iter()
-                .map(|&i| (side.difference[i] / unit, sigma[i] / unit));
-            (side.calibration.name.as_str(), points.collect())
-        })
-        .collect();
-    let (y, kind) = axis(sides.iter().map(|(_, points)| reach(points)).collect());
-    let spacing = 0.6 / sides.len().max(1) as f64;
-    let series = sides.iter().enumerate().flat_map(|(n, (name, points))| {
-        let x =
-            |place: usize| place as f64 + spacing * (n as f64 - 0.5 * (sides.len() as f64 - 1.0));
-        let bars = points
-            .iter()
-            .enumerate()
-            .filter(|(_, (_, sigma))| *sigma > 0.0);
-        let bars = bars
-            .map(|(k, (d, sigma))| (x(k), d - sigma, d + sigma))
-            .collect();
-        let marks = points.iter().enumerate().map(|(k, point)| (x(k), point.0));
+    let side = |side: &Side| {
+        let sigma = side.calibration.sigma().unwrap_or_default();
+        let points = indices.iter();
+        let points = points.map(|&i| (side.difference[i] / unit, sigma[i] / unit));
+        (
+            side.calibration.name.clone(),
+            points.collect::<Vec<Point>>(),
+        )
+    };
+    let sides: Vec<(String, Vec<Point>)> = comparison.sides.iter().map(side).collect();
+    let (y, kind) = axis(sides.iter().map(|(_, points)| reach(points)));
+    let series = sides.iter().enumerate().map(|(n, (name, points))| {
+        let shift = beside(n, sides.len(), 0.6);
+        let points = points.iter().enumerate();
+        let points = points.map(|(k, (off, sigma))| (k as f64 + shift, *off, *sigma));
         let mark = [Mark::Dot, Mark::Ring, Mark::Cross][n % 3];
-        [
-            Series::new(Shape::Intervals(bars)).nth(n).width(1.25),
-            Series::marks(mark, marks).nth(n).width(1.75).label(*name),
-        ]
+        let marks = Series::measured(mark, points).nth(n);
+        marks.width(1.75).label(name)
     });
     let names = indices
         .iter()
@@ -426,20 +390,14 @@ fn panel(comparison: &Comparison, group: Group) -> Panel {
 }
 
 /// How far points reach from zero with their σ.
-fn reach(points: &[(f64, f64)]) -> f64 {
-    let reaches = points
-        .iter()
-        .map(|(difference, sigma)| difference.abs() + sigma);
+fn reach(points: &[Point]) -> f64 {
+    let reaches = points.iter().map(|(off, sigma)| off.abs() + sigma);
     reaches.fold(0.0, f64::max)
 }
 
 /// The axis of calibrations that reach as far as this, and what its title says of it.
-fn axis(reaches: Vec<f64>) -> (Axis, &'static str) {
-    let most = reaches.iter().copied().fold(0.0, f64::max);
-    let least = reaches
-        .into_iter()
-        .filter(|r| *r > 0.0)
-        .fold(most, f64::min);
+fn axis(reaches: impl Iterator<Item = f64>) -> (Axis, &'static str) {
+    let (least, most) = positive_range(reaches);
     match most > APART * least {
         true => (
             Axis::symlog(0.3 * least).between(-1.5 * most, 1.5 * most),

@@ -9,8 +9,6 @@ use crate::study::experiment::{Estimator, Navigated, Situation, Worth};
 
 /// Half the height of a box, in places of the axis.
 const HALF: f64 = 0.2;
-/// From one bar to the next, in places of the axis.
-const APART: f64 = 0.28;
 /// Below this nothing is worth a place on the axis of time, nmile.
 const LEAST: f64 = 0.01;
 
@@ -54,7 +52,6 @@ fn distribution(experiment: &Experiment) -> Plot {
             )
             .with(Series::words(
                 (noise, -0.5),
-                (-4.0, -3.0),
                 Anchor::AboveLeft,
                 "noise alone",
             ))
@@ -74,38 +71,29 @@ fn distribution(experiment: &Experiment) -> Plot {
 }
 
 fn boxed(place: f64, worth: &Worth) -> Vec<Series> {
-    let color = color(worth.method.estimator);
     let (below, above) = (place - HALF, place + HALF);
     let at_end = &worth.at_end;
     let [first, third] = [at_end.quartiles.0, at_end.quartiles.1].map(miles);
     let [median, most] = [at_end.median, at_end.below_95].map(miles);
-    let upright = |x: f64| {
-        Series::line([(x, below), (x, above)])
-            .color(color)
-            .width(1.0)
-    };
-    vec![
-        Series::band(
-            vec![(first, below), (third, below)],
-            vec![(first, above), (third, above)],
-        ),
+    let upright = |x: f64| Series::line([(x, below), (x, above)]);
+    let thin = [
         upright(first),
         upright(third),
         upright(most),
-        Series::line([(third, place), (most, place)])
-            .color(color)
-            .width(1.0),
-        Series::marks(Mark::Dot, worth.errors.iter().map(|&e| (miles(e), place)))
-            .color(color)
-            .width(0.5),
+        Series::line([(third, place), (most, place)]),
+    ];
+    let color = color(worth.method.estimator);
+    let dots = worth.errors.iter().map(|&error| (miles(error), place));
+    let dots = Series::marks(Mark::Dot, dots).color(color).width(0.5);
+    let edge = |y: f64| vec![(first, y), (third, y)];
+    let mut all = vec![Series::band(edge(below), edge(above))];
+    all.extend(thin.map(|line| line.color(color).width(1.0)));
+    all.extend([
+        dots,
         upright(median).color(Color::Ink).width(3.0),
-        Series::words(
-            (median, place),
-            (0.0, -8.0),
-            Anchor::Above,
-            nmile(at_end.median),
-        ),
-    ]
+        Series::words((median, place), Anchor::Above, nmile(at_end.median)),
+    ]);
+    all
 }
 
 fn against_time(experiment: &Experiment) -> Plot {
@@ -121,13 +109,8 @@ fn against_time(experiment: &Experiment) -> Plot {
             .label(method_name(experiment, worth.method))
     };
     let all = experiment.navigations.iter().flat_map(|n| &n.methods);
-    let all = all
-        .flat_map(course)
-        .map(|point| point.1)
-        .filter(|y| *y > LEAST);
-    let (low, high) = all.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), y| {
-        (low.min(y), high.max(y))
-    });
+    let all = all.flat_map(course).map(|point| point.1);
+    let (low, high) = positive_range(all.filter(|y| *y > LEAST));
     let panel = |navigated: &Navigated| {
         let title = format!(
             "{}: median position error, nmile",
@@ -162,10 +145,7 @@ fn budget(experiment: &Experiment) -> Plot {
     let all = shown
         .clone()
         .flat_map(|n| Estimator::ALL.into_iter().filter_map(|e| in_general(n, e)));
-    let all = all.flat_map(heights).filter(|y| *y > 0.0);
-    let (low, high) = all.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), y| {
-        (low.min(y), high.max(y))
-    });
+    let (low, high) = positive_range(all.flat_map(heights));
     // What is a thousandth of the whole is nothing.
     let y = Axis::log("").between(low.max(1e-3 * high) * 0.7, 1.8 * high);
     let panel = |navigated: &Navigated| {
@@ -175,33 +155,20 @@ fn budget(experiment: &Experiment) -> Plot {
             "{}: position error alone, RMS, nmile",
             situation_name(navigated.situation)
         );
-        let bars = Estimator::ALL
-            .into_iter()
-            .enumerate()
-            .filter_map(|(n, estimator)| {
-                let heights = heights(in_general(navigated, estimator)?);
-                let x = |place: usize| place as f64 + APART * (n as f64 - 1.0);
-                let tops: Vec<Point> = heights
-                    .iter()
-                    .enumerate()
-                    .map(|(k, &h)| (x(k), h))
-                    .collect();
-                let words = tops
-                    .clone()
-                    .into_iter()
-                    .filter(|top| top.1 >= 0.7 * low.max(1e-3 * high))
-                    .map(height_in_words);
-                let bars = Shape::Bars {
-                    tops,
-                    half: 0.12,
-                    base: None,
-                    filled: true,
-                };
-                let bars = Series::new(bars)
-                    .color(color(estimator))
-                    .key(names[n].clone());
-                Some(std::iter::once(bars).chain(words.collect::<Vec<_>>()))
-            });
+        let bars = Estimator::ALL.into_iter().enumerate();
+        let bars = bars.filter_map(|(n, estimator)| {
+            let shift = beside(n, Estimator::ALL.len(), 0.84);
+            let heights = heights(in_general(navigated, estimator)?);
+            let tops = heights.into_iter().enumerate();
+            let tops: Vec<Point> = tops.map(|(k, top)| (k as f64 + shift, top)).collect();
+            let bars = tops.iter().map(|&(x, top)| (x, f64::NEG_INFINITY, top));
+            let bars = Series::bars(0.12, Fill::Pale, bars).color(color(estimator));
+            let worded = tops
+                .into_iter()
+                .filter(|top| top.1 >= 0.7 * low.max(1e-3 * high));
+            let words: Vec<Series> = worded.map(height_in_words).collect();
+            Some(std::iter::once(bars.key(names[n].clone())).chain(words))
+        });
         Panel::new(title, x, y.clone()).with_all(bars.flatten())
     };
     Plot::new("budget.svg", "Error budget", (1, 360), shown.map(panel)).caption(format!(
@@ -220,7 +187,7 @@ fn height_in_words(top: Point) -> Series {
     } else {
         three_digits(top.1)
     };
-    Series::words(top, (0.0, -3.0), Anchor::Above, number)
+    Series::words(top, Anchor::Above, number)
 }
 
 /// Of each group alone, of all as claimed and as they were, nmile.

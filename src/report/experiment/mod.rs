@@ -229,12 +229,8 @@ fn limit(experiment: &Experiment, situation: Situation) -> Option<String> {
         ))
     };
     let of = Estimator::ALL.into_iter().map(|estimator| {
-        let worth = in_general(navigated, estimator)?;
-        Some(format!(
-            "{}: {}",
-            estimator_name(experiment, estimator),
-            most(&worth.budget)?
-        ))
+        let most = most(&in_general(navigated, estimator)?.budget)?;
+        Some(format!("{}: {most}", estimator_name(experiment, estimator)))
     });
     Some(format!(
         "{}, most of the variance is made by: {}. Noise alone would leave a median of {} nmile.",
@@ -254,35 +250,28 @@ fn failures(experiment: &Experiment) -> Vec<String> {
         let diverged = all().flatten().filter(|c| !c.converged).count();
         let rejected = all().flatten().filter(|c| c.rejects_form).count();
         let (name, of) = (method_name(experiment, method), count(trials.len()));
-        if failed > 0 {
-            let reason = all()
-                .find_map(|c| c.as_ref().err())
-                .map_or("", String::as_str);
-            let failed = count(failed);
-            sentences.push(format!(
-                "{name}: {failed} of {of} calibrations failed, the first because: {reason}"
-            ));
-        }
-        if rejected > 0 {
-            let rejected = count(rejected);
-            sentences.push(format!(
-                "{name}: the data reject the form for {rejected} of {of} instruments."
-            ));
-        }
-        if diverged > 0 {
-            let diverged = count(diverged);
-            sentences.push(format!(
-                "{name}: {diverged} of {of} calibrations did not converge; they are counted as they are."
-            ));
+        let reason = all().find_map(|c| c.as_ref().err());
+        let reason = reason.map_or("", String::as_str);
+        for (number, what) in [
+            (
+                failed,
+                format!("calibrations failed, the first because: {reason}"),
+            ),
+            (
+                rejected,
+                "instruments have data that reject the form.".to_owned(),
+            ),
+            (
+                diverged,
+                "calibrations did not converge; they are counted as they are.".to_owned(),
+            ),
+        ] {
+            if number > 0 {
+                sentences.push(format!("{name}: {} of {of} {what}", count(number)));
+            }
         }
     }
     sentences
-}
-
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    let first = letters.next().into_iter().flat_map(char::to_uppercase);
-    first.chain(letters).collect()
 }
 
 #[cfg(test)]

@@ -38,11 +38,11 @@ pub fn nmile(metres: f64) -> String {
 }
 
 fn errors(experiment: &Experiment, navigated: &Navigated) -> Table {
-    let headings: Vec<&str> = columns(
+    let headings = columns(
         "nmile | median | 99 % interval | mean | 68 % below | 95 % below | largest, median | \
          largest, 95 % below | closed form : EKF | 99 % interval",
-    )
-    .collect();
+    );
+    let headings: Vec<&str> = headings.collect();
     let row = |worth: &Worth| {
         let (at_end, largest) = (&worth.at_end, &worth.largest);
         let (low, high) = worth.median_interval;
@@ -55,7 +55,6 @@ fn errors(experiment: &Experiment, navigated: &Navigated) -> Table {
         row.extend([largest.median, largest.below_95].map(nmile));
         let gain = worth
             .gain
-            .as_ref()
             .map(|gain| with_interval(gain.value, gain.interval));
         row.extend(gain.unwrap_or([NONE; 2].map(str::to_owned)));
         row
@@ -115,13 +114,11 @@ fn paper(experiment: &Experiment, navigated: &Navigated) -> Table {
 }
 
 fn budget(experiment: &Experiment, navigated: &Navigated) -> Table {
-    let worths: Vec<(String, &Worth)> = Estimator::ALL
-        .into_iter()
-        .filter_map(|estimator| {
-            let worth = in_general(navigated, estimator)?;
-            Some((estimator_name(experiment, estimator), worth))
-        })
-        .collect();
+    let worths = Estimator::ALL.into_iter().filter_map(|estimator| {
+        let worth = in_general(navigated, estimator)?;
+        Some((estimator_name(experiment, estimator), worth))
+    });
+    let worths: Vec<(String, &Worth)> = worths.collect();
     let mut columns = vec!["nmile, RMS".to_owned()];
     for (name, _) in &worths {
         columns.extend([format!("{name}: alone"), "share".to_owned()]);

@@ -3,7 +3,7 @@
 use crate::lot::{
     Against, Check, FALSE_ALARM, FALSE_TREND, Lot, Quantity, Row, Sample, Statistics, Verdict,
 };
-use crate::report::lot::shown::{shown, shown_spread, spread_symbol, unit_key, verdict};
+use crate::report::lot::shown::{shown, shown_spread, spread_symbol, unit_key};
 use crate::report::prelude::*;
 
 pub fn data(lot: &Lot) -> Value {
@@ -11,7 +11,7 @@ pub fn data(lot: &Lot) -> Value {
         "format": "turncal-lot/1",
         "body_frame": lot.body_frame,
         "nominal_scale": { "gyro": lot.nominal.gyro.0.as_slice(), "accel": lot.nominal.accel.0.as_slice() },
-        "verdict": super::verdict::of(lot).map(|(word, _)| json!({ "word": word, "reasons": reasons(lot) })),
+        "verdict": super::verdict(lot).map(|(word, _)| json!({ "word": word, "reasons": reasons(lot) })),
         "false_alarm": FALSE_ALARM,
         "false_trend": FALSE_TREND,
         "confidence": lot.specification.as_ref().map(|s| s.confidence),
@@ -22,31 +22,27 @@ pub fn data(lot: &Lot) -> Value {
 
 /// The limits that are not kept for certain, by unit and parameter.
 fn reasons(lot: &Lot) -> Vec<String> {
-    let rows = lot
-        .rows
-        .iter()
-        .flat_map(|row| row.checks.iter().map(move |check| (row, check)));
-    let open = rows.filter(|(_, check)| check.verdict != Verdict::Pass);
-    let name = |(row, check): (&Row, &Check)| {
-        let parameter = Quantity::Parameter(check.limit.parameter);
-        format!(
-            "{} {} {}",
-            row.unit.name,
-            parameter.name(),
-            check.verdict.name()
-        )
+    let of_row = |row: &Row| {
+        let open = row
+            .checks
+            .iter()
+            .filter(|check| check.verdict != Verdict::Pass);
+        let words = |check: &Check| {
+            let (parameter, verdict) = (check.quantity().name(), check.verdict.name());
+            format!("{} {parameter} {verdict}", row.unit.name)
+        };
+        open.map(words).collect::<Vec<_>>()
     };
-    open.map(name).collect()
+    lot.rows.iter().flat_map(of_row).collect()
 }
 
 fn unit(lot: &Lot, place: usize, row: &Row) -> Value {
     let calibration = row.unit.calibrated.as_ref().ok().map(|of| &of.calibration);
-    let parameter = |check: &&Check| Quantity::Parameter(check.limit.parameter);
     let quantities = Quantity::all(lot.body_frame).into_iter();
     let values = quantities.filter_map(|quantity| {
         let (value, sigma) = shown(quantity, row.sample(quantity)?);
         let mut entry = json!({ "value": value, "sigma": sigma, "unit": unit_key(quantity) });
-        if let Some(check) = row.checks.iter().find(|check| parameter(check) == quantity) {
+        if let Some(check) = row.check_of(quantity) {
             entry["verdict"] = json!(check.verdict);
             entry["probability_within"] = json!(check.probability);
         }
@@ -65,7 +61,7 @@ fn unit(lot: &Lot, place: usize, row: &Row) -> Value {
         "nis": calibration.and_then(|c| Some(c.consistency.as_ref()?.all.nis)),
         "warnings": calibration.map(|c| &c.warnings),
         "verdict": row.verdict,
-        "outside": failing.map(|check| parameter(&check).name()).collect::<Vec<_>>(),
+        "outside": failing.map(|check| check.quantity().name()).collect::<Vec<_>>(),
         "apart": apart,
         "values": values.collect::<Map<_, _>>(),
     })
@@ -106,16 +102,9 @@ fn quantity(lot: &Lot, of: &Statistics) -> Value {
     })
 }
 
+#[rustfmt::skip]
 const HEADER: [&str; 9] = [
-    "unit",
-    "serial",
-    "date",
-    "quantity",
-    "unit_of_value",
-    "value",
-    "sigma",
-    "apart",
-    "verdict",
+    "unit", "serial", "date", "quantity", "unit_of_value", "value", "sigma", "apart", "verdict",
 ];
 
 /// As CSV. A unit without a calibration has one row without values.
@@ -147,7 +136,9 @@ pub fn csv(lot: &Lot) -> String {
                 value.to_string(),
                 sigma.to_string(),
                 apart.to_string(),
-                verdict(row, quantity).map_or("", Verdict::name).to_owned(),
+                row.check_of(quantity)
+                    .map_or("", |check| check.verdict.name())
+                    .to_owned(),
             ];
             write(&[&first[..], &rest].concat());
         }

@@ -31,33 +31,21 @@ pub fn noise(lot: &Lot) -> Plot {
 
 /// Series for each quantity: bars and marks, crosses where a unit is apart.
 fn panel(lot: &Lot, title: &str, quantities: &[Quantity], names: &[String]) -> Panel {
-    let spacing = 0.7 / quantities.len().max(1) as f64;
-    let shift = |n: usize| spacing * (n as f64 - 0.5 * (quantities.len() as f64 - 1.0));
-    let series = quantities
-        .iter()
-        .zip(names)
-        .enumerate()
-        .flat_map(|(n, (&quantity, name))| {
-            let points = |apart: bool| {
-                lot.rows.iter().enumerate().filter_map(move |(place, row)| {
-                    let is_apart = lot.outliers_of(place).any(|of| of.quantity == quantity);
-                    let (value, sigma) = shown(quantity, row.sample(quantity)?);
-                    (is_apart == apart).then_some((place as f64 + 1.0 + shift(n), value, sigma))
-                })
-            };
-            let bars = points(false).chain(points(true)).filter(|p| p.2 > 0.0);
-            let bars = bars.map(|(x, y, own)| (x, y - own, y + own)).collect();
-            let at = |apart| points(apart).map(|(x, y, _)| (x, y));
-            [
-                Series::new(Shape::Intervals(bars)).nth(n).width(1.0),
-                Series::marks(Mark::Dot, at(false))
-                    .nth(n)
-                    .width(1.5)
-                    .key(name.clone()),
-                Series::marks(Mark::Cross, at(true)).nth(n).width(2.5),
-            ]
-        });
-    let series: Vec<Series> = series.collect();
+    let of_quantity = |(n, (&quantity, name)): (usize, (&Quantity, &String))| {
+        let shift = beside(n, quantities.len(), 0.7);
+        let points = |apart: bool| {
+            lot.rows.iter().enumerate().filter_map(move |(place, row)| {
+                let is_apart = lot.outliers_of(place).any(|of| of.quantity == quantity);
+                let (value, sigma) = shown(quantity, row.sample(quantity)?);
+                (is_apart == apart).then_some((place as f64 + 1.0 + shift, value, sigma))
+            })
+        };
+        let dots = Series::measured(Mark::Dot, points(false)).key(name);
+        let crosses = Series::measured(Mark::Cross, points(true)).width(2.5);
+        [dots, crosses].map(|marks| marks.nth(n))
+    };
+    let series = quantities.iter().zip(names).enumerate();
+    let series = series.flat_map(of_quantity);
     let units = Axis::linear("unit").between(0.3, lot.rows.len() as f64 + 0.7);
     Panel::new(title, units, Axis::linear("").room(0.05, 0.05)).with_all(series)
 }
@@ -69,7 +57,7 @@ fn limits(lot: &Lot, quantities: &[Quantity]) -> Vec<f64> {
     };
     let of = |quantity: &Quantity| {
         let mut limits = specification.limits.iter();
-        let limit = limits.find(|limit| Quantity::Parameter(limit.parameter) == *quantity)?;
+        let limit = limits.find(|of| Quantity::Parameter(of.parameter) == *quantity)?;
         let at = |sign: f64| {
             let value = limit.nominal + sign * limit.within;
             shown(*quantity, Sample { value, sigma: 0.0 }).0

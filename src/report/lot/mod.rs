@@ -6,34 +6,40 @@ mod shown;
 mod tables;
 #[cfg(test)]
 mod tests;
-mod verdict;
 
 use std::collections::BTreeMap;
 
 use shown::{change, title};
 
+use crate::calibration::Word;
 use crate::imu::AXES;
 use crate::lot::{FALSE_ALARM, FALSE_TREND, Lot, Row, Verdict};
 use crate::report::prelude::*;
 
 /// Everything that is said of a lot.
 pub fn document(lot: &Lot) -> Document {
-    let units = lot.rows.len();
     let mut document = Document::new(match &lot.rows[..] {
         [row] => row.unit.name.clone(),
-        _ => format!("Lot of {} units", count(units)),
+        rows => format!("Lot of {} units", count(rows.len())),
     });
-    document.verdict = verdict::of(lot);
+    document.verdict = verdict(lot);
     document.lead = vec![format!(
         "General form, body frame: {}. Scale factors are departures from the lot's nominal ones. Every σ is 1σ.",
         lot.body_frame.words()
     )];
-    say_failures(lot, &mut document);
-    say_verdicts(lot, &mut document);
-    say_outliers(lot, &mut document);
-    say_nominal(lot, &mut document);
-    say_findings(lot, &mut document);
-    say_trends(lot, &mut document);
+    let failures = lot.failures();
+    let failures = failures.map(|(unit, reason)| (false, format!("{}: {reason}", unit.name)));
+    let sentences = [
+        failures.collect(),
+        kept(lot),
+        outliers(lot),
+        nominal(lot),
+        findings(lot),
+        trends(lot),
+    ];
+    for (good, text) in sentences.into_iter().flatten() {
+        document.say(good, text);
+    }
     document.both(tables::undecided(lot));
     document.both(facts(lot));
     document.both(tables::units(lot));
@@ -45,6 +51,28 @@ pub fn document(lot: &Lot) -> Document {
     document.data = data::data(lot);
     document.files = vec![("lot.csv".to_owned(), data::csv(lot))];
     document
+}
+
+/// A conclusion or a warning.
+type Sentence = (bool, String);
+
+/// Of all limits of all units, how many are exceeded, kept or neither for certain.
+fn verdict(lot: &Lot) -> Option<(Word, String)> {
+    let specification = lot.specification.as_ref()?;
+    let all = || lot.rows.iter().flat_map(|row| &row.checks);
+    let number = |verdict| all().filter(|check| check.verdict == verdict).count();
+    let [passed, open, failed] = [Verdict::Pass, Verdict::NotDecided, Verdict::Fail].map(number);
+    let word = match (failed, open + lot.failures().count()) {
+        (0, 0) => Word::Pass,
+        (0, _) => Word::Undecided,
+        _ => Word::Fail,
+    };
+    let words = format!(
+        "{failed} of {} limits exceeded, {passed} kept, {open} undecided ({} % each)",
+        all().count(),
+        100.0 * specification.confidence
+    );
+    Some((word, words))
 }
 
 fn facts(lot: &Lot) -> Facts {
@@ -78,15 +106,9 @@ fn facts(lot: &Lot) -> Facts {
     facts
 }
 
-fn say_failures(lot: &Lot, document: &mut Document) {
-    for (unit, reason) in lot.failures() {
-        document.say(false, format!("{}: {reason}", unit.name));
-    }
-}
-
-fn say_verdicts(lot: &Lot, document: &mut Document) {
+fn kept(lot: &Lot) -> Vec<Sentence> {
     let Some(specification) = &lot.specification else {
-        return;
+        return Vec::new();
     };
     let names = |verdict: Verdict| {
         let of = lot.rows.iter().filter(|row| row.verdict == Some(verdict));
@@ -94,122 +116,118 @@ fn say_verdicts(lot: &Lot, document: &mut Document) {
     };
     let percent = 100.0 * specification.confidence;
     let failing = names(Verdict::Fail);
-    if !failing.is_empty() {
-        let words = format!(
-            "Outside a limit with {percent} % confidence: {}.",
-            failing.join(", ")
-        );
-        document.say(false, words);
-    }
     let failed: Vec<&str> = lot.failures().map(|(unit, _)| unit.name.as_str()).collect();
     let mut undecided = names(Verdict::NotDecided);
     undecided.retain(|name| !failed.contains(name));
+    let mut sentences = Vec::new();
+    if !failing.is_empty() {
+        let names = failing.join(", ");
+        sentences.push((
+            false,
+            format!("Outside a limit with {percent} % confidence: {names}."),
+        ));
+    }
     if !undecided.is_empty() {
         let words = format!(
             "Not decided with {percent} % confidence: {}. A smaller σ decides.",
             undecided.join(", ")
         );
-        document.say(false, words);
+        sentences.push((false, words));
     }
-    if failing.len() + undecided.len() == 0 {
+    if sentences.is_empty() {
         let words =
             format!("All calibrated units are within all limits with {percent} % confidence.");
-        document.say(true, words);
+        sentences.push((true, words));
     }
+    sentences
 }
 
-fn say_outliers(lot: &Lot, document: &mut Document) {
-    let mut any = false;
-    for (place, row) in lot.rows.iter().enumerate() {
-        let apart: Vec<String> = lot
-            .outliers_of(place)
-            .map(|of| title(of.quantity))
-            .collect();
-        if !apart.is_empty() {
-            any = true;
-            let words = format!(
-                "{} is apart from the lot in {}; means and spreads there are without it.",
-                row.unit.name,
-                apart.join(", ")
-            );
-            document.say(false, words);
-        }
-    }
-    if !any && lot.rows.len() > 1 {
-        let percent = 100.0 * FALSE_ALARM;
+fn outliers(lot: &Lot) -> Vec<Sentence> {
+    let of_unit = |(place, row): (usize, &Row)| {
+        let apart = lot.outliers_of(place).map(|of| title(of.quantity));
+        let apart = apart.collect::<Vec<_>>().join(", ");
         let words = format!(
-            "No unit is apart from the others; a sound lot has one named in {percent} % of all cases."
+            "{} is apart from the lot in {apart}; means and spreads there are without it.",
+            row.unit.name
         );
-        document.say(true, words);
+        (!apart.is_empty()).then_some((false, words))
+    };
+    let sentences: Vec<Sentence> = lot.rows.iter().enumerate().filter_map(of_unit).collect();
+    match sentences.is_empty() && lot.rows.len() > 1 {
+        true => vec![(
+            true,
+            format!(
+                "No unit is apart from the others; a sound lot has one named in {} % of all cases.",
+                100.0 * FALSE_ALARM
+            ),
+        )],
+        false => sentences,
     }
 }
 
 /// Units of one type have one nominal scale: who states another is named, where most state the same.
-fn say_nominal(lot: &Lot, document: &mut Document) {
-    let same = |row: &Row| row.nominal_off(&lot.nominal).is_none();
+fn nominal(lot: &Lot) -> Vec<Sentence> {
     let stated = lot.rows.iter().filter(|row| row.unit.calibrated.is_ok());
-    let others: Vec<&Row> = stated.clone().filter(|row| !same(row)).collect();
-    if 2 * others.len() > stated.count() {
-        return;
-    }
-    for row in others {
-        if let Some((sensor, axis, off)) = row.nominal_off(&lot.nominal) {
-            document.say(
-                false,
-                format!(
-                    "{} states another nominal scale than the lot: {} {}, {} ppm off; its scale factors are given \
-                     against the lot's.",
-                    row.unit.name,
-                    sensor.name(),
-                    AXES[axis],
-                    three_digits(off / PPM)
-                ),
-            );
-        }
+    let other = |row: &Row| {
+        let (sensor, axis, off) = row.nominal_off(&lot.nominal)?;
+        let words = format!(
+            "{} states another nominal scale than the lot: {} {}, {} ppm off; its scale factors are given against \
+             the lot's.",
+            row.unit.name,
+            sensor.name(),
+            AXES[axis],
+            three_digits(off / PPM)
+        );
+        Some((false, words))
+    };
+    let others: Vec<Sentence> = stated.clone().filter_map(other).collect();
+    match 2 * others.len() > stated.count() {
+        true => Vec::new(),
+        false => others,
     }
 }
 
 /// What the units' own calibrations warn of, by kind.
-fn say_findings(lot: &Lot, document: &mut Document) {
+fn findings(lot: &Lot) -> Vec<Sentence> {
     let mut kinds: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
-    for row in &lot.rows {
-        let calibration = row.unit.calibrated.as_ref().ok().map(|of| &of.calibration);
-        let findings = calibration.into_iter().flat_map(|c| &c.findings);
+    let calibrated = lot.rows.iter().filter_map(|row| {
+        let of = row.unit.calibrated.as_ref().ok()?;
+        Some((row.unit.name.as_str(), &of.calibration.findings))
+    });
+    for (name, findings) in calibrated.clone() {
         for finding in findings {
             let units = kinds.entry(finding.kind.as_str()).or_default();
-            if units.last() != Some(&row.unit.name.as_str()) {
-                units.push(&row.unit.name);
+            if units.last() != Some(&name) {
+                units.push(name);
             }
         }
     }
-    let calibrated = lot
-        .rows
-        .iter()
-        .filter(|row| row.unit.calibrated.is_ok())
-        .count();
-    for (kind, units) in kinds {
-        let who = match units.len() == calibrated {
+    let all = calibrated.count();
+    let sentence = |(kind, units): (&str, Vec<&str>)| {
+        let who = match units.len() == all {
             true => "all units".to_owned(),
             false => units.join(", "),
         };
-        let words = format!("Their own reports warn of `{kind}`: {who}.");
-        document.say(false, words);
-    }
+        (false, format!("Their own reports warn of `{kind}`: {who}."))
+    };
+    kinds.into_iter().map(sentence).collect()
 }
 
-fn say_trends(lot: &Lot, document: &mut Document) {
-    let told: usize = lot.statistics.iter().map(|of| of.trends.len()).sum();
-    for statistics in &lot.statistics {
-        for trend in &statistics.trends {
-            document.say(false, change(statistics.quantity, trend));
-        }
-    }
-    if told == 0 {
-        let percent = 100.0 * FALSE_TREND;
-        let words = format!(
-            "No trend with serial or date, as far as runs state them; a lot without one has one told in \
-             {percent} % of all cases."
-        );
-        document.say(true, words);
+fn trends(lot: &Lot) -> Vec<Sentence> {
+    let trends = lot.statistics.iter().flat_map(|of| {
+        let words = |trend| (false, change(of.quantity, trend));
+        of.trends.iter().map(words)
+    });
+    let sentences: Vec<Sentence> = trends.collect();
+    match sentences.is_empty() {
+        true => vec![(
+            true,
+            format!(
+                "No trend with serial or date, as far as runs state them; a lot without one has one told in {} % of \
+                 all cases.",
+                100.0 * FALSE_TREND
+            ),
+        )],
+        false => sentences,
     }
 }

@@ -1,7 +1,7 @@
 //! How quantities of a lot are spoken of.
 
 use crate::imu::{AXES, InstallationForm, Sensor};
-use crate::lot::{Against, Check, Lot, Quantity, Row, Sample, Spread, Trend, Verdict};
+use crate::lot::{Against, Lot, Quantity, Sample, Spread, Trend};
 use crate::report::prelude::*;
 
 /// Such as `gyro K x` or `gyro noise x`.
@@ -130,10 +130,4 @@ pub fn together(lot: &Lot) -> Vec<(String, Vec<String>, Vec<Quantity>)> {
         (heading, AXES.map(String::from).to_vec(), quantities)
     });
     groups.chain(noises).collect()
-}
-
-/// The verdict of the limit of a quantity.
-pub fn verdict(row: &Row, quantity: Quantity) -> Option<Verdict> {
-    let is_of = |check: &&Check| Quantity::Parameter(check.limit.parameter) == quantity;
-    row.checks.iter().find(is_of).map(|check| check.verdict)
 }

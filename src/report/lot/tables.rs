@@ -1,6 +1,5 @@
 //! Tables of a lot.
 
-use super::shown;
 use super::shown::{
     chance, shown, shown_spread, spread, spread_symbol, symbol, title, together, with_sigma,
 };
@@ -42,7 +41,7 @@ pub fn units(lot: &Lot) -> Table {
         }
         cells
     };
-    let table = Table::new("Units", columns)
+    let mut table = Table::new("Units", columns)
         .section(lot.rows.iter().enumerate().map(row))
         .note(
             "NIS: of all observations, one if the σ are true. Warnings: in the unit's own report.",
@@ -51,14 +50,12 @@ pub fn units(lot: &Lot) -> Table {
             "Apart: from the other units, by a test that names any in {} % of sound lots.",
             100.0 * FALSE_ALARM
         ));
-    let without = |column: &str| table.columns.iter().position(|name| name == column);
-    let optional = ["warnings", "date", "serial"]
+    let place = |column: &str| table.columns.iter().position(|name| name == column);
+    table.optional = ["warnings", "date", "serial"]
         .into_iter()
-        .filter_map(without);
-    Table {
-        optional: optional.collect(),
-        ..table
-    }
+        .filter_map(place)
+        .collect();
+    table
 }
 
 fn nis(calibrated: &Calibrated) -> String {
@@ -71,10 +68,7 @@ fn verdict(of: Option<Verdict>, check: Option<&Check>) -> String {
     let word = of.map_or(NONE, Verdict::name);
     match (of, check) {
         (Some(Verdict::Fail | Verdict::NotDecided), Some(check)) => {
-            format!(
-                "{word}: {}",
-                title(Quantity::Parameter(check.limit.parameter))
-            )
+            format!("{word}: {}", title(check.quantity()))
         }
         _ => word.to_owned(),
     }
@@ -82,7 +76,6 @@ fn verdict(of: Option<Verdict>, check: Option<&Check>) -> String {
 
 /// Mean and spread of every parameter.
 pub fn parameters(lot: &Lot) -> Table {
-    let is_parameter = |of: &Statistics| matches!(of.quantity, Quantity::Parameter(_));
     let sections = Sensor::ALL.map(|sensor| {
         let of_sensor = move |of: &&Statistics| match of.quantity {
             Quantity::Parameter(index) => Group::of(index).sensor() == sensor,
@@ -91,7 +84,7 @@ pub fn parameters(lot: &Lot) -> Table {
         lot.statistics.iter().filter(of_sensor).map(row)
     });
     statistics("Parameters of the lot")
-        .sections(sections.map(|rows| rows.filter(|_| lot.statistics.iter().any(is_parameter))))
+        .sections(sections)
         .note("Mean: weighted by spread and own σ, ± its 1σ. Scatter: sample standard deviation as it stands.")
         .note("χ²/n: of the scatter against the units' own σ; p: chance of as much if these explain it all.")
         .note(format!(
@@ -169,7 +162,8 @@ pub fn values(lot: &Lot) -> Vec<Table> {
                     return NONE.to_owned();
                 };
                 let apart = lot.outliers_of(place).any(|of| of.quantity == quantity);
-                let fails = shown::verdict(row, quantity) == Some(Verdict::Fail);
+                let check = row.check_of(quantity);
+                let fails = check.is_some_and(|check| check.verdict == Verdict::Fail);
                 let mark = if apart || fails { "! " } else { "" };
                 format!("{mark}{}", with_sigma(shown(quantity, sample)))
             }));
@@ -185,7 +179,7 @@ pub fn values(lot: &Lot) -> Vec<Table> {
 /// Limits that are not kept, or of which that cannot be said.
 pub fn undecided(lot: &Lot) -> Table {
     let row = |row: &Row, check: &Check| {
-        let quantity = Quantity::Parameter(check.limit.parameter);
+        let quantity = check.quantity();
         let in_unit = |x: f64| shown_spread(quantity, x);
         let off = check
             .off

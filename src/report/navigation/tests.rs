@@ -2,7 +2,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::super::{svg, terminal};
 use super::*;
-use crate::navigation::{ErrorMatrix, NavigationError, Solution};
+use crate::navigation::{NavigationError, Solution};
 use crate::units::ARCSEC;
 
 fn mission() -> Mission {
@@ -20,7 +20,7 @@ fn mission() -> Mission {
 }
 
 /// Errors that grow with time to two hours, σ half of them.
-fn moments(covariance: bool) -> Vec<Epoch> {
+fn moments(sigma: bool) -> Vec<Outlook> {
     let moment = |k: u32| {
         let part = f64::from(k) / 120.0;
         let error = NavigationError {
@@ -28,17 +28,16 @@ fn moments(covariance: bool) -> Vec<Epoch> {
             velocity: Vector3::new(0.3, -0.4, 0.0) * part,
             position: Vector3::new(3.0, 4.0, 0.0) * NAUTICAL_MILE * part,
         };
-        let variance = (error.to_vector() * 0.5).map(|sigma| sigma * sigma);
-        Epoch {
+        Outlook {
             time: f64::from(k) * INTERVAL,
-            error,
-            covariance: covariance.then(|| ErrorMatrix::from_diagonal(&variance)),
+            error: Some(error),
+            sigma: sigma.then(|| error.to_vector().abs() * 0.5),
         }
     };
     (0..=120).map(moment).collect()
 }
 
-fn document(moments: &[Epoch]) -> Document {
+fn document(moments: &[Outlook]) -> Document {
     let navigation = Navigation {
         calibration: "monday",
         truth: "truth",

@@ -120,11 +120,13 @@ impl Axis {
         }
         let values = values.into_iter().chain(self.including.iter().copied());
         let values = values.filter(|v| v.is_finite() && (*v > 0.0 || self.kind != Kind::Log));
-        let (low, high) = self.ends.unwrap_or_else(|| {
-            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-                (low.min(v), high.max(v))
+        let nothing = (f64::INFINITY, f64::NEG_INFINITY);
+        let held = || {
+            values.fold(nothing, |(low, high), v| {
+                (f64::min(low, v), f64::max(high, v))
             })
-        });
+        };
+        let (low, high) = self.ends.unwrap_or_else(held);
         let (below, above) = self.room;
         match self.kind {
             Kind::Linear => {
@@ -207,9 +209,7 @@ impl Scale {
             kind: Kind::Log,
             low: 10f64.powi(first),
             high: 10f64.powi(last),
-            ticks: decades(first, last)
-                .map(|k| (10f64.powi(k), number::power_of_ten(k)))
-                .collect(),
+            ticks: decades(first, last).map(power).collect(),
         }
     }
 
@@ -222,9 +222,7 @@ impl Scale {
         let extent = if extent.is_finite() { extent } else { 0.0 }.max(4.0 * linear);
         let mut ticks = vec![(0.0, "0".to_owned())];
         let decades = decades(linear.log10().ceil() as i32, extent.log10().floor() as i32);
-        let mut beside: Vec<_> = decades
-            .map(|k| (10f64.powi(k), number::power_of_ten(k)))
-            .collect();
+        let mut beside: Vec<_> = decades.map(power).collect();
         if beside.is_empty() {
             let even = Self::linear(linear, extent, None).ticks;
             beside.extend(even.into_iter().next_back());
@@ -261,6 +259,11 @@ impl Scale {
         let (low, high) = (straight(self.low), straight(self.high));
         ((straight(value) - low) / (high - low)).clamp(0.0, 1.0)
     }
+}
+
+/// A power of ten with its label.
+fn power(exponent: i32) -> (f64, String) {
+    (10f64.powi(exponent), number::power_of_ten(exponent))
 }
 
 /// Every decade, or every second or third where they are many.

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 pub use axis::{Axis, Kind, Scale};
 pub(super) use series::thinned;
-pub use series::{Anchor, Color, Dash, Mark, Pen, Point, Series, Shape};
+pub use series::{Anchor, Color, Dash, Fill, Mark, Pen, Point, Series, Shape, Upright};
 
 /// A figure with its file, heading and caption.
 #[derive(Debug, Clone, PartialEq)]
@@ -169,17 +169,29 @@ impl Panel {
         self
     }
 
-    /// Ordinates of all that the vertical axis has to hold.
-    pub(super) fn heights(&self) -> impl Iterator<Item = f64> {
-        self.series
-            .iter()
-            .flat_map(|series| series.shape.extent().1)
+    /// The scales of both axes.
+    pub(super) fn scales(&self) -> (Scale, Scale) {
+        let corners = self.series.iter().flat_map(|of| of.shape.corners());
+        let (across, up): (Vec<f64>, Vec<f64>) = corners.unzip();
+        (self.x.scale(across), self.y.scale(up))
     }
+}
 
-    /// The same for the horizontal axis.
-    pub(super) fn widths(&self) -> impl Iterator<Item = f64> {
-        self.series
-            .iter()
-            .flat_map(|series| series.shape.extent().0)
-    }
+/// How far the n-th of several stands from the middle of its place, of which all together take this part.
+pub fn beside(n: usize, count: usize, part: f64) -> f64 {
+    part * ((n as f64 + 0.5) / count.max(1) as f64 - 0.5)
+}
+
+/// Numbers at even distances, both ends among them.
+pub fn steps(low: f64, high: f64, count: usize) -> impl Iterator<Item = f64> + Clone {
+    let last = count.saturating_sub(1).max(1) as f64;
+    (0..count).map(move |k| low + (high - low) * k as f64 / last)
+}
+
+/// The least positive number and the largest.
+pub fn positive_range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let positive = values.filter(|value| *value > 0.0);
+    positive.fold((f64::INFINITY, 0.0), |(low, high), value| {
+        (f64::min(low, value), f64::max(high, value))
+    })
 }

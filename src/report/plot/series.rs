@@ -7,11 +7,17 @@ pub struct Series {
     pub shape: Shape,
     /// How.
     pub pen: Pen,
-    /// Name at the right end of the panel, with the point that it belongs to.
-    pub label: Option<(Point, String)>,
+    /// Name at the right end of the panel.
+    pub label: Option<String>,
     /// Name in the line of the title.
     pub key: Option<String>,
 }
+
+/// Abscissa and ordinate. A line is interrupted where one of them is not a number.
+pub type Point = (f64, f64);
+
+/// Abscissa, lower and upper end.
+pub type Upright = (f64, f64, f64);
 
 /// Geometry of a series.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,38 +26,16 @@ pub enum Shape {
     Line(Vec<Point>),
     /// The area between two lines over the same abscissae.
     Band(Vec<Point>, Vec<Point>),
-    /// A mark at each point.
-    Marks(Mark, Vec<Point>),
-    /// Upright lines with caps: abscissa, lower and upper end.
-    Intervals(Vec<(f64, f64, f64)>),
-    /// Bars from a base, of this half width; filled or open.
-    Bars {
-        /// Middle and height of each.
-        tops: Vec<Point>,
-        /// Half the width of a bar.
-        half: f64,
-        /// Height at which they stand; `None` for the foot of the axis.
-        base: Option<f64>,
-        /// Whether they are shaded.
-        filled: bool,
-    },
-    /// Filled rectangles of this half width: middle, lower and upper end of each.
-    Blocks(f64, Vec<(f64, f64, f64)>),
+    /// A mark at each point, on an upright line with caps between two heights where these differ.
+    Marks(Mark, Vec<(Point, (f64, f64))>),
+    /// Bars of this half width; one that begins at −∞ stands on the foot of the axis.
+    Bars(f64, Fill, Vec<Upright>),
     /// A line across the panel at this height.
     Level(f64),
     /// A line from bottom to top.
     Upright(f64),
-    /// Words beside a point, moved by some pixels to the right and down.
-    Words {
-        /// The point.
-        at: Point,
-        /// Right and down.
-        shift: (f64, f64),
-        /// Which part of the words stands there.
-        anchor: Anchor,
-        /// The words.
-        text: String,
-    },
+    /// Words beside a point.
+    Words(Point, Anchor, String),
 }
 
 /// A mark at a point.
@@ -65,14 +49,25 @@ pub enum Mark {
     Cross,
 }
 
-/// Which part of a text stands at its place.
+/// How a bar is filled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fill {
+    /// With the colour of the pen, without an outline.
+    Solid,
+    /// Pale within an outline.
+    Pale,
+    /// Not at all.
+    Open,
+}
+
+/// Where a text stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
-    /// The middle of its foot: the text is above.
+    /// In the middle above its point.
     Above,
-    /// The middle of its head: the text is below.
+    /// In the middle below it.
     Below,
-    /// Its lower right corner: the text is above, to the left.
+    /// To the left above it.
     AboveLeft,
 }
 
@@ -110,37 +105,31 @@ pub enum Dash {
 }
 
 impl Shape {
-    /// Abscissae and ordinates that the axes have to hold.
-    pub(super) fn extent(&self) -> (Vec<f64>, Vec<f64>) {
+    /// Points that the axes have to hold.
+    pub(in crate::report) fn corners(&self) -> Vec<Point> {
         match self {
-            Self::Line(points) | Self::Marks(_, points) => points.iter().copied().unzip(),
-            Self::Band(lower, upper) => lower.iter().chain(upper).copied().unzip(),
-            Self::Intervals(of) => of
+            Self::Line(points) => points.clone(),
+            Self::Marks(_, points) => points
                 .iter()
-                .flat_map(|&(x, low, high)| [(x, low), (x, high)])
-                .unzip(),
-            Self::Blocks(half, of) => of
+                .flat_map(|&((x, y), (low, high))| [(x, y), (x, low), (x, high)])
+                .collect(),
+            Self::Band(lower, upper) => [&lower[..], upper].concat(),
+            Self::Bars(half, _, bars) => bars
                 .iter()
                 .flat_map(|&(x, low, high)| [(x - half, low), (x + half, high)])
-                .unzip(),
-            Self::Bars {
-                tops, half, base, ..
-            } => tops
-                .iter()
-                .flat_map(|&(x, top)| [(x - half, top), (x + half, base.unwrap_or(top))])
-                .unzip(),
-            Self::Level(_) | Self::Upright(_) | Self::Words { .. } => Default::default(),
+                .collect(),
+            Self::Level(_) | Self::Upright(_) | Self::Words(..) => Vec::new(),
         }
     }
 
     /// Its right end.
-    fn end(&self) -> Option<Point> {
+    pub(in crate::report) fn end(&self) -> Option<Point> {
+        let is_known = |point: &Point| point.1.is_finite();
         match self {
-            Self::Line(points) | Self::Marks(_, points) | Self::Band(_, points) => points
-                .iter()
-                .rev()
-                .copied()
-                .find(|point| point.1.is_finite()),
+            Self::Line(points) | Self::Band(_, points) => {
+                points.iter().rev().copied().find(is_known)
+            }
+            Self::Marks(_, points) => points.iter().rev().map(|of| of.0).find(is_known),
             Self::Level(y) => Some((f64::INFINITY, *y)),
             _ => None,
         }
@@ -165,7 +154,7 @@ impl Series {
 
     /// Points joined in order; of very many the lowest and highest.
     pub fn line(points: impl IntoIterator<Item = Point>) -> Self {
-        Self::new(Shape::Line(thinned(points)))
+        Self::new(Shape::Line(thinned(points, MOST)))
     }
 
     /// The area between two lines.
@@ -175,7 +164,23 @@ impl Series {
 
     /// A mark at each point.
     pub fn marks(mark: Mark, points: impl IntoIterator<Item = Point>) -> Self {
+        Self::whiskers(mark, points.into_iter().map(|at| (at, (at.1, at.1))))
+    }
+
+    /// The same between the ends of an interval each.
+    pub fn whiskers(mark: Mark, points: impl IntoIterator<Item = (Point, (f64, f64))>) -> Self {
         Self::new(Shape::Marks(mark, points.into_iter().collect()))
+    }
+
+    /// The same of values with their σ, one standard deviation to both sides.
+    pub fn measured(mark: Mark, points: impl IntoIterator<Item = (f64, f64, f64)>) -> Self {
+        let points = points.into_iter();
+        Self::whiskers(mark, points.map(|(x, y, own)| ((x, y), (y - own, y + own))))
+    }
+
+    /// Bars of this half width.
+    pub fn bars(half: f64, fill: Fill, bars: impl IntoIterator<Item = Upright>) -> Self {
+        Self::new(Shape::Bars(half, fill, bars.into_iter().collect()))
     }
 
     /// A line across the panel.
@@ -189,15 +194,8 @@ impl Series {
     }
 
     /// Words beside a point.
-    pub fn words(at: Point, shift: (f64, f64), anchor: Anchor, text: impl Into<String>) -> Self {
-        let text = text.into();
-        let shape = Shape::Words {
-            at,
-            shift,
-            anchor,
-            text,
-        };
-        Self::new(shape).color(Color::Ink)
+    pub fn words(at: Point, anchor: Anchor, text: impl Into<String>) -> Self {
+        Self::new(Shape::Words(at, anchor, text.into())).color(Color::Ink)
     }
 
     /// The colour.
@@ -236,15 +234,15 @@ impl Series {
 
     /// Names its right end.
     pub fn label(mut self, text: impl Into<String>) -> Self {
-        self.label = self.shape.end().map(|end| (end, text.into()));
+        self.label = Some(text.into());
         self
     }
 
     /// Names a height alone.
     pub fn name(y: f64, text: impl Into<String>) -> Self {
-        let mut series = Self::line([]).color(Color::Quiet);
-        series.label = y.is_finite().then(|| ((f64::INFINITY, y), text.into()));
-        series
+        Self::line([(f64::INFINITY, y)])
+            .color(Color::Quiet)
+            .label(text)
     }
 
     /// Names it in the line of the title.
@@ -254,63 +252,47 @@ impl Series {
     }
 }
 
-/// Abscissa and ordinate. A line is interrupted where one of them is not a number.
-pub type Point = (f64, f64);
-
 /// Points that a line keeps at most; a panel is a hundredth as wide in pixels.
 const MOST: usize = 1 << 17;
 
-/// A line thinned to the useful number of points: each group of consecutive points is replaced by its lowest and its
-/// highest.
-pub fn thinned(points: impl IntoIterator<Item = Point>) -> Vec<Point> {
-    let mut line = Vec::new();
-    // Of these, from this place of the line on, two will stay.
-    let (mut together, mut begin, mut since) = (1, 0, 0);
-    let mut most = MOST;
+/// About `most` points of a line: of each stretch the lowest and the highest, every gap, and the end, which is what
+/// the line's name points to.
+pub fn thinned(points: impl IntoIterator<Item = Point>, most: usize) -> Vec<Point> {
+    let points = points.into_iter();
+    let (least, greatest) = points.size_hint();
+    let together = (2 * greatest.unwrap_or(least)).div_ceil(most.max(2));
+    let (mut line, mut stretch) = (Vec::new(), Vec::new());
     for point in points {
-        let is_gap = point.0.is_nan() || point.1.is_nan();
-        line.push(point);
-        since += 1;
-        if together > 1 && (since == together || is_gap) {
-            let end = line.len() - usize::from(is_gap);
-            let ends = lowest_and_highest(&line[begin..end]);
-            line.splice(begin..end, ends);
+        let is_gap = !(point.0.is_finite() && point.1.is_finite());
+        if is_gap || stretch.len() >= together {
+            line.extend(ends(&stretch));
+            stretch.clear();
         }
-        if since == together || is_gap {
-            (begin, since) = (line.len(), 0);
-        }
-        if line.len() >= most && since == 0 {
-            let pieces = line.chunk_by(|a, b| is_finite(a) == is_finite(b));
-            let kept = pieces.flat_map(|piece| match is_finite(&piece[0]) {
-                true => piece.chunks(4).flat_map(lowest_and_highest).collect(),
-                false => piece[..1].to_vec(),
-            });
-            line = kept.collect();
-            // Many gaps stay.
-            most = MOST.max(2 * line.len());
-            (begin, together) = (line.len(), (2 * together).max(4));
+        match is_gap {
+            true => line.push(point),
+            false => stretch.push(point),
         }
     }
+    line.extend(ends(&stretch));
+    let last = stretch.last().filter(|last| line.last() != Some(last));
+    line.extend(last.copied());
     line
 }
 
-fn is_finite(point: &Point) -> bool {
-    !point.0.is_nan() && !point.1.is_nan()
-}
-
-/// Both in their order; one where there is no other.
-fn lowest_and_highest(points: &[Point]) -> Vec<Point> {
-    let by_height = |a: &(usize, &Point), b: &(usize, &Point)| a.1.1.total_cmp(&b.1.1);
-    let lowest = points.iter().enumerate().min_by(by_height);
-    let highest = points.iter().enumerate().max_by(by_height);
-    let ends = lowest
-        .zip(highest)
-        .map(|(low, high)| match low.0.cmp(&high.0) {
-            std::cmp::Ordering::Less => vec![*low.1, *high.1],
-            std::cmp::Ordering::Equal => vec![*low.1],
-            std::cmp::Ordering::Greater => vec![*high.1, *low.1],
-        });
-    ends.unwrap_or_default()
+/// All of a few points; of more the lowest and the highest, in their order.
+fn ends(stretch: &[Point]) -> Vec<Point> {
+    if stretch.len() <= 2 {
+        return stretch.to_vec();
+    }
+    let by_height = |a: &&Point, b: &&Point| a.1.total_cmp(&b.1);
+    let ends = [
+        stretch.iter().min_by(by_height),
+        stretch.iter().max_by(by_height),
+    ];
+    let mut ends: Vec<Point> = ends.into_iter().flatten().copied().collect();
+    ends.sort_by(|a, b| a.0.total_cmp(&b.0));
+    ends.dedup();
+    ends
 }
 
 #[cfg(test)]
@@ -327,7 +309,7 @@ mod tests {
             };
             (k as f64, if k == 1_000_000 { f64::NAN } else { height })
         };
-        let line = thinned((0..3_000_000).map(point));
+        let line = thinned((0..3_000_000).map(point), MOST);
         assert!(
             line.len() <= MOST && line.len() > MOST / 8,
             "{}",
@@ -349,6 +331,6 @@ mod tests {
         let line: Vec<Point> = (0..1000)
             .map(|k| (f64::from(k), f64::from(k % 7)))
             .collect();
-        assert_eq!(thinned(line.iter().copied()), line);
+        assert_eq!(thinned(line.iter().copied(), MOST), line);
     }
 }

@@ -1,13 +1,14 @@
 //! Panels in rows: scales, margins, frames, ticks, titles, tags and notes.
 
-use plotters::style::text_anchor::{HPos, VPos};
+use plotters::style::RGBColor;
 
-use super::super::plot::{Grid, Panel, Scale};
-use super::canvas::{
-    Canvas, Frame, GRID, INK, LETTER, QUIET, SHADE, SMALL, WIDTH, rgb, shortened, width,
-};
-use super::series;
+use super::super::plot::{Grid, Panel, Point, Scale};
+use super::{Canvas, Height, INK, LETTER, QUIET, SMALL, WIDTH, rgb, series, shortened, width};
 
+/// Grid lines.
+const GRID: RGBColor = RGBColor(218, 218, 214);
+/// The time of a dwell.
+const SHADE: RGBColor = RGBColor(243, 243, 238);
 /// Above the axes, for the title.
 const TOP: f64 = 26.0;
 /// Between one line of text and the next.
@@ -17,28 +18,53 @@ const TAG: f64 = 0.85;
 /// Of a panel's width, the most that names at the ends of lines may take.
 const LABELS: f64 = 0.3;
 
-fn rows(grid: &Grid) -> usize {
-    grid.panels.len().div_ceil(grid.columns).max(1)
+/// A panel laid out: where its axes are.
+pub struct Frame<'p> {
+    /// The panel.
+    pub(super) panel: &'p Panel,
+    /// Horizontal scale.
+    pub(super) x: Scale,
+    /// Vertical scale.
+    pub(super) y: Scale,
+    /// Left and right end of the axes.
+    pub(super) across: (f64, f64),
+    /// Upper and lower end.
+    pub(super) down: (f64, f64),
+    /// Right end of the panel.
+    end: f64,
 }
 
-pub fn height(grid: &Grid) -> u32 {
-    grid.height * rows(grid) as u32
+impl Frame<'_> {
+    /// Where a point is drawn.
+    pub(super) fn at(&self, (x, y): Point) -> Point {
+        (self.at_x(x), self.at_y(y))
+    }
+
+    /// Where an abscissa is drawn.
+    pub(super) fn at_x(&self, x: f64) -> f64 {
+        self.across.0 + self.x.part(x) * (self.across.1 - self.across.0)
+    }
+
+    /// Where a height is drawn.
+    pub(super) fn at_y(&self, y: f64) -> f64 {
+        self.down.1 - self.y.part(y) * (self.down.1 - self.down.0)
+    }
 }
 
-pub fn draw(on: &Canvas, grid: &Grid) {
+/// Draws it and returns the height of the figure.
+pub fn draw(on: &mut Canvas, grid: &Grid) -> u32 {
     let panel_width = f64::from(WIDTH) / grid.columns as f64;
     for column in 0..grid.columns {
         let panels = grid.panels.iter().skip(column).step_by(grid.columns);
-        let scaled = panels.map(|p| (p, p.x.scale(p.widths()), p.y.scale(p.heights())));
-        let scaled: Vec<(&Panel, Scale, Scale)> = scaled.collect();
+        let scaled: Vec<(&Panel, (Scale, Scale))> = panels.map(|p| (p, p.scales())).collect();
         // All panels of a column have the same margins.
-        let drawn = || scaled.iter().filter(|(panel, ..)| !panel.blank);
-        let left = drawn().map(|(_, _, y)| widest(&y.ticks) + 14.0);
-        let right = drawn().map(|(panel, x, _)| right(panel, x, panel_width));
+        let drawn = || scaled.iter().filter(|(panel, _)| !panel.blank);
+        let left = drawn().map(|(_, (_, y))| widest(&y.ticks) + 14.0);
+        let right = drawn().map(|(panel, (x, _))| right(panel, x, panel_width));
         let [left, right] = [left.fold(14.0, f64::max), right.fold(14.0, f64::max)];
         let origin = panel_width * column as f64;
         let across = (origin + left, origin + panel_width - right);
-        for (row, (panel, x, y)) in scaled.into_iter().enumerate() {
+        for (row, (panel, (x, y))) in scaled.into_iter().enumerate() {
             let names = names(&x, (across.1 - across.0) / x.ticks.len().max(1) as f64);
             let lines = names.iter().map(Vec::len).max().unwrap_or(1).max(1);
             let lines = lines + usize::from(!panel.x.title.is_empty());
@@ -60,6 +86,7 @@ pub fn draw(on: &Canvas, grid: &Grid) {
             }
         }
     }
+    grid.height * grid.panels.len().div_ceil(grid.columns).max(1) as u32
 }
 
 fn widest(ticks: &[(f64, String)]) -> f64 {
@@ -74,7 +101,7 @@ fn right(panel: &Panel, x: &Scale, panel_width: f64) -> f64 {
         .iter()
         .filter_map(|series| series.label.as_ref());
     let widest = labels
-        .map(|(_, text)| width(text, SMALL) + 18.0)
+        .map(|text| width(text, SMALL) + 18.0)
         .fold(0.0, f64::max);
     let last = x.ticks.iter().max_by(|a, b| a.0.total_cmp(&b.0));
     let half = last.filter(|_| panel.x.places.is_empty());
@@ -95,12 +122,12 @@ fn names(x: &Scale, room: f64) -> Vec<Vec<String>> {
     x.ticks.iter().map(|(_, label)| lines(label)).collect()
 }
 
-fn title(on: &Canvas, frame: &Frame) {
+fn title(on: &mut Canvas, frame: &Frame) {
     let at = (frame.across.0, frame.down.0 - TOP + 6.0);
-    on.text(&frame.panel.title, at, (HPos::Left, VPos::Top), INK, 1.0)
+    on.text(&frame.panel.title, at, ("start", Height::Head), INK, 1.0)
 }
 
-fn of_panel(on: &Canvas, frame: &Frame, names: &[Vec<String>]) {
+fn of_panel(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
     let (panel, (left, right), (top, bottom)) = (frame.panel, frame.across, frame.down);
     for range in &panel.shading {
         let (start, end) = (range.start.max(frame.x.low), range.end.min(frame.x.high));
@@ -118,17 +145,17 @@ fn of_panel(on: &Canvas, frame: &Frame, names: &[Vec<String>]) {
     }
     tags(on, frame);
     let (x, side) = match panel.notes_left {
-        true => (left + 6.0, HPos::Left),
-        false => (right - 6.0, HPos::Right),
+        true => (left + 6.0, "start"),
+        false => (right - 6.0, "end"),
     };
     for (line, note) in panel.notes.iter().enumerate() {
         let at = (x, top + 6.0 + LINE * line as f64);
-        on.text(note, at, (side, VPos::Top), INK, SMALL);
+        on.text(note, at, (side, Height::Head), INK, SMALL);
     }
     labels(on, frame)
 }
 
-fn ticks(on: &Canvas, frame: &Frame, names: &[Vec<String>]) {
+fn ticks(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
     let ((left, right), (top, bottom)) = (frame.across, frame.down);
     let mut taken: Vec<f64> = Vec::new();
     for (value, label) in &frame.y.ticks {
@@ -139,13 +166,7 @@ fn ticks(on: &Canvas, frame: &Frame, names: &[Vec<String>]) {
         taken.push(y);
         on.stroke(&[(left, y), (right, y)], GRID, 0.75);
         on.stroke(&[(left - 3.0, y), (left, y)], QUIET, 0.75);
-        on.text(
-            label,
-            (left - 6.0, y),
-            (HPos::Right, VPos::Center),
-            INK,
-            SMALL,
-        );
+        on.text(label, (left - 6.0, y), ("end", Height::Middle), INK, SMALL);
     }
     let mut taken: Vec<(f64, f64)> = Vec::new();
     for ((value, _), lines) in frame.x.ticks.iter().zip(names) {
@@ -164,7 +185,7 @@ fn ticks(on: &Canvas, frame: &Frame, names: &[Vec<String>]) {
         taken.push((x, half));
         for (n, line) in lines.iter().enumerate() {
             let at = (x, bottom + 6.0 + LINE * n as f64);
-            on.text(line, at, (HPos::Center, VPos::Top), INK, SMALL);
+            on.text(line, at, ("middle", Height::Head), INK, SMALL);
         }
     }
     let lines = names.iter().map(Vec::len).max().unwrap_or(1).max(1) as f64;
@@ -173,16 +194,16 @@ fn ticks(on: &Canvas, frame: &Frame, names: &[Vec<String>]) {
     if title.is_empty() {
         return;
     }
-    on.text(title, at, (HPos::Center, VPos::Top), INK, SMALL)
+    on.text(title, at, ("middle", Height::Head), INK, SMALL)
 }
 
 /// Names with a sample of their colour, from the right end of the title's line.
-fn keys(on: &Canvas, frame: &Frame, y: f64) {
+fn keys(on: &mut Canvas, frame: &Frame, y: f64) {
     let mut x = frame.across.1;
     for series in frame.panel.series.iter().rev() {
         let Some(key) = &series.key else { continue };
         x -= width(key, SMALL);
-        on.text(key, (x, y), (HPos::Left, VPos::Top), INK, SMALL);
+        on.text(key, (x, y), ("start", Height::Head), INK, SMALL);
         let sample = [(x - 16.0, y + 3.0), (x - 5.0, y + 14.0)];
         on.rectangle(sample, rgb(series.pen.color));
         x -= 28.0;
@@ -190,7 +211,7 @@ fn keys(on: &Canvas, frame: &Frame, y: f64) {
 }
 
 /// Tags in the first of some lines that has room; those for which there is none are left out.
-fn tags(on: &Canvas, frame: &Frame) {
+fn tags(on: &mut Canvas, frame: &Frame) {
     let (left, right) = frame.across;
     let mut taken = vec![f64::NEG_INFINITY; frame.panel.tag_lines];
     for (x, text) in &frame.panel.tags {
@@ -204,17 +225,18 @@ fn tags(on: &Canvas, frame: &Frame) {
         };
         taken[line] = at + half + 6.0;
         let place = (at, frame.down.0 + 3.0 + 15.0 * line as f64);
-        on.text(text, place, (HPos::Center, VPos::Top), QUIET, TAG);
+        on.text(text, place, ("middle", Height::Head), QUIET, TAG);
     }
 }
 
 /// Names at the ends of lines, pushed apart where they would overlap, each with a leader to its line.
-fn labels(on: &Canvas, frame: &Frame) {
+fn labels(on: &mut Canvas, frame: &Frame) {
     let labelled = frame.panel.series.iter();
-    let labelled = labelled.filter_map(|s| Some((s.label.as_ref()?, rgb(s.pen.color))));
-    let mut labels: Vec<_> = labelled
-        .map(|((point, text), color)| (frame.at(*point), text, color))
-        .collect();
+    let labelled = labelled.filter_map(|s| {
+        let end = s.shape.end().filter(|end| end.1.is_finite())?;
+        Some((frame.at(end), s.label.as_ref()?, rgb(s.pen.color)))
+    });
+    let mut labels: Vec<_> = labelled.collect();
     labels.sort_by(|a, b| a.0.1.total_cmp(&b.0.1));
     let heights: Vec<f64> = labels.iter().map(|label| label.0.1).collect();
     let right = frame.across.1;
@@ -223,7 +245,7 @@ fn labels(on: &Canvas, frame: &Frame) {
         on.stroke(&[(right + 1.0, y), (right + 9.0, shown_at)], color, 0.75);
         let text = shortened(text, frame.end - right - 12.0);
         let at = (right + 11.0, shown_at);
-        on.text(&text, at, (HPos::Left, VPos::Center), color, SMALL);
+        on.text(&text, at, ("start", Height::Middle), color, SMALL);
     }
 }
 

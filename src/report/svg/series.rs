@@ -1,113 +1,149 @@
 //! One series in its frame.
 
-use plotters::style::text_anchor::{HPos, VPos};
+use plotters::style::RGBColor;
 
-use super::super::plot::{Anchor, Mark, Pen, Point, Series, Shape};
-use super::canvas::{BAND, Canvas, Frame, SMALL, rgb};
+use super::super::plot::{Anchor, Axis, Fill, Mark, Pen, Point, Series, Shape, Upright, thinned};
+use super::grid::Frame;
+use super::{Canvas, Height, SMALL, rgb};
+use crate::number::three_digits;
 
+/// Bands and pale bars.
+const BAND: RGBColor = RGBColor(196, 214, 228);
 /// Half the width of a cap, in pixels.
 const CAP: f64 = 4.0;
 /// Points of a line for each pixel of its panel; more would not show.
 const POINTS: f64 = 1.5;
+/// Nobody hovers over one of more marks than this.
+const HOVERED: usize = 500;
 
-pub fn draw(on: &Canvas, frame: &Frame, series: &Series) {
+pub fn draw(on: &mut Canvas, frame: &Frame, series: &Series) {
     let (pen, color) = (series.pen, rgb(series.pen.color));
     let ((left, right), (top, bottom)) = (frame.across, frame.down);
     match &series.shape {
         Shape::Line(points) => line(on, frame, points, pen),
-        Shape::Band(lower, upper) => band(on, frame, lower, upper),
-        Shape::Marks(mark, points) => {
-            let points = placed(frame, &visible(frame, points));
-            points.into_iter().for_each(|at| marked(on, at, *mark, pen))
+        Shape::Band(lower, upper) => {
+            let most = (POINTS * (right - left)) as usize;
+            let [lower, upper] = [lower, upper].map(|edge| thinned(visible(frame, edge), most));
+            let outline = upper.into_iter().chain(lower.into_iter().rev());
+            let outline = placed(frame, outline);
+            if outline.len() > 2 {
+                on.area(&outline, BAND);
+            }
         }
-        Shape::Intervals(of) => of
-            .iter()
-            .filter(|(_, low, high)| low.is_finite() && high.is_finite())
-            .for_each(|&of| interval(on, frame, of, pen)),
-        Shape::Bars {
-            tops,
-            half,
-            base,
-            filled,
-        } => tops
-            .iter()
-            .filter(|top| top.1.is_finite())
-            .for_each(|&(x, top)| {
-                let foot = base.unwrap_or(frame.y.low);
-                let corners = corners(frame, x, *half, (foot, top));
-                if *filled {
-                    on.area(&corners, BAND);
-                }
-                on.stroke(&corners, color, pen.width)
-            }),
-        Shape::Blocks(half, of) => of
-            .iter()
-            .filter(|(_, low, high)| low.is_finite() && high > low)
-            .for_each(|&(x, low, high)| on.area(&corners(frame, x, *half, (low, high)), color)),
+        Shape::Marks(mark, points) => marks(on, frame, series, *mark, points),
+        Shape::Bars(half, fill, of) => bars(on, frame, series, (*half, *fill), of),
         Shape::Level(y) => {
             let y = frame.at_y(*y);
             on.line(&[(left, y), (right, y)], pen)
         }
         Shape::Upright(x) => {
-            let (x, _) = frame.at((*x, frame.y.low));
+            let x = frame.at_x(*x);
             on.line(&[(x, top), (x, bottom)], pen)
         }
-        Shape::Words {
-            at,
-            shift,
-            anchor,
-            text,
-        } => {
+        Shape::Words(at, anchor, text) => {
             let (x, y) = frame.at(*at);
-            let anchor = match anchor {
-                Anchor::Above => (HPos::Center, VPos::Bottom),
-                Anchor::Below => (HPos::Center, VPos::Top),
-                Anchor::AboveLeft => (HPos::Right, VPos::Bottom),
+            let (at, lie) = match anchor {
+                Anchor::Above => ((x, y - 5.0), ("middle", Height::Foot)),
+                Anchor::Below => ((x, y + 5.0), ("middle", Height::Head)),
+                Anchor::AboveLeft => ((x - 4.0, y - 3.0), ("end", Height::Foot)),
             };
-            on.text(text, (x + shift.0, y + shift.1), anchor, color, SMALL)
+            on.text(text, at, lie, color, SMALL)
         }
     }
 }
 
-fn band(on: &Canvas, frame: &Frame, lower: &[Point], upper: &[Point]) {
-    let limit = (POINTS * (frame.across.1 - frame.across.0)) as usize;
-    let lower = thinned(&visible(frame, lower), limit);
-    let mut outline = thinned(&visible(frame, upper), limit);
-    outline.extend(lower.into_iter().rev());
-    match outline.len() {
-        0..=2 => {}
-        _ => on.area(&placed(frame, &outline), BAND),
+fn marks(
+    on: &mut Canvas,
+    frame: &Frame,
+    series: &Series,
+    mark: Mark,
+    points: &[(Point, (f64, f64))],
+) {
+    let is_hovered = points.len() <= HOVERED;
+    for &(at, ends) in points {
+        if visible(frame, &[at]).is_empty() {
+            continue;
+        }
+        let drawn = |on: &mut Canvas| {
+            if ends.0 < ends.1 {
+                whisker(on, frame, (at.0, ends), rgb(series.pen.color));
+            }
+            marked(on, frame.at(at), mark, series.pen)
+        };
+        match is_hovered {
+            true => on.titled(&hover(frame, series, at, ends), drawn),
+            false => drawn(on),
+        }
     }
 }
 
-/// An upright line from low to high with a cap at each end.
-fn interval(on: &Canvas, frame: &Frame, (x, low, high): (f64, f64, f64), pen: Pen) {
-    let color = rgb(pen.color);
-    let ends = [frame.at((x, low)), frame.at((x, high))];
-    on.stroke(&ends, color, pen.width);
-    ends.into_iter()
-        .for_each(|(x, y)| on.stroke(&[(x - CAP, y), (x + CAP, y)], color, pen.width))
+fn bars(
+    on: &mut Canvas,
+    frame: &Frame,
+    series: &Series,
+    (half, fill): (f64, Fill),
+    bars: &[Upright],
+) {
+    let (pen, color) = (series.pen, rgb(series.pen.color));
+    let drawn = |of: &&Upright| of.2.is_finite() && of.1 != of.2;
+    for &(x, low, high) in bars.iter().filter(drawn) {
+        let (before, after) = (x - half, x + half);
+        let corners = [(before, low), (before, high), (after, high), (after, low)];
+        let corners = corners.map(|corner| frame.at(corner));
+        // Of stacked bars the height is what each adds.
+        let height = if fill == Fill::Solid {
+            high - low
+        } else {
+            high
+        };
+        let text = hover(frame, series, (x, height), (height, height));
+        on.titled(&text, |on| match fill {
+            Fill::Solid => on.area(&corners, color),
+            Fill::Pale => {
+                on.area(&corners, BAND);
+                on.stroke(&corners, color, pen.width)
+            }
+            Fill::Open => on.stroke(&corners, color, pen.width),
+        })
+    }
 }
 
-/// Corners of a bar about `x`: up on its left, across, and down on its right.
-fn corners(frame: &Frame, x: f64, half: f64, (foot, top): (f64, f64)) -> [Point; 4] {
-    let corners = [
-        (x - half, foot),
-        (x - half, top),
-        (x + half, top),
-        (x + half, foot),
-    ];
-    corners.map(|corner| frame.at(corner))
+/// Name, abscissa, ordinate and interval of a point.
+fn hover(frame: &Frame, series: &Series, (x, y): Point, (low, high): (f64, f64)) -> String {
+    let panel = frame.panel;
+    let of = |axis: &Axis, title: &str, value: f64| match axis.places.get(value.round() as usize) {
+        Some(place) => place.clone(),
+        None if title.is_empty() => three_digits(value),
+        None => format!("{title}: {}", three_digits(value)),
+    };
+    let name = series.key.iter().chain(&series.label).cloned();
+    let mut lines: Vec<String> = name.collect();
+    lines.push(of(&panel.x, &panel.x.title, x));
+    let mut height = of(&panel.y, &panel.title, y);
+    if low.is_finite() && low < high {
+        height += &format!(" ({} … {})", three_digits(low), three_digits(high));
+    }
+    lines.push(height);
+    lines.join("\n")
+}
+
+/// An upright line with a cap at each end.
+fn whisker(on: &mut Canvas, frame: &Frame, (x, (low, high)): (f64, (f64, f64)), color: RGBColor) {
+    let ends = [frame.at((x, low)), frame.at((x, high))];
+    on.stroke(&ends, color, 1.0);
+    for (x, y) in ends {
+        on.stroke(&[(x - CAP, y), (x + CAP, y)], color, 1.0);
+    }
 }
 
 /// Points joined between those that are no numbers; a point alone is a dot.
-fn line(on: &Canvas, frame: &Frame, points: &[Point], pen: Pen) {
-    let limit = POINTS * (frame.across.1 - frame.across.0);
+fn line(on: &mut Canvas, frame: &Frame, points: &[Point], pen: Pen) {
+    let most = POINTS * (frame.across.1 - frame.across.0);
     let is_point = |p: &Point| p.0.is_finite() && p.1.is_finite();
     for piece in points.split(|p| !is_point(p)) {
         let piece = visible(frame, piece);
-        let share = limit * piece.len() as f64 / points.len() as f64;
-        let piece = placed(frame, &thinned(&piece, share as usize));
+        let share = most * piece.len() as f64 / points.len() as f64;
+        let piece = placed(frame, thinned(piece, share as usize));
         match piece[..] {
             [] => {}
             [alone] => marked(on, alone, Mark::Dot, Pen { width: 0.5, ..pen }),
@@ -118,18 +154,18 @@ fn line(on: &Canvas, frame: &Frame, points: &[Point], pen: Pen) {
 
 /// What lies on the horizontal axis and is a number.
 fn visible(frame: &Frame, points: &[Point]) -> Vec<Point> {
-    let (low, high) = (frame.x.low, frame.x.high);
+    let across = frame.x.low..=frame.x.high;
     let points = points.iter().copied();
     points
-        .filter(|(x, y)| *x >= low && *x <= high && y.is_finite())
+        .filter(|(x, y)| across.contains(x) && y.is_finite())
         .collect()
 }
 
-fn placed(frame: &Frame, points: &[Point]) -> Vec<Point> {
-    points.iter().map(|&point| frame.at(point)).collect()
+fn placed(frame: &Frame, points: impl IntoIterator<Item = Point>) -> Vec<Point> {
+    points.into_iter().map(|point| frame.at(point)).collect()
 }
 
-fn marked(on: &Canvas, at: Point, mark: Mark, pen: Pen) {
+fn marked(on: &mut Canvas, at: Point, mark: Mark, pen: Pen) {
     let color = rgb(pen.color);
     let (x, y) = at;
     match mark {
@@ -140,27 +176,4 @@ fn marked(on: &Canvas, at: Point, mark: Mark, pen: Pen) {
             on.stroke(&[(x - 4.0, y + 4.0), (x + 4.0, y - 4.0)], color, pen.width)
         }
     }
-}
-
-/// About `limit` points of a line, the lowest and the highest of each stretch.
-pub fn thinned(points: &[Point], limit: usize) -> Vec<Point> {
-    if points.len() <= limit.max(2) {
-        return points.to_vec();
-    }
-    let stretch = (2 * points.len()).div_ceil(limit.max(2));
-    let ends = |chunk: &[Point]| {
-        let by_height = |a: &&Point, b: &&Point| a.1.total_cmp(&b.1);
-        let ends = [
-            chunk.iter().min_by(by_height),
-            chunk.iter().max_by(by_height),
-        ];
-        let mut ends: Vec<Point> = ends.into_iter().flatten().copied().collect();
-        ends.sort_by(|a, b| a.0.total_cmp(&b.0));
-        ends.dedup();
-        ends
-    };
-    let mut thin: Vec<Point> = points.chunks(stretch).flat_map(ends).collect();
-    // The end is what the line's name points to.
-    thin.extend(points.last().filter(|last| thin.last() != Some(last)));
-    thin
 }

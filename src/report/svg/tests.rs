@@ -1,6 +1,6 @@
 //! Properties of every figure.
 
-use super::super::plot::{Axis, Mark, Panel, Plot, Series};
+use super::super::plot::{Axis, Mark, Panel, Plot, Series, thinned};
 use super::*;
 
 /// The value of an attribute.
@@ -20,9 +20,8 @@ fn texts(svg: &str) -> Vec<(String, [f64; 4])> {
     tags.map(|tag| {
         let (tag, rest) = tag.split_once('>').unwrap();
         let text = rest.split_once("</text>").unwrap().0.trim().to_owned();
-        let (x, y) = (number(tag, "x") / 8.0, number(tag, "y") / 8.0);
-        let size = number(tag, "font-size") / 8.0;
-        let width = canvas::width(&text.replace("&lt;", "<"), size / canvas::LETTER);
+        let [x, y, size] = ["x", "y", "font-size"].map(|name| number(tag, name) / canvas::FINE);
+        let width = width(&text.replace("&lt;", "<"), size / LETTER);
         if attribute(tag, "transform").is_some() {
             return (text, [x - size, x + size, y - width, y]);
         }
@@ -74,19 +73,19 @@ pub fn assert_sound(figures: &[String]) {
 
 /// Figures that were drawn and found sound.
 pub fn drawn<'a>(plots: impl Iterator<Item = &'a Plot>) -> Vec<String> {
-    let figures: Vec<String> = plots.map(|plot| draw(plot).unwrap()).collect();
+    let figures: Vec<String> = plots.map(draw).collect();
     assert_sound(&figures);
     figures
 }
 
 fn of(panels: impl IntoIterator<Item = Panel>) -> String {
-    draw(&Plot::new("a.svg", "A", (2, 200), panels)).unwrap()
+    draw(&Plot::new("a.svg", "A", (2, 200), panels))
 }
 
 #[test]
-fn a_figure_is_shown_at_its_size_and_drawn_finer() {
+fn a_figure_has_its_size() {
     let svg = of([]);
-    assert!(svg.starts_with(r#"<svg width="1200" height="200" viewBox="0 0 9600 1600""#));
+    assert!(svg.starts_with(r#"<svg width="1200" height="200" viewBox="0 0 1200 200""#));
 }
 
 #[test]
@@ -94,7 +93,7 @@ fn thinning_a_line_keeps_its_extremes_and_its_end() {
     let mut points: Vec<_> = (0..10_000).map(|i| (f64::from(i), 0.0)).collect();
     points[1234].1 = 7.0;
     points[7777].1 = -3.0;
-    let thin = series::thinned(&points, 400);
+    let thin = thinned(points.iter().copied(), 400);
     assert!(thin.len() <= 410);
     assert!(thin.contains(&(1234.0, 7.0)) && thin.contains(&(7777.0, -3.0)));
     assert!(thin.is_sorted_by(|a, b| a.0 <= b.0));
@@ -150,7 +149,7 @@ fn ticks_leave_each_other_room() {
         Axis::symlog(1.0).between(-1e9, 1e9),
     )
     .with(Series::line([(0.0, 0.0)]));
-    let svg = draw(&Plot::new("a.svg", "A", (1, 120), [panel])).unwrap();
+    let svg = draw(&Plot::new("a.svg", "A", (1, 120), [panel]));
     let ticks: Vec<f64> = texts(&svg)
         .into_iter()
         .filter(|(text, _)| text.contains("10") && !text.contains("place"))
@@ -162,4 +161,18 @@ fn ticks_leave_each_other_room() {
             "{ticks:?}"
         );
     }
+}
+
+#[test]
+fn who_hovers_over_a_mark_sees_its_name_place_and_interval() {
+    let places = ["x", "y"].map(str::to_owned);
+    let panel = Panel::new("bias, °/h", Axis::places(places), Axis::linear(""))
+        .with(Series::measured(Mark::Dot, [(0.1, 1.5, 0.25), (1.1, 2.0, f64::NAN)]).key("EKF <1>"));
+    let svg = of([panel]);
+    assert!(
+        svg.contains("<title>EKF &lt;1&gt;\nx\nbias, °/h: 1.50 (1.25 … 1.75)</title>"),
+        "{svg}"
+    );
+    assert!(svg.contains("\ny\nbias, °/h: 2.00</title>"), "{svg}");
+    assert_sound(&[svg]);
 }

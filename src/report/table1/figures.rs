@@ -14,13 +14,9 @@ const MOTION: [Quantity; 2] = [Quantity::Velocity, Quantity::Position];
 
 pub fn figures(table: &Table1) -> Vec<Plot> {
     let of_column = |column: &Column| {
-        let figures = column
-            .published
-            .figures
-            .into_iter()
-            .zip([&ATTITUDE[..], &MOTION]);
-        let plots = figures.map(|(number, of)| figure(table, column, number, of));
-        plots.collect::<Vec<_>>()
+        let [attitude, motion] = column.published.figures;
+        let figures = [(attitude, &ATTITUDE[..]), (motion, &MOTION)];
+        figures.map(|(number, of)| figure(table, column, number, of))
     };
     table.columns.iter().flat_map(of_column).collect()
 }
@@ -34,15 +30,12 @@ fn figure(table: &Table1, column: &Column, number: u8, quantities: &[Quantity]) 
         InstallationForm::ThreeAngle => "three-angle",
         _ => "six-angle",
     };
-    let errors = if quantities.len() == 3 {
-        "attitude"
-    } else {
-        "velocity and position"
+    let errors = match quantities.len() {
+        3 => "attitude",
+        _ => "velocity and position",
     };
     let heading = format!("Figure {number}: {sensor}, {form} form, {errors}");
-    let panels = quantities
-        .iter()
-        .map(|&quantity| panel(table, column, quantity));
+    let panels = quantities.iter().map(|&of| panel(table, column, of));
     Plot::new(&format!("figure-{number}.svg"), &heading, (1, 230), panels)
         .caption(caption(table, column, quantities))
 }
@@ -63,11 +56,8 @@ fn caption(table: &Table1, column: &Column, quantities: &[Quantity]) -> String {
             let largest = extent(column, q) / q.unit_value();
             format!("{} {largest:.0e} {}", q.name(), q.unit())
         });
-        let largest: Vec<String> = largest.collect();
-        text += &format!(
-            " Nothing is left but rounding; largest: {}.",
-            largest.join(", ")
-        );
+        let largest = largest.collect::<Vec<_>>().join(", ");
+        text += &format!(" Nothing is left but rounding; largest: {largest}.");
     }
     text
 }
@@ -88,13 +78,10 @@ fn extent(column: &Column, quantity: Quantity) -> f64 {
 /// The same over both forms of the triad.
 fn common_extent(table: &Table1, column: &Column, quantity: Quantity) -> f64 {
     let sensor = column.published.sensor;
-    let columns = table
-        .columns
-        .iter()
-        .filter(|column| column.published.sensor == sensor);
-    columns
-        .map(|column| extent(column, quantity))
-        .fold(0.0, f64::max)
+    let columns = table.columns.iter();
+    let columns = columns.filter(|column| column.published.sensor == sensor);
+    let extents = columns.map(|column| extent(column, quantity));
+    extents.fold(0.0, f64::max)
 }
 
 fn panel(table: &Table1, column: &Column, quantity: Quantity) -> Panel {
@@ -106,24 +93,20 @@ fn panel(table: &Table1, column: &Column, quantity: Quantity) -> Panel {
     let line = |values: &mut dyn Iterator<Item = f64>| {
         let lowest = if signed { f64::NEG_INFINITY } else { 0.0 };
         let values = values.map(|value| (value / unit).max(lowest));
-        Series::line(straight(
-            hours.iter().copied().zip(values).collect(),
-            FLAT * extent,
-        ))
+        let points = hours.iter().copied().zip(values).collect();
+        Series::line(straight(points, FLAT * extent))
     };
     let samples = courses.samples.iter().map(|sample| {
-        line(&mut sample.iter().map(|errors| errors[q]))
-            .nth(3)
-            .width(0.4)
+        let line = line(&mut sample.iter().map(|errors| errors[q]));
+        line.nth(3).width(0.4)
     });
     let flat = flat(table, column, quantity);
     let means = [(1.0, "mean + σ"), (-1.0, "mean − σ"), (0.0, "mean")].map(|(sign, name)| {
         let values = courses.moments.iter().map(|moments| moments[q]);
         let series = line(&mut values.map(|m| m.mean + sign * m.std)).color(Color::Ink);
-        let series = if sign == 0.0 {
-            series.width(2.25)
-        } else {
-            series.width(1.25).dashed()
+        let series = match sign == 0.0 {
+            true => series.width(2.25),
+            false => series.width(1.25).dashed(),
         };
         match (flat, sign == 0.0) {
             (false, _) => series.label(name),
@@ -131,10 +114,9 @@ fn panel(table: &Table1, column: &Column, quantity: Quantity) -> Panel {
             (true, false) => series,
         }
     });
-    let (kind, low) = if signed {
-        ("error", -extent)
-    } else {
-        ("error, horizontal", 0.0)
+    let (kind, low) = match signed {
+        true => ("error", -extent),
+        false => ("error, horizontal", 0.0),
     };
     let title = format!("{} {kind}, {}", quantity.name(), quantity.unit());
     let x = Axis::hours(hours.last().copied().unwrap_or(1.0));

@@ -94,19 +94,11 @@ fn of_column(table: &Table1, column: &Column) -> Block {
         let mut lines = pair(row.reading.name, &row.sample, &verdict::of_row(column, row));
         if table.population > table.study.samples {
             let of = format!("mean of {}", count(table.population));
-            lines.push(line(
-                "",
-                &of,
-                |q| figure(q, row.population[q as usize].mean),
-                "",
-            ));
+            let mean = |q: Quantity| figure(q, row.population[q as usize].mean);
+            lines.push(line("", &of, mean, ""));
         }
-        lines.push(line(
-            "",
-            "z",
-            |q| standard_errors(row.difference[q as usize]),
-            "",
-        ));
+        let z = |q: Quantity| standard_errors(row.difference[q as usize]);
+        lines.push(line("", "z", z, ""));
         lines
     });
     Table::new(verdict::title(column.published), headings)
@@ -117,15 +109,9 @@ fn of_column(table: &Table1, column: &Column) -> Block {
 
 /// Mean and standard deviation.
 fn pair(name: &str, moments: &ByQuantity<Moments>, verdict: &str) -> Vec<Vec<String>> {
-    vec![
-        line(
-            name,
-            "mean",
-            |q| figure(q, moments[q as usize].mean),
-            verdict,
-        ),
-        line("", "std", |q| figure(q, moments[q as usize].std), ""),
-    ]
+    let mean = |q: Quantity| figure(q, moments[q as usize].mean);
+    let std = |q: Quantity| figure(q, moments[q as usize].std);
+    vec![line(name, "mean", mean, verdict), line("", "std", std, "")]
 }
 
 fn line(name: &str, what: &str, cell: impl Fn(Quantity) -> String, verdict: &str) -> Vec<String> {
@@ -146,9 +132,8 @@ fn standard_errors(z: f64) -> String {
 /// Figures by name, in the units of the keys.
 fn data(table: &Table1) -> Value {
     let (study, columns) = (&table.study, &table.columns);
-    let rows = columns
-        .iter()
-        .flat_map(|column| column.rows().map(|row| reading(column, row)));
+    let rows = |column| Column::rows(column).map(move |row| reading(column, row));
+    let rows = columns.iter().flat_map(rows);
     json!({
         "samples": study.samples,
         "seed": study.seed,
@@ -189,10 +174,8 @@ fn reading(column: &Column, row: &Row) -> Value {
 }
 
 fn by_key<T: Into<Value>>(of: impl Fn(Quantity) -> T) -> Map<String, Value> {
-    Quantity::ALL
-        .into_iter()
-        .map(|q| (q.key().to_owned(), of(q).into()))
-        .collect()
+    let all = Quantity::ALL.into_iter();
+    all.map(|q| (q.key().to_owned(), of(q).into())).collect()
 }
 
 #[cfg(test)]

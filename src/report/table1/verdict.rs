@@ -60,16 +60,13 @@ pub fn sentence(column: &Column) -> String {
                 .to_owned()
         }
         Verdict::UnderAnotherReading(reading) => {
-            let mut text = format!(
-                "not reproduced as stated, but under another reading: {}.",
-                reading.name
-            );
-            let partly = column.others.iter().filter(|row| {
+            let name = reading.name;
+            let mut text = format!("not reproduced as stated, but under another reading: {name}.");
+            for row in &column.others {
                 let (agree, apart) = split(row);
-                !apart.is_empty() && apart.len() < agree.len()
-            });
-            for row in partly {
-                text.push_str(&format!(" With {} {}.", row.reading.name, of_reading(row)));
+                if !apart.is_empty() && apart.len() < agree.len() {
+                    text += &format!(" With {} {}.", row.reading.name, of_reading(row));
+                }
             }
             text
         }
@@ -78,14 +75,10 @@ pub fn sentence(column: &Column) -> String {
             if column.published.form.holds(InstallationForm::General) {
                 text.push_str(", which gives zero because K C is recovered exactly");
             }
-            match slip {
-                Some(slip) => text.push_str(&format!(
-                    "; a slip gives the paper's figures: {}.",
-                    slip.name
-                )),
-                None => text.push('.'),
+            if let Some(slip) = slip {
+                text += &format!("; a slip gives the paper's figures: {}", slip.name);
             }
-            text
+            text + "."
         }
     }
 }

@@ -146,9 +146,7 @@ impl Way {
             Some(self.position(error))
         };
         Position {
-            filter: trial
-                .filtered
-                .as_ref()
+            filter: { trial.filtered.as_ref() }
                 .map(|f| (self.position(&f.error), covariance(&f.covariance))),
             bound: covariance(&trial.bound_covariance),
             closed_form: closed(Baseline::OWN_TIME),
@@ -215,12 +213,10 @@ impl Region {
 
 impl Containment {
     fn new(region: Region, errors: &[(Vector2<f64>, Matrix2<f64>)]) -> Option<Self> {
-        let held = |(error, covariance)| region.holds(error, covariance);
-        let held: Vec<bool> = errors
+        let held = errors
             .iter()
-            .map(|(error, covariance)| (error, covariance))
-            .filter_map(held)
-            .collect();
+            .filter_map(|(error, covariance)| region.holds(error, covariance));
+        let held: Vec<bool> = held.collect();
         let runs = held.len();
         let binomial = Binomial::new(region.probability(), runs as u64).ok()?;
         let at = |p: f64| binomial.inverse_cdf(p) as usize;

@@ -2,24 +2,39 @@
 
 use nalgebra::SVector;
 
-use super::{INTERVAL, Mission, NavigationStudyError, Pair};
+use super::{Epoch, INTERVAL, Mission, NavigationStudyError, Pair};
 use crate::calibration::Estimate;
 use crate::earth::{SEMI_MAJOR_AXIS, Site};
 use crate::imu::{PerSensor, Triad};
-use crate::navigation::NavigationError;
 use crate::navigation::error_model::STATES;
+use crate::navigation::{ErrorMatrix, NavigationError};
 use crate::units::DEGREE;
 
-/// Navigation error at one moment: predicted, and actual if known.
+/// Navigation error at one moment, as far as it is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outlook {
     /// Time since the start, s.
     pub time: f64,
-    /// Its 1σ predicted from the calibration's covariance, in the order of
-    /// [`NavigationError::to_vector`].
-    pub sigma: SVector<f64, STATES>,
     /// The actual error; `None` if the truth is not known.
     pub error: Option<NavigationError>,
+    /// Its 1σ predicted from the calibration's covariance, in the order of
+    /// [`NavigationError::to_vector`]; `None` if the calibration states no σ.
+    pub sigma: Option<SVector<f64, STATES>>,
+}
+
+/// Errors without a prediction.
+pub fn known(epochs: &[Epoch]) -> Vec<Outlook> {
+    let outlook = |epoch: &Epoch| Outlook {
+        time: epoch.time,
+        error: Some(epoch.error),
+        sigma: None,
+    };
+    epochs.iter().map(outlook).collect()
+}
+
+/// Predicted 1σ of each error.
+pub fn sigma(covariance: &ErrorMatrix) -> SVector<f64, STATES> {
+    covariance.diagonal().map(|v| v.max(0.0).sqrt())
 }
 
 /// Largest attitude error for which the linear model is valid, rad: beyond it, predicted σ are wrong by more than 1 %.
@@ -65,9 +80,11 @@ impl Mission {
     /// The longest round duration after which an estimate's predicted errors are small; the shortest if there is none.
     fn useful(site: &Site, estimate: &Estimate) -> Result<f64, NavigationStudyError> {
         let small = |moment: &Outlook| {
-            let attitude = moment.sigma.fixed_rows::<3>(0).amax();
-            let position = moment.sigma.fixed_rows::<2>(6).norm();
-            attitude <= SMALL && position <= NEAR * SEMI_MAJOR_AXIS
+            moment.sigma.is_some_and(|sigma| {
+                let attitude = sigma.fixed_rows::<3>(0).amax();
+                let position = sigma.fixed_rows::<2>(6).norm();
+                attitude <= SMALL && position <= NEAR * SEMI_MAJOR_AXIS
+            })
         };
         // A poor one needs no forty hours to be found poor.
         let mut useful = DURATIONS[0];
@@ -106,19 +123,12 @@ impl Mission {
         });
         let actual = actual.transpose()?.unwrap_or_default();
         let exposures = self.exposure(&estimate.triads)?;
-        Ok(exposures
-            .iter()
-            .enumerate()
-            .map(|(k, exposure)| {
-                let spread = exposure.by_parameter * estimate.covariance;
-                let variance = |i: usize| spread.row(i).dot(&exposure.by_parameter.row(i));
-                Outlook {
-                    time: exposure.time,
-                    sigma: SVector::from_fn(|i, _| variance(i).max(0.0).sqrt()),
-                    error: actual.get(k).map(|moment| moment.error),
-                }
-            })
-            .collect())
+        let moments = exposures.iter().enumerate().map(|(k, exposure)| Outlook {
+            time: exposure.time,
+            error: actual.get(k).map(|moment| moment.error),
+            sigma: Some(sigma(&exposure.covariance(&estimate.covariance))),
+        });
+        Ok(moments.collect())
     }
 }
 
@@ -182,9 +192,9 @@ mod tests {
             })
             .unwrap();
         for (found, expected) in found.iter().zip(&expected) {
-            assert_eq!(found.error, Some(expected.error));
-            let apart = found.sigma - expected.sigma().unwrap();
-            assert!(apart.amax() <= 1e-3 * found.sigma.amax());
+            assert_eq!(found.error, expected.error);
+            let [found, expected] = [found, expected].map(|of| of.sigma.unwrap());
+            assert!((found - expected).amax() <= 1e-3 * found.amax());
         }
         let unknown = mission.outlook(&estimate, None).unwrap();
         assert!(unknown.iter().all(|moment| moment.error.is_none()));

@@ -1,4 +1,4 @@
-use nalgebra::Vector2;
+use nalgebra::{SVector, Vector2};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -240,9 +240,10 @@ fn errors_of_both_triads_are_the_sum_of_those_of_each() {
     let end = |pair: &Pair| mission.navigate(pair).unwrap().pop().unwrap();
     let [gyro, accel] = Sensor::ALL.map(|sensor| end(&both.clone().with_errors_of(sensor)));
     let both = end(&both);
-    let apart = both.error.position - gyro.error.position - accel.error.position;
-    assert!(apart.norm() < 1e-3 * both.error.horizontal_position());
-    let sigma = [both, gyro, accel].map(|moment| moment.sigma().unwrap()[6]);
+    let errors = [both, gyro, accel].map(|moment| moment.error.unwrap());
+    let apart = errors[0].position - errors[1].position - errors[2].position;
+    assert!(apart.norm() < 1e-3 * errors[0].horizontal_position());
+    let sigma = [both, gyro, accel].map(|moment| moment.sigma.unwrap()[6]);
     assert!(sigma[1] > 0.0 && sigma[2] > 0.0);
     // The triads' errors are correlated, so their squares do not add up.
     let independent = sigma[1].hypot(sigma[2]);

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Vector3};
 use thiserror::Error;
 
-use super::{Epoch, Exposure, Mission, NavigationStudyError, Pair, sensed_errors};
+use super::{Exposure, Mission, NavigationStudyError, Outlook, Pair, outlook, sensed_errors};
 use crate::calibration::result::Calibration;
 use crate::calibration::{
     Estimate, TEMPERATURE_TOLERANCE, Thermal, from_vector, sensor_and_parameter, triads_of,
@@ -153,7 +153,7 @@ impl Mission {
         &self,
         pair: &WarmingPair,
         warming: &Warming,
-    ) -> Result<Vec<Epoch>, NavigationStudyError> {
+    ) -> Result<Vec<Outlook>, NavigationStudyError> {
         let middle = |interval: u32| warming.at((f64::from(interval) - 0.5) * self.interval);
         for interval in 1..=self.intervals {
             let (temperature, _) = middle(interval);
@@ -161,17 +161,17 @@ impl Mission {
                 return Err(WarmingError::Outside.into());
             }
         }
-        let mut epochs = self.errors_by(&ErrorVector::zeros(), |interval| {
+        let epochs = self.errors_by(&ErrorVector::zeros(), |interval| {
             pair.at(middle(interval)).sensed()
         })?;
+        let mut moments = outlook::known(&epochs);
         let Changing { estimate, thermal } = &pair.calibration;
         if estimate.estimated().next().is_none() {
-            return Ok(epochs);
+            return Ok(moments);
         }
         let own = self.exposure_warming(pair, &middle, None)?;
-        for (epoch, by) in epochs.iter_mut().zip(&own) {
-            epoch.covariance = Some(by.covariance(&estimate.covariance));
-        }
+        let of_parameters = own.iter().map(|by| by.covariance(&estimate.covariance));
+        let mut covariances: Vec<ErrorMatrix> = of_parameters.collect();
         if let Some(thermal) = thermal {
             let coefficients = thermal.coefficients.iter();
             let mut functions: Vec<usize> = coefficients.map(|c| c.function).collect();
@@ -181,7 +181,7 @@ impl Mission {
                 .iter()
                 .map(|&f| self.exposure_warming(pair, &middle, Some(f)));
             let by_function: Vec<_> = by_function.collect::<Result<_, _>>()?;
-            for (k, (epoch, own)) in epochs.iter_mut().zip(&own).enumerate() {
+            for (k, (covariance, own)) in covariances.iter_mut().zip(&own).enumerate() {
                 let mut by = DMatrix::zeros(STATES, thermal.coefficients.len());
                 for (mut column, of) in by.column_iter_mut().zip(&thermal.coefficients) {
                     let place = functions.partition_point(|&function| function < of.function);
@@ -190,11 +190,13 @@ impl Mission {
                 let crossed = own.by_parameter * &thermal.cross * by.transpose();
                 let added =
                     &crossed + crossed.transpose() + &by * &thermal.covariance * by.transpose();
-                let added = ErrorMatrix::from_fn(|i, j| added[(i, j)]);
-                epoch.covariance = epoch.covariance.map(|covariance| covariance + added);
+                *covariance += ErrorMatrix::from_fn(|i, j| added[(i, j)]);
             }
         }
-        Ok(epochs)
+        for (moment, covariance) in moments.iter_mut().zip(&covariances) {
+            moment.sigma = Some(outlook::sigma(covariance));
+        }
+        Ok(moments)
     }
 
     /// Sensitivity of navigation to the parameters, or to their coefficients of one function.

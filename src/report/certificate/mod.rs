@@ -143,10 +143,9 @@ fn method(certificate: &Certificate) -> Facts {
         "Method",
         [("procedure", laboratory.method.procedure.clone())],
     );
-    let deviations = laboratory.method.deviations.clone();
     facts.push(
         "deviations",
-        deviations.unwrap_or_else(|| "none".to_owned()),
+        laboratory.method.deviations.as_deref().unwrap_or("none"),
     );
     let how = evaluation(calibration.aiding);
     facts.push("evaluation", format!("{}: {how}", provenance.program));
@@ -169,10 +168,8 @@ fn method(certificate: &Certificate) -> Facts {
         ),
     );
     if let Some(temperature) = &calibration.temperature {
-        facts.push(
-            "temperature",
-            temperature_words(temperature, |t| value(t, 1.0)),
-        );
+        let words = temperature_words(temperature, |t| value(t, 1.0));
+        facts.push("temperature", words);
     }
     facts.push("body frame", calibration.body_frame.words());
     if let Some(gravity) = calibration.gravity {
@@ -184,10 +181,8 @@ fn method(certificate: &Certificate) -> Facts {
             format!("{}, SHA-256 {}", input.name, input.sha256),
         );
     }
-    facts.push(
-        "calibration.json",
-        format!("attached, SHA-256 {}", certificate.sha256),
-    );
+    let attached = format!("attached, SHA-256 {}", certificate.sha256);
+    facts.push("calibration.json", attached);
     facts
 }
 
@@ -215,16 +210,8 @@ fn of_gravity(gravity: GravityRecord) -> String {
 
 fn conditions(certificate: &Certificate) -> Facts {
     let conditions = &certificate.laboratory.conditions;
-    let with = |condition: Condition, unit: &str| {
-        let Condition {
-            value: of,
-            uncertainty,
-        } = condition;
-        format!(
-            "({} ± {}) {unit}, k = 2",
-            value(of, uncertainty),
-            sigma(uncertainty)
-        )
+    let with = |of: Condition, unit: &str| {
+        format!("({}) {unit}, k = 2", plus_minus(of.value, of.uncertainty))
     };
     let mut facts = Facts::new(
         "Conditions",
@@ -237,12 +224,8 @@ fn conditions(certificate: &Certificate) -> Facts {
 }
 
 fn verdict(conformity: &Conformity) -> String {
-    let limits = conformity.limits.len();
-    let kept = conformity
-        .limits
-        .iter()
-        .filter(|of| of.decision == Decision::Pass)
-        .count();
+    let (limits, all) = (conformity.limits.len(), || conformity.limits.iter());
+    let kept = all().filter(|of| of.decision == Decision::Pass).count();
     let first = match conformity.overall() {
         Some(Decision::Pass) => format!("Every one of {limits} limits is kept."),
         Some(worst) => format!(
@@ -251,11 +234,7 @@ fn verdict(conformity: &Conformity) -> String {
         ),
         None => "No limit concerns a parameter that was calibrated.".to_owned(),
     };
-    let risk = conformity
-        .limits
-        .iter()
-        .map(|of| of.risk)
-        .fold(0.0, f64::max);
+    let risk = all().map(|of| of.risk).fold(0.0, f64::max);
     let mut text = format!(
         "{first} Decision rule: {}. Largest probability that a decision below is wrong: {}.",
         conformity.rule.words(),
@@ -348,14 +327,12 @@ fn traceability(certificate: &Certificate) -> Facts {
         "Metrological traceability",
         [("statement", traceability.statement.clone())],
     );
-    for equipment in &traceability.equipment {
-        facts.push(
-            &equipment.name,
-            format!(
-                "serial number {}, certificate {}",
-                equipment.serial, equipment.certificate
-            ),
+    for of in &traceability.equipment {
+        let words = format!(
+            "serial number {}, certificate {}",
+            of.serial, of.certificate
         );
+        facts.push(&of.name, words);
     }
     facts
 }

@@ -2,10 +2,9 @@
 
 use nalgebra::SVector;
 
-use crate::navigation::NavigationError;
 use crate::navigation::error_model::STATES;
 use crate::report::prelude::*;
-use crate::study::navigation::Epoch;
+use crate::study::navigation::Outlook;
 
 /// Lines this many times apart share an axis that is logarithmic.
 const APART: f64 = 20.0;
@@ -20,13 +19,13 @@ const LENGTHS: Units = &[("nmile", NAUTICAL_MILE), ("m", 1.0)];
 #[derive(Debug, Clone, Copy)]
 pub struct Quantity {
     /// Such as `pitch`.
-    pub(super) name: &'static str,
+    pub name: &'static str,
     /// Its name in documents, with its unit.
-    pub(super) key: &'static str,
-    /// Place in [`NavigationError::to_vector`]; of a horizontal length that of its first component.
+    pub key: &'static str,
+    /// Place in [`Outlook::sigma`]; of a horizontal length that of its first component.
     place: usize,
     /// Whether it has a sign, and a normal distribution where parameters have one.
-    pub(super) is_component: bool,
+    pub is_component: bool,
     units: Units,
 }
 
@@ -49,7 +48,7 @@ const fn horizontal(place: usize, name: &'static str, key: &'static str, units: 
 
 impl Quantity {
     /// Attitude, velocity, position, three each.
-    pub(super) const ALL: [Self; 9] = [
+    pub const ALL: [Self; 9] = [
         component(0, "pitch", "pitch_deg", ANGLES),
         component(1, "roll", "roll_deg", ANGLES),
         component(2, "heading", "heading_deg", ANGLES),
@@ -62,7 +61,7 @@ impl Quantity {
     ];
 
     /// Symbol of its unit in documents and tables.
-    pub(super) fn unit(self) -> &'static str {
+    pub fn unit(self) -> &'static str {
         self.units[0].0
     }
 
@@ -72,7 +71,7 @@ impl Quantity {
 
     /// A unit in which values up to this one, in the usual unit, have few zeros; and how many of it
     /// make the usual unit.
-    pub(super) fn readable_unit(self, largest: f64) -> (&'static str, f64) {
+    pub fn readable_unit(self, largest: f64) -> (&'static str, f64) {
         let size = largest * self.unit_value();
         let fits = self.units.iter().find(|(_, value)| size >= 0.5 * value);
         let (unit, value) = fits.copied().unwrap_or(self.units[self.units.len() - 1]);
@@ -80,17 +79,17 @@ impl Quantity {
     }
 
     /// The error in the usual unit.
-    pub(super) fn error(self, error: &NavigationError) -> f64 {
-        self.of(&error.to_vector())
+    pub fn error(self, moment: &Outlook) -> Option<f64> {
+        Some(self.of(&moment.error.as_ref()?.to_vector()))
     }
 
     /// Predicted 1σ in the usual unit; of a horizontal length the root of its mean square.
-    pub(super) fn sigma(self, moment: &Epoch) -> Option<f64> {
-        Some(self.of(&moment.sigma()?))
+    pub fn sigma(self, moment: &Outlook) -> Option<f64> {
+        Some(self.of(moment.sigma.as_ref()?))
     }
 
-    /// The same of all errors or their σ, in the order of [`NavigationError::to_vector`].
-    pub(super) fn of(self, all: &SVector<f64, STATES>) -> f64 {
+    /// The same of all errors or their σ, in the order of [`Outlook::sigma`].
+    fn of(self, all: &SVector<f64, STATES>) -> f64 {
         let si = match self.is_component {
             true => all[self.place],
             false => all[self.place].hypot(all[self.place + 1]),
@@ -98,20 +97,34 @@ impl Quantity {
         si / self.unit_value()
     }
 
-    /// Lines against time over a band of ±σ, all given in the usual unit and drawn in a readable one.
-    pub(super) fn panel(self, time: Axis, sigma: &[Point], mut lines: Vec<Series>) -> Panel {
-        let size = |points: &[Point]| points.iter().map(|p| p.1.abs()).fold(0.0, f64::max);
-        let of_line = |series: &Series| match &series.shape {
-            Shape::Line(points) => size(points),
-            _ => 0.0,
+    /// Errors by name against time, over the band of ±σ of the last, in a readable unit; bounds of σ where no error
+    /// is known. `second` is the length of a second on the axis of time.
+    pub fn panel(self, time: Axis, second: f64, navigated: &[(&str, &[Outlook])]) -> Panel {
+        let curve = |moments: &[Outlook], of: &dyn Fn(&Outlook) -> Option<f64>| -> Vec<Point> {
+            let points = moments.iter();
+            let points = points.filter_map(|m| Some((m.time * second, of(m)?)));
+            points.collect()
         };
-        let sizes = lines.iter().map(of_line).chain([size(sigma)]);
-        let (smallest, largest) = sizes
-            .filter(|size| *size > 0.0)
-            .fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), size| {
-                (low.min(size), high.max(size))
-            });
+        let mut lines = Vec::new();
+        for &(name, moments) in navigated {
+            let errors = curve(moments, &|m| self.error(m));
+            if !errors.is_empty() {
+                lines.push((name, Some(name.to_owned()), errors));
+                continue;
+            }
+            let upper = curve(moments, &|m| self.sigma(m));
+            lines.push((name, Some(format!("σ of {name}")), upper));
+            lines.push((name, None, curve(moments, &|m| Some(-self.sigma(m)?))));
+        }
+        let last = navigated.last().map_or(&[][..], |last| last.1);
+        let sigma = |sign: f64| curve(last, &|m| Some(sign * self.sigma(m)?));
+        let size = |points: &[Point]| points.iter().map(|p| p.1.abs()).fold(0.0, f64::max);
+        let sizes = lines.iter().map(|(.., points)| size(points));
+        let (smallest, largest) = positive_range(sizes.chain([size(&sigma(1.0))]));
         let (unit, scale) = self.readable_unit(largest);
+        let scaled = |points: Vec<Point>| -> Vec<Point> {
+            points.into_iter().map(|(t, y)| (t, y * scale)).collect()
+        };
         let (y, kind) = match largest > APART * smallest {
             true => (
                 Axis::symlog(0.3 * smallest * scale),
@@ -121,28 +134,23 @@ impl Quantity {
             // Exactly zero everywhere has no range of its own.
             false => (Axis::linear("").between(-1.0, 1.0), ""),
         };
-        for line in &mut lines {
-            let label = line.label.iter_mut().map(|(at, _)| at);
-            let points = match &mut line.shape {
-                Shape::Line(points) => &mut points[..],
-                _ => &mut [],
-            };
-            points
-                .iter_mut()
-                .chain(label)
-                .for_each(|point| point.1 *= scale);
-        }
-        let sigma = |sign: f64| -> Vec<Point> {
-            sigma.iter().map(|&(t, s)| (t, sign * s * scale)).collect()
-        };
+        let lines = lines.into_iter().map(|(name, label, points)| {
+            let mut line = Series::line(scaled(points));
+            line.label = label;
+            match name {
+                "closed form" => line.nth(1).dashed(),
+                _ => line,
+            }
+        });
         let lowest = if self.is_component { -1.0 } else { 0.0 };
-        let names = [(1.0, "+σ"), (-1.0, "−σ")].into_iter();
-        let names = names
-            .filter(|(sign, _)| *sign >= lowest)
-            .filter_map(|(sign, name)| Some(Series::name(sigma(sign).last()?.1, name)));
-        let title = format!("{}, {unit}{kind}", self.name);
-        Panel::new(title, time, y)
-            .with(Series::band(sigma(lowest), sigma(1.0)))
+        let [low, high] = [lowest, 1.0].map(|sign| scaled(sigma(sign)));
+        let mut names = vec![(&high, "+σ")];
+        names.extend(self.is_component.then_some((&low, "−σ")));
+        let names = names.into_iter();
+        let names = names.filter_map(|(edge, name)| Some(Series::name(edge.last()?.1, name)));
+        let names: Vec<Series> = names.collect();
+        Panel::new(format!("{}, {unit}{kind}", self.name), time, y)
+            .with(Series::band(low, high))
             .with(Series::zero())
             .with_all(names)
             .with_all(lines)

@@ -1,16 +1,21 @@
 //! The report of a navigation: errors with their predicted σ as table, as figures against time in the manner of
 //! the paper's Figures 2 to 10, minute by minute as CSV, and hour by hour as JSON.
 
+mod outlook;
+mod quantity;
 #[cfg(test)]
 mod tests;
 
 use std::fmt::Write;
 
-use super::quantity::Quantity;
 use crate::attitude::to_pitch_roll_heading;
 use crate::imu::{BodyFrame, Sensor};
 use crate::report::prelude::*;
-use crate::study::navigation::{Epoch, INTERVAL, Mission, Motion, Warming};
+use crate::study::navigation::{INTERVAL, Mission, Motion, Outlook, Warming};
+use quantity::Quantity;
+
+pub use outlook::{Flown, Navigated, add_missions};
+pub(super) use outlook::{add, line};
 
 /// Hours over which the paper gives the drift of position.
 const PAPER_HOURS: f64 = 40.0;
@@ -37,7 +42,7 @@ pub struct Navigation<'a> {
     /// Name of the trajectory, if it moved.
     pub trajectory: Option<&'a str>,
     /// The errors.
-    pub moments: &'a [Epoch],
+    pub moments: &'a [Outlook],
 }
 
 impl Navigation<'_> {
@@ -113,7 +118,7 @@ impl Navigation<'_> {
                 "{name} does not change with temperature: its σ are those of the temperature that it was made at."
             ));
         }
-        if self.moments.iter().any(|m| m.covariance.is_none()) {
+        if self.moments.iter().any(|m| m.sigma.is_none()) {
             warnings.push(format!("{name} claims no σ, so none is predicted."));
         }
         if self.terms {
@@ -127,7 +132,7 @@ impl Navigation<'_> {
     /// Position error at the end over the time, nmile/h.
     fn drift(&self) -> Option<f64> {
         let last = self.moments.last().filter(|last| last.time > 0.0)?;
-        Some(last.error.horizontal_position() / NAUTICAL_MILE / (last.time / HOUR))
+        Some(last.error?.horizontal_position() / NAUTICAL_MILE / (last.time / HOUR))
     }
 
     fn table(&self) -> Table {
@@ -149,8 +154,8 @@ impl Navigation<'_> {
     }
 
     fn row(&self, quantity: Quantity) -> Vec<String> {
-        let error = |moment: &Epoch| quantity.error(&moment.error);
-        let magnitude = |m: &&Epoch| error(m).abs();
+        let error = |moment: &Outlook| quantity.error(moment).unwrap_or(f64::NAN);
+        let magnitude = |m: &&Outlook| error(m).abs();
         let moments = self.moments.iter();
         let largest = moments.max_by(|a, b| magnitude(a).total_cmp(&magnitude(b)));
         let last = self.moments.last();
@@ -179,7 +184,9 @@ impl Navigation<'_> {
         let mut quantities = Quantity::ALL.chunks(3);
         figures.map(|(file, heading, more)| {
             let quantities = quantities.next().unwrap_or_default().iter();
-            let panels = quantities.map(|&quantity| self.panel(quantity));
+            let errors = [("error", self.moments)];
+            let hours = || Axis::hours(self.hours());
+            let panels = quantities.map(|of| of.panel(hours(), HOUR.recip(), &errors));
             Plot::new(file, heading, (1, 210), panels).caption(format!(
                 "Computed minus true. Line: actual error by full navigation; band: ±1σ predicted from the \
                  calibration's covariance by the linear model, within which the error of two calibrations in \
@@ -188,18 +195,9 @@ impl Navigation<'_> {
         })
     }
 
-    fn panel(&self, quantity: Quantity) -> Panel {
-        let moments = || self.moments.iter();
-        let errors = moments().map(|m| (m.time / HOUR, quantity.error(&m.error)));
-        let sigma = moments().filter_map(|m| Some((m.time / HOUR, quantity.sigma(m)?)));
-        let error = Series::line(errors).label("error");
-        let time = Axis::hours(self.hours());
-        quantity.panel(time, &sigma.collect::<Vec<_>>(), vec![error])
-    }
-
     /// A row a minute: time, errors, predicted σ where there is one.
     fn csv(&self) -> String {
-        let with_sigma = self.moments.iter().all(|m| m.covariance.is_some());
+        let with_sigma = self.moments.iter().all(|m| m.sigma.is_some());
         let keys = Quantity::ALL.map(|quantity| quantity.key);
         let mut text = format!("t_h,{}", keys.join(","));
         if with_sigma {
@@ -209,7 +207,7 @@ impl Navigation<'_> {
         for moment in self.moments {
             // Writing to a string cannot fail.
             let _ = write!(text, "{}", moment.time / HOUR);
-            let errors = Quantity::ALL.map(|q| Some(q.error(&moment.error)));
+            let errors = Quantity::ALL.map(|q| q.error(moment));
             let sigmas = Quantity::ALL.map(|q| q.sigma(moment));
             for value in errors.into_iter().chain(sigmas).flatten() {
                 let _ = write!(text, ",{value:e}");
@@ -259,28 +257,27 @@ impl Navigation<'_> {
 }
 
 /// One number for each quantity under its key.
-fn by_key(of: impl Fn(Quantity) -> f64) -> Map<String, Value> {
+fn by_key(of: impl Fn(Quantity) -> Option<f64>) -> Map<String, Value> {
     let all = Quantity::ALL.into_iter();
     all.map(|quantity| (quantity.key.to_owned(), of(quantity).into()))
         .collect()
 }
 
 /// Errors and their predicted σ at one time.
-fn at(moment: &Epoch) -> Value {
+fn at(moment: &Outlook) -> Value {
     let mut row = Map::from_iter([("t_h".to_owned(), (moment.time / HOUR).into())]);
-    row.extend(by_key(|quantity| quantity.error(&moment.error)));
-    let sigma = moment.covariance.as_ref();
-    let sigma = sigma.map(|_| by_key(|quantity| quantity.sigma(moment).unwrap_or_default()));
+    row.extend(by_key(|quantity| quantity.error(moment)));
+    let sigma = moment
+        .sigma
+        .map(|_| by_key(|quantity| quantity.sigma(moment)));
     row.insert("sigma".to_owned(), sigma.into());
     row.into()
 }
 
-fn largest<'m>(moments: impl Iterator<Item = &'m Epoch> + Clone) -> Value {
+fn largest<'m>(moments: impl Iterator<Item = &'m Outlook> + Clone) -> Value {
     let of = |quantity: Quantity| {
-        moments
-            .clone()
-            .map(|m| quantity.error(&m.error).abs())
-            .fold(0.0, f64::max)
+        let errors = moments.clone().filter_map(|m| quantity.error(m));
+        Some(errors.map(f64::abs).fold(0.0, f64::max))
     };
     by_key(of).into()
 }
