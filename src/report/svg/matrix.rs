@@ -1,7 +1,7 @@
 //! A correlation matrix: squares below the diagonal, numbers above it.
 
 use super::super::plot::{Matrix, Point};
-use super::{Canvas, Height, INK, QUIET, width};
+use super::canvas::{Canvas, Height, INK, QUIET, width};
 
 const SIDE: f64 = 880.0;
 const DIAGONAL: &str = "#e1e1de";
