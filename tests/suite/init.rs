@@ -391,7 +391,7 @@ fn a_sensor_brings_the_noise_and_tolerances_of_its_data_sheet() {
         "velocity_random_walk_ug_per_sqrt_hz = 160.0 ",
         "scale_sigma_ppm = 10000.0",
         // 1 °/s.
-        "bias_sigma = 0.0175 ",
+        "bias_sigma = 0.01745 ",
     ] {
         assert!(draft.contains(line), "{line}:\n{draft}");
     }

@@ -3,7 +3,7 @@
 use crate::lot::{
     Against, Check, FALSE_ALARM, FALSE_TREND, Lot, Quantity, Row, Sample, Statistics, Verdict,
 };
-use crate::report::lot::shown::{shown, shown_spread, spread_symbol, unit_key};
+use crate::report::lot::shown::{shown, shown_spread, spread_symbol, unit_key, verdict};
 use crate::report::prelude::*;
 
 pub fn data(lot: &Lot) -> Value {
@@ -11,7 +11,7 @@ pub fn data(lot: &Lot) -> Value {
         "format": "turncal-lot/1",
         "body_frame": lot.body_frame,
         "nominal_scale": { "gyro": lot.nominal.gyro.0.as_slice(), "accel": lot.nominal.accel.0.as_slice() },
-        "verdict": super::verdict(lot).map(|(word, _)| json!({ "word": word, "reasons": reasons(lot) })),
+        "verdict": verdict(lot).map(|(word, _)| json!({ "word": word, "reasons": reasons(lot) })),
         "false_alarm": FALSE_ALARM,
         "false_trend": FALSE_TREND,
         "confidence": lot.specification.as_ref().map(|s| s.confidence),

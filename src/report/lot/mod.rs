@@ -9,9 +9,8 @@ mod tests;
 
 use std::collections::BTreeMap;
 
-use shown::{change, title};
+use shown::{change, title, verdict};
 
-use crate::calibration::Word;
 use crate::imu::AXES;
 use crate::lot::{FALSE_ALARM, FALSE_TREND, Lot, Row, Verdict};
 use crate::report::prelude::*;
@@ -55,25 +54,6 @@ pub fn document(lot: &Lot) -> Document {
 
 /// A conclusion or a warning.
 type Sentence = (bool, String);
-
-/// Of all limits of all units, how many are exceeded, kept or neither for certain.
-fn verdict(lot: &Lot) -> Option<(Word, String)> {
-    let specification = lot.specification.as_ref()?;
-    let all = || lot.rows.iter().flat_map(|row| &row.checks);
-    let number = |verdict| all().filter(|check| check.verdict == verdict).count();
-    let [passed, open, failed] = [Verdict::Pass, Verdict::NotDecided, Verdict::Fail].map(number);
-    let word = match (failed, open + lot.failures().count()) {
-        (0, 0) => Word::Pass,
-        (0, _) => Word::Undecided,
-        _ => Word::Fail,
-    };
-    let words = format!(
-        "{failed} of {} limits exceeded, {passed} kept, {open} undecided ({} % each)",
-        all().count(),
-        100.0 * specification.confidence
-    );
-    Some((word, words))
-}
 
 fn facts(lot: &Lot) -> Facts {
     let failed = lot.failures().count();

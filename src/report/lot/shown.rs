@@ -1,7 +1,8 @@
 //! How quantities of a lot are spoken of.
 
+use crate::calibration::Word;
 use crate::imu::{AXES, InstallationForm, Sensor};
-use crate::lot::{Against, Lot, Quantity, Sample, Spread, Trend};
+use crate::lot::{Against, Lot, Quantity, Sample, Spread, Trend, Verdict};
 use crate::report::prelude::*;
 
 /// Such as `gyro K x` or `gyro noise x`.
@@ -130,4 +131,23 @@ pub fn together(lot: &Lot) -> Vec<(String, Vec<String>, Vec<Quantity>)> {
         (heading, AXES.map(String::from).to_vec(), quantities)
     });
     groups.chain(noises).collect()
+}
+
+/// Of all limits of all units, how many are exceeded, kept or neither for certain.
+pub fn verdict(lot: &Lot) -> Option<(Word, String)> {
+    let specification = lot.specification.as_ref()?;
+    let all = || lot.rows.iter().flat_map(|row| &row.checks);
+    let number = |verdict| all().filter(|check| check.verdict == verdict).count();
+    let [passed, open, failed] = [Verdict::Pass, Verdict::NotDecided, Verdict::Fail].map(number);
+    let word = match (failed, open + lot.failures().count()) {
+        (0, 0) => Word::Pass,
+        (0, _) => Word::Undecided,
+        _ => Word::Fail,
+    };
+    let words = format!(
+        "{failed} of {} limits exceeded, {passed} kept, {open} undecided ({} % each)",
+        all().count(),
+        100.0 * specification.confidence
+    );
+    Some((word, words))
 }

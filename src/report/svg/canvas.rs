@@ -1,4 +1,5 @@
-//! Where marks are drawn: plotters draws each, the canvas keeps them in order and says what hovering over them shows.
+//! What figures are drawn on, with its colours, pens and letters: plotters draws each mark, the canvas keeps them in
+//! order and says what hovering over them shows.
 //!
 //! Plotters rounds every coordinate to a whole pixel, so a mark is drawn [`FINE`] times larger and shown at its size.
 //! Sizes here are in shown pixels.
@@ -6,18 +7,74 @@
 use maud::{PreEscaped, html};
 use plotters::element::{DashedPathElement, Drawable, PointCollection};
 use plotters::prelude::*;
+use plotters::style::Color as _;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::{INK, LETTER, rgb};
-use crate::report::plot::{Dash, Pen, Point};
+use crate::report::plot::{Color, Dash, Panel, Pen, Point, Scale};
 
+/// Width of every figure in pixels.
+pub const WIDTH: u32 = 1200;
 /// Drawn pixels in one shown pixel.
 pub const FINE: f64 = 8.0;
+/// Drawn pixels of the widest and of the highest figure.
+const MOST: u32 = 1 << 20;
 /// What plotters divides a font's size by when it writes SVG.
 const FONT_RATIO: f64 = 1.24;
+/// Size of the letters.
+pub const LETTER: f64 = 14.0;
+/// Of ticks, labels and notes.
+pub const SMALL: f64 = 0.95;
 
-/// How a text lies about its point: across, and the part of it that is at its height.
-type Lie = (&'static str, Height);
+/// Text and axes.
+pub const INK: RGBColor = RGBColor(34, 34, 34);
+/// What must not distract.
+pub const QUIET: RGBColor = RGBColor(110, 110, 110);
+const COLORS: [RGBColor; 6] = [
+    RGBColor(0, 84, 147),
+    RGBColor(200, 80, 0),
+    RGBColor(0, 128, 96),
+    RGBColor(86, 160, 211),
+    RGBColor(150, 60, 110),
+    RGBColor(140, 120, 20),
+];
+
+/// The colour of a pen.
+pub fn rgb(color: Color) -> RGBColor {
+    match color {
+        Color::Ink => INK,
+        Color::Quiet => QUIET,
+        Color::Nth(n) => COLORS[n % COLORS.len()],
+    }
+}
+
+/// About how wide a text is; fonts differ, this is one of the wide ones.
+pub fn width(text: &str, scale: f64) -> f64 {
+    let of = |letter: char| match letter {
+        'i' | 'j' | 'l' | '\'' | '|' | 'I' => 0.29,
+        ' ' | '.' | ',' | ':' | ';' | '\u{202f}' => 0.32,
+        'f' | 't' | 'r' | '(' | ')' | '-' | '/' | '″' | '′' => 0.4,
+        's' | 'c' | 'z' | '°' => 0.54,
+        'm' | 'w' | 'W' | 'M' | '−' | '±' | '+' | '=' | '<' | '>' | '%' | '…' => 0.88,
+        letter if letter.is_uppercase() => 0.72,
+        _ => 0.63,
+    };
+    text.chars().map(of).sum::<f64>() * LETTER * scale
+}
+
+/// A text cut to a width.
+pub fn shortened(text: &str, room: f64) -> String {
+    if width(text, SMALL) <= room {
+        return text.to_owned();
+    }
+    let mut short = text.to_owned();
+    while !short.is_empty() && width(&short, SMALL) + 0.9 * LETTER > room {
+        short.pop();
+    }
+    short + "…"
+}
+
+/// How a text lies about its point: `start`, `middle` or `end` across, and the part of it that is at its height.
+pub type Lie = (&'static str, Height);
 
 /// Which part of a text is at the height of its point.
 #[derive(Clone, Copy)]
@@ -41,7 +98,7 @@ fn place((x, y): Point) -> (i32, i32) {
 
 impl Canvas {
     /// All marks, at their size.
-    pub fn inside(&self) -> String {
+    pub(super) fn inside(&self) -> String {
         let shown = format!("scale({})", FINE.recip());
         html! { g transform=(shown) { (PreEscaped(&self.0)) } }.into_string()
     }
@@ -52,7 +109,7 @@ impl Canvas {
         E: for<'b> Drawable<SVGBackend<'b>>,
     {
         let mut document = String::new();
-        let area = SVGBackend::with_string(&mut document, (1, 1)).into_drawing_area();
+        let area = SVGBackend::with_string(&mut document, (MOST, MOST)).into_drawing_area();
         // Writing into a text does not fail.
         let _ = area.draw(&element);
         drop(area);
@@ -61,14 +118,14 @@ impl Canvas {
     }
 
     /// Draws what shows this text to who hovers over it.
-    pub fn titled(&mut self, text: &str, drawn: impl FnOnce(&mut Self)) {
+    pub(super) fn titled(&mut self, text: &str, drawn: impl FnOnce(&mut Self)) {
         let mut inside = Self::default();
         drawn(&mut inside);
         self.0 += &html! { g { title { (text) } (PreEscaped(inside.0)) } }.into_string();
     }
 
     /// Joins points.
-    pub fn line(&mut self, points: &[Point], pen: Pen) {
+    pub(super) fn line(&mut self, points: &[Point], pen: Pen) {
         let (dash, gap) = match pen.dash {
             Dash::Solid => return self.stroke(points, rgb(pen.color), pen.width),
             Dash::Dashed => (6.0, 4.0),
@@ -80,7 +137,7 @@ impl Canvas {
     }
 
     /// The same without dashes in any colour.
-    pub fn stroke(&mut self, points: &[Point], color: RGBColor, width: f64) {
+    pub(super) fn stroke(&mut self, points: &[Point], color: RGBColor, width: f64) {
         let points: Vec<_> = points.iter().copied().map(place).collect();
         self.put(PathElement::new(
             points,
@@ -89,24 +146,24 @@ impl Canvas {
     }
 
     /// Fills an outline.
-    pub fn area(&mut self, outline: &[Point], color: RGBColor) {
+    pub(super) fn area(&mut self, outline: &[Point], color: RGBColor) {
         let outline: Vec<_> = outline.iter().copied().map(place).collect();
         self.put(Polygon::new(outline, color.filled()));
     }
 
     /// Fills a rectangle.
-    pub fn rectangle(&mut self, corners: [Point; 2], color: RGBColor) {
+    pub(super) fn rectangle(&mut self, corners: [Point; 2], color: RGBColor) {
         self.put(Rectangle::new(corners.map(place), color.filled()));
     }
 
     /// A circle, filled or open with a line of this width.
-    pub fn circle(&mut self, at: Point, radius: f64, color: RGBColor, line: Option<f64>) {
+    pub(super) fn circle(&mut self, at: Point, radius: f64, color: RGBColor, line: Option<f64>) {
         let style = line.map_or(color.filled(), |width| color.stroke_width(px(width) as u32));
         self.put(Circle::new(place(at), px(radius), style));
     }
 
     /// Writes text; `scale` 1 is the usual size.
-    pub fn text(
+    pub(super) fn text(
         &mut self,
         text: &str,
         at: Point,
@@ -129,7 +186,7 @@ impl Canvas {
     }
 
     /// Writes text upwards.
-    pub fn upright(&mut self, text: &str, at: Point, scale: f64) {
+    pub(super) fn upright(&mut self, text: &str, at: Point, scale: f64) {
         let style = font(scale).transform(FontTransform::Rotate270);
         let style = style.color(&INK).pos(Pos::new(HPos::Left, VPos::Center));
         self.put(Text::new(text.to_owned(), place(at), style));
@@ -138,4 +195,37 @@ impl Canvas {
 
 fn font(scale: f64) -> FontDesc<'static> {
     ("sans-serif", LETTER * FONT_RATIO * FINE * scale).into_font()
+}
+
+/// A panel laid out: where its axes are.
+pub struct Frame<'p> {
+    /// The panel.
+    pub(super) panel: &'p Panel,
+    /// Horizontal scale.
+    pub(super) x: Scale,
+    /// Vertical scale.
+    pub(super) y: Scale,
+    /// Left and right end of the axes.
+    pub(super) across: (f64, f64),
+    /// Upper and lower end.
+    pub(super) down: (f64, f64),
+    /// Right end of the panel.
+    pub(super) end: f64,
+}
+
+impl Frame<'_> {
+    /// Where a point is drawn.
+    pub(super) fn at(&self, (x, y): Point) -> Point {
+        (self.at_x(x), self.at_y(y))
+    }
+
+    /// Where an abscissa is drawn.
+    pub(super) fn at_x(&self, x: f64) -> f64 {
+        self.across.0 + self.x.part(x) * (self.across.1 - self.across.0)
+    }
+
+    /// Where a height is drawn.
+    pub(super) fn at_y(&self, y: f64) -> f64 {
+        self.down.1 - self.y.part(y) * (self.down.1 - self.down.0)
+    }
 }

@@ -2,8 +2,11 @@
 
 use plotters::style::RGBColor;
 
-use super::super::plot::{Grid, Panel, Point, Scale};
-use super::{Canvas, Height, INK, LETTER, QUIET, SMALL, WIDTH, rgb, series, shortened, width};
+use super::super::plot::{Grid, Panel, Scale};
+use super::canvas::{
+    Canvas, Frame, Height, INK, LETTER, QUIET, SMALL, WIDTH, rgb, shortened, width,
+};
+use super::series;
 
 /// Grid lines.
 const GRID: RGBColor = RGBColor(218, 218, 214);
@@ -17,39 +20,6 @@ const LINE: f64 = 17.0;
 const TAG: f64 = 0.85;
 /// Of a panel's width, the most that names at the ends of lines may take.
 const LABELS: f64 = 0.3;
-
-/// A panel laid out: where its axes are.
-pub struct Frame<'p> {
-    /// The panel.
-    pub(super) panel: &'p Panel,
-    /// Horizontal scale.
-    pub(super) x: Scale,
-    /// Vertical scale.
-    pub(super) y: Scale,
-    /// Left and right end of the axes.
-    pub(super) across: (f64, f64),
-    /// Upper and lower end.
-    pub(super) down: (f64, f64),
-    /// Right end of the panel.
-    end: f64,
-}
-
-impl Frame<'_> {
-    /// Where a point is drawn.
-    pub(super) fn at(&self, (x, y): Point) -> Point {
-        (self.at_x(x), self.at_y(y))
-    }
-
-    /// Where an abscissa is drawn.
-    pub(super) fn at_x(&self, x: f64) -> f64 {
-        self.across.0 + self.x.part(x) * (self.across.1 - self.across.0)
-    }
-
-    /// Where a height is drawn.
-    pub(super) fn at_y(&self, y: f64) -> f64 {
-        self.down.1 - self.y.part(y) * (self.down.1 - self.down.0)
-    }
-}
 
 /// Draws it and returns the height of the figure.
 pub fn draw(on: &mut Canvas, grid: &Grid) -> u32 {

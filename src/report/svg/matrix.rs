@@ -3,7 +3,7 @@
 use plotters::style::RGBColor;
 
 use super::super::plot::{Matrix, Point};
-use super::{Canvas, Height, INK, QUIET, width};
+use super::canvas::{Canvas, Height, INK, QUIET, width};
 
 const SIDE: f64 = 880.0;
 const DIAGONAL: RGBColor = RGBColor(225, 225, 222);

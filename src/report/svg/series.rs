@@ -3,8 +3,7 @@
 use plotters::style::RGBColor;
 
 use super::super::plot::{Anchor, Axis, Fill, Mark, Pen, Point, Series, Shape, Upright, thinned};
-use super::grid::Frame;
-use super::{Canvas, Height, SMALL, rgb};
+use super::canvas::{Canvas, Frame, Height, SMALL, rgb};
 use crate::number::three_digits;
 
 /// Bands and pale bars.

@@ -1,6 +1,7 @@
 //! Properties of every figure.
 
 use super::super::plot::{Axis, Mark, Panel, Plot, Series, thinned};
+use super::canvas::{LETTER, width};
 use super::*;
 
 /// The value of an attribute.
