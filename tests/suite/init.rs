@@ -399,3 +399,36 @@ fn a_sensor_brings_the_noise_and_tolerances_of_its_data_sheet() {
     let message = text(&unknown.get_output().stderr);
     assert!(message.contains("did you mean \"bmi088\""), "{message}");
 }
+
+#[test]
+fn triads_in_two_files_calibrate_as_one_log() {
+    let place = tempfile::tempdir().unwrap();
+    let [run, gyro, accel] = ["run", "gyro.csv", "accel.csv"].map(|name| place.path().join(name));
+    let turncal = || Command::new(env!("CARGO_BIN_EXE_turncal"));
+    turncal()
+        .args(["simulate", "mems", "-o"])
+        .arg(&run)
+        .assert()
+        .success();
+    let packed = fs::File::open(run.join("imu.csv.gz")).unwrap();
+    let rows = std::io::read_to_string(flate2::read::MultiGzDecoder::new(packed)).unwrap();
+    let columns = |which: std::ops::Range<usize>| -> String {
+        let row = |row: &str| {
+            let cells: Vec<&str> = row.split(',').collect();
+            format!("{},{}\n", cells[0], cells[which.clone()].join(","))
+        };
+        rows.lines().map(row).collect()
+    };
+    fs::write(&gyro, columns(1..4)).unwrap();
+    fs::write(&accel, columns(4..7)).unwrap();
+    let mut calibrate = turncal();
+    calibrate
+        .arg("calibrate")
+        .arg(&gyro)
+        .arg("--accel-file")
+        .arg(&accel);
+    let done = calibrate.arg("--json").assert().success();
+    let found: serde_json::Value = serde_json::from_slice(&done.get_output().stdout).unwrap();
+    assert!((found["accel"]["scale"][0].as_f64().unwrap() - 1.0).abs() < 0.02);
+    assert_eq!(found["provenance"]["inputs"].as_array().unwrap().len(), 2);
+}

@@ -14,6 +14,9 @@ use super::{latitude, positive};
 #[derive(Debug, Clone, PartialEq, Default, clap::Args)]
 #[command(next_help_heading = "Of a log without run.toml")]
 pub struct OfLog {
+    /// File with the rows of the accelerometers, if the log has those of the gyros only
+    #[arg(long, value_name = "ACCEL.csv", conflicts_with = "stream")]
+    accel_file: Option<PathBuf>,
     /// Rows per second
     #[arg(long, value_name = "HZ", value_parser = positive)]
     rate: Option<f64>,
@@ -60,6 +63,7 @@ impl OfLog {
             of: of.name,
         };
         let stated = Stated {
+            accel_file: self.accel_file.clone(),
             rate_hz: self.rate.or(kalibr.and_then(|imu| imu.rate_hz)),
             latitude_deg: self.latitude,
             height_m: self.height,

@@ -24,8 +24,8 @@ pub struct Init {
     /// with `.gz`; or MCAP, a ROS bag, PX4 ULog, ArduPilot DataFlash, MAT, NPY or NPZ, whose streams are listed
     #[arg(value_name = "IMU.csv")]
     log: PathBuf,
-    /// File with the accelerometers' rows, if the log has those of the gyros only
-    #[arg(value_name = "ACCEL.csv", conflicts_with = "stream")]
+    /// The same as --accel-file
+    #[arg(value_name = "ACCEL.csv", conflicts_with_all = ["stream", "accel_file"])]
     accel: Option<PathBuf>,
     #[command(flatten)]
     of_log: OfLog,
@@ -41,7 +41,8 @@ impl Init {
     pub fn run(&self) -> anyhow::Result<()> {
         let activity = Activity::new("reading");
         let (stream, stated) = self.of_log.stated()?;
-        let draft = match &self.accel {
+        let accel = self.accel.as_ref().or(stated.accel_file.as_ref());
+        let draft = match accel {
             Some(accel) => Draft::of_two_files(&self.log, accel, &self.name(accel), &stated)?,
             None => Draft::of_stream(&self.log, stream, &stated)?,
         };
@@ -50,7 +51,7 @@ impl Init {
         let Some(output) = &self.output else {
             return print(text.as_bytes());
         };
-        keep(output, [&self.log].into_iter().chain(&self.accel))?;
+        keep(output, [&self.log].into_iter().chain(accel))?;
         write_whole(output, text.as_bytes(), self.force)?;
         show_found(&self.log, &draft.found());
         tell!("written: {}", output.display());

@@ -87,6 +87,10 @@ impl Draft {
         stream: Option<&str>,
         stated: &Stated,
     ) -> Result<Self, FileError> {
+        if let Some(accel) = &stated.accel_file {
+            let whole = accel.canonicalize().unwrap_or_else(|_| accel.clone());
+            return Self::of_two_files(path, accel, &whole.to_string_lossy(), stated);
+        }
         if let Some((streams, sheet)) = Streams::of_file(path, stream)? {
             return Ok(Self::of_sheet(sheet, Some(streams), stated));
         }

@@ -141,6 +141,7 @@ impl<'a> Fields<'a> {
         let keys = NoiseKeys::of(sensor);
         let get = |name: &str| self.run.imu.noise.get(name).map(|value| value.0);
         let ((key, sigma_unit), time) = (keys.gauss_markov, keys.correlation_time);
+        let key = get(keys.former).map_or(key, |_| keys.former);
         let path = |name: &str| format!("imu.noise.{name}");
         let gauss_markov = match (get(key), get(time)) {
             (None, None) => None,

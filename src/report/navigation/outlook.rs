@@ -30,20 +30,17 @@ pub struct Flown {
 /// Adds position errors at the end of each mission by each method, a row for each mission.
 pub fn add_missions(document: &mut Document, methods: &[String], missions: &[Flown]) {
     let [.., horizontal] = Quantity::ALL;
-    let mut columns = vec![String::new()];
-    for method in methods {
-        columns.extend([format!("{method}: error, nmile"), "σ".to_owned()]);
-    }
-    let row = |flown: &Flown| {
-        let mut row = vec![flown.how.to_owned()];
-        for end in &flown.ends {
-            row.push(or_dash(horizontal.error(end), three_digits));
-            row.push(or_dash(horizontal.sigma(end), three_digits));
-        }
-        row
-    };
-    let table = Table::new("Position error after 40 h of navigation", columns)
-        .section(missions.iter().map(row));
+    let of_missions = missions.iter().flat_map(|flown| [flown.how, "σ"]);
+    let columns = std::iter::once("").chain(of_missions);
+    let rows = methods.iter().enumerate().map(|(n, method)| {
+        let ends = missions.iter().filter_map(|flown| flown.ends.get(n));
+        let figures = ends.flat_map(|end| {
+            let [error, sigma] = [horizontal.error(end), horizontal.sigma(end)];
+            [error, sigma].map(|figure| or_dash(figure, three_digits))
+        });
+        std::iter::once(method.clone()).chain(figures).collect()
+    });
+    let table = Table::new("Position error after 40 h of navigation, nmile", columns).section(rows);
     let shows = missions.iter().map(|flown| flown.shows);
     let table = shows.fold(table, Table::note);
     document.brief.insert(1, table.into());

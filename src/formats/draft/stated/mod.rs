@@ -3,6 +3,7 @@
 mod kalibr;
 
 use std::collections::BTreeSet;
+use std::path::PathBuf;
 
 pub use kalibr::KalibrImu;
 
@@ -13,6 +14,8 @@ use crate::imu::{Noise, PerSensor, Sensor};
 /// What a user states of a log that has no `run.toml`; what is not stated is found, or wide.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Stated {
+    /// The file of the accelerometers, if the log has the rows of the gyros only.
+    pub accel_file: Option<PathBuf>,
     /// Rows a second.
     pub rate_hz: Option<f64>,
     /// Geodetic latitude, north positive.
