@@ -32,7 +32,7 @@ else:
     print('no TURNCAL_DCC_SCHEMA')
 try:
     from dcc.dcc import DCC
-except ImportError:
+except Exception:
     print('no PyDCC')
 else:
     read = DCC(os.path.join(directory, 'dcc.xml')).get_calibration_results('name')

@@ -343,7 +343,8 @@ fn remarks(certificate: &Certificate) -> List {
         "This certificate may not be reproduced except in full without approval of the laboratory.".to_owned(),
     ];
     items.extend(certificate.laboratory.remarks.clone());
-    let warnings = certificate.calibration.warnings.iter();
-    items.extend(warnings.map(|warning| format!("From the evaluation: {warning}")));
+    // What to do about them is the laboratory's matter, not the customer's.
+    let findings = certificate.calibration.findings.iter();
+    items.extend(findings.map(|of| format!("From the evaluation: {}.", of.headline().0)));
     List::new("Remarks", items)
 }

@@ -29,9 +29,15 @@ pub fn results(certificate: &Certificate) -> Table {
         };
         let (unit, size) = of.quantity.unit();
         let expanded = of.expanded / size;
+        // EA-4/02, 6.3: U to two digits, the value to the same place.
+        let place = 10f64.powf((expanded.log10() - 1.0).floor().max(0.0));
+        let rounded = |figure: f64| match place > 1.0 {
+            true => (figure / place).round() * place,
+            false => figure,
+        };
         cells![
             name(&of.name),
-            format!("{} ± {}", value(of.value / size, expanded), sigma(expanded)),
+            plus_minus(rounded(of.value / size), rounded(expanded)),
             unit,
             value(of.coverage_factor, 0.1),
             of.degrees_of_freedom.map_or(infinite.to_owned(), sigma),
