@@ -70,7 +70,7 @@ impl Run {
     }
 }
 
-/// Observations of the filter.
+/// The observations that the filter uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]

@@ -97,7 +97,7 @@ pub struct Imperfection {
 pub struct AxisImperfection {
     /// A constant tilt.
     pub tilt: Vector3<f64>,
-    /// Errors for each of [`super::phases`] of its angle: wobble across the axis, encoder error along it.
+    /// Coefficients of its errors, one for each of [`super::phases`] of its angle: wobble across the axis, encoder error along it.
     pub harmonics: [Vector3<f64>; PHASES],
 }
 

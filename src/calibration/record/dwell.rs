@@ -15,7 +15,7 @@ use crate::turntable::AxisResponse;
 /// held by hand keeps its attitude, too.
 const STEPS: usize = 100;
 
-/// A part of a dwell, whose error model is that of one attitude.
+/// A part of a dwell, modelled with one constant attitude.
 #[derive(Debug, Clone)]
 pub struct Rest {
     /// Whether it is the dwell's first and its last.

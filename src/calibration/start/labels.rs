@@ -89,7 +89,7 @@ impl Used {
     }
 }
 
-/// Mean outputs of both triads under the inputs that labels state.
+/// Mean outputs of both triads for the inputs that labels state.
 pub fn observed(run: &Run, rests: &[Rest], sections: &[Section]) -> PerSensor<Observed> {
     PerSensor::from_fn(|sensor| Observed {
         sensor,

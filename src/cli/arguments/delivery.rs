@@ -8,7 +8,7 @@ use turncal::report::{self, Document};
 
 use crate::cli::terminal::show;
 
-/// What every command that writes has in common.
+/// The option that all commands that write share.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub struct Overwrite {
     /// Replace the output directory if it exists and holds only what turncal wrote

@@ -114,7 +114,7 @@ impl WholeDirectory {
 }
 
 /// Writes the list of a directory that grows, in which nothing but these names is turncal's; what is in a name
-/// that ends in `/` has a list of its own. Files that the list before named and this one does not go.
+/// that ends in `/` has a list of its own. Files that only the previous list names are deleted.
 pub fn list_anew(directory: &Path, names: &[&str]) -> Result<(), FileError> {
     for old in manifest::listed_files(directory) {
         let still = |name: &&str| old.file_name() == Some(name.as_ref());

@@ -102,7 +102,7 @@ impl Draft {
         Ok(Self::of_sheet(sheet, None, stated))
     }
 
-    /// Looks at two files of rows, of gyros and of accelerometers; how the latter is to be called in the draft.
+    /// Looks at two files of rows, of gyros and of accelerometers. `accel_name` is the name of the latter in the draft.
     ///
     /// # Errors
     /// [`FileError`] if one cannot be read, has hardly any rows or lacks its triad or its time.

@@ -71,7 +71,7 @@ impl Draft {
         let from = stated.map_or_else(
             || {
                 format!(
-                    "usual of {} instrument: check them against the data sheet",
+                    "typical of {} instrument: check against the data sheet",
                     class.name
                 )
             },

@@ -4,7 +4,7 @@ use super::Exported;
 use super::source::{Axes, Held, Remainder, Source};
 use crate::imu::{PerSensor, Sensor, Term};
 
-/// What hardly any format holds.
+/// What nearly every format lacks.
 pub const SIGMA: &str = "sigma and covariance of the parameters; they are in calibration.json";
 
 pub const TEST_VECTORS: &str =

@@ -64,7 +64,7 @@ pub fn dlio(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let held = held(&axes);
     let notes = [
-        "scale and misalignment of gyros, nor the turn from the log's axes to baselink, which DLIO makes first",
+        "gyro scale and misalignment; the rotation from the log's axes to baselink, which DLIO applies first",
     ];
     let reads = ("#", "DLIO reads rad/s and m/s^2, here");
     let mut file = Document::correcting(source, &axes, reads, &held, &notes);

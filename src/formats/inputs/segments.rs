@@ -48,7 +48,10 @@ pub fn read(
             return wrong("a segment", expected);
         }
         if row(start) == row(end) {
-            let expected = format!("a segment of several samples of {} s", imu.period);
+            let expected = format!(
+                "a segment several samples long (sample period {} s)",
+                imu.period
+            );
             return wrong("no sample", expected);
         }
         let label = csv.text(label_column)?.into_owned();

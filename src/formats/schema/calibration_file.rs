@@ -195,7 +195,7 @@ impl Calibration {
             || (thermal.covariance.len() == n && thermal.cross.len() == self.parameters.len());
         expect!(
             covered && rows().all(|row| row.len() == n),
-            "a row of covariance for each coefficient, one of cross for each parameter",
+            "one row of covariance per coefficient and one row of cross per parameter",
             "temperature.covariance or .cross of another size"
         );
         let none = PerSensor::default();
@@ -281,7 +281,7 @@ impl Calibration {
             expect!(
                 value.abs() <= (1.0 + ROUNDING) * scale,
                 "a correlation from −1 to 1",
-                "a covariance {both} of {value:e} beside σ of {:e} and {:e}",
+                "a covariance {both} of {value:e} with σ of {:e} and {:e}",
                 sigma[i],
                 sigma[j]
             );

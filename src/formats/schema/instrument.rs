@@ -105,8 +105,8 @@ impl<'a> Fields<'a> {
             return Ok(false);
         }
         if self.run.imu.output != Output::Rate || self.run.turntable.is_some() {
-            let meaning = "the name of a column; rows of pulses or increments, or rows with a [turntable], need it, \
-                           or else sample_period_s";
+            let meaning = "the name of a column; pulses, increments and runs with a [turntable] require either it or \
+                           sample_period_s";
             return Err(self.document.missing("imu.columns.time", meaning));
         }
         clock.period = Some(USUAL_PERIOD);
@@ -229,7 +229,7 @@ impl<'a> Fields<'a> {
             }
             (Some(scale), Some(of_unit)) if !is_near(&scale, of_unit) => Err(document.wrong(
                 &path,
-                format_args!("about {of_unit}, which this unit says for one rad/s or m/s²"),
+                format_args!("about {of_unit}, which is 1 rad/s or 1 m/s² in this unit"),
                 "Correct the scale or the unit, or leave the scale out.",
             )),
             (Some(scale), _) => Ok(scale),

@@ -87,8 +87,8 @@ impl Input {
     /// Goes to another place.
     pub fn go_to(&mut self, offset: u64) -> Result<(), Broken> {
         if offset > self.length {
-            let found = format!("a part at byte {offset}");
-            let expected = format!("one within the file of {} bytes", self.length);
+            let found = format!("a reference to byte {offset}");
+            let expected = format!("an offset within the file ({} bytes)", self.length);
             return Err(Broken::new(self.offset, found, expected));
         }
         let sought = self.source.seek(SeekFrom::Start(offset));
@@ -177,7 +177,7 @@ impl<'a> Slice<'a> {
         let bytes = bytes.ok_or_else(|| {
             Broken::new(
                 self.offset(),
-                format_args!("{} bytes to the end of their record", self.left()),
+                format_args!("only {} bytes left in the record", self.left()),
                 format_args!("{count} bytes of {what}"),
             )
         })?;

@@ -100,7 +100,7 @@ impl Format {
                             return Err(Broken::new(
                                 offset,
                                 format_args!("a field of type `{other}` in {name}"),
-                                "a letter of the format",
+                                "a field type that the DataFlash format defines",
                             ));
                         }
                     };
@@ -176,7 +176,7 @@ impl Log for DataFlash {
                 return Err(Broken::new(
                     self.offset,
                     format_args!("a message of type {kind}"),
-                    "a type that an FMT message before it describes",
+                    "a type defined by an earlier FMT message",
                 ));
             };
             self.input.go_to(self.offset)?;

@@ -71,7 +71,7 @@ pub fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
 
 /// The content of the element in a compressed one; nothing if it is no array.
 fn unpack(packed: &[u8], offset: u64, big_endian: bool) -> Result<Vec<u8>, Broken> {
-    let broken = |error: std::io::Error| Broken::new(offset, error, "an element by zlib");
+    let broken = |error: std::io::Error| Broken::new(offset, error, "a zlib-compressed element");
     let mut decoder = ZlibDecoder::new(packed);
     let mut tag = [0; 8];
     decoder.read_exact(&mut tag).map_err(broken)?;

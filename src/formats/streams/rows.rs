@@ -62,8 +62,8 @@ pub fn survey(file: &Path, mut log: Box<dyn Log>) -> (Vec<Found>, Option<FileErr
     (with_samples, damage.map(|broken| broken.of(file, CUT_OFF)))
 }
 
-const CUT_OFF: &str = "Copy or record the file again, or say `salvage = true` and what is whole before this \
-                       place is used.";
+const CUT_OFF: &str = "Copy or record the file again, or set `salvage = true` to use the intact data \
+                       before this point.";
 
 impl StreamRows {
     /// Opens a stream, which must have a sample; without a name the only one.

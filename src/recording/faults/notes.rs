@@ -3,7 +3,7 @@
 use super::{Fault, FaultKind, Slower};
 use crate::recording::ImuSamples;
 
-/// A sentence for each part of a lower rate, and for each kind of fault outside such parts.
+/// One sentence per part that was recorded at a lower rate, and one per kind of fault elsewhere.
 pub fn notes(imu: &ImuSamples) -> Vec<String> {
     let slower = imu.slower();
     let is_beside = |fault: &&Fault| !slower.iter().any(|part| part.holds(fault));

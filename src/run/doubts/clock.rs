@@ -46,8 +46,8 @@ fn way(steps: impl Iterator<Item = (f64, f64, f64)>, noise: f64, zero: f64) -> [
     [all, moment / all.max(f64::MIN_POSITIVE), fastest]
 }
 
-/// Reports moves for which gyros and table differ in angle or in time; else a scale factor that contradicts all moves
-/// together.
+/// Reports moves for which gyros and table differ in angle or time; if there are none, a gyro scale factor that all moves
+/// together contradict.
 ///
 /// This shows rows that one log has lost, clocks that drift apart and a log of another run, whatever the time stamps.
 pub fn clock(run: &Run) -> Option<String> {

@@ -130,7 +130,7 @@ kinds! {
         "The residuals show a parameter that drifts during the record. The calibration holds its mean. Let the instrument \
          warm up, keep its temperature constant, or use --temperature if the log has a temperature column."
     EvenTermsInseparable = "W24" "even-terms-inseparable" Care:
-        "With an axis up or down, second order and asymmetry of an accelerometer have the same effect. Add dwells with \
+        "With an axis up or down, an accelerometer's second-order term and its asymmetry have the same effect. Add dwells with \
          axes at about 45°, or leave one of the two terms off."
     TemperatureNotSeen = "W25" "temperature-not-seen" Care:
         "The record does not show how these parameters change with temperature, so they are valid only at the recorded \

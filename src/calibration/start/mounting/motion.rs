@@ -58,7 +58,7 @@ pub struct Turned {
 /// All that is known of the motion of one recording.
 #[derive(Debug, Clone)]
 pub struct Motion {
-    /// Dwells: force over gravity, rate over Earth rate. What is known is known by the table.
+    /// Dwells: force over gravity, rate over Earth rate. `known` is set where there is a log of the table.
     pub rests: Vec<PerSensor<Sensed>>,
     /// With a table in parts from reading to reading, for a whole move may end as it began.
     pub moves: Vec<Move>,

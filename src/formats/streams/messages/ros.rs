@@ -134,7 +134,7 @@ impl Reader<'_> {
 
     fn pass(&mut self, bytes: usize) -> Result<(), Broken> {
         self.bytes
-            .take(bytes, "a field of its definition")
+            .take(bytes, "a field that the message definition declares")
             .map(|_| ())
     }
 

@@ -106,7 +106,7 @@ pub fn selects(topic: &str, columns: &[Column]) -> PerSensor<Option<usize>> {
     })
 }
 
-/// What of a topic is corrected.
+/// The corrections of a topic's samples, which have to be undone.
 pub fn of_topic(topic: &str, columns: &[Column]) -> Undo {
     let place = |name: &str| columns.iter().position(|column| column.name == name);
     let corrected = PerSensor::from_fn(|sensor| {
