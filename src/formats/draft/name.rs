@@ -141,7 +141,7 @@ impl Name {
         }
     }
 
-    /// The triad that the stem names.
+    /// The triad that the stem names; a unit of the other triad decides between them.
     pub fn sensor(&self) -> Option<Sensor> {
         let names = |(_, parts, all): &&(Sensor, &[&str], &[&str])| {
             parts.iter().any(|part| self.stem.contains(part)) || all.contains(&&*self.stem)
@@ -150,7 +150,10 @@ impl Name {
             .iter()
             .find(names)
             .filter(|_| !self.is_of_another_sensor());
-        triad.map(|(sensor, ..)| *sensor)
+        triad.map(|(sensor, ..)| match self.unit.map(|unit| unit.of) {
+            Some(Of::Rows(of_unit, _)) => of_unit,
+            _ => *sensor,
+        })
     }
 
     /// Whether it is neither a gyro's nor an accelerometer's, by its name.
@@ -173,7 +176,9 @@ impl Name {
         } else if is(&["t", "time", "timestamp", "tow", "gpstime", "stamp"]) {
             3
         } else if has(&["time", "tow", "clock", "stamp", "elapsed"])
-            || is(&["sec", "seconds", "secs", "ms", "us", "ns"])
+            || is(&[
+                "sec", "seconds", "secs", "ms", "us", "ns", "millis", "micros",
+            ])
         {
             2
         } else {
@@ -265,6 +270,7 @@ mod tests {
             ("UncalGyroXRadPerSec", Gyro, 'x', Some("rad/s")),
             ("Gyroscope Y CAL", Gyro, 'y', None),
             ("acc_z_m_s2", Accel, 'z', Some("m/s^2")),
+            ("ARS-X [deg/s]", Gyro, 'x', Some("deg/s")),
         ] {
             let name = Name::of(text);
             assert_eq!(

@@ -367,7 +367,9 @@ fn names(found: &Found) -> Vec<String> {
         .iter()
         .map(|column| column.name.clone());
     let bare: Vec<String> = bare.collect();
-    if bare.iter().any(|name| Name::of(name).sensor().is_some()) {
+    // Numbers of columns behind the name of a stream would be numbers of axes.
+    let is_number = |name: &String| name.bytes().all(|of| of.is_ascii_digit());
+    if bare.iter().any(|name| Name::of(name).sensor().is_some()) || bare.iter().all(is_number) {
         return bare;
     }
     let stream = &found.stream.name;

@@ -436,6 +436,19 @@ fn rows_that_a_tag_tells_apart_are_streams_and_constants_no_axes() {
             "columns = { time = \"2\", gyro = [\"3\", \"4\", \"5\"], accel = [\"3\", \"4\", \"5\"] }",
         ],
     );
+    // The names of streams make no axes of the numbers of columns.
+    let text = draft("", |k, [gx, gy, gz, ax, ay, az]| {
+        let time = 88_000_000_000_000u64 + 10_000_000 * k as u64;
+        format!("ACC,{time},{ax},{ay},{az}\nGYR,{time},{gx},{gy},{gz}")
+    });
+    has(
+        &text,
+        &[
+            "stream = \"GYR\"",
+            "accel_from = { stream = \"ACC\", time = \"2\", time_unit = \"ns\" }",
+            "columns = { time = \"2\", gyro = [\"3\", \"4\", \"5\"], accel = [\"3\", \"4\", \"5\"] }",
+        ],
+    );
     let text = draft("", |k, v| {
         let compass = (k as f64).sin();
         format!("Raw:{k},1\nUni:{},{compass},7,9", joined(&v, ","))
