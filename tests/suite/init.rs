@@ -430,4 +430,5 @@ fn triads_in_two_files_calibrate_as_one_log() {
     let done = calibrate.arg("--json").assert().success();
     let found: serde_json::Value = serde_json::from_slice(&done.get_output().stdout).unwrap();
     assert!((found["accel"]["scale"][0].as_f64().unwrap() - 1.0).abs() < 0.02);
+    assert_eq!(found["provenance"]["inputs"].as_array().unwrap().len(), 2);
 }

@@ -42,8 +42,13 @@ impl Calibrated {
     }
 
     /// With the files that a run.toml or campaign.toml names.
-    pub fn of_files(mut self, path: &Path) -> Self {
+    pub fn of_files(mut self, path: &Path, run: &Run) -> Self {
         stamp(&mut self.calibration, path);
+        let is_log = path.extension().is_none_or(|end| end != "toml");
+        // No run.toml names the second file of a log.
+        for file in run.recording.files.iter().skip(1).filter(|_| is_log) {
+            add(&mut self.calibration, file);
+        }
         self
     }
 
@@ -113,10 +118,16 @@ fn predicted(problem: &Problem, solution: &Solution) -> Option<Expected> {
 /// Says in a calibration of which files it was made.
 pub fn stamp(calibration: &mut Calibration, path: &Path) {
     if let Some(provenance) = &mut calibration.provenance {
+        provenance.inputs.clear();
+    }
+    add(calibration, path);
+}
+
+fn add(calibration: &mut Calibration, path: &Path) {
+    if let Some(provenance) = &mut calibration.provenance {
         let inputs = input_digests(path).into_iter();
-        provenance.inputs = inputs
-            .map(|(name, sha256)| InputFile { name, sha256 })
-            .collect();
+        let inputs = inputs.map(|(name, sha256)| InputFile { name, sha256 });
+        provenance.inputs.extend(inputs);
     }
 }
 

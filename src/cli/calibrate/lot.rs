@@ -135,7 +135,7 @@ impl Request<'_> {
         let problem = self.estimation.problem(&run, path)?;
         let method = self.estimation.method;
         let mut solution = problem.solve(method, UNWATCHED)?;
-        let calibrated = Calibrated::new(&problem, &mut solution)?.of_files(path);
+        let calibrated = Calibrated::new(&problem, &mut solution)?.of_files(path, &run);
         let document =
             calibrated.document((&problem, &run.recording.name), &solution, method, None);
         let calibration = calibrated.calibration;

@@ -216,7 +216,7 @@ impl Calibrate {
         // What was found in the files may be why.
         let mut solution = solve(problem, self.estimation.method, &activity)
             .inspect_err(|_| say(&run.recording))?;
-        let calibrated = Calibrated::new(problem, &mut solution)?.of_files(path);
+        let calibrated = Calibrated::new(problem, &mut solution)?.of_files(path, run);
         activity.next("writing");
         // Standard output alone, as JSON, takes no report.
         let document = (directory.is_some() || !self.json).then(|| {
