@@ -4,6 +4,7 @@
 //! The files of the `models/` folder are embedded. A path to an existing file wins over an embedded
 //! name, on the command line and in a user's scenario; an embedded scenario names embedded models.
 
+mod by_hand;
 mod catalogue;
 mod instrument;
 mod machine;
@@ -17,6 +18,7 @@ use serde::de::DeserializeOwned;
 
 use crate::formats::{Document, FileError, Place as At};
 
+pub use by_hand::path_by_hand;
 pub use catalogue::Embedded;
 pub use instrument::{InstallationModel, Instrument, Spread, Variation};
 pub use machine::{path, turntable};

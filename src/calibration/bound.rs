@@ -2,10 +2,11 @@
 
 use nalgebra::DVector;
 
+use crate::calibration::checks::error_term_test::{TermsOn, with_everything};
 use crate::calibration::start::coarse::initial_attitudes;
 use crate::calibration::{
-    Auxiliary, CalibrationError, Epoch, Estimate, Gate, Linearisation, PARAMETERS, PassResult,
-    Prior, Problem, Script, pass,
+    Auxiliary, CalibrationError, Epoch, ErrorTerm, Estimate, Gate, Linearisation, Observability,
+    PARAMETERS, ParameterVector, PassResult, Prior, Problem, Script, pass,
 };
 use crate::imu::{PerSensor, TermVector, ThermalCoefficients, Triad};
 
@@ -18,6 +19,22 @@ pub struct Bound {
     pub auxiliary: Auxiliary,
     /// σ against time.
     pub history: Vec<Epoch>,
+    /// Prior 1σ of the parameters.
+    pub prior_sigma: ParameterVector,
+    /// Which combinations of parameters the record determines.
+    pub observability: Observability,
+}
+
+/// An error term that a bound leaves off.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TermLeftOff {
+    /// The term.
+    pub term: ErrorTerm,
+    /// Largest remaining part of the prior σ of any combination of its parameters if it were estimated with its usual σ:
+    /// from 0 (known) to 1 (not observed).
+    pub remaining: f64,
+    /// 1σ of the change of each parameter if the term has its usual size.
+    pub change: ParameterVector,
 }
 
 /// The covariance of a pass linearised at the truth, with `terms` the true error terms, in the installation
@@ -37,14 +54,43 @@ pub fn bound(
     let at = Linearisation::new(*truth, *terms, Vec::new());
     let at_truth = pass_at(&problem, at)?;
     let prior = Prior::new(&at_truth.reduction.constants, &problem.model, &at_truth.at);
+    let prior_sigma = problem.model.prior_sigma;
+    let estimate = Estimate {
+        triads: *truth,
+        covariance: at_truth.posterior.parameter_covariance,
+    };
+    let (_, across) = at_truth.last_attitude();
     Ok(Bound {
-        estimate: Estimate {
-            triads: *truth,
-            covariance: at_truth.posterior.parameter_covariance,
-        },
+        observability: Observability::new(&estimate, &prior_sigma, &across),
+        prior_sigma,
+        estimate,
         auxiliary: at_truth.auxiliary(&problem.model),
         history: at_truth.reduction.history(&prior, &at_truth.at),
     })
+}
+
+/// The constant error terms that a problem leaves off, at a truth as for [`bound`].
+///
+/// # Errors
+/// [`CalibrationError`] as for [`super::estimate`].
+pub fn terms_left_off(
+    problem: &Problem,
+    truth: &PerSensor<Triad>,
+    terms: &TermVector,
+) -> Result<Vec<TermLeftOff>, CalibrationError> {
+    let problem = problem.with(|model| *model = model.in_form(problem.run(), truth.gyro.form));
+    let at = Linearisation::new(*truth, *terms, Vec::new());
+    let PassResult { at, reduction, .. } = pass_at(&with_everything(&problem), at)?;
+    let terms_on = TermsOn::new(&problem, &at, reduction.folded());
+    let off = ErrorTerm::constant().filter(|&term| !problem.model.has(term));
+    let left_off = off.filter_map(|term| {
+        Some(TermLeftOff {
+            term,
+            remaining: terms_on.remaining(term)?,
+            change: terms_on.left_off(term)?.usual,
+        })
+    });
+    Ok(left_off.collect())
 }
 
 /// A pass at the truth.

@@ -7,6 +7,7 @@ mod demo;
 mod list;
 mod log;
 mod man;
+mod path;
 mod result;
 mod schema;
 mod simulate;
@@ -67,6 +68,7 @@ enum Command {
     Init(log::init::Init),
     Convert(log::convert::Convert),
     Check(log::check::Check),
+    Path(path::PathCommand),
     Explain(result::explain::Explain),
     Allan(log::allan::Allan),
     Noise(log::noise::Noise),
@@ -97,6 +99,7 @@ impl Cli {
             Command::Init(init) => init.run(),
             Command::Convert(convert) => convert.run(),
             Command::Check(check) => check.run(),
+            Command::Path(path) => path.run(),
             Command::Explain(explain) => explain.run(),
             Command::Allan(allan) => allan.run(),
             Command::Noise(noise) => noise.run(),

@@ -19,11 +19,11 @@ use crate::calibration::result::frame::Canonical;
 use crate::imu::{BodyFrame, Nominal, PerSensor};
 use crate::statistics::median_of_axes;
 
-use limits::{checks, overall};
+use limits::overall;
 use statistics::of_all;
 use unit::noise_at_rest;
 
-pub use limits::{Check, Limit, Specification, Verdict, probability_outside};
+pub use limits::{Check, Limit, Specification, Verdict, checks, probability_outside};
 pub use quantity::{Quantity, Sample};
 pub use spread::{Scatter, Spread};
 pub use statistics::{FALSE_ALARM, FALSE_TREND, Statistics};

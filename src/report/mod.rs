@@ -43,6 +43,7 @@ pub mod experiment;
 mod group;
 pub mod lot;
 pub mod navigation;
+pub mod path;
 mod prelude;
 pub mod table1;
 mod terms;

@@ -4,6 +4,7 @@ pub mod accuracy;
 pub mod campaign;
 pub mod experiment;
 pub mod navigation;
+pub mod path;
 mod ratio;
 mod shard;
 pub mod table1;

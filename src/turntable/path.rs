@@ -71,9 +71,34 @@ pub enum Rotation {
     },
 }
 
+impl Moves {
+    /// Their number.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Axes { steps, .. } => steps.len(),
+            Self::Body { steps, .. } => steps.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The same without one of them and the dwell after it.
+    pub fn without(&self, number: usize) -> Self {
+        let mut moves = self.clone();
+        match &mut moves {
+            Self::Axes { steps, .. } => drop(steps.remove(number)),
+            Self::Body { steps, .. } => drop(steps.remove(number)),
+        }
+        moves
+    }
+}
+
 impl Rotation {
     /// The rotation vector in body axes, rad, from the attitude `C_b_n` where it begins.
-    pub(super) fn vector(&self, attitude: &Matrix3<f64>) -> Vector3<f64> {
+    pub fn vector(&self, attitude: &Matrix3<f64>) -> Vector3<f64> {
         match *self {
             Self::By(vector) => vector,
             Self::Point { axis, along } => {

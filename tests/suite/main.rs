@@ -37,6 +37,7 @@ mod navigate;
 mod navigation;
 mod observability;
 mod outliers;
+mod path;
 mod recorded;
 mod rows;
 mod shared;

@@ -18,8 +18,8 @@ use crate::calibration::{
 use crate::statistics::{FALSE_ALARM, ln_survival};
 pub use bias_variation::{bias_variation, biases_may_vary};
 pub use evidence::Evidence;
-pub use terms_on::UnmodelledEffect;
-use terms_on::{Explanation, TermsOn, With, seen_and_left_off};
+use terms_on::{Explanation, With, seen_and_left_off};
+pub use terms_on::{TermsOn, UnmodelledEffect, with_everything};
 
 /// Comparison of a calibration with and without an error term.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -197,13 +197,17 @@ impl<'a> Tested<'a> {
             false => other.switch_on(VARYING),
         });
         // The longer of the two first: a thread that is done with something else can take the other.
-        let (otherwise, terms): (Result<With, CalibrationError>, _) = rayon::join(
-            || {
-                let reduction = outcome.reduction(other)?;
-                Ok(With::new(&reduction, &other.model, &outcome.linearised_at))
-            },
-            || TermsOn::new(problem, outcome),
-        );
+        let (otherwise, terms): (Result<With, CalibrationError>, Result<_, CalibrationError>) =
+            rayon::join(
+                || {
+                    let reduction = outcome.reduction(other)?;
+                    Ok(With::new(&reduction, &other.model, &outcome.linearised_at))
+                },
+                || {
+                    let reduction = outcome.reduction(&with_everything(problem))?.folded();
+                    Ok(TermsOn::new(problem, &outcome.linearised_at, reduction))
+                },
+            );
         let mut tested = Self {
             terms: terms?,
             otherwise: otherwise?,

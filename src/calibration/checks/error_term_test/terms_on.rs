@@ -4,8 +4,8 @@ use nalgebra::DMatrix;
 
 use super::evidence::Evidence;
 use crate::calibration::{
-    CalibrationError, ErrorTerm, Linearisation, Model, Outcome, ParameterMatrix, ParameterVector,
-    Posterior, Prior, Problem, Reduction,
+    ErrorTerm, Linearisation, Model, ParameterMatrix, ParameterVector, Posterior, Prior, Problem,
+    Reduction,
 };
 
 /// 1σ of the change of each parameter by an error term that is not estimated; not part of any covariance.
@@ -61,6 +61,11 @@ pub struct TermsOn<'a> {
     pub own: With,
 }
 
+/// A problem whose reduction has columns for the constants of all terms.
+pub fn with_everything<'r>(problem: &Problem<'r>) -> Problem<'r> {
+    problem.with(|model| ErrorTerm::constant().for_each(|term| model.switch_on(term)))
+}
+
 /// Prior and posterior of the constants.
 pub struct With {
     prior: Prior,
@@ -68,17 +73,15 @@ pub struct With {
 }
 
 impl<'a> TermsOn<'a> {
-    pub fn new(problem: &'a Problem, outcome: &'a Outcome) -> Result<Self, CalibrationError> {
-        let (model, at) = (&problem.model, &outcome.linearised_at);
-        let everything =
-            problem.with(|model| ErrorTerm::constant().for_each(|term| model.switch_on(term)));
-        let reduction = outcome.reduction(&everything)?.folded();
-        Ok(Self {
+    /// Of a problem at a point, with the `reduction` of its record by [`with_everything`].
+    pub fn new(problem: &'a Problem, at: &'a Linearisation, reduction: Reduction) -> Self {
+        let model = &problem.model;
+        Self {
             own: With::new(&reduction, model, at),
             model,
             at,
             reduction,
-        })
+        }
     }
 
     /// With these terms on in addition to those of the model, each with its usual σ.
@@ -93,6 +96,13 @@ impl<'a> TermsOn<'a> {
         let mut model = self.model.clone();
         model.switch_off(term);
         With::new(&self.reduction, &model, self.at)
+    }
+
+    /// Largest remaining part of the prior σ of any combination of a term's parameters, with the term on at its usual
+    /// σ: from 0 (known) to 1 (not observed); `None` if the reduction does not include it.
+    pub fn remaining(&self, term: ErrorTerm) -> Option<f64> {
+        let covariance = self.over_prior(term, &self.with(&[term]));
+        (!covariance.is_empty()).then(|| covariance.symmetric_eigenvalues().max().max(0.0).sqrt())
     }
 
     /// The constants of a term.

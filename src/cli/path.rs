@@ -1,0 +1,239 @@
+//! `turncal path`
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::Subcommand;
+use turncal::calibration::{ErrorTerm, Options};
+use turncal::formats::Opened;
+use turncal::lot::Specification;
+use turncal::models::{Instrument, Place, path_by_hand, turntable};
+use turncal::report::path::Report;
+use turncal::run::Aiding;
+use turncal::simulation::Scenario;
+use turncal::study::path::{Evaluation, PathStudy};
+use turncal::turntable::{Moves, Rotation};
+use turncal::units::DEGREE;
+
+use crate::cli::NotMet;
+use crate::cli::arguments::{Delivery, OfLog, error_term, needs_table};
+use crate::cli::terminal::Activity;
+
+/// Tells what a path of turntable or hand will give, before any data exist
+#[derive(Debug, clap::Args)]
+pub struct PathCommand {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Evaluate(Evaluate),
+}
+
+impl PathCommand {
+    pub fn run(&self) -> anyhow::Result<()> {
+        let Command::Evaluate(evaluate) = &self.command;
+        evaluate.run()
+    }
+}
+
+/// Predicts σ, the value of each move, and what a path cannot show
+///
+/// The path is a TOML file or an embedded name, or words for a sensor turned by hand: x_up … z_down, and turns such
+/// as "turn x 90", separated by commas. For a run.toml, σ are those expected from its own record. The prediction
+/// is the Cramér–Rao bound for the stated noise. With a specification, the exit status is 3 if σ are too large to
+/// decide a limit.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  turncal path evaluate three-axis
+  turncal path evaluate my-path.toml --imu navigation-fog \\
+      --specification specification.toml
+  turncal path evaluate \"z_up, turn x 90, turn x 90, x_up, x_down, y_up\" \\
+      --imu bmi088
+  turncal path evaluate my-run/run.toml -o expected")]
+pub struct Evaluate {
+    /// Path: a TOML file, an embedded name, words for a path by hand, or a run.toml
+    path: String,
+    /// Scenario with site, rate, instrument and table [default: demo; by hand: mems]
+    #[arg(long, value_name = "SCENARIO")]
+    scenario: Option<String>,
+    /// Instrument: a TOML file or an embedded name, in place of the scenario's
+    #[arg(long, value_name = "MODEL")]
+    imu: Option<String>,
+    /// Table: a TOML file or an embedded name, in place of the scenario's
+    #[arg(long, value_name = "MODEL")]
+    table: Option<String>,
+    /// Observations of the filter [default: table; by hand: velocity]
+    #[arg(long, value_enum)]
+    aiding: Option<Aiding>,
+    /// Error terms to estimate
+    #[arg(long, value_name = "TERM", value_parser = error_term(), value_delimiter = ',')]
+    with: Vec<ErrorTerm>,
+    /// Limits that the calibration is to decide: a specification.toml
+    #[arg(long, value_name = "FILE")]
+    specification: Option<PathBuf>,
+    #[command(flatten)]
+    delivery: Delivery,
+}
+
+impl Evaluate {
+    fn run(&self) -> anyhow::Result<()> {
+        let specification = self.specification.as_deref().map(Specification::read);
+        let specification = specification.transpose()?;
+        let file = Path::new(&self.path);
+        let inputs: Vec<&Path> = std::iter::once(file)
+            .chain(self.specification.as_deref())
+            .collect();
+        let begun = self.delivery.begin(&inputs)?;
+        let activity = Activity::new("evaluating the path");
+        let (name, with, moves, evaluation) = match is_run(file) {
+            true => self.of_run(file)?,
+            false => self.of_path()?,
+        };
+        drop(activity);
+        let report = Report {
+            name: &name,
+            with: &with,
+            moves: &moves,
+            evaluation: &evaluation,
+            specification: specification.as_ref(),
+        };
+        begun.deliver(&report.document())?;
+        let checks = specification
+            .map(|of| evaluation.checks(&of))
+            .unwrap_or_default();
+        let open = checks
+            .iter()
+            .filter(|check| check.verdict != turncal::lot::Verdict::Pass);
+        match open.count() {
+            0 => Ok(()),
+            open => {
+                Err(NotMet(format!("{name}: σ are too large to decide {open} limit(s)")).into())
+            }
+        }
+    }
+
+    fn options(&self, aiding: Aiding) -> Options {
+        let terms = self
+            .with
+            .iter()
+            .inspect(|&&term| needs_table(term, Some(aiding)));
+        Options {
+            terms: terms.copied().collect(),
+            aiding: Some(aiding),
+            ..Options::default()
+        }
+    }
+
+    fn of_run(&self, file: &Path) -> anyhow::Result<(String, String, Vec<String>, Evaluation)> {
+        let Opened { run, .. } = OfLog::default().open(file)?;
+        let options = self.options(self.aiding.unwrap_or_else(|| run.aiding()));
+        let evaluation = Evaluation::of_run(&run, &options).with_context(|| self.path.clone())?;
+        let with = format!(
+            "The record of {}, with the noise that its run.toml states",
+            self.path
+        );
+        Ok((run.recording.name.clone(), with, Vec::new(), evaluation))
+    }
+
+    fn of_path(&self) -> anyhow::Result<(String, String, Vec<String>, Evaluation)> {
+        let by_hand = self.path.contains(',') || self.path.starts_with("turn ");
+        let usual = if by_hand { "mems" } else { "demo" };
+        let mut scenario = Scenario::load(self.scenario.as_deref().unwrap_or(usual))?;
+        if let Some(model) = &self.imu {
+            scenario.instrument = Instrument::load(model, &Place::CommandLine)?;
+        }
+        if let Some(model) = &self.table {
+            (scenario.table, scenario.table_name) = turntable(model, &Place::CommandLine)?;
+        }
+        if by_hand {
+            scenario.path = path_by_hand(&self.path).map_err(anyhow::Error::msg)?;
+            scenario.path_name = "by hand".to_owned();
+            scenario.integrator.lever_arm = Default::default();
+        } else {
+            scenario = scenario.with_path(&self.path)?;
+        }
+        let aiding = match (self.aiding, by_hand) {
+            (Some(aiding), _) => aiding,
+            (None, true) => Aiding::Velocity,
+            (None, false) => Aiding::Table,
+        };
+        scenario.body_frame = aiding.body_frame();
+        for &term in &self.with {
+            scenario = scenario.with_error_term(term);
+        }
+        let table = if by_hand {
+            "turned by hand"
+        } else {
+            &scenario.table_name
+        };
+        let with = format!(
+            "Instrument {}, {table}, {:.0} Hz, latitude {:.1}°",
+            scenario.instrument.name,
+            1.0 / scenario.integrator.period,
+            scenario.site.latitude / DEGREE
+        );
+        let (name, moves) = (scenario.path_name.clone(), words(&scenario));
+        let options = self.options(aiding);
+        let study = PathStudy {
+            scenario,
+            by_hand,
+            options,
+        };
+        let evaluation = study.evaluate().with_context(|| format!("path {name}"))?;
+        Ok((name, with, moves, evaluation))
+    }
+}
+
+/// Whether a file describes a run.
+fn is_run(file: &Path) -> bool {
+    file.is_file() && std::fs::read_to_string(file).is_ok_and(|text| text.contains("turncal-run/"))
+}
+
+/// Each move in words.
+fn words(scenario: &Scenario) -> Vec<String> {
+    let degrees = |angle: f64| format!("{:+.0}°", angle / DEGREE);
+    match &scenario.path.moves {
+        Moves::Axes { steps, .. } => {
+            let step = |angles: &[f64]| {
+                let axes = scenario.table.axes.iter().zip(angles);
+                let turned = axes.filter(|(_, angle)| **angle != 0.0);
+                let words =
+                    turned.map(|(axis, angle)| format!("{} {}", axis.name, degrees(*angle)));
+                words.collect::<Vec<_>>().join(", ")
+            };
+            steps.iter().map(|of| step(&of.angles)).collect()
+        }
+        Moves::Body { steps, .. } => steps.iter().map(|of| rotation(&of.rotation)).collect(),
+    }
+}
+
+fn rotation(rotation: &Rotation) -> String {
+    let vector = match rotation {
+        Rotation::By(vector) => vector / DEGREE,
+        Rotation::Point { axis, .. } => *axis,
+    };
+    let axes = ["x", "y", "z"].into_iter().zip(&vector);
+    let along = axes.filter(|(_, part)| **part != 0.0);
+    match rotation {
+        Rotation::By(_) => {
+            let words = along.map(|(axis, angle)| format!("{axis} {angle:+.0}°"));
+            format!("turn {}", words.collect::<Vec<_>>().join(", "))
+        }
+        Rotation::Point { along: to, .. } => {
+            let words = along.map(|(axis, sign)| {
+                if *sign < 0.0 {
+                    format!("−{axis}")
+                } else {
+                    axis.to_owned()
+                }
+            });
+            let words = words.collect::<String>();
+            match to.z > 0.999 {
+                true => format!("{words} up"),
+                false => format!("{words} along ({:.2}, {:.2}, {:.2})", to.x, to.y, to.z),
+            }
+        }
+    }
+}

@@ -1,0 +1,398 @@
+//! The report of what a path will give: expected σ, what each move is worth, what the path cannot show.
+
+use super::navigation::{self, Navigated};
+use super::prelude::*;
+use crate::calibration::{ParameterVector, TermLeftOff, Word, auxiliary_name, parameter_name};
+use crate::imu::InstallationForm;
+use crate::lot::{Check, Specification, Verdict};
+use crate::study::path::{Evaluation, Without};
+
+/// From this remaining part of a term's prior σ on, the path does not show the term.
+const NOT_SHOWN: f64 = 0.5;
+/// Number of combinations of parameters that the page lists.
+const LISTED: usize = 5;
+
+/// A path as it is reported.
+pub struct Report<'a> {
+    /// Name of the path.
+    pub name: &'a str,
+    /// Instrument, table and site in words.
+    pub with: &'a str,
+    /// Each move in words.
+    pub moves: &'a [String],
+    /// What is expected of it.
+    pub evaluation: &'a Evaluation,
+    /// The specification that the calibration is to decide, if any.
+    pub specification: Option<&'a Specification>,
+}
+
+impl Report<'_> {
+    /// The report.
+    pub fn document(&self) -> Document {
+        let evaluation = self.evaluation;
+        let checks = self.specification.map(|of| evaluation.checks(of));
+        let mut document = Document::new(format!("What the path {} will give", self.name));
+        document.verdict = Some(self.verdict(checks.as_deref()));
+        document.lead = vec![format!(
+            "{}. σ are the Cramér–Rao bound of a record along this path with the stated noise; nothing was measured.",
+            self.with
+        )];
+        document.both(self.groups(checks.as_deref()));
+        document.both(self.facts());
+        document.both(self.moves());
+        document.page(self.figure());
+        document.page(self.terms());
+        document.page(self.parameters());
+        if let Some(checks) = &checks {
+            document.page(limits(checks));
+        }
+        navigation::add(&mut document, Ok(&self.navigated()));
+        document.data = self.data(checks.as_deref());
+        document
+    }
+
+    fn verdict(&self, checks: Option<&[Check]>) -> (Word, String) {
+        let time = minutes(self.evaluation.duration);
+        let unobserved = self.evaluation.bound.observability.unobserved().count();
+        match checks {
+            Some(checks) => {
+                let open = checks
+                    .iter()
+                    .filter(|check| check.verdict != Verdict::Pass)
+                    .count();
+                let text = match open {
+                    0 => format!("a unit at its nominal values passes every limit after {time}"),
+                    open => format!(
+                        "after {time}, σ are too large to decide {open} of {} limits",
+                        checks.len()
+                    ),
+                };
+                let word = if open == 0 {
+                    Word::Pass
+                } else {
+                    Word::Undecided
+                };
+                (word, text)
+            }
+            None if unobserved == 0 => (
+                Word::Good,
+                format!("the path determines every parameter in {time}"),
+            ),
+            None => (
+                Word::UseWithCare,
+                format!(
+                    "after {time}, {unobserved} combination(s) of parameters keep more than half of their prior σ"
+                ),
+            ),
+        }
+    }
+
+    /// Expected σ of each group, the largest part of the prior that remains, and the tightest limit.
+    fn groups(&self, checks: Option<&[Check]>) -> Table {
+        let bound = &self.evaluation.bound;
+        let sigma = bound.estimate.sigma();
+        let mut columns = cells!["", "expected 1σ", "largest 1σ", "prior 1σ"];
+        columns.extend(checks.map(|_| "decides".to_owned()));
+        let row = |group: Group| {
+            let indices = group.estimated(&bound.estimate);
+            let with_unit = |value: Option<f64>| {
+                or_dash(value, |value| {
+                    format!("{} {}", three_digits(value), group.unit())
+                })
+            };
+            let spread = group.spread(&sigma, &indices);
+            let mut row = vec![
+                group.title(),
+                with_unit(spread.map(|(_, rms)| rms)),
+                with_unit(spread.map(|(largest, _)| largest)),
+                with_unit(
+                    group
+                        .spread(&bound.prior_sigma, &indices)
+                        .map(|(_, rms)| rms),
+                ),
+            ];
+            row.extend(checks.map(|checks| decided(group, checks)));
+            row
+        };
+        Table::new("Expected accuracy", columns)
+            .section(Group::all().map(row))
+            .note("Expected: RMS of the group's parameters.")
+    }
+
+    fn facts(&self) -> Facts {
+        let evaluation = self.evaluation;
+        let mut facts = Facts::default();
+        facts.push(
+            "time",
+            format!(
+                "{}, of which {} at rest",
+                minutes(evaluation.duration),
+                minutes(evaluation.standing)
+            ),
+        );
+        let directions = &evaluation.bound.observability.directions;
+        let weakest = directions.iter().take(2);
+        let weakest = weakest.map(|of| format!("{} ({} %)", of.words, percent(of.remaining)));
+        facts.push("weakest", weakest.collect::<Vec<_>>().join("; "));
+        facts.push("navigation", navigation::line(&self.navigated()));
+        let hidden = evaluation
+            .left_off
+            .iter()
+            .filter(|of| of.remaining > NOT_SHOWN);
+        let hidden: Vec<String> = hidden.map(|of| self.effect(of)).collect();
+        if !hidden.is_empty() {
+            facts.push("not shown", hidden.join("; "));
+        }
+        facts
+    }
+
+    /// A term that is left off with its largest effect, relative to the expected σ.
+    fn effect(&self, of: &TermLeftOff) -> String {
+        let sigma = self.rms(&self.evaluation.bound.estimate.sigma());
+        let change = self.rms(&of.change);
+        let groups = Group::all().zip(sigma).zip(change);
+        let ratio =
+            groups.filter_map(|((group, sigma), change)| Some((group, change?, change? / sigma?)));
+        let largest = ratio.max_by(|a, b| a.2.total_cmp(&b.2));
+        largest.map_or(String::new(), |(group, change, _)| {
+            let (change, unit) = (three_digits(change), group.unit());
+            format!(
+                "{} (could change {} by {change} {unit})",
+                of.term.name(),
+                group.short()
+            )
+        })
+    }
+
+    /// σ of each group without each move, over σ with all.
+    fn moves(&self) -> Table {
+        let all = self.rms(&self.evaluation.bound.estimate.sigma());
+        let row = |(number, without): (usize, &Without)| {
+            let mut row = cells![
+                (number + 1).to_string(),
+                self.moves.get(number).map_or("", String::as_str),
+                value(without.time, 1.0),
+            ];
+            let ratios = without.sigma.map(|sigma| self.rms(&sigma));
+            row.extend((0..all.len()).map(|k| {
+                let ratio = ratios.as_ref().and_then(|of| Some(of[k]? / all[k]?));
+                or_dash(ratio, |ratio| format!("{ratio:.2}"))
+            }));
+            row
+        };
+        let groups = Group::all().map(Group::short);
+        let columns = cells!["", "move", "s"].into_iter().chain(groups);
+        let mut table = Table::new("σ without each move, over σ with all moves", columns)
+            .section(self.evaluation.without.iter().enumerate().map(row))
+            .note("1.00: the move and the dwell after it can be left out. Turns are relative: without one, all later positions \
+                   differ, so that a figure below one is a better path.");
+        table.optional = vec![2];
+        table
+    }
+
+    /// Error terms that are left off: whether the path would show them, and how far they move the groups.
+    fn terms(&self) -> Table {
+        let mut terms: Vec<_> = self.evaluation.left_off.iter().collect();
+        terms.sort_by(|a, b| b.remaining.total_cmp(&a.remaining));
+        let row = |of: &&TermLeftOff| {
+            let mut row = cells![
+                of.term.name(),
+                if of.remaining > NOT_SHOWN {
+                    "no"
+                } else {
+                    "yes"
+                },
+            ];
+            row.extend(Group::all().map(|group| {
+                let indices = group.estimated(&self.evaluation.bound.estimate);
+                or_dash(
+                    group.spread(&of.change, &indices).map(|(_, rms)| rms),
+                    three_digits,
+                )
+            }));
+            row
+        };
+        let groups = Group::all().map(|group| format!("{}, {}", group.short(), group.unit()));
+        let columns = cells!["error term", "shown"].into_iter().chain(groups);
+        Table::new("Error terms of usual size that are not estimated, and their effect (RMS, 1σ)", columns)
+            .section(terms.iter().map(row))
+            .note("Shown: the data of this path would determine all of the term's parameters to half of their usual σ.")
+    }
+
+    /// σ of each group against time.
+    fn figure(&self) -> Plot {
+        let bound = &self.evaluation.bound;
+        let form = bound.estimate.form();
+        let panel = |group: Group| {
+            let indices = group.estimated(&bound.estimate);
+            if indices.is_empty() {
+                return Panel::blank(format!("{}: all fixed", group.title()));
+            }
+            let line = |(n, &i): (usize, &usize)| {
+                let points = bound.history.iter();
+                let points = points.map(|m| (m.time, m.sigma[i] / group.unit_value()));
+                Series::line(points).nth(n).label(axis_name(form, i))
+            };
+            let x = Axis::linear("time, s").between(0.0, self.evaluation.duration);
+            Panel::new(group.titled(), x, Axis::log(""))
+                .with_all(indices.iter().enumerate().map(line))
+        };
+        let panels = Group::all().map(panel);
+        Plot::new("sigma.svg", "Expected 1σ against time", (3, 330), panels).caption(
+            "1σ of every parameter as the path is followed. A line that stays level is not observed by that part of \
+             the path.",
+        )
+    }
+
+    /// Expected σ of every parameter.
+    fn parameters(&self) -> Table {
+        let rows = self.each().map(|(name, unit, sigma, prior)| {
+            cells![name, three_digits(sigma), three_digits(prior), unit]
+        });
+        Table::new(
+            "Parameters",
+            columns("parameter | expected 1σ | prior 1σ | unit"),
+        )
+        .section(rows)
+        .note("Parameters of estimated error terms are in SI units.")
+    }
+
+    /// Name, unit, expected σ and prior σ of every estimated parameter.
+    fn each(&self) -> impl Iterator<Item = (String, &'static str, f64, f64)> {
+        let bound = &self.evaluation.bound;
+        let (form, sigma) = (bound.estimate.form(), bound.estimate.sigma());
+        let parameters = bound.estimate.estimated().filter_map(move |k| {
+            let group = Group::of(k);
+            let unit = group.unit_value();
+            let prior = bound.prior_sigma[k] / unit;
+            Some((
+                parameter_name(form, k)?,
+                group.unit(),
+                sigma[k] / unit,
+                prior,
+            ))
+        });
+        let of_terms = bound.auxiliary.sigma();
+        let terms = bound.auxiliary.estimated().filter_map(move |k| {
+            Some((
+                auxiliary_name(k)?,
+                "SI",
+                of_terms[k],
+                bound.auxiliary.prior_sigma[k],
+            ))
+        });
+        parameters.chain(terms)
+    }
+
+    fn navigated(&self) -> [Navigated; 1] {
+        [Navigated {
+            method: "EKF",
+            outlook: self.evaluation.navigation.clone(),
+        }]
+    }
+
+    /// RMS of each group of σ, in the group's unit.
+    fn rms(&self, sigma: &ParameterVector) -> Vec<Option<f64>> {
+        let estimate = &self.evaluation.bound.estimate;
+        let rms = |group: Group| Some(group.spread(sigma, &group.estimated(estimate))?.1);
+        Group::all().map(rms).collect()
+    }
+
+    fn by_group(&self, v: &ParameterVector) -> Value {
+        let rms = Group::all().map(Group::key).zip(self.rms(v));
+        rms.map(|(key, rms)| (key, rms.into()))
+            .collect::<Map<_, Value>>()
+            .into()
+    }
+
+    fn data(&self, checks: Option<&[Check]>) -> Value {
+        let evaluation = self.evaluation;
+        let bound = &evaluation.bound;
+        let (word, reason) = self.verdict(checks);
+        let parameters = self.each().map(|(name, unit, sigma, prior)| {
+            (
+                name,
+                json!({ "sigma": sigma, "prior_sigma": prior, "unit": unit }),
+            )
+        });
+        let without = evaluation.without.iter().enumerate().map(|(k, without)| {
+            json!({
+                "move": self.moves.get(k), "time_s": without.time,
+                "sigma": without.sigma.map(|sigma| self.by_group(&sigma)),
+            })
+        });
+        let terms = evaluation.left_off.iter().map(|of| {
+            json!({ "term": of.term.name(), "remaining": of.remaining, "change": self.by_group(&of.change) })
+        });
+        let mut data = json!({
+            "path": self.name,
+            "verdict": { "word": word, "reasons": [reason] },
+            "aiding": evaluation.aiding,
+            "duration_s": evaluation.duration,
+            "standing_s": evaluation.standing,
+            "sigma": self.by_group(&bound.estimate.sigma()),
+            "parameters": parameters.collect::<Map<_, _>>(),
+            "weakest": bound.observability.directions.iter().take(LISTED).collect::<Vec<_>>(),
+            "without": without.collect::<Value>(),
+            "terms_left_off": terms.collect::<Value>(),
+        });
+        if let Some(checks) = checks {
+            let limit = |check: &Check| {
+                let name = parameter_name(InstallationForm::General, check.limit.parameter);
+                json!({ "parameter": name, "decided": check.verdict == Verdict::Pass })
+            };
+            data["limits"] = checks.iter().map(limit).collect();
+        }
+        data
+    }
+}
+
+/// How many limits of a group are decided.
+fn decided(group: Group, checks: &[Check]) -> String {
+    let of_group = || {
+        checks
+            .iter()
+            .filter(|check| Group::of(check.limit.parameter) == group)
+    };
+    let decided = of_group()
+        .filter(|check| check.verdict == Verdict::Pass)
+        .count();
+    match of_group().count() {
+        0 => NONE.to_owned(),
+        all => format!("{decided} of {all}"),
+    }
+}
+
+/// Every limit with the σ that decides it or not.
+fn limits(checks: &[Check]) -> Table {
+    let form = InstallationForm::General;
+    let row = |check: &Check| {
+        let group = Group::of(check.limit.parameter);
+        let unit = group.unit_value();
+        cells![
+            parameter_name(form, check.limit.parameter).unwrap_or_default(),
+            three_digits(check.limit.within / unit),
+            or_dash(check.off.map(|(_, sigma)| sigma / unit), three_digits),
+            group.unit(),
+            if check.verdict == Verdict::Pass {
+                "yes"
+            } else {
+                "no"
+            },
+        ]
+    };
+    Table::new("Limits", columns("parameter | within ± | expected 1σ | unit | decided"))
+        .section(checks.iter().map(row))
+        .note("Decided: a unit at its nominal value would pass with the confidence that the specification asks for.")
+}
+
+fn percent(part: f64) -> String {
+    three_digits(100.0 * part)
+}
+
+fn minutes(seconds: f64) -> String {
+    match seconds < 120.0 {
+        true => format!("{} s", value(seconds, 1.0)),
+        false => format!("{} min", value(seconds / 60.0, 0.1)),
+    }
+}

@@ -1,0 +1,94 @@
+//! `turncal path evaluate`: what is said of a path before any data exist.
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+fn turncal(arguments: &[&str]) -> Command {
+    let mut command = Command::cargo_bin("turncal").unwrap();
+    command.args(["path", "evaluate"]).args(arguments);
+    command
+}
+
+fn json(arguments: &[&str]) -> Value {
+    let output = turncal(arguments).arg("--json").assert().success();
+    serde_json::from_slice(&output.get_output().stdout).unwrap()
+}
+
+fn sigma(of: &Value, group: &str) -> f64 {
+    of["sigma"][group].as_f64().unwrap()
+}
+
+/// By the bound, the σ of a path without a move are those of the path in whose file the move is missing.
+#[test]
+fn a_move_is_worth_what_the_path_without_it_lacks() {
+    let steps = [
+        "{ turn_deg = [0, 0, 720] }",
+        "{ turn_deg = [0, 90, 0] }",
+        "{ turn_deg = [0, 0, 90] }",
+        "{ turn_deg = [-720, 0, 0] }",
+    ];
+    let path = |steps: &[&str]| {
+        format!(
+            "first_dwell_s = 30.0\n[axes]\nstart_deg = [0, 0, 0]\nrate_deg_per_s = 60.0\n\
+             acceleration_deg_per_s2 = 20.0\ndwell_s = 10.0\nsteps = [{}]\n",
+            steps.join(", ")
+        )
+    };
+    let directory = tempfile::tempdir().unwrap();
+    let [whole, without] = [&steps[..], &steps[1..]].map(|steps| {
+        let file = directory.path().join(format!("{}.toml", steps.len()));
+        std::fs::write(&file, path(steps)).unwrap();
+        json(&[file.to_str().unwrap()])
+    });
+    let first = &whole["without"][0];
+    for group in ["gyro.scale_ppm", "gyro.bias_deg_per_h", "accel.bias_ug"] {
+        let ratio = sigma(first, group) / sigma(&without, group);
+        assert!((ratio - 1.0).abs() < 1e-3, "{group}: {ratio}");
+    }
+    // Two full turns about y give its scale factor.
+    assert!(sigma(first, "gyro.scale_ppm") > 1.5 * sigma(&whole, "gyro.scale_ppm"));
+    let time = |of: &Value| of["duration_s"].as_f64().unwrap();
+    let saved = first["time_s"].as_f64().unwrap();
+    assert!((time(&whole) - time(&without) - saved).abs() < 1e-6);
+}
+
+#[test]
+fn a_path_by_hand_lacks_what_it_never_turns_about() {
+    let six = "z_up, z_down, x_up, x_down, y_up, y_down";
+    let expected = json(&[six, "--imu", "bmi088"]);
+    let level = json(&["z_up, turn z 360, turn z 360", "--imu", "bmi088"]);
+    let of = |of: &Value, name: &str| {
+        let of = &of["parameters"][name];
+        of["sigma"].as_f64().unwrap() / of["prior_sigma"].as_f64().unwrap()
+    };
+    assert!(of(&expected, "accel.bias.x") < 0.1);
+    assert!(of(&level, "accel.bias.x") > 0.9);
+    assert!(of(&level, "gyro.scale.x") > 0.9);
+    assert_eq!(level["verdict"]["word"], "use with care");
+    assert!(!level["weakest"].as_array().unwrap().is_empty());
+    let turned = turncal(&["z_up, turn w 90"]).assert().failure();
+    let message = String::from_utf8_lossy(&turned.get_output().stderr).into_owned();
+    assert!(message.contains("found `turn w 90`"), "{message}");
+}
+
+#[test]
+fn a_specification_that_the_path_cannot_decide_is_status_three() {
+    let directory = tempfile::tempdir().unwrap();
+    let specification = |limit: f64| {
+        let file = directory.path().join(format!("{limit}.toml"));
+        let text = format!("format = \"turncal-specification/1\"\n[gyro]\nscale_ppm = {limit}\n");
+        std::fs::write(&file, text).unwrap();
+        file.to_str().unwrap().to_owned()
+    };
+    let run =
+        |limit: f64| turncal(&["three-axis", "--specification", &specification(limit)]).assert();
+    let decided = run(5.0).success();
+    let text = String::from_utf8_lossy(&decided.get_output().stdout).into_owned();
+    assert!(text.contains("PASS") && text.contains("3 of 3"), "{text}");
+    let open = run(0.1).code(3);
+    let text = String::from_utf8_lossy(&open.get_output().stdout).into_owned();
+    assert!(
+        text.contains("UNDECIDED") && text.contains("0 of 3"),
+        "{text}"
+    );
+}
