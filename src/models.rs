@@ -17,6 +17,7 @@ use include_dir::Dir;
 use serde::de::DeserializeOwned;
 
 use crate::formats::{Document, FileError, Place as At};
+use crate::lot::Specification;
 
 pub use by_hand::path_by_hand;
 pub use catalogue::Embedded;
@@ -42,11 +43,13 @@ pub enum Room {
     Campaign,
     /// Trajectories to navigate along.
     Trajectory,
+    /// Limits of a unit's parameters.
+    Specification,
 }
 
 impl Room {
     /// All folders, those first that commands name most.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Scenario,
         Self::Campaign,
         Self::Path,
@@ -54,6 +57,7 @@ impl Room {
         Self::Imu,
         Self::Installation,
         Self::Trajectory,
+        Self::Specification,
     ];
 
     /// The folder's name.
@@ -66,6 +70,7 @@ impl Room {
             Self::Scenario => "scenario",
             Self::Campaign => "campaign",
             Self::Trajectory => "trajectory",
+            Self::Specification => "specification",
         }
     }
 
@@ -210,6 +215,19 @@ pub fn text(room: Room, name_or_path: &str, named_in: &Place) -> Result<Text, Mo
     })
 }
 
+/// Finds and reads a specification.
+///
+/// # Errors
+/// If there is none of that name or it is malformed.
+pub fn specification(name_or_path: &Path) -> Result<Specification, ModelError> {
+    let text = text(
+        Room::Specification,
+        &name_or_path.to_string_lossy(),
+        &Place::CommandLine,
+    )?;
+    Ok(Specification::of_text(Path::new(&text.file), &text.text)?)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -229,6 +247,7 @@ mod tests {
             Room::Campaign => crate::simulation::SimulatedCampaign::load(path).unwrap_err(),
             Room::Scenario => crate::simulation::Scenario::load(path).unwrap_err(),
             Room::Trajectory => trajectory(path, place).unwrap_err(),
+            Room::Specification => specification(Path::new(path)).unwrap_err(),
         };
         let message = error.to_string();
         assert!(message.contains("mine.toml"), "{message}");

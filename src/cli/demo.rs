@@ -1,26 +1,35 @@
 //! `turncal demo`
 
 use std::collections::BTreeMap;
+use std::ffi::{OsStr, OsString};
+use std::fs::File;
+use std::io::Write;
 use std::path::PathBuf;
+use std::thread;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
+use clap::Parser;
 use rayon::prelude::*;
 use turncal::calibration::{
     self, Assessment, ClosedForm, Estimate, Method, Options, Problem, Solution,
 };
 use turncal::imu::{PerSensor, Triad};
-use turncal::models::{self, Place};
+use turncal::models::{self, Place, path_by_hand};
 use turncal::report::calibration::{self as of_calibration, Report};
 use turncal::report::navigation::{Flown, add_missions};
 use turncal::report::{Document, Facts};
 use turncal::run::{Dwell, Run};
 use turncal::simulation::{Scenario, Simulated};
 use turncal::study::navigation::{FORTY_HOURS, Mission, Motion};
+use turncal::turntable::Moves;
+use turncal::units::DEGREE;
 
 use super::calibrate::{dwell_times, navigate, note, solve, stamp, write_report};
 use super::simulate::{simulated, write};
 
-use crate::cli::arguments::{Overwrite, seed};
+use crate::cli::Cli;
+use crate::cli::arguments::{Overwrite, positive, seed};
 use crate::cli::terminal::{Activity, show_brief};
 
 /// Simulates a calibration and compares it with the truth
@@ -31,7 +40,9 @@ use crate::cli::terminal::{Activity, show_brief};
 /// directory and contains ekf/ with its calibration, six-position/ with the static run and its
 /// calibration, and report/.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:  turncal demo -o my-demo --seed 3")]
+#[command(after_help = "Examples:
+  turncal demo -o my-demo --seed 3
+  turncal demo --follow --speed 10")]
 pub struct Demo {
     /// Directory to write
     #[arg(short, long, value_name = "DIR", default_value = "turncal-demo")]
@@ -39,12 +50,26 @@ pub struct Demo {
     /// Seed of all random numbers [default: the scenario's]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
+    /// Play a sensor that is turned by hand, and follow its rows
+    #[arg(long)]
+    follow: bool,
+    /// With --follow: how many times as fast as the sensor
+    #[arg(long, value_name = "N", value_parser = positive, default_value = "5", requires = "follow")]
+    speed: f64,
     #[command(flatten)]
     overwrite: Overwrite,
 }
 
+/// The hand's path; its third dwell is too short to be one.
+const BY_HAND: &str = "z_up, turn x 180, turn y 20, x_up, x_down, turn z 90, y_up, y_down, turn y 180, turn z 180, \
+                       turn x 90, turn x 180, turn y 90, z_up, turn z 180";
+const TOO_SHORT: usize = 1;
+
 impl Demo {
     pub fn run(&self) -> anyhow::Result<()> {
+        if self.follow {
+            return self.followed();
+        }
         let directory = self.overwrite.directory(&self.output, &[])?;
         let activity = Activity::new("simulating both runs");
         // The same seed gives both runs the same instrument.
@@ -96,6 +121,55 @@ impl Demo {
         files.push("with a log of your own", "turncal calibrate LOG");
         document.brief.push(files.into());
         show_brief(&document)
+    }
+}
+
+impl Demo {
+    /// Plays a sensor in the hand into a growing log that is followed.
+    fn followed(&self) -> anyhow::Result<()> {
+        let mut scenario = Scenario::load("mems")?;
+        scenario.path = path_by_hand(BY_HAND).map_err(anyhow::Error::msg)?;
+        if let Moves::Body { steps, .. } = &mut scenario.path.moves {
+            steps[TOO_SHORT].dwell = 0.5;
+        }
+        let folder = tempfile::tempdir()?;
+        let (whole, log) = (folder.path().join("sensor"), folder.path().join("imu.csv"));
+        std::fs::create_dir(&whole)?;
+        write(&simulated(&scenario, self.seed)?, &whole)?;
+        let rows = std::fs::read_to_string(whole.join("imu.csv"))?;
+        let latitude = (scenario.site.latitude / DEGREE).to_string();
+        let arguments = [
+            "turncal",
+            "calibrate",
+            "--follow",
+            "--patience",
+            "3",
+            "--latitude",
+        ];
+        let mut arguments: Vec<OsString> = arguments.map(OsString::from).into();
+        let output: [&OsStr; 4] = [
+            latitude.as_ref(),
+            log.as_ref(),
+            "-o".as_ref(),
+            self.output.as_ref(),
+        ];
+        arguments.extend(output.map(OsStr::to_owned));
+        if self.overwrite.force {
+            arguments.push("--force".into());
+        }
+        let mut file = File::create(&log)?;
+        let pause = Duration::from_secs_f64(scenario.integrator.period / self.speed);
+        let begun = Instant::now();
+        let play = move || {
+            for (number, row) in (0..).zip(rows.split_inclusive('\n')) {
+                thread::sleep((pause * number).saturating_sub(begun.elapsed()));
+                if file.write_all(row.as_bytes()).is_err() {
+                    return;
+                }
+            }
+        };
+        thread::Builder::new().name("sensor".into()).spawn(play)?;
+        Cli::try_parse_from(arguments)?.run()
     }
 }
 

@@ -6,12 +6,12 @@ use anyhow::Context;
 use clap::Subcommand;
 use turncal::calibration::{ErrorTerm, Options};
 use turncal::formats::Opened;
-use turncal::lot::Specification;
-use turncal::models::{Instrument, Place, path_by_hand, turntable};
+use turncal::models::{Instrument, Place, path_by_hand, specification, turntable};
 use turncal::report::path::Report;
 use turncal::run::Aiding;
 use turncal::simulation::Scenario;
 use turncal::study::path::{Evaluation, PathStudy};
+use turncal::survey::decided;
 use turncal::turntable::{Moves, Rotation};
 use turncal::units::DEGREE;
 
@@ -79,7 +79,7 @@ pub struct Evaluate {
 
 impl Evaluate {
     fn run(&self) -> anyhow::Result<()> {
-        let specification = self.specification.as_deref().map(Specification::read);
+        let specification = self.specification.as_deref().map(specification);
         let specification = specification.transpose()?;
         let file = Path::new(&self.path);
         let inputs: Vec<&Path> = std::iter::once(file)
@@ -101,7 +101,7 @@ impl Evaluate {
         };
         begun.deliver(&report.document())?;
         let checks = specification
-            .map(|of| evaluation.checks(&of))
+            .map(|of| decided(&of, &evaluation.bound))
             .unwrap_or_default();
         let open = checks
             .iter()

@@ -45,6 +45,7 @@ pub mod lot;
 pub mod navigation;
 pub mod path;
 mod prelude;
+pub mod session;
 pub mod table1;
 mod terms;
 #[cfg(test)]

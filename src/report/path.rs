@@ -6,6 +6,7 @@ use crate::calibration::{ParameterVector, TermLeftOff, Word, auxiliary_name, par
 use crate::imu::InstallationForm;
 use crate::lot::{Check, Specification, Verdict};
 use crate::study::path::{Evaluation, Without};
+use crate::survey::decided;
 
 /// From this remaining part of a term's prior σ on, the path does not show the term.
 const NOT_SHOWN: f64 = 0.5;
@@ -30,7 +31,7 @@ impl Report<'_> {
     /// The report.
     pub fn document(&self) -> Document {
         let evaluation = self.evaluation;
-        let checks = self.specification.map(|of| evaluation.checks(of));
+        let checks = self.specification.map(|of| decided(of, &evaluation.bound));
         let mut document = Document::new(format!("What the path {} will give", self.name));
         document.verdict = Some(self.verdict(checks.as_deref()));
         document.lead = vec![format!(
@@ -111,7 +112,7 @@ impl Report<'_> {
                         .map(|(_, rms)| rms),
                 ),
             ];
-            row.extend(checks.map(|checks| decided(group, checks)));
+            row.extend(checks.map(|checks| how_many(group, checks)));
             row
         };
         Table::new("Expected accuracy", columns)
@@ -348,7 +349,7 @@ impl Report<'_> {
 }
 
 /// How many limits of a group are decided.
-fn decided(group: Group, checks: &[Check]) -> String {
+fn how_many(group: Group, checks: &[Check]) -> String {
     let of_group = || {
         checks
             .iter()

@@ -4,18 +4,13 @@ use rayon::prelude::*;
 
 use super::navigation::{Mission, NavigationStudyError, Outlook};
 use crate::calibration::{
-    Bound, CalibrationError, Options, PARAMETERS, ParameterVector, Problem, TermLeftOff, bound,
-    terms_left_off,
+    Bound, CalibrationError, Options, ParameterVector, Problem, TermLeftOff, bound, terms_left_off,
 };
-use crate::imu::{MotionNoise, PerSensor, TermVector, Triad};
-use crate::lot::{Check, Sample, Specification, checks};
+use crate::imu::{PerSensor, TermVector, Triad};
 use crate::run::{Aiding, Run};
 use crate::simulation::Scenario;
+use crate::survey::TURNED_BY_HAND;
 use crate::turntable::TableError;
-
-/// Noise that turning by hand adds to the gyros' angle, √s: 0.05° (1σ) in a quarter turn of 1.5 s, the size that
-/// records of MEMS sensors turned by hand show (bandwidth, timing and second-order effects of the sensor).
-const TURNED_BY_HAND: f64 = 7e-4;
 
 /// A path to evaluate.
 #[derive(Debug, Clone)]
@@ -79,7 +74,7 @@ impl PathStudy {
         let (whole, without) = rayon::join(
             || {
                 let (run, truth, terms) = self.record(&self.scenario)?;
-                Evaluation::new(&run, &self.options, (&truth, &terms))
+                Evaluation::new(&Problem::new(&run, &self.options), (&truth, &terms))
             },
             || {
                 let moves = 0..self.scenario.path.moves.len();
@@ -117,10 +112,7 @@ impl PathStudy {
         let mut run = simulated.run;
         if self.by_hand {
             run.recording.table = None;
-            run.instrument.motion_noise.gyro = MotionNoise {
-                by_motion: TURNED_BY_HAND,
-                ..MotionNoise::default()
-            };
+            run.instrument.motion_noise.gyro = TURNED_BY_HAND;
         }
         Ok((run, simulated.truth, simulated.terms))
     }
@@ -133,20 +125,20 @@ impl Evaluation {
     /// [`PathError`] if no calibration is possible.
     pub fn of_run(run: &Run, options: &Options) -> Result<Self, PathError> {
         let problem = Problem::new(run, options);
-        let start = crate::calibration::coarse_start(&problem)?;
-        Self::new(run, options, (&start.at.triads, &TermVector::zeros()))
+        let start = coarse_start(&problem)?;
+        let problem = start.by_hand(&problem).unwrap_or(problem);
+        Self::new(&problem, (&start.at.triads, &TermVector::zeros()))
     }
 
     fn new(
-        run: &Run,
-        options: &Options,
+        problem: &Problem,
         (truth, terms): (&PerSensor<Triad>, &TermVector),
     ) -> Result<Self, PathError> {
-        let problem = Problem::new(run, options);
+        let run = problem.run();
         let imu = &run.recording.imu;
         let (bound, left_off) = rayon::join(
-            || bound(&problem, truth, terms),
-            || terms_left_off(&problem, truth, terms),
+            || bound(problem, truth, terms),
+            || terms_left_off(problem, truth, terms),
         );
         let bound = bound?;
         let mission = Mission::suited(&run.site, &[&bound.estimate])?;
@@ -160,30 +152,12 @@ impl Evaluation {
             without: Vec::new(),
         })
     }
-
-    /// A unit at its nominal values against every limit of a specification: it passes if the expected σ are small
-    /// enough to decide the limit.
-    pub fn checks(&self, specification: &Specification) -> Vec<Check> {
-        let estimate = self.bound.estimate.in_general_form();
-        let sigma = estimate.sigma();
-        let nominal = |parameter: usize| {
-            let mut limits = specification.limits.iter();
-            limits.find(|limit| limit.parameter == parameter)
-        };
-        checks(specification, |parameter| {
-            let limit = nominal(parameter).filter(|_| parameter < PARAMETERS)?;
-            Some(Sample {
-                value: limit.nominal,
-                sigma: sigma[parameter],
-            })
-        })
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::{Group, NoisePolicy, UNWATCHED, estimate, to_vector};
+    use crate::calibration::{Group, NoisePolicy, PARAMETERS, UNWATCHED, estimate, to_vector};
 
     #[test]
     fn what_is_expected_of_a_record_is_what_the_filter_states() {

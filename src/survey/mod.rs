@@ -1,8 +1,14 @@
 //! What a record holds, and what the methods could see of the instrument in it. Nothing is calibrated: all
 //! is by nominal scales and prior biases.
 
+mod advice;
+mod session;
+
+pub use advice::{Advisor, Move, TURNED_BY_HAND};
+pub use session::{Progress, Session, Status, decided, needed};
+
 use crate::calibration::{
-    CalibrationError, Contradiction, Estimate, Group, OBSERVED_BELOW, Options, Problem,
+    Bound, CalibrationError, Contradiction, Estimate, Group, OBSERVED_BELOW, Options, Problem,
 };
 use crate::calibration::{bound, coarse_start, parameter_name, sensor_and_parameter, six_position};
 use crate::imu::{BodyFrame, InstallationForm, TermVector};
@@ -73,14 +79,8 @@ pub struct Expected {
 }
 
 impl Survey {
-    /// Looks at a run.
+    /// Looks at a run, and at what each method could see in it.
     pub fn of(run: &Run) -> Self {
-        let rests = motion::rests(run);
-        let durations = || {
-            rests
-                .iter()
-                .map(|rest| rest.dwell.duration(&run.recording.imu))
-        };
         let expected = |path| {
             (
                 path,
@@ -88,9 +88,23 @@ impl Survey {
             )
         };
         Self {
+            methods: Path::ALL.map(expected).into(),
+            ..Self::of_motion(run)
+        }
+    }
+
+    /// Looks at a run, without the methods.
+    pub fn of_motion(run: &Run) -> Self {
+        let rests = motion::rests(run);
+        let durations = || {
+            rests
+                .iter()
+                .map(|rest| rest.dwell.duration(&run.recording.imu))
+        };
+        Self {
             turns: motion::turns(run, &rests),
             labels: motion::checks(run, &rests),
-            methods: Path::ALL.map(expected).into(),
+            methods: Vec::new(),
             contradiction: Contradiction::of(&Problem::new(run, &Options::default()))
                 .map(|(_, contradiction)| contradiction),
             standing: durations().sum(),
@@ -140,13 +154,21 @@ impl Expected {
             Path::TableAiding => Aiding::Table,
             Path::VelocityAiding => Aiding::Velocity,
         };
-        // What the filter ends with, linearised where it would begin, with the noise that shows there.
-        let problem = Problem::new(run, &Options::default().aiding(aiding));
-        let start = coarse_start(&problem)?;
-        let problem = start.by_hand(&problem).unwrap_or(problem);
-        let bound = bound(&problem, &start.at.triads, &TermVector::zeros())?;
+        let options = Options::default().aiding(aiding);
+        let bound = bound_of_record(run, &options)?;
         Ok(summary(run, aiding.body_frame(), &bound.estimate))
     }
+}
+
+/// What the filter ends with by a record: the bound where the filter would begin, with the noise that shows there.
+///
+/// # Errors
+/// [`CalibrationError`] if the record allows no calibration.
+pub fn bound_of_record(run: &Run, options: &Options) -> Result<Bound, CalibrationError> {
+    let problem = Problem::new(run, options);
+    let start = coarse_start(&problem)?;
+    let problem = start.by_hand(&problem).unwrap_or(problem);
+    bound(&problem, &start.at.triads, &TermVector::zeros())
 }
 
 fn summary(run: &Run, body_frame: BodyFrame, estimate: &Estimate) -> Expected {

@@ -20,6 +20,7 @@ mod export;
 mod faults;
 mod features;
 mod field;
+mod follow;
 mod fuzz;
 mod help;
 mod init;

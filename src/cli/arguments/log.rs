@@ -78,10 +78,13 @@ impl OfLog {
 
     /// Reads a run, or a log with what is stated of it; what was found in a log is shown.
     pub fn open(&self, path: &Path) -> anyhow::Result<Opened> {
+        self.open_with(path, |found| show_found(path, found))
+    }
+
+    /// The same; `show` is given what was found in a log.
+    pub fn open_with(&self, path: &Path, show: impl FnOnce(&[Found])) -> anyhow::Result<Opened> {
         let (stream, stated) = self.stated()?;
-        Ok(Opened::new(path, stream, &stated, |found| {
-            show_found(path, found);
-        })?)
+        Ok(Opened::new(path, stream, &stated, show)?)
     }
 }
 

@@ -12,4 +12,6 @@ pub use error_term::{error_term, needs_table};
 pub use estimation::Estimation;
 pub use log::{OfLog, run_file, run_or_log, show_found};
 pub use sharding::Sharding;
-pub use values::{at_least_two, at_temperature, hours, latitude, number, positive, seed, shard};
+pub use values::{
+    at_least_two, at_temperature, hours, latitude, number, positive, seconds, seed, shard,
+};

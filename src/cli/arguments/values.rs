@@ -1,6 +1,7 @@
 //! What arguments must be, said in the field's words.
 
 use std::path::Path;
+use std::time::Duration;
 
 use anyhow::Context;
 use turncal::calibration::result::Calibration;
@@ -28,6 +29,11 @@ fn between(text: &str, low: f64, high: f64) -> Option<f64> {
 pub fn positive(text: &str) -> Result<f64, String> {
     between(text, f64::MIN_POSITIVE, f64::MAX)
         .ok_or_else(|| "expected a number above zero".to_owned())
+}
+
+/// A duration in seconds, from a tenth to a day.
+pub fn seconds(text: &str) -> Result<Duration, String> {
+    Ok(Duration::from_secs_f64(number(text, 0.1, 86_400.0)?))
 }
 
 /// Degrees, north positive.

@@ -7,7 +7,8 @@ use anyhow::bail;
 use turncal::calibration::{UNWATCHED, Word};
 use turncal::formats::{Job, JobKind, LotDirectory, Part, unit_key};
 use turncal::imu::PerSensor;
-use turncal::lot::{self, Lot, Specification, Unit};
+use turncal::lot::{self, Lot, Unit};
+use turncal::models;
 use turncal::noise::RestNoise;
 use turncal::report;
 use turncal::report::Document;
@@ -38,7 +39,7 @@ pub struct Request<'a> {
 impl Request<'_> {
     pub fn run(&self) -> anyhow::Result<()> {
         let names = unit_names(self.runs)?;
-        let specification = self.specification.map(Specification::read).transpose()?;
+        let specification = self.specification.map(models::specification).transpose()?;
         let mut words = serde_json::to_value(self.estimation)?;
         if *self.of_log != OfLog::default() {
             words["of_log"] = format!("{:?}", self.of_log).into();

@@ -1,6 +1,7 @@
 //! `turncal calibrate`
 
 mod calibrated;
+mod follow;
 mod lot;
 mod merge;
 
@@ -10,24 +11,29 @@ pub use merge::Merge;
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use anyhow::{Context, bail};
 use clap::error::ErrorKind;
 use turncal::calibration::{AtRest, Finding, Method, Problem, Solution, Together};
 use turncal::formats::{Campaign, Opened};
+use turncal::models;
 use turncal::recording::Recording;
 use turncal::report::terminal::printable;
 use turncal::report::{self, Facts};
 use turncal::run::Run;
 use turncal::study::Shard;
 
-use crate::cli::arguments::{Estimation, OfLog, Overwrite, run_or_log, shard};
+use crate::cli::arguments::{Estimation, OfLog, Overwrite, run_or_log, seconds, shard};
 use crate::cli::terminal::{Activity, print, show, show_brief};
 
 use calibrated::{Calibrated, read_truth};
+use follow::Follow;
 
 /// Highest order of the polynomials of outputs at rest.
 const HIGHEST_ORDER_AT_REST: usize = 5;
+/// Heading of the options of a log that is still being written.
+const FOLLOWING: &str = "Of a log that is being written";
 
 /// Estimates scale factors, installation and biases of a run
 ///
@@ -55,6 +61,8 @@ const HIGHEST_ORDER_AT_REST: usize = 5;
   turncal calibrate campaign.toml -o mine
   turncal calibrate lot/*/run.toml -o lot-result \\
       --specification specification.toml
+  turncal calibrate --follow - --sensor bmi088 < /dev/ttyUSB0
+  turncal calibrate --follow imu.csv --specification mems-by-hand
   turncal calibrate lot/*/run.toml --shard 3/8 -o part-3")]
 pub struct Calibrate {
     /// The run's run.toml, or a log, or - for rows of text on standard input; several are the units of a lot; a
@@ -81,6 +89,16 @@ pub struct Calibrate {
     /// Calibrate part i of M of a lot, to be merged with the others
     #[arg(long, value_name = "i/M", value_parser = shard, requires = "output", conflicts_with_all = ["json", "truth"], help_heading = "Advanced")]
     shard: Option<Shard>,
+    /// Follow a growing log, - or a serial device: show what its rows give so far and what to do next, and calibrate
+    /// when the specification is reached, no more rows come, or Ctrl-C is pressed
+    #[arg(long, conflicts_with_all = ["shard", "temperature", "truth"], help_heading = FOLLOWING)]
+    follow: bool,
+    /// File that keeps the rows of - or a device; an existing one is continued [default: follow-TIME.csv]
+    #[arg(long, value_name = "FILE", requires = "follow", help_heading = FOLLOWING)]
+    keep: Option<PathBuf>,
+    /// A followed file ends when it has not grown for this time, s
+    #[arg(long, value_name = "S", requires = "follow", value_parser = seconds, default_value = "30", help_heading = FOLLOWING)]
+    patience: Duration,
     /// Print the calibration, or the evaluation of the lot, as one JSON document and nothing else
     #[arg(long)]
     json: bool,
@@ -94,6 +112,9 @@ pub struct Calibrate {
 impl Calibrate {
     pub fn run(&self) -> anyhow::Result<()> {
         self.estimation.check();
+        if self.follow {
+            return self.followed();
+        }
         match self.runs.as_slice() {
             [file] if self.specification.is_none() && self.shard.is_none() => {
                 match Campaign::is_at(file) {
@@ -103,6 +124,25 @@ impl Calibrate {
             }
             _ => self.lot(),
         }
+    }
+
+    /// Follows the rows of a log to their end, then calibrates them.
+    fn followed(&self) -> anyhow::Result<()> {
+        let [source] = self.runs.as_slice() else {
+            let message = "--follow is of one log; calibrate several when they are complete\n";
+            clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
+        };
+        let specification = self.specification.as_deref().map(models::specification);
+        let specification = specification.transpose()?;
+        let follow = Follow {
+            source,
+            of_log: &self.of_log,
+            specification: specification.as_ref(),
+            keep: self.keep.as_deref(),
+            patience: self.patience,
+            silent: self.json,
+        };
+        self.one(&follow.run()?)
     }
 
     fn lot(&self) -> anyhow::Result<()> {

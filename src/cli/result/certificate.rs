@@ -6,7 +6,7 @@ use anyhow::Context;
 use turncal::calibration::result::Calibration;
 use turncal::certificate::{Certificate as Content, Conformity, Decision, Laboratory};
 use turncal::formats::digest_of_bytes;
-use turncal::lot::Specification;
+use turncal::models;
 use turncal::report::certificate;
 
 use crate::cli::NotMet;
@@ -63,7 +63,7 @@ impl Certificate {
         let bytes = read(path)?;
         let laboratory = Laboratory::read(laboratory, |key| calibration.meta.get(key).cloned())?;
         let specification = self.specification.as_deref();
-        let specification = specification.map(Specification::read).transpose()?;
+        let specification = specification.map(models::specification).transpose()?;
         let earlier = self.as_found.as_deref();
         let earlier = earlier.map(Calibration::read).transpose()?;
         let name = self

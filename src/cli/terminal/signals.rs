@@ -1,12 +1,28 @@
 //! What happens when the command is interrupted.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Whether Ctrl-C ends what is going on instead of the command …
+static ENDS_GENTLY: AtomicBool = AtomicBool::new(false);
+/// … and whether it was pressed.
+static ENDED: AtomicBool = AtomicBool::new(false);
+
+/// From here on, the first Ctrl-C makes [`is_ended`] true; the next one ends the command.
+pub fn end_gently() {
+    ENDS_GENTLY.store(true, Ordering::SeqCst);
+}
+
+/// Whether Ctrl-C was pressed after [`end_gently`].
+pub fn is_ended() -> bool {
+    ENDED.load(Ordering::SeqCst)
+}
+
 /// Makes Ctrl-C, a request to end and a lost terminal end the command without leaving anything
 /// unfinished behind; shells report them as status 130, 143 and 129.
 #[cfg(unix)]
 pub fn leave_nothing_behind() {
     use std::process;
     use std::sync::Arc;
-    use std::sync::atomic::AtomicBool;
     use std::thread;
 
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
@@ -26,7 +42,11 @@ pub fn leave_nothing_behind() {
     let thread = thread::Builder::new()
         .name("signals".into())
         .spawn(move || {
-            if let Some(signal) = signals.forever().next() {
+            for signal in signals.forever() {
+                if signal == SIGINT && ENDS_GENTLY.swap(false, Ordering::SeqCst) {
+                    ENDED.store(true, Ordering::SeqCst);
+                    continue;
+                }
                 abandon_unfinished();
                 // Ended by the signal itself, so that a shell's loop over many runs ends, too.
                 let _ = emulate_default_handler(signal);

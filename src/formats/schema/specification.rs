@@ -46,7 +46,12 @@ impl Specification {
             "the specification",
             "Give the path of a specification.toml.",
         )?;
-        let document = Document::of(path, &text);
+        Self::of_text(path, &text)
+    }
+
+    /// The same of a text that was read from a file.
+    pub fn of_text(path: &Path, text: &str) -> Result<Self, FileError> {
+        let document = Document::of(path, text);
         let file: SpecificationFile = document.fill(document.of_format(FORMAT)?)?;
         let confidence = file.confidence.unwrap_or(CONFIDENCE);
         if !(0.5..1.0).contains(&confidence) {

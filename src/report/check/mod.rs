@@ -9,6 +9,8 @@ use crate::report::prelude::*;
 use crate::run::Run;
 use crate::survey::Survey;
 
+pub use words::{findings, way_up};
+
 /// Everything that is said of a run and what was found in it.
 pub fn document(run: &Run, survey: &Survey) -> Document {
     let imu = &run.recording.imu;

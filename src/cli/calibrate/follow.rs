@@ -1,0 +1,306 @@
+//! `turncal calibrate --follow`: evaluates rows while they come in, until they are enough or no more come.
+
+use std::fs::{File, OpenOptions};
+use std::io::{self, IsTerminal, Read, Write};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
+use std::thread;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use anyhow::Context;
+use turncal::lot::Specification;
+use turncal::report::terminal::printable;
+use turncal::report::{session, wrapped};
+use turncal::run::Run;
+use turncal::survey::{Advisor, Status};
+
+use crate::cli::arguments::OfLog;
+use crate::cli::terminal::{columns, end_gently, is_ended, print};
+
+/// The screen is drawn again after this time.
+const REDRAW: Duration = Duration::from_millis(250);
+/// Evaluations take at most one part in this many of the time, and start a second apart.
+const SHARE: u32 = 20;
+const APART: Duration = Duration::from_secs(1);
+/// A device that is gone is looked for again after this time.
+const AGAIN: Duration = Duration::from_secs(1);
+
+/// Rows to follow.
+pub struct Follow<'a> {
+    /// A growing file, `-` or a device.
+    pub source: &'a Path,
+    pub of_log: &'a OfLog,
+    pub specification: Option<&'a Specification>,
+    /// Where rows of a pipe or a device are kept.
+    pub keep: Option<&'a Path>,
+    /// A file that has not grown for this time has ended.
+    pub patience: Duration,
+    /// Whether standard output belongs to the result.
+    pub silent: bool,
+}
+
+impl Follow<'_> {
+    /// Follows the rows to their end, and returns the log in which they are.
+    pub fn run(&self) -> anyhow::Result<PathBuf> {
+        end_gently();
+        let mut rows = self.begin()?;
+        let mut screen = Screen::new(self.silent);
+        let mut advisor = Advisor::default();
+        let mut due = Instant::now();
+        let mut known = 0;
+        let end = loop {
+            if is_ended() {
+                break "Ctrl-C";
+            }
+            if !rows.wait(REDRAW)? {
+                break "no more rows";
+            }
+            if rows.size > known && Instant::now() >= due {
+                let begun = Instant::now();
+                known = rows.size;
+                if self.evaluate(&rows.log, &mut advisor, &mut screen)? {
+                    break "the specification can be decided";
+                }
+                due = begun + APART.max(begun.elapsed() * SHARE);
+            }
+        };
+        if rows.size > known {
+            self.evaluate(&rows.log, &mut advisor, &mut screen)?;
+        }
+        tell!("following ended: {end}; rows are in {}", rows.log.display());
+        Ok(rows.log)
+    }
+
+    /// Shows what the rows give so far; whether they are enough.
+    fn evaluate(
+        &self,
+        log: &Path,
+        advisor: &mut Advisor,
+        screen: &mut Screen,
+    ) -> anyhow::Result<bool> {
+        match self.of_log.open_with(log, |_| ()) {
+            Ok(opened) => {
+                let status = Status::of(&opened.run, self.specification, advisor);
+                screen.show(&opened.run, &status, self.specification)?;
+                Ok(status.is_met())
+            }
+            Err(error) => {
+                screen.trouble(&format!("{error:#}"))?;
+                Ok(false)
+            }
+        }
+    }
+
+    fn begin(&self) -> anyhow::Result<Incoming> {
+        let named =
+            |error: io::Error| anyhow::Error::new(error).context(self.source.display().to_string());
+        if self.source.is_file() {
+            return Ok(Incoming {
+                log: self.source.to_owned(),
+                size: 0,
+                kind: Kind::Growing {
+                    grew: Instant::now(),
+                    patience: self.patience,
+                },
+            });
+        }
+        let is_stdin = self.source == Path::new("-");
+        if !is_stdin {
+            self.source.metadata().map_err(named)?;
+        }
+        let log = self.keep.map_or_else(default_log, Path::to_owned);
+        let file = OpenOptions::new().create(true).append(true).open(&log);
+        let file = file.with_context(|| log.display().to_string())?;
+        Ok(Incoming {
+            size: file.metadata().map_err(named)?.len(),
+            kind: Kind::Kept {
+                file,
+                chunks: read_in_background(self.source.to_owned())?,
+            },
+            log,
+        })
+    }
+}
+
+fn default_log() -> PathBuf {
+    let now = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default();
+    PathBuf::from(format!("follow-{}.csv", now.as_secs()))
+}
+
+/// Rows that come in, and the log in which they are.
+struct Incoming {
+    log: PathBuf,
+    /// Bytes up to now.
+    size: u64,
+    kind: Kind,
+}
+
+enum Kind {
+    /// Another program writes the log.
+    Growing { grew: Instant, patience: Duration },
+    /// What is read is kept in the log.
+    Kept {
+        file: File,
+        chunks: Receiver<io::Result<Vec<u8>>>,
+    },
+}
+
+impl Incoming {
+    /// Waits for bytes; false at the end.
+    fn wait(&mut self, most: Duration) -> anyhow::Result<bool> {
+        match &mut self.kind {
+            Kind::Growing { grew, patience } => {
+                thread::sleep(most);
+                let size = self.log.metadata().map_or(self.size, |of| of.len());
+                if size != self.size {
+                    (self.size, *grew) = (size, Instant::now());
+                }
+                Ok(grew.elapsed() < *patience)
+            }
+            Kind::Kept { file, chunks } => {
+                let begun = Instant::now();
+                while let Some(left) = most.checked_sub(begun.elapsed()) {
+                    match chunks.recv_timeout(left) {
+                        Ok(bytes) => {
+                            let bytes = bytes.with_context(|| self.log.display().to_string())?;
+                            file.write_all(&bytes)
+                                .with_context(|| self.log.display().to_string())?;
+                            self.size += bytes.len() as u64;
+                        }
+                        Err(RecvTimeoutError::Timeout) => break,
+                        Err(RecvTimeoutError::Disconnected) => return Ok(false),
+                    }
+                }
+                Ok(true)
+            }
+        }
+    }
+}
+
+/// Reads standard input or a device. A device that goes is opened again when it comes; a row that was cut is ended.
+fn read_in_background(source: PathBuf) -> anyhow::Result<Receiver<io::Result<Vec<u8>>>> {
+    let (chunks, received) = mpsc::channel();
+    let is_stdin = source == Path::new("-");
+    let read = move || {
+        let mut buffer = [0; 4096];
+        loop {
+            let opened: io::Result<Box<dyn Read>> = match is_stdin {
+                true => Ok(Box::new(io::stdin())),
+                false => File::open(&source).map(|file| Box::new(file) as Box<dyn Read>),
+            };
+            if let Ok(mut input) = opened {
+                let mut in_row = false;
+                while let Ok(count @ 1..) = input.read(&mut buffer) {
+                    in_row = buffer[count - 1] != b'\n';
+                    if chunks.send(Ok(buffer[..count].to_vec())).is_err() {
+                        return;
+                    }
+                }
+                if is_stdin {
+                    return;
+                }
+                if in_row && chunks.send(Ok(b"\n".to_vec())).is_err() {
+                    return;
+                }
+                tell!("{}: gone; waiting for it (Ctrl-C ends)", source.display());
+            }
+            thread::sleep(AGAIN);
+        }
+    };
+    thread::Builder::new().name("rows".into()).spawn(read)?;
+    Ok(received)
+}
+
+/// What is shown: a screen that is redrawn on a terminal, else a line for each dwell.
+struct Screen {
+    is_terminal: bool,
+    silent: bool,
+    /// Lines on the terminal that the next screen replaces.
+    drawn: usize,
+    /// Dwells that were told.
+    told: usize,
+    trouble: String,
+}
+
+impl Screen {
+    fn new(silent: bool) -> Self {
+        Self {
+            is_terminal: io::stdout().is_terminal(),
+            silent,
+            drawn: 0,
+            told: 0,
+            trouble: String::new(),
+        }
+    }
+
+    fn show(
+        &mut self,
+        run: &Run,
+        status: &Status,
+        specification: Option<&Specification>,
+    ) -> anyhow::Result<()> {
+        self.trouble.clear();
+        if self.is_terminal && !self.silent {
+            return self.draw(&session::screen(run, status, specification));
+        }
+        // The last dwell goes on while the instrument is at rest.
+        let whole = status.survey.rests.len() - usize::from(status.still > 0.0);
+        while self.told < whole {
+            if let Some(line) = session::line(status, self.told) {
+                self.tell(&line)?;
+            }
+            self.told += 1;
+            if self.told == whole
+                && let Some(next) = status.next
+            {
+                self.tell(&format!("next: {}", session::words(next)))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// What keeps the rows from being evaluated, once.
+    fn trouble(&mut self, text: &str) -> anyhow::Result<()> {
+        if self.is_terminal && !self.silent {
+            return self.draw(&[
+                "waiting for rows that can be read".to_owned(),
+                text.to_owned(),
+            ]);
+        }
+        if self.trouble != text {
+            text.clone_into(&mut self.trouble);
+            self.tell(&format!("not yet: {text}"))?;
+        }
+        Ok(())
+    }
+
+    fn tell(&self, line: &str) -> anyhow::Result<()> {
+        match self.silent {
+            true => {
+                tell!("{}", printable(line));
+                Ok(())
+            }
+            false => print(format!("{}\n", printable(line)).as_bytes()),
+        }
+    }
+
+    fn draw(&mut self, lines: &[String]) -> anyhow::Result<()> {
+        let width = usize::from(columns().unwrap_or(80)).max(20);
+        let mut text = String::new();
+        if self.drawn > 0 {
+            text += &format!("\u{1b}[{}A", self.drawn);
+        }
+        text += "\u{1b}[J";
+        self.drawn = 0;
+        for line in lines {
+            for part in wrapped(&printable(line), "  ", Some(width)) {
+                text += &part;
+                text.push('\n');
+                self.drawn += 1;
+            }
+        }
+        print(text.as_bytes())
+    }
+}

@@ -1,0 +1,246 @@
+//! What to do next with a sensor in the hand: of 26 attitudes and six turns, the one that lowers σ most.
+//!
+//! The information of a move is that of a short record of it, dwell, turn and dwell, which adds to that of the record
+//! so far.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, Matrix3, Vector3};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::Survey;
+use super::session::{Progress, needed_ratio};
+use crate::attitude::level;
+use crate::calibration::{Bound, Options, Problem, bound};
+use crate::imu::{InstallationForm, MotionNoise, NoiseSource, Sensor, TermVector};
+use crate::lot::{Check, Specification, Verdict};
+use crate::recording::Recording;
+use crate::run::{Aiding, Run};
+use crate::simulation::{Integrator, true_increments};
+use crate::turntable::{
+    Axis, BodyStep, Imperfection, Motion, Moves, Path, Rotation, Table, TableErrors,
+};
+use crate::units::DEGREE;
+
+/// Noise that turning by hand adds to the gyros' angle, √s: 0.05° (1σ) in a quarter turn of 1.5 s, the size that
+/// records of MEMS sensors turned by hand show (bandwidth, timing and second-order effects of the sensor).
+pub const TURNED_BY_HAND: MotionNoise = MotionNoise {
+    by_motion: 7e-4,
+    by_duration: 0.0,
+};
+
+/// Duration of a dwell, s.
+const DWELL: f64 = 5.0;
+/// Mean rate of a turn by hand, rad/s.
+const RATE: f64 = 45.0 * DEGREE;
+/// Sample period of the short records, s: noise is stated by its density, and hands are slow.
+const PERIOD: f64 = 0.05;
+
+/// A move of the instrument, to be followed by a dwell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Move {
+    /// To where this direction along right-front-up points up: an axis, an edge or a corner.
+    Up(Vector3<f64>),
+    /// By half a turn about this body axis, right-handed about the positive or negative axis.
+    HalfTurn {
+        /// Index of the axis: right, front, up.
+        axis: usize,
+        /// Whether about the negative axis.
+        is_negative: bool,
+    },
+}
+
+impl Move {
+    /// The 26 attitudes and six turns.
+    pub fn all() -> impl Iterator<Item = Self> {
+        let turns = (0..6).map(|k| Self::HalfTurn {
+            axis: k / 2,
+            is_negative: k % 2 == 1,
+        });
+        ups().map(Self::Up).chain(turns)
+    }
+
+    fn rotation(self) -> Rotation {
+        match self {
+            Self::Up(axis) => Rotation::Point {
+                axis,
+                along: Vector3::z(),
+            },
+            Self::HalfTurn { axis, is_negative } => {
+                let angle = if is_negative { -180.0 } else { 180.0 };
+                Rotation::By(Vector3::ith(axis, angle * DEGREE))
+            }
+        }
+    }
+}
+
+/// Directions from the centre of a cube to its six faces, then twelve edges, then eight corners.
+fn ups() -> impl Iterator<Item = Vector3<f64>> {
+    (1..=3).flat_map(|parts| {
+        let all = (0..27)
+            .map(|k| Vector3::new(k % 3, k / 3 % 3, k / 9).map(|part| f64::from(part) - 1.0));
+        let of_parts =
+            move |up: &Vector3<f64>| up.iter().filter(|part| **part != 0.0).count() == parts;
+        all.filter(of_parts).map(|up| up.normalize())
+    })
+}
+
+/// Chooses moves. Information of moves is kept for each attitude at which they begin.
+#[derive(Debug, Clone, Default)]
+pub struct Advisor {
+    from: BTreeMap<usize, Vec<(Move, DMatrix<f64>)>>,
+}
+
+impl Advisor {
+    /// What to do before any calibration is possible: the first axis that was neither up nor down, from the first on.
+    pub fn first(&self, survey: &Survey) -> Move {
+        let faces = ups().take(6);
+        let apart = |up: &Vector3<f64>| {
+            let angles = survey.rests.iter().map(|rest| rest.force.angle(up));
+            angles.fold(f64::INFINITY, f64::min)
+        };
+        let farthest = faces.max_by(|a, b| apart(a).total_cmp(&apart(b)));
+        Move::Up(farthest.unwrap_or(Vector3::z()))
+    }
+
+    /// The move that lowers most what is missing, from where this direction along body axes points up: σ beyond those
+    /// that a specification needs, else all σ. `None` if the specification is decided.
+    pub fn next(
+        &mut self,
+        run: &Run,
+        up: &Vector3<f64>,
+        progress: &Progress,
+        specification: Option<&Specification>,
+    ) -> Option<Move> {
+        if progress.is_met() {
+            return None;
+        }
+        let known = information(&progress.bound)?;
+        let place = ups()
+            .enumerate()
+            .min_by(|(_, a), (_, b)| a.angle(up).total_cmp(&b.angle(up)));
+        let (place, from) = place?;
+        let moves = self.from.entry(place).or_insert_with(|| worth(run, &from));
+        let missing = |(_, gained): &(Move, DMatrix<f64>)| -> f64 {
+            let all = &known + gained;
+            let Some(covariance) = all.cholesky().map(|root| root.inverse()) else {
+                return f64::INFINITY;
+            };
+            let sigma = covariance.diagonal().map(f64::sqrt);
+            missing(
+                &progress.bound,
+                sigma.as_slice(),
+                &progress.checks,
+                specification,
+            )
+        };
+        let best = moves
+            .iter()
+            .min_by(|a, b| missing(a).total_cmp(&missing(b)));
+        best.map(|(best, _)| *best)
+    }
+}
+
+/// Sum of the logarithms of σ, in units of their prior: over what a specification needs, or of all.
+fn missing(
+    bound: &Bound,
+    sigma: &[f64],
+    checks: &[Check],
+    specification: Option<&Specification>,
+) -> f64 {
+    let estimated: Vec<usize> = bound.estimate.estimated().collect();
+    let Some(specification) = specification else {
+        return sigma.iter().map(|sigma| sigma.ln()).sum();
+    };
+    let needed = needed_ratio(specification);
+    let over = |check: &Check| {
+        let k = estimated.iter().position(|&k| k == check.limit.parameter)?;
+        let allowed = check.limit.within / needed / bound.prior_sigma[check.limit.parameter];
+        Some((sigma[k] / allowed).ln().max(0.0))
+    };
+    let open = checks.iter().filter(|check| check.verdict != Verdict::Pass);
+    open.filter_map(over).sum()
+}
+
+/// Information on the estimated parameters in units of their prior σ, with that of the prior.
+fn information(bound: &Bound) -> Option<DMatrix<f64>> {
+    let estimated: Vec<usize> = bound.estimate.estimated().collect();
+    let n = estimated.len();
+    let prior = &bound.prior_sigma;
+    let covariance = DMatrix::from_fn(n, n, |i, j| {
+        let (i, j) = (estimated[i], estimated[j]);
+        bound.estimate.covariance[(i, j)] / (prior[i] * prior[j])
+    });
+    Some(covariance.cholesky()?.inverse())
+}
+
+/// What each move from an attitude gains, without the prior.
+fn worth(run: &Run, from: &Vector3<f64>) -> Vec<(Move, DMatrix<f64>)> {
+    let gained = |of: Move| {
+        let information = information(&alone(run, from, of)?)?;
+        let n = information.nrows();
+        Some((of, information - DMatrix::identity(n, n)))
+    };
+    Move::all().filter_map(gained).collect()
+}
+
+/// The bound of a short record of one move.
+fn alone(run: &Run, from: &Vector3<f64>, of: Move) -> Option<Bound> {
+    let start = level(from);
+    let rotation = of.rotation();
+    let angle = rotation.vector(&start).norm();
+    let path = Path {
+        first_dwell: DWELL,
+        moves: Moves::Body {
+            start,
+            steps: vec![BodyStep {
+                rotation,
+                duration: 1.0 + angle / RATE,
+                acceleration: 2.0 * RATE,
+                dwell: DWELL,
+            }],
+        },
+    };
+    let record = Run {
+        recording: recording(run, &path)?,
+        ..run.clone()
+    };
+    let options = Options::default().aiding(Aiding::Velocity);
+    let mut problem = Problem::new(&record, &options);
+    problem.model.motion_noise.gyro = TURNED_BY_HAND;
+    let truth = run.instrument.prior_mean(InstallationForm::General);
+    bound(&problem, &truth, &TermVector::zeros()).ok()
+}
+
+/// The record of a path by an instrument like that of a run, with its noise.
+fn recording(run: &Run, path: &Path) -> Option<Recording> {
+    let fast = Axis {
+        name: String::new(),
+        direction: Vector3::z(),
+        max_rate: f64::INFINITY,
+        max_acceleration: f64::INFINITY,
+    };
+    let hand = Table {
+        axes: vec![fast],
+        mount: Matrix3::identity(),
+        errors: TableErrors::default(),
+    };
+    let motion = Motion::new(&hand, path, &Imperfection::none(&hand)).ok()?;
+    let integrator = Integrator {
+        period: PERIOD,
+        lever_arm: Vector3::zeros(),
+        steps: 1,
+    };
+    let mut samples = true_increments(&motion, &run.site, &integrator, &TermVector::zeros());
+    let mut rng = ChaCha8Rng::seed_from_u64(0);
+    for sensor in Sensor::ALL {
+        let instrument = &run.instrument;
+        let mut noise = NoiseSource::new(*instrument.noise.get(sensor), PERIOD, &mut rng);
+        let bias = instrument.prior.get(sensor).bias * PERIOD;
+        for sample in samples.get_mut(sensor) {
+            *sample += bias + noise.draw(&mut rng);
+        }
+    }
+    Recording::from_samples("", 0.0, PERIOD, samples.gyro, samples.accel).ok()
+}

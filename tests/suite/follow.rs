@@ -1,0 +1,166 @@
+//! `turncal calibrate --follow`: rows that come in are evaluated, kept, and calibrated in the end.
+
+use std::fs::{self, OpenOptions};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::thread;
+use std::time::Duration;
+
+use turncal::formats::write_run;
+use turncal::imu::Output as Quantity;
+use turncal::models::path_by_hand;
+use turncal::simulation::Scenario;
+
+const PATH: &str =
+    "z_up, turn x 180, x_up, x_down, turn z 90, y_up, y_down, turn y 180, turn x 90, turn z 180";
+const STATED: [&str; 2] = ["--latitude", "34"];
+
+/// Rows of a sensor that is turned by hand, 100 a second.
+fn rows(directory: &Path) -> String {
+    let mut scenario = Scenario::load("mems").unwrap();
+    scenario.path = path_by_hand(PATH).unwrap();
+    let run = scenario.simulate(5, 0).unwrap().run;
+    let whole = directory.join("whole");
+    fs::create_dir(&whole).unwrap();
+    write_run(&whole, &run, Quantity::Rate, None).unwrap();
+    fs::read_to_string(whole.join("imu.csv")).unwrap()
+}
+
+fn turncal(directory: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin("turncal"));
+    command
+        .current_dir(directory)
+        .arg("calibrate")
+        .args(STATED)
+        .args(arguments);
+    command
+}
+
+fn spawned(directory: &Path, arguments: &[&str]) -> Child {
+    let mut command = turncal(directory, arguments);
+    let command = command
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command.spawn().unwrap()
+}
+
+/// The calibration of the kept rows by the ordinary command.
+fn offline(directory: &Path, log: &str) -> Vec<u8> {
+    let output = turncal(directory, &[log, "--json"]).output().unwrap();
+    assert!(output.status.success());
+    output.stdout
+}
+
+fn text(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
+}
+
+#[test]
+fn rows_of_a_pipe_are_kept_and_calibrated_as_the_file_of_them() {
+    let directory = tempfile::tempdir().unwrap();
+    let rows = rows(directory.path());
+    let mut child = spawned(
+        directory.path(),
+        &["--follow", "-", "--keep", "kept.csv", "--json"],
+    );
+    let mut stdin = child.stdin.take().unwrap();
+    // Half a row now, the other half later, and an end within a row.
+    let cut = rows.len() / 2 + 7;
+    for part in [&rows[..cut], &rows[cut..rows.len() - 3]] {
+        stdin.write_all(part.as_bytes()).unwrap();
+        thread::sleep(Duration::from_millis(1500));
+    }
+    drop(stdin);
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success(), "{}", text(&output));
+    let kept = fs::read_to_string(directory.path().join("kept.csv")).unwrap();
+    assert_eq!(kept, rows[..rows.len() - 3]);
+    assert_eq!(output.stdout, offline(directory.path(), "kept.csv"));
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(told.contains("dwell 1: z up"), "{told}");
+    assert!(told.contains("next: "), "{told}");
+}
+
+#[test]
+fn a_growing_file_ends_when_it_no_longer_grows() {
+    let directory = tempfile::tempdir().unwrap();
+    let rows = rows(directory.path());
+    let log = directory.path().join("imu.csv");
+    fs::write(&log, &rows[..rows.len() / 3]).unwrap();
+    let child = spawned(
+        directory.path(),
+        &["--follow", "imu.csv", "--patience", "3", "--json"],
+    );
+    let mut file = OpenOptions::new().append(true).open(&log).unwrap();
+    thread::sleep(Duration::from_secs(1));
+    file.write_all(&rows.as_bytes()[rows.len() / 3..]).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(
+        output.stdout,
+        offline(directory.path(), "imu.csv"),
+        "{}",
+        text(&output)
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn a_device_that_goes_comes_again_and_ctrl_c_calibrates_what_was_read() {
+    let directory = tempfile::tempdir().unwrap();
+    let rows = rows(directory.path());
+    let made = Command::new("mkfifo")
+        .arg(directory.path().join("device"))
+        .status();
+    assert!(made.unwrap().success());
+    let child = spawned(
+        directory.path(),
+        &["--follow", "device", "--keep", "kept.csv", "--json"],
+    );
+    let device: PathBuf = directory.path().join("device");
+    let cut = rows[..rows.len() / 2].rfind('\n').unwrap() + 1;
+    for part in [&rows[..cut], &rows[cut..]] {
+        fs::write(&device, part).unwrap();
+        thread::sleep(Duration::from_secs(2));
+    }
+    let id = child.id().to_string();
+    assert!(
+        Command::new("kill")
+            .args(["-INT", &id])
+            .status()
+            .unwrap()
+            .success()
+    );
+    let output = child.wait_with_output().unwrap();
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(told.contains("gone") && told.contains("Ctrl-C"), "{told}");
+    assert_eq!(
+        fs::read_to_string(directory.path().join("kept.csv")).unwrap(),
+        rows
+    );
+    assert_eq!(
+        output.stdout,
+        offline(directory.path(), "kept.csv"),
+        "{told}"
+    );
+}
+
+#[test]
+fn what_keeps_rows_from_being_read_is_told_while_they_come() {
+    let directory = tempfile::tempdir().unwrap();
+    let mut child = spawned(directory.path(), &["--follow", "-", "--keep", "kept.csv"]);
+    let mut stdin = child.stdin.take().unwrap();
+    // As a serial line at another baud rate.
+    let noise: Vec<u8> = (0..4000_u32)
+        .map(|k| (k * 7919 % 251) as u8 | 0x80)
+        .collect();
+    stdin.write_all(&noise).unwrap();
+    thread::sleep(Duration::from_secs(2));
+    drop(stdin);
+    let output = child.wait_with_output().unwrap();
+    assert!(!output.status.success());
+    let told = text(&output);
+    assert!(told.contains("not yet: "), "{told}");
+    assert_eq!(fs::read(directory.path().join("kept.csv")).unwrap(), noise);
+}
