@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use clap::Parser;
+use flate2::read::GzDecoder;
 use rayon::prelude::*;
 use turncal::calibration::{
     self, Assessment, ClosedForm, Estimate, Method, Options, Problem, Solution,
@@ -136,7 +137,8 @@ impl Demo {
         let (whole, log) = (folder.path().join("sensor"), folder.path().join("imu.csv"));
         std::fs::create_dir(&whole)?;
         write(&simulated(&scenario, self.seed)?, &whole)?;
-        let rows = std::fs::read_to_string(whole.join("imu.csv"))?;
+        let rows = GzDecoder::new(File::open(whole.join("imu.csv.gz"))?);
+        let rows = std::io::read_to_string(rows)?;
         let latitude = (scenario.site.latitude / DEGREE).to_string();
         let arguments = [
             "turncal",

@@ -5,6 +5,7 @@
 //! not decided: a guard band on both sides of each limit (JCGM 106:2012, 7.2 and 8.3).
 
 use serde::{Deserialize, Serialize};
+use statrs::distribution::{ContinuousCDF, Normal};
 use statrs::function::erf::erfc;
 
 use super::quantity::{Quantity, Sample};
@@ -16,6 +17,13 @@ pub struct Specification {
     pub confidence: f64,
     /// The limits.
     pub limits: Vec<Limit>,
+}
+
+impl Specification {
+    /// Largest σ with which a unit at its nominal value passes a limit within this distance.
+    pub fn deciding_sigma(&self, within: f64) -> f64 {
+        within / Normal::standard().inverse_cdf(0.5 * (1.0 + self.confidence))
+    }
 }
 
 /// Limit of a parameter.

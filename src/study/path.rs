@@ -4,7 +4,8 @@ use rayon::prelude::*;
 
 use super::navigation::{Mission, NavigationStudyError, Outlook};
 use crate::calibration::{
-    Bound, CalibrationError, Options, ParameterVector, Problem, TermLeftOff, bound, terms_left_off,
+    Bound, CalibrationError, Options, ParameterVector, Problem, TermLeftOff, bound, coarse_start,
+    terms_left_off,
 };
 use crate::imu::{PerSensor, TermVector, Triad};
 use crate::run::{Aiding, Run};

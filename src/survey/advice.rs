@@ -10,7 +10,6 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::Survey;
-use super::session::{Progress, needed_ratio};
 use crate::attitude::level;
 use crate::calibration::{Bound, Options, Problem, bound};
 use crate::imu::{InstallationForm, MotionNoise, NoiseSource, Sensor, TermVector};
@@ -105,18 +104,15 @@ impl Advisor {
     }
 
     /// The move that lowers most what is missing, from where this direction along body axes points up: σ beyond those
-    /// that a specification needs, else all σ. `None` if the specification is decided.
+    /// that a specification needs, else all σ.
     pub fn next(
         &mut self,
         run: &Run,
         up: &Vector3<f64>,
-        progress: &Progress,
+        (bound, checks): (&Bound, &[Check]),
         specification: Option<&Specification>,
     ) -> Option<Move> {
-        if progress.is_met() {
-            return None;
-        }
-        let known = information(&progress.bound)?;
+        let known = information(bound)?;
         let place = ups()
             .enumerate()
             .min_by(|(_, a), (_, b)| a.angle(up).total_cmp(&b.angle(up)));
@@ -128,12 +124,7 @@ impl Advisor {
                 return f64::INFINITY;
             };
             let sigma = covariance.diagonal().map(f64::sqrt);
-            missing(
-                &progress.bound,
-                sigma.as_slice(),
-                &progress.checks,
-                specification,
-            )
+            missing(bound, sigma.as_slice(), checks, specification)
         };
         let best = moves
             .iter()
@@ -153,10 +144,10 @@ fn missing(
     let Some(specification) = specification else {
         return sigma.iter().map(|sigma| sigma.ln()).sum();
     };
-    let needed = needed_ratio(specification);
     let over = |check: &Check| {
         let k = estimated.iter().position(|&k| k == check.limit.parameter)?;
-        let allowed = check.limit.within / needed / bound.prior_sigma[check.limit.parameter];
+        let allowed = specification.deciding_sigma(check.limit.within);
+        let allowed = allowed / bound.prior_sigma[check.limit.parameter];
         Some((sigma[k] / allowed).ln().max(0.0))
     };
     let open = checks.iter().filter(|check| check.verdict != Verdict::Pass);

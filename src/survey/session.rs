@@ -1,7 +1,6 @@
 //! A calibration while its rows come in: what they give so far, and what to do next.
 
 use nalgebra::Vector3;
-use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::advice::{Advisor, Move};
 use super::{Survey, bound_of_record};
@@ -58,7 +57,10 @@ impl Status {
         let bound = bound_of_record(run, &Options::default());
         let expected = bound.map(|bound| Progress::new(run, &survey, bound, specification));
         let next = match &expected {
-            Ok(progress) => advisor.next(run, &up, progress, specification),
+            Ok(progress) if progress.is_met() => None,
+            Ok(Progress { bound, checks, .. }) => {
+                advisor.next(run, &up, (bound, checks), specification)
+            }
             Err(_) => Some(advisor.first(&survey)),
         };
         Self {
@@ -141,12 +143,7 @@ pub fn needed(specification: &Specification, group: Group) -> Option<f64> {
     let of_group = |limit: &&Limit| Group::of(limit.parameter) == group;
     let limits = specification.limits.iter().filter(of_group);
     let tightest = limits.map(|limit| limit.within).reduce(f64::min)?;
-    Some(tightest / needed_ratio(specification))
-}
-
-/// Ratio of a limit to the σ that decides it for a unit at its nominal values.
-pub fn needed_ratio(specification: &Specification) -> f64 {
-    Normal::standard().inverse_cdf(0.5 * (1.0 + specification.confidence))
+    Some(specification.deciding_sigma(tightest))
 }
 
 fn rms(sigma: &ParameterVector, indices: &[usize]) -> Option<f64> {

@@ -24,7 +24,8 @@ fn rows(directory: &Path) -> String {
     let whole = directory.join("whole");
     fs::create_dir(&whole).unwrap();
     write_run(&whole, &run, Quantity::Rate, None).unwrap();
-    fs::read_to_string(whole.join("imu.csv")).unwrap()
+    let file = fs::File::open(whole.join("imu.csv.gz")).unwrap();
+    std::io::read_to_string(flate2::read::GzDecoder::new(file)).unwrap()
 }
 
 fn turncal(directory: &Path, arguments: &[&str]) -> Command {

