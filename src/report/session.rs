@@ -57,12 +57,11 @@ pub fn screen(run: &Run, status: &Status, specification: Option<&Specification>)
     lines.push(String::new());
     lines.push(coverage(status));
     let findings = check::findings(run, &status.survey);
-    lines.extend(
-        findings
-            .iter()
-            .take(SHOWN)
-            .map(|finding| format!("note: {finding}")),
-    );
+    let first = |finding: &String| {
+        let sentence = finding.split_inclusive(". ").next().unwrap_or_default();
+        format!("note: {}", sentence.trim_end())
+    };
+    lines.extend(findings.iter().take(SHOWN).map(first));
     lines.push(match status.next {
         Some(next) => format!("next: {}; hold it still for 5 s", words(next)),
         None => "every limit of the specification can be decided".to_owned(),

@@ -19,7 +19,7 @@ use crate::cli::terminal::{columns, end_gently, is_ended, print};
 
 /// The screen is drawn again after this time.
 const REDRAW: Duration = Duration::from_millis(250);
-/// Evaluations take at most one part in this many of the time, and start a second apart.
+/// Evaluations take at most one part in this many of the time of a processor, and start a second apart.
 const SHARE: u32 = 20;
 const APART: Duration = Duration::from_secs(1);
 /// A device that is gone is looked for again after this time.
@@ -56,12 +56,12 @@ impl Follow<'_> {
                 break "no more rows";
             }
             if rows.size > known && Instant::now() >= due {
-                let begun = Instant::now();
+                let (begun, spent) = (Instant::now(), processor_time());
                 known = rows.size;
                 if self.evaluate(&rows.log, &mut advisor, &mut screen)? {
                     break "the specification can be decided";
                 }
-                due = begun + APART.max(begun.elapsed() * SHARE);
+                due = begun + APART.max(processor_time().saturating_sub(spent) * SHARE);
             }
         };
         if rows.size > known {
@@ -120,6 +120,21 @@ impl Follow<'_> {
             log,
         })
     }
+}
+
+/// Processor time of the command.
+#[cfg(any(target_os = "linux", target_vendor = "apple"))]
+fn processor_time() -> Duration {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    Duration::try_from(time).unwrap_or_default()
+}
+
+/// The time itself, where the system does not tell that of the processor.
+#[cfg(not(any(target_os = "linux", target_vendor = "apple")))]
+fn processor_time() -> Duration {
+    SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .unwrap_or_default()
 }
 
 fn default_log() -> PathBuf {
