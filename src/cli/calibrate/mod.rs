@@ -256,10 +256,13 @@ impl Calibrate {
     }
 }
 
-/// The run.toml by which a run was read: of a log, the one that is written next to the result.
+/// The run.toml by which a run was read: of a log, the one that is written next to the result; of a campaign, any.
 fn read_by(opened: Option<&Opened>, target: Option<&Path>, path: &Path) -> PathBuf {
-    let of_log = opened.filter(|opened| opened.is_of_log()).and(target);
-    of_log.map_or_else(|| path.to_owned(), |target| target.join("run.toml"))
+    match (opened, target) {
+        (Some(opened), Some(target)) if opened.is_of_log() => target.join("run.toml"),
+        (Some(_), _) => path.to_owned(),
+        (None, _) => PathBuf::from("RUN.toml"),
+    }
 }
 
 /// What was written, and what to do with it.
@@ -281,7 +284,10 @@ fn files(target: Option<&Path>, run: &Path, findings: &[Finding]) -> Facts {
     let explain = findings
         .first()
         .map(|finding| format!(", or turncal explain {}", finding.code));
-    facts.push("more", format!("--verbose{}", explain.unwrap_or_default()));
+    // What is there already is replaced by the same.
+    let force = target.map_or("", |_| " --force");
+    let more = format!("--verbose{force}{}", explain.unwrap_or_default());
+    facts.push("more", more);
     facts
 }
 
