@@ -157,14 +157,8 @@ pub(super) fn run(report: &Report) -> Facts {
     }
     for (sensor, input) in [(Sensor::Gyro, "rad/s"), (Sensor::Accel, "m/s²")] {
         let (name, instrument) = (sensor.name(), &run.instrument);
-        let (of, unit) = (
-            instrument.nominal.get(sensor).0,
-            instrument.unit.get(sensor),
-        );
-        let scale = format!(
-            "{}, {}, {} {unit} per second for 1 {input}",
-            of.x, of.y, of.z
-        );
+        let of = instrument.nominal.get(sensor).0.into();
+        let scale = nominal_scale(of, instrument.unit.get(sensor), input);
         facts.push(&format!("{name} nominal scale"), scale);
         let noise = noise(sensor, instrument.noise.get(sensor));
         facts.push(&format!("{name} noise"), noise);

@@ -2,7 +2,7 @@
 
 mod results;
 
-use results::{name, results};
+use results::results;
 
 use super::document::Block;
 use super::pdf;
@@ -11,7 +11,7 @@ use crate::calibration::Group;
 use crate::calibration::result::{EQUATION, GravityRecord};
 use crate::certificate::{
     AsFound, Authorised, Certificate, Condition, Conformity, Contact, Decision, Quantity, dcc,
-    temperature_words,
+    in_words, temperature_words,
 };
 use crate::imu::ParameterKind;
 use crate::report::prelude::*;
@@ -267,13 +267,13 @@ fn limits(conformity: &Conformity) -> Table {
         };
         let expanded = 2.0 * of.sigma / size;
         cells![
-            name(&of.name),
+            in_words(&of.name),
             value((of.off + of.limit.nominal - base) / size, expanded),
             sigma(expanded),
             format!(
                 "{} ± {}",
-                value((of.limit.nominal - base) / size, of.limit.within / size),
-                sigma(of.limit.within / size)
+                stated((of.limit.nominal - base) / size),
+                stated(of.limit.within / size)
             ),
             unit,
             of.decision.words(),
@@ -296,7 +296,7 @@ fn found(as_found: &AsFound) -> Table {
         let by = (change.left - change.found) / size;
         let in_u = expanded.filter(|u| *u > 0.0).map(|u| by / u);
         cells![
-            name(&change.name),
+            in_words(&change.name),
             value(change.found / size, digits),
             value(change.left / size, digits),
             value(by, digits),

@@ -1,22 +1,9 @@
 //! The table of results.
 
 use crate::calibration::Group;
-use crate::certificate::{Certificate, Measured, Quantity, to_twelve_digits};
+use crate::certificate::{Certificate, Measured, Quantity, in_words};
 use crate::imu::{Sensor, Term};
 use crate::report::prelude::*;
-
-/// A parameter in words, such as `gyroscope scale factor x`.
-pub fn name(measured: &str) -> String {
-    let words = [
-        ("gyro.", "gyroscope "),
-        ("accel.", "accelerometer "),
-        ("scale.", "scale factor "),
-        ("installation.", "misalignment "),
-    ];
-    let named = |name: String, (key, word): (&str, &str)| name.replace(key, word);
-    let name = words.into_iter().fold(measured.to_owned(), named);
-    name.replace(['.', '_'], " ")
-}
 
 /// Every parameter with its expanded uncertainty, and what both are.
 pub fn results(certificate: &Certificate) -> Table {
@@ -36,7 +23,7 @@ pub fn results(certificate: &Certificate) -> Table {
             false => figure,
         };
         cells![
-            name(&of.name),
+            in_words(&of.name),
             plus_minus(rounded(of.value / size), rounded(expanded)),
             unit,
             value(of.coverage_factor, 0.1),
@@ -83,14 +70,7 @@ pub fn results(certificate: &Certificate) -> Table {
 fn nominal(certificate: &Certificate, sensor: Sensor, input: &str) -> String {
     let unit = certificate.calibration.unit.as_ref();
     let unit = unit.map_or("output", |unit| unit.get(sensor).as_str());
-    let nominal = certificate.provenance.nominal.get(sensor);
-    let of = nominal.map(|scale| plain(to_twelve_digits(scale)));
-    // Outputs that are not rates are stated per second.
-    let per = match unit.contains('/') || unit == "g" {
-        true => "",
-        false => " per second",
-    };
-    format!("{} {unit}{per} for 1 {input}", of.join(", "))
+    nominal_scale(*certificate.provenance.nominal.get(sensor), unit, input)
 }
 
 /// What the error terms that have results add to the model's input.
