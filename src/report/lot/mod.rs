@@ -39,14 +39,17 @@ pub fn document(lot: &Lot) -> Document {
     for (good, text) in sentences.into_iter().flatten() {
         document.say(good, text);
     }
-    document.both(tables::undecided(lot));
-    document.both(facts(lot));
-    document.both(tables::units(lot));
-    document.page(figures::parameters(lot));
-    document.both(tables::parameters(lot));
-    document.page(figures::noise(lot));
-    document.both(tables::noise(lot));
-    document.pages(tables::values(lot));
+    document.both(tables::limits(lot));
+    // A single unit has no lot to be compared with.
+    if lot.rows.len() != 1 {
+        document.both(facts(lot));
+        document.both(tables::units(lot));
+        document.page(figures::parameters(lot));
+        document.both(tables::parameters(lot));
+        document.page(figures::noise(lot));
+        document.both(tables::noise(lot));
+        document.pages(tables::values(lot));
+    }
     document.data = data::data(lot);
     document.files = vec![("lot.csv".to_owned(), data::csv(lot))];
     document
@@ -199,7 +202,7 @@ fn trends(lot: &Lot) -> Vec<Sentence> {
         of.trends.iter().map(words)
     });
     let sentences: Vec<Sentence> = trends.collect();
-    match sentences.is_empty() {
+    match sentences.is_empty() && lot.rows.len() > 1 {
         true => vec![(
             true,
             format!(
