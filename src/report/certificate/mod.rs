@@ -2,7 +2,7 @@
 
 mod results;
 
-use results::results;
+use results::{results, two_digits};
 
 use super::document::Block;
 use super::pdf;
@@ -265,10 +265,11 @@ fn limits(conformity: &Conformity) -> Table {
             ParameterKind::Scale => 1.0,
             ParameterKind::Installation | ParameterKind::Bias => 0.0,
         };
-        let expanded = 2.0 * of.sigma / size;
+        let off = of.off + of.limit.nominal - base;
+        let (found, expanded) = two_digits(off / size, 2.0 * of.sigma / size);
         cells![
             in_words(&of.name),
-            value((of.off + of.limit.nominal - base) / size, expanded),
+            value(found, expanded),
             sigma(expanded),
             format!(
                 "{} ± {}",
@@ -293,14 +294,15 @@ fn found(as_found: &AsFound) -> Table {
         let (unit, size) = change.quantity.unit();
         let expanded = change.sigma.map(|sigma| 2.0 * sigma / size);
         let digits = expanded.unwrap_or(0.01);
-        let by = (change.left - change.found) / size;
-        let in_u = expanded.filter(|u| *u > 0.0).map(|u| by / u);
+        let by = change.left - change.found;
+        let in_u = expanded.filter(|u| *u > 0.0).map(|u| by / size / u);
+        let shown = |of: f64| value(two_digits(of / size, digits).0, digits);
         cells![
             in_words(&change.name),
-            value(change.found / size, digits),
-            value(change.left / size, digits),
-            value(by, digits),
-            or_dash(expanded, sigma),
+            shown(change.found),
+            shown(change.left),
+            shown(by),
+            or_dash(expanded, |u| sigma(two_digits(0.0, u).1)),
             unit,
             or_dash(in_u, |x| value(x, 0.1)),
         ]

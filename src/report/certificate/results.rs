@@ -5,6 +5,18 @@ use crate::certificate::{Certificate, Measured, Quantity, in_words};
 use crate::imu::{Sensor, Term};
 use crate::report::prelude::*;
 
+/// A value and its U as EA-4/02, 6.3 wants them: U to two digits, the value to the same place.
+pub fn two_digits(of: f64, expanded: f64) -> (f64, f64) {
+    let place = 10f64.powf((expanded.log10() - 1.0).floor());
+    match place > 1.0 {
+        true => (
+            (of / place).round() * place,
+            (expanded / place).round() * place,
+        ),
+        false => (of, expanded),
+    }
+}
+
 /// Every parameter with its expanded uncertainty, and what both are.
 pub fn results(certificate: &Certificate) -> Table {
     let has_budget = certificate.calibration.budget.is_some();
@@ -15,16 +27,10 @@ pub fn results(certificate: &Certificate) -> Table {
             _ => NONE,
         };
         let (unit, size) = of.quantity.unit();
-        let expanded = of.expanded / size;
-        // EA-4/02, 6.3: U to two digits, the value to the same place.
-        let place = 10f64.powf((expanded.log10() - 1.0).floor().max(0.0));
-        let rounded = |figure: f64| match place > 1.0 {
-            true => (figure / place).round() * place,
-            false => figure,
-        };
+        let (value_of, expanded) = two_digits(of.value / size, of.expanded / size);
         cells![
             in_words(&of.name),
-            plus_minus(rounded(of.value / size), rounded(expanded)),
+            plus_minus(value_of, expanded),
             unit,
             value(of.coverage_factor, 0.1),
             of.degrees_of_freedom.map_or(infinite.to_owned(), sigma),
