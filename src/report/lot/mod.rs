@@ -172,21 +172,22 @@ fn nominal(lot: &Lot) -> Vec<Sentence> {
 
 /// What the units' own calibrations warn of, by kind.
 fn findings(lot: &Lot) -> Vec<Sentence> {
-    let mut kinds: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    let mut kinds: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     let calibrated = lot.rows.iter().filter_map(|row| {
         let of = row.unit.calibrated.as_ref().ok()?;
         Some((row.unit.name.as_str(), &of.calibration.findings))
     });
     for (name, findings) in calibrated.clone() {
         for finding in findings {
-            let units = kinds.entry(finding.kind.as_str()).or_default();
+            let kind = format!("{} {}", finding.code, finding.kind.replace('-', " "));
+            let units = kinds.entry(kind).or_default();
             if units.last() != Some(&name) {
                 units.push(name);
             }
         }
     }
     let all = calibrated.count();
-    let sentence = |(kind, units): (&str, Vec<&str>)| {
+    let sentence = |(kind, units): (String, Vec<&str>)| {
         let who = match units.len() == all {
             true => "all units".to_owned(),
             false => units.join(", "),
