@@ -44,6 +44,7 @@ impl Report<'_> {
         document.pages(self.against_time().and_then(|outcome| self.sigma(outcome)));
         let quality = self.quality.filter(|of| !of.dwells.is_empty());
         document.pages(quality.map(residuals::figure));
+        document.pages(self.outcome.map_or_else(Vec::new, temperature::figures));
         document.fold("Every parameter");
         if let Some(estimate) = self.estimate() {
             document.both(self.parameters(estimate));
