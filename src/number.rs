@@ -61,6 +61,26 @@ pub fn plain(x: f64) -> String {
     }
 }
 
+/// Rounds a number to twelve digits: further digits are only rounding errors.
+pub fn to_twelve_digits(x: f64) -> f64 {
+    format!("{x:.11e}").parse().unwrap_or(x)
+}
+
+/// A number as it was stated, without the rounding errors of a change of unit.
+pub fn stated(x: f64) -> String {
+    plain(to_twelve_digits(x))
+}
+
+/// The same of three axes; one number if all are equal.
+pub fn stated_axes(of: [f64; 3]) -> String {
+    let mut all = of.map(stated).to_vec();
+    all.dedup();
+    match &all[..] {
+        [one] => one.clone(),
+        _ => of.map(stated).join(", "),
+    }
+}
+
 /// A whole number in groups of three digits.
 pub fn count(n: usize) -> String {
     let digits = n.to_string();

@@ -8,9 +8,10 @@ use std::fmt::Write;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
-    Certificate, Condition, Contact, Decided, Equipment, Item, Measured, temperature_words,
-    to_twelve_digits,
+    Certificate, Condition, Contact, Decided, Equipment, Item, Measured, in_words,
+    temperature_words,
 };
+use crate::number::to_twelve_digits;
 
 /// Coverage probability of every uncertainty.
 const PROBABILITY: f64 = 0.9545;
@@ -247,7 +248,7 @@ fn item(xml: &mut Xml, item: &Item) {
 
 fn statement(xml: &mut Xml, limit: &Decided, rule: &str) {
     xml.element("dcc:statement", |xml| {
-        xml.words("dcc:name", &limit.name);
+        xml.words("dcc:name", &in_words(&limit.name));
         let text = format!(
             "{} from nominal in SI units, limit ±{}; decision rule: {rule}; probability that the decision is \
              wrong: {:.1e}",
@@ -351,8 +352,10 @@ fn description(certificate: &Certificate) -> String {
 
 /// One parameter as readers of certificates look for it.
 fn quantity(xml: &mut Xml, of: &Measured) {
-    xml.with("dcc:quantity", " refType=\"basic_measuredValue\"", |xml| {
-        xml.words("dcc:name", &of.name);
+    // The name that calibration.json has is a valid xs:ID.
+    let attributes = format!(" id=\"{}\" refType=\"basic_measuredValue\"", of.name);
+    xml.with("dcc:quantity", &attributes, |xml| {
+        xml.words("dcc:name", &in_words(&of.name));
         let expanded = Expanded {
             uncertainty: of.expanded,
             coverage_factor: of.coverage_factor,

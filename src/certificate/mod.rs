@@ -16,7 +16,7 @@ use crate::lot::Specification;
 pub use as_found::{AsFound, Change};
 pub use conformity::{Conformity, Decided, Decision};
 pub use laboratory::*;
-pub use results::{Measured, Quantity, temperature_words, to_twelve_digits};
+pub use results::{Measured, Quantity, in_words, temperature_words};
 
 /// Errors of a certificate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -160,7 +160,15 @@ pub fn temperature_words(of: &ThermalRecord, number: impl Fn(f64) -> String) -> 
     )
 }
 
-/// Rounds a number to twelve digits: further digits are only rounding errors.
-pub fn to_twelve_digits(x: f64) -> f64 {
-    format!("{x:.11e}").parse().unwrap_or(x)
+/// A parameter in words, such as `gyroscope scale factor x`.
+pub fn in_words(measured: &str) -> String {
+    let words = [
+        ("gyro.", "gyroscope "),
+        ("accel.", "accelerometer "),
+        ("scale.", "scale factor "),
+        ("installation.", "misalignment "),
+    ];
+    let named = |name: String, (key, word): (&str, &str)| name.replace(key, word);
+    let name = words.into_iter().fold(measured.to_owned(), named);
+    name.replace(['.', '_'], " ")
 }

@@ -2,6 +2,7 @@
 
 use crate::calibration::{ParameterVector, parameter_name};
 use crate::imu::{InstallationForm, ParameterKind, RATE};
+use crate::number::stated_axes;
 
 pub(super) use crate::calibration::Group;
 
@@ -90,6 +91,16 @@ pub fn function_name(function: Option<usize>) -> String {
 /// A short name for a figure's margin, such as `gyro E xy`.
 pub fn short_name(form: InstallationForm, index: usize) -> String {
     format!("{} {}", Group::of(index).short(), axis_name(form, index))
+}
+
+/// The nominal scale factors of a triad, such as `2 062 648 count per second for 1 rad/s`.
+pub fn nominal_scale(of: [f64; 3], unit: &str, input: &str) -> String {
+    // Outputs that are not rates are stated per second.
+    let per = match unit.contains('/') || unit == "g" {
+        true => "",
+        false => " per second",
+    };
+    format!("{} {unit}{per} for 1 {input}", stated_axes(of))
 }
 
 #[cfg(test)]

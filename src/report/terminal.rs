@@ -11,8 +11,8 @@ const HEADING: usize = 9;
 /// Between two columns.
 const GAP: usize = 2;
 
-/// So many lines of findings fit on one screen.
-const FINDINGS: usize = 16;
+/// Lines of one screen.
+const SCREEN: usize = 40;
 /// The width of a screen that is not known.
 const USUAL_WIDTH: usize = 80;
 /// What stands before the words of a finding: its code.
@@ -25,10 +25,12 @@ pub fn brief(document: &Document, width: Option<usize>) -> String {
     if let Some((word, of_it)) = &document.verdict {
         head.extend(wrapped(&format!("{word}   {of_it}"), "", Some(width)));
     }
-    let mut parts = vec![head, findings(&document.findings, width)];
     let brief = document.brief.iter();
-    parts.extend(brief.map(|block| shown(block, Some(width))));
-    laid(parts)
+    let brief: Vec<_> = brief.map(|block| shown(block, Some(width))).collect();
+    // With a line between parts.
+    let taken: usize = brief.iter().chain([&head]).map(|part| part.len() + 1).sum();
+    let findings = findings(&document.findings, width, SCREEN.saturating_sub(taken));
+    laid([head, findings].into_iter().chain(brief).collect())
 }
 
 /// The title with what was done on what.
@@ -38,7 +40,7 @@ fn titled(document: &Document) -> String {
 }
 
 /// What is wrong and what to do about it, as far as there is room; what needs nothing done is named in a line.
-fn findings(all: &[Finding], width: usize) -> Vec<String> {
+fn findings(all: &[Finding], width: usize, room: usize) -> Vec<String> {
     let of_one = |finding: &Finding| {
         let (what, next) = finding.headline();
         let code = format!("  {}  ", finding.code);
@@ -55,7 +57,8 @@ fn findings(all: &[Finding], width: usize) -> Vec<String> {
     let mut lines = Vec::new();
     for (place, finding) in all.iter().enumerate() {
         let more = of_one(finding);
-        if lines.len() + more.len() > FINDINGS {
+        let is_last = place + 1 == all.len();
+        if lines.len() + more.len() + usize::from(!is_last) > room {
             lines.push(format!("{CODE}{} more: --verbose", all.len() - place));
             break;
         }

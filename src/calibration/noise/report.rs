@@ -164,7 +164,7 @@ pub fn noise_learnt(
     let used = sources.iter().filter(|figures| figures.counts());
     let used: Vec<String> = used.map(SourceFigures::to_string).collect();
     let text = format!(
-        "The noise you stated does not fit this record (likelihood-ratio statistic {ratio:.0}; expected below \
+        "The stated noise does not fit this record (likelihood-ratio statistic {ratio:.0}; expected below \
          {limit:.0}). turncal used the noise it estimated from the record \
          instead; all σ include it: {}. To keep it, paste noise.run_toml of calibration.json into [imu.noise].",
         used.join("; ")

@@ -15,12 +15,12 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use clap::error::ErrorKind;
-use turncal::calibration::{AtRest, Finding, Method, Problem, Solution, Together};
+use turncal::calibration::{AtRest, Method, Problem, Solution, Together, Word};
 use turncal::formats::{Campaign, Opened};
 use turncal::models;
 use turncal::recording::Recording;
 use turncal::report::terminal::printable;
-use turncal::report::{self, Facts};
+use turncal::report::{self, Document, Facts};
 use turncal::run::Run;
 use turncal::study::Shard;
 
@@ -274,14 +274,9 @@ impl Calibrate {
         match document {
             Some(document) if self.verbose => show(&document, false)?,
             Some(mut document) if !self.json => {
-                document.brief.push(
-                    files(
-                        target.as_deref(),
-                        &read_by(opened, target.as_deref(), path),
-                        &document.findings,
-                    )
-                    .into(),
-                );
+                let run = read_by(opened, target.as_deref(), path);
+                let files = files(target.as_deref(), &run, &document);
+                document.brief.push(files.into());
                 show_brief(&document)?;
             }
             _ => print(&calibration.to_json(Path::new("standard output"))?)?,
@@ -296,32 +291,39 @@ impl Calibrate {
     }
 }
 
-/// The run.toml by which a run was read: of a log, the one that is written next to the result.
+/// The run.toml by which a run was read: of a log, the one that is written next to the result; of a campaign, any.
 fn read_by(opened: Option<&Opened>, target: Option<&Path>, path: &Path) -> PathBuf {
-    let of_log = opened.filter(|opened| opened.is_of_log()).and(target);
-    of_log.map_or_else(|| path.to_owned(), |target| target.join("run.toml"))
+    match (opened, target) {
+        (Some(opened), Some(target)) if opened.is_of_log() => target.join("run.toml"),
+        (Some(_), _) => path.to_owned(),
+        (None, _) => PathBuf::from("RUN.toml"),
+    }
 }
 
 /// What was written, and what to do with it.
-fn files(target: Option<&Path>, run: &Path, findings: &[Finding]) -> Facts {
+fn files(target: Option<&Path>, run: &Path, document: &Document) -> Facts {
     let mut facts = Facts::default();
     let shown = |path: PathBuf| path.display().to_string();
     if let Some(target) = target {
         let calibration = shown(target.join("calibration.json"));
         facts.push("calibration", calibration.clone());
         facts.push("report", shown(target.join("report").join("index.html")));
-        facts.push(
-            "use it",
-            format!(
-                "turncal apply {calibration} {} -o calibrated.csv",
-                run.display()
-            ),
-        );
+        if !matches!(document.verdict, Some((Word::Failed, _))) {
+            let run = run.display();
+            facts.push(
+                "use it",
+                format!("turncal apply {calibration} {run} -o calibrated.csv"),
+            );
+        }
     }
-    let explain = findings
+    let explain = document
+        .findings
         .first()
         .map(|finding| format!(", or turncal explain {}", finding.code));
-    facts.push("more", format!("--verbose{}", explain.unwrap_or_default()));
+    // What is there already is replaced by the same.
+    let force = target.map_or("", |_| " --force");
+    let more = format!("--verbose{force}{}", explain.unwrap_or_default());
+    facts.push("more", more);
     facts
 }
 

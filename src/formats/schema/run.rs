@@ -29,19 +29,26 @@ pub const META: [&str; 8] = [
     "notes",
 ];
 
-/// A run: an instrument's log, what is known of it, and how it was moved
+/// A recording of an instrument on a turntable or turned by hand
 #[derive(Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct RunFile {
+    /// Place of the recording
     #[serde(default)]
     pub site: SiteFile,
+    /// Texts that are copied into the result: instrument, serial, operator, date, temperature_degc, laboratory,
+    /// table, notes
     #[serde(default)]
     pub meta: BTreeMap<String, String>,
+    /// Log of the IMU, its units, noise and prior
     pub imu: ImuFile,
+    /// 1σ of the motion in dwells
     #[serde(default)]
     pub standstill: StandstillFile,
+    /// Log of the turntable
     pub turntable: Option<TurntableFile>,
+    /// Labelled sections of the recording
     pub segments: Option<SegmentsFile>,
 }
 
@@ -49,12 +56,16 @@ pub struct RunFile {
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct SiteFile {
+    /// Latitude, degrees, north positive; needed with a turntable. Default: Earth rate is estimated
     pub latitude_deg: Option<Latitude>,
+    /// Longitude, degrees; default 0
     pub longitude_deg: Option<Longitude>,
+    /// Height above the ellipsoid, m; default 0 ± 500
     pub height_m: Option<Height>,
-    /// Its digits are its accuracy where none is stated.
+    /// Measured gravity, m/s²; without gravity_sigma_mgal its last digit gives its σ. Default: normal gravity
     #[cfg_attr(feature = "cli", schemars(with = "Option<Gravity>"))]
     pub gravity_m_s2: Option<Spanned<Gravity>>,
+    /// 1σ of gravity, mGal
     pub gravity_sigma_mgal: Option<Milligals>,
 }
 
@@ -62,29 +73,48 @@ pub struct SiteFile {
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ImuFile {
+    /// Log of the IMU, relative to this file
     pub file: String,
+    /// Stream that holds the gyros, in a file with several
     pub stream: Option<String>,
+    /// Use a damaged log up to the damage; default false
     pub salvage: Option<bool>,
+    /// Accelerometers that are not in the rows of the gyros
     pub accel_from: Option<AccelFromFile>,
+    /// What a row holds: whole counts in the sample (pulse), the integral over it (increment) or the mean over it
+    /// (rate)
     pub output: Output,
+    /// Unit of the gyros: count; rad, deg, arcsec of increments; rad/s, deg/s, mdps, deg/h of rates
     pub gyro_unit: Option<String>,
+    /// Unit of the accelerometers: count; m/s, g*s of increments; m/s^2, g, mg of rates
     pub accel_unit: Option<String>,
+    /// End of the range of the gyros, in the unit of a row; samples there are saturated
     pub gyro_full_scale: Option<Positive>,
+    /// End of the range of the accelerometers, in the unit of a row; samples there are saturated
     pub accel_full_scale: Option<Positive>,
+    /// Unit of the time column: s (default), ms, us, ns, a tick in s, or count for a sample counter
     pub time_unit: Option<TimeUnit>,
+    /// Time from row to row, s; default from the time stamps
     pub sample_period_s: Option<Positive>,
+    /// Whether a stamp marks the end, the start or the middle of its sample
     pub time_stamp: TimeStamp,
+    /// False if the file holds sections laid end to end; default true
     pub continuous: Option<bool>,
+    /// Use only the rows of one instrument of several
     pub instance: Option<InstanceFile>,
+    /// Unit of the temperature columns: degC (default), K or degF
     pub temperature_unit: Option<TemperatureUnit>,
+    /// Axes of the log: rfu right-front-up (default), frd or flu
     pub body_axes: Option<AxisOrder>,
+    /// Names or numbers of the columns; a minus before a name reverses its sign
     pub columns: ImuColumns,
-    /// By the names of [`crate::imu::NoiseKeys`].
+    /// Noise figures by name, such as angle_random_walk_deg_per_sqrt_h
     #[serde(default)]
     pub noise: BTreeMap<String, NonNegative>,
+    /// Knowledge of the triads before the calibration
     #[serde(default)]
     pub prior: PriorsFile,
-    /// By the names of error terms.
+    /// Error terms to estimate, by name, such as time-offset
     #[serde(default)]
     pub terms: BTreeMap<String, TermFile>,
 }
@@ -115,11 +145,17 @@ impl ImuFile {
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct AccelFromFile {
+    /// Log of the accelerometers; default that of the gyros
     pub file: Option<String>,
+    /// Stream that holds the accelerometers
     pub stream: Option<String>,
+    /// Use a damaged log up to the damage
     pub salvage: Option<bool>,
+    /// Time column of the accelerometers
     pub time: Option<TimeColumn>,
+    /// Unit of that column
     pub time_unit: Option<TimeUnit>,
+    /// Time from row to row, s
     pub sample_period_s: Option<Positive>,
 }
 
@@ -128,7 +164,9 @@ pub struct AccelFromFile {
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct InstanceFile {
+    /// Column that distinguishes the instruments
     pub column: String,
+    /// Number of the instrument to use
     pub number: Finite,
 }
 
@@ -136,9 +174,13 @@ pub struct InstanceFile {
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ImuColumns {
+    /// Time column; optional if the period is known
     pub time: Option<TimeColumn>,
+    /// Three gyro columns, in the order of body_axes
     pub gyro: Option<Names<3>>,
+    /// Three accelerometer columns, in the order of body_axes
     pub accel: Option<Names<3>>,
+    /// Temperature column of the instrument, or one or three for each triad
     pub temperature: Option<TemperatureColumn>,
 }
 
@@ -163,7 +205,9 @@ pub enum TimeColumn {
 pub enum TemperatureColumn {
     One(String),
     Triads {
+        /// Temperature column of the gyros, or one for each
         gyro: OneOrThree<String>,
+        /// Temperature column of the accelerometers, or one for each
         accel: OneOrThree<String>,
     },
 }
@@ -172,7 +216,9 @@ pub enum TemperatureColumn {
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct PriorsFile {
+    /// Prior of the gyros
     pub gyro: PriorFile,
+    /// Prior of the accelerometers
     pub accel: PriorFile,
 }
 
@@ -180,10 +226,15 @@ pub struct PriorsFile {
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct PriorFile {
+    /// Nominal scale factor: output per second for 1 rad/s or 1 m/s²; optional if the unit implies it
     pub scale: Option<OneOrThree>,
+    /// 1σ of the scale factor, ppm; default 50 000
     pub scale_sigma_ppm: Option<OneOrThree>,
+    /// 1σ of each misalignment, ″; default 7200
     pub installation_sigma_arcsec: Option<OneOrThree>,
+    /// Expected bias, in output per second; default 0
     pub bias: Option<OneOrThree>,
+    /// 1σ of the bias, in output per second; default 2 °/s or 1 m/s²
     pub bias_sigma: Option<OneOrThree>,
 }
 
@@ -192,6 +243,7 @@ pub struct PriorFile {
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct TermFile {
+    /// 1σ of each parameter of the error term, around zero
     pub sigma: Positive,
 }
 
@@ -199,9 +251,13 @@ pub struct TermFile {
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct StandstillFile {
+    /// White 1σ of the velocity in a dwell, m/s; default from the dwells
     pub velocity_sigma_m_s: Option<Positive>,
+    /// White 1σ of the attitude in a dwell without a table, ″; default from the dwells
     pub attitude_sigma_arcsec: Option<Positive>,
+    /// Random walk of the attitude in a dwell without a table, °/√s
     pub turning_deg_per_sqrt_s: Option<NonNegative>,
+    /// Distance of the IMU from the table's centre, 1σ, m; default 1
     pub position_sigma_m: Option<Positive>,
 }
 
@@ -209,20 +265,35 @@ pub struct StandstillFile {
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct TurntableFile {
+    /// Log of the turntable, relative to this file
     pub file: String,
+    /// Stream that holds the attitude, in a file with several
     pub stream: Option<String>,
+    /// Use a damaged log up to the damage; default false
     pub salvage: Option<bool>,
+    /// Unit of the time column
     pub time_unit: Option<TimeUnit>,
+    /// Time from row to row, s
     pub sample_period_s: Option<Positive>,
+    /// Columns of time and attitude
     pub columns: TableColumns,
+    /// Axis of each angle when all angles are zero, such as z, x, y
     pub axes: Option<Vec<String>>,
+    /// 1σ per axis of the position error, ″: constant in a dwell, new at every position
     pub position_sigma_arcsec: Angle,
+    /// 1σ per axis of the white error of each reading, ″
     pub reading_sigma_arcsec: Angle,
+    /// 1σ of the base's tilt, ″; switches its estimation on
     pub level_sigma_arcsec: Option<Angle>,
+    /// 1σ of the base's azimuth, ″; switches its estimation on
     pub north_sigma_arcsec: Option<Angle>,
+    /// 1σ of the tilt of each inner axis, ″; needs angles
     pub nonorthogonality_sigma_arcsec: Option<Angle>,
+    /// 1σ of each axis's wobble, once and twice a turn, ″; needs angles
     pub wobble_sigma_arcsec: Option<Angle>,
+    /// 1σ of each encoder's error, once and twice a turn, ″; needs angles
     pub encoder_sigma_arcsec: Option<Angle>,
+    /// Without effect: readings that are taken while the table turns are not used
     pub time_sigma_ms: Option<Positive>,
 }
 
@@ -249,9 +320,13 @@ impl TurntableFile {
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct TableColumns {
+    /// Time column
     pub time: TimeColumn,
+    /// Quaternion w, x, y, z, from body to East-North-Up
     pub quaternion: Option<Names<4>>,
+    /// Axis angles, degrees, outermost first
     pub angles: Option<Vec<String>>,
+    /// The same as axes of the turntable
     pub axes: Option<Vec<String>>,
 }
 
@@ -259,7 +334,9 @@ pub struct TableColumns {
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct SegmentsFile {
+    /// CSV file with start, end and label of each section, relative to this file
     pub file: String,
+    /// 1σ per axis of a position set by hand, degrees; default 1
     pub position_sigma_deg: Option<Positive>,
 }
 
@@ -267,7 +344,8 @@ pub struct SegmentsFile {
 #[cfg(feature = "cli")]
 pub fn json_schema() -> serde_json::Value {
     let mut schema = schemars::schema_for!(RunFile);
-    let format = serde_json::json!({ "const": FORMAT });
+    let format =
+        serde_json::json!({ "const": FORMAT, "description": "Name and version of the format" });
     if let Some(fields) = schema
         .get_mut("properties")
         .and_then(|of| of.as_object_mut())
@@ -275,4 +353,28 @@ pub fn json_schema() -> serde_json::Value {
         fields.insert("format".to_owned(), format);
     }
     schema.to_value()
+}
+
+#[cfg(all(test, feature = "cli"))]
+mod tests {
+    use serde_json::Value;
+
+    /// Names of the fields without a description.
+    fn undescribed(schema: &Value) -> Vec<String> {
+        let fields = schema["properties"].as_object().into_iter().flatten();
+        let bare = fields.filter(|(_, of)| of["description"].is_null());
+        let mut names: Vec<String> = bare.map(|(name, _)| name.clone()).collect();
+        let parts: Vec<&Value> = match schema {
+            Value::Object(of) => of.values().collect(),
+            Value::Array(of) => of.iter().collect(),
+            _ => Vec::new(),
+        };
+        names.extend(parts.into_iter().flat_map(undescribed));
+        names
+    }
+
+    #[test]
+    fn the_schema_describes_every_field() {
+        assert_eq!(undescribed(&super::json_schema()), Vec::<String>::new());
+    }
 }

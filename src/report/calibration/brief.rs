@@ -33,7 +33,7 @@ fn accuracy(report: &Report, estimate: &Estimate) -> Table {
         _ => None,
     };
     let truth = report.truth_vector();
-    let mut columns = vec!["Accuracy (RMS of a group)", "1σ"];
+    let mut columns = vec!["Accuracy (group RMS)", "1σ"];
     columns.extend(truth.map(|_| "error"));
     columns.extend(both.map(|_| "closed form 1σ"));
     columns.extend(both.and(truth).map(|_| "closed form error"));

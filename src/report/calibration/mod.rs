@@ -10,6 +10,8 @@ mod temperature;
 #[cfg(test)]
 mod tests;
 
+use std::collections::BTreeSet;
+
 use crate::calibration::{Finding, Verdict, Word};
 use crate::imu::{Noise, Sensor};
 use crate::report::prelude::*;
@@ -18,19 +20,31 @@ use crate::report::{navigation, terms};
 pub use super::navigation::Navigated;
 pub use report::{ClosedForm, Report};
 
+/// The most severe first; of one level, the first of each kind before more of any.
+fn in_order(findings: &[Finding]) -> Vec<Finding> {
+    let mut seen = BTreeSet::new();
+    let keyed = findings.iter().map(|finding| {
+        let is_first = seen.insert(&finding.code);
+        ((finding.level(), !is_first), finding.clone())
+    });
+    let mut keyed: Vec<_> = keyed.collect();
+    keyed.sort_by_key(|(key, _)| *key);
+    keyed.into_iter().map(|(_, finding)| finding).collect()
+}
+
 impl Report<'_> {
     /// Everything that is said of the calibration. Its figures by name are in the calibration's own file.
     pub fn document(&self) -> Document {
         let mut document = Document::new(self.title);
         document.verdict = self.verdict();
         document.lead = self.lead();
-        document.findings = self.findings.to_vec();
-        document.findings.sort_by_key(Finding::level);
+        document.findings = in_order(self.findings);
         brief::add(&mut document, self);
         document.page(item(self));
         document.pages(self.against_time().and_then(|outcome| self.sigma(outcome)));
         let quality = self.quality.filter(|of| !of.dwells.is_empty());
         document.pages(quality.map(residuals::figure));
+        document.pages(self.outcome.map_or_else(Vec::new, temperature::figures));
         document.fold("Every parameter");
         if let Some(estimate) = self.estimate() {
             document.both(self.parameters(estimate));
@@ -157,14 +171,8 @@ pub(super) fn run(report: &Report) -> Facts {
     }
     for (sensor, input) in [(Sensor::Gyro, "rad/s"), (Sensor::Accel, "m/s²")] {
         let (name, instrument) = (sensor.name(), &run.instrument);
-        let (of, unit) = (
-            instrument.nominal.get(sensor).0,
-            instrument.unit.get(sensor),
-        );
-        let scale = format!(
-            "{}, {}, {} {unit} per second for 1 {input}",
-            of.x, of.y, of.z
-        );
+        let of = instrument.nominal.get(sensor).0.into();
+        let scale = nominal_scale(of, instrument.unit.get(sensor), input);
         facts.push(&format!("{name} nominal scale"), scale);
         let noise = noise(sensor, instrument.noise.get(sensor));
         facts.push(&format!("{name} noise"), noise);

@@ -10,17 +10,21 @@ use crate::report::prelude::*;
 /// Points of a curve.
 const POINTS: usize = 81;
 
+/// How parameters change with temperature, and whether anything of it is left.
+pub fn figures(outcome: &Outcome) -> Vec<Plot> {
+    let of = |thermal| vec![curves(outcome, thermal), residuals(outcome)];
+    outcome.thermal.as_ref().map_or_else(Vec::new, of)
+}
+
 /// Adds tables and figures, where anything changes or differs.
 pub fn add(document: &mut Document, outcome: &Outcome) {
     if let Some(thermal) = &outcome.thermal {
         document.both(orders(outcome, thermal));
         document.both(hysteresis(outcome, thermal));
-        document.page(curves(outcome, thermal));
         let known = outcome.alone.iter().filter(|a| a.estimate.is_some());
         if known.count() > 1 {
             document.page(departures(outcome, thermal));
         }
-        document.page(residuals(outcome));
     }
     document.both(recordings(outcome));
     document.both(differences(outcome));

@@ -2,7 +2,7 @@
 
 mod results;
 
-use results::{name, results};
+use results::{results, two_digits};
 
 use super::document::Block;
 use super::pdf;
@@ -11,7 +11,7 @@ use crate::calibration::Group;
 use crate::calibration::result::{EQUATION, GravityRecord};
 use crate::certificate::{
     AsFound, Authorised, Certificate, Condition, Conformity, Contact, Decision, Quantity, dcc,
-    temperature_words,
+    in_words, temperature_words,
 };
 use crate::imu::ParameterKind;
 use crate::report::prelude::*;
@@ -265,15 +265,16 @@ fn limits(conformity: &Conformity) -> Table {
             ParameterKind::Scale => 1.0,
             ParameterKind::Installation | ParameterKind::Bias => 0.0,
         };
-        let expanded = 2.0 * of.sigma / size;
+        let off = of.off + of.limit.nominal - base;
+        let (found, expanded) = two_digits(off / size, 2.0 * of.sigma / size);
         cells![
-            name(&of.name),
-            value((of.off + of.limit.nominal - base) / size, expanded),
+            in_words(&of.name),
+            value(found, expanded),
             sigma(expanded),
             format!(
                 "{} ± {}",
-                value((of.limit.nominal - base) / size, of.limit.within / size),
-                sigma(of.limit.within / size)
+                stated((of.limit.nominal - base) / size),
+                stated(of.limit.within / size)
             ),
             unit,
             of.decision.words(),
@@ -293,14 +294,15 @@ fn found(as_found: &AsFound) -> Table {
         let (unit, size) = change.quantity.unit();
         let expanded = change.sigma.map(|sigma| 2.0 * sigma / size);
         let digits = expanded.unwrap_or(0.01);
-        let by = (change.left - change.found) / size;
-        let in_u = expanded.filter(|u| *u > 0.0).map(|u| by / u);
+        let by = change.left - change.found;
+        let in_u = expanded.filter(|u| *u > 0.0).map(|u| by / size / u);
+        let shown = |of: f64| value(two_digits(of / size, digits).0, digits);
         cells![
-            name(&change.name),
-            value(change.found / size, digits),
-            value(change.left / size, digits),
-            value(by, digits),
-            or_dash(expanded, sigma),
+            in_words(&change.name),
+            shown(change.found),
+            shown(change.left),
+            shown(by),
+            or_dash(expanded, |u| sigma(two_digits(0.0, u).1)),
             unit,
             or_dash(in_u, |x| value(x, 0.1)),
         ]

@@ -1,21 +1,20 @@
 //! The table of results.
 
 use crate::calibration::Group;
-use crate::certificate::{Certificate, Measured, Quantity, to_twelve_digits};
+use crate::certificate::{Certificate, Measured, Quantity, in_words};
 use crate::imu::{Sensor, Term};
 use crate::report::prelude::*;
 
-/// A parameter in words, such as `gyroscope scale factor x`.
-pub fn name(measured: &str) -> String {
-    let words = [
-        ("gyro.", "gyroscope "),
-        ("accel.", "accelerometer "),
-        ("scale.", "scale factor "),
-        ("installation.", "misalignment "),
-    ];
-    let named = |name: String, (key, word): (&str, &str)| name.replace(key, word);
-    let name = words.into_iter().fold(measured.to_owned(), named);
-    name.replace(['.', '_'], " ")
+/// A value and its U as EA-4/02, 6.3 wants them: U to two digits, the value to the same place.
+pub fn two_digits(of: f64, expanded: f64) -> (f64, f64) {
+    let place = 10f64.powf((expanded.log10() - 1.0).floor());
+    match place > 1.0 {
+        true => (
+            (of / place).round() * place,
+            (expanded / place).round() * place,
+        ),
+        false => (of, expanded),
+    }
 }
 
 /// Every parameter with its expanded uncertainty, and what both are.
@@ -28,16 +27,10 @@ pub fn results(certificate: &Certificate) -> Table {
             _ => NONE,
         };
         let (unit, size) = of.quantity.unit();
-        let expanded = of.expanded / size;
-        // EA-4/02, 6.3: U to two digits, the value to the same place.
-        let place = 10f64.powf((expanded.log10() - 1.0).floor().max(0.0));
-        let rounded = |figure: f64| match place > 1.0 {
-            true => (figure / place).round() * place,
-            false => figure,
-        };
+        let (value_of, expanded) = two_digits(of.value / size, of.expanded / size);
         cells![
-            name(&of.name),
-            plus_minus(rounded(of.value / size), rounded(expanded)),
+            in_words(&of.name),
+            plus_minus(value_of, expanded),
             unit,
             value(of.coverage_factor, 0.1),
             of.degrees_of_freedom.map_or(infinite.to_owned(), sigma),
@@ -83,14 +76,7 @@ pub fn results(certificate: &Certificate) -> Table {
 fn nominal(certificate: &Certificate, sensor: Sensor, input: &str) -> String {
     let unit = certificate.calibration.unit.as_ref();
     let unit = unit.map_or("output", |unit| unit.get(sensor).as_str());
-    let nominal = certificate.provenance.nominal.get(sensor);
-    let of = nominal.map(|scale| plain(to_twelve_digits(scale)));
-    // Outputs that are not rates are stated per second.
-    let per = match unit.contains('/') || unit == "g" {
-        true => "",
-        false => " per second",
-    };
-    format!("{} {unit}{per} for 1 {input}", of.join(", "))
+    nominal_scale(*certificate.provenance.nominal.get(sensor), unit, input)
 }
 
 /// What the error terms that have results add to the model's input.

@@ -37,7 +37,7 @@ fn panel(lot: &Lot, title: &str, quantities: &[Quantity], names: &[String]) -> P
             lot.rows.iter().enumerate().filter_map(move |(place, row)| {
                 let is_apart = lot.outliers_of(place).any(|of| of.quantity == quantity);
                 let (value, sigma) = shown(quantity, row.sample(quantity)?);
-                (is_apart == apart).then_some((place as f64 + 1.0 + shift, value, sigma))
+                (is_apart == apart).then_some((place as f64 + shift, value, sigma))
             })
         };
         let dots = Series::measured(Mark::Dot, points(false)).key(name);
@@ -46,7 +46,7 @@ fn panel(lot: &Lot, title: &str, quantities: &[Quantity], names: &[String]) -> P
     };
     let series = quantities.iter().zip(names).enumerate();
     let series = series.flat_map(of_quantity);
-    let units = Axis::linear("unit").between(0.3, lot.rows.len() as f64 + 0.7);
+    let units = Axis::places(lot.rows.iter().map(|row| row.unit.name.clone()));
     Panel::new(title, units, Axis::linear("").room(0.05, 0.05)).with_all(series)
 }
 

@@ -39,14 +39,17 @@ pub fn document(lot: &Lot) -> Document {
     for (good, text) in sentences.into_iter().flatten() {
         document.say(good, text);
     }
-    document.both(tables::undecided(lot));
-    document.both(facts(lot));
-    document.both(tables::units(lot));
-    document.page(figures::parameters(lot));
-    document.both(tables::parameters(lot));
-    document.page(figures::noise(lot));
-    document.both(tables::noise(lot));
-    document.pages(tables::values(lot));
+    document.both(tables::limits(lot));
+    // A single unit has no lot to be compared with.
+    if lot.rows.len() != 1 {
+        document.both(facts(lot));
+        document.both(tables::units(lot));
+        document.page(figures::parameters(lot));
+        document.both(tables::parameters(lot));
+        document.page(figures::noise(lot));
+        document.both(tables::noise(lot));
+        document.pages(tables::values(lot));
+    }
     document.data = data::data(lot);
     document.files = vec![("lot.csv".to_owned(), data::csv(lot))];
     document
@@ -169,21 +172,22 @@ fn nominal(lot: &Lot) -> Vec<Sentence> {
 
 /// What the units' own calibrations warn of, by kind.
 fn findings(lot: &Lot) -> Vec<Sentence> {
-    let mut kinds: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
+    let mut kinds: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     let calibrated = lot.rows.iter().filter_map(|row| {
         let of = row.unit.calibrated.as_ref().ok()?;
         Some((row.unit.name.as_str(), &of.calibration.findings))
     });
     for (name, findings) in calibrated.clone() {
         for finding in findings {
-            let units = kinds.entry(finding.kind.as_str()).or_default();
+            let kind = format!("{} {}", finding.code, finding.kind.replace('-', " "));
+            let units = kinds.entry(kind).or_default();
             if units.last() != Some(&name) {
                 units.push(name);
             }
         }
     }
     let all = calibrated.count();
-    let sentence = |(kind, units): (&str, Vec<&str>)| {
+    let sentence = |(kind, units): (String, Vec<&str>)| {
         let who = match units.len() == all {
             true => "all units".to_owned(),
             false => units.join(", "),
@@ -199,7 +203,7 @@ fn trends(lot: &Lot) -> Vec<Sentence> {
         of.trends.iter().map(words)
     });
     let sentences: Vec<Sentence> = trends.collect();
-    match sentences.is_empty() {
+    match sentences.is_empty() && lot.rows.len() > 1 {
         true => vec![(
             true,
             format!(

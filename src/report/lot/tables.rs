@@ -176,8 +176,8 @@ pub fn values(lot: &Lot) -> Vec<Table> {
     tables.map(table).collect()
 }
 
-/// Limits that are not kept, or of which that cannot be said.
-pub fn undecided(lot: &Lot) -> Table {
+/// Every limit of a single unit, those that are not kept first; of a lot those that are not kept, or not certainly.
+pub fn limits(lot: &Lot) -> Table {
     let row = |row: &Row, check: &Check| {
         let quantity = check.quantity();
         let in_unit = |x: f64| shown_spread(quantity, x);
@@ -189,17 +189,23 @@ pub fn undecided(lot: &Lot) -> Table {
             title(quantity),
             symbol(quantity),
             off.unwrap_or_else(|| NONE.to_owned()),
-            format!("±{}", in_unit(check.limit.within)),
+            format!("±{}", stated(in_unit(check.limit.within))),
             or_dash(check.probability, |p| value(p, 0.01)),
             check.verdict.name(),
         ]
     };
+    let is_single = lot.rows.len() == 1;
     let rows = lot.rows.iter().flat_map(|of| {
-        let open = of.checks.iter().filter(|c| c.verdict != Verdict::Pass);
-        open.map(move |check| row(of, check))
+        let (passed, mut shown): (Vec<_>, Vec<_>) =
+            of.checks.iter().partition(|c| c.verdict == Verdict::Pass);
+        shown.extend(passed.into_iter().filter(|_| is_single));
+        shown.into_iter().map(move |check| row(of, check))
     });
     Table::new(
-        "Limits that are not kept, or not certainly",
+        match is_single {
+            true => "Limits",
+            false => "Limits that are not kept, or not certainly",
+        },
         columns("unit | | unit | from nominal | limit | P(within) | verdict"),
     )
     .section(rows)

@@ -94,3 +94,30 @@ fn a_lot_without_units_limits_or_figures_is_still_a_document() {
     svg::drawn(document.plots());
     assert!(terminal::text(&document, Some(80)).contains("Lot of 0 units"));
 }
+
+#[test]
+fn a_single_unit_has_every_limit_and_nothing_of_a_lot() {
+    let draw = Draw {
+        spread: 30.0 * PPM,
+        sigma: 1.0 * PPM,
+        shared: 0.0,
+    };
+    let limit = |parameter| Limit {
+        parameter,
+        nominal: 1.0,
+        within: if parameter == 0 { 1e-9 } else { 4000.0 * PPM },
+    };
+    let specification = Specification {
+        confidence: 0.95,
+        limits: vec![limit(1), limit(0)],
+    };
+    let document = document(&Lot::new(drawn(1, draw, 5), Some(specification)));
+    assert_eq!(document.plots().count(), 0);
+    let text = terminal::text(&document, Some(80));
+    let [failed, passed] = ["gyro K x", "gyro K y"].map(|name| text.find(name));
+    assert!(failed < passed && passed.is_some(), "{text}");
+    assert!(
+        text.contains("±4\u{202f}000") && !text.contains("trend"),
+        "{text}"
+    );
+}

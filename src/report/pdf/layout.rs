@@ -95,7 +95,7 @@ impl<'a> Layout<'a> {
         }
         self.y += 10.0;
         self.need(2.0 * BODY);
-        let end = self.frame.end.clone();
+        let end = self.shortened(&self.frame.end, REMARK, WIDTH - 2.0 * MARGIN);
         let at = 0.5 * (WIDTH - self.width(&end, REMARK));
         self.text(at, &end, REMARK);
         self.frames();
@@ -273,11 +273,16 @@ impl<'a> Layout<'a> {
         } = self.frame;
         for page in 0..total {
             let number = format!("Page {} of {total}", page + 1);
+            let room = WIDTH - 2.0 * MARGIN;
             let end = |text: &str| WIDTH - MARGIN - self.width(text, style);
+            let beside = |text: &str, other: &str| {
+                self.shortened(text, style, room - self.width(other, style) - GAP)
+            };
+            let right = self.shortened(right, style, 0.5 * room);
             let texts = [
-                (MARGIN, 44.0, left.clone()),
-                (end(right), 44.0, right.clone()),
-                (MARGIN, HEIGHT - 36.0, foot.clone()),
+                (MARGIN, 44.0, beside(left, &right)),
+                (end(&right), 44.0, right),
+                (MARGIN, HEIGHT - 36.0, beside(foot, &number)),
                 (end(&number), HEIGHT - 36.0, number),
             ];
             let texts = texts.map(|(x, y, text)| Drawn::Text {
@@ -341,6 +346,18 @@ impl<'a> Layout<'a> {
 
     fn width(&self, text: &str, style: Style) -> f32 {
         self.fonts.get(style.bold).width(text, style.size)
+    }
+
+    /// As much of a text as fits into a line of this width.
+    fn shortened(&self, text: &str, style: Style, room: f32) -> String {
+        let mut lines = self
+            .broken(text, style, room - self.width("…", style))
+            .into_iter();
+        let first = lines.next().unwrap_or_default();
+        match lines.next() {
+            Some(_) => first + "…",
+            None => first,
+        }
     }
 
     /// A text in lines that are no wider than this; a word that is, is broken anywhere.

@@ -79,11 +79,14 @@ fn right(panel: &Panel, x: &Scale, panel_width: f64) -> f64 {
     widest.min(LABELS * panel_width).max(half)
 }
 
+/// Fewer letters than these are no line of a name.
+const LETTERS: usize = 6;
+
 /// Labels of the horizontal ticks, names of places in as many lines as they need.
 fn names(x: &Scale, room: f64) -> Vec<Vec<String>> {
-    let letters = (room / (0.6 * LETTER * SMALL)).max(3.0) as usize;
+    let letters = (room / (0.6 * LETTER * SMALL)) as usize;
     let lines = |label: &String| {
-        if width(label, SMALL) < room {
+        if width(label, SMALL) < room || letters < LETTERS {
             return vec![label.clone()];
         }
         let lines = textwrap::wrap(label, textwrap::Options::new(letters).break_words(false));
@@ -146,15 +149,21 @@ fn ticks(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
                 .iter()
                 .map(|line| width(line, SMALL))
                 .fold(0.0, f64::max);
-        let near = |&(other, of): &(f64, f64)| (other - x).abs() < half + of + 6.0;
+        let is_place = !frame.panel.x.places.is_empty();
+        let shown = match is_place {
+            true => x.clamp(left + half, (right - half).max(left + half)),
+            false => x,
+        };
+        let gap = if is_place { 0.0 } else { 6.0 };
+        let near = |&(other, of): &(f64, f64)| (other - shown).abs() < half + of + gap;
         on.stroke(&[(x, top), (x, bottom)], GRID, 0.75);
         on.stroke(&[(x, bottom), (x, bottom + 3.0)], QUIET, 0.75);
-        if frame.panel.x.places.is_empty() && taken.iter().any(near) {
+        if taken.iter().any(near) {
             continue;
         }
-        taken.push((x, half));
+        taken.push((shown, half));
         for (n, line) in lines.iter().enumerate() {
-            let at = (x, bottom + 6.0 + LINE * n as f64);
+            let at = (shown, bottom + 6.0 + LINE * n as f64);
             on.text(line, at, ("middle", Height::Head), INK, SMALL);
         }
     }

@@ -17,6 +17,7 @@ use crate::calibration::{
     FindingKind as Kind, Innovation, Iterated, Observation, Prior, Problem, Script,
 };
 use crate::imu::Sensor;
+use crate::number::three_digits;
 use crate::run::{Aiding, Dwell};
 use crate::statistics::{FALSE_ALARM, chi_square_limit, ln_survival, median};
 use crate::units::{ARCSEC, DEG_PER_H, MICRO_G};
@@ -350,11 +351,11 @@ impl FoundCause {
                     Sensor::Accel => (MICRO_G, "µg"),
                 };
                 let text = format!(
-                    "The {} bias stepped by {:.3} {name} before dwell {number} (at {time:.1} s). turncal estimated the \
+                    "The {} bias stepped by {} {name} before dwell {number} (at {time:.1} s). turncal estimated the \
                      step; the calibration has the mean of both biases. Look there for a shock, or a change of supply \
                      or temperature",
                     sensor.name(),
-                    self.value.norm() / unit,
+                    three_digits(self.value.norm() / unit),
                 );
                 (Kind::BiasStep, text)
             }

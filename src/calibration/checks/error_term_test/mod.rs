@@ -110,8 +110,7 @@ impl ErrorTermTest {
         let (alternatives, further) = (names(Role::Alternative), names(Role::Further));
         let (term, gain, limit) = (likeliest.term.name(), likeliest.gain, likeliest.limit);
         let mut text = format!(
-            "An unmodelled error is visible. The best explanation is {term} (χ² falls by {gain:.0}; limit \
-             {limit:.0}). Next: rerun with --with {term}."
+            "An unmodelled error is visible, best explained by {term} (χ² falls by {gain:.0}; limit {limit:.0})."
         );
         for (names, words) in [
             (&alternatives, "This path cannot tell it from"),
@@ -122,11 +121,9 @@ impl ErrorTermTest {
             }
         }
         if let Some(growth) = growth {
-            text += &format!(
-                " Until you do, σ are widened {} to cover it.",
-                widened_by(growth)
-            );
+            text += &format!(" turncal widened σ {} to cover it.", widened_by(growth));
         }
+        text += &format!(" Rerun with --with {term}.");
         let figures = json!({
             "term": term, "alternatives": alternatives, "further": further, "gain": gain, "limit": limit,
             "nis_without": likeliest.without, "nis_with": likeliest.with, "growth": growth
