@@ -8,18 +8,16 @@ mod figures;
 mod navigation;
 mod trial;
 
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::navigation::NavigationStudyError;
+use super::{Study, StudyError};
 use crate::calibration::{
-    CalibrationError, ErrorTerm, ErrorTermTest, Group, Nis, NoisePolicy, PARAMETERS,
-    ParameterVector, mean_square_interval,
+    ErrorTerm, ErrorTermTest, Group, Nis, NoisePolicy, PARAMETERS, ParameterVector,
+    mean_square_interval,
 };
 use crate::imu::InstallationForm;
-use crate::models::ModelError;
 use crate::simulation::{Runs, Scenario};
-use crate::turntable::TableError;
 
 pub(in crate::study) use figures::Squares;
 use figures::rms;
@@ -45,25 +43,6 @@ pub struct AccuracyStudy {
     pub runs: u64,
     /// Seed; each run has its own random streams.
     pub seed: u64,
-}
-
-/// Errors of a study.
-#[derive(Debug, thiserror::Error)]
-pub enum StudyError {
-    /// The closed form's static positions or the trajectory of navigation cannot be read.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    /// The table cannot follow the path.
-    #[error(transparent)]
-    Table(#[from] TableError),
-    /// The bound of a run cannot be computed.
-    #[error("run {run} of the study: {source}")]
-    Bound {
-        /// Number of the run.
-        run: u64,
-        /// The cause.
-        source: CalibrationError,
-    },
 }
 
 /// Result of the study.
@@ -124,38 +103,21 @@ pub struct GroupAccuracy {
     pub closed_form_against_time: Vec<(f64, f64)>,
 }
 
-impl AccuracyStudy {
-    /// Makes all runs on all cores; `done` is called after each. The result does not depend on the number
-    /// of cores.
-    ///
-    /// # Errors
-    /// [`StudyError`] if runs cannot be made. A run on which the filter fails is not an error: it is
-    /// counted.
-    pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Accuracy, StudyError> {
-        let all: Vec<u64> = (0..self.runs).collect();
-        self.result(self.trials(&all, done)?)
+impl Study for AccuracyStudy {
+    type Trial = Trial;
+    type Outcome = Accuracy;
+
+    fn runs(&self) -> u64 {
+        self.runs
     }
 
-    /// Makes some of the runs, given by their numbers; `done` is called after each.
-    ///
-    /// # Errors
-    /// As [`Self::run`].
-    pub fn trials(&self, runs: &[u64], done: &(dyn Fn() + Sync)) -> Result<Vec<Trial>, StudyError> {
+    fn maker(&self) -> Result<impl Fn(u64) -> Result<Trial, StudyError> + Sync, StudyError> {
         let baseline = Baseline::new(&self.scenario)?;
         let simulated = [Runs::new(&self.scenario)?, Runs::new(&baseline.scenario)?];
-        let all = runs.par_iter().with_max_len(1).map(|&run| {
-            let trial = self.trial(&baseline, &simulated, run);
-            done();
-            trial
-        });
-        all.collect()
+        Ok(move |run| self.trial(&baseline, &simulated, run))
     }
 
-    /// The result of all runs, in the order of their numbers.
-    ///
-    /// # Errors
-    /// As [`Self::run`].
-    pub fn result(&self, trials: Vec<Trial>) -> Result<Accuracy, StudyError> {
+    fn outcome(&self, trials: Vec<Trial>) -> Result<Accuracy, StudyError> {
         let baseline = Baseline::new(&self.scenario)?;
         let table_time = self.scenario.duration()?;
         let (mut navigation, mut not_navigated) = (Vec::new(), Vec::new());

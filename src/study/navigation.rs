@@ -2,6 +2,7 @@
 //! navigation, and the σ of this error predicted from its covariance, by the linear model.
 
 mod outlook;
+mod quantity;
 mod warming;
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
@@ -21,6 +22,7 @@ use crate::navigation::{
 };
 
 pub use outlook::Outlook;
+pub use quantity::Quantity;
 pub use warming::{Warming, WarmingError, WarmingPair};
 
 /// Time in s between two moments of a result.
@@ -190,6 +192,11 @@ impl Mission {
             intervals,
             interval: INTERVAL,
         }
+    }
+
+    /// True state and sensed input at the start.
+    pub fn start(&self) -> Instant {
+        *Course::new(&self.motion).here()
     }
 
     /// Navigates: errors and their predicted covariance at the start and after each interval.

@@ -148,9 +148,8 @@ fn of_group_against_time(of: &GroupAccuracy) -> Panel {
         .with(rings.label("closed form"))
 }
 
-/// Half the width of the axis of errors in σ, unless more than one in twenty lies beyond.
+/// Half the width of the axis of errors, in σ.
 const REACH: f64 = 5.0;
-const BEYOND: f64 = 0.05;
 const BINS: usize = 24;
 /// Points of a curve.
 const CURVE: usize = 301;
@@ -163,35 +162,27 @@ const POSITION_REACH: f64 = 4.0;
 pub fn errors(accuracy: &Accuracy) -> Plot {
     let panels = Group::all().map(|group| {
         let values = normalised(accuracy, group);
-        let reach = reach(&values);
         let normal = |z: f64| (-0.5 * z * z).exp() / TAU.sqrt();
-        let curve = steps(-reach, reach, CURVE);
-        let bars = histogram(&values, reach);
-        let highest = bars.iter().map(|bar| bar.2).fold(0.0, f64::max);
-        // Errors far beyond their σ are lower than the curve by far: it leaves the panel then.
-        let top = if reach > REACH {
-            highest
-        } else {
-            highest.max(normal(0.0))
-        };
+        let curve = steps(-REACH, REACH, CURVE);
+        let bars = histogram(&values);
+        let top = bars.iter().map(|bar| bar.2).fold(normal(0.0), f64::max);
         let mean_square = values.iter().map(|z| z * z).sum::<f64>() / values.len() as f64;
-        let beyond = values.iter().filter(|z| z.abs() > reach).count();
+        let beyond = values.iter().filter(|z| z.abs() > REACH).count();
         let mut notes = vec![
             format!("{} values", count(values.len())),
             format!("RMS {}", tables::factor(mean_square.sqrt())),
         ];
         notes.extend((beyond > 0).then(|| format!("{} beyond ±{REACH}", count(beyond))));
-        let x = Axis::linear("error / σ").between(-reach, reach);
+        let x = Axis::linear("error / σ").between(-REACH, REACH);
         let y = Axis::linear("").between(0.0, 1.08 * top);
         Panel::new(format!("{}: density", group.title()), x, y)
-            .with(Series::bars(reach / BINS as f64, Fill::Pale, bars).width(0.75))
+            .with(Series::bars(REACH / BINS as f64, Fill::Pale, bars).width(0.75))
             .with(Series::line(curve.map(|z| (z, normal(z)))).color(Color::Ink))
             .noted(notes)
     });
     Plot::new("errors.svg", "Errors over claimed σ", (3, 300), panels).caption(
         "Density of every parameter's error over the σ that the filter claims for it, all runs. Line: the standard \
-         normal density, which it follows if the σ are true; RMS is then 1. Where the axis ends beyond ±5 they are \
-         not, and the line is a spike at zero.",
+         normal density, which it follows if the σ are true; RMS is then 1.",
     )
 }
 
@@ -206,29 +197,19 @@ fn normalised(accuracy: &Accuracy, group: Group) -> Vec<f64> {
         .collect()
 }
 
-fn reach(values: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> = values.iter().map(|z| z.abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    let last = (sizes.len() as f64 * (1.0 - BEYOND)) as usize;
-    match (sizes.get(last), sizes.last()) {
-        (Some(&most), Some(&all)) if most > REACH => all,
-        _ => REACH,
-    }
-}
-
-/// Middle, foot and density of the bins of a histogram over ±`reach`, as a density of all values.
-fn histogram(values: &[f64], reach: f64) -> Vec<Upright> {
+/// Middle, foot and density of the bins of a histogram, as a density of all values.
+fn histogram(values: &[f64]) -> Vec<Upright> {
     let mut counts = [0usize; BINS];
     for z in values {
-        let place = (z / reach + 1.0) * 0.5 * BINS as f64;
+        let place = (z / REACH + 1.0) * 0.5 * BINS as f64;
         if let Some(bin) = counts.get_mut(place as usize).filter(|_| place >= 0.0) {
             *bin += 1;
         }
     }
-    let width = 2.0 * reach / BINS as f64;
+    let width = 2.0 * REACH / BINS as f64;
     let density = |n: usize| n as f64 / (values.len().max(1) as f64 * width);
     let bins = counts.into_iter().enumerate();
-    bins.map(|(k, n)| ((k as f64 + 0.5) * width - reach, 0.0, density(n)))
+    bins.map(|(k, n)| ((k as f64 + 0.5) * width - REACH, 0.0, density(n)))
         .collect()
 }
 
@@ -336,7 +317,6 @@ fn of_mission(of: &NavigationAccuracy, cloud: Vec<Point>, reach: f64) -> Panel {
         .with_all(circles)
         .with(Series::marks(Mark::Dot, cloud).width(1.0))
         .noted(notes);
-    panel.notes_left = true;
     panel.square = true;
     panel
 }
@@ -347,7 +327,7 @@ mod tests {
 
     #[test]
     fn a_histogram_holds_each_value_once_in_its_own_bin() {
-        let tops = histogram(&[-0.1, 0.1, 0.1, 7.0, -7.0], 5.0);
+        let tops = histogram(&[-0.1, 0.1, 0.1, 7.0, -7.0]);
         let width = 10.0 / BINS as f64;
         let at = |z: f64| {
             tops.iter()
@@ -358,15 +338,5 @@ mod tests {
         assert!((at(0.1) - 2.0 / (5.0 * width)).abs() < 1e-12);
         assert!((at(-0.1) - 1.0 / (5.0 * width)).abs() < 1e-12);
         assert_eq!(at(4.9), 0.0);
-    }
-
-    #[test]
-    fn an_axis_widens_only_for_errors_that_no_normal_density_has() {
-        let mut values = vec![0.5; 99];
-        values.push(40.0);
-        assert_eq!(reach(&values), REACH);
-        values.extend([30.0; 10]);
-        assert_eq!(reach(&values), 40.0);
-        assert_eq!(reach(&[]), REACH);
     }
 }

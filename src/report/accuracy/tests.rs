@@ -10,7 +10,7 @@ use crate::calibration::Group;
 use crate::imu::InstallationForm;
 use crate::navigation::NearPole;
 use crate::simulation::Scenario;
-use crate::study::AccuracyStudy;
+use crate::study::{AccuracyStudy, Study};
 
 /// Three runs of the demo at a low sample rate.
 fn small() -> Accuracy {

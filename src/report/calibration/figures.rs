@@ -99,16 +99,14 @@ impl Report<'_> {
                 history.map(|m| (m.time, of(m) / unit)).collect()
             };
             let error = |m: &Epoch| m.estimate[index] - reference[index];
+            let [low, high] = [-3.0, 3.0].map(|factor| of(&|m| factor * m.sigma[index]));
             let sigma = group.spread(&estimate.sigma(), &indices);
             let sigma = sigma.map_or(1.0, |x| x.1);
             let title = format!("{} {}", group.title(), axis_name(estimate.form(), index));
             let y = Axis::symlog(sigma).between(-EXTENT * sigma, EXTENT * sigma);
             Panel::new(format!("{title}, {}", group.unit()), self.time(), y)
                 .shaded(self.dwells)
-                .with(Series::band(
-                    of(&|m| -3.0 * m.sigma[index]),
-                    of(&|m| 3.0 * m.sigma[index]),
-                ))
+                .with(Series::band(low, high))
                 .with(Series::zero())
                 .with(Series::line(of(&error)).color(Color::Ink).width(1.75))
         };

@@ -126,21 +126,22 @@ fn curves(outcome: &Outcome, thermal: &Thermal) -> Plot {
         let title = format!("{}, change", group.titled());
         let mut panel = Panel::new(title, x, Axis::linear("").room(0.03, 0.03));
         for (n, &i) in indices.iter().enumerate() {
-            let edge = |factor: f64| {
-                let points = curve.iter().map(|(t, (change, covariance))| {
-                    let sigma = covariance[(i, i)].max(0.0).sqrt();
-                    (*t, (change[i] + factor * sigma) / unit)
-                });
-                points.collect::<Vec<_>>()
-            };
+            let points = curve.iter().map(|(t, (change, covariance))| {
+                (
+                    *t,
+                    change[i] / unit,
+                    covariance[(i, i)].max(0.0).sqrt() / unit,
+                )
+            });
+            let [band, line] = Series::curve(&points.collect::<Vec<_>>());
             let marks = outcome.alone.iter().filter_map(|alone| {
                 let estimate = alone.estimate.as_ref()?;
                 let t = own_temperature(alone, i)?;
                 Some((t, (estimate.vector()[i] - reference[i]) / unit))
             });
             panel = panel
-                .with(Series::band(edge(-1.0), edge(1.0)))
-                .with(Series::line(edge(0.0)).nth(n).label(axis_name(form, i)))
+                .with(band)
+                .with(line.nth(n).label(axis_name(form, i)))
                 .with(Series::marks(Mark::Ring, marks).nth(n));
         }
         panel

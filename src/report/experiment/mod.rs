@@ -280,8 +280,8 @@ mod tests {
     use super::*;
     use crate::models::{Place, trajectory};
     use crate::simulation::Scenario;
-    use crate::study::ExperimentStudy;
     use crate::study::experiment::Method;
+    use crate::study::{ExperimentStudy, Study};
 
     #[test]
     #[ignore = "slow: an experiment whole"]

@@ -7,6 +7,9 @@ const DECADES: i32 = 10;
 /// Fewer decades than this have ticks at 1, 2 and 5 of each, and end near the data.
 const FEW_DECADES: f64 = 2.5;
 
+/// Some that reach this many times further than others make an axis about zero logarithmic.
+const APART: f64 = 20.0;
+
 /// How numbers are laid along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Kind {
@@ -78,6 +81,19 @@ impl Axis {
         Self {
             step: step.filter(|_| end > 0.0),
             ..Self::linear(&format!("time, {unit}")).between(0.0, end)
+        }
+    }
+
+    /// An axis that holds zero and is logarithmic to both sides of it where some of what is drawn reaches much further
+    /// than the rest; and what its title says of that.
+    pub fn about_zero(reaches: impl Iterator<Item = f64>) -> (Self, &'static str) {
+        let (least, most) = positive_range(reaches);
+        match most > APART * least {
+            true => (
+                Self::symlog(0.3 * least).room(0.0, 0.5),
+                ", logarithmic to both sides",
+            ),
+            false => (Self::linear("").including([0.0]).room(0.06, 0.06), ""),
         }
     }
 
@@ -259,6 +275,14 @@ impl Scale {
         let (low, high) = (straight(self.low), straight(self.high));
         ((straight(value) - low) / (high - low)).clamp(0.0, 1.0)
     }
+}
+
+/// The least positive number and the largest.
+pub fn positive_range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let positive = values.filter(|value| *value > 0.0);
+    positive.fold((f64::INFINITY, 0.0), |(low, high), value| {
+        (f64::min(low, value), f64::max(high, value))
+    })
 }
 
 /// A power of ten with its label.

@@ -5,7 +5,7 @@ mod series;
 
 use std::ops::Range;
 
-pub use axis::{Axis, Kind, Scale};
+pub use axis::{Axis, Kind, Scale, positive_range};
 pub(super) use series::thinned;
 pub use series::{Anchor, Color, Dash, Fill, Mark, Pen, Point, Series, Shape, Upright};
 
@@ -72,10 +72,8 @@ pub struct Panel {
     pub tags: Vec<(f64, String)>,
     /// Number of lines over which the tags are spread.
     pub tag_lines: usize,
-    /// Lines of text in an upper corner.
+    /// Lines of text in the upper right corner.
     pub notes: Vec<String>,
-    /// Whether they stand in the left corner instead of the right one.
-    pub notes_left: bool,
     /// Whether both axes have the same length.
     pub square: bool,
     /// Whether only the title is drawn.
@@ -186,12 +184,4 @@ pub fn beside(n: usize, count: usize, part: f64) -> f64 {
 pub fn steps(low: f64, high: f64, count: usize) -> impl Iterator<Item = f64> + Clone {
     let last = count.saturating_sub(1).max(1) as f64;
     (0..count).map(move |k| low + (high - low) * k as f64 / last)
-}
-
-/// The least positive number and the largest.
-pub fn positive_range(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    let positive = values.filter(|value| *value > 0.0);
-    positive.fold((f64::INFINITY, 0.0), |(low, high), value| {
-        (f64::min(low, value), f64::max(high, value))
-    })
 }

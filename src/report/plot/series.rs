@@ -162,6 +162,13 @@ impl Series {
         Self::new(Shape::Band(lower, upper)).color(Color::Quiet)
     }
 
+    /// A line through values with their σ, and the band of ±σ behind it.
+    pub fn curve(points: &[(f64, f64, f64)]) -> [Self; 2] {
+        let edge = |factor: f64| points.iter().map(move |&(x, y, own)| (x, y + factor * own));
+        let band = Self::band(edge(-1.0).collect(), edge(1.0).collect());
+        [band, Self::line(edge(0.0))]
+    }
+
     /// A mark at each point.
     pub fn marks(mark: Mark, points: impl IntoIterator<Item = Point>) -> Self {
         Self::whiskers(mark, points.into_iter().map(|at| (at, (at.1, at.1))))

@@ -4,7 +4,7 @@ use plotters::style::RGBColor;
 
 use super::super::plot::{Grid, Panel, Scale};
 use super::canvas::{
-    Canvas, Frame, Height, INK, LETTER, QUIET, SMALL, WIDTH, rgb, shortened, width,
+    Canvas, Frame, HPos, INK, LETTER, QUIET, SMALL, VPos, WIDTH, rgb, shortened, width,
 };
 use super::series;
 
@@ -94,7 +94,7 @@ fn names(x: &Scale, room: f64) -> Vec<Vec<String>> {
 
 fn title(on: &mut Canvas, frame: &Frame) {
     let at = (frame.across.0, frame.down.0 - TOP + 6.0);
-    on.text(&frame.panel.title, at, ("start", Height::Head), INK, 1.0)
+    on.text(&frame.panel.title, at, (HPos::Left, VPos::Top), INK, 1.0)
 }
 
 fn of_panel(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
@@ -114,13 +114,9 @@ fn of_panel(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
         series::draw(on, frame, series);
     }
     tags(on, frame);
-    let (x, side) = match panel.notes_left {
-        true => (left + 6.0, "start"),
-        false => (right - 6.0, "end"),
-    };
     for (line, note) in panel.notes.iter().enumerate() {
-        let at = (x, top + 6.0 + LINE * line as f64);
-        on.text(note, at, (side, Height::Head), INK, SMALL);
+        let at = (right - 6.0, top + 6.0 + LINE * line as f64);
+        on.text(note, at, (HPos::Right, VPos::Top), INK, SMALL);
     }
     labels(on, frame)
 }
@@ -136,7 +132,13 @@ fn ticks(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
         taken.push(y);
         on.stroke(&[(left, y), (right, y)], GRID, 0.75);
         on.stroke(&[(left - 3.0, y), (left, y)], QUIET, 0.75);
-        on.text(label, (left - 6.0, y), ("end", Height::Middle), INK, SMALL);
+        on.text(
+            label,
+            (left - 6.0, y),
+            (HPos::Right, VPos::Center),
+            INK,
+            SMALL,
+        );
     }
     let mut taken: Vec<(f64, f64)> = Vec::new();
     for ((value, _), lines) in frame.x.ticks.iter().zip(names) {
@@ -155,7 +157,7 @@ fn ticks(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
         taken.push((x, half));
         for (n, line) in lines.iter().enumerate() {
             let at = (x, bottom + 6.0 + LINE * n as f64);
-            on.text(line, at, ("middle", Height::Head), INK, SMALL);
+            on.text(line, at, (HPos::Center, VPos::Top), INK, SMALL);
         }
     }
     let lines = names.iter().map(Vec::len).max().unwrap_or(1).max(1) as f64;
@@ -164,7 +166,7 @@ fn ticks(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
     if title.is_empty() {
         return;
     }
-    on.text(title, at, ("middle", Height::Head), INK, SMALL)
+    on.text(title, at, (HPos::Center, VPos::Top), INK, SMALL)
 }
 
 /// Names with a sample of their colour, from the right end of the title's line.
@@ -173,7 +175,7 @@ fn keys(on: &mut Canvas, frame: &Frame, y: f64) {
     for series in frame.panel.series.iter().rev() {
         let Some(key) = &series.key else { continue };
         x -= width(key, SMALL);
-        on.text(key, (x, y), ("start", Height::Head), INK, SMALL);
+        on.text(key, (x, y), (HPos::Left, VPos::Top), INK, SMALL);
         let sample = [(x - 16.0, y + 3.0), (x - 5.0, y + 14.0)];
         on.rectangle(sample, rgb(series.pen.color));
         x -= 28.0;
@@ -195,7 +197,7 @@ fn tags(on: &mut Canvas, frame: &Frame) {
         };
         taken[line] = at + half + 6.0;
         let place = (at, frame.down.0 + 3.0 + 15.0 * line as f64);
-        on.text(text, place, ("middle", Height::Head), QUIET, TAG);
+        on.text(text, place, (HPos::Center, VPos::Top), QUIET, TAG);
     }
 }
 
@@ -215,7 +217,7 @@ fn labels(on: &mut Canvas, frame: &Frame) {
         on.stroke(&[(right + 1.0, y), (right + 9.0, shown_at)], color, 0.75);
         let text = shortened(text, frame.end - right - 12.0);
         let at = (right + 11.0, shown_at);
-        on.text(&text, at, ("start", Height::Middle), color, SMALL);
+        on.text(&text, at, (HPos::Left, VPos::Center), color, SMALL);
     }
 }
 

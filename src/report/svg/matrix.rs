@@ -3,7 +3,7 @@
 use plotters::style::RGBColor;
 
 use super::super::plot::{Matrix, Point};
-use super::canvas::{Canvas, Height, INK, QUIET, width};
+use super::canvas::{Canvas, HPos, INK, QUIET, VPos, width};
 
 const SIDE: f64 = 880.0;
 const DIAGONAL: RGBColor = RGBColor(225, 225, 222);
@@ -24,7 +24,7 @@ pub fn draw(on: &mut Canvas, matrix: &Matrix) -> u32 {
         on.text(
             name,
             (margin - 8.0, middle),
-            ("end", Height::Middle),
+            (HPos::Right, VPos::Center),
             INK,
             LETTERS,
         );
@@ -45,7 +45,7 @@ pub fn draw(on: &mut Canvas, matrix: &Matrix) -> u32 {
                     } else if r.abs() >= matrix.written {
                         let text = format!("{:.0}", 100.0 * r).replace('-', "−");
                         let place = (left + 0.5 * cell, top + 0.5 * cell);
-                        on.text(&text, place, ("middle", Height::Middle), INK, LETTERS);
+                        on.text(&text, place, (HPos::Center, VPos::Center), INK, LETTERS);
                     }
                 },
             )
@@ -104,7 +104,7 @@ fn scale(on: &mut Canvas, (x, y): Point) {
         on.text(
             &hundredths(r),
             place,
-            ("start", Height::Middle),
+            (HPos::Left, VPos::Center),
             INK,
             LETTERS,
         );

@@ -3,7 +3,7 @@
 use crate::imu::{InstallationForm, Sensor};
 use crate::study::Table1;
 use crate::study::table1::paper::Published;
-use crate::study::table1::{Column, Kind, Quantity, Row, Verdict};
+use crate::study::table1::{Column, Kind, QUANTITIES, Row, Verdict};
 
 /// A verdict in a few words.
 pub fn short(verdict: &Verdict) -> &'static str {
@@ -36,10 +36,11 @@ fn of_reading(row: &Row) -> String {
 
 /// Names of the quantities that agree and of those that do not.
 fn split(row: &Row) -> (Vec<&'static str>, Vec<&'static str>) {
-    let (agree, apart): (Vec<Quantity>, Vec<Quantity>) =
-        Quantity::ALL.into_iter().partition(|&q| row.agrees(q));
-    let names = |quantities: Vec<Quantity>| quantities.into_iter().map(Quantity::name).collect();
-    (names(agree), names(apart))
+    let named = |agrees: bool| {
+        let those = (0..QUANTITIES.len()).filter(move |&q| row.agrees(q) == agrees);
+        those.map(|q| QUANTITIES[q].short()).collect()
+    };
+    (named(true), named(false))
 }
 
 /// A sentence for each of the paper's columns.

@@ -1,7 +1,6 @@
 //! The baseline of the comparison: the closed form on the paper's static positions, with the same
 //! instrument and the same noise.
 
-use super::StudyError;
 use crate::calibration::{
     Options, ParameterVector, Problem, in_body_frame, in_general_form, six_position_of, to_vector,
 };
@@ -10,6 +9,7 @@ use crate::models;
 use crate::models::{ModelError, Place};
 use crate::run::Dwell;
 use crate::simulation::{Scenario, Simulated};
+use crate::study::StudyError;
 use crate::turntable::Table;
 
 /// The runs of the closed form. It is also evaluated on the first part of every dwell, as if the dwells

@@ -3,7 +3,7 @@
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
-use super::{AccuracyStudy, Baseline, StudyError};
+use super::{AccuracyStudy, Baseline};
 use crate::calibration::{
     AUXILIARY, AuxiliaryVector, Epoch, ErrorTermTest, Estimate, FormTest, Nees, Nis, Options,
     Outcome, PARAMETERS, ParameterMatrix, ParameterVector, Problem, UNWATCHED, auxiliary_vector,
@@ -12,6 +12,7 @@ use crate::calibration::{
 use crate::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
 use crate::run::Aiding;
 use crate::simulation::Runs;
+use crate::study::StudyError;
 
 /// One run. Errors are estimate minus truth; everything is in the general form.
 #[derive(Debug, Clone, Serialize, Deserialize)]
