@@ -22,6 +22,7 @@ use crate::calibration::{PARAMETERS, ParameterVector, parameter};
 use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::navigation::{SensedErrors, Sensitivity, Trajectory};
 use crate::simulation::Scenario;
+use crate::units::NAUTICAL_MILE;
 
 pub use budget::{Budget, Part};
 pub use method::{Calibrated, Estimator, Method, Trial};
@@ -87,12 +88,12 @@ pub struct Navigated {
     pub situation: Situation,
     /// Each of [`Method::all`].
     pub methods: Vec<Worth>,
-    /// Horizontal position error at the end in m that the noise of alignment and navigation makes by
+    /// Horizontal position error at the end in nmile that the noise of alignment and navigation makes by
     /// itself, after any calibration.
     pub noise: Spread,
 }
 
-/// What a method is worth: horizontal position errors in m over all instruments.
+/// What a method is worth: horizontal position errors in nmile over all instruments.
 #[derive(Debug, Clone)]
 pub struct Worth {
     /// The method.
@@ -117,7 +118,7 @@ pub struct Worth {
 }
 
 /// How a length is distributed.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spread {
     /// Half of all are below.
     pub median: f64,
@@ -126,10 +127,13 @@ pub struct Spread {
     /// Root of the mean square.
     pub rms: f64,
     /// A quarter of all are below the first, three quarters below the second.
+    #[serde(skip)]
     pub quartiles: (f64, f64),
     /// 68 % are below.
+    #[serde(rename = "below_68_percent")]
     pub below_68: f64,
     /// 95 % are below.
+    #[serde(rename = "below_95_percent")]
     pub below_95: f64,
 }
 
@@ -150,7 +154,7 @@ impl Spread {
     }
 }
 
-/// Horizontal position error, east and north in m, by parameter errors.
+/// Horizontal position error, east and north in nmile, by parameter errors.
 type ByParameter = SMatrix<f64, 2, PARAMETERS>;
 
 impl Study for ExperimentStudy {
@@ -209,10 +213,10 @@ impl ExperimentStudy {
         let noise = noise::position(&mission, aligned, &self.scenario.instrument.noise)?;
         Ok(Way {
             situation,
-            noise: noise::spread(&noise),
+            noise: noise::spread(&(noise / NAUTICAL_MILE.powi(2))),
             minutes: exposures
                 .iter()
-                .map(|at| (at.time, at.position()))
+                .map(|at| (at.time, at.position() / NAUTICAL_MILE))
                 .collect(),
         })
     }

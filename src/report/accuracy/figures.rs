@@ -9,10 +9,10 @@ use crate::report::prelude::*;
 use crate::study::accuracy::{Position, Region};
 use crate::study::{Accuracy, Figures, GroupAccuracy, NavigationAccuracy, Ratio};
 
-/// The narrowest axis about a ratio of one.
-const NEAR: f64 = 0.04;
-/// A ratio beyond this or below its inverse makes its axis logarithmic.
-const FAR: f64 = 2.0;
+/// The narrowest axis of ratios: its ends are this factor apart.
+const NARROWEST: f64 = 1.08;
+/// Left free at both ends of it, in parts of its length.
+const FREE: f64 = 0.2;
 /// Lines that end nearer than this factor have one name.
 const TOGETHER: f64 = 2.0;
 
@@ -28,55 +28,9 @@ pub fn figures(accuracy: &Accuracy) -> Vec<Plot> {
     plots
 }
 
-/// Ratios with their place on the axis.
-fn ratios(accuracy: &Accuracy, of: impl Fn(&Figures) -> Option<Ratio>) -> Vec<(f64, Ratio)> {
-    let all = compared(accuracy).into_iter().enumerate();
-    all.filter_map(|(place, compared)| Some((place as f64, of(compared.figures)?)))
-        .filter(|(_, ratio)| ratio.value.is_finite())
-        .collect()
-}
-
-/// A panel with a place for each that is compared and a line at 1.
-fn by_compared(accuracy: &Accuracy, title: String, y: Axis) -> Panel {
-    let x = Axis::places(compared(accuracy).into_iter().map(|of| of.title));
-    Panel::new(title, x, y).with(Series::level(1.0).width(1.5))
-}
-
-/// A mark at each ratio with its interval, and its value beyond that, away from 1.
-fn with_values(ratios: &[(f64, Ratio)], shift: f64) -> Vec<Series> {
-    let at = |&(x, ratio): &(f64, Ratio)| ((x + shift, ratio.value), ratio.interval);
-    let values = ratios.iter().map(|(x, ratio)| {
-        let [text, _] = with_interval(ratio.value, ratio.interval);
-        match ratio.value >= 1.0 {
-            true => Series::words((x + shift, ratio.interval.1), Anchor::Above, text),
-            false => Series::words((x + shift, ratio.interval.0), Anchor::Below, text),
-        }
-    });
-    let marks = Series::whiskers(Mark::Dot, ratios.iter().map(at)).width(3.0);
-    std::iter::once(marks).chain(values).collect()
-}
-
 /// RMS error over bound.
 fn ratio(accuracy: &Accuracy) -> Plot {
-    let ratios = ratios(accuracy, |f| f.ratio);
-    let ends = || {
-        ratios
-            .iter()
-            .flat_map(|(_, r)| [r.interval.0, r.interval.1])
-    };
-    let half = ends().map(|end| (end - 1.0).abs()).fold(NEAR, f64::max);
-    let (y, kind) = match ends().any(|end| !(1.0 / FAR..=FAR).contains(&end)) {
-        true => (
-            Axis::log("").including([1.0]).room(0.4, 0.8),
-            ", logarithmic",
-        ),
-        false => (
-            Axis::linear("").between(1.0 - 1.3 * half, 1.0 + 1.3 * half),
-            "",
-        ),
-    };
-    let panel = by_compared(accuracy, format!("RMS error / RMS bound{kind}"), y)
-        .with_all(with_values(&ratios, 0.0));
+    let panel = ratios(accuracy, "RMS error / RMS bound", &[("", |f| f.ratio)]);
     Plot::new("ratio.svg", "Error over bound", (1, 400), [panel]).caption(
         "RMS error of the EKF over the Cramér–Rao bound, of each group of parameters and of the position after 40 \
          h; bars: its 99 % interval. A bar that crosses the line at 1 says that nothing shows the filter to be \
@@ -86,30 +40,60 @@ fn ratio(accuracy: &Accuracy) -> Plot {
 
 /// Error of the closed form over that of the filter.
 fn gain(accuracy: &Accuracy) -> Plot {
-    let y = Axis::log("").including([1.0]).room(0.4, 0.8);
-    let title = "RMS error of closed form / RMS error of EKF".to_owned();
-    let mut panel = by_compared(accuracy, title, y);
-    let equal: fn(&Figures) -> Option<Ratio> = |f| f.gain_in_equal_time;
-    let own: fn(&Figures) -> Option<Ratio> = |f| f.gain;
-    for (of, shift, fill) in [(own, -0.17, Fill::Pale), (equal, 0.17, Fill::Open)] {
-        let ratios = ratios(accuracy, of);
-        let bars = ratios
+    let own = format!("closed form {}", minutes(accuracy.baseline.table_time));
+    let mut all: Vec<(&str, OfFigures)> = vec![(&own, |f| f.gain)];
+    let equal = accuracy
+        .baseline
+        .equal_time()
+        .map(|time| format!("closed form {}", minutes(time)));
+    all.extend(
+        equal
             .iter()
-            .map(|(x, ratio)| (x + shift, 1.0, ratio.value));
-        panel = panel
-            .with(Series::bars(0.13, fill, bars).width(1.25))
-            .with_all(with_values(&ratios, shift));
-    }
-    let equal = match accuracy.baseline.equal_time() {
-        Some(time) => format!(" Right, open: closed form in {}.", minutes(time)),
-        None => " Its positions cannot be had in the time of the EKF.".to_owned(),
-    };
+            .map(|equal| (equal.as_str(), (|f| f.gain_in_equal_time) as OfFigures)),
+    );
+    let panel = ratios(
+        accuracy,
+        "RMS error of closed form / RMS error of EKF",
+        &all,
+    );
     Plot::new("gain.svg", "Gain over the closed form", (1, 460), [panel]).caption(format!(
-        "RMS error of the closed form over that of the EKF in {}, logarithmic, with 99 % intervals. Above the line \
-         at 1 the EKF is better, below the closed form. Left, shaded: closed form in its own {}.{equal}",
+        "RMS error of the closed form over that of the EKF in {}, with 99 % intervals. Above the line at 1 the EKF \
+         is better, below the closed form.",
         minutes(accuracy.table_time),
-        minutes(accuracy.baseline.table_time)
     ))
+}
+
+type OfFigures = fn(&Figures) -> Option<Ratio>;
+
+/// Ratios by name, each with its interval and its value beyond that, away from the line at 1.
+fn ratios(accuracy: &Accuracy, title: &str, all: &[(&str, OfFigures)]) -> Panel {
+    let compared = compared(accuracy);
+    let (mut low, mut high) = (1.0, 1.0);
+    let mut series = vec![Series::level(1.0).width(1.5)];
+    for (n, (name, of)) in all.iter().enumerate() {
+        let mut marks = Vec::new();
+        for (place, compared) in compared.iter().enumerate() {
+            let ratio = of(compared.figures).filter(|ratio| ratio.value.is_finite());
+            let Some(Ratio { value, interval }) = ratio else {
+                continue;
+            };
+            let x = place as f64 + beside(n, all.len(), 0.68);
+            let [text, _] = with_interval(value, interval);
+            marks.push(((x, value), interval));
+            series.push(match value >= 1.0 {
+                true => Series::words((x, interval.1), Anchor::Above, text),
+                false => Series::words((x, interval.0), Anchor::Below, text),
+            });
+            (low, high) = (f64::min(low, interval.0), f64::max(high, interval.1));
+        }
+        let mut marks = Series::whiskers(Mark::Dot, marks).nth(n).width(3.0);
+        marks.key = Some((*name).to_owned()).filter(|name| !name.is_empty());
+        series.push(marks);
+    }
+    let free = (high / low).max(NARROWEST).powf(FREE);
+    let y = Axis::log("").between(low / free, high * free);
+    let names = compared.into_iter().map(|of| of.title);
+    Panel::new(format!("{title}, logarithmic"), Axis::places(names), y).with_all(series)
 }
 
 /// RMS error of both methods against table time.

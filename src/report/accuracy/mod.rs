@@ -1,7 +1,7 @@
 //! The report of a study of accuracy.
 
 mod figures;
-mod tables;
+pub(super) mod tables;
 #[cfg(test)]
 mod tests;
 mod verdict;

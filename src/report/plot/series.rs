@@ -56,8 +56,6 @@ pub enum Fill {
     Solid,
     /// Pale within an outline.
     Pale,
-    /// Not at all.
-    Open,
 }
 
 /// Where a text stands.

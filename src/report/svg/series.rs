@@ -102,7 +102,6 @@ fn bars(
                 on.area(&corners, BAND);
                 on.stroke(&corners, color, pen.width)
             }
-            Fill::Open => on.stroke(&corners, color, pen.width),
         })
     }
 }

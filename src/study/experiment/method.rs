@@ -14,13 +14,16 @@ use crate::study::StudyError;
 use crate::turntable::TableError;
 
 /// An estimator with its path.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Estimator {
     /// The closed form on the paper's static positions.
+    #[serde(rename = "six-position")]
     ClosedForm,
     /// The filter on the scenario's path.
+    #[serde(rename = "ekf")]
     Filter,
     /// The filter on a path that takes the closed form's table time.
+    #[serde(rename = "ekf-equal-time")]
     LongFilter,
 }
 
