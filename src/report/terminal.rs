@@ -3,7 +3,7 @@
 use textwrap::core::display_width;
 use textwrap::{Options, WordSplitter};
 
-use super::document::{Block, Document, Facts, List, Medium, Table};
+use super::document::{Block, Document, Facts, List, Table};
 use crate::calibration::{Finding, Level};
 
 /// Least width, in letters, of the lines into which a column heading is broken.
@@ -90,7 +90,7 @@ pub fn text(document: &Document, width: Option<usize>) -> String {
     parts[0].extend(lead.flat_map(|text| paragraphs(&[text], width)));
     let brief = document.brief.iter();
     let blocks = document.blocks.iter();
-    let blocks = blocks.filter(|(medium, _)| *medium != Medium::Page);
+    let blocks = blocks.filter(|(page_only, _)| !page_only);
     let all = brief.chain(blocks.map(|(_, block)| block));
     parts.extend(all.map(|block| shown(block, width)));
     parts.push(list(&document.conclusions, "  ", width));

@@ -122,9 +122,10 @@ impl Study for AccuracyStudy {
         let table_time = self.scenario.duration()?;
         let (mut navigation, mut not_navigated) = (Vec::new(), Vec::new());
         for journey in Journey::ALL {
-            match Way::of(journey, &self.scenario)? {
+            match Way::of(journey, &self.scenario) {
                 Ok(way) => navigation.push(way.worth(&trials)),
-                Err(error) => not_navigated.push((journey, error)),
+                Err(StudyError::Navigation(error)) => not_navigated.push((journey, error)),
+                Err(error) => return Err(error),
             }
         }
         let effects = trials.first().map(|trial| trial.effects.clone());

@@ -137,8 +137,6 @@ const REACH: f64 = 5.0;
 const BINS: usize = 24;
 /// Points of a curve.
 const CURVE: usize = 301;
-/// Runs this many times above the upper end of the interval of NEES make its axis logarithmic.
-const FAR_NEES: f64 = 4.0;
 /// The least half width of the axes of positions, in σ.
 const POSITION_REACH: f64 = 4.0;
 
@@ -215,15 +213,11 @@ pub fn nees(accuracy: &Accuracy) -> Plot {
         count(outside),
         count(all().count())
     );
-    let most = all().fold(one.1, f64::max);
-    let (y, kind) = match most > FAR_NEES * one.1 {
-        true => (Axis::log("").including([one.0, one.1]), ", logarithmic"),
-        false => (Axis::linear("").between(0.0, 1.08 * most), ""),
-    };
+    let y = Axis::log("").including([one.0, one.1]);
     let (first, last) = (-0.5, accuracy.trials.len() as f64 - 0.5);
     let n = accuracy.anees.map_or(0, |anees| anees.directions);
     let x = Axis::linear("run").between(first, last);
-    let mut panel = Panel::new(format!("NEES/n of each run, n = {n}{kind}"), x, y);
+    let mut panel = Panel::new(format!("NEES/n of each run, n = {n}, logarithmic"), x, y);
     if let Some(of) = accuracy.anees {
         let mean = tables::mean(of.mean, of.interval_95);
         caption += &format!(

@@ -104,8 +104,8 @@ fn correlation_time(found: Found) -> String {
     }
 }
 
-/// Allan deviations of all axes at every so-manieth cluster time.
-pub fn deviations(analysis: &NoiseAnalysis, every: usize) -> Table {
+/// Allan deviations of all axes at every cluster time.
+pub fn deviations(analysis: &NoiseAnalysis) -> Table {
     let freedom = |triad: &TriadNoise, point: usize| {
         let of = |axis: &AxisNoise| Some(*axis.identified.as_ref()?.freedom.get(point)?);
         triad.axes.iter().filter_map(of).fold(f64::NAN, f64::min)
@@ -133,7 +133,7 @@ pub fn deviations(analysis: &NoiseAnalysis, every: usize) -> Table {
     let columns = columns.chain(["degrees of freedom".to_owned()]);
     let taus = triads.gyro.mean.curve.tau.iter().enumerate();
     let mut table = Table::new("Overlapping Allan deviation", columns)
-        .section(taus.step_by(every).map(row))
+        .section(taus.map(row))
         .note(format!(
             "Degrees of freedom: the fewest of the six. {}",
             words::INTERVALS

@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 
 use crate::attitude::matrix;
-use crate::calibration::{Epoch, Estimate, Innovation, Nis, Observation, Outcome, ParameterVector};
+use crate::calibration::{Epoch, Estimate, Innovation, Observation, Outcome, ParameterVector};
 use crate::imu::{AXES, Sensor};
 use crate::recording::{ImuSamples, TableLog};
 use crate::report::calibration::report::Report;
@@ -128,19 +128,19 @@ impl Report<'_> {
 
     /// Whitened innovations with their bounds: velocity above, table attitude below.
     fn innovations(&self, outcome: &Outcome) -> Option<Plot> {
-        let consistency = &outcome.consistency;
-        let kinds = [
-            ("velocity", Observation::Velocity, &consistency.velocity),
-            ("table attitude", Observation::Table, &consistency.table),
-            ("attitude", Observation::Attitude, &consistency.attitude),
-        ];
         let of_kind = |kind| {
             let all = outcome.innovations.iter();
             all.filter(move |i| i.observation == kind)
         };
-        let is_there = |(_, kind, _): &(&str, Observation, &Nis)| of_kind(*kind).next().is_some();
-        let kinds: Vec<(&str, Observation, &Nis)> = kinds.into_iter().filter(is_there).collect();
-        let panel = |name: &str, kind: Observation, direction: usize| {
+        let kinds = [
+            Observation::Velocity,
+            Observation::Table,
+            Observation::Attitude,
+        ];
+        let kinds = kinds
+            .into_iter()
+            .filter(|kind| of_kind(*kind).next().is_some());
+        let panel = |kind: Observation, direction: usize| {
             let point = |i: &Innovation| (i.time, i.whitened[direction].clamp(-EDGE, EDGE));
             let of = |accepted| {
                 let those = of_kind(kind).filter(move |i| i.accepted == accepted);
@@ -151,7 +151,7 @@ impl Report<'_> {
                 true => Series::marks(Mark::Dot, accepted),
                 false => Series::line(self.interrupted_by_turns(&accepted)),
             };
-            let title = format!("{name}, {}, σ", ["east", "north", "up"][direction]);
+            let title = format!("{}, {}, σ", kind.name(), ["east", "north", "up"][direction]);
             let y = Axis::linear("").between(-EDGE, EDGE).step(2.0);
             Panel::new(title, self.time(), y)
                 .shaded(self.dwells)
@@ -159,18 +159,16 @@ impl Report<'_> {
                 .with_all([-3.0, -1.0, 1.0, 3.0].map(bound))
                 .with(Series::marks(Mark::Cross, of(false)).nth(1))
         };
-        let rows = kinds.iter();
-        let rows = rows.flat_map(|&(name, kind, _)| [0, 1, 2].map(|d| panel(name, kind, d)));
-        let sentences = kinds.iter().map(|(name, _, nis)| sentence(name, nis));
-        let sentences: Vec<String> = sentences.collect();
+        let panels = kinds.flat_map(|kind| [0, 1, 2].map(|direction| panel(kind, direction)));
+        let panels: Vec<Panel> = panels.collect();
         let caption = format!(
             "Innovations of the last pass in units of their own σ; they should look like white noise of unit \
              variance. Solid lines: ±1σ; dashed: ±3σ. Where they are many the line runs through the extremes of \
-             each stretch. Crosses: rejected by the gate; at the edge: ±{EDGE}σ or more. {}",
-            sentences.join(" ")
+             each stretch. Crosses: rejected by the gate; at the edge: ±{EDGE}σ or more."
         );
-        let plot = Plot::new("innovations.svg", "Innovations", (3, 270), rows);
-        (!kinds.is_empty()).then(|| plot.caption(caption))
+        let drawn = !panels.is_empty();
+        let plot = Plot::new("innovations.svg", "Innovations", (3, 270), panels);
+        drawn.then(|| plot.caption(caption))
     }
 
     /// A line across a turn would show what was not observed.
@@ -191,12 +189,6 @@ fn bound(y: f64) -> Series {
     } else {
         series.color(Color::Quiet).width(1.0)
     }
-}
-
-fn sentence(name: &str, nis: &Nis) -> String {
-    let [mean, low, high] = [nis.mean, nis.interval.0, nis.interval.1].map(|x| value(x, 0.01));
-    let scalars = count(nis.count);
-    format!("NIS of {name} {mean} (95 % interval {low}–{high}, {scalars} scalars).")
 }
 
 /// Correlations of the estimated parameters; `None` if nothing was estimated.

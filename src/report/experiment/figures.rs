@@ -6,8 +6,6 @@ use crate::report::prelude::*;
 use crate::study::Experiment;
 use crate::study::experiment::{Estimator, Navigated, Worth};
 
-/// Half the height of a box, in places of the axis.
-const HALF: f64 = 0.2;
 /// Below this nothing is worth a place on the axis of time, nmile.
 const LEAST: f64 = 0.01;
 
@@ -25,67 +23,39 @@ fn distribution(experiment: &Experiment) -> Plot {
     let all = experiment.navigations.iter().flat_map(|n| &n.methods);
     let all: Vec<f64> = all.flat_map(|w| w.errors.iter().copied()).collect();
     let panel = |navigated: &Navigated| {
-        // The first method stands at the top.
-        let methods: Vec<&Worth> = navigated.methods.iter().rev().collect();
-        let names = methods
-            .iter()
-            .map(|worth| method_name(experiment, worth.method));
-        let noise = navigated.noise.median;
-        let title = format!(
-            "{}: position error, nmile",
-            situation_name(navigated.situation)
-        );
-        let x = Axis::log("").including(all.iter().copied()).room(0.1, 0.1);
-        Panel::new(title, x, Axis::places(names).room(0.0, 0.4))
-            .with(
-                Series::new(Shape::Upright(noise))
-                    .color(Color::Quiet)
-                    .dashed()
-                    .width(1.25),
-            )
-            .with(Series::words(
-                (noise, -0.5),
-                Anchor::AboveLeft,
-                "noise alone",
-            ))
-            .with_all(
-                methods
-                    .iter()
-                    .enumerate()
-                    .flat_map(|(k, worth)| boxed(k as f64, worth)),
-            )
+        let methods = navigated.methods.iter();
+        let x = Axis::places(methods.map(|worth| method_name(experiment, worth.method)));
+        let situation = situation_name(navigated.situation);
+        let y = Axis::log("").including(all.iter().copied()).room(0.1, 0.4);
+        let noise = Series::level(navigated.noise.median).color(Color::Quiet);
+        let boxes = navigated.methods.iter().enumerate();
+        Panel::new(format!("{situation}: position error, nmile"), x, y)
+            .with(noise.dashed().label("noise alone"))
+            .with_all(boxes.flat_map(|(place, worth)| boxed(place as f64, worth)))
     };
     let panels = experiment.navigations.iter().map(panel);
     Plot::new("distribution.svg", "Position error at the end", (1, 330), panels).caption(
-        "Horizontal position error at the end, logarithmic, the same axis for all. Dots: instruments; thick line \
-         with its value: median; box: the middle half; line beyond: 95 % are below; dashed: median of what the \
+        "Horizontal position error at the end, logarithmic, the same axis for all. Small dots: instruments; large \
+         dot with its value: median; box: the middle half; line: 95 % are below its end; dashed: median of what the \
          noise of the instrument alone makes.",
     )
 }
 
-fn boxed(place: f64, worth: &Worth) -> Vec<Series> {
-    let (below, above) = (place - HALF, place + HALF);
+fn boxed(x: f64, worth: &Worth) -> [Series; 4] {
     let at_end = &worth.at_end;
     let ((first, third), median, most) = (at_end.quartiles, at_end.median, at_end.below_95);
-    let upright = |x: f64| Series::line([(x, below), (x, above)]);
-    let thin = [
-        upright(first),
-        upright(third),
-        upright(most),
-        Series::line([(third, place), (most, place)]),
-    ];
     let color = color(worth.method.estimator);
-    let dots = worth.errors.iter().map(|&error| (error, place));
-    let dots = Series::marks(Mark::Dot, dots).color(color).width(0.5);
-    let edge = |y: f64| vec![(first, y), (third, y)];
-    let mut all = vec![Series::band(edge(below), edge(above))];
-    all.extend(thin.map(|line| line.color(color).width(1.0)));
-    all.extend([
-        dots,
-        upright(median).color(Color::Ink).width(3.0),
-        Series::words((median, place), Anchor::Above, three_digits(median)),
-    ]);
-    all
+    let dots = worth.errors.iter().map(|&error| (x, error));
+    [
+        Series::bars(0.2, Fill::Pale, [(x, first, third)])
+            .color(color)
+            .width(1.0),
+        Series::marks(Mark::Dot, dots).color(color).width(0.5),
+        Series::whiskers(Mark::Dot, [((x, median), (median, most))])
+            .color(color)
+            .width(3.0),
+        Series::words((x, most), Anchor::Above, three_digits(median)),
+    ]
 }
 
 fn against_time(experiment: &Experiment) -> Plot {

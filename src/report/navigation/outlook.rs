@@ -112,6 +112,50 @@ pub fn line(navigated: &[Navigated]) -> String {
     )
 }
 
+/// One quantity by one calibration: the largest error with its time, the error at the end, its σ, and what the error
+/// is of that.
+#[derive(Clone, Copy)]
+struct Figures {
+    largest: Option<Point>,
+    at_end: Option<f64>,
+    sigma: Option<f64>,
+    ratio: Option<f64>,
+}
+
+impl Figures {
+    fn of(quantity: Quantity, navigated: &Navigated) -> Self {
+        let moments = &navigated.outlook;
+        let errors = moments
+            .iter()
+            .filter_map(|m| Some((m.time, quantity.error(m)?)));
+        let at_end = moments.last().and_then(|end| quantity.error(end));
+        let sigma = moments.last().and_then(|end| quantity.sigma(end));
+        let sigma = sigma.filter(|sigma| *sigma > 0.0);
+        let ratio = at_end.zip(sigma).filter(|_| quantity.is_component);
+        Self {
+            largest: errors.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())),
+            at_end,
+            sigma,
+            ratio: ratio.map(|(error, sigma)| error / sigma),
+        }
+    }
+
+    fn cells(&self, scale: f64, second: f64, known: bool) -> Vec<String> {
+        let shown = |x: Option<f64>| or_dash(x, |x| three_digits(x * scale));
+        if !known {
+            return vec![shown(self.sigma)];
+        }
+        let (after, largest) = self.largest.unzip();
+        vec![
+            shown(largest),
+            or_dash(after, |time| value(time / second, 1.0)),
+            shown(self.at_end),
+            shown(self.sigma),
+            or_dash(self.ratio, |z| value(z, 1.0)),
+        ]
+    }
+}
+
 /// Every quantity at the end of navigation, and the largest of each where errors are known.
 pub fn table(heading: &str, navigated: &[Navigated]) -> Table {
     let known = is_known(navigated);
@@ -122,59 +166,52 @@ pub fn table(heading: &str, navigated: &[Navigated]) -> Table {
             [_] => String::new(),
             _ => format!("{}: ", of.method),
         };
-        if known {
-            let after = format!("after, {unit_of_time}");
-            columns.extend([format!("{name}largest"), after, "at the end".to_owned()]);
-            columns.extend(cells!["σ", "error/σ"]);
-        } else {
-            columns.push(format!("{name}σ"));
-        }
-    }
-    let row = |quantity: Quantity, is_drift: bool| {
-        let ends = navigated.iter().map(|of| {
-            let error = |moment: &Outlook| Some((moment.time, quantity.error(moment)?));
-            let (last, errors) = (of.outlook.last(), of.outlook.iter().filter_map(error));
-            let largest = errors.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-            let sigma = last.and_then(|end| quantity.sigma(end));
-            (
-                largest.filter(|_| !is_drift),
-                last.and_then(error),
-                sigma.filter(|s| *s > 0.0),
-            )
+        let after = format!("after, {unit_of_time}");
+        columns.extend(match known {
+            true => cells![
+                format!("{name}largest"),
+                after,
+                "at the end",
+                "σ",
+                "error/σ"
+            ],
+            false => cells![format!("{name}σ")],
         });
-        let ends: Vec<(Option<Point>, Option<Point>, Option<f64>)> = ends.collect();
-        let sizes = ends
-            .iter()
-            .flat_map(|&(largest, _, sigma)| [largest.map(|of| of.1), sigma]);
-        let size = sizes.flatten().map(f64::abs).fold(0.0, f64::max);
-        let (name, unit, scale) = if is_drift {
-            let unit = format!("{}/{unit_of_time}", quantity.unit());
-            ("drift", unit, second / duration(navigated))
-        } else {
-            let (unit, scale) = quantity.readable_unit(size);
-            (quantity.name, unit.to_owned(), scale)
-        };
-        let shown = |x: Option<f64>| or_dash(x, |x| three_digits(x * scale));
-        let mut row = cells![name, unit];
-        for (largest, end, sigma) in ends {
-            let ratio = end.zip(sigma).filter(|_| quantity.is_component);
-            row.extend(known.then(|| shown(largest.map(|of| of.1))));
-            row.extend(known.then(|| or_dash(largest.map(|of| of.0 / second), |t| value(t, 1.0))));
-            row.extend(known.then(|| shown(end.map(|of| of.1))));
-            row.push(shown(sigma));
-            row.extend(known.then(|| or_dash(ratio.map(|(end, s)| end.1 / s), |z| value(z, 1.0))));
-        }
-        row
+    }
+    let row = |name: &str, unit: &str, scale: f64, all: &[Figures]| {
+        let cells = all.iter().flat_map(|of| of.cells(scale, second, known));
+        cells![name, unit].into_iter().chain(cells).collect()
     };
-    let rows = Quantity::ALL.map(|quantity| row(quantity, false));
+    let all = |quantity| navigated.iter().map(move |of| Figures::of(quantity, of));
+    let rows = Quantity::ALL.map(|quantity| {
+        let all: Vec<Figures> = all(quantity).collect();
+        let sizes = all
+            .iter()
+            .flat_map(|of| [of.largest.map(|of| of.1), of.sigma]);
+        let (unit, scale) =
+            quantity.readable_unit(sizes.flatten().map(f64::abs).fold(0.0, f64::max));
+        row(quantity.name, unit, scale, &all)
+    });
     let [.., horizontal] = Quantity::ALL;
+    let drift = all(horizontal).map(|of| Figures {
+        largest: None,
+        ratio: None,
+        ..of
+    });
+    let unit = format!("{}/{unit_of_time}", horizontal.unit());
+    let drift = row(
+        "drift",
+        &unit,
+        second / duration(navigated),
+        &drift.collect::<Vec<_>>(),
+    );
     let what = match known {
         true => "Computed minus true. σ: of the error at the end, predicted",
         false => "The truth is not known, so no error is shown. σ: at the end, predicted",
     };
     Table::new(heading, columns)
         .sections(rows.chunks(3).map(<[_]>::to_vec))
-        .section([row(horizontal, true)])
+        .section([drift])
         .note(format!(
             "{what} from the calibration's covariance by the linear error model; of horizontal errors the root of the \
              mean square. Drift: position at the end over the time."

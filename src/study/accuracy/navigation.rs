@@ -12,7 +12,8 @@ use crate::imu::{InstallationForm, PerSensor};
 use crate::models;
 use crate::models::{ModelError, Place};
 use crate::simulation::Scenario;
-use crate::study::navigation::{FORTY_HOURS, INTERVAL, Mission, Motion, NavigationStudyError};
+use crate::study::StudyError;
+use crate::study::navigation::{FORTY_HOURS, INTERVAL, Mission, Motion};
 
 /// The trajectory of the mission that moves.
 const TRAJECTORY: &str = "flight";
@@ -105,22 +106,18 @@ impl Journey {
 }
 
 impl Way {
-    /// The model of a mission; the inner error if it cannot be navigated.
-    pub(super) fn of(
-        journey: Journey,
-        scenario: &Scenario,
-    ) -> Result<Result<Self, NavigationStudyError>, ModelError> {
+    /// The model of a mission.
+    pub(super) fn of(journey: Journey, scenario: &Scenario) -> Result<Self, StudyError> {
         let nominal = PerSensor::from_fn(|sensor| {
             let prior = scenario.instrument.prior(sensor, &scenario.installation);
             prior.mean(InstallationForm::General)
         });
-        let exposures = journey.mission(scenario)?.exposure(&nominal);
-        Ok(exposures.map(|exposures| Self {
+        let exposures = journey.mission(scenario)?.exposure(&nominal)?;
+        let end = exposures.last();
+        Ok(Self {
             journey,
-            by_parameter: exposures
-                .last()
-                .map_or_else(SMatrix::zeros, |end| end.position()),
-        }))
+            by_parameter: end.map_or_else(SMatrix::zeros, |end| end.position()),
+        })
     }
 
     /// Navigation accuracy of the calibrations of these runs.
@@ -239,7 +236,7 @@ mod tests {
     use super::*;
     use crate::calibration::{from_vector, to_vector};
     use crate::imu::Triad;
-    use crate::study::navigation::Pair;
+    use crate::study::navigation::{NavigationStudyError, Pair};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
@@ -315,7 +312,7 @@ mod tests {
     #[test]
     fn a_way_leads_where_navigation_with_the_estimate_does() {
         let scenario = Scenario::load("demo").unwrap();
-        let way = Way::of(Journey::Standing, &scenario).unwrap().unwrap();
+        let way = Way::of(Journey::Standing, &scenario).unwrap();
         let form = InstallationForm::General;
         let truth = PerSensor::from_fn(|_| Triad::ideal(form));
         let error = ParameterVector::from_fn(|i, _| 1e-8 * (1.0 + i as f64).sin());
@@ -338,12 +335,14 @@ mod tests {
     fn a_site_at_a_pole_is_refused_and_one_in_the_south_flown_from() {
         let mut scenario = Scenario::load("demo").unwrap();
         scenario.site.latitude = -1.2;
-        let way = Way::of(Journey::Standing, &scenario).unwrap();
-        assert!(way.is_ok());
+        assert!(Way::of(Journey::Standing, &scenario).is_ok());
         scenario.site.latitude = std::f64::consts::FRAC_PI_2;
         for journey in Journey::ALL {
-            let way = Way::of(journey, &scenario).unwrap();
-            assert!(matches!(way, Err(NavigationStudyError::NearPole(_))));
+            let way = Way::of(journey, &scenario);
+            assert!(matches!(
+                way,
+                Err(StudyError::Navigation(NavigationStudyError::NearPole(_)))
+            ));
         }
     }
 }
