@@ -60,15 +60,6 @@ pub struct Pair {
     pub covariance: Option<ParameterMatrix>,
 }
 
-/// Navigation errors of one moment.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Epoch {
-    /// Time since the start, s.
-    pub time: f64,
-    /// The actual error.
-    pub error: NavigationError,
-}
-
 /// Sensitivity of navigation errors to the parameters of both triads at one moment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Exposure {
@@ -204,7 +195,7 @@ impl Mission {
     /// # Errors
     /// If the mission leads to a pole or the calibration is singular.
     pub fn navigate(&self, pair: &Pair) -> Result<Vec<Outlook>, NavigationStudyError> {
-        let mut moments = outlook::known(&self.errors(pair)?);
+        let mut moments = self.errors(pair)?;
         if let Some(covariance) = &pair.covariance {
             for (moment, exposure) in moments.iter_mut().zip(self.exposure(&pair.truth)?) {
                 moment.sigma = Some(outlook::sigma(&exposure.covariance(covariance)));
@@ -217,7 +208,7 @@ impl Mission {
     ///
     /// # Errors
     /// As for [`Self::navigate`].
-    pub fn errors(&self, pair: &Pair) -> Result<Vec<Epoch>, NavigationStudyError> {
+    pub fn errors(&self, pair: &Pair) -> Result<Vec<Outlook>, NavigationStudyError> {
         self.errors_from(&ErrorVector::zeros(), pair)
     }
 
@@ -229,7 +220,7 @@ impl Mission {
         &self,
         start: &ErrorVector,
         pair: &Pair,
-    ) -> Result<Vec<Epoch>, NavigationStudyError> {
+    ) -> Result<Vec<Outlook>, NavigationStudyError> {
         self.errors_by(start, |_| pair.sensed())
     }
 
@@ -238,7 +229,7 @@ impl Mission {
         &self,
         start: &ErrorVector,
         sensed: impl Fn(u32) -> Result<PerSensor<Sensed>, NavigationStudyError>,
-    ) -> Result<Vec<Epoch>, NavigationStudyError> {
+    ) -> Result<Vec<Outlook>, NavigationStudyError> {
         let mut course = Course::new(&self.motion);
         within_reach(course.here().truth.latitude + start[POSITION])?;
         let mut errors = NonlinearError::new(start);
@@ -343,10 +334,11 @@ fn sensed_errors(triads: &PerSensor<Triad>) -> Result<SensedErrors, NavigationSt
     SensedErrors::new(triads).map_err(|sensor| NavigationStudyError::Singular { sensor })
 }
 
-fn moment(time: f64, errors: &NonlinearError, truth: &Solution) -> Epoch {
-    Epoch {
+fn moment(time: f64, errors: &NonlinearError, truth: &Solution) -> Outlook {
+    Outlook {
         time,
-        error: NavigationError::of(&errors.computed(truth), truth),
+        error: Some(NavigationError::of(&errors.computed(truth), truth)),
+        sigma: None,
     }
 }
 

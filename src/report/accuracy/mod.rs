@@ -76,11 +76,6 @@ pub(super) fn facts(accuracy: &Accuracy) -> Facts {
         (of, runs) => format!("{} in {} of the runs", count(of), count(runs)),
     };
     facts.push("rejected observations", rejected);
-    if let (rejections, tested @ 1..) = accuracy.rejections() {
-        let (rejections, tested) = (count(rejections), count(tested));
-        let words = format!("the data reject {form} in {rejections} of {tested} runs");
-        facts.push("form", words);
-    }
     facts
 }
 

@@ -48,7 +48,7 @@ pub fn document(lot: &Lot) -> Document {
     document.both(tables::noise(lot));
     document.pages(tables::values(lot));
     document.data = data::data(lot);
-    document.files = vec![("lot.csv".to_owned(), data::csv(lot))];
+    document.files = vec![("lot.csv".to_owned(), data::csv(&document.data))];
     document
 }
 

@@ -323,7 +323,7 @@ mod tests {
         };
         let mission = Journey::Standing.mission(&scenario).unwrap();
         let end = mission.errors(&pair).unwrap().pop().unwrap();
-        let expected = end.error.position.xy();
+        let expected = end.error.unwrap().position.xy();
         let apart = way.position(&error) - expected;
         assert!(
             expected.norm() > 1000.0 && apart.norm() < 0.02 * expected.norm(),

@@ -70,7 +70,7 @@ fn exposure_against_navigation(cases: &[(InstallationForm, u32, f64)]) {
             };
             let actual = mission.errors_from(&start, &pair).unwrap();
             let way = study.way(situation).unwrap();
-            let position = |moment: usize| actual[moment].error.position.xy();
+            let position = |moment: usize| actual[moment].error.unwrap().position.xy();
             let last = actual.len() - 1;
             let largest = (0..=last).map(|k| position(k).norm()).fold(0.0, f64::max);
             for k in (0..=last).step_by(60) {
