@@ -20,7 +20,7 @@ use crate::imu::InstallationForm;
 use crate::simulation::{Runs, Scenario};
 
 pub(in crate::study) use figures::Squares;
-use figures::rms;
+use figures::{mean_square, rms};
 use navigation::Way;
 
 pub use baseline::Baseline;
@@ -195,10 +195,7 @@ impl GroupAccuracy {
             return None;
         }
         // The mean square of the group in one run.
-        let square = |of: &ParameterVector| {
-            let sum: f64 = indices.iter().map(|&i| of[i].powi(2)).sum();
-            sum / indices.len() as f64
-        };
+        let square = |of: &ParameterVector| mean_square(of.as_slice(), &indices);
         let closed = |t: &Trial, part: usize| Some(square(t.closed_form.get(part)?.as_ref()?));
         let all = |of: &dyn Fn(&Trial) -> Option<f64>| -> Vec<f64> {
             trials.iter().filter_map(of).collect()

@@ -23,8 +23,6 @@ pub fn document(accuracy: &Accuracy) -> Document {
         count(accuracy.trials.len()),
         accuracy.study.scenario.name
     ));
-    document.conclusions.heading = "Conclusions".to_owned();
-    document.warnings.heading = "To be noted".to_owned();
     verdict::say(&mut document, accuracy);
     document.both(facts(accuracy));
     document.both(tables::bound(accuracy));

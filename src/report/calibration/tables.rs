@@ -195,13 +195,6 @@ pub fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
     }
 }
 
-/// The smallest unit in which a figure is below a thousand, else the largest.
-pub fn readable(units: &[(&'static str, f64); 2], figure: f64) -> (&'static str, f64) {
-    match figure < 1000.0 * units[0].1 {
-        true => units[0],
-        false => units[1],
-    }
-}
-
-pub const FORCE: [(&str, f64); 2] = [("µg", MICRO_G), ("mg", MILLI_G)];
-pub const ANGLE: [(&str, f64); 2] = [("″", ARCSEC), ("°", DEGREE)];
+/// Units of residuals.
+pub const FORCE: [(&str, f64); 2] = [("mg", MILLI_G), ("µg", MICRO_G)];
+pub const ANGLE: [(&str, f64); 2] = [("°", DEGREE), ("″", ARCSEC)];

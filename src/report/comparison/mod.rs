@@ -248,14 +248,10 @@ fn scatter(comparison: &Comparison) -> Table {
 
 fn chi_square(chi_square: Option<ChiSquare>) -> [String; 3] {
     chi_square.map_or([NONE; 3].map(str::to_owned), |of| {
-        let p = match of.p < 1e-4 {
-            true => "< 0.0001".to_owned(),
-            false => value(of.p, 0.01),
-        };
         [
             value(of.value / of.freedom as f64, 0.1),
             count(of.freedom),
-            p,
+            chance(of.p),
         ]
     })
 }

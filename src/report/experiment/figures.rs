@@ -79,7 +79,7 @@ fn against_time(experiment: &Experiment) -> Plot {
             situation_name(navigated.situation)
         );
         let y = Axis::log("").between(low, 1.3 * high);
-        Panel::new(title, Axis::hours(hours(experiment)), y)
+        Panel::new(title, Axis::time("h", hours(experiment)), y)
             .with_all(navigated.methods.iter().map(series))
     };
     let panels = experiment.navigations.iter().map(panel);

@@ -17,8 +17,6 @@ pub fn document(experiment: &Experiment) -> Document {
     let instruments = count(experiment.trials.len());
     let title = format!("The turntable experiment with {instruments} simulated instruments");
     let mut document = Document::new(title);
-    document.conclusions.heading = "Conclusions".to_owned();
-    document.warnings.heading = "To be noted".to_owned();
     say(&mut document, experiment);
     document.both(facts(experiment));
     tables::tables(experiment)

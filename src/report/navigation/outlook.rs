@@ -78,9 +78,7 @@ fn duration(navigated: &[Navigated]) -> f64 {
 
 /// The unit of time of the report: its symbol and its length in seconds.
 fn clock(navigated: &[Navigated]) -> (&'static str, f64) {
-    let units = [("h", 3600.0), ("min", 60.0)].into_iter();
-    let mut fits = units.filter(|(_, size)| duration(navigated) >= *size);
-    fits.next().unwrap_or(("s", 1.0))
+    readable(&TIMES, duration(navigated))
 }
 
 /// Duration in words.
@@ -114,7 +112,6 @@ pub fn line(navigated: &[Navigated]) -> String {
 
 /// One quantity by one calibration: the largest error with its time, the error at the end, its σ, and what the error
 /// is of that.
-#[derive(Clone, Copy)]
 struct Figures {
     largest: Option<Point>,
     at_end: Option<f64>,
@@ -182,29 +179,26 @@ pub fn table(heading: &str, navigated: &[Navigated]) -> Table {
         let cells = all.iter().flat_map(|of| of.cells(scale, second, known));
         cells![name, unit].into_iter().chain(cells).collect()
     };
-    let all = |quantity| navigated.iter().map(move |of| Figures::of(quantity, of));
-    let rows = Quantity::ALL.map(|quantity| {
-        let all: Vec<Figures> = all(quantity).collect();
+    let of = |quantity: Quantity| {
+        let all = navigated.iter().map(|of| Figures::of(quantity, of));
+        let all: Vec<Figures> = all.collect();
         let sizes = all
             .iter()
             .flat_map(|of| [of.largest.map(|of| of.1), of.sigma]);
-        let (unit, scale) =
-            quantity.readable_unit(sizes.flatten().map(f64::abs).fold(0.0, f64::max));
+        let size = sizes.flatten().map(f64::abs).fold(0.0, f64::max);
+        (all, quantity.readable_unit(size))
+    };
+    let rows = Quantity::ALL.map(|quantity| {
+        let (all, (unit, scale)) = of(quantity);
         row(quantity.name, unit, scale, &all)
     });
     let [.., horizontal] = Quantity::ALL;
-    let drift = all(horizontal).map(|of| Figures {
-        largest: None,
-        ratio: None,
-        ..of
-    });
-    let unit = format!("{}/{unit_of_time}", horizontal.unit());
-    let drift = row(
-        "drift",
-        &unit,
-        second / duration(navigated),
-        &drift.collect::<Vec<_>>(),
-    );
+    let (mut all, (unit, scale)) = of(horizontal);
+    for of in &mut all {
+        (of.largest, of.ratio) = (None, None);
+    }
+    let unit = format!("{unit}/{unit_of_time}");
+    let drift = row("drift", &unit, scale * second / duration(navigated), &all);
     let what = match known {
         true => "Computed minus true. σ: of the error at the end, predicted",
         false => "The truth is not known, so no error is shown. σ: at the end, predicted",

@@ -66,11 +66,6 @@ impl Axis {
         }
     }
 
-    /// Hours from zero on, with ticks at whole ones or even parts.
-    pub fn hours(hours: f64) -> Self {
-        Self::time("h", hours)
-    }
-
     /// Time in a unit from zero on, with ticks at whole ones or even parts.
     pub fn time(unit: &str, end: f64) -> Self {
         let steps: &[f64] = match unit {
@@ -358,7 +353,7 @@ mod tests {
             (log.clone(), vec![3.0]),
             (log.between(f64::INFINITY, 0.0), vec![]),
             (Axis::symlog(0.0), vec![f64::NAN]),
-            (Axis::hours(0.0), vec![]),
+            (Axis::time("h", 0.0), vec![]),
         ] {
             let scale = axis.scale(values);
             assert!(

@@ -122,7 +122,7 @@ fn panel(table: &Table1, column: &Column, q: usize) -> Panel {
         false => ("error, horizontal", 0.0),
     };
     let title = format!("{} {kind}, {}", quantity.short(), quantity.unit());
-    let x = Axis::hours(hours.last().copied().unwrap_or(1.0));
+    let x = Axis::time("h", hours.last().copied().unwrap_or(1.0));
     Panel::new(title, x, Axis::linear("").between(low, extent))
         .with_all(samples)
         .with_all(means)

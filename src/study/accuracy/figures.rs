@@ -72,10 +72,7 @@ pub fn of_error_terms(trials: &[Trial]) -> Vec<(ErrorTerm, Figures)> {
     let of_term = |term: ErrorTerm| {
         let is_of = |&k: &usize| AuxiliaryKind::of(k).is_some_and(|of| of.error_term() == term);
         let indices: Vec<usize> = (0..AUXILIARY).filter(is_of).filter(has_sigma).collect();
-        let square = |of: &AuxiliaryVector| {
-            let sum: f64 = indices.iter().map(|&k| of[k].powi(2)).sum();
-            sum / indices.len() as f64
-        };
+        let square = |of: &AuxiliaryVector| mean_square(of.as_slice(), &indices);
         let runs = trials.iter().filter_map(|trial| {
             let estimated = |f: &&Filtered| square(&f.auxiliary_sigma) > 0.0;
             let filtered = trial.filtered.as_ref().filter(estimated)?;
@@ -90,6 +87,11 @@ pub fn of_error_terms(trials: &[Trial]) -> Vec<(ErrorTerm, Figures)> {
         (!runs.is_empty()).then(|| (term, Figures::new(runs.into_iter())))
     };
     ErrorTerm::ALL.into_iter().filter_map(of_term).collect()
+}
+
+/// Over the entries at some indices.
+pub fn mean_square(of: &[f64], indices: &[usize]) -> f64 {
+    indices.iter().map(|&k| of[k].powi(2)).sum::<f64>() / indices.len() as f64
 }
 
 /// Root of the mean; NaN for no values.

@@ -2,6 +2,7 @@
 
 use super::Outlook;
 use crate::navigation::ErrorVector;
+use crate::number::readable;
 use crate::units::{ARCSEC, DEGREE, NAUTICAL_MILE};
 
 /// Units of one kind with their size in SI, the usual one first.
@@ -72,9 +73,7 @@ impl Quantity {
     /// A unit in which values up to this one, in the usual unit, have few zeros; and how many of it
     /// make the usual unit.
     pub fn readable_unit(self, largest: f64) -> (&'static str, f64) {
-        let size = largest * self.unit_value();
-        let fits = self.units.iter().find(|(_, value)| size >= 0.5 * value);
-        let (unit, value) = fits.copied().unwrap_or(self.units[self.units.len() - 1]);
+        let (unit, value) = readable(self.units, largest * self.unit_value());
         (unit, self.unit_value() / value)
     }
 
