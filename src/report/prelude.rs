@@ -7,8 +7,8 @@ pub(super) use super::document::{
 };
 pub(super) use super::group::{Group, axis_name, function_name, group_columns, short_name};
 pub(super) use super::plot::{
-    Anchor, Axis, Color, Dash, Fill, Mark, Matrix, Panel, Plot, Point, Series, Shape, Upright,
-    beside, positive_range, steps,
+    Anchor, Axis, Color, Dash, Fill, Mark, Panel, Plot, Point, Series, Shape, Upright, beside,
+    positive_range, steps,
 };
 pub(super) use crate::number::*;
 pub(super) use crate::units::*;

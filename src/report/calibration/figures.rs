@@ -17,6 +17,8 @@ const EDGE: f64 = 6.0;
 const DOTS: usize = 150;
 /// Weaker correlations are not written out: they would only hide the strong ones.
 const WRITTEN: f64 = 0.2;
+/// Half the side of a square that would not be seen.
+const FAINT: f64 = 0.02;
 
 impl Report<'_> {
     /// Every figure that there is something to show in.
@@ -193,30 +195,37 @@ fn bound(y: f64) -> Series {
 
 /// Correlations of the estimated parameters; `None` if nothing was estimated.
 fn correlation(estimate: &Estimate) -> Option<Plot> {
-    let indices: Vec<usize> = estimate.estimated().collect();
-    let sigma = estimate.sigma();
-    let row = |&i: &usize| {
-        let of = |&j: &usize| estimate.covariance[(i, j)] / (sigma[i] * sigma[j]);
-        indices.iter().map(of).collect()
-    };
-    let new_group = |&n: &usize| Group::of(indices[n - 1]) != Group::of(indices[n]);
-    let matrix = Matrix {
-        names: indices
-            .iter()
-            .map(|&i| short_name(estimate.form(), i))
-            .collect(),
-        groups: (1..indices.len()).filter(new_group).collect(),
-        values: indices.iter().map(row).collect(),
-        written: WRITTEN,
-    };
-    (!indices.is_empty()).then(|| {
-        Plot::matrix("correlation.svg", "Correlations", matrix).caption(format!(
-            "Correlation of the estimated parameters. Below the diagonal the side of a square grows with the \
-             magnitude; filled squares are positive, open ones negative. Above it stands the coefficient in \
-             hundredths where its magnitude is at least {WRITTEN}. Strongly correlated parameters were observed \
-             by this path as a sum or difference rather than each alone."
-        ))
-    })
+    let (indices, sigma) = (Vec::from_iter(estimate.estimated()), estimate.sigma());
+    let names = || indices.iter().map(|&i| short_name(estimate.form(), i));
+    let mut series = Vec::new();
+    for (row, &i) in indices.iter().enumerate() {
+        for (column, &j) in indices.iter().enumerate() {
+            let r = estimate.covariance[(i, j)] / (sigma[i] * sigma[j]);
+            // The first row is the uppermost.
+            let (x, y) = (column as f64, (indices.len() - 1 - row) as f64);
+            let half = 0.45 * r.abs().min(1.0);
+            if row > column && half > FAINT {
+                let square = Series::bars(half, Fill::Solid, [(x, y - half, y + half)]);
+                series.push(square.nth(usize::from(r < 0.0)));
+            } else if row < column && r.abs() >= WRITTEN {
+                series.push(Series::words(
+                    (x, y),
+                    Anchor::Middle,
+                    value(100.0 * r, 10.0),
+                ));
+            }
+        }
+    }
+    let y = Axis::places(names().rev());
+    let mut panel = Panel::new("", Axis::places(names()), y).with_all(series);
+    panel.square = true;
+    let plot = Plot::new("correlation.svg", "Correlations", (1, 1000), [panel]).caption(format!(
+        "Correlation of the estimated parameters. Below the diagonal the side of a square grows with the magnitude; \
+         blue squares are positive, orange ones negative. Above it stands the coefficient in hundredths where its \
+         magnitude is at least {WRITTEN}. Strongly correlated parameters were observed by this path as a sum or \
+         difference rather than each alone."
+    ));
+    (!indices.is_empty()).then_some(plot)
 }
 
 /// Magnitude of each parameter's error by each method, with the σ that it claims.

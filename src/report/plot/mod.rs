@@ -1,4 +1,4 @@
-//! A plot as a value: panels with axes and series, or a matrix. It knows nothing of where it is drawn.
+//! A plot as a value: panels with axes and series. It knows nothing of where it is drawn.
 
 mod axis;
 mod series;
@@ -18,41 +18,12 @@ pub struct Plot {
     pub heading: String,
     /// How to read it, a sentence or two.
     pub caption: String,
-    /// What is drawn.
-    pub body: Body,
-}
-
-/// What is drawn.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Body {
-    /// Panels row by row.
-    Panels(Grid),
-    /// A correlation matrix.
-    Matrix(Matrix),
-}
-
-/// Panels of one size in rows.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Grid {
     /// Panels in a row.
     pub columns: usize,
     /// Height of a panel in pixels; the width of the figure is fixed.
     pub height: u32,
-    /// The panels; a row may be closed by [`Panel::blank`].
+    /// The panels, row by row; a row may be closed by [`Panel::blank`].
     pub panels: Vec<Panel>,
-}
-
-/// Coefficients between −1 and 1, symmetric.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Matrix {
-    /// A name for each row and column.
-    pub names: Vec<String>,
-    /// Rows before which a new group begins.
-    pub groups: Vec<usize>,
-    /// Row by row.
-    pub values: Vec<Vec<f64>>,
-    /// Coefficients of at least this magnitude are written out.
-    pub written: f64,
 }
 
 /// Axes with a title, and what is drawn into them.
@@ -88,25 +59,13 @@ impl Plot {
         (columns, height): (usize, u32),
         panels: impl IntoIterator<Item = Panel>,
     ) -> Self {
-        let grid = Grid {
-            columns: columns.max(1),
-            height,
-            panels: panels.into_iter().collect(),
-        };
-        Self::of(file, heading, Body::Panels(grid))
-    }
-
-    /// A matrix.
-    pub fn matrix(file: &str, heading: &str, matrix: Matrix) -> Self {
-        Self::of(file, heading, Body::Matrix(matrix))
-    }
-
-    fn of(file: &str, heading: &str, body: Body) -> Self {
         Self {
             file: file.to_owned(),
             heading: heading.to_owned(),
             caption: String::new(),
-            body,
+            columns: columns.max(1),
+            height,
+            panels: panels.into_iter().collect(),
         }
     }
 

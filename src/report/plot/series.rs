@@ -67,6 +67,8 @@ pub enum Anchor {
     Below,
     /// To the left above it.
     AboveLeft,
+    /// In the middle of it.
+    Middle,
 }
 
 /// How a line is drawn.

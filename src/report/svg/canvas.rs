@@ -165,13 +165,6 @@ impl Canvas {
         let style = font(scale).color(&color).pos(Pos::new(across, height));
         self.put(Text::new(text.to_owned(), place(at), style));
     }
-
-    /// Writes text upwards.
-    pub(super) fn upright(&mut self, text: &str, at: Point, scale: f64) {
-        let style = font(scale).transform(FontTransform::Rotate270);
-        let style = style.color(&INK).pos(Pos::new(HPos::Left, VPos::Center));
-        self.put(Text::new(text.to_owned(), place(at), style));
-    }
 }
 
 fn font(scale: f64) -> FontDesc<'static> {

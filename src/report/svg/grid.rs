@@ -2,7 +2,7 @@
 
 use plotters::style::RGBColor;
 
-use super::super::plot::{Grid, Panel, Scale};
+use super::super::plot::{Panel, Plot, Scale};
 use super::canvas::{
     Canvas, Frame, HPos, INK, LETTER, QUIET, SMALL, VPos, WIDTH, rgb, shortened, width,
 };
@@ -22,10 +22,10 @@ const TAG: f64 = 0.85;
 const LABELS: f64 = 0.3;
 
 /// Draws it and returns the height of the figure.
-pub fn draw(on: &mut Canvas, grid: &Grid) -> u32 {
-    let panel_width = f64::from(WIDTH) / grid.columns as f64;
-    for column in 0..grid.columns {
-        let panels = grid.panels.iter().skip(column).step_by(grid.columns);
+pub fn draw(on: &mut Canvas, plot: &Plot) -> u32 {
+    let panel_width = f64::from(WIDTH) / plot.columns as f64;
+    for column in 0..plot.columns {
+        let panels = plot.panels.iter().skip(column).step_by(plot.columns);
         let scaled: Vec<(&Panel, (Scale, Scale))> = panels.map(|p| (p, p.scales())).collect();
         // All panels of a column have the same margins.
         let drawn = || scaled.iter().filter(|(panel, _)| !panel.blank);
@@ -38,8 +38,8 @@ pub fn draw(on: &mut Canvas, grid: &Grid) -> u32 {
             let names = names(&x, (across.1 - across.0) / x.ticks.len().max(1) as f64);
             let lines = names.iter().map(Vec::len).max().unwrap_or(1).max(1);
             let lines = lines + usize::from(!panel.x.title.is_empty());
-            let top = f64::from(grid.height) * row as f64;
-            let bottom = top + f64::from(grid.height) - 12.0 - LINE * lines as f64;
+            let top = f64::from(plot.height) * row as f64;
+            let bottom = top + f64::from(plot.height) - 12.0 - LINE * lines as f64;
             let down = (top + TOP, bottom);
             let square = (across.0, across.0 + down.1 - down.0);
             let frame = Frame {
@@ -56,7 +56,7 @@ pub fn draw(on: &mut Canvas, grid: &Grid) -> u32 {
             }
         }
     }
-    grid.height * grid.panels.len().div_ceil(grid.columns).max(1) as u32
+    plot.height * plot.panels.len().div_ceil(plot.columns).max(1) as u32
 }
 
 fn widest(ticks: &[(f64, String)]) -> f64 {

@@ -44,6 +44,7 @@ pub fn draw(on: &mut Canvas, frame: &Frame, series: &Series) {
             let (at, lie) = match anchor {
                 Anchor::Above => ((x, y - 5.0), (HPos::Center, VPos::Bottom)),
                 Anchor::Below => ((x, y + 5.0), (HPos::Center, VPos::Top)),
+                Anchor::Middle => ((x, y), (HPos::Center, VPos::Center)),
                 Anchor::AboveLeft => ((x - 4.0, y - 3.0), (HPos::Right, VPos::Bottom)),
             };
             on.text(text, at, lie, color, SMALL)
