@@ -127,7 +127,7 @@ fn laid(parts: Vec<Vec<String>>) -> String {
 }
 
 /// Lines of at most `width` letters, all but the first behind an indent; what is laid out is left as it is.
-pub fn wrapped(text: &str, indent: &str, width: Option<usize>) -> Vec<String> {
+fn wrapped(text: &str, indent: &str, width: Option<usize>) -> Vec<String> {
     let fits = |width: &usize| display_width(text) > *width;
     let Some(width) = width.filter(fits) else {
         return vec![text.to_owned()];
