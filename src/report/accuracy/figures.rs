@@ -13,9 +13,6 @@ use crate::study::{Accuracy, Figures, GroupAccuracy, NavigationAccuracy, Ratio};
 const NARROWEST: f64 = 1.08;
 /// Left free at both ends of it, in parts of its length.
 const FREE: f64 = 0.2;
-/// Lines that end nearer than this factor have one name.
-const TOGETHER: f64 = 2.0;
-
 pub fn figures(accuracy: &Accuracy) -> Vec<Plot> {
     let mut plots = vec![
         errors(accuracy),
@@ -115,19 +112,17 @@ fn of_group_against_time(of: &GroupAccuracy) -> Panel {
     let filter = line(&mut of.filter_against_time.iter().map(|p| (p.0, p.1)));
     let bound = line(&mut of.filter_against_time.iter().map(|p| (p.0, p.2)));
     let closed = line(&mut of.closed_form_against_time.iter().copied());
-    let ends = filter.last().zip(bound.last());
-    let together = ends.is_some_and(|(a, b)| (a.1 / b.1).ln().abs() < TOGETHER.ln());
-    let (of_filter, of_bound) = match together {
-        true => ("EKF, bound", None),
-        false => ("EKF", Some("bound")),
-    };
-    let mut bound = Series::line(bound).color(Color::Ink).dashed().width(1.25);
-    bound.label = of_bound.map(str::to_owned);
     let rings = Series::marks(Mark::Ring, closed.clone()).nth(1).width(1.25);
     let title = of.group.titled();
     Panel::new(title, Axis::log("table time, min"), Axis::log(""))
-        .with(Series::line(filter).width(1.75).label(of_filter))
-        .with(bound)
+        .with(Series::line(filter).width(1.75).label("EKF"))
+        .with(
+            Series::line(bound)
+                .color(Color::Ink)
+                .dashed()
+                .width(1.25)
+                .label("bound"),
+        )
         .with(Series::line(closed).nth(1).width(1.0))
         .with(rings.label("closed form"))
 }

@@ -58,19 +58,12 @@ pub fn coefficients(analysis: &NoiseAnalysis, sensor: Sensor) -> Table {
         .into_iter()
         .chain(axes)
         .chain(["triad".to_owned()]);
-    let table = Table::new(title(sensor), headings).section(rows).note(
+    let table = Table::new(capital(triad_name(sensor)), headings).section(rows).note(
         "± 1σ. <: its slope is not detected; 95 % upper limit. triad: the mean of the three variances.",
     );
     match of_a_pulse(*analysis.pulse.get(sensor), sensor) {
         Some(note) => table.note(note),
         None => table,
-    }
-}
-
-fn title(sensor: Sensor) -> &'static str {
-    match sensor {
-        Sensor::Gyro => "Gyros",
-        Sensor::Accel => "Accelerometers",
     }
 }
 

@@ -95,15 +95,14 @@ impl Report<'_> {
             None => (estimate.vector(), "final value"),
         };
         let panel = |group: Group, index: usize| {
-            let (unit, indices) = (group.unit_value(), group.estimated(estimate));
+            let unit = group.unit_value();
             let of = |of: &dyn Fn(&Epoch) -> f64| -> Vec<Point> {
                 let history = outcome.history.iter();
                 history.map(|m| (m.time, of(m) / unit)).collect()
             };
             let error = |m: &Epoch| m.estimate[index] - reference[index];
             let [low, high] = [-3.0, 3.0].map(|factor| of(&|m| factor * m.sigma[index]));
-            let sigma = group.spread(&estimate.sigma(), &indices);
-            let sigma = sigma.map_or(1.0, |x| x.1);
+            let sigma = group.rms(&estimate.sigma(), estimate).unwrap_or(1.0);
             let title = format!("{} {}", group.title(), axis_name(estimate.form(), index));
             let y = Axis::symlog(sigma).between(-EXTENT * sigma, EXTENT * sigma);
             Panel::new(format!("{title}, {}", group.unit()), self.time(), y)

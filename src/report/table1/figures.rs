@@ -1,7 +1,6 @@
 //! The paper's Figures 2 to 9: every sample's course, their mean and standard deviation.
 
 use super::verdict::title;
-use crate::imu::{InstallationForm, Sensor};
 use crate::report::prelude::*;
 use crate::study::Table1;
 use crate::study::table1::{Column, QUANTITIES};
@@ -23,19 +22,15 @@ pub fn figures(table: &Table1) -> Vec<Plot> {
 }
 
 fn figure(table: &Table1, column: &Column, number: u8, quantities: &[usize]) -> Plot {
-    let sensor = match column.published.sensor {
-        Sensor::Gyro => "gyros",
-        Sensor::Accel => "accelerometers",
-    };
-    let form = match column.published.form {
-        InstallationForm::ThreeAngle => "three-angle",
-        _ => "six-angle",
-    };
+    let (triad, form) = (
+        triad_name(column.published.sensor),
+        column.published.form.name(),
+    );
     let errors = match quantities.len() {
         3 => "attitude",
         _ => "velocity and position",
     };
-    let heading = format!("Figure {number}: {sensor}, {form} form, {errors}");
+    let heading = format!("Figure {number}: {triad}, {form} form, {errors}");
     let panels = quantities.iter().map(|&of| panel(table, column, of));
     Plot::new(&format!("figure-{number}.svg"), &heading, (1, 230), panels)
         .caption(caption(table, column, quantities))

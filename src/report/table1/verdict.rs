@@ -1,6 +1,7 @@
 //! What can be said of the paper's figures, in words.
 
-use crate::imu::{InstallationForm, Sensor};
+use crate::imu::InstallationForm;
+use crate::report::prelude::*;
 use crate::study::Table1;
 use crate::study::table1::paper::Published;
 use crate::study::table1::{Column, Kind, QUANTITIES, Row, Verdict};
@@ -85,13 +86,11 @@ pub fn sentence(column: &Column) -> String {
 }
 
 /// A column of the paper's in words.
-pub fn title(published: &Published) -> &'static str {
-    match (published.sensor, published.form) {
-        (Sensor::Gyro, InstallationForm::ThreeAngle) => "Gyros, three-angle form (Eq. 10)",
-        (Sensor::Gyro, _) => "Gyros, six-angle form (Eq. 8)",
-        (Sensor::Accel, InstallationForm::ThreeAngle) => {
-            "Accelerometers, three-angle form (Eq. 10)"
-        }
-        (Sensor::Accel, _) => "Accelerometers, six-angle form (Eq. 8)",
-    }
+pub fn title(published: &Published) -> String {
+    let equation = match published.form {
+        InstallationForm::ThreeAngle => 10,
+        _ => 8,
+    };
+    let (triad, form) = (triad_name(published.sensor), published.form.name());
+    format!("{}, {form} form (Eq. {equation})", capital(triad))
 }
