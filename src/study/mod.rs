@@ -15,7 +15,7 @@ use crate::calibration::CalibrationError;
 use crate::models::ModelError;
 use crate::turntable::TableError;
 
-pub use accuracy::{Accuracy, AccuracyStudy, Figures, GroupAccuracy, NavigationAccuracy};
+pub use accuracy::{Accuracy, AccuracyStudy, Figures, NavigationAccuracy};
 pub use campaign::{CampaignAccuracy, CampaignStudy};
 pub use experiment::{Experiment, ExperimentStudy};
 pub use ratio::Ratio;

@@ -7,7 +7,7 @@ use crate::report::accuracy::tables;
 use crate::report::accuracy::tables::{compared, journey_name};
 use crate::report::prelude::*;
 use crate::study::accuracy::{Position, Region};
-use crate::study::{Accuracy, Figures, GroupAccuracy, NavigationAccuracy, Ratio};
+use crate::study::{Accuracy, Figures, NavigationAccuracy, Ratio};
 
 /// The narrowest axis of ratios: its ends are this factor apart.
 const NARROWEST: f64 = 1.08;
@@ -19,7 +19,6 @@ pub fn figures(accuracy: &Accuracy) -> Vec<Plot> {
         ratio(accuracy),
         nees(accuracy),
         gain(accuracy),
-        against_time(accuracy),
     ];
     plots.extend((!accuracy.navigation.is_empty()).then(|| positions(accuracy)));
     plots
@@ -91,40 +90,6 @@ fn ratios(accuracy: &Accuracy, title: &str, all: &[(&str, OfFigures)]) -> Panel 
     let y = Axis::log("").between(low / free, high * free);
     let names = compared.into_iter().map(|of| of.title);
     Panel::new(format!("{title}, logarithmic"), Axis::places(names), y).with_all(series)
-}
-
-/// RMS error of both methods against table time.
-fn against_time(accuracy: &Accuracy) -> Plot {
-    let panels = accuracy.groups.iter().map(of_group_against_time);
-    Plot::new("time.svg", "Accuracy against table time", (3, 340), panels).caption(
-        "RMS error over all runs at that time of the last pass, one panel for each group, both axes logarithmic. \
-         Solid: EKF; dashed: its Cramér–Rao bound; rings: closed form with shorter dwells at all of its \
-         positions.",
-    )
-}
-
-fn of_group_against_time(of: &GroupAccuracy) -> Panel {
-    let unit = of.group.unit_value();
-    let line = |points: &mut dyn Iterator<Item = Point>| -> Vec<Point> {
-        let points = points.map(|(time, rms)| (time / MINUTE, rms / unit));
-        points.filter(|(_, rms)| rms.is_finite()).collect()
-    };
-    let filter = line(&mut of.filter_against_time.iter().map(|p| (p.0, p.1)));
-    let bound = line(&mut of.filter_against_time.iter().map(|p| (p.0, p.2)));
-    let closed = line(&mut of.closed_form_against_time.iter().copied());
-    let rings = Series::marks(Mark::Ring, closed.clone()).nth(1).width(1.25);
-    let title = of.group.titled();
-    Panel::new(title, Axis::log("table time, min"), Axis::log(""))
-        .with(Series::line(filter).width(1.75).label("EKF"))
-        .with(
-            Series::line(bound)
-                .color(Color::Ink)
-                .dashed()
-                .width(1.25)
-                .label("bound"),
-        )
-        .with(Series::line(closed).nth(1).width(1.0))
-        .with(rings.label("closed form"))
 }
 
 /// Half the width of the axis of errors, in σ.

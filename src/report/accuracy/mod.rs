@@ -162,8 +162,8 @@ pub(super) fn data(accuracy: &Accuracy) -> Value {
         "form_rejections":
             (tested > 0).then(|| json!({ "rejected": rejections, "tested": tested })),
     });
-    for of in &accuracy.groups {
-        data[of.group.key()] = figures(accuracy, &of.figures, of.group.unit_value());
+    for (group, of) in &accuracy.groups {
+        data[group.key()] = figures(accuracy, of, group.unit_value());
     }
     let terms = accuracy.error_terms.iter();
     let terms = terms.map(|(term, of)| (term.name().to_owned(), against_bound(of, 1.0)));

@@ -71,6 +71,9 @@ mod tests {
             sample.x = -sample.x;
         }
         let said = checked(&run).warnings.items;
-        assert!(said.len() == 1 && said[0].contains("left-handed"), "{said:?}");
+        assert!(
+            said.len() == 1 && said[0].contains("left-handed"),
+            "{said:?}"
+        );
     }
 }

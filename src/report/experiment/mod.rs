@@ -6,7 +6,7 @@ mod tables;
 use crate::imu::Sensor;
 use crate::report::experiment::tables::{
     PAPER, estimator_name, hours, in_general, method_kind, method_name, navigated, situation_name,
-    timed,
+    table_time,
 };
 use crate::report::prelude::*;
 use crate::study::Experiment;
@@ -29,13 +29,9 @@ pub fn document(experiment: &Experiment) -> Document {
 
 fn facts(experiment: &Experiment) -> Facts {
     let (study, scenario) = (&experiment.study, &experiment.study.scenario);
-    let time = |estimator| timed(experiment).find(|(m, _)| m.estimator == estimator);
     let times = Estimator::ALL.into_iter().filter_map(|estimator| {
-        Some(format!(
-            "{} {}",
-            method_kind(estimator),
-            minutes(time(estimator)?.1)
-        ))
+        let time = minutes(table_time(experiment, estimator)?);
+        Some(format!("{} {time}", method_kind(estimator)))
     });
     let rows = [
         (

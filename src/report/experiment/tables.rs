@@ -157,9 +157,10 @@ pub fn hours(experiment: &Experiment) -> f64 {
     f64::from(experiment.study.intervals) * INTERVAL / HOUR
 }
 
-/// Every method with its table time, s.
-pub fn timed(experiment: &Experiment) -> impl Iterator<Item = (Method, f64)> {
-    Method::all().zip(experiment.table_times.iter().copied())
+/// Table time of an estimator, s.
+pub fn table_time(experiment: &Experiment, estimator: Estimator) -> Option<f64> {
+    let mut timed = Method::all().zip(&experiment.table_times);
+    timed.find_map(|(method, time)| (method.estimator == estimator).then_some(*time))
 }
 
 /// Such as `EKF 10 min, six-angle`.
@@ -177,8 +178,7 @@ pub fn method_kind(estimator: Estimator) -> &'static str {
 
 /// Such as `EKF 10 min`, to the minute: the facts hold the rest.
 pub fn estimator_name(experiment: &Experiment, estimator: Estimator) -> String {
-    let time = timed(experiment).find(|(method, _)| method.estimator == estimator);
-    let minutes = time.map_or(f64::NAN, |(_, time)| time / 60.0);
+    let minutes = table_time(experiment, estimator).unwrap_or(f64::NAN) / 60.0;
     format!("{} {minutes:.0} min", method_kind(estimator))
 }
 

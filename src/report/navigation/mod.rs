@@ -134,7 +134,8 @@ impl Navigation<'_> {
             .outlook
             .last()
             .filter(|last| last.time > 0.0)?;
-        Some(last.error?.horizontal_position() / NAUTICAL_MILE / (last.time / HOUR))
+        let [.., horizontal] = Quantity::ALL;
+        Some(horizontal.error(last)? / (last.time / HOUR))
     }
 
     fn table(&self) -> Table {

@@ -6,7 +6,7 @@ use statrs::distribution::{Binomial, DiscreteCDF};
 use statrs::function::erf::erf;
 
 use super::figures::Squares;
-use super::{Baseline, Figures, Trial};
+use super::{Figures, Trial};
 use crate::calibration::{PARAMETERS, ParameterMatrix, ParameterVector};
 use crate::imu::{InstallationForm, PerSensor};
 use crate::models;
@@ -138,16 +138,14 @@ impl Way {
     fn of_trial(&self, trial: &Trial) -> Position {
         let covariance =
             |of: &ParameterMatrix| self.by_parameter * of * self.by_parameter.transpose();
-        let closed = |part: usize| {
-            let error = trial.closed_form.get(part)?.as_ref()?;
-            Some(self.position(error))
-        };
+        let closed = trial.closed_form.each_ref();
+        let [own, equal] = closed.map(|error| Some(self.position(error.as_ref()?)));
         Position {
             filter: { trial.filtered.as_ref() }
                 .map(|f| (self.position(&f.error), covariance(&f.covariance))),
             bound: covariance(&trial.bound_covariance),
-            closed_form: closed(Baseline::OWN_TIME),
-            closed_form_in_equal_time: closed(Baseline::EQUAL_TIME),
+            closed_form: own,
+            closed_form_in_equal_time: equal,
         }
     }
 
