@@ -112,7 +112,7 @@ fn pair(name: &str, moments: &ByQuantity<Moments>, verdict: &str) -> Vec<Vec<Str
 }
 
 fn line(name: &str, what: &str, figures: ByQuantity<String>, verdict: &str) -> Vec<String> {
-    [&cells![name, what], &figures[..], &cells![verdict]].concat()
+    [cells![name, what], figures.to_vec(), cells![verdict]].concat()
 }
 
 fn standard_errors(z: f64) -> String {
