@@ -6,7 +6,7 @@
 use turncal::imu::InstallationForm;
 use turncal::report::{accuracy, terminal};
 use turncal::simulation::Scenario;
-use turncal::study::AccuracyStudy;
+use turncal::study::{AccuracyStudy, Study};
 
 /// Enough for the root mean squares to be known within a few per cent.
 const RUNS: u64 = 40;

@@ -1,6 +1,6 @@
 //! Numbers as a reader wants them: digits up to the second that σ leaves meaning to.
 
-use crate::units::MINUTE;
+use crate::units::{HOUR, MINUTE};
 
 const MINUS: char = '−';
 
@@ -106,14 +106,34 @@ pub fn with_interval(of: f64, (low, high): (f64, f64)) -> [String; 2] {
     [value(of, 0.5 * (high - low)), interval((low, high))]
 }
 
-/// A value with its 1σ.
+/// A value with its 1σ; to three digits where it has none.
 pub fn plus_minus(of: f64, own: f64) -> String {
+    if own <= 0.0 {
+        return three_digits(of);
+    }
     format!("{} ± {}", value(of, own), sigma(own))
 }
 
 /// A number or a dash.
 pub fn or_dash(of: Option<f64>, shown: impl FnOnce(f64) -> String) -> String {
     of.map_or_else(|| "–".to_owned(), shown)
+}
+
+/// The first of some units, the largest first, of which a size in SI has one at least; else the last.
+pub fn readable(units: &[(&'static str, f64)], size: f64) -> (&'static str, f64) {
+    let fits = units.iter().find(|(_, unit)| size >= *unit);
+    fits.or(units.last()).copied().unwrap_or(("", 1.0))
+}
+
+/// Units of time with their size in s.
+pub const TIMES: [(&str, f64); 3] = [("h", HOUR), ("min", MINUTE), ("s", 1.0)];
+
+/// A probability.
+pub fn chance(p: f64) -> String {
+    match p < 1e-4 {
+        true => "< 0.0001".to_owned(),
+        false => value(p, 0.1 * p.max(0.01)),
+    }
 }
 
 /// A time in minutes with its unit.

@@ -20,7 +20,7 @@ use turncal::imu::{InstallationForm, PerSensor, Triad};
 use turncal::navigation::{Navigator, ProcessNoise, State};
 use turncal::run::Run;
 use turncal::simulation::{Scenario, Simulated};
-use turncal::study::AccuracyStudy;
+use turncal::study::{AccuracyStudy, Study};
 
 fn main() {
     divan::main();

@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 use turncal::models::Embedded;
-use turncal::report::wrapped;
+use turncal::report::{Document, Facts};
 
-use crate::cli::terminal::{columns, print};
+use crate::cli::terminal::show;
 
 /// Shows the embedded scenarios, instruments, installations, tables, paths and trajectories
 ///
@@ -36,20 +36,12 @@ impl List {
                 description: model.description(),
             })
             .collect();
-        if self.json {
-            return print((serde_json::to_string_pretty(&entries)? + "\n").as_bytes());
+        let mut document = Document::default();
+        for alike in entries.chunk_by(|a, b| a.kind == b.kind) {
+            let rows = alike.iter().map(|entry| (entry.name, &entry.description));
+            document.both(Facts::new(alike[0].kind, rows));
         }
-        let widest = entries.iter().map(|entry| entry.name.len()).max();
-        let widest = widest.unwrap_or(0);
-        let indent = " ".repeat(widest + 4);
-        let row = |entry: &Entry| {
-            let row = format!("  {:widest$}  {}", entry.name, entry.description);
-            wrapped(&row, &indent, columns().map(usize::from)).join("\n") + "\n"
-        };
-        let of_kind = entries.chunk_by(|a, b| a.kind == b.kind).map(|alike| {
-            let rows: String = alike.iter().map(row).collect();
-            format!("{}:\n{rows}", alike[0].kind)
-        });
-        print(of_kind.collect::<Vec<_>>().join("\n").as_bytes())
+        document.data = serde_json::to_value(&entries)?;
+        show(&document, self.json)
     }
 }

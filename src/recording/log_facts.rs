@@ -1,5 +1,7 @@
 //! Statistics of a log as read.
 
+use serde::Serialize;
+
 use crate::imu::{AxisOrder, Output, PerSensor, Sensor};
 
 /// Statistics of the instrument's file, in its own units.
@@ -77,7 +79,7 @@ impl NamedColumns {
 }
 
 /// One column of samples.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct ColumnFacts {
     /// Its name in the file.
     pub name: String,
@@ -92,11 +94,12 @@ pub struct ColumnFacts {
     /// The step of the grid on which all values lie, if they do.
     pub step: Option<f64>,
     /// One unit of the column per row, rad or m/s by the nominal scale.
+    #[serde(skip)]
     pub unit: f64,
 }
 
 /// A column of temperatures, °C.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TemperatureFacts {
     /// The smallest value.
     pub smallest: f64,

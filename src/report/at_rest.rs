@@ -96,24 +96,22 @@ fn curves(at_rest: &AtRest) -> Plot {
                 .map(|s| (s.temperature, (s.output - of.at_reference.0) / unit))
                 .collect::<Vec<_>>()
         };
-        let edge = |factor: f64| {
-            let points = steps(range.lowest, range.highest, POINTS).map(|temperature| {
-                let (change, sigma) = of.at(range, temperature);
-                (temperature, (change + factor * sigma) / unit)
-            });
-            points.collect::<Vec<_>>()
-        };
+        let curve = steps(range.lowest, range.highest, POINTS).map(|temperature| {
+            let (change, sigma) = of.at(range, temperature);
+            (temperature, change / unit, sigma / unit)
+        });
+        let [band, line] = Series::curve(&curve.collect::<Vec<_>>());
         let x = Axis::linear("temperature, °C").room(0.02, 0.02);
         let title = format!("{}, {}", name(of), group(of).unit());
         Panel::new(title, x, Axis::linear("").room(0.02, 0.02))
-            .with(Series::band(edge(-1.0), edge(1.0)))
+            .with(band)
             .with_all(
                 [(false, 1, "heating"), (true, 2, "cooling")].map(|(cools, n, name)| {
                     let marks = Series::marks(Mark::Dot, marks(cools)).nth(n);
                     marks.width(0.5).key(name)
                 }),
             )
-            .with(Series::line(edge(0.0)).nth(0).width(2.0))
+            .with(line.width(2.0))
     };
     let (heading, panels) = (
         "Outputs at rest against temperature",

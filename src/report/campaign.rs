@@ -1,5 +1,6 @@
 //! The report of a study of campaigns.
 
+use super::accuracy::tables::against_bound;
 use crate::report::prelude::*;
 use crate::study::CampaignAccuracy;
 
@@ -37,21 +38,9 @@ pub fn document(accuracy: &CampaignAccuracy) -> Document {
 fn figures(accuracy: &CampaignAccuracy) -> Table {
     let row = |group: Group, function: Option<usize>| {
         let (of, campaigns) = accuracy.figures(group, function)?;
-        let (ratio, unit) = (of.ratio?, group.unit_value());
-        Some(vec![
-            format!("{}, {}", group.short(), function_name(function)),
-            group.unit().to_owned(),
-            campaigns.to_string(),
-            three_digits(of.filter / unit),
-            three_digits(of.claimed / unit),
-            three_digits(of.bound / unit),
-            format!(
-                "{} ({} to {})",
-                value(ratio.value, 0.01),
-                value(ratio.interval.0, 0.01),
-                value(ratio.interval.1, 0.01)
-            ),
-        ])
+        let name = format!("{}, {}", group.short(), function_name(function));
+        let row = cells![name, group.unit(), count(campaigns)];
+        Some([row, against_bound(&of, group.unit_value())].concat())
     };
     let sections = Group::all().map(|group| {
         let functions = accuracy.functions().into_iter();
@@ -61,7 +50,7 @@ fn figures(accuracy: &CampaignAccuracy) -> Table {
     });
     Table::new(
         "RMS errors against σ and bound",
-        columns("| unit | campaigns | RMS error | RMS σ | RMS bound | error/bound (99 %)"),
+        columns("| unit | campaigns | RMS error | RMS σ | RMS bound | error/bound | 99 % interval"),
     )
     .sections(sections)
     .note("Bound: Cramér–Rao, linearised at the truth with the orders that were chosen.")

@@ -23,24 +23,16 @@ pub struct Document {
     pub warnings: List,
     /// Conclusions from the figures, the most important first.
     pub conclusions: List,
-    /// Facts, tables and plots in their order, each with its medium.
-    pub blocks: Vec<(Medium, Block)>,
+    /// Facts, tables and plots in their order, and which the page alone has room for.
+    pub blocks: Vec<(PageOnly, Block)>,
     /// The figures by name, with the unit in the name; NaN is null.
     pub data: Value,
     /// Auxiliary files by name, such as a table as CSV.
     pub files: Vec<(String, String)>,
 }
 
-/// Medium on which a part of a document is shown.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Medium {
-    /// The page, which has room for everything.
-    Page,
-    /// The terminal only.
-    Terminal,
-    /// Both.
-    Both,
-}
+/// Whether a part of a document is left out of its text.
+pub type PageOnly = bool;
 
 /// A part of a document.
 #[derive(Debug, Clone, PartialEq)]
@@ -117,12 +109,12 @@ impl Document {
 
     /// Adds a block for page and terminal; empty blocks are omitted.
     pub fn both(&mut self, block: impl Into<Block>) {
-        self.add(Medium::Both, block.into());
+        self.add(false, block.into());
     }
 
     /// Adds a block for the page only.
     pub fn page(&mut self, block: impl Into<Block>) {
-        self.add(Medium::Page, block.into());
+        self.add(true, block.into());
     }
 
     /// The same for several blocks.
@@ -130,17 +122,12 @@ impl Document {
         blocks.into_iter().for_each(|block| self.page(block));
     }
 
-    /// Adds a block for the terminal only, in place of a plot or of a longer table.
-    pub fn terminal(&mut self, block: impl Into<Block>) {
-        self.add(Medium::Terminal, block.into());
-    }
-
     /// Starts a section that is collapsed on a page.
     pub fn fold(&mut self, heading: &str) {
         self.page(Block::Fold(heading.to_owned()));
     }
 
-    fn add(&mut self, medium: Medium, block: Block) {
+    fn add(&mut self, page_only: PageOnly, block: Block) {
         let empty = match &block {
             Block::Facts(facts) => facts.rows.is_empty(),
             Block::Table(table) => table.sections.is_empty(),
@@ -149,7 +136,7 @@ impl Document {
             Block::Text(_, text) | Block::Code(_, text) => text.is_empty(),
         };
         if !empty {
-            self.blocks.push((medium, block));
+            self.blocks.push((page_only, block));
         }
     }
 

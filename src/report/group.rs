@@ -1,7 +1,7 @@
 //! How the six groups are spoken of: names, and the unit of each.
 
-use crate::calibration::{ParameterVector, parameter_name};
-use crate::imu::{InstallationForm, ParameterKind, RATE};
+use crate::calibration::{Estimate, ParameterVector, parameter_name};
+use crate::imu::{InstallationForm, ParameterKind, RATE, Sensor};
 use crate::number::stated_axes;
 
 pub(super) use crate::calibration::Group;
@@ -52,6 +52,12 @@ impl Group {
         all.filter(|&index| Self::of(index) == self).collect()
     }
 
+    /// Root mean square of a vector's entries that were estimated, in the group's unit.
+    pub fn rms(self, v: &ParameterVector, estimate: &Estimate) -> Option<f64> {
+        let (_, rms) = self.spread(v, &self.estimated(estimate))?;
+        Some(rms)
+    }
+
     /// Largest magnitude and root mean square of some of a vector's entries, in the group's unit;
     /// `None` if there are none.
     pub fn spread(self, v: &ParameterVector, indices: &[usize]) -> Option<(f64, f64)> {
@@ -60,6 +66,14 @@ impl Group {
         values()
             .reduce(f64::max)
             .map(|largest| (largest, mean_square.sqrt()))
+    }
+}
+
+/// A triad in the plural.
+pub fn triad_name(sensor: Sensor) -> &'static str {
+    match sensor {
+        Sensor::Gyro => "gyros",
+        Sensor::Accel => "accelerometers",
     }
 }
 

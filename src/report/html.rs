@@ -5,7 +5,7 @@ use std::{fs, io};
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-use super::document::{Block, Document, Facts, List, Medium, Table};
+use super::document::{Block, Document, Facts, List, PageOnly, Table};
 use super::plot::Plot;
 use super::svg;
 use crate::calibration::{Finding, FindingKind as Kind};
@@ -49,10 +49,9 @@ pub fn write(document: &Document, directory: &Path) -> Result<(), ReportError> {
 /// document of each plot in order.
 pub(super) fn page(document: &Document, drawn: &[String]) -> String {
     let mut drawn = drawn.iter();
-    let blocks = document.blocks.iter();
-    let shown = blocks.filter(|(medium, _)| *medium != Medium::Terminal);
-    let shown: Vec<&Block> = shown.map(|(_, block)| block).collect();
-    let parts = shown.chunk_by(|_, next| !matches!(next, Block::Fold(_)));
+    let parts = document
+        .blocks
+        .chunk_by(|_, (_, next)| !matches!(next, Block::Fold(_)));
     let page = html! {
         (DOCTYPE)
         html lang="en" {
@@ -108,11 +107,11 @@ fn of_finding(finding: &Finding) -> Markup {
 }
 
 /// Blocks below a fold's heading; those before the first fold have none.
-fn of_part<'a>(part: &[&Block], drawn: &mut impl Iterator<Item = &'a String>) -> Markup {
-    let blocks = html! { @for block in part { (of_block(block, drawn)) } };
+fn of_part<'a>(part: &[(PageOnly, Block)], drawn: &mut impl Iterator<Item = &'a String>) -> Markup {
+    let blocks = html! { @for (_, block) in part { (of_block(block, drawn)) } };
     match part {
-        [Block::Fold(_)] => html! {},
-        [Block::Fold(heading), ..] => html! { details { summary { (heading) } (blocks) } },
+        [(_, Block::Fold(_))] => html! {},
+        [(_, Block::Fold(heading)), ..] => html! { details { summary { (heading) } (blocks) } },
         _ => blocks,
     }
 }

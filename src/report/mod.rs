@@ -53,7 +53,6 @@ mod tests;
 
 pub use document::{Document, Facts};
 pub use html::{ReportError, files, write};
-pub use terminal::wrapped;
 
 /// The figures of a document by name as JSON.
 pub fn json(document: &Document) -> String {

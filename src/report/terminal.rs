@@ -3,7 +3,7 @@
 use textwrap::core::display_width;
 use textwrap::{Options, WordSplitter};
 
-use super::document::{Block, Document, Facts, List, Medium, Table};
+use super::document::{Block, Document, Facts, List, Table};
 use crate::calibration::{Finding, Level};
 
 /// Least width, in letters, of the lines into which a column heading is broken.
@@ -93,7 +93,7 @@ pub fn text(document: &Document, width: Option<usize>) -> String {
     parts[0].extend(lead.flat_map(|text| paragraphs(&[text], width)));
     let brief = document.brief.iter();
     let blocks = document.blocks.iter();
-    let blocks = blocks.filter(|(medium, _)| *medium != Medium::Page);
+    let blocks = blocks.filter(|(page_only, _)| !page_only);
     let all = brief.chain(blocks.map(|(_, block)| block));
     parts.extend(all.map(|block| shown(block, width)));
     parts.push(list(&document.conclusions, "  ", width));
@@ -130,7 +130,7 @@ fn laid(parts: Vec<Vec<String>>) -> String {
 }
 
 /// Lines of at most `width` letters, all but the first behind an indent; what is laid out is left as it is.
-pub fn wrapped(text: &str, indent: &str, width: Option<usize>) -> Vec<String> {
+fn wrapped(text: &str, indent: &str, width: Option<usize>) -> Vec<String> {
     let fits = |width: &usize| display_width(text) > *width;
     let Some(width) = width.filter(fits) else {
         return vec![text.to_owned()];

@@ -41,22 +41,46 @@ pub fn rows(
     let row = |k: usize| {
         let (name, (unit, in_si)) = (auxiliary_name(k)?, unit(AuxiliaryKind::of(k)?.error_term()));
         let (of, own, prior) = (auxiliary.values[k], posterior[k], auxiliary.prior_sigma[k]);
-        let truth = truth.get(&name).map(|truth| of - truth.value);
-        let mut row = vec![
+        let error = truth.get(&name).map(|truth| (of - truth.value) / in_si);
+        let error = errors.then_some(error);
+        Some(parameter_row(
             name,
-            plus_minus(of / in_si, own / in_si),
-            unit.to_owned(),
-            three_digits(prior / in_si),
-            improvement(prior, own),
-        ];
-        if errors {
-            row.extend(truth.map_or([NONE; 2].map(str::to_owned), |error| {
-                [value(error / in_si, own / in_si), value(error / own, 0.1)]
-            }));
-        }
-        Some(row)
+            unit,
+            [of, own].map(|x| x / in_si),
+            Some(prior / in_si),
+            error,
+        ))
     };
     auxiliary.estimated().filter_map(row).collect()
+}
+
+/// A row of the table of parameters: a value with its σ, which is zero where it is fixed; what the data made of the
+/// prior σ; and its error, as far as it is known, in a table that has errors.
+pub fn parameter_row(
+    name: String,
+    unit: &str,
+    [of, own]: [f64; 2],
+    prior: Option<f64>,
+    error: Option<Option<f64>>,
+) -> Vec<String> {
+    let fixed = own <= 0.0;
+    let shown = match fixed {
+        true => format!("{} (fixed)", value(of, own)),
+        false => plus_minus(of, own),
+    };
+    let mut row = cells![name, shown, unit];
+    row.extend(prior.iter().flat_map(|prior| match fixed {
+        true => [NONE; 2].map(str::to_owned),
+        false => [three_digits(*prior), improvement(*prior, own)],
+    }));
+    row.extend(error.iter().flat_map(|error| {
+        let in_sigma = error.filter(|_| !fixed).map(|error| error / own);
+        [
+            or_dash(*error, |error| value(error, own)),
+            or_dash(in_sigma, |z| value(z, 0.1)),
+        ]
+    }));
+    row
 }
 
 /// Prior over posterior σ, with words where the data did not observe the parameter.

@@ -24,20 +24,20 @@ pub struct Drive {
 
 /// Many runs of a scenario. With a perfect table, all of them share one drive, which is computed once.
 #[derive(Debug, Clone)]
-pub struct Runs<'a> {
-    scenario: &'a Scenario,
+pub struct Runs {
+    scenario: Scenario,
     perfect: Drive,
 }
 
-impl<'a> Runs<'a> {
+impl Runs {
     /// Of a scenario.
     ///
     /// # Errors
     /// If the table cannot follow the path.
-    pub fn new(scenario: &'a Scenario) -> Result<Self, TableError> {
+    pub fn new(scenario: &Scenario) -> Result<Self, TableError> {
         let none = Imperfection::none(&scenario.table);
         Ok(Self {
-            scenario,
+            scenario: scenario.clone(),
             perfect: Drive::new(scenario, none, TermVector::zeros())?,
         })
     }

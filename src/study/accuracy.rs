@@ -8,21 +8,15 @@ mod figures;
 mod navigation;
 mod trial;
 
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::navigation::NavigationStudyError;
-use crate::calibration::{
-    CalibrationError, ErrorTerm, ErrorTermTest, Group, Nis, NoisePolicy, PARAMETERS,
-    ParameterVector, mean_square_interval,
-};
+use super::{Study, StudyError};
+use crate::calibration::{ErrorTerm, ErrorTermTest, Group, Nis, NoisePolicy, mean_square_interval};
 use crate::imu::InstallationForm;
-use crate::models::ModelError;
 use crate::simulation::{Runs, Scenario};
-use crate::turntable::TableError;
 
 pub(in crate::study) use figures::Squares;
-use figures::rms;
 use navigation::Way;
 
 pub use baseline::Baseline;
@@ -47,25 +41,6 @@ pub struct AccuracyStudy {
     pub seed: u64,
 }
 
-/// Errors of a study.
-#[derive(Debug, thiserror::Error)]
-pub enum StudyError {
-    /// The closed form's static positions or the trajectory of navigation cannot be read.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    /// The table cannot follow the path.
-    #[error(transparent)]
-    Table(#[from] TableError),
-    /// The bound of a run cannot be computed.
-    #[error("run {run} of the study: {source}")]
-    Bound {
-        /// Number of the run.
-        run: u64,
-        /// The cause.
-        source: CalibrationError,
-    },
-}
-
 /// Result of the study.
 #[derive(Debug, Clone)]
 pub struct Accuracy {
@@ -77,8 +52,8 @@ pub struct Accuracy {
     pub table_time: f64,
     /// Every run, in order.
     pub trials: Vec<Trial>,
-    /// Figures of each group.
-    pub groups: Vec<GroupAccuracy>,
+    /// Figures of each group that has a parameter to estimate, RMS over its parameters, in rad/s, m/s² or pure numbers.
+    pub groups: Vec<(Group, Figures)>,
     /// Navigation accuracy of the calibrations in each mission.
     pub navigation: Vec<NavigationAccuracy>,
     /// Missions that cannot be navigated from the scenario's site.
@@ -110,66 +85,34 @@ pub struct Anees {
     pub interval_of_one: (f64, f64),
 }
 
-/// Figures of one group of parameters, RMS over its parameters and all runs, in rad/s, m/s² or pure
-/// numbers.
-#[derive(Debug, Clone, PartialEq)]
-pub struct GroupAccuracy {
-    /// The group.
-    pub group: Group,
-    /// The figures.
-    pub figures: Figures,
-    /// Table time in s against RMS error and RMS bound of the filter.
-    pub filter_against_time: Vec<(f64, f64, f64)>,
-    /// Table time in s against RMS error of the closed form.
-    pub closed_form_against_time: Vec<(f64, f64)>,
-}
+impl Study for AccuracyStudy {
+    type Trial = Trial;
+    type Outcome = Accuracy;
 
-impl AccuracyStudy {
-    /// Makes all runs on all cores; `done` is called after each. The result does not depend on the number
-    /// of cores.
-    ///
-    /// # Errors
-    /// [`StudyError`] if runs cannot be made. A run on which the filter fails is not an error: it is
-    /// counted.
-    pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Accuracy, StudyError> {
-        let all: Vec<u64> = (0..self.runs).collect();
-        self.result(self.trials(&all, done)?)
+    fn runs(&self) -> u64 {
+        self.runs
     }
 
-    /// Makes some of the runs, given by their numbers; `done` is called after each.
-    ///
-    /// # Errors
-    /// As [`Self::run`].
-    pub fn trials(&self, runs: &[u64], done: &(dyn Fn() + Sync)) -> Result<Vec<Trial>, StudyError> {
+    fn maker(&self) -> Result<impl Fn(u64) -> Result<Trial, StudyError> + Sync, StudyError> {
         let baseline = Baseline::new(&self.scenario)?;
         let simulated = [Runs::new(&self.scenario)?, Runs::new(&baseline.scenario)?];
-        let all = runs.par_iter().with_max_len(1).map(|&run| {
-            let trial = self.trial(&baseline, &simulated, run);
-            done();
-            trial
-        });
-        all.collect()
+        Ok(move |run| self.trial(&baseline, &simulated, run))
     }
 
-    /// The result of all runs, in the order of their numbers.
-    ///
-    /// # Errors
-    /// As [`Self::run`].
-    pub fn result(&self, trials: Vec<Trial>) -> Result<Accuracy, StudyError> {
+    fn outcome(&self, trials: Vec<Trial>) -> Result<Accuracy, StudyError> {
         let baseline = Baseline::new(&self.scenario)?;
         let table_time = self.scenario.duration()?;
         let (mut navigation, mut not_navigated) = (Vec::new(), Vec::new());
         for journey in Journey::ALL {
-            match Way::of(journey, &self.scenario)? {
+            match Way::of(journey, &self.scenario) {
                 Ok(way) => navigation.push(way.worth(&trials)),
-                Err(error) => not_navigated.push((journey, error)),
+                Err(StudyError::Navigation(error)) => not_navigated.push((journey, error)),
+                Err(error) => return Err(error),
             }
         }
         let effects = trials.first().map(|trial| trial.effects.clone());
         Ok(Accuracy {
-            groups: Group::all()
-                .filter_map(|group| GroupAccuracy::new(group, &trials, &baseline, table_time))
-                .collect(),
+            groups: figures::of_groups(&trials),
             navigation,
             not_navigated,
             error_terms: figures::of_error_terms(&trials),
@@ -217,60 +160,6 @@ impl Accuracy {
         let tests = || self.filtered().filter_map(|filtered| filtered.form_test);
         let rejected = tests().filter(|test| test.rejects());
         (rejected.count(), tests().count())
-    }
-}
-
-impl GroupAccuracy {
-    /// `None` if the form and the body frame leave no parameter of the group to estimate.
-    fn new(group: Group, trials: &[Trial], baseline: &Baseline, table_time: f64) -> Option<Self> {
-        let estimated = |&i: &usize| trials.iter().any(|trial| trial.bound[i] > 0.0);
-        let indices: Vec<usize> = (0..PARAMETERS)
-            .filter(|&i| Group::of(i) == group)
-            .filter(estimated)
-            .collect();
-        if indices.is_empty() {
-            return None;
-        }
-        // The mean square of the group in one run.
-        let square = |of: &ParameterVector| {
-            let sum: f64 = indices.iter().map(|&i| of[i].powi(2)).sum();
-            sum / indices.len() as f64
-        };
-        let closed = |t: &Trial, part: usize| Some(square(t.closed_form.get(part)?.as_ref()?));
-        let all = |of: &dyn Fn(&Trial) -> Option<f64>| -> Vec<f64> {
-            trials.iter().filter_map(of).collect()
-        };
-        let at = |moment: usize| {
-            let filter = |t: &Trial| Some(square(t.filtered.as_ref()?.track.get(moment)?));
-            let bound = |t: &Trial| t.bound_track.get(moment).map(square);
-            (rms(&all(&filter)), rms(&all(&bound)))
-        };
-        Some(Self {
-            group,
-            figures: Figures::new(trials.iter().map(|t| {
-                let filtered = t.filtered.as_ref();
-                Squares {
-                    filter: filtered.map(|f| square(&f.error)),
-                    claimed: filtered.map(|f| square(&f.sigma)),
-                    bound: square(&t.bound),
-                    closed_form: closed(t, Baseline::OWN_TIME),
-                    closed_form_in_equal_time: closed(t, Baseline::EQUAL_TIME),
-                }
-            })),
-            filter_against_time: trial::moments(table_time)
-                .enumerate()
-                .map(|(moment, time)| {
-                    let (filter, bound) = at(moment);
-                    (time, filter, bound)
-                })
-                .collect(),
-            closed_form_against_time: baseline
-                .parts()
-                .map(|(part, time)| (time, all(&|t| closed(t, part))))
-                .filter(|(_, squares)| !squares.is_empty())
-                .map(|(time, squares)| (time, rms(&squares)))
-                .collect(),
-        })
     }
 }
 

@@ -2,9 +2,9 @@
 //! the reference temperature, their coefficients, and the selected orders.
 
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
-use super::accuracy::{Figures, Squares, StudyError};
+use super::accuracy::{Figures, Squares};
+use super::{Study, StudyError};
 use crate::calibration::{
     CalibrationError, Coefficient, Group, Nees, NoisePolicy, Options, Outcome, PARAMETERS, Problem,
     UNWATCHED, estimate, mean_square_interval, nees, thermal_bound, to_vector,
@@ -63,26 +63,28 @@ pub struct ErrorOf {
     pub squares: [f64; 3],
 }
 
-impl CampaignStudy {
-    /// Runs all campaigns on all cores; `done` is called after each.
-    ///
-    /// # Errors
-    /// [`StudyError`] if they cannot be simulated, or if the bound cannot be computed.
-    pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<CampaignAccuracy, StudyError> {
-        let streams: Vec<u64> = (0..self.runs).collect();
-        let all = streams.into_par_iter().with_max_len(1).map(|stream| {
-            let trial = self.trial(stream);
-            done();
-            trial
-        });
-        let all: Vec<Option<CampaignTrial>> = all.collect::<Result<_, StudyError>>()?;
-        Ok(CampaignAccuracy {
-            study: self.clone(),
-            failures: all.iter().filter(|trial| trial.is_none()).count(),
-            trials: all.into_iter().flatten().collect(),
-        })
+impl Study for CampaignStudy {
+    type Trial = Option<CampaignTrial>;
+    type Outcome = CampaignAccuracy;
+
+    fn runs(&self) -> u64 {
+        self.runs
     }
 
+    fn maker(&self) -> Result<impl Fn(u64) -> Result<Self::Trial, StudyError> + Sync, StudyError> {
+        Ok(|stream| self.trial(stream))
+    }
+
+    fn outcome(&self, trials: Vec<Self::Trial>) -> Result<CampaignAccuracy, StudyError> {
+        Ok(CampaignAccuracy {
+            study: self.clone(),
+            failures: trials.iter().filter(|trial| trial.is_none()).count(),
+            trials: trials.into_iter().flatten().collect(),
+        })
+    }
+}
+
+impl CampaignStudy {
     fn trial(&self, stream: u64) -> Result<Option<CampaignTrial>, StudyError> {
         let simulated = self.campaign.simulate(self.seed, stream)?;
         let runs: Vec<&Run> = simulated.iter().map(|one| &one.run).collect();

@@ -15,15 +15,14 @@ use nalgebra::SMatrix;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::Ratio;
-use super::navigation::{Mission, Motion, NavigationStudyError};
+use super::navigation::{Mission, Motion};
 use super::ratio::{bootstrap, median, quantile};
+use super::{Ratio, Study, StudyError};
 use crate::calibration::{PARAMETERS, ParameterVector, parameter};
 use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
-use crate::models::ModelError;
 use crate::navigation::{SensedErrors, Sensitivity, Trajectory};
 use crate::simulation::Scenario;
-use crate::turntable::TableError;
+use crate::units::NAUTICAL_MILE;
 
 pub use budget::{Budget, Part};
 pub use method::{Calibrated, Estimator, Method, Trial};
@@ -51,20 +50,6 @@ pub struct ExperimentStudy {
     pub samples: u64,
     /// Seed; each instrument has its own streams of it.
     pub seed: u64,
-}
-
-/// An experiment that cannot be made.
-#[derive(Debug, thiserror::Error)]
-pub enum ExperimentError {
-    /// A path that belongs to the experiment cannot be had.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    /// The table cannot follow a path.
-    #[error(transparent)]
-    Table(#[from] TableError),
-    /// A mission cannot be navigated.
-    #[error(transparent)]
-    Navigation(#[from] NavigationStudyError),
 }
 
 /// Situation in which an instrument navigates.
@@ -103,12 +88,12 @@ pub struct Navigated {
     pub situation: Situation,
     /// Each of [`Method::all`].
     pub methods: Vec<Worth>,
-    /// Horizontal position error at the end in m that the noise of alignment and navigation makes by
+    /// Horizontal position error at the end in nmile that the noise of alignment and navigation makes by
     /// itself, after any calibration.
     pub noise: Spread,
 }
 
-/// What a method is worth: horizontal position errors in m over all instruments.
+/// What a method is worth: horizontal position errors in nmile over all instruments.
 #[derive(Debug, Clone)]
 pub struct Worth {
     /// The method.
@@ -133,7 +118,7 @@ pub struct Worth {
 }
 
 /// How a length is distributed.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spread {
     /// Half of all are below.
     pub median: f64,
@@ -142,10 +127,13 @@ pub struct Spread {
     /// Root of the mean square.
     pub rms: f64,
     /// A quarter of all are below the first, three quarters below the second.
+    #[serde(skip)]
     pub quartiles: (f64, f64),
     /// 68 % are below.
+    #[serde(rename = "below_68_percent")]
     pub below_68: f64,
     /// 95 % are below.
+    #[serde(rename = "below_95_percent")]
     pub below_95: f64,
 }
 
@@ -166,54 +154,35 @@ impl Spread {
     }
 }
 
-/// Horizontal position error, east and north in m, by parameter errors.
+/// Horizontal position error, east and north in nmile, by parameter errors.
 type ByParameter = SMatrix<f64, 2, PARAMETERS>;
 
-impl ExperimentStudy {
-    /// Runs the whole study on all cores; `done` is called after each instrument. The result does not
-    /// depend on the number of cores.
-    ///
-    /// # Errors
-    /// [`ExperimentError`] if runs or missions cannot be made. A calibration that fails is no error:
-    /// it is counted.
-    pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Experiment, ExperimentError> {
-        let all: Vec<u64> = (0..self.samples).collect();
-        self.result(self.trials(&all, done)?)
+impl Study for ExperimentStudy {
+    type Trial = Trial;
+    type Outcome = Experiment;
+
+    fn runs(&self) -> u64 {
+        self.samples
     }
 
-    /// Runs some of the instruments, given by their numbers; `done` is called after each.
-    ///
-    /// # Errors
-    /// As [`Self::run`].
-    pub fn trials(
-        &self,
-        runs: &[u64],
-        done: &(dyn Fn() + Sync),
-    ) -> Result<Vec<Trial>, ExperimentError> {
+    fn maker(&self) -> Result<impl Fn(u64) -> Result<Trial, StudyError> + Sync, StudyError> {
         let scenarios = method::Scenarios::new(&self.scenario)?;
-        let all = runs.par_iter().with_max_len(1).map(|&run| {
-            let trial = scenarios.trial(self.seed, run)?;
-            done();
-            Ok(trial)
-        });
-        all.collect()
+        Ok(move |run| scenarios.trial(self.seed, run))
     }
 
-    /// What all instruments say, in the order of their numbers.
-    ///
-    /// # Errors
-    /// As [`Self::run`].
-    pub fn result(&self, trials: Vec<Trial>) -> Result<Experiment, ExperimentError> {
+    fn outcome(&self, trials: Vec<Trial>) -> Result<Experiment, StudyError> {
         let navigated = Situation::ALL.into_par_iter();
         let navigated = navigated.map(|situation| Ok(self.way(situation)?.navigated(&trials)));
         Ok(Experiment {
-            navigations: navigated.collect::<Result<_, ExperimentError>>()?,
+            navigations: navigated.collect::<Result<_, StudyError>>()?,
             study: self.clone(),
             table_times: method::Scenarios::new(&self.scenario)?.table_times()?,
             trials,
         })
     }
+}
 
+impl ExperimentStudy {
     /// The mission of a situation.
     fn mission(&self, situation: Situation) -> Mission {
         match situation {
@@ -228,7 +197,7 @@ impl ExperimentStudy {
         }
     }
 
-    fn way(&self, situation: Situation) -> Result<Way, ExperimentError> {
+    fn way(&self, situation: Situation) -> Result<Way, StudyError> {
         let mission = self.mission(situation);
         let instrument = ideal();
         let mut start = Sensitivity::zeros();
@@ -244,10 +213,10 @@ impl ExperimentStudy {
         let noise = noise::position(&mission, aligned, &self.scenario.instrument.noise)?;
         Ok(Way {
             situation,
-            noise: noise::spread(&noise),
+            noise: noise::spread(&(noise / NAUTICAL_MILE.powi(2))),
             minutes: exposures
                 .iter()
-                .map(|at| (at.time, at.position()))
+                .map(|at| (at.time, at.position() / NAUTICAL_MILE))
                 .collect(),
         })
     }

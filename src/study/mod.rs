@@ -9,9 +9,89 @@ mod ratio;
 mod shard;
 pub mod table1;
 
-pub use accuracy::{Accuracy, AccuracyStudy, Figures, GroupAccuracy, NavigationAccuracy};
+use navigation::NavigationStudyError;
+use rayon::prelude::*;
+
+use crate::calibration::CalibrationError;
+use crate::models::ModelError;
+use crate::turntable::TableError;
+
+pub use accuracy::{Accuracy, AccuracyStudy, Figures, NavigationAccuracy};
 pub use campaign::{CampaignAccuracy, CampaignStudy};
 pub use experiment::{Experiment, ExperimentStudy};
 pub use ratio::Ratio;
 pub use shard::{Shard, ShardError};
 pub use table1::{Table1, Table1Study};
+
+/// A study of runs that are given by their numbers, each with random streams of its own: neither the number of cores
+/// nor a division into parts changes its result.
+pub trait Study: Sync {
+    /// What one run gives.
+    type Trial: Send;
+    /// What all of them give.
+    type Outcome;
+
+    /// Number of runs.
+    fn runs(&self) -> u64;
+
+    /// What makes a run of a number.
+    ///
+    /// # Errors
+    /// [`StudyError`] if no run can be made.
+    fn maker(&self) -> Result<impl Fn(u64) -> Result<Self::Trial, StudyError> + Sync, StudyError>;
+
+    /// The outcome of all runs, in the order of their numbers.
+    ///
+    /// # Errors
+    /// [`StudyError`] if they cannot be judged.
+    fn outcome(&self, trials: Vec<Self::Trial>) -> Result<Self::Outcome, StudyError>;
+
+    /// Makes some of the runs on all cores; `done` is called after each.
+    ///
+    /// # Errors
+    /// [`StudyError`] if runs cannot be made. A run that gives no calibration is not an error: it is counted.
+    fn trials(
+        &self,
+        runs: &[u64],
+        done: &(dyn Fn() + Sync),
+    ) -> Result<Vec<Self::Trial>, StudyError> {
+        let make = self.maker()?;
+        let all = runs.par_iter().with_max_len(1).map(|&run| {
+            let trial = make(run);
+            done();
+            trial
+        });
+        all.collect()
+    }
+
+    /// The whole study.
+    ///
+    /// # Errors
+    /// As [`Self::trials`] and [`Self::outcome`].
+    fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Self::Outcome, StudyError> {
+        let all: Vec<u64> = (0..self.runs()).collect();
+        self.outcome(self.trials(&all, done)?)
+    }
+}
+
+/// Errors of a study.
+#[derive(Debug, thiserror::Error)]
+pub enum StudyError {
+    /// A path, table or trajectory that the study needs cannot be read.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The table cannot follow a path.
+    #[error(transparent)]
+    Table(#[from] TableError),
+    /// A mission cannot be navigated.
+    #[error(transparent)]
+    Navigation(#[from] NavigationStudyError),
+    /// The bound of a run cannot be computed.
+    #[error("run {run} of the study: {source}")]
+    Bound {
+        /// Number of the run.
+        run: u64,
+        /// The cause.
+        source: CalibrationError,
+    },
+}

@@ -2,6 +2,7 @@
 //! navigation, and the σ of this error predicted from its covariance, by the linear model.
 
 mod outlook;
+mod quantity;
 mod warming;
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
@@ -21,6 +22,7 @@ use crate::navigation::{
 };
 
 pub use outlook::Outlook;
+pub use quantity::Quantity;
 pub use warming::{Warming, WarmingError, WarmingPair};
 
 /// Time in s between two moments of a result.
@@ -56,15 +58,6 @@ pub struct Pair {
     pub calibration: PerSensor<Triad>,
     /// Covariance of the calibration minus the truth; `None` if no σ is stated.
     pub covariance: Option<ParameterMatrix>,
-}
-
-/// Navigation errors of one moment.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Epoch {
-    /// Time since the start, s.
-    pub time: f64,
-    /// The actual error.
-    pub error: NavigationError,
 }
 
 /// Sensitivity of navigation errors to the parameters of both triads at one moment.
@@ -192,12 +185,17 @@ impl Mission {
         }
     }
 
+    /// True state and sensed input at the start.
+    pub fn start(&self) -> Instant {
+        *Course::new(&self.motion).here()
+    }
+
     /// Navigates: errors and their predicted covariance at the start and after each interval.
     ///
     /// # Errors
     /// If the mission leads to a pole or the calibration is singular.
     pub fn navigate(&self, pair: &Pair) -> Result<Vec<Outlook>, NavigationStudyError> {
-        let mut moments = outlook::known(&self.errors(pair)?);
+        let mut moments = self.errors(pair)?;
         if let Some(covariance) = &pair.covariance {
             for (moment, exposure) in moments.iter_mut().zip(self.exposure(&pair.truth)?) {
                 moment.sigma = Some(outlook::sigma(&exposure.covariance(covariance)));
@@ -210,7 +208,7 @@ impl Mission {
     ///
     /// # Errors
     /// As for [`Self::navigate`].
-    pub fn errors(&self, pair: &Pair) -> Result<Vec<Epoch>, NavigationStudyError> {
+    pub fn errors(&self, pair: &Pair) -> Result<Vec<Outlook>, NavigationStudyError> {
         self.errors_from(&ErrorVector::zeros(), pair)
     }
 
@@ -222,7 +220,7 @@ impl Mission {
         &self,
         start: &ErrorVector,
         pair: &Pair,
-    ) -> Result<Vec<Epoch>, NavigationStudyError> {
+    ) -> Result<Vec<Outlook>, NavigationStudyError> {
         self.errors_by(start, |_| pair.sensed())
     }
 
@@ -231,7 +229,7 @@ impl Mission {
         &self,
         start: &ErrorVector,
         sensed: impl Fn(u32) -> Result<PerSensor<Sensed>, NavigationStudyError>,
-    ) -> Result<Vec<Epoch>, NavigationStudyError> {
+    ) -> Result<Vec<Outlook>, NavigationStudyError> {
         let mut course = Course::new(&self.motion);
         within_reach(course.here().truth.latitude + start[POSITION])?;
         let mut errors = NonlinearError::new(start);
@@ -336,10 +334,11 @@ fn sensed_errors(triads: &PerSensor<Triad>) -> Result<SensedErrors, NavigationSt
     SensedErrors::new(triads).map_err(|sensor| NavigationStudyError::Singular { sensor })
 }
 
-fn moment(time: f64, errors: &NonlinearError, truth: &Solution) -> Epoch {
-    Epoch {
+fn moment(time: f64, errors: &NonlinearError, truth: &Solution) -> Outlook {
+    Outlook {
         time,
-        error: NavigationError::of(&errors.computed(truth), truth),
+        error: Some(NavigationError::of(&errors.computed(truth), truth)),
+        sigma: None,
     }
 }
 

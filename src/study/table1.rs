@@ -20,15 +20,14 @@ use paper::Published;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use response::{Response, standing};
+use response::{Response, errors, standing};
 
 use crate::earth::ROTATION_RATE;
 use crate::imu::{InstallationForm, PerSensor, Sensor, Triad};
 use crate::models::{InstallationModel, Instrument, ModelError, Place};
-use crate::navigation::{Instant, LARGEST_LATITUDE};
-use crate::units::DEGREE;
+use crate::study::navigation::{Exposure, NavigationStudyError};
 
-pub use paper::{ByQuantity, Installation, Kind, Quantity, Reading};
+pub use paper::{ByQuantity, Installation, Kind, QUANTITIES, Reading};
 pub use response::Moments;
 pub use verdict::{AGREEMENT, Verdict};
 
@@ -58,12 +57,8 @@ pub enum Table1Error {
     #[error(transparent)]
     Model(#[from] ModelError),
     /// East-North-Up has no heading near a pole.
-    #[error(
-        "latitude {:.3}° is too near to a pole for East-North-Up: stay within ±{:.1}°",
-        .0 / DEGREE,
-        LARGEST_LATITUDE / DEGREE
-    )]
-    Latitude(f64),
+    #[error(transparent)]
+    Navigation(#[from] NavigationStudyError),
     /// Invalid length of a run, h.
     #[error("a run of {0} h; expected more than 0 h")]
     Hours(f64),
@@ -103,7 +98,7 @@ pub struct Column {
     pub courses: Courses,
 }
 
-/// A column under one reading. Errors in rad, m/s and m.
+/// A column under one reading. Errors in the usual units of [`QUANTITIES`].
 #[derive(Debug, Clone)]
 pub struct Row {
     /// The reading.
@@ -130,9 +125,9 @@ impl Column {
 }
 
 impl Row {
-    /// Whether a quantity agrees with the paper's figure.
-    pub fn agrees(&self, quantity: Quantity) -> bool {
-        self.difference[quantity as usize].abs() <= AGREEMENT
+    /// Whether a quantity, given by its place in [`QUANTITIES`], agrees with the paper's figure.
+    pub fn agrees(&self, quantity: usize) -> bool {
+        self.difference[quantity].abs() <= AGREEMENT
     }
 }
 
@@ -190,13 +185,6 @@ impl Table1Study {
         Ok((0..count as u64).map(sample).collect())
     }
 
-    fn response(&self, hours: f64) -> Result<Response, Table1Error> {
-        Some(self.latitude)
-            .filter(|latitude| latitude.abs() <= LARGEST_LATITUDE)
-            .and_then(|latitude| Response::new(&standing(latitude), hours * 3600.0))
-            .ok_or(Table1Error::Latitude(self.latitude))
-    }
-
     fn column(
         &self,
         published: &'static Published,
@@ -239,11 +227,12 @@ impl Table1Study {
     ) -> Result<Row, Table1Error> {
         let (sensor, form) = (published.sensor, published.form);
         let hours = reading.hours.unwrap_or(self.hours);
-        let response = self.response(hours)?;
-        let Instant { rate, force, .. } = standing(self.latitude).steady();
+        let mission = standing(self.latitude, hours * 3600.0);
+        let response = Response::new(&mission)?;
+        let at_rest = mission.start();
         let (input, size) = match sensor {
-            Sensor::Gyro => (rate, ROTATION_RATE),
-            Sensor::Accel => (force, force.norm()),
+            Sensor::Gyro => (at_rest.rate, ROTATION_RATE),
+            Sensor::Accel => (at_rest.force, at_rest.force.norm()),
         };
         let results: Vec<(Vector3<f64>, ByQuantity<f64>)> = triads
             .par_iter()
@@ -257,7 +246,7 @@ impl Table1Study {
             .collect::<Result<_, Table1Error>>()?;
         let moments = |count: usize| {
             let results = results.iter().take(count);
-            Quantity::ALL.map(|q| Moments::of(results.clone().map(|r| r.1[q as usize])))
+            std::array::from_fn(|q| Moments::of(results.clone().map(|r| r.1[q])))
         };
         let population = moments(triads.len());
         let paper = published.moments();
@@ -266,8 +255,7 @@ impl Table1Study {
             hours,
             sample: moments(self.samples),
             population,
-            difference: Quantity::ALL.map(|q| {
-                let q = q as usize;
+            difference: std::array::from_fn(|q| {
                 verdict::difference(&paper[q], &population[q], triads.len())
             }),
             sensed: results.iter().take(self.samples).map(|r| r.0).collect(),
@@ -279,18 +267,20 @@ impl Table1Study {
     /// # Errors
     /// As [`Self::run`].
     pub fn courses(&self, sensor: Sensor, row: &Row) -> Result<Courses, Table1Error> {
-        let response = self.response(row.hours)?;
-        let outputs: Vec<usize> = response.thinned(TIMES).collect();
-        let errors = |output: &usize, sensed| response.errors(sensor, *output, sensed);
-        let course = |sensed| outputs.iter().map(|k| errors(k, sensed)).collect();
-        let moments = |output: &usize| {
-            let all: Vec<_> = row.sensed.iter().map(|s| errors(output, s)).collect();
-            Quantity::ALL.map(|q| Moments::of(all.iter().map(|errors| errors[q as usize])))
+        let response = Response::new(&standing(self.latitude, row.hours * 3600.0))?;
+        let exposures: Vec<&Exposure> = response.thinned(TIMES).collect();
+        let course = |sensed: &Vector3<f64>| {
+            let errors = exposures.iter().map(|at| errors(at, sensor, sensed));
+            errors.collect()
+        };
+        let moments = |at: &&Exposure| {
+            let all: Vec<_> = row.sensed.iter().map(|s| errors(at, sensor, s)).collect();
+            std::array::from_fn(|q| Moments::of(all.iter().map(|errors| errors[q])))
         };
         Ok(Courses {
-            times: outputs.iter().map(|&k| response.time(k)).collect(),
+            times: exposures.iter().map(|at| at.time).collect(),
             samples: row.sensed.iter().take(paper::SAMPLES).map(course).collect(),
-            moments: outputs.par_iter().map(moments).collect(),
+            moments: exposures.par_iter().map(moments).collect(),
         })
     }
 }

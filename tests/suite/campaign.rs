@@ -415,7 +415,7 @@ fn sigma_of_coefficients_are_true_and_orders_right() {
     use turncal::calibration::NoisePolicy;
     use turncal::imu::InstallationForm;
     use turncal::simulation::SimulatedCampaign;
-    use turncal::study::CampaignStudy;
+    use turncal::study::{CampaignStudy, Study};
     let study = CampaignStudy {
         campaign: SimulatedCampaign::load("five-soaks").unwrap(),
         form: InstallationForm::General,

@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Vector3};
 use turncal::imu::{InstallationForm, Sensor};
 use turncal::navigation::{Height, Increments, Instant, NavigationError, Solution, Strapdown};
 use turncal::study::Table1Study;
-use turncal::study::table1::{Column, Installation, Quantity, Row, Table1, Verdict, paper};
+use turncal::study::table1::{Column, Installation, QUANTITIES, Row, Table1, Verdict, paper};
 use turncal::units::DEGREE;
 
 use InstallationForm::{SixAngle, ThreeAngle};
@@ -72,20 +72,14 @@ fn means_of_the_population_are_those_of_an_independent_program() {
         ),
     ] {
         let row = row(large(), sensor, ThreeAngle, installation);
-        for quantity in Quantity::ALL {
-            let unit = quantity.unit_value();
-            let found = row.sample[quantity as usize];
-            let apart = found.mean / unit - expected[quantity as usize];
-            let error = found.std / unit * (2.0 / 4000f64).sqrt();
-            println!(
-                "{sensor:?} {installation:?} {quantity:?} {:.2}",
-                apart / error
-            );
+        for ((quantity, found), expected) in QUANTITIES.iter().zip(row.sample).zip(expected) {
+            let (name, apart) = (quantity.name, found.mean - expected);
+            let error = found.std * (2.0 / 4000f64).sqrt();
+            println!("{sensor:?} {installation:?} {name} {:.2}", apart / error);
             assert!(
                 apart.abs() < 3.0 * error,
-                "{sensor:?} {installation:?} {quantity:?}: {} {}",
-                found.mean / unit,
-                expected[quantity as usize]
+                "{sensor:?} {installation:?} {name}: {} {expected}",
+                found.mean
             );
         }
     }
@@ -98,14 +92,14 @@ fn what_comes_back_exactly_leaves_nothing_to_navigate_with() {
         row(large(), Accel, SixAngle, Installation::OfForm),
         row(large(), Accel, ThreeAngle, Installation::Upper),
     ] {
-        for quantity in Quantity::ALL {
-            let mean = row.sample[quantity as usize].mean / quantity.unit_value();
-            let limit = if quantity == Quantity::Position {
+        for (quantity, of) in QUANTITIES.iter().zip(row.sample) {
+            let (name, mean) = (quantity.name, of.mean);
+            let limit = if name.contains("position") {
                 1e-6
             } else {
                 1e-9
             };
-            assert!(mean < limit, "{} {quantity:?} {mean:e}", row.reading.name);
+            assert!(mean < limit, "{} {name} {mean:e}", row.reading.name);
         }
     }
 }
@@ -139,8 +133,9 @@ fn judged_as_the_population_is(seeds: std::ops::RangeInclusive<u64>) {
         let wide = column(&table, Gyro, ThreeAngle).rows();
         let wide = wide.filter(|r| r.reading.angles == 2.0 && r.reading.hours.is_none());
         for row in wide {
-            let apart = Quantity::ALL.into_iter().filter(|&q| !row.agrees(q));
-            assert_eq!(apart.collect::<Vec<_>>(), [Quantity::Position]);
+            let apart = (0..QUANTITIES.len()).filter(|&q| !row.agrees(q));
+            let apart: Vec<&str> = apart.map(|q| QUANTITIES[q].key).collect();
+            assert_eq!(apart, ["position_nmile"]);
         }
     }
 }
@@ -175,9 +170,7 @@ fn nonlinear(sensor: Sensor, sensed: &Vector3<f64>, times: &[f64]) -> Vec<[f64; 
         for _ in 0..STEPS {
             navigation.advance(&increments, held).unwrap();
         }
-        let [pitch, roll, heading] = error.attitude.into();
-        let (velocity, position) = (error.horizontal_velocity(), error.horizontal_position());
-        [pitch, roll, heading, velocity, position]
+        QUANTITIES.map(|quantity| quantity.of(&error.to_vector()))
     });
     errors.collect()
 }

@@ -101,7 +101,7 @@ fn a_sound_record_is_good_and_one_with_wrong_noise_is_used_with_care() {
 fn every_finding_is_explained() {
     let (status, list, _) = turncal(&["explain"]);
     assert_eq!(status, 0);
-    for line in list.lines() {
+    for line in list.lines().map(str::trim) {
         let code = line.split_whitespace().next().unwrap();
         let (status, text, message) = turncal(&["explain", code]);
         assert!(

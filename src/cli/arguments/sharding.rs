@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 use turncal::formats::{Job, JobKind, Part, part_is_there, write_part};
-use turncal::study::Shard;
+use turncal::study::{Shard, Study};
 
 use super::{Delivery, shard};
 use crate::cli::terminal::Runs;
@@ -18,22 +18,20 @@ pub struct Sharding {
 }
 
 impl Sharding {
-    /// Makes the requested part of a study of `runs` runs, unless that part exists; returns false if the whole study
-    /// is requested. `trials` makes runs by their numbers, and reports each.
-    pub fn make<T: Serialize>(
+    /// Makes the requested part of a study, unless that part exists; returns false if the whole study is requested.
+    pub fn make<S: Study<Trial: Serialize> + Serialize>(
         self,
-        (job, study, runs): (JobKind, &impl Serialize, u64),
+        job: JobKind,
+        study: &S,
         delivery: &Delivery,
         inputs: &[&Path],
-        trials: impl FnOnce(&[u64], &(dyn Fn() + Sync)) -> anyhow::Result<Vec<T>>,
     ) -> anyhow::Result<bool> {
         let Some((shard, target)) = self.shard.zip(delivery.output()) else {
             return Ok(false);
         };
-        let part = Part::new(
-            Job::new(job, serde_json::to_value(study)?, runs),
-            Some(shard),
-        );
+        let runs = study.runs();
+        let job = Job::new(job, serde_json::to_value(study)?, runs);
+        let part = Part::new(job, Some(shard));
         if !delivery.force() && part_is_there(target, &part) {
             tell!("part {shard} is there already");
             return Ok(true);
@@ -41,7 +39,7 @@ impl Sharding {
         let begun = delivery.begin(inputs)?;
         let held = part.held();
         let progress = Runs::new(held.len() as u64);
-        let made = trials(&held, &|| progress.one_done())?;
+        let made = study.trials(&held, &|| progress.one_done())?;
         drop(progress);
         let written = begun.fill(|directory| write_part(directory, part.clone(), &made));
         // Another process may have made the same part in the meantime.

@@ -7,8 +7,9 @@ use serde::de::DeserializeOwned;
 use turncal::formats::{JobKind, LotDirectory, Part, Parts, read_part_unit};
 use turncal::lot::{Lot, Unit};
 use turncal::report;
+use turncal::report::Document;
 use turncal::report::terminal::printable;
-use turncal::study::{AccuracyStudy, ExperimentStudy};
+use turncal::study::{AccuracyStudy, ExperimentStudy, Study};
 
 use super::lot;
 
@@ -38,28 +39,29 @@ impl Merge {
         match parts.job.job {
             JobKind::Lot => self.lot(&parts, &inputs),
             JobKind::StudyAccuracy => {
-                let study: AccuracyStudy = self.study(&parts)?;
-                let begun = self.delivery.begin(&inputs)?;
-                let accuracy = study.result(parts.results()?)?;
-                begun.deliver(&report::accuracy::document(&accuracy))
+                self.study::<AccuracyStudy>(&parts, &inputs, report::accuracy::document)
             }
             JobKind::StudyExperiment => {
-                let study: ExperimentStudy = self.study(&parts)?;
-                let begun = self.delivery.begin(&inputs)?;
-                let experiment = study.result(parts.results()?)?;
-                begun.deliver(&report::experiment::document(&experiment))
+                self.study::<ExperimentStudy>(&parts, &inputs, report::experiment::document)
             }
         }
     }
 
-    fn study<T: DeserializeOwned>(&self, parts: &Parts) -> anyhow::Result<T> {
-        serde_json::from_value(parts.job.options.clone()).with_context(|| {
+    fn study<S: Study<Trial: DeserializeOwned> + DeserializeOwned>(
+        &self,
+        parts: &Parts,
+        inputs: &[&Path],
+        document: fn(&S::Outcome) -> Document,
+    ) -> anyhow::Result<()> {
+        let study: S = serde_json::from_value(parts.job.options.clone()).with_context(|| {
             let first = self.parts.first().map_or(Path::new(""), PathBuf::as_path);
             format!(
                 "{}: job.json does not state a study; make the parts again",
                 first.display()
             )
-        })
+        })?;
+        let begun = self.delivery.begin(inputs)?;
+        begun.deliver(&document(&study.outcome(parts.results()?)?))
     }
 
     fn lot(&self, parts: &Parts, inputs: &[&Path]) -> anyhow::Result<()> {

@@ -2,9 +2,10 @@
 
 use anyhow::bail;
 use turncal::calibration::{FindingKind, Level};
-use turncal::report::wrapped;
+use turncal::report::document::Block;
+use turncal::report::{Document, Facts};
 
-use crate::cli::terminal::{columns, print};
+use crate::cli::terminal::show;
 
 /// Explains a finding: its meaning, its cause and the remedy
 #[derive(Debug, clap::Args)]
@@ -20,16 +21,12 @@ pub struct Explain {
 
 impl Explain {
     pub fn run(&self) -> anyhow::Result<()> {
-        let width = columns().map_or(80, usize::from);
         let Some(code) = &self.code else {
-            let line = |kind: &FindingKind| format!("{}  {}\n", kind.code(), kind.name());
-            return print(
-                FindingKind::ALL
-                    .iter()
-                    .map(line)
-                    .collect::<String>()
-                    .as_bytes(),
-            );
+            let mut document = Document::default();
+            let kinds = FindingKind::ALL.iter();
+            let rows = kinds.map(|kind| (kind.code(), kind.name()));
+            document.both(Facts::new("", rows));
+            return show(&document, false);
         };
         let Some(kind) = FindingKind::named(code) else {
             bail!(
@@ -41,8 +38,9 @@ impl Explain {
             Level::Care => "The verdict is USE WITH CARE.",
             Level::Note => "The verdict is not affected.",
         };
-        let (name, explanation) = (kind.name(), kind.explanation());
-        let text = wrapped(&format!("{explanation} {verdict}"), "", Some(width)).join("\n");
-        print(format!("{}  {name}\n\n{text}\n", kind.code()).as_bytes())
+        let mut document = Document::new(format!("{}  {}", kind.code(), kind.name()));
+        let text = format!("{} {verdict}", kind.explanation());
+        document.both(Block::Text(String::new(), text));
+        show(&document, false)
     }
 }

@@ -10,7 +10,7 @@ use turncal::calibration::{Calibration, Named};
 use turncal::imu::Sensor;
 use turncal::models::{self, Place};
 use turncal::navigation::Solution;
-use turncal::report::navigation::Navigation;
+use turncal::report::navigation::{Navigated, Navigation};
 use turncal::study::navigation::{INTERVAL, Mission, Motion, Pair, Warming, WarmingPair};
 use turncal::units::DEGREE;
 
@@ -158,6 +158,10 @@ impl Navigate {
         };
         let moments = moments.with_context(|| self.calibration.display().to_string())?;
         drop(activity);
+        let navigated = Navigated {
+            method: "error",
+            outlook: moments,
+        };
         let navigation = Navigation {
             calibration: &names[0],
             truth: &names[1],
@@ -170,7 +174,7 @@ impl Navigate {
                 .as_ref()
                 .map(|warming| (warming, calibration.temperature.is_some())),
             trajectory: trajectory.as_deref(),
-            moments: &moments,
+            navigated: &navigated,
         };
         begun.deliver(&navigation.document())
     }

@@ -11,8 +11,8 @@ use turncal::run::Aiding;
 use turncal::simulation::{Scenario, SimulatedCampaign};
 use turncal::study::{AccuracyStudy, CampaignStudy};
 
+use super::carry_out;
 use crate::cli::arguments::{Delivery, Sharding, at_least_two, error_term, needs_table, seed};
-use crate::cli::terminal::Runs;
 
 /// Tests the accuracy of the filter and the consistency of its σ
 ///
@@ -98,20 +98,11 @@ impl Accuracy {
             scenario,
         };
         let inputs = [Path::new(&self.scenario)];
-        let job = (JobKind::StudyAccuracy, &study, self.runs);
-        let part = self
-            .sharding
-            .make(job, &self.delivery, &inputs, |runs, done| {
-                Ok(study.trials(runs, done)?)
-            })?;
-        if part {
+        let part = self.sharding;
+        if part.make(JobKind::StudyAccuracy, &study, &self.delivery, &inputs)? {
             return Ok(());
         }
-        let begun = self.delivery.begin(&inputs)?;
-        let runs = Runs::new(self.runs);
-        let accuracy = study.run(&|| runs.one_done())?;
-        drop(runs);
-        begun.deliver(&report::accuracy::document(&accuracy))
+        carry_out(&study, &self.delivery, &inputs, report::accuracy::document)
     }
 
     fn campaign(&self) -> anyhow::Result<()> {
@@ -124,10 +115,7 @@ impl Accuracy {
             rate: !self.without_rate,
             campaign,
         };
-        let begun = self.delivery.begin(&[Path::new(&self.scenario)])?;
-        let runs = Runs::new(self.runs);
-        let accuracy = study.run(&|| runs.one_done())?;
-        drop(runs);
-        begun.deliver(&report::campaign::document(&accuracy))
+        let inputs = [Path::new(&self.scenario)];
+        carry_out(&study, &self.delivery, &inputs, report::campaign::document)
     }
 }

@@ -9,8 +9,8 @@ use turncal::simulation::Scenario;
 use turncal::study::ExperimentStudy;
 use turncal::study::navigation::INTERVAL;
 
+use super::carry_out;
 use crate::cli::arguments::{Delivery, Sharding, at_least_two, hours, seed};
-use crate::cli::terminal::Runs;
 
 const HOUR: f64 = 3600.0;
 const SCENARIO: &str = "experiment";
@@ -60,19 +60,15 @@ impl Experiment {
             samples: self.samples,
         };
         let inputs = [Path::new(&self.trajectory)];
-        let job = (JobKind::StudyExperiment, &study, self.samples);
-        let part = self
-            .sharding
-            .make(job, &self.delivery, &inputs, |runs, done| {
-                Ok(study.trials(runs, done)?)
-            })?;
-        if part {
+        let part = self.sharding;
+        if part.make(JobKind::StudyExperiment, &study, &self.delivery, &inputs)? {
             return Ok(());
         }
-        let begun = self.delivery.begin(&inputs)?;
-        let runs = Runs::new(self.samples);
-        let experiment = study.run(&|| runs.one_done())?;
-        drop(runs);
-        begun.deliver(&report::experiment::document(&experiment))
+        carry_out(
+            &study,
+            &self.delivery,
+            &inputs,
+            report::experiment::document,
+        )
     }
 }

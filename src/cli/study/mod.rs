@@ -4,7 +4,14 @@ mod accuracy;
 mod experiment;
 mod table1;
 
+use std::path::Path;
+
 use clap::Subcommand;
+use turncal::report::Document;
+use turncal::study;
+
+use crate::cli::arguments::Delivery;
+use crate::cli::terminal::Runs;
 
 /// Runs a Monte Carlo study
 #[derive(Debug, clap::Args)]
@@ -30,4 +37,18 @@ impl Study {
             Question::Table1(table1) => table1.run(),
         }
     }
+}
+
+/// Makes a whole study and delivers the document of its outcome.
+fn carry_out<S: study::Study>(
+    study: &S,
+    delivery: &Delivery,
+    inputs: &[&Path],
+    document: fn(&S::Outcome) -> Document,
+) -> anyhow::Result<()> {
+    let begun = delivery.begin(inputs)?;
+    let runs = Runs::new(study.runs());
+    let outcome = study.run(&|| runs.one_done())?;
+    drop(runs);
+    begun.deliver(&document(&outcome))
 }

@@ -37,7 +37,7 @@ fn in_colour(word: Word) -> String {
 }
 
 /// How wide standard output is: that of its terminal, else what COLUMNS says, else without limit.
-pub fn columns() -> Option<u16> {
+fn columns() -> Option<u16> {
     let terminal = terminal_size::terminal_size_of(io::stdout()).map(|(width, _)| width.0);
     terminal.or_else(|| std::env::var("COLUMNS").ok()?.parse().ok())
 }

@@ -7,76 +7,26 @@ use crate::report::accuracy::tables;
 use crate::report::accuracy::tables::{compared, journey_name};
 use crate::report::prelude::*;
 use crate::study::accuracy::{Position, Region};
-use crate::study::{Accuracy, Figures, GroupAccuracy, NavigationAccuracy, Ratio};
+use crate::study::{Accuracy, Figures, NavigationAccuracy, Ratio};
 
-/// The narrowest axis about a ratio of one.
-const NEAR: f64 = 0.04;
-/// A ratio beyond this or below its inverse makes its axis logarithmic.
-const FAR: f64 = 2.0;
-/// Lines that end nearer than this factor have one name.
-const TOGETHER: f64 = 2.0;
-
+/// The narrowest axis of ratios: its ends are this factor apart.
+const NARROWEST: f64 = 1.08;
+/// Left free at both ends of it, in parts of its length.
+const FREE: f64 = 0.2;
 pub fn figures(accuracy: &Accuracy) -> Vec<Plot> {
     let mut plots = vec![
         errors(accuracy),
         ratio(accuracy),
         nees(accuracy),
         gain(accuracy),
-        against_time(accuracy),
     ];
     plots.extend((!accuracy.navigation.is_empty()).then(|| positions(accuracy)));
     plots
 }
 
-/// Ratios with their place on the axis.
-fn ratios(accuracy: &Accuracy, of: impl Fn(&Figures) -> Option<Ratio>) -> Vec<(f64, Ratio)> {
-    let all = compared(accuracy).into_iter().enumerate();
-    all.filter_map(|(place, compared)| Some((place as f64, of(compared.figures)?)))
-        .filter(|(_, ratio)| ratio.value.is_finite())
-        .collect()
-}
-
-/// A panel with a place for each that is compared and a line at 1.
-fn by_compared(accuracy: &Accuracy, title: String, y: Axis) -> Panel {
-    let x = Axis::places(compared(accuracy).into_iter().map(|of| of.title));
-    Panel::new(title, x, y).with(Series::level(1.0).width(1.5))
-}
-
-/// A mark at each ratio with its interval, and its value beyond that, away from 1.
-fn with_values(ratios: &[(f64, Ratio)], shift: f64) -> Vec<Series> {
-    let at = |&(x, ratio): &(f64, Ratio)| ((x + shift, ratio.value), ratio.interval);
-    let values = ratios.iter().map(|(x, ratio)| {
-        let [text, _] = with_interval(ratio.value, ratio.interval);
-        match ratio.value >= 1.0 {
-            true => Series::words((x + shift, ratio.interval.1), Anchor::Above, text),
-            false => Series::words((x + shift, ratio.interval.0), Anchor::Below, text),
-        }
-    });
-    let marks = Series::whiskers(Mark::Dot, ratios.iter().map(at)).width(3.0);
-    std::iter::once(marks).chain(values).collect()
-}
-
 /// RMS error over bound.
 fn ratio(accuracy: &Accuracy) -> Plot {
-    let ratios = ratios(accuracy, |f| f.ratio);
-    let ends = || {
-        ratios
-            .iter()
-            .flat_map(|(_, r)| [r.interval.0, r.interval.1])
-    };
-    let half = ends().map(|end| (end - 1.0).abs()).fold(NEAR, f64::max);
-    let (y, kind) = match ends().any(|end| !(1.0 / FAR..=FAR).contains(&end)) {
-        true => (
-            Axis::log("").including([1.0]).room(0.4, 0.8),
-            ", logarithmic",
-        ),
-        false => (
-            Axis::linear("").between(1.0 - 1.3 * half, 1.0 + 1.3 * half),
-            "",
-        ),
-    };
-    let panel = by_compared(accuracy, format!("RMS error / RMS bound{kind}"), y)
-        .with_all(with_values(&ratios, 0.0));
+    let panel = ratios(accuracy, "RMS error / RMS bound", &[("", |f| f.ratio)]);
     Plot::new("ratio.svg", "Error over bound", (1, 400), [panel]).caption(
         "RMS error of the EKF over the Cramér–Rao bound, of each group of parameters and of the position after 40 \
          h; bars: its 99 % interval. A bar that crosses the line at 1 says that nothing shows the filter to be \
@@ -86,76 +36,67 @@ fn ratio(accuracy: &Accuracy) -> Plot {
 
 /// Error of the closed form over that of the filter.
 fn gain(accuracy: &Accuracy) -> Plot {
-    let y = Axis::log("").including([1.0]).room(0.4, 0.8);
-    let title = "RMS error of closed form / RMS error of EKF".to_owned();
-    let mut panel = by_compared(accuracy, title, y);
-    let equal: fn(&Figures) -> Option<Ratio> = |f| f.gain_in_equal_time;
-    let own: fn(&Figures) -> Option<Ratio> = |f| f.gain;
-    for (of, shift, fill) in [(own, -0.17, Fill::Pale), (equal, 0.17, Fill::Open)] {
-        let ratios = ratios(accuracy, of);
-        let bars = ratios
+    let own = format!("closed form {}", minutes(accuracy.baseline.table_time));
+    let mut all: Vec<(&str, OfFigures)> = vec![(&own, |f| f.gain)];
+    let equal = accuracy
+        .baseline
+        .equal_time()
+        .map(|time| format!("closed form {}", minutes(time)));
+    all.extend(
+        equal
             .iter()
-            .map(|(x, ratio)| (x + shift, 1.0, ratio.value));
-        panel = panel
-            .with(Series::bars(0.13, fill, bars).width(1.25))
-            .with_all(with_values(&ratios, shift));
-    }
-    let equal = match accuracy.baseline.equal_time() {
-        Some(time) => format!(" Right, open: closed form in {}.", minutes(time)),
-        None => " Its positions cannot be had in the time of the EKF.".to_owned(),
-    };
+            .map(|equal| (equal.as_str(), (|f| f.gain_in_equal_time) as OfFigures)),
+    );
+    let panel = ratios(
+        accuracy,
+        "RMS error of closed form / RMS error of EKF",
+        &all,
+    );
     Plot::new("gain.svg", "Gain over the closed form", (1, 460), [panel]).caption(format!(
-        "RMS error of the closed form over that of the EKF in {}, logarithmic, with 99 % intervals. Above the line \
-         at 1 the EKF is better, below the closed form. Left, shaded: closed form in its own {}.{equal}",
+        "RMS error of the closed form over that of the EKF in {}, with 99 % intervals. Above the line at 1 the EKF \
+         is better, below the closed form.",
         minutes(accuracy.table_time),
-        minutes(accuracy.baseline.table_time)
     ))
 }
 
-/// RMS error of both methods against table time.
-fn against_time(accuracy: &Accuracy) -> Plot {
-    let panels = accuracy.groups.iter().map(of_group_against_time);
-    Plot::new("time.svg", "Accuracy against table time", (3, 340), panels).caption(
-        "RMS error over all runs at that time of the last pass, one panel for each group, both axes logarithmic. \
-         Solid: EKF; dashed: its Cramér–Rao bound; rings: closed form with shorter dwells at all of its \
-         positions.",
-    )
+type OfFigures = fn(&Figures) -> Option<Ratio>;
+
+/// Ratios by name, each with its interval and its value beyond that, away from the line at 1.
+fn ratios(accuracy: &Accuracy, title: &str, all: &[(&str, OfFigures)]) -> Panel {
+    let compared = compared(accuracy);
+    let (mut low, mut high) = (1.0, 1.0);
+    let mut series = vec![Series::level(1.0).width(1.5)];
+    for (n, (name, of)) in all.iter().enumerate() {
+        let mut marks = Vec::new();
+        for (place, compared) in compared.iter().enumerate() {
+            let ratio = of(compared.figures).filter(|ratio| ratio.value.is_finite());
+            let Some(Ratio { value, interval }) = ratio else {
+                continue;
+            };
+            let x = place as f64 + beside(n, all.len(), 0.68);
+            let [text, _] = with_interval(value, interval);
+            marks.push(((x, value), interval));
+            series.push(match value >= 1.0 {
+                true => Series::words((x, interval.1), Anchor::Above, text),
+                false => Series::words((x, interval.0), Anchor::Below, text),
+            });
+            (low, high) = (f64::min(low, interval.0), f64::max(high, interval.1));
+        }
+        let mut marks = Series::whiskers(Mark::Dot, marks).nth(n).width(3.0);
+        marks.key = Some((*name).to_owned()).filter(|name| !name.is_empty());
+        series.push(marks);
+    }
+    let free = (high / low).max(NARROWEST).powf(FREE);
+    let y = Axis::log("").between(low / free, high * free);
+    let names = compared.into_iter().map(|of| of.title);
+    Panel::new(format!("{title}, logarithmic"), Axis::places(names), y).with_all(series)
 }
 
-fn of_group_against_time(of: &GroupAccuracy) -> Panel {
-    let unit = of.group.unit_value();
-    let line = |points: &mut dyn Iterator<Item = Point>| -> Vec<Point> {
-        let points = points.map(|(time, rms)| (time / MINUTE, rms / unit));
-        points.filter(|(_, rms)| rms.is_finite()).collect()
-    };
-    let filter = line(&mut of.filter_against_time.iter().map(|p| (p.0, p.1)));
-    let bound = line(&mut of.filter_against_time.iter().map(|p| (p.0, p.2)));
-    let closed = line(&mut of.closed_form_against_time.iter().copied());
-    let ends = filter.last().zip(bound.last());
-    let together = ends.is_some_and(|(a, b)| (a.1 / b.1).ln().abs() < TOGETHER.ln());
-    let (of_filter, of_bound) = match together {
-        true => ("EKF, bound", None),
-        false => ("EKF", Some("bound")),
-    };
-    let mut bound = Series::line(bound).color(Color::Ink).dashed().width(1.25);
-    bound.label = of_bound.map(str::to_owned);
-    let rings = Series::marks(Mark::Ring, closed.clone()).nth(1).width(1.25);
-    let title = of.group.titled();
-    Panel::new(title, Axis::log("table time, min"), Axis::log(""))
-        .with(Series::line(filter).width(1.75).label(of_filter))
-        .with(bound)
-        .with(Series::line(closed).nth(1).width(1.0))
-        .with(rings.label("closed form"))
-}
-
-/// Half the width of the axis of errors in σ, unless more than one in twenty lies beyond.
+/// Half the width of the axis of errors, in σ.
 const REACH: f64 = 5.0;
-const BEYOND: f64 = 0.05;
 const BINS: usize = 24;
 /// Points of a curve.
 const CURVE: usize = 301;
-/// Runs this many times above the upper end of the interval of NEES make its axis logarithmic.
-const FAR_NEES: f64 = 4.0;
 /// The least half width of the axes of positions, in σ.
 const POSITION_REACH: f64 = 4.0;
 
@@ -163,35 +104,27 @@ const POSITION_REACH: f64 = 4.0;
 pub fn errors(accuracy: &Accuracy) -> Plot {
     let panels = Group::all().map(|group| {
         let values = normalised(accuracy, group);
-        let reach = reach(&values);
         let normal = |z: f64| (-0.5 * z * z).exp() / TAU.sqrt();
-        let curve = steps(-reach, reach, CURVE);
-        let bars = histogram(&values, reach);
-        let highest = bars.iter().map(|bar| bar.2).fold(0.0, f64::max);
-        // Errors far beyond their σ are lower than the curve by far: it leaves the panel then.
-        let top = if reach > REACH {
-            highest
-        } else {
-            highest.max(normal(0.0))
-        };
+        let curve = steps(-REACH, REACH, CURVE);
+        let bars = histogram(&values);
+        let top = bars.iter().map(|bar| bar.2).fold(normal(0.0), f64::max);
         let mean_square = values.iter().map(|z| z * z).sum::<f64>() / values.len() as f64;
-        let beyond = values.iter().filter(|z| z.abs() > reach).count();
+        let beyond = values.iter().filter(|z| z.abs() > REACH).count();
         let mut notes = vec![
             format!("{} values", count(values.len())),
             format!("RMS {}", tables::factor(mean_square.sqrt())),
         ];
         notes.extend((beyond > 0).then(|| format!("{} beyond ±{REACH}", count(beyond))));
-        let x = Axis::linear("error / σ").between(-reach, reach);
+        let x = Axis::linear("error / σ").between(-REACH, REACH);
         let y = Axis::linear("").between(0.0, 1.08 * top);
         Panel::new(format!("{}: density", group.title()), x, y)
-            .with(Series::bars(reach / BINS as f64, Fill::Pale, bars).width(0.75))
+            .with(Series::bars(REACH / BINS as f64, Fill::Pale, bars).width(0.75))
             .with(Series::line(curve.map(|z| (z, normal(z)))).color(Color::Ink))
             .noted(notes)
     });
     Plot::new("errors.svg", "Errors over claimed σ", (3, 300), panels).caption(
         "Density of every parameter's error over the σ that the filter claims for it, all runs. Line: the standard \
-         normal density, which it follows if the σ are true; RMS is then 1. Where the axis ends beyond ±5 they are \
-         not, and the line is a spike at zero.",
+         normal density, which it follows if the σ are true; RMS is then 1.",
     )
 }
 
@@ -206,29 +139,19 @@ fn normalised(accuracy: &Accuracy, group: Group) -> Vec<f64> {
         .collect()
 }
 
-fn reach(values: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> = values.iter().map(|z| z.abs()).collect();
-    sizes.sort_by(f64::total_cmp);
-    let last = (sizes.len() as f64 * (1.0 - BEYOND)) as usize;
-    match (sizes.get(last), sizes.last()) {
-        (Some(&most), Some(&all)) if most > REACH => all,
-        _ => REACH,
-    }
-}
-
-/// Middle, foot and density of the bins of a histogram over ±`reach`, as a density of all values.
-fn histogram(values: &[f64], reach: f64) -> Vec<Upright> {
+/// Middle, foot and density of the bins of a histogram, as a density of all values.
+fn histogram(values: &[f64]) -> Vec<Upright> {
     let mut counts = [0usize; BINS];
     for z in values {
-        let place = (z / reach + 1.0) * 0.5 * BINS as f64;
+        let place = (z / REACH + 1.0) * 0.5 * BINS as f64;
         if let Some(bin) = counts.get_mut(place as usize).filter(|_| place >= 0.0) {
             *bin += 1;
         }
     }
-    let width = 2.0 * reach / BINS as f64;
+    let width = 2.0 * REACH / BINS as f64;
     let density = |n: usize| n as f64 / (values.len().max(1) as f64 * width);
     let bins = counts.into_iter().enumerate();
-    bins.map(|(k, n)| ((k as f64 + 0.5) * width - reach, 0.0, density(n)))
+    bins.map(|(k, n)| ((k as f64 + 0.5) * width - REACH, 0.0, density(n)))
         .collect()
 }
 
@@ -250,15 +173,11 @@ pub fn nees(accuracy: &Accuracy) -> Plot {
         count(outside),
         count(all().count())
     );
-    let most = all().fold(one.1, f64::max);
-    let (y, kind) = match most > FAR_NEES * one.1 {
-        true => (Axis::log("").including([one.0, one.1]), ", logarithmic"),
-        false => (Axis::linear("").between(0.0, 1.08 * most), ""),
-    };
+    let y = Axis::log("").including([one.0, one.1]);
     let (first, last) = (-0.5, accuracy.trials.len() as f64 - 0.5);
     let n = accuracy.anees.map_or(0, |anees| anees.directions);
     let x = Axis::linear("run").between(first, last);
-    let mut panel = Panel::new(format!("NEES/n of each run, n = {n}{kind}"), x, y);
+    let mut panel = Panel::new(format!("NEES/n of each run, n = {n}, logarithmic"), x, y);
     if let Some(of) = accuracy.anees {
         let mean = tables::mean(of.mean, of.interval_95);
         caption += &format!(
@@ -336,7 +255,6 @@ fn of_mission(of: &NavigationAccuracy, cloud: Vec<Point>, reach: f64) -> Panel {
         .with_all(circles)
         .with(Series::marks(Mark::Dot, cloud).width(1.0))
         .noted(notes);
-    panel.notes_left = true;
     panel.square = true;
     panel
 }
@@ -347,7 +265,7 @@ mod tests {
 
     #[test]
     fn a_histogram_holds_each_value_once_in_its_own_bin() {
-        let tops = histogram(&[-0.1, 0.1, 0.1, 7.0, -7.0], 5.0);
+        let tops = histogram(&[-0.1, 0.1, 0.1, 7.0, -7.0]);
         let width = 10.0 / BINS as f64;
         let at = |z: f64| {
             tops.iter()
@@ -358,15 +276,5 @@ mod tests {
         assert!((at(0.1) - 2.0 / (5.0 * width)).abs() < 1e-12);
         assert!((at(-0.1) - 1.0 / (5.0 * width)).abs() < 1e-12);
         assert_eq!(at(4.9), 0.0);
-    }
-
-    #[test]
-    fn an_axis_widens_only_for_errors_that_no_normal_density_has() {
-        let mut values = vec![0.5; 99];
-        values.push(40.0);
-        assert_eq!(reach(&values), REACH);
-        values.extend([30.0; 10]);
-        assert_eq!(reach(&values), 40.0);
-        assert_eq!(reach(&[]), REACH);
     }
 }

@@ -1,7 +1,7 @@
 //! The report of a study of accuracy.
 
 mod figures;
-mod tables;
+pub(super) mod tables;
 #[cfg(test)]
 mod tests;
 mod verdict;
@@ -23,8 +23,6 @@ pub fn document(accuracy: &Accuracy) -> Document {
         count(accuracy.trials.len()),
         accuracy.study.scenario.name
     ));
-    document.conclusions.heading = "Conclusions".to_owned();
-    document.warnings.heading = "To be noted".to_owned();
     verdict::say(&mut document, accuracy);
     document.both(facts(accuracy));
     document.both(tables::bound(accuracy));
@@ -76,11 +74,6 @@ pub(super) fn facts(accuracy: &Accuracy) -> Facts {
         (of, runs) => format!("{} in {} of the runs", count(of), count(runs)),
     };
     facts.push("rejected observations", rejected);
-    if let (rejections, tested @ 1..) = accuracy.rejections() {
-        let (rejections, tested) = (count(rejections), count(tested));
-        let words = format!("the data reject {form} in {rejections} of {tested} runs");
-        facts.push("form", words);
-    }
     facts
 }
 
@@ -169,8 +162,8 @@ pub(super) fn data(accuracy: &Accuracy) -> Value {
         "form_rejections":
             (tested > 0).then(|| json!({ "rejected": rejections, "tested": tested })),
     });
-    for of in &accuracy.groups {
-        data[of.group.key()] = figures(accuracy, &of.figures, of.group.unit_value());
+    for (group, of) in &accuracy.groups {
+        data[group.key()] = figures(accuracy, of, group.unit_value());
     }
     let terms = accuracy.error_terms.iter();
     let terms = terms.map(|(term, of)| (term.name().to_owned(), against_bound(of, 1.0)));

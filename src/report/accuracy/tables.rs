@@ -46,7 +46,7 @@ fn sections(
 }
 
 /// RMS error, σ and bound in a unit, and the ratio of the first to the last.
-fn against_bound(of: &Figures, unit: f64) -> Vec<String> {
+pub fn against_bound(of: &Figures, unit: f64) -> Vec<String> {
     let rms = [of.filter, of.claimed, of.bound].map(|rms| three_digits(rms / unit));
     rms.into_iter()
         .chain(ratio_cells(of.ratio.as_ref()))
@@ -190,12 +190,12 @@ pub struct Compared<'a> {
 
 /// The parameters group by group, then the position after each mission.
 pub fn compared(accuracy: &Accuracy) -> Vec<Compared<'_>> {
-    let groups = accuracy.groups.iter().map(|of| Compared {
-        title: of.group.title(),
-        sensor: Some(of.group.sensor()),
-        unit: of.group.unit(),
-        unit_value: of.group.unit_value(),
-        figures: &of.figures,
+    let groups = accuracy.groups.iter().map(|(group, figures)| Compared {
+        title: group.title(),
+        sensor: Some(group.sensor()),
+        unit: group.unit(),
+        unit_value: group.unit_value(),
+        figures,
     });
     let positions = accuracy.navigation.iter().map(|of| Compared {
         title: format!("position, {}", journey_name(of.journey)),

@@ -10,7 +10,7 @@ use crate::calibration::Group;
 use crate::imu::InstallationForm;
 use crate::navigation::NearPole;
 use crate::simulation::Scenario;
-use crate::study::AccuracyStudy;
+use crate::study::{AccuracyStudy, Study};
 
 /// Three runs of the demo at a low sample rate.
 fn small() -> Accuracy {
@@ -47,15 +47,10 @@ fn all_failed() -> Accuracy {
         }
         &mut navigated.figures
     });
-    let groups = accuracy.groups.iter_mut().map(|group| &mut group.figures);
+    let groups = accuracy.groups.iter_mut().map(|(_, figures)| figures);
     for figures in groups.chain(positions) {
         (figures.filter, figures.claimed) = (f64::NAN, f64::NAN);
         (figures.ratio, figures.gain, figures.gain_in_equal_time) = (None, None, None);
-    }
-    for group in &mut accuracy.groups {
-        for point in &mut group.filter_against_time {
-            point.1 = f64::NAN;
-        }
     }
     accuracy.anees = None;
     for nis in [&mut accuracy.velocity, &mut accuracy.table] {
@@ -81,9 +76,9 @@ fn summary(accuracy: &Accuracy) -> String {
 fn every_figure_is_drawn_whether_the_filter_works_or_not() {
     for accuracy in [small(), all_failed()] {
         let document = document(&accuracy);
-        assert_eq!(svg::drawn(document.plots()).len(), 6);
+        assert_eq!(svg::drawn(document.plots()).len(), 5);
         let names: Vec<&str> = document.plots().map(|plot| plot.file.as_str()).collect();
-        let expected = ["errors", "ratio", "nees", "gain", "time", "position"];
+        let expected = ["errors", "ratio", "nees", "gain", "position"];
         assert_eq!(names, expected.map(|name| format!("{name}.svg")));
         let text = summary(&accuracy);
         assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
@@ -105,9 +100,9 @@ fn a_document_gives_every_group_in_the_unit_of_its_key() {
         "accel.installation_arcsec",
         "accel.bias_ug",
     ]) {
-        let of = accuracy.groups.iter().find(|g| g.group == group).unwrap();
+        let (_, of) = accuracy.groups.iter().find(|of| of.0 == group).unwrap();
         let number = |name: &str| document[key][name].as_f64().unwrap();
-        assert_eq!(number("ekf_rms"), of.figures.filter / group.unit_value());
+        assert_eq!(number("ekf_rms"), of.filter / group.unit_value());
         let (ekf, bound) = (number("ekf_rms"), number("bound_rms"));
         assert!((ekf / bound / number("ratio") - 1.0).abs() < 1e-9);
         let (closed, gain) = (number("six_position_rms"), number("gain"));
@@ -143,7 +138,7 @@ fn sigma_that_are_too_small_are_called_so() {
 #[test]
 fn a_group_in_which_the_closed_form_is_better_is_named() {
     let mut accuracy = small();
-    let gain = accuracy.groups[5].figures.gain.as_mut().unwrap();
+    let gain = accuracy.groups[5].1.gain.as_mut().unwrap();
     (gain.value, gain.interval) = (0.5, (0.4, 0.6));
     let doubts = doubts(&accuracy);
     let line = doubts

@@ -90,12 +90,8 @@ fn axis(axis: &AxisNoise, sensor: Sensor) -> Value {
     })
 }
 
-/// A field of `[imu.noise]` with what has to be said of it.
-struct Field {
-    key: &'static str,
-    value: f64,
-    comment: String,
-}
+/// A field of `[imu.noise]`: key, value, and a comment or nothing.
+type Field = (&'static str, f64, String);
 
 /// `[imu.noise]` with all that was found, ready to be pasted.
 pub fn noise_table(analysis: &NoiseAnalysis) -> String {
@@ -106,12 +102,7 @@ pub fn noise_table(analysis: &NoiseAnalysis) -> String {
             let name = sensor.name();
             text += &format!("# {name}: nothing was found; state the data sheet's figure\n");
         }
-        for Field {
-            key,
-            value,
-            comment,
-        } in fields
-        {
+        for (key, value, comment) in fields {
             let mark = if comment.is_empty() { "" } else { "  # " };
             text += &format!("{key} = {}{mark}{comment}\n", four_digits(value));
         }
@@ -123,7 +114,7 @@ pub fn noise_table(analysis: &NoiseAnalysis) -> String {
 pub fn fields(analysis: &NoiseAnalysis) -> Map<String, Value> {
     let fields = Sensor::ALL.map(|sensor| of_triad(analysis, sensor));
     let fields = fields.into_iter().flatten();
-    let fields = fields.map(|field| (field.key.to_owned(), field.value.into()));
+    let fields = fields.map(|(key, value, _)| (key.to_owned(), value.into()));
     fields.collect()
 }
 
@@ -136,11 +127,8 @@ fn of_triad(analysis: &NoiseAnalysis, sensor: Sensor) -> Vec<Field> {
         true => "a limit: its slope was not found",
         false => "root of the mean square of the axes",
     };
-    let mut fields = vec![Field {
-        key: walk.key,
-        value: figures.noise.random_walk / walk.value,
-        comment: comment.to_owned(),
-    }];
+    let of_walk = figures.noise.random_walk / walk.value;
+    let mut fields = vec![(walk.key, of_walk, comment.to_owned())];
     let Some(of) = figures.noise.gauss_markov else {
         return fields;
     };
@@ -150,20 +138,13 @@ fn of_triad(analysis: &NoiseAnalysis, sensor: Sensor) -> Vec<Field> {
         ..
     } = NoiseKeys::of(sensor);
     let stands_for = in_place_of(analysis, sensor);
-    fields.push(Field {
-        key,
-        value: of.sigma / unit,
-        comment: format!("1σ of a Gauss–Markov process{stands_for}"),
-    });
+    let comment = format!("1σ of a Gauss–Markov process{stands_for}");
+    fields.push((key, of.sigma / unit, comment));
     let open = match figures.correlation_is_open {
         true => "as long as the record can show; σ grows with its root",
         false => "",
     };
-    fields.push(Field {
-        key: time_key,
-        value: of.correlation_time,
-        comment: open.to_owned(),
-    });
+    fields.push((time_key, of.correlation_time, open.to_owned()));
     fields
 }
 

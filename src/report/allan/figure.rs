@@ -11,10 +11,8 @@ const SEEN: f64 = 0.02;
 const POINTS: f64 = 24.0;
 
 pub fn figure(analysis: &NoiseAnalysis, sensor: Sensor) -> Plot {
-    let (file, heading) = match sensor {
-        Sensor::Gyro => ("gyro.svg", "Gyros: Allan deviation"),
-        Sensor::Accel => ("accel.svg", "Accelerometers: Allan deviation"),
-    };
+    let file = format!("{}.svg", sensor.name());
+    let heading = format!("{}: Allan deviation", capital(triad_name(sensor)));
     let triad = analysis.triads.get(sensor);
     let unit = deviation_unit(sensor).1;
     let all = triad.axes.iter().flat_map(|axis| &axis.curve.variance);
@@ -22,7 +20,7 @@ pub fn figure(analysis: &NoiseAnalysis, sensor: Sensor) -> Plot {
     let ends = (0.5 * low, 1.8 * high);
     let panels = triad.axes.iter().zip(AXES);
     let panels = panels.map(|(axis, letter)| panel(axis, letter, sensor, ends));
-    Plot::new(file, heading, (3, 440), panels).caption(
+    Plot::new(&file, &heading, (3, 440), panels).caption(
         "Overlapping Allan deviation against cluster time, both logarithmic, the same axes for all three. Dots: as \
          measured, with the 95 % interval as a band; black: the sum of what was found; dashed: each process \
          found, with its slope and coefficient. Where no dashed line is, no slope was found. Upright line: 1 s, \

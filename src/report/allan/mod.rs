@@ -9,9 +9,6 @@ mod words;
 use crate::noise::NoiseAnalysis;
 use crate::report::prelude::*;
 
-/// Of the deviations a terminal shows every so-manieth.
-const EVERY: usize = 2;
-
 /// Everything that is said of the noise of a run of this name.
 pub fn document(run: &str, analysis: &NoiseAnalysis) -> Document {
     let NoiseAnalysis {
@@ -31,8 +28,7 @@ pub fn document(run: &str, analysis: &NoiseAnalysis) -> Document {
     for &sensor in &analysis.sensors {
         document.both(tables::coefficients(analysis, sensor));
     }
-    document.terminal(tables::deviations(analysis, EVERY));
-    document.page(tables::deviations(analysis, 1));
+    document.both(tables::deviations(analysis));
     document.both(List::new("Not found", words::advice(analysis)));
     let toml = data::noise_table(analysis);
     document.both(Block::Code("For run.toml".to_owned(), toml));

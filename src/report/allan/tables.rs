@@ -58,19 +58,12 @@ pub fn coefficients(analysis: &NoiseAnalysis, sensor: Sensor) -> Table {
         .into_iter()
         .chain(axes)
         .chain(["triad".to_owned()]);
-    let table = Table::new(title(sensor), headings).section(rows).note(
+    let table = Table::new(capital(triad_name(sensor)), headings).section(rows).note(
         "± 1σ. <: its slope is not detected; 95 % upper limit. triad: the mean of the three variances.",
     );
     match of_a_pulse(*analysis.pulse.get(sensor), sensor) {
         Some(note) => table.note(note),
         None => table,
-    }
-}
-
-fn title(sensor: Sensor) -> &'static str {
-    match sensor {
-        Sensor::Gyro => "Gyros",
-        Sensor::Accel => "Accelerometers",
     }
 }
 
@@ -104,8 +97,8 @@ fn correlation_time(found: Found) -> String {
     }
 }
 
-/// Allan deviations of all axes at every so-manieth cluster time.
-pub fn deviations(analysis: &NoiseAnalysis, every: usize) -> Table {
+/// Allan deviations of all axes at every cluster time.
+pub fn deviations(analysis: &NoiseAnalysis) -> Table {
     let freedom = |triad: &TriadNoise, point: usize| {
         let of = |axis: &AxisNoise| Some(*axis.identified.as_ref()?.freedom.get(point)?);
         triad.axes.iter().filter_map(of).fold(f64::NAN, f64::min)
@@ -133,7 +126,7 @@ pub fn deviations(analysis: &NoiseAnalysis, every: usize) -> Table {
     let columns = columns.chain(["degrees of freedom".to_owned()]);
     let taus = triads.gyro.mean.curve.tau.iter().enumerate();
     let mut table = Table::new("Overlapping Allan deviation", columns)
-        .section(taus.step_by(every).map(row))
+        .section(taus.map(row))
         .note(format!(
             "Degrees of freedom: the fewest of the six. {}",
             words::INTERVALS

@@ -161,11 +161,6 @@ pub fn advice(analysis: &NoiseAnalysis) -> Vec<String> {
 
 /// A time in a readable unit.
 pub fn duration(seconds: f64) -> String {
-    if seconds < 600.0 {
-        format!("{} s", three_digits(seconds))
-    } else if seconds < 3.0 * 3600.0 {
-        format!("{} min", three_digits(seconds / 60.0))
-    } else {
-        format!("{} h", three_digits(seconds / 3600.0))
-    }
+    let (unit, size) = readable(&TIMES, seconds);
+    format!("{} {unit}", three_digits(seconds / size))
 }

@@ -45,7 +45,7 @@ fn accuracy(report: &Report, estimate: &Estimate) -> Table {
         };
         let mut row = vec![group.title()];
         for of in std::iter::once(estimate).chain(both) {
-            let rms = |v: &ParameterVector| Some(group.spread(v, &group.estimated(of))?.1);
+            let rms = |v: &ParameterVector| group.rms(v, of);
             row.push(with_unit(rms(&of.sigma())));
             row.extend(truth.map(|truth| with_unit(rms(&(of.vector() - truth)))));
         }

@@ -20,10 +20,7 @@ const NAMED: f64 = 1e-3;
 pub fn table(budget: &Budget, estimate: &Estimate) -> Table {
     let row = |name: &str, u: ParameterVector, freedom: &str| {
         let mut row = vec![name.to_owned()];
-        row.extend(Group::all().map(|group| {
-            let spread = group.spread(&u, &group.estimated(estimate));
-            or_dash(spread.map(|of| of.1), three_digits)
-        }));
+        row.extend(Group::all().map(|group| or_dash(group.rms(&u, estimate), three_digits)));
         row.push(freedom.to_owned());
         row
     };
@@ -149,9 +146,8 @@ pub fn unseen(report: &Report, estimate: &Estimate) -> Option<String> {
     let worst = |test: &ErrorTermTest| {
         let left_off = test.left_off.filter(|_| !test.significant())?;
         let of_group = |group: Group| {
-            let indices = group.estimated(estimate);
-            let [may, sigma] = [&left_off.shown, &claimed].map(|v| group.spread(v, &indices));
-            Some((group, may?.1 / sigma?.1))
+            let [may, sigma] = [&left_off.shown, &claimed].map(|v| group.rms(v, estimate));
+            Some((group, may? / sigma?))
         };
         let groups = Group::all().filter_map(of_group);
         groups
@@ -174,10 +170,7 @@ pub fn unseen(report: &Report, estimate: &Estimate) -> Option<String> {
 
 /// What is in no sum: error terms that are not estimated.
 pub fn left_off(report: &Report, estimate: &Estimate) -> Table {
-    let cell = |group: Group, of: &ParameterVector| {
-        let spread = group.spread(of, &group.estimated(estimate));
-        or_dash(spread.map(|of| of.1), sigma)
-    };
+    let cell = |group: Group, of: &ParameterVector| or_dash(group.rms(of, estimate), sigma);
     let row = |test: &ErrorTermTest| {
         let left_off = test.left_off?;
         let mut row = cells![title(test.term)];

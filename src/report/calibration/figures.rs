@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 
 use crate::attitude::matrix;
-use crate::calibration::{Epoch, Estimate, Innovation, Nis, Observation, Outcome, ParameterVector};
+use crate::calibration::{Epoch, Estimate, Innovation, Observation, Outcome, ParameterVector};
 use crate::imu::{AXES, Sensor};
 use crate::recording::{ImuSamples, TableLog};
 use crate::report::calibration::report::Report;
@@ -17,6 +17,8 @@ const EDGE: f64 = 6.0;
 const DOTS: usize = 150;
 /// Weaker correlations are not written out: they would only hide the strong ones.
 const WRITTEN: f64 = 0.2;
+/// Half the side of a square that would not be seen.
+const FAINT: f64 = 0.02;
 
 impl Report<'_> {
     /// Every figure that there is something to show in.
@@ -93,22 +95,19 @@ impl Report<'_> {
             None => (estimate.vector(), "final value"),
         };
         let panel = |group: Group, index: usize| {
-            let (unit, indices) = (group.unit_value(), group.estimated(estimate));
+            let unit = group.unit_value();
             let of = |of: &dyn Fn(&Epoch) -> f64| -> Vec<Point> {
                 let history = outcome.history.iter();
                 history.map(|m| (m.time, of(m) / unit)).collect()
             };
             let error = |m: &Epoch| m.estimate[index] - reference[index];
-            let sigma = group.spread(&estimate.sigma(), &indices);
-            let sigma = sigma.map_or(1.0, |x| x.1);
+            let [low, high] = [-3.0, 3.0].map(|factor| of(&|m| factor * m.sigma[index]));
+            let sigma = group.rms(&estimate.sigma(), estimate).unwrap_or(1.0);
             let title = format!("{} {}", group.title(), axis_name(estimate.form(), index));
             let y = Axis::symlog(sigma).between(-EXTENT * sigma, EXTENT * sigma);
             Panel::new(format!("{title}, {}", group.unit()), self.time(), y)
                 .shaded(self.dwells)
-                .with(Series::band(
-                    of(&|m| -3.0 * m.sigma[index]),
-                    of(&|m| 3.0 * m.sigma[index]),
-                ))
+                .with(Series::band(low, high))
                 .with(Series::zero())
                 .with(Series::line(of(&error)).color(Color::Ink).width(1.75))
         };
@@ -130,19 +129,19 @@ impl Report<'_> {
 
     /// Whitened innovations with their bounds: velocity above, table attitude below.
     fn innovations(&self, outcome: &Outcome) -> Option<Plot> {
-        let consistency = &outcome.consistency;
-        let kinds = [
-            ("velocity", Observation::Velocity, &consistency.velocity),
-            ("table attitude", Observation::Table, &consistency.table),
-            ("attitude", Observation::Attitude, &consistency.attitude),
-        ];
         let of_kind = |kind| {
             let all = outcome.innovations.iter();
             all.filter(move |i| i.observation == kind)
         };
-        let is_there = |(_, kind, _): &(&str, Observation, &Nis)| of_kind(*kind).next().is_some();
-        let kinds: Vec<(&str, Observation, &Nis)> = kinds.into_iter().filter(is_there).collect();
-        let panel = |name: &str, kind: Observation, direction: usize| {
+        let kinds = [
+            Observation::Velocity,
+            Observation::Table,
+            Observation::Attitude,
+        ];
+        let kinds = kinds
+            .into_iter()
+            .filter(|kind| of_kind(*kind).next().is_some());
+        let panel = |kind: Observation, direction: usize| {
             let point = |i: &Innovation| (i.time, i.whitened[direction].clamp(-EDGE, EDGE));
             let of = |accepted| {
                 let those = of_kind(kind).filter(move |i| i.accepted == accepted);
@@ -153,7 +152,7 @@ impl Report<'_> {
                 true => Series::marks(Mark::Dot, accepted),
                 false => Series::line(self.interrupted_by_turns(&accepted)),
             };
-            let title = format!("{name}, {}, σ", ["east", "north", "up"][direction]);
+            let title = format!("{}, {}, σ", kind.name(), ["east", "north", "up"][direction]);
             let y = Axis::linear("").between(-EDGE, EDGE).step(2.0);
             Panel::new(title, self.time(), y)
                 .shaded(self.dwells)
@@ -161,18 +160,16 @@ impl Report<'_> {
                 .with_all([-3.0, -1.0, 1.0, 3.0].map(bound))
                 .with(Series::marks(Mark::Cross, of(false)).nth(1))
         };
-        let rows = kinds.iter();
-        let rows = rows.flat_map(|&(name, kind, _)| [0, 1, 2].map(|d| panel(name, kind, d)));
-        let sentences = kinds.iter().map(|(name, _, nis)| sentence(name, nis));
-        let sentences: Vec<String> = sentences.collect();
+        let panels = kinds.flat_map(|kind| [0, 1, 2].map(|direction| panel(kind, direction)));
+        let panels: Vec<Panel> = panels.collect();
         let caption = format!(
             "Innovations of the last pass in units of their own σ; they should look like white noise of unit \
              variance. Solid lines: ±1σ; dashed: ±3σ. Where they are many the line runs through the extremes of \
-             each stretch. Crosses: rejected by the gate; at the edge: ±{EDGE}σ or more. {}",
-            sentences.join(" ")
+             each stretch. Crosses: rejected by the gate; at the edge: ±{EDGE}σ or more."
         );
-        let plot = Plot::new("innovations.svg", "Innovations", (3, 270), rows);
-        (!kinds.is_empty()).then(|| plot.caption(caption))
+        let drawn = !panels.is_empty();
+        let plot = Plot::new("innovations.svg", "Innovations", (3, 270), panels);
+        drawn.then(|| plot.caption(caption))
     }
 
     /// A line across a turn would show what was not observed.
@@ -195,38 +192,39 @@ fn bound(y: f64) -> Series {
     }
 }
 
-fn sentence(name: &str, nis: &Nis) -> String {
-    let [mean, low, high] = [nis.mean, nis.interval.0, nis.interval.1].map(|x| value(x, 0.01));
-    let scalars = count(nis.count);
-    format!("NIS of {name} {mean} (95 % interval {low}–{high}, {scalars} scalars).")
-}
-
 /// Correlations of the estimated parameters; `None` if nothing was estimated.
 fn correlation(estimate: &Estimate) -> Option<Plot> {
-    let indices: Vec<usize> = estimate.estimated().collect();
-    let sigma = estimate.sigma();
-    let row = |&i: &usize| {
-        let of = |&j: &usize| estimate.covariance[(i, j)] / (sigma[i] * sigma[j]);
-        indices.iter().map(of).collect()
-    };
-    let new_group = |&n: &usize| Group::of(indices[n - 1]) != Group::of(indices[n]);
-    let matrix = Matrix {
-        names: indices
-            .iter()
-            .map(|&i| short_name(estimate.form(), i))
-            .collect(),
-        groups: (1..indices.len()).filter(new_group).collect(),
-        values: indices.iter().map(row).collect(),
-        written: WRITTEN,
-    };
-    (!indices.is_empty()).then(|| {
-        Plot::matrix("correlation.svg", "Correlations", matrix).caption(format!(
-            "Correlation of the estimated parameters. Below the diagonal the side of a square grows with the \
-             magnitude; filled squares are positive, open ones negative. Above it stands the coefficient in \
-             hundredths where its magnitude is at least {WRITTEN}. Strongly correlated parameters were observed \
-             by this path as a sum or difference rather than each alone."
-        ))
-    })
+    let (indices, sigma) = (Vec::from_iter(estimate.estimated()), estimate.sigma());
+    let names = || indices.iter().map(|&i| short_name(estimate.form(), i));
+    let mut series = Vec::new();
+    for (row, &i) in indices.iter().enumerate() {
+        for (column, &j) in indices.iter().enumerate() {
+            let r = estimate.covariance[(i, j)] / (sigma[i] * sigma[j]);
+            // The first row is the uppermost.
+            let (x, y) = (column as f64, (indices.len() - 1 - row) as f64);
+            let half = 0.45 * r.abs().min(1.0);
+            if row > column && half > FAINT {
+                let square = Series::bars(half, Fill::Solid, [(x, y - half, y + half)]);
+                series.push(square.nth(usize::from(r < 0.0)));
+            } else if row < column && r.abs() >= WRITTEN {
+                series.push(Series::words(
+                    (x, y),
+                    Anchor::Middle,
+                    value(100.0 * r, 10.0),
+                ));
+            }
+        }
+    }
+    let y = Axis::places(names().rev());
+    let mut panel = Panel::new("", Axis::places(names()), y).with_all(series);
+    panel.square = true;
+    let plot = Plot::new("correlation.svg", "Correlations", (1, 1000), [panel]).caption(format!(
+        "Correlation of the estimated parameters. Below the diagonal the side of a square grows with the magnitude; \
+         blue squares are positive, orange ones negative. Above it stands the coefficient in hundredths where its \
+         magnitude is at least {WRITTEN}. Strongly correlated parameters were observed by this path as a sum or \
+         difference rather than each alone."
+    ));
+    (!indices.is_empty()).then_some(plot)
 }
 
 /// Magnitude of each parameter's error by each method, with the σ that it claims.

@@ -1,6 +1,6 @@
 //! Residuals in each dwell, as a figure.
 
-use super::tables::{ANGLE, FORCE, readable};
+use super::tables::{ANGLE, FORCE};
 use crate::calibration::{DwellResidual, Quality};
 use crate::report::prelude::*;
 

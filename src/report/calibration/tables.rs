@@ -17,29 +17,12 @@ impl Report<'_> {
         let truth = self.truth_vector();
         let (form, posterior, values) = (estimate.form(), estimate.sigma(), estimate.vector());
         let row = |group: Group, i: usize| {
-            let (unit, fixed) = (group.unit_value(), posterior[i] <= 0.0);
-            let (shown, s) = (group.shown(values[i]), posterior[i] / unit);
-            let mut row = vec![
-                parameter_name(form, i)?,
-                match fixed {
-                    true => format!("{} (fixed)", value(shown, s)),
-                    false => plus_minus(shown, s),
-                },
-                group.unit().to_owned(),
-            ];
-            row.extend(prior.iter().flat_map(|prior| match fixed {
-                true => [NONE; 2].map(str::to_owned),
-                false => [
-                    three_digits(prior[i] / unit),
-                    improvement(prior[i], posterior[i]),
-                ],
-            }));
-            row.extend(truth.iter().flat_map(|truth| {
-                let error = (values[i] - truth[i]) / unit;
-                let in_sigma = (!fixed).then(|| error / s);
-                [value(error, s), or_dash(in_sigma, |z| value(z, 0.1))]
-            }));
-            Some(row)
+            let unit = group.unit_value();
+            let of = [group.shown(values[i]), posterior[i] / unit];
+            let prior = prior.map(|prior| prior[i] / unit);
+            let error = truth.map(|truth| Some((values[i] - truth[i]) / unit));
+            let name = parameter_name(form, i)?;
+            Some(terms::parameter_row(name, group.unit(), of, prior, error))
         };
         let mut columns = vec!["parameter", "value ± 1σ", "unit"];
         let mut optional = Vec::new();
@@ -195,13 +178,6 @@ pub fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
     }
 }
 
-/// The smallest unit in which a figure is below a thousand, else the largest.
-pub fn readable(units: &[(&'static str, f64); 2], figure: f64) -> (&'static str, f64) {
-    match figure < 1000.0 * units[0].1 {
-        true => units[0],
-        false => units[1],
-    }
-}
-
-pub const FORCE: [(&str, f64); 2] = [("µg", MICRO_G), ("mg", MILLI_G)];
-pub const ANGLE: [(&str, f64); 2] = [("″", ARCSEC), ("°", DEGREE)];
+/// Units of residuals.
+pub const FORCE: [(&str, f64); 2] = [("mg", MILLI_G), ("µg", MICRO_G)];
+pub const ANGLE: [(&str, f64); 2] = [("°", DEGREE), ("″", ARCSEC)];

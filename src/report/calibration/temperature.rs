@@ -1,7 +1,7 @@
 //! What changes with temperature, and what differs between recordings.
 
 use crate::calibration::{
-    Estimate, Outcome, ParameterMatrix, ParameterVector, SeparateEstimate, Thermal, parameter_name,
+    Outcome, ParameterMatrix, ParameterVector, SeparateEstimate, Thermal, parameter_name,
     sensor_and_parameter,
 };
 use crate::imu::{RATE, Sensor};
@@ -113,89 +113,95 @@ fn hysteresis(outcome: &Outcome, thermal: &Thermal) -> Table {
     .section(rows)
 }
 
-/// Every parameter against temperature, with what each recording alone says.
-fn curves(outcome: &Outcome, thermal: &Thermal) -> Plot {
-    let form = outcome.estimate.form();
-    let reference = outcome.estimate.vector();
+/// A panel for each group with its parameters against temperature; left free at both ends is this part of the range.
+fn against_temperature(
+    outcome: &Outcome,
+    thermal: &Thermal,
+    room: f64,
+    series: impl Fn(Group, &[usize]) -> Vec<Series>,
+) -> Vec<Panel> {
     let panel = |group: Group| {
         let range = thermal.model.range.get(group.sensor());
-        let unit = group.unit_value();
-        let indices = group.estimated(&outcome.estimate);
-        let temperatures = steps(range.lowest, range.highest, POINTS);
-        let curve: Vec<(f64, (ParameterVector, ParameterMatrix))> = temperatures
-            .map(|t| (t, there(outcome, thermal, t)))
-            .collect();
-        let room = 0.03 * (range.highest - range.lowest);
+        let room = room * (range.highest - range.lowest);
         let x = Axis::linear("temperature, °C").between(range.lowest - room, range.highest + room);
-        let title = format!("{}, change", group.titled());
-        let mut panel = Panel::new(title, x, Axis::linear("").room(0.03, 0.03));
-        for (n, &i) in indices.iter().enumerate() {
-            let edge = |factor: f64| {
-                let points = curve.iter().map(|(t, (change, covariance))| {
-                    let sigma = covariance[(i, i)].max(0.0).sqrt();
-                    (*t, (change[i] + factor * sigma) / unit)
-                });
-                points.collect::<Vec<_>>()
-            };
-            let marks = outcome.alone.iter().filter_map(|alone| {
-                let estimate = alone.estimate.as_ref()?;
-                let t = own_temperature(alone, i)?;
-                Some((t, (estimate.vector()[i] - reference[i]) / unit))
-            });
-            panel = panel
-                .with(Series::band(edge(-1.0), edge(1.0)))
-                .with(Series::line(edge(0.0)).nth(n).label(axis_name(form, i)))
-                .with(Series::marks(Mark::Ring, marks).nth(n));
-        }
-        panel
+        let y = Axis::linear("").room(0.05, 0.05);
+        let indices = group.estimated(&outcome.estimate);
+        Panel::new(group.titled(), x, y).with_all(series(group, &indices))
     };
-    let (heading, panels) = ("Parameters against temperature", Group::all().map(panel));
-    Plot::new("temperature.svg", heading, (3, 330), panels).caption(
+    Group::all().map(panel).collect()
+}
+
+/// What each recording alone says of a parameter: temperature at its axis, value and σ.
+fn alone(outcome: &Outcome, index: usize) -> impl Iterator<Item = (f64, f64, f64)> {
+    let (sensor, _) = sensor_and_parameter(index);
+    outcome.alone.iter().filter_map(move |alone| {
+        let estimate = alone.estimate.as_ref()?;
+        let axes = alone.temperature.as_ref()?.get(sensor);
+        let temperature = axes.iter().sum::<f64>() / 3.0;
+        Some((
+            temperature,
+            estimate.vector()[index],
+            estimate.sigma()[index],
+        ))
+    })
+}
+
+/// Every parameter against temperature, with what each recording alone says.
+fn curves(outcome: &Outcome, thermal: &Thermal) -> Plot {
+    let (form, reference) = (outcome.estimate.form(), outcome.estimate.vector());
+    let series = |group: Group, indices: &[usize]| {
+        let (range, unit) = (thermal.model.range.get(group.sensor()), group.unit_value());
+        let temperatures = steps(range.lowest, range.highest, POINTS);
+        let curve = temperatures.map(|t| (t, there(outcome, thermal, t)));
+        let curve: Vec<(f64, (ParameterVector, ParameterMatrix))> = curve.collect();
+        let of_parameter = |(n, &i): (usize, &usize)| {
+            let points = curve.iter().map(|(t, (change, covariance))| {
+                (
+                    *t,
+                    change[i] / unit,
+                    covariance[(i, i)].max(0.0).sqrt() / unit,
+                )
+            });
+            let [band, line] = Series::curve(&points.collect::<Vec<_>>());
+            let marks = alone(outcome, i).map(|(t, value, _)| (t, (value - reference[i]) / unit));
+            let line = line.nth(n).label(axis_name(form, i));
+            [band, line, Series::marks(Mark::Ring, marks).nth(n)]
+        };
+        indices.iter().enumerate().flat_map(of_parameter).collect()
+    };
+    let panels = against_temperature(outcome, thermal, 0.03, series);
+    Plot::new("temperature.svg", "Parameters against temperature", (3, 330), panels).caption(
         "Change of each parameter from its value at the reference temperature, with its ±1σ band. Rings: what \
          each recording alone says, with stated noise.",
     )
 }
 
-/// The temperature of a recording at the axis of a parameter.
-fn own_temperature(alone: &SeparateEstimate, index: usize) -> Option<f64> {
-    let (sensor, _) = sensor_and_parameter(index);
-    let axes = alone.temperature.as_ref()?.get(sensor);
-    Some(axes.iter().sum::<f64>() / 3.0)
-}
-
 /// What each recording alone says less the curve.
 fn departures(outcome: &Outcome, thermal: &Thermal) -> Plot {
-    let form = outcome.estimate.form();
-    let panel = |group: Group| {
-        let range = thermal.model.range.get(group.sensor());
-        let unit = group.unit_value();
-        let indices = group.estimated(&outcome.estimate);
-        let span = range.highest - range.lowest;
-        let x = Axis::linear("temperature, °C")
-            .between(range.lowest - 0.06 * span, range.highest + 0.06 * span);
-        let mut panel = Panel::new(
-            format!("{}, {}", group.short(), group.unit()),
-            x,
-            Axis::linear("").room(0.05, 0.05),
-        )
-        .with(Series::zero());
-        for (n, &i) in indices.iter().enumerate() {
+    let (form, reference) = (outcome.estimate.form(), outcome.estimate.vector());
+    let series = |group: Group, indices: &[usize]| {
+        let (range, unit) = (thermal.model.range.get(group.sensor()), group.unit_value());
+        let of_parameter = |(n, &i): (usize, &usize)| {
             // Side by side, so that their intervals do not hide each other.
-            let shift = beside(n, indices.len(), 0.06 * span);
-            let points = outcome.alone.iter().filter_map(|alone| {
-                let estimate: &Estimate = alone.estimate.as_ref()?;
-                let t = own_temperature(alone, i)?;
+            let shift = beside(n, indices.len(), 0.06 * (range.highest - range.lowest));
+            let points = alone(outcome, i).map(|(t, value, sigma)| {
                 let (change, _) = there(outcome, thermal, t);
-                let off = estimate.vector()[i] - outcome.estimate.vector()[i] - change[i];
-                Some((t + shift, off / unit, estimate.sigma()[i] / unit))
+                (
+                    t + shift,
+                    (value - reference[i] - change[i]) / unit,
+                    sigma / unit,
+                )
             });
-            let marks = Series::measured(Mark::Dot, points).nth(n);
-            panel = panel.with(marks.key(axis_name(form, i)));
-        }
-        panel
+            Series::measured(Mark::Dot, points)
+                .nth(n)
+                .key(axis_name(form, i))
+        };
+        let marks = indices.iter().enumerate().map(of_parameter);
+        std::iter::once(Series::zero()).chain(marks).collect()
     };
     let heading = "Each recording alone, less all together";
-    Plot::new("recordings.svg", heading, (3, 330), Group::all().map(panel)).caption(
+    let panels = against_temperature(outcome, thermal, 0.06, series);
+    Plot::new("recordings.svg", heading, (3, 330), panels).caption(
         "What each recording alone says, ±1σ, less the parameter at its temperature by all together. Two thirds \
          of the intervals should reach zero.",
     )

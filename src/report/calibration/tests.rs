@@ -174,14 +174,14 @@ fn without_truth_or_baseline_no_error_is_claimed() {
         moment.error = None;
     }
     let mut report = made_up.report();
-    assert!(page(&report).contains("EKF: error"));
+    assert!(page(&report).contains("EKF: largest"));
     report.truth = None;
     report.navigation = Ok(&navigation);
     let files = written(&report);
     assert_sound(&files);
     assert!(!names(&files).contains(&"comparison.svg"));
     let page = page(&report);
-    assert!(!page.contains("error / σ") && !page.contains("EKF: error"));
+    assert!(!page.contains("error / σ") && !page.contains("EKF: largest"));
     assert!(page.contains("The truth is not known"));
     report.closed_form = None;
     report.navigation = Ok(&navigation[1..]);

@@ -61,17 +61,9 @@ fn degrees(angle: f64) -> f64 {
 fn log(run: &Run) -> Option<Value> {
     let log = run.recording.imu.log.as_ref()?;
     let columns = columns_of_log(run).map(|(sensor, axis, column)| {
-        json!({
-            "name": column.name,
-            "sensor": sensor.name(),
-            "axis": axis,
-            "smallest": column.smallest,
-            "at_smallest": column.at_smallest,
-            "largest": column.largest,
-            "at_largest": column.at_largest,
-            "step": column.step,
-            "step_si": column.step_rate(run.recording.imu.period),
-        })
+        let step_si = column.step_rate(run.recording.imu.period);
+        let further = json!({ "sensor": sensor.name(), "axis": axis, "step_si": step_si });
+        joined(json!(column), further)
     });
     let mut data = json!({
         "rows": log.rows,
@@ -80,8 +72,7 @@ fn log(run: &Run) -> Option<Value> {
         "columns": columns.collect::<Value>(),
     });
     if let Some(of) = &log.temperature {
-        data["temperature"] =
-            json!({ "smallest": of.smallest, "mean": of.mean, "largest": of.largest });
+        data["temperature"] = json!(of);
         if let Some(temperature) = &run.recording.imu.temperature {
             let rates = Sensor::ALL.map(|sensor| temperature.largest_rate(sensor));
             data["temperature"]["largest_rate_k_per_s"] = json!(rates[0].max(rates[1]));

@@ -1,18 +1,11 @@
 //! What has to be said of a run before it is calibrated.
 
-use crate::calibration::Contradiction;
 use crate::imu::{AXES, Sensor};
 use crate::report::prelude::*;
-use crate::run::motion::{LabelCheck, Rest, Turn};
+use crate::run::motion::{LabelCheck, Turn};
 use crate::run::{LONG_ENOUGH, Run};
 use crate::survey::{APART, Survey};
 
-/// Specific force at rest further from gravity than this part of it has a wrong unit or scale.
-const WRONG_FORCE: f64 = 0.15;
-/// Turns and directions further off than this have a wrong unit, sign or axis, rad …
-const WRONG_ANGLE: f64 = 5.0 * DEGREE;
-/// … where that is more than this part of the turn.
-const WRONG_PART: f64 = 0.1;
 /// A turn of at least this much about a body axis shows its gyro's scale, rad.
 const WORTH: f64 = 60.0 * DEGREE;
 /// Parameters of the accelerometers without a table: as many directions of up are needed.
@@ -20,8 +13,6 @@ const DIRECTIONS: usize = 9;
 /// An instrument whose temperature spans less, K, has soaked.
 const SOAKED: f64 = 1.0;
 const MICROSECOND: f64 = 1e-6;
-/// Largest number of places that are named; beyond it only their number is given.
-const NAMED: usize = 4;
 
 /// A degree sign behind a number.
 pub fn degrees(angle: f64) -> String {
@@ -113,85 +104,12 @@ fn warming(run: &Run) -> String {
 /// What to look at and what to change, a sentence or two each.
 pub fn findings(run: &Run, survey: &Survey) -> Vec<String> {
     let mut findings = [&run.recording.doubts[..], &run.recording.notes].concat();
-    findings.extend(survey.contradiction.iter().map(of_contradiction));
-    findings.extend(of_units(run, survey));
+    let contradiction = survey.contradiction.iter();
+    findings.extend(contradiction.map(|of| capital(&of.to_string())));
     findings.extend(survey.labels.iter().filter_map(of_label));
     findings.extend(of_motion(survey));
     findings.extend(of_methods(survey));
     findings
-}
-
-/// What the methods refuse, in a sentence.
-fn of_contradiction(contradiction: &Contradiction) -> String {
-    capital(&contradiction.to_string())
-}
-
-/// Signs of a wrong unit, scale or frame.
-fn of_units(run: &Run, survey: &Survey) -> Vec<String> {
-    let rests = &survey.rests;
-    let mut findings = Vec::new();
-    let off = |rest: &Rest| (rest.force.norm() / run.site.gravity - 1.0).abs();
-    let wrong = places(rests, |rest| off(rest) > WRONG_FORCE);
-    if let Some(&first) = wrong.first() {
-        findings.push(format!(
-            "Specific force at rest is {} m/s² in {}, not gravity's {}: correct accel_unit, the scale or the bias in \
-             [imu.prior.accel].",
-            three_digits(rests[first].force.norm()),
-            dwells(&wrong),
-            three_digits(run.site.gravity)
-        ));
-    }
-    let tilted = places(rests, |rest| {
-        rest.off_table().is_some_and(|off| off > WRONG_ANGLE)
-    });
-    if !tilted.is_empty() {
-        findings.push(format!(
-            "In {} the accelerometers observe another axis up than the table's log: check body_axes, the order of \
-             quaternion or angles, and that the table's zero is as C_b_n = I has it.",
-            dwells(&tilted)
-        ));
-    }
-    let far = |turn: &Turn, off: Option<f64>| {
-        off.is_some_and(|off| off > WRONG_ANGLE.max(WRONG_PART * turn.angle.abs()))
-    };
-    let turns = &survey.turns;
-    for (wrong, by) in [
-        (
-            places(turns, |turn| far(turn, turn.off_table)),
-            "the table's log",
-        ),
-        (
-            places(turns, |turn| far(turn, turn.off_gravity)),
-            "gravity's direction",
-        ),
-    ] {
-        if let Some(&first) = wrong.first() {
-            findings.push(format!(
-                "Gyros and {by} do not turn alike in {} of {} turns (first at {} s): check gyro_unit, scale, signs and \
-                 the order of axes.",
-                wrong.len(),
-                turns.len(),
-                value(run.recording.imu.time(turns[first].samples.start), 1.0)
-            ));
-        }
-    }
-    findings
-}
-
-/// Places of those of which something is true.
-fn places<T>(all: &[T], which: impl Fn(&T) -> bool) -> Vec<usize> {
-    (0..all.len()).filter(|&place| which(&all[place])).collect()
-}
-
-/// Such as `dwells 1, 2 and 4 more`.
-fn dwells(places: &[usize]) -> String {
-    let numbers = places.iter().take(NAMED).map(|k| (k + 1).to_string());
-    let numbers = numbers.collect::<Vec<_>>().join(", ");
-    let word = if places.len() == 1 { "dwell" } else { "dwells" };
-    match places.len().saturating_sub(NAMED) {
-        0 => format!("{word} {numbers}"),
-        more => format!("{word} {numbers} and {more} more"),
-    }
 }
 
 /// What a label and the record disagree in.
@@ -214,8 +132,11 @@ fn of_motion(survey: &Survey) -> Vec<String> {
         ));
         return findings;
     }
-    let missing = places(&survey.ways_up(), |rests| *rests == 0).into_iter();
-    let missing: Vec<String> = missing.map(|way| way_up(way / 2, way % 2 == 1)).collect();
+    let ways = survey.ways_up().into_iter().enumerate();
+    let missing = ways.filter(|(_, rests)| *rests == 0);
+    let missing: Vec<String> = missing
+        .map(|(way, _)| way_up(way / 2, way % 2 == 1))
+        .collect();
     if !missing.is_empty() && survey.directions < DIRECTIONS {
         findings.push(format!(
             "Of the six positions {} are missing, and there are {} directions of up that differ by {}°; the nine \

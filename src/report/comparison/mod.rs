@@ -248,14 +248,10 @@ fn scatter(comparison: &Comparison) -> Table {
 
 fn chi_square(chi_square: Option<ChiSquare>) -> [String; 3] {
     chi_square.map_or([NONE; 3].map(str::to_owned), |of| {
-        let p = match of.p < 1e-4 {
-            true => "< 0.0001".to_owned(),
-            false => value(of.p, 0.01),
-        };
         [
             value(of.value / of.freedom as f64, 0.1),
             count(of.freedom),
-            p,
+            chance(of.p),
         ]
     })
 }
@@ -343,9 +339,6 @@ fn chi2(of: ChiSquare) -> Value {
     json!({ "chi2": of.value, "degrees_of_freedom": of.freedom, "p": of.p })
 }
 
-/// Calibrations that reach this many times further than others make an axis logarithmic.
-const APART: f64 = 20.0;
-
 pub(super) fn figure(comparison: &Comparison) -> Plot {
     let panels = Group::all().map(|group| panel(comparison, group));
     Plot::new("differences.svg", "Differences to the reference", (3, 320), panels).caption(format!(
@@ -368,7 +361,7 @@ fn panel(comparison: &Comparison, group: Group) -> Panel {
         )
     };
     let sides: Vec<(String, Vec<Point>)> = comparison.sides.iter().map(side).collect();
-    let (y, kind) = axis(sides.iter().map(|(_, points)| reach(points)));
+    let (y, kind) = Axis::about_zero(sides.iter().map(|(_, points)| reach(points)));
     let series = sides.iter().enumerate().map(|(n, (name, points))| {
         let shift = beside(n, sides.len(), 0.6);
         let points = points.iter().enumerate();
@@ -393,16 +386,4 @@ fn panel(comparison: &Comparison, group: Group) -> Panel {
 fn reach(points: &[Point]) -> f64 {
     let reaches = points.iter().map(|(off, sigma)| off.abs() + sigma);
     reaches.fold(0.0, f64::max)
-}
-
-/// The axis of calibrations that reach as far as this, and what its title says of it.
-fn axis(reaches: impl Iterator<Item = f64>) -> (Axis, &'static str) {
-    let (least, most) = positive_range(reaches);
-    match most > APART * least {
-        true => (
-            Axis::symlog(0.3 * least).between(-1.5 * most, 1.5 * most),
-            ", logarithmic",
-        ),
-        false => (Axis::linear("").between(-1.15 * most, 1.15 * most), ""),
-    }
 }

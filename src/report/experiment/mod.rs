@@ -5,22 +5,18 @@ mod tables;
 
 use crate::imu::Sensor;
 use crate::report::experiment::tables::{
-    PAPER, estimator_name, hours, in_general, method_kind, method_name, miles, navigated, nmile,
-    situation_name, timed,
+    PAPER, estimator_name, hours, in_general, method_kind, method_name, navigated, situation_name,
+    table_time,
 };
 use crate::report::prelude::*;
 use crate::study::Experiment;
-use crate::study::experiment::{
-    ALIGNMENT_TIME, Budget, Estimator, Method, Situation, Spread, Worth,
-};
+use crate::study::experiment::{ALIGNMENT_TIME, Budget, Estimator, Method, Situation, Worth};
 
 /// Everything that is said of the experiment.
 pub fn document(experiment: &Experiment) -> Document {
     let instruments = count(experiment.trials.len());
     let title = format!("The turntable experiment with {instruments} simulated instruments");
     let mut document = Document::new(title);
-    document.conclusions.heading = "Conclusions".to_owned();
-    document.warnings.heading = "To be noted".to_owned();
     say(&mut document, experiment);
     document.both(facts(experiment));
     tables::tables(experiment)
@@ -33,13 +29,9 @@ pub fn document(experiment: &Experiment) -> Document {
 
 fn facts(experiment: &Experiment) -> Facts {
     let (study, scenario) = (&experiment.study, &experiment.study.scenario);
-    let time = |estimator| timed(experiment).find(|(m, _)| m.estimator == estimator);
     let times = Estimator::ALL.into_iter().filter_map(|estimator| {
-        Some(format!(
-            "{} {}",
-            method_kind(estimator),
-            minutes(time(estimator)?.1)
-        ))
+        let time = minutes(table_time(experiment, estimator)?);
+        Some(format!("{} {time}", method_kind(estimator)))
     });
     let rows = [
         (
@@ -89,7 +81,7 @@ pub(super) fn data(experiment: &Experiment) -> Value {
         let methods = methods.map(|(place, worth)| method(experiment, place, worth));
         Some(json!({
             "methods": methods.collect::<Value>(),
-            "noise_alone_nmile": spread(&navigated.noise),
+            "noise_alone_nmile": navigated.noise,
         }))
     };
     let paper = PAPER.iter().map(|&(sensor, form, position)| {
@@ -111,16 +103,6 @@ pub(super) fn data(experiment: &Experiment) -> Value {
     })
 }
 
-fn spread(metres: &Spread) -> Value {
-    json!({
-        "median": miles(metres.median),
-        "mean": miles(metres.mean),
-        "rms": miles(metres.rms),
-        "below_68_percent": miles(metres.below_68),
-        "below_95_percent": miles(metres.below_95),
-    })
-}
-
 /// Intervals are of 99 %, by bootstrap over instruments.
 fn method(experiment: &Experiment, place: usize, worth: &Worth) -> Value {
     let calibrations = || {
@@ -129,36 +111,31 @@ fn method(experiment: &Experiment, place: usize, worth: &Worth) -> Value {
             .iter()
             .filter_map(|t| t.calibrations.get(place))
     };
-    let (low, high) = worth.median_interval;
     let budget = worth.budget.parts.iter().map(|part| {
-        let data = json!({ "alone_rms_nmile": miles(part.alone), "share": part.share });
+        let data = json!({ "alone_rms_nmile": part.alone, "share": part.share });
         (part.group.key(), data)
     });
     let against_time = worth.against_time.iter();
-    let against_time = against_time
-        .map(|&(time, metres)| json!({ "t_h": time / HOUR, "position_nmile": miles(metres) }));
+    let against_time =
+        against_time.map(|&(time, median)| json!({ "t_h": time / HOUR, "position_nmile": median }));
     json!({
-        "method": match worth.method.estimator {
-            Estimator::ClosedForm => "six-position",
-            Estimator::Filter => "ekf",
-            Estimator::LongFilter => "ekf-equal-time",
-        },
+        "method": worth.method.estimator,
         "installation_form": worth.method.form,
         "table_time_s": experiment.table_times.get(place),
         "failures": calibrations().filter(|c| c.is_err()).count(),
         "not_converged": calibrations().flatten().filter(|c| !c.converged).count(),
         "form_rejections": calibrations().flatten().filter(|c| c.rejects_form).count(),
-        "position_nmile": spread(&worth.at_end),
-        "median_interval": [miles(low), miles(high)],
-        "largest_position_nmile": spread(&worth.largest),
-        "gyro_errors_alone_nmile": spread(worth.by_one.get(Sensor::Gyro)),
-        "accel_errors_alone_nmile": spread(worth.by_one.get(Sensor::Accel)),
+        "position_nmile": worth.at_end,
+        "median_interval": worth.median_interval,
+        "largest_position_nmile": worth.largest,
+        "gyro_errors_alone_nmile": worth.by_one.get(Sensor::Gyro),
+        "accel_errors_alone_nmile": worth.by_one.get(Sensor::Accel),
         "closed_form_over_ekf": worth.gain.map(|gain| gain.value),
         "closed_form_over_ekf_interval": worth.gain.map(|gain| gain.interval),
-        "claimed_rms_nmile": miles(worth.budget.claimed),
+        "claimed_rms_nmile": worth.budget.claimed,
         "budget": budget.collect::<Map<_, _>>(),
         "median_against_time": against_time.collect::<Value>(),
-        "positions_nmile": worth.errors.iter().map(|&metres| miles(metres)).collect::<Value>(),
+        "positions_nmile": worth.errors,
     })
 }
 
@@ -206,9 +183,9 @@ fn compared(
         "{}, {} h: median {} nmile after {}, {} after {}, ratio {by} ({interval}): {judged}.",
         capital(situation_name(situation)),
         three_digits(hours(experiment)),
-        nmile(filter.at_end.median),
+        three_digits(filter.at_end.median),
         estimator_name(experiment, estimator),
-        nmile(closed.at_end.median),
+        three_digits(closed.at_end.median),
         estimator_name(experiment, Estimator::ClosedForm),
     );
     Some((low > 1.0, text))
@@ -236,7 +213,7 @@ fn limit(experiment: &Experiment, situation: Situation) -> Option<String> {
         "{}, most of the variance is made by: {}. Noise alone would leave a median of {} nmile.",
         capital(situation_name(situation)),
         of.collect::<Option<Vec<_>>>()?.join("; "),
-        nmile(navigated.noise.median)
+        three_digits(navigated.noise.median)
     ))
 }
 
@@ -280,8 +257,8 @@ mod tests {
     use super::*;
     use crate::models::{Place, trajectory};
     use crate::simulation::Scenario;
-    use crate::study::ExperimentStudy;
     use crate::study::experiment::Method;
+    use crate::study::{ExperimentStudy, Study};
 
     #[test]
     #[ignore = "slow: an experiment whole"]
@@ -305,7 +282,7 @@ mod tests {
         for experiment in [&with_two, &none.run(&|| {}).unwrap()] {
             let document = document(experiment);
             let drawn = svg::drawn(document.plots());
-            assert_eq!(drawn.len(), 3);
+            assert_eq!(drawn.len(), 2);
             let text = terminal::text(&document, Some(100));
             assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
         }

@@ -33,10 +33,6 @@ pub fn tables(experiment: &Experiment) -> Vec<Table> {
     errors.chain(others.into_iter().flatten()).collect()
 }
 
-pub fn nmile(metres: f64) -> String {
-    three_digits(miles(metres))
-}
-
 fn errors(experiment: &Experiment, navigated: &Navigated) -> Table {
     let headings = columns(
         "nmile | median | 99 % interval | mean | 68 % below | 95 % below | largest, median | \
@@ -48,11 +44,11 @@ fn errors(experiment: &Experiment, navigated: &Navigated) -> Table {
         let (low, high) = worth.median_interval;
         let mut row = cells![
             method_name(experiment, worth.method),
-            nmile(at_end.median),
-            format!("{}…{}", nmile(low), nmile(high)),
+            three_digits(at_end.median),
+            format!("{}…{}", three_digits(low), three_digits(high)),
         ];
-        row.extend([at_end.mean, at_end.below_68, at_end.below_95].map(nmile));
-        row.extend([largest.median, largest.below_95].map(nmile));
+        row.extend([at_end.mean, at_end.below_68, at_end.below_95].map(three_digits));
+        row.extend([largest.median, largest.below_95].map(three_digits));
         let gain = worth
             .gain
             .map(|gain| with_interval(gain.value, gain.interval));
@@ -60,8 +56,8 @@ fn errors(experiment: &Experiment, navigated: &Navigated) -> Table {
         row
     };
     let noise = &navigated.noise;
-    let mut last = cells!["noise alone", nmile(noise.median), NONE];
-    last.extend([noise.mean, noise.below_68, noise.below_95].map(nmile));
+    let mut last = cells!["noise alone", three_digits(noise.median), NONE];
+    last.extend([noise.mean, noise.below_68, noise.below_95].map(three_digits));
     last.resize(headings.len(), NONE.to_owned());
     let by_estimator = navigated.methods.chunks(InstallationForm::ALL.len());
     let situation = situation_name(navigated.situation);
@@ -87,8 +83,8 @@ fn paper(experiment: &Experiment, navigated: &Navigated) -> Table {
             let method = Method { estimator, form };
             let worth = navigated.methods.iter().find(|w| w.method == method);
             let spread = worth.map(|worth| worth.by_one.get(sensor));
-            row.push(or_dash(spread.map(|of| of.median), nmile));
-            row.push(or_dash(spread.map(|of| of.below_95), nmile));
+            row.push(or_dash(spread.map(|of| of.median), three_digits));
+            row.push(or_dash(spread.map(|of| of.below_95), three_digits));
         }
         row.push(or_dash(paper, three_digits));
         row
@@ -127,7 +123,7 @@ fn budget(experiment: &Experiment, navigated: &Navigated) -> Table {
         let mut row = vec![group.title()];
         for (_, worth) in &worths {
             let part = worth.budget.parts.get(place);
-            row.push(or_dash(part.map(|part| part.alone), nmile));
+            row.push(or_dash(part.map(|part| part.alone), three_digits));
             let share = part.map(|part| 100.0 * part.share);
             row.push(or_dash(share, |share| format!("{} %", value(share, 10.0))));
         }
@@ -136,7 +132,7 @@ fn budget(experiment: &Experiment, navigated: &Navigated) -> Table {
     let total = |name: &str, of: &dyn Fn(&Worth) -> f64| {
         let mut row = vec![name.to_owned()];
         for (_, worth) in &worths {
-            row.extend([nmile(of(worth)), String::new()]);
+            row.extend([three_digits(of(worth)), String::new()]);
         }
         row
     };
@@ -161,9 +157,10 @@ pub fn hours(experiment: &Experiment) -> f64 {
     f64::from(experiment.study.intervals) * INTERVAL / HOUR
 }
 
-/// Every method with its table time, s.
-pub fn timed(experiment: &Experiment) -> impl Iterator<Item = (Method, f64)> {
-    Method::all().zip(experiment.table_times.iter().copied())
+/// Table time of an estimator, s.
+pub fn table_time(experiment: &Experiment, estimator: Estimator) -> Option<f64> {
+    let mut timed = Method::all().zip(&experiment.table_times);
+    timed.find_map(|(method, time)| (method.estimator == estimator).then_some(*time))
 }
 
 /// Such as `EKF 10 min, six-angle`.
@@ -181,8 +178,7 @@ pub fn method_kind(estimator: Estimator) -> &'static str {
 
 /// Such as `EKF 10 min`, to the minute: the facts hold the rest.
 pub fn estimator_name(experiment: &Experiment, estimator: Estimator) -> String {
-    let time = timed(experiment).find(|(method, _)| method.estimator == estimator);
-    let minutes = time.map_or(f64::NAN, |(_, time)| time / 60.0);
+    let minutes = table_time(experiment, estimator).unwrap_or(f64::NAN) / 60.0;
     format!("{} {minutes:.0} min", method_kind(estimator))
 }
 
@@ -192,10 +188,6 @@ pub fn situation_name(situation: Situation) -> &'static str {
         Situation::Aligned => "stationary, alignment given",
         Situation::Moving => "moving, alignment given",
     }
-}
-
-pub fn miles(metres: f64) -> f64 {
-    metres / NAUTICAL_MILE
 }
 
 /// What a method is worth in the general form.

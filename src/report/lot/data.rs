@@ -107,38 +107,37 @@ const HEADER: [&str; 9] = [
     "unit", "serial", "date", "quantity", "unit_of_value", "value", "sigma", "apart", "verdict",
 ];
 
-/// As CSV. A unit without a calibration has one row without values.
-pub fn csv(lot: &Lot) -> String {
+fn text(of: &Value) -> &str {
+    of.as_str().unwrap_or_default()
+}
+
+/// The values of all units as CSV. A unit without a calibration has one row without values.
+pub fn csv(data: &Value) -> String {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    let mut write = |cells: &[String]| {
+    let mut write = |cells: &[&str]| {
         // Memory takes it all.
         let _ = writer.write_record(cells);
     };
-    write(&HEADER.map(str::to_owned));
-    for (place, row) in lot.rows.iter().enumerate() {
-        let meta = |key: &str| row.unit.meta.get(key).cloned().unwrap_or_default();
-        let first = [row.unit.name.clone(), meta("serial"), meta("date")];
-        if row.canonical.is_err() {
-            let empty = std::iter::repeat_n(String::new(), HEADER.len() - first.len() - 1);
-            let all = first.iter().cloned().chain(empty);
-            write(&all.chain(["not calibrated".to_owned()]).collect::<Vec<_>>());
-            continue;
+    write(&HEADER);
+    for unit in data["units"].as_array().into_iter().flatten() {
+        let meta = |key: &str| text(&unit["meta"][key]);
+        let first = [text(&unit["name"]), meta("serial"), meta("date")];
+        if !unit["failure"].is_null() {
+            write(&[&first[..], &["", "", "", "", "", "not calibrated"]].concat());
         }
-        for quantity in lot.statistics.iter().map(|of| of.quantity) {
-            let Some(sample) = row.sample(quantity) else {
-                continue;
-            };
-            let (value, sigma) = shown(quantity, sample);
-            let apart = lot.outliers_of(place).any(|of| of.quantity == quantity);
+        for (name, of) in unit["values"].as_object().into_iter().flatten() {
+            let [value, sigma] =
+                ["value", "sigma"].map(|key| of[key].as_f64().unwrap_or(f64::NAN).to_string());
+            let apart = unit["apart"]
+                .as_array()
+                .is_some_and(|all| all.contains(&json!(name)));
             let rest = [
-                quantity.name(),
-                unit_key(quantity).to_owned(),
-                value.to_string(),
-                sigma.to_string(),
-                apart.to_string(),
-                row.check_of(quantity)
-                    .map_or("", |check| check.verdict.name())
-                    .to_owned(),
+                name.as_str(),
+                text(&of["unit"]),
+                &value,
+                &sigma,
+                &apart.to_string(),
+                &text(&of["verdict"]).replace('-', " "),
             ];
             write(&[&first[..], &rest].concat());
         }

@@ -51,7 +51,7 @@ pub fn document(lot: &Lot) -> Document {
         document.pages(tables::values(lot));
     }
     document.data = data::data(lot);
-    document.files = vec![("lot.csv".to_owned(), data::csv(lot))];
+    document.files = vec![("lot.csv".to_owned(), data::csv(&document.data))];
     document
 }
 
@@ -62,21 +62,6 @@ fn facts(lot: &Lot) -> Facts {
     let failed = lot.failures().count();
     let mut facts = Facts::new("Lot", [("units", count(lot.rows.len()))]);
     facts.push("calibrated", count(lot.rows.len() - failed));
-    if let Some(specification) = &lot.specification {
-        let of = |verdict| {
-            let with = lot.rows.iter().filter(|row| row.verdict == Some(verdict));
-            format!("{} {}", verdict.name(), count(with.count()))
-        };
-        let all = [Verdict::Pass, Verdict::NotDecided, Verdict::Fail].map(of);
-        facts.push(
-            "specification",
-            format!(
-                "{}; each limit at a confidence of {} %",
-                all.join(", "),
-                100.0 * specification.confidence
-            ),
-        );
-    }
     if let Some(gravity) = lot.shared_gravity {
         facts.push(
             "gravity",

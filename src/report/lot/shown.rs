@@ -65,14 +65,6 @@ pub fn spread_symbol(quantity: Quantity) -> &'static str {
     }
 }
 
-/// A value with its σ, or with three digits where it has none.
-pub fn with_sigma((of, own): (f64, f64)) -> String {
-    match own > 0.0 {
-        true => plus_minus(of, own),
-        false => three_digits(of),
-    }
-}
-
 /// A trend in a sentence.
 pub fn change(quantity: Quantity, trend: &Trend) -> String {
     let (what, unit) = match trend.against {
@@ -87,14 +79,6 @@ pub fn change(quantity: Quantity, trend: &Trend) -> String {
         spread_symbol(quantity),
         chance(trend.p)
     )
-}
-
-/// A probability.
-pub fn chance(p: f64) -> String {
-    match p < 1e-4 {
-        true => "< 0.0001".to_owned(),
-        false => value(p, 0.1 * p.max(0.01)),
-    }
 }
 
 /// A spread with its own σ, or what it stays below.

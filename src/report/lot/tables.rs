@@ -1,8 +1,6 @@
 //! Tables of a lot.
 
-use super::shown::{
-    chance, shown, shown_spread, spread, spread_symbol, symbol, title, together, with_sigma,
-};
+use super::shown::{shown, shown_spread, spread, spread_symbol, symbol, title, together};
 use crate::imu::Sensor;
 use crate::lot::{Calibrated, Check, FALSE_ALARM, Lot, Quantity, Row, Sample, Statistics, Verdict};
 use crate::report::prelude::*;
@@ -121,12 +119,13 @@ fn row(of: &Statistics) -> Vec<String> {
         value: of.scatter.mean,
         sigma: of.scatter.mean_sigma,
     };
+    let (mean, own) = shown(quantity, mean);
     let scatter = shown_spread(quantity, of.scatter.deviation);
     let chi2 = of.scatter.chi_square;
     cells![
         title(quantity),
         symbol(quantity),
-        with_sigma(shown(quantity, mean)),
+        plus_minus(mean, own),
         sigma(scatter),
         or_dash(chi2.map(|c| c.value / c.freedom as f64), ratio),
         or_dash(chi2.map(|c| c.p), chance),
@@ -165,7 +164,8 @@ pub fn values(lot: &Lot) -> Vec<Table> {
                 let check = row.check_of(quantity);
                 let fails = check.is_some_and(|check| check.verdict == Verdict::Fail);
                 let mark = if apart || fails { "! " } else { "" };
-                format!("{mark}{}", with_sigma(shown(quantity, sample)))
+                let (value, own) = shown(quantity, sample);
+                format!("{mark}{}", plus_minus(value, own))
             }));
             cells
         };
@@ -183,7 +183,7 @@ pub fn limits(lot: &Lot) -> Table {
         let in_unit = |x: f64| shown_spread(quantity, x);
         let off = check
             .off
-            .map(|(off, own)| with_sigma((in_unit(off), in_unit(own))));
+            .map(|(off, own)| plus_minus(in_unit(off), in_unit(own)));
         cells![
             row.unit.name.as_str(),
             title(quantity),

@@ -2,7 +2,6 @@
 //! the paper's Figures 2 to 10, minute by minute as CSV, and hour by hour as JSON.
 
 mod outlook;
-mod quantity;
 #[cfg(test)]
 mod tests;
 
@@ -11,8 +10,7 @@ use std::fmt::Write;
 use crate::attitude::to_pitch_roll_heading;
 use crate::imu::{BodyFrame, Sensor};
 use crate::report::prelude::*;
-use crate::study::navigation::{INTERVAL, Mission, Motion, Outlook, Warming};
-use quantity::Quantity;
+use crate::study::navigation::{INTERVAL, Mission, Motion, Outlook, Quantity, Warming};
 
 pub use outlook::{Flown, Navigated, add_missions};
 pub(super) use outlook::{add, line};
@@ -42,7 +40,7 @@ pub struct Navigation<'a> {
     /// Name of the trajectory, if it moved.
     pub trajectory: Option<&'a str>,
     /// The errors.
-    pub moments: &'a [Outlook],
+    pub navigated: &'a Navigated,
 }
 
 impl Navigation<'_> {
@@ -118,7 +116,7 @@ impl Navigation<'_> {
                 "{name} does not change with temperature: its σ are those of the temperature that it was made at."
             ));
         }
-        if self.moments.iter().any(|m| m.sigma.is_none()) {
+        if self.navigated.outlook.iter().any(|m| m.sigma.is_none()) {
             warnings.push(format!("{name} claims no σ, so none is predicted."));
         }
         if self.terms {
@@ -131,45 +129,24 @@ impl Navigation<'_> {
 
     /// Position error at the end over the time, nmile/h.
     fn drift(&self) -> Option<f64> {
-        let last = self.moments.last().filter(|last| last.time > 0.0)?;
-        Some(last.error?.horizontal_position() / NAUTICAL_MILE / (last.time / HOUR))
+        let last = self
+            .navigated
+            .outlook
+            .last()
+            .filter(|last| last.time > 0.0)?;
+        let [.., horizontal] = Quantity::ALL;
+        Some(horizontal.error(last)? / (last.time / HOUR))
     }
 
     fn table(&self) -> Table {
-        let rows = Quantity::ALL.map(|quantity| self.row(quantity));
-        let table = Table::new("Errors", columns("| unit | largest | after h | at the end | σ | error/σ"))
-            .sections(rows.chunks(3).map(<[_]>::to_vec))
-            .note(
-                "Computed minus true. σ: of the error at the end, predicted from the calibration's covariance; \
-                 of horizontal errors the root of the mean square.",
-            );
+        let table = outlook::table("Errors", std::slice::from_ref(self.navigated));
         match self.drift() {
             None => table,
             Some(drift) => table.note(format!(
-                "Position at the end over the time: {} nmile/h, {} nmile/{PAPER_HOURS} h.",
-                three_digits(drift),
-                three_digits(drift * PAPER_HOURS),
+                "A drift of {} nmile/{PAPER_HOURS} h.",
+                three_digits(drift * PAPER_HOURS)
             )),
         }
-    }
-
-    fn row(&self, quantity: Quantity) -> Vec<String> {
-        let error = |moment: &Outlook| quantity.error(moment).unwrap_or(f64::NAN);
-        let magnitude = |m: &&Outlook| error(m).abs();
-        let moments = self.moments.iter();
-        let largest = moments.max_by(|a, b| magnitude(a).total_cmp(&magnitude(b)));
-        let last = self.moments.last();
-        let sigma = last.and_then(|m| quantity.sigma(m)).filter(|s| *s > 0.0);
-        let ratio = last.zip(sigma).filter(|_| quantity.is_component);
-        cells![
-            quantity.name,
-            quantity.unit(),
-            or_dash(largest.map(error), three_digits),
-            or_dash(largest.map(|m| m.time / HOUR), |t| value(t, 1.0)),
-            or_dash(last.map(error), three_digits),
-            or_dash(sigma, three_digits),
-            ratio.map_or(NONE.to_owned(), |(m, s)| value(error(m) / s, 1.0)),
-        ]
     }
 
     /// Attitude, velocity and position against time with their predicted σ as a band.
@@ -184,9 +161,8 @@ impl Navigation<'_> {
         let mut quantities = Quantity::ALL.chunks(3);
         figures.map(|(file, heading, more)| {
             let quantities = quantities.next().unwrap_or_default().iter();
-            let errors = [("error", self.moments)];
-            let hours = || Axis::hours(self.hours());
-            let panels = quantities.map(|of| of.panel(hours(), HOUR.recip(), &errors));
+            let navigated = std::slice::from_ref(self.navigated);
+            let panels = quantities.map(|of| outlook::panel(*of, navigated));
             Plot::new(file, heading, (1, 210), panels).caption(format!(
                 "Computed minus true. Line: actual error by full navigation; band: ±1σ predicted from the \
                  calibration's covariance by the linear model, within which the error of two calibrations in \
@@ -197,14 +173,14 @@ impl Navigation<'_> {
 
     /// A row a minute: time, errors, predicted σ where there is one.
     fn csv(&self) -> String {
-        let with_sigma = self.moments.iter().all(|m| m.sigma.is_some());
+        let with_sigma = self.navigated.outlook.iter().all(|m| m.sigma.is_some());
         let keys = Quantity::ALL.map(|quantity| quantity.key);
         let mut text = format!("t_h,{}", keys.join(","));
         if with_sigma {
             text.extend(keys.iter().map(|key| format!(",sigma_{key}")));
         }
         text.push('\n');
-        for moment in self.moments {
+        for moment in &self.navigated.outlook {
             // Writing to a string cannot fail.
             let _ = write!(text, "{}", moment.time / HOUR);
             let errors = Quantity::ALL.map(|q| q.error(moment));
@@ -219,7 +195,8 @@ impl Navigation<'_> {
 
     fn data(&self) -> Value {
         let hourly = || {
-            self.moments
+            self.navigated
+                .outlook
                 .iter()
                 .filter(|moment| moment.time % HOUR == 0.0)
         };
@@ -248,8 +225,8 @@ impl Navigation<'_> {
         data["hours"] = self.hours().into();
         data["series"] = hourly().map(at).collect();
         data["max_abs"] = largest(hourly());
-        data["max_abs_by_minute"] = largest(self.moments.iter());
-        data["final"] = self.moments.last().map(at).into();
+        data["max_abs_by_minute"] = largest(self.navigated.outlook.iter());
+        data["final"] = self.navigated.outlook.last().map(at).into();
         data["drift_nmile_per_h"] = self.drift().into();
         data["drift_nmile_per_40_h"] = self.drift().map(|drift| drift * PAPER_HOURS).into();
         data

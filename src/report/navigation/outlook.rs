@@ -1,16 +1,15 @@
-//! What the calibrations of one run are worth: their navigation errors side by side, or where the truth is not
-//! known their predicted σ alone.
+//! Navigation errors by one calibration or by several side by side, or where the truth is not known their predicted
+//! σ alone: a table of all quantities at the end, and a panel for each quantity against time.
 
-use super::quantity::Quantity;
 use crate::report::prelude::*;
-use crate::study::navigation::{NavigationStudyError, Outlook};
+use crate::study::navigation::{NavigationStudyError, Outlook, Quantity};
 
 const HEADING: &str = "Navigation with this calibration";
 
-/// The navigation errors that one method's calibration leads to, stationary and level at the run's site.
+/// The navigation errors that one calibration leads to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Navigated {
-    /// `EKF` or `closed form`.
+    /// Its name beside the others', such as `EKF` or `closed form`.
     pub method: &'static str,
     /// The errors, as far as they are known.
     pub outlook: Vec<Outlook>,
@@ -55,7 +54,12 @@ pub fn add(document: &mut Document, navigation: Result<&[Navigated], &Navigation
         }
         Ok([]) => {}
         Ok(navigated @ [.., last]) => {
-            document.page(table(navigated));
+            let how = format!(
+                "{} stationary and level at the site of the run, heading North, from perfect alignment, height \
+                 held: as long as predicted errors stay small (1° and 1 % of the Earth's radius).",
+                long(navigated)
+            );
+            document.page(table(HEADING, navigated).note(how));
             document.page(figure(navigated, last.method));
         }
     }
@@ -74,9 +78,7 @@ fn duration(navigated: &[Navigated]) -> f64 {
 
 /// The unit of time of the report: its symbol and its length in seconds.
 fn clock(navigated: &[Navigated]) -> (&'static str, f64) {
-    let units = [("h", 3600.0), ("min", 60.0)].into_iter();
-    let mut fits = units.filter(|(_, size)| duration(navigated) >= *size);
-    fits.next().unwrap_or(("s", 1.0))
+    readable(&TIMES, duration(navigated))
 }
 
 /// Duration in words.
@@ -108,67 +110,106 @@ pub fn line(navigated: &[Navigated]) -> String {
     )
 }
 
-/// Error and σ of one row by one calibration.
-type Cells = [Option<f64>; 2];
+/// One quantity by one calibration: the largest error with its time, the error at the end, its σ, and what the error
+/// is of that.
+struct Figures {
+    largest: Option<Point>,
+    at_end: Option<f64>,
+    sigma: Option<f64>,
+    ratio: Option<f64>,
+}
 
-fn table(navigated: &[Navigated]) -> Table {
-    let known = is_known(navigated);
-    let mut columns = vec![String::new(), "unit".to_owned()];
-    for of in navigated {
-        columns.extend(known.then(|| format!("{}: error", of.method)));
-        columns.push(format!("{}: σ", of.method));
-    }
-    let row = |quantity: Quantity, name: &str, per: &str, of: &dyn Fn(&[Outlook]) -> Cells| {
-        let cells: Vec<Cells> = navigated.iter().map(|n| of(&n.outlook)).collect();
-        let sizes = cells.iter().flatten().flatten().map(|x| x.abs());
-        let (unit, scale) = match per {
-            // In nautical miles an hour others need no second look.
-            "/h" => (quantity.unit(), 1.0),
-            _ => quantity.readable_unit(sizes.fold(0.0, f64::max)),
-        };
-        let shown = |x: Option<f64>| or_dash(x, |x| three_digits(x * scale));
-        let mut row = cells![name, format!("{unit}{per}")];
-        for [error, sigma] in cells {
-            row.extend(known.then(|| shown(error)));
-            row.push(shown(sigma));
+impl Figures {
+    fn of(quantity: Quantity, navigated: &Navigated) -> Self {
+        let moments = &navigated.outlook;
+        let errors = moments
+            .iter()
+            .filter_map(|m| Some((m.time, quantity.error(m)?)));
+        let at_end = moments.last().and_then(|end| quantity.error(end));
+        let sigma = moments.last().and_then(|end| quantity.sigma(end));
+        let sigma = sigma.filter(|sigma| *sigma > 0.0);
+        let ratio = at_end.zip(sigma).filter(|_| quantity.is_component);
+        Self {
+            largest: errors.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())),
+            at_end,
+            sigma,
+            ratio: ratio.map(|(error, sigma)| error / sigma),
         }
-        row
+    }
+
+    fn cells(&self, scale: f64, second: f64, known: bool) -> Vec<String> {
+        let shown = |x: Option<f64>| or_dash(x, |x| three_digits(x * scale));
+        if !known {
+            return vec![shown(self.sigma)];
+        }
+        let (after, largest) = self.largest.unzip();
+        vec![
+            shown(largest),
+            or_dash(after, |time| value(time / second, 1.0)),
+            shown(self.at_end),
+            shown(self.sigma),
+            or_dash(self.ratio, |z| value(z, 1.0)),
+        ]
+    }
+}
+
+/// Every quantity at the end of navigation, and the largest of each where errors are known.
+pub fn table(heading: &str, navigated: &[Navigated]) -> Table {
+    let known = is_known(navigated);
+    let (unit_of_time, second) = clock(navigated);
+    let mut columns = cells!["", "unit"];
+    for of in navigated {
+        let name = match navigated {
+            [_] => String::new(),
+            _ => format!("{}: ", of.method),
+        };
+        let after = format!("after, {unit_of_time}");
+        columns.extend(match known {
+            true => cells![
+                format!("{name}largest"),
+                after,
+                "at the end",
+                "σ",
+                "error/σ"
+            ],
+            false => cells![format!("{name}σ")],
+        });
+    }
+    let row = |name: &str, unit: &str, scale: f64, all: &[Figures]| {
+        let cells = all.iter().flat_map(|of| of.cells(scale, second, known));
+        cells![name, unit].into_iter().chain(cells).collect()
     };
-    let at_end = |quantity: Quantity, of: &[Outlook]| match of.last() {
-        Some(end) => [quantity.error(end), quantity.sigma(end)],
-        None => [None; 2],
+    let of = |quantity: Quantity| {
+        let all = navigated.iter().map(|of| Figures::of(quantity, of));
+        let all: Vec<Figures> = all.collect();
+        let sizes = all
+            .iter()
+            .flat_map(|of| [of.largest.map(|of| of.1), of.sigma]);
+        let size = sizes.flatten().map(f64::abs).fold(0.0, f64::max);
+        (all, quantity.readable_unit(size))
     };
-    let end = |quantity: Quantity| {
-        let name = format!("{} at the end", quantity.name);
-        row(quantity, &name, "", &|of| at_end(quantity, of))
+    let rows = Quantity::ALL.map(|quantity| {
+        let (all, (unit, scale)) = of(quantity);
+        row(quantity.name, unit, scale, &all)
+    });
+    let [.., horizontal] = Quantity::ALL;
+    let (mut all, (unit, scale)) = of(horizontal);
+    for of in &mut all {
+        (of.largest, of.ratio) = (None, None);
+    }
+    let unit = format!("{unit}/{unit_of_time}");
+    let drift = row("drift", &unit, scale * second / duration(navigated), &all);
+    let what = match known {
+        true => "Computed minus true. σ: of the error at the end, predicted",
+        false => "The truth is not known, so no error is shown. σ: at the end, predicted",
     };
-    let [pitch, roll, heading, _, _, _, east, north, horizontal] = Quantity::ALL;
-    let mut position = [east, north, horizontal].map(end).to_vec();
-    let largest = |of: &[Outlook]| {
-        let errors = of.iter().filter_map(|moment| horizontal.error(moment));
-        [errors.reduce(f64::max), None]
-    };
-    let name = format!("{}, largest", horizontal.name);
-    position.extend(known.then(|| row(horizontal, &name, "", &largest)));
-    let (unit, second) = clock(navigated);
-    let time = duration(navigated) / second;
-    position.push(row(horizontal, "drift", &format!("/{unit}"), &|of| {
-        at_end(horizontal, of).map(|x| Some(x? / time))
-    }));
-    Table::new(HEADING, columns)
-        .section(position)
-        .section([pitch, roll, heading].map(end))
+    Table::new(heading, columns)
+        .sections(rows.chunks(3).map(<[_]>::to_vec))
+        .section([drift])
         .note(format!(
-            "{} stationary and level at the site of the run, heading North, from perfect alignment, height \
-             held: as long as predicted errors stay small (1° and 1 % of the Earth's radius). σ: predicted from \
-             the covariance of the calibration by the linear error model; of horizontal errors the root of the \
-             mean square.",
-            long(navigated)
+            "{what} from the calibration's covariance by the linear error model; of horizontal errors the root of the \
+             mean square. Drift: position at the end over the time."
         ))
-        .note(match known {
-            true => "Errors are computed minus true. Drift: position error at the end over the time.",
-            false => "The truth is not known, so no error is shown.",
-        })
 }
 
 /// Position error east and north against time.
@@ -191,12 +232,63 @@ fn figure(navigated: &[Navigated], last: &str) -> Plot {
     if navigated.len() > 1 {
         caption += " Solid: EKF; dashed: closed form.";
     }
-    let (unit, second) = clock(navigated);
-    let all = navigated.iter().map(|of| (of.method, &of.outlook[..]));
-    let all: Vec<(&str, &[Outlook])> = all.collect();
-    let panels = [6, 7].map(|place| {
-        let time = Axis::time(unit, duration(navigated) / second);
-        Quantity::ALL[place].panel(time, second.recip(), &all)
-    });
+    let panels = Quantity::ALL[6..8].iter().map(|of| panel(*of, navigated));
     Plot::new("navigation.svg", heading, (1, 250), panels).caption(caption)
+}
+
+/// Errors against time, over the band of ±σ of the last, in a readable unit; bounds of σ where no error is known.
+pub fn panel(quantity: Quantity, navigated: &[Navigated]) -> Panel {
+    let (unit_of_time, second) = clock(navigated);
+    let time = Axis::time(unit_of_time, duration(navigated) / second);
+    let curve = |moments: &[Outlook], of: &dyn Fn(&Outlook) -> Option<f64>| -> Vec<Point> {
+        let points = moments.iter();
+        let points = points.filter_map(|m| Some((m.time / second, of(m)?)));
+        points.collect()
+    };
+    let mut lines = Vec::new();
+    for Navigated {
+        method: name,
+        outlook: moments,
+    } in navigated
+    {
+        let name = *name;
+        let errors = curve(moments, &|m| quantity.error(m));
+        if !errors.is_empty() {
+            lines.push((name, Some(name.to_owned()), errors));
+            continue;
+        }
+        let upper = curve(moments, &|m| quantity.sigma(m));
+        lines.push((name, Some(format!("σ of {name}")), upper));
+        lines.push((name, None, curve(moments, &|m| Some(-quantity.sigma(m)?))));
+    }
+    let last = navigated.last().map_or(&[][..], |last| &last.outlook);
+    let sigma = |sign: f64| curve(last, &|m| Some(sign * quantity.sigma(m)?));
+    let size = |points: &[Point]| points.iter().map(|p| p.1.abs()).fold(0.0, f64::max);
+    let sizes = lines.iter().map(|(.., points)| size(points));
+    let sizes: Vec<f64> = sizes.chain([size(&sigma(1.0))]).collect();
+    let (unit, scale) = quantity.readable_unit(sizes.iter().copied().fold(0.0, f64::max));
+    let (y, kind) = Axis::about_zero(sizes.into_iter().map(|size| size * scale));
+    let scaled = |points: Vec<Point>| -> Vec<Point> {
+        points.into_iter().map(|(t, y)| (t, y * scale)).collect()
+    };
+    let lines = lines.into_iter().map(|(name, label, points)| {
+        let mut line = Series::line(scaled(points));
+        line.label = label;
+        match name {
+            "closed form" => line.nth(1).dashed(),
+            _ => line,
+        }
+    });
+    let lowest = if quantity.is_component { -1.0 } else { 0.0 };
+    let [low, high] = [lowest, 1.0].map(|sign| scaled(sigma(sign)));
+    let mut names = vec![(&high, "+σ")];
+    names.extend(quantity.is_component.then_some((&low, "−σ")));
+    let names = names.into_iter();
+    let names = names.filter_map(|(edge, name)| Some(Series::name(edge.last()?.1, name)));
+    let names: Vec<Series> = names.collect();
+    Panel::new(format!("{}, {unit}{kind}", quantity.name), time, y)
+        .with(Series::band(low, high))
+        .with(Series::zero())
+        .with_all(names)
+        .with_all(lines)
 }

@@ -38,6 +38,10 @@ fn moments(sigma: bool) -> Vec<Outlook> {
 }
 
 fn document(moments: &[Outlook]) -> Document {
+    let navigated = Navigated {
+        method: "error",
+        outlook: moments.to_vec(),
+    };
     let navigation = Navigation {
         calibration: "monday",
         truth: "truth",
@@ -48,7 +52,7 @@ fn document(moments: &[Outlook]) -> Document {
         mission: &mission(),
         warming: None,
         trajectory: None,
-        moments,
+        navigated: &navigated,
     };
     navigation.document()
 }

@@ -1,6 +1,6 @@
 //! Where the parts of a document stand on pages.
 
-use crate::report::document::{Block, Document, Facts, List, Medium, Table};
+use crate::report::document::{Block, Document, Facts, List, Table};
 use crate::report::pdf::font::Fonts;
 
 /// A4, pt.
@@ -85,10 +85,8 @@ impl<'a> Layout<'a> {
         for text in &document.lead {
             self.paragraph(text, PLAIN);
         }
-        for (medium, block) in &document.blocks {
-            if *medium != Medium::Terminal {
-                self.block(block);
-            }
+        for (_, block) in &document.blocks {
+            self.block(block);
         }
         if !document.warnings.items.is_empty() {
             self.list(&document.warnings);

@@ -7,6 +7,9 @@ const DECADES: i32 = 10;
 /// Fewer decades than this have ticks at 1, 2 and 5 of each, and end near the data.
 const FEW_DECADES: f64 = 2.5;
 
+/// Some that reach this many times further than others make an axis about zero logarithmic.
+const APART: f64 = 20.0;
+
 /// How numbers are laid along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Kind {
@@ -63,11 +66,6 @@ impl Axis {
         }
     }
 
-    /// Hours from zero on, with ticks at whole ones or even parts.
-    pub fn hours(hours: f64) -> Self {
-        Self::time("h", hours)
-    }
-
     /// Time in a unit from zero on, with ticks at whole ones or even parts.
     pub fn time(unit: &str, end: f64) -> Self {
         let steps: &[f64] = match unit {
@@ -78,6 +76,19 @@ impl Axis {
         Self {
             step: step.filter(|_| end > 0.0),
             ..Self::linear(&format!("time, {unit}")).between(0.0, end)
+        }
+    }
+
+    /// An axis that holds zero and is logarithmic to both sides of it where some of what is drawn reaches much further
+    /// than the rest; and what its title says of that.
+    pub fn about_zero(reaches: impl Iterator<Item = f64>) -> (Self, &'static str) {
+        let (least, most) = positive_range(reaches);
+        match most > APART * least {
+            true => (
+                Self::symlog(0.3 * least).room(0.0, 0.5),
+                ", logarithmic to both sides",
+            ),
+            false => (Self::linear("").including([0.0]).room(0.06, 0.06), ""),
         }
     }
 
@@ -261,6 +272,14 @@ impl Scale {
     }
 }
 
+/// The least positive number and the largest.
+pub fn positive_range(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let positive = values.filter(|value| *value > 0.0);
+    positive.fold((f64::INFINITY, 0.0), |(low, high), value| {
+        (f64::min(low, value), f64::max(high, value))
+    })
+}
+
 /// A power of ten with its label.
 fn power(exponent: i32) -> (f64, String) {
     (10f64.powi(exponent), number::power_of_ten(exponent))
@@ -334,7 +353,7 @@ mod tests {
             (log.clone(), vec![3.0]),
             (log.between(f64::INFINITY, 0.0), vec![]),
             (Axis::symlog(0.0), vec![f64::NAN]),
-            (Axis::hours(0.0), vec![]),
+            (Axis::time("h", 0.0), vec![]),
         ] {
             let scale = axis.scale(values);
             assert!(

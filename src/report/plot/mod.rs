@@ -1,11 +1,11 @@
-//! A plot as a value: panels with axes and series, or a matrix. It knows nothing of where it is drawn.
+//! A plot as a value: panels with axes and series. It knows nothing of where it is drawn.
 
 mod axis;
 mod series;
 
 use std::ops::Range;
 
-pub use axis::{Axis, Kind, Scale};
+pub use axis::{Axis, Kind, Scale, positive_range};
 pub(super) use series::thinned;
 pub use series::{Anchor, Color, Dash, Fill, Mark, Pen, Point, Series, Shape, Upright};
 
@@ -18,41 +18,12 @@ pub struct Plot {
     pub heading: String,
     /// How to read it, a sentence or two.
     pub caption: String,
-    /// What is drawn.
-    pub body: Body,
-}
-
-/// What is drawn.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Body {
-    /// Panels row by row.
-    Panels(Grid),
-    /// A correlation matrix.
-    Matrix(Matrix),
-}
-
-/// Panels of one size in rows.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Grid {
     /// Panels in a row.
     pub columns: usize,
     /// Height of a panel in pixels; the width of the figure is fixed.
     pub height: u32,
-    /// The panels; a row may be closed by [`Panel::blank`].
+    /// The panels, row by row; a row may be closed by [`Panel::blank`].
     pub panels: Vec<Panel>,
-}
-
-/// Coefficients between −1 and 1, symmetric.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Matrix {
-    /// A name for each row and column.
-    pub names: Vec<String>,
-    /// Rows before which a new group begins.
-    pub groups: Vec<usize>,
-    /// Row by row.
-    pub values: Vec<Vec<f64>>,
-    /// Coefficients of at least this magnitude are written out.
-    pub written: f64,
 }
 
 /// Axes with a title, and what is drawn into them.
@@ -72,10 +43,8 @@ pub struct Panel {
     pub tags: Vec<(f64, String)>,
     /// Number of lines over which the tags are spread.
     pub tag_lines: usize,
-    /// Lines of text in an upper corner.
+    /// Lines of text in the upper right corner.
     pub notes: Vec<String>,
-    /// Whether they stand in the left corner instead of the right one.
-    pub notes_left: bool,
     /// Whether both axes have the same length.
     pub square: bool,
     /// Whether only the title is drawn.
@@ -90,25 +59,13 @@ impl Plot {
         (columns, height): (usize, u32),
         panels: impl IntoIterator<Item = Panel>,
     ) -> Self {
-        let grid = Grid {
-            columns: columns.max(1),
-            height,
-            panels: panels.into_iter().collect(),
-        };
-        Self::of(file, heading, Body::Panels(grid))
-    }
-
-    /// A matrix.
-    pub fn matrix(file: &str, heading: &str, matrix: Matrix) -> Self {
-        Self::of(file, heading, Body::Matrix(matrix))
-    }
-
-    fn of(file: &str, heading: &str, body: Body) -> Self {
         Self {
             file: file.to_owned(),
             heading: heading.to_owned(),
             caption: String::new(),
-            body,
+            columns: columns.max(1),
+            height,
+            panels: panels.into_iter().collect(),
         }
     }
 
@@ -186,12 +143,4 @@ pub fn beside(n: usize, count: usize, part: f64) -> f64 {
 pub fn steps(low: f64, high: f64, count: usize) -> impl Iterator<Item = f64> + Clone {
     let last = count.saturating_sub(1).max(1) as f64;
     (0..count).map(move |k| low + (high - low) * k as f64 / last)
-}
-
-/// The least positive number and the largest.
-pub fn positive_range(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    let positive = values.filter(|value| *value > 0.0);
-    positive.fold((f64::INFINITY, 0.0), |(low, high), value| {
-        (f64::min(low, value), f64::max(high, value))
-    })
 }

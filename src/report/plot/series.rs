@@ -56,8 +56,6 @@ pub enum Fill {
     Solid,
     /// Pale within an outline.
     Pale,
-    /// Not at all.
-    Open,
 }
 
 /// Where a text stands.
@@ -69,6 +67,8 @@ pub enum Anchor {
     Below,
     /// To the left above it.
     AboveLeft,
+    /// In the middle of it.
+    Middle,
 }
 
 /// How a line is drawn.
@@ -160,6 +160,13 @@ impl Series {
     /// The area between two lines.
     pub fn band(lower: Vec<Point>, upper: Vec<Point>) -> Self {
         Self::new(Shape::Band(lower, upper)).color(Color::Quiet)
+    }
+
+    /// A line through values with their σ, and the band of ±σ behind it.
+    pub fn curve(points: &[(f64, f64, f64)]) -> [Self; 2] {
+        let edge = |factor: f64| points.iter().map(move |&(x, y, own)| (x, y + factor * own));
+        let band = Self::band(edge(-1.0).collect(), edge(1.0).collect());
+        [band, Self::line(edge(0.0))]
     }
 
     /// A mark at each point.

@@ -8,9 +8,11 @@ use maud::{PreEscaped, html};
 use plotters::element::{DashedPathElement, Drawable, PointCollection};
 use plotters::prelude::*;
 use plotters::style::Color as _;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::text_anchor::Pos;
 
 use crate::report::plot::{Color, Dash, Panel, Pen, Point, Scale};
+
+pub use plotters::style::text_anchor::{HPos, VPos};
 
 /// Width of every figure in pixels.
 pub const WIDTH: u32 = 1200;
@@ -71,17 +73,6 @@ pub fn shortened(text: &str, room: f64) -> String {
         short.pop();
     }
     short + "…"
-}
-
-/// How a text lies about its point: `start`, `middle` or `end` across, and the part of it that is at its height.
-pub type Lie = (&'static str, Height);
-
-/// Which part of a text is at the height of its point.
-#[derive(Clone, Copy)]
-pub enum Height {
-    Head,
-    Middle,
-    Foot,
 }
 
 /// The inside of an SVG document in the making.
@@ -162,33 +153,16 @@ impl Canvas {
         self.put(Circle::new(place(at), px(radius), style));
     }
 
-    /// Writes text; `scale` 1 is the usual size.
+    /// Writes text, the point at this part of it; `scale` 1 is the usual size.
     pub(super) fn text(
         &mut self,
         text: &str,
         at: Point,
-        (across, height): Lie,
+        (across, height): (HPos, VPos),
         color: RGBColor,
         scale: f64,
     ) {
-        let across = match across {
-            "start" => HPos::Left,
-            "middle" => HPos::Center,
-            _ => HPos::Right,
-        };
-        let height = match height {
-            Height::Head => VPos::Top,
-            Height::Middle => VPos::Center,
-            Height::Foot => VPos::Bottom,
-        };
         let style = font(scale).color(&color).pos(Pos::new(across, height));
-        self.put(Text::new(text.to_owned(), place(at), style));
-    }
-
-    /// Writes text upwards.
-    pub(super) fn upright(&mut self, text: &str, at: Point, scale: f64) {
-        let style = font(scale).transform(FontTransform::Rotate270);
-        let style = style.color(&INK).pos(Pos::new(HPos::Left, VPos::Center));
         self.put(Text::new(text.to_owned(), place(at), style));
     }
 }

@@ -2,9 +2,9 @@
 
 use plotters::style::RGBColor;
 
-use super::super::plot::{Grid, Panel, Scale};
+use super::super::plot::{Panel, Plot, Scale};
 use super::canvas::{
-    Canvas, Frame, Height, INK, LETTER, QUIET, SMALL, WIDTH, rgb, shortened, width,
+    Canvas, Frame, HPos, INK, LETTER, QUIET, SMALL, VPos, WIDTH, rgb, shortened, width,
 };
 use super::series;
 
@@ -22,10 +22,10 @@ const TAG: f64 = 0.85;
 const LABELS: f64 = 0.3;
 
 /// Draws it and returns the height of the figure.
-pub fn draw(on: &mut Canvas, grid: &Grid) -> u32 {
-    let panel_width = f64::from(WIDTH) / grid.columns as f64;
-    for column in 0..grid.columns {
-        let panels = grid.panels.iter().skip(column).step_by(grid.columns);
+pub fn draw(on: &mut Canvas, plot: &Plot) -> u32 {
+    let panel_width = f64::from(WIDTH) / plot.columns as f64;
+    for column in 0..plot.columns {
+        let panels = plot.panels.iter().skip(column).step_by(plot.columns);
         let scaled: Vec<(&Panel, (Scale, Scale))> = panels.map(|p| (p, p.scales())).collect();
         // All panels of a column have the same margins.
         let drawn = || scaled.iter().filter(|(panel, _)| !panel.blank);
@@ -38,8 +38,8 @@ pub fn draw(on: &mut Canvas, grid: &Grid) -> u32 {
             let names = names(&x, (across.1 - across.0) / x.ticks.len().max(1) as f64);
             let lines = names.iter().map(Vec::len).max().unwrap_or(1).max(1);
             let lines = lines + usize::from(!panel.x.title.is_empty());
-            let top = f64::from(grid.height) * row as f64;
-            let bottom = top + f64::from(grid.height) - 12.0 - LINE * lines as f64;
+            let top = f64::from(plot.height) * row as f64;
+            let bottom = top + f64::from(plot.height) - 12.0 - LINE * lines as f64;
             let down = (top + TOP, bottom);
             let square = (across.0, across.0 + down.1 - down.0);
             let frame = Frame {
@@ -56,7 +56,7 @@ pub fn draw(on: &mut Canvas, grid: &Grid) -> u32 {
             }
         }
     }
-    grid.height * grid.panels.len().div_ceil(grid.columns).max(1) as u32
+    plot.height * plot.panels.len().div_ceil(plot.columns).max(1) as u32
 }
 
 fn widest(ticks: &[(f64, String)]) -> f64 {
@@ -97,7 +97,7 @@ fn names(x: &Scale, room: f64) -> Vec<Vec<String>> {
 
 fn title(on: &mut Canvas, frame: &Frame) {
     let at = (frame.across.0, frame.down.0 - TOP + 6.0);
-    on.text(&frame.panel.title, at, ("start", Height::Head), INK, 1.0)
+    on.text(&frame.panel.title, at, (HPos::Left, VPos::Top), INK, 1.0)
 }
 
 fn of_panel(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
@@ -117,13 +117,9 @@ fn of_panel(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
         series::draw(on, frame, series);
     }
     tags(on, frame);
-    let (x, side) = match panel.notes_left {
-        true => (left + 6.0, "start"),
-        false => (right - 6.0, "end"),
-    };
     for (line, note) in panel.notes.iter().enumerate() {
-        let at = (x, top + 6.0 + LINE * line as f64);
-        on.text(note, at, (side, Height::Head), INK, SMALL);
+        let at = (right - 6.0, top + 6.0 + LINE * line as f64);
+        on.text(note, at, (HPos::Right, VPos::Top), INK, SMALL);
     }
     labels(on, frame)
 }
@@ -139,7 +135,13 @@ fn ticks(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
         taken.push(y);
         on.stroke(&[(left, y), (right, y)], GRID, 0.75);
         on.stroke(&[(left - 3.0, y), (left, y)], QUIET, 0.75);
-        on.text(label, (left - 6.0, y), ("end", Height::Middle), INK, SMALL);
+        on.text(
+            label,
+            (left - 6.0, y),
+            (HPos::Right, VPos::Center),
+            INK,
+            SMALL,
+        );
     }
     let mut taken: Vec<(f64, f64)> = Vec::new();
     for ((value, _), lines) in frame.x.ticks.iter().zip(names) {
@@ -164,7 +166,7 @@ fn ticks(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
         taken.push((shown, half));
         for (n, line) in lines.iter().enumerate() {
             let at = (shown, bottom + 6.0 + LINE * n as f64);
-            on.text(line, at, ("middle", Height::Head), INK, SMALL);
+            on.text(line, at, (HPos::Center, VPos::Top), INK, SMALL);
         }
     }
     let lines = names.iter().map(Vec::len).max().unwrap_or(1).max(1) as f64;
@@ -173,7 +175,7 @@ fn ticks(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
     if title.is_empty() {
         return;
     }
-    on.text(title, at, ("middle", Height::Head), INK, SMALL)
+    on.text(title, at, (HPos::Center, VPos::Top), INK, SMALL)
 }
 
 /// Names with a sample of their colour, from the right end of the title's line.
@@ -182,7 +184,7 @@ fn keys(on: &mut Canvas, frame: &Frame, y: f64) {
     for series in frame.panel.series.iter().rev() {
         let Some(key) = &series.key else { continue };
         x -= width(key, SMALL);
-        on.text(key, (x, y), ("start", Height::Head), INK, SMALL);
+        on.text(key, (x, y), (HPos::Left, VPos::Top), INK, SMALL);
         let sample = [(x - 16.0, y + 3.0), (x - 5.0, y + 14.0)];
         on.rectangle(sample, rgb(series.pen.color));
         x -= 28.0;
@@ -204,7 +206,7 @@ fn tags(on: &mut Canvas, frame: &Frame) {
         };
         taken[line] = at + half + 6.0;
         let place = (at, frame.down.0 + 3.0 + 15.0 * line as f64);
-        on.text(text, place, ("middle", Height::Head), QUIET, TAG);
+        on.text(text, place, (HPos::Center, VPos::Top), QUIET, TAG);
     }
 }
 
@@ -224,7 +226,7 @@ fn labels(on: &mut Canvas, frame: &Frame) {
         on.stroke(&[(right + 1.0, y), (right + 9.0, shown_at)], color, 0.75);
         let text = shortened(text, frame.end - right - 12.0);
         let at = (right + 11.0, shown_at);
-        on.text(&text, at, ("start", Height::Middle), color, SMALL);
+        on.text(&text, at, (HPos::Left, VPos::Center), color, SMALL);
     }
 }
 

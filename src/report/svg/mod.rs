@@ -3,7 +3,6 @@
 
 mod canvas;
 mod grid;
-mod matrix;
 mod series;
 #[cfg(test)]
 mod tests;
@@ -11,7 +10,7 @@ mod tests;
 use canvas::{Canvas, WIDTH};
 use maud::{PreEscaped, html};
 
-use super::plot::{Body, Plot};
+use super::plot::Plot;
 
 #[cfg(test)]
 pub(super) use tests::{assert_sound, drawn};
@@ -19,10 +18,7 @@ pub(super) use tests::{assert_sound, drawn};
 /// The SVG document of a plot.
 pub fn draw(plot: &Plot) -> String {
     let mut on = Canvas::default();
-    let height = match &plot.body {
-        Body::Panels(grid) => grid::draw(&mut on, grid),
-        Body::Matrix(matrix) => matrix::draw(&mut on, matrix),
-    };
+    let height = grid::draw(&mut on, plot);
     let document = html! {
         svg width=(WIDTH) height=(height) viewBox={ "0 0 " (WIDTH) " " (height) } font-family="sans-serif"
             xmlns="http://www.w3.org/2000/svg" {

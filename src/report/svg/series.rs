@@ -3,7 +3,7 @@
 use plotters::style::RGBColor;
 
 use super::super::plot::{Anchor, Axis, Fill, Mark, Pen, Point, Series, Shape, Upright, thinned};
-use super::canvas::{Canvas, Frame, Height, SMALL, rgb};
+use super::canvas::{Canvas, Frame, HPos, SMALL, VPos, rgb};
 use crate::number::three_digits;
 
 /// Bands and pale bars.
@@ -42,9 +42,10 @@ pub fn draw(on: &mut Canvas, frame: &Frame, series: &Series) {
         Shape::Words(at, anchor, text) => {
             let (x, y) = frame.at(*at);
             let (at, lie) = match anchor {
-                Anchor::Above => ((x, y - 5.0), ("middle", Height::Foot)),
-                Anchor::Below => ((x, y + 5.0), ("middle", Height::Head)),
-                Anchor::AboveLeft => ((x - 4.0, y - 3.0), ("end", Height::Foot)),
+                Anchor::Above => ((x, y - 5.0), (HPos::Center, VPos::Bottom)),
+                Anchor::Below => ((x, y + 5.0), (HPos::Center, VPos::Top)),
+                Anchor::Middle => ((x, y), (HPos::Center, VPos::Center)),
+                Anchor::AboveLeft => ((x - 4.0, y - 3.0), (HPos::Right, VPos::Bottom)),
             };
             on.text(text, at, lie, color, SMALL)
         }
@@ -102,7 +103,6 @@ fn bars(
                 on.area(&corners, BAND);
                 on.stroke(&corners, color, pen.width)
             }
-            Fill::Open => on.stroke(&corners, color, pen.width),
         })
     }
 }

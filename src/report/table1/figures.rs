@@ -1,16 +1,16 @@
 //! The paper's Figures 2 to 9: every sample's course, their mean and standard deviation.
 
 use super::verdict::title;
-use crate::imu::{InstallationForm, Sensor};
 use crate::report::prelude::*;
 use crate::study::Table1;
-use crate::study::table1::{Column, Quantity};
+use crate::study::table1::{Column, QUANTITIES};
 
 /// A course that stays within this part of its axis is a straight line.
 const FLAT: f64 = 1e-4;
 
-const ATTITUDE: [Quantity; 3] = [Quantity::Pitch, Quantity::Roll, Quantity::Heading];
-const MOTION: [Quantity; 2] = [Quantity::Velocity, Quantity::Position];
+/// Places of attitude, and of velocity and position, in [`QUANTITIES`].
+const ATTITUDE: [usize; 3] = [0, 1, 2];
+const MOTION: [usize; 2] = [3, 4];
 
 pub fn figures(table: &Table1) -> Vec<Plot> {
     let of_column = |column: &Column| {
@@ -21,26 +21,22 @@ pub fn figures(table: &Table1) -> Vec<Plot> {
     table.columns.iter().flat_map(of_column).collect()
 }
 
-fn figure(table: &Table1, column: &Column, number: u8, quantities: &[Quantity]) -> Plot {
-    let sensor = match column.published.sensor {
-        Sensor::Gyro => "gyros",
-        Sensor::Accel => "accelerometers",
-    };
-    let form = match column.published.form {
-        InstallationForm::ThreeAngle => "three-angle",
-        _ => "six-angle",
-    };
+fn figure(table: &Table1, column: &Column, number: u8, quantities: &[usize]) -> Plot {
+    let (triad, form) = (
+        triad_name(column.published.sensor),
+        column.published.form.name(),
+    );
     let errors = match quantities.len() {
         3 => "attitude",
         _ => "velocity and position",
     };
-    let heading = format!("Figure {number}: {sensor}, {form} form, {errors}");
+    let heading = format!("Figure {number}: {triad}, {form} form, {errors}");
     let panels = quantities.iter().map(|&of| panel(table, column, of));
     Plot::new(&format!("figure-{number}.svg"), &heading, (1, 230), panels)
         .caption(caption(table, column, quantities))
 }
 
-fn caption(table: &Table1, column: &Column, quantities: &[Quantity]) -> String {
+fn caption(table: &Table1, column: &Column, quantities: &[usize]) -> String {
     let drawn = column.courses.samples.len();
     let samples = match drawn < table.study.samples {
         true => format!("{drawn} of {} samples", count(table.study.samples)),
@@ -53,8 +49,8 @@ fn caption(table: &Table1, column: &Column, quantities: &[Quantity]) -> String {
     );
     if quantities.iter().all(|&q| flat(table, column, q)) {
         let largest = quantities.iter().map(|&q| {
-            let largest = extent(column, q) / q.unit_value();
-            format!("{} {largest:.0e} {}", q.name(), q.unit())
+            let of = QUANTITIES[q];
+            format!("{} {:.0e} {}", of.short(), extent(column, q), of.unit())
         });
         let largest = largest.collect::<Vec<_>>().join(", ");
         text += &format!(" Nothing is left but rounding; largest: {largest}.");
@@ -62,13 +58,12 @@ fn caption(table: &Table1, column: &Column, quantities: &[Quantity]) -> String {
     text
 }
 
-fn flat(table: &Table1, column: &Column, quantity: Quantity) -> bool {
-    extent(column, quantity) < FLAT * common_extent(table, column, quantity)
+fn flat(table: &Table1, column: &Column, q: usize) -> bool {
+    extent(column, q) < FLAT * common_extent(table, column, q)
 }
 
 /// Largest magnitude of what is drawn of a column.
-fn extent(column: &Column, quantity: Quantity) -> f64 {
-    let q = quantity as usize;
+fn extent(column: &Column, q: usize) -> f64 {
     let samples = column.courses.samples.iter().flatten().map(|e| e[q].abs());
     let moments = column.courses.moments.iter();
     let moments = moments.map(|m| m[q].mean.abs() + m[q].std);
@@ -76,31 +71,34 @@ fn extent(column: &Column, quantity: Quantity) -> f64 {
 }
 
 /// The same over both forms of the triad.
-fn common_extent(table: &Table1, column: &Column, quantity: Quantity) -> f64 {
+fn common_extent(table: &Table1, column: &Column, q: usize) -> f64 {
     let sensor = column.published.sensor;
     let columns = table.columns.iter();
     let columns = columns.filter(|column| column.published.sensor == sensor);
-    let extents = columns.map(|column| extent(column, quantity));
+    let extents = columns.map(|column| extent(column, q));
     extents.fold(0.0, f64::max)
 }
 
-fn panel(table: &Table1, column: &Column, quantity: Quantity) -> Panel {
-    let (unit, q) = (quantity.unit_value(), quantity as usize);
-    let extent = 1.05 * common_extent(table, column, quantity) / unit;
-    let signed = ATTITUDE.contains(&quantity);
+fn panel(table: &Table1, column: &Column, q: usize) -> Panel {
+    let quantity = QUANTITIES[q];
+    let extent = 1.05 * common_extent(table, column, q);
+    let signed = quantity.is_component;
     let courses = &column.courses;
     let hours: Vec<f64> = courses.times.iter().map(|t| t / HOUR).collect();
     let line = |values: &mut dyn Iterator<Item = f64>| {
         let lowest = if signed { f64::NEG_INFINITY } else { 0.0 };
-        let values = values.map(|value| (value / unit).max(lowest));
-        let points = hours.iter().copied().zip(values).collect();
-        Series::line(straight(points, FLAT * extent))
+        Series::line(
+            hours
+                .iter()
+                .copied()
+                .zip(values.map(|value| value.max(lowest))),
+        )
     };
     let samples = courses.samples.iter().map(|sample| {
         let line = line(&mut sample.iter().map(|errors| errors[q]));
         line.nth(3).width(0.4)
     });
-    let flat = flat(table, column, quantity);
+    let flat = flat(table, column, q);
     let means = [(1.0, "mean + σ"), (-1.0, "mean − σ"), (0.0, "mean")].map(|(sign, name)| {
         let values = courses.moments.iter().map(|moments| moments[q]);
         let series = line(&mut values.map(|m| m.mean + sign * m.std)).color(Color::Ink);
@@ -118,19 +116,9 @@ fn panel(table: &Table1, column: &Column, quantity: Quantity) -> Panel {
         true => ("error", -extent),
         false => ("error, horizontal", 0.0),
     };
-    let title = format!("{} {kind}, {}", quantity.name(), quantity.unit());
-    let x = Axis::hours(hours.last().copied().unwrap_or(1.0));
+    let title = format!("{} {kind}, {}", quantity.short(), quantity.unit());
+    let x = Axis::time("h", hours.last().copied().unwrap_or(1.0));
     Panel::new(title, x, Axis::linear("").between(low, extent))
         .with_all(samples)
         .with_all(means)
-}
-
-/// A line that stays within a height, as its ends.
-fn straight(points: Vec<Point>, height: f64) -> Vec<Point> {
-    match (points.first(), points.last()) {
-        (Some(&first), Some(&last)) if points.iter().all(|p| (p.1 - first.1).abs() < height) => {
-            vec![first, last]
-        }
-        _ => points,
-    }
 }

@@ -5,7 +5,7 @@ mod verdict;
 
 use crate::report::prelude::*;
 use crate::study::Table1;
-use crate::study::table1::{AGREEMENT, ByQuantity, Column, Moments, Quantity, Row, paper};
+use crate::study::table1::{AGREEMENT, ByQuantity, Column, Moments, QUANTITIES, Row, paper};
 
 /// Smaller figures, in the units shown, are shown as zero.
 const ZERO: f64 = 5e-10;
@@ -75,18 +75,15 @@ fn notes(table: &Table1) -> Vec<String> {
     notes
 }
 
-/// A figure in the unit of its quantity.
-fn figure(quantity: Quantity, figure: f64) -> String {
-    let shown = figure / quantity.unit_value();
-    if shown.abs() < ZERO {
-        "0".to_owned()
-    } else {
-        three_digits(shown)
+fn figure(of: f64) -> String {
+    match of.abs() < ZERO {
+        true => "0".to_owned(),
+        false => three_digits(of),
     }
 }
 
 fn of_column(table: &Table1, column: &Column) -> Block {
-    let quantities = Quantity::ALL.map(|q| format!("{}, {}", q.name(), q.unit()));
+    let quantities = QUANTITIES.map(|q| format!("{}, {}", q.short(), q.unit()));
     let headings = cells!["reading", ""].into_iter().chain(quantities);
     let headings = headings.chain(["the paper's figures".to_owned()]);
     let paper_name = format!("paper, {} samples", paper::SAMPLES);
@@ -94,11 +91,9 @@ fn of_column(table: &Table1, column: &Column) -> Block {
         let mut lines = pair(row.reading.name, &row.sample, &verdict::of_row(column, row));
         if table.population > table.study.samples {
             let of = format!("mean of {}", count(table.population));
-            let mean = |q: Quantity| figure(q, row.population[q as usize].mean);
-            lines.push(line("", &of, mean, ""));
+            lines.push(line("", &of, row.population.map(|of| figure(of.mean)), ""));
         }
-        let z = |q: Quantity| standard_errors(row.difference[q as usize]);
-        lines.push(line("", "z", z, ""));
+        lines.push(line("", "z", row.difference.map(standard_errors), ""));
         lines
     });
     Table::new(verdict::title(column.published), headings)
@@ -109,16 +104,15 @@ fn of_column(table: &Table1, column: &Column) -> Block {
 
 /// Mean and standard deviation.
 fn pair(name: &str, moments: &ByQuantity<Moments>, verdict: &str) -> Vec<Vec<String>> {
-    let mean = |q: Quantity| figure(q, moments[q as usize].mean);
-    let std = |q: Quantity| figure(q, moments[q as usize].std);
-    vec![line(name, "mean", mean, verdict), line("", "std", std, "")]
+    let [mean, std] = [moments.map(|of| of.mean), moments.map(|of| of.std)];
+    vec![
+        line(name, "mean", mean.map(figure), verdict),
+        line("", "std", std.map(figure), ""),
+    ]
 }
 
-fn line(name: &str, what: &str, cell: impl Fn(Quantity) -> String, verdict: &str) -> Vec<String> {
-    let mut cells = cells![name, what];
-    cells.extend(Quantity::ALL.map(cell));
-    cells.push(verdict.to_owned());
-    cells
+fn line(name: &str, what: &str, figures: ByQuantity<String>, verdict: &str) -> Vec<String> {
+    [cells![name, what], figures.to_vec(), cells![verdict]].concat()
 }
 
 fn standard_errors(z: f64) -> String {
@@ -153,29 +147,29 @@ fn data(table: &Table1) -> Value {
 
 fn reading(column: &Column, row: &Row) -> Value {
     let paper = column.published.moments();
-    let of = |moments: &ByQuantity<Moments>, part: fn(&Moments) -> f64| {
-        by_key(|q| part(&moments[q as usize]) / q.unit_value())
-    };
+    let mean = |moments: &ByQuantity<Moments>| by_key(moments.map(|of| of.mean));
+    let std = |moments: &ByQuantity<Moments>| by_key(moments.map(|of| of.std));
     json!({
         "sensor": column.published.sensor.name(),
         "form": column.published.form,
         "reading": row.reading.name,
         "hours": row.hours,
-        "mean": of(&row.sample, |m| m.mean),
-        "std": of(&row.sample, |m| m.std),
-        "paper_mean": of(&paper, |m| m.mean),
-        "paper_std": of(&paper, |m| m.std),
-        "population_mean": of(&row.population, |m| m.mean),
-        "population_std": of(&row.population, |m| m.std),
-        "z": by_key(|q| row.difference[q as usize]),
-        "agrees": by_key(|q| row.agrees(q)),
+        "mean": mean(&row.sample),
+        "std": std(&row.sample),
+        "paper_mean": mean(&paper),
+        "paper_std": std(&paper),
+        "population_mean": mean(&row.population),
+        "population_std": std(&row.population),
+        "z": by_key(row.difference),
+        "agrees": by_key(std::array::from_fn(|q| row.agrees(q))),
         "verdict": verdict::of_row(column, row),
     })
 }
 
-fn by_key<T: Into<Value>>(of: impl Fn(Quantity) -> T) -> Map<String, Value> {
-    let all = Quantity::ALL.into_iter();
-    all.map(|q| (q.key().to_owned(), of(q).into())).collect()
+fn by_key<T: Into<Value>>(of: ByQuantity<T>) -> Map<String, Value> {
+    let all = QUANTITIES.into_iter().zip(of);
+    all.map(|(quantity, of)| (quantity.key.to_owned(), of.into()))
+        .collect()
 }
 
 #[cfg(test)]
@@ -250,6 +244,6 @@ mod tests {
         let paper = stated["paper_mean"]["position_nmile"].as_f64().unwrap();
         assert!((paper - 39.42).abs() < 1e-12, "{paper}");
         let mean = small().columns[1].stated.sample[4].mean;
-        assert_eq!(stated["mean"]["position_nmile"], mean / 1852.0);
+        assert_eq!(stated["mean"]["position_nmile"], mean);
     }
 }

@@ -1,9 +1,10 @@
 //! What can be said of the paper's figures, in words.
 
-use crate::imu::{InstallationForm, Sensor};
+use crate::imu::InstallationForm;
+use crate::report::prelude::*;
 use crate::study::Table1;
 use crate::study::table1::paper::Published;
-use crate::study::table1::{Column, Kind, Quantity, Row, Verdict};
+use crate::study::table1::{Column, Kind, QUANTITIES, Row, Verdict};
 
 /// A verdict in a few words.
 pub fn short(verdict: &Verdict) -> &'static str {
@@ -36,10 +37,11 @@ fn of_reading(row: &Row) -> String {
 
 /// Names of the quantities that agree and of those that do not.
 fn split(row: &Row) -> (Vec<&'static str>, Vec<&'static str>) {
-    let (agree, apart): (Vec<Quantity>, Vec<Quantity>) =
-        Quantity::ALL.into_iter().partition(|&q| row.agrees(q));
-    let names = |quantities: Vec<Quantity>| quantities.into_iter().map(Quantity::name).collect();
-    (names(agree), names(apart))
+    let named = |agrees: bool| {
+        let those = (0..QUANTITIES.len()).filter(move |&q| row.agrees(q) == agrees);
+        those.map(|q| QUANTITIES[q].short()).collect()
+    };
+    (named(true), named(false))
 }
 
 /// A sentence for each of the paper's columns.
@@ -84,13 +86,11 @@ pub fn sentence(column: &Column) -> String {
 }
 
 /// A column of the paper's in words.
-pub fn title(published: &Published) -> &'static str {
-    match (published.sensor, published.form) {
-        (Sensor::Gyro, InstallationForm::ThreeAngle) => "Gyros, three-angle form (Eq. 10)",
-        (Sensor::Gyro, _) => "Gyros, six-angle form (Eq. 8)",
-        (Sensor::Accel, InstallationForm::ThreeAngle) => {
-            "Accelerometers, three-angle form (Eq. 10)"
-        }
-        (Sensor::Accel, _) => "Accelerometers, six-angle form (Eq. 8)",
-    }
+pub fn title(published: &Published) -> String {
+    let equation = match published.form {
+        InstallationForm::ThreeAngle => 10,
+        _ => 8,
+    };
+    let (triad, form) = (triad_name(published.sensor), published.form.name());
+    format!("{}, {form} form (Eq. {equation})", capital(triad))
 }

@@ -1,7 +1,6 @@
 //! The baseline of the comparison: the closed form on the paper's static positions, with the same
 //! instrument and the same noise.
 
-use super::StudyError;
 use crate::calibration::{
     Options, ParameterVector, Problem, in_body_frame, in_general_form, six_position_of, to_vector,
 };
@@ -10,10 +9,11 @@ use crate::models;
 use crate::models::{ModelError, Place};
 use crate::run::Dwell;
 use crate::simulation::{Scenario, Simulated};
+use crate::study::StudyError;
 use crate::turntable::Table;
 
 /// The runs of the closed form. It is also evaluated on the first part of every dwell, as if the dwells
-/// were shorter.
+/// were as short as the filter's table time has them.
 #[derive(Debug, Clone)]
 pub struct Baseline {
     /// The simulated scenario.
@@ -27,15 +27,7 @@ pub struct Baseline {
     equal: Option<f64>,
 }
 
-/// Number of equal steps of the part of a dwell in the curve against time.
-const PARTS: usize = 12;
-
 impl Baseline {
-    /// Index of the whole dwells among the parts.
-    pub(super) const OWN_TIME: usize = PARTS - 1;
-    /// Index of the filter's time among them.
-    pub(super) const EQUAL_TIME: usize = PARTS;
-
     /// The baseline of a scenario: its instrument and table on the paper's positions; if the table has too
     /// few axes, a table with three axes and the same errors. The axes are orthogonal, because the
     /// positions are given as turns about body axes.
@@ -62,44 +54,27 @@ impl Baseline {
 
     /// Table time of the closed form in the comparison at equal time, s.
     pub fn equal_time(&self) -> Option<f64> {
-        self.equal.map(|part| self.time_of(part))
+        let part = self.equal?;
+        Some(self.table_time - (1.0 - part) * self.standing)
     }
 
-    fn time_of(&self, part: f64) -> f64 {
-        self.table_time - (1.0 - part) * self.standing
-    }
-
-    fn part(number: usize) -> f64 {
-        (number + 1) as f64 / PARTS as f64
-    }
-
-    /// The number of each part in the curve against time, with its table time in s.
-    pub(super) fn parts(&self) -> impl Iterator<Item = (usize, f64)> {
-        (0..PARTS).map(|number| (number, self.time_of(Self::part(number))))
-    }
-
-    /// Errors of the closed form in one of its runs, for every part and for the filter's time; `None` if it
-    /// fails.
+    /// Errors of the closed form in one of its runs, in its own time and in the filter's; `None` if it fails.
     pub(super) fn errors(
         &self,
         Simulated { run, truth, .. }: Simulated,
         form: InstallationForm,
-    ) -> Vec<Option<ParameterVector>> {
+    ) -> [Option<ParameterVector>; 2] {
         let truth = to_vector(&in_general_form(&truth));
         let problem = Problem::new(&run, &Options::default().installation(form));
         let dwells: Vec<Dwell> = problem.dwells().cloned().collect();
-        let parts = (0..PARTS).map(|number| Some(Self::part(number)));
-        parts
-            .chain([self.equal])
-            .map(|part| {
-                let part = part?;
-                let shorter = |dwell: &Dwell| dwell.first_part(part, &run.recording.imu);
-                let dwells: Vec<Dwell> = dwells.iter().map(shorter).collect();
-                let closed_form = six_position_of(&problem, &dwells).ok()?;
-                let estimate = in_general_form(&closed_form.estimate.triads);
-                Some(to_vector(&in_body_frame(&estimate, self.scenario.body_frame)) - truth)
-            })
-            .collect()
+        [Some(1.0), self.equal].map(|part| {
+            let part = part?;
+            let shorter = |dwell: &Dwell| dwell.first_part(part, &run.recording.imu);
+            let dwells: Vec<Dwell> = dwells.iter().map(shorter).collect();
+            let closed_form = six_position_of(&problem, &dwells).ok()?;
+            let estimate = in_general_form(&closed_form.estimate.triads);
+            Some(to_vector(&in_body_frame(&estimate, self.scenario.body_frame)) - truth)
+        })
     }
 }
 

@@ -1,7 +1,9 @@
 //! Root mean square errors over the runs, for every method, and their ratios.
 
 use super::trial::{Filtered, Trial};
-use crate::calibration::{AUXILIARY, AuxiliaryKind, AuxiliaryVector, ErrorTerm};
+use crate::calibration::{
+    AUXILIARY, AuxiliaryKind, AuxiliaryVector, ErrorTerm, Group, PARAMETERS, ParameterVector,
+};
 use crate::study::Ratio;
 
 /// Figures of one kind of error over all runs, in SI.
@@ -66,16 +68,37 @@ impl Figures {
     }
 }
 
+/// Figures of each group of which any run has a bound.
+pub fn of_groups(trials: &[Trial]) -> Vec<(Group, Figures)> {
+    let has_bound = |&i: &usize| trials.iter().any(|trial| trial.bound[i] > 0.0);
+    let of_group = |group: Group| {
+        let all = (0..PARAMETERS).filter(|&i| Group::of(i) == group);
+        let indices: Vec<usize> = all.filter(has_bound).collect();
+        let square = |of: &ParameterVector| mean_square(of.as_slice(), &indices);
+        let squares = trials.iter().map(|trial| {
+            let filtered = trial.filtered.as_ref();
+            let closed = trial.closed_form.each_ref();
+            let [own, equal] = closed.map(|error| error.as_ref().map(square));
+            Squares {
+                filter: filtered.map(|f| square(&f.error)),
+                claimed: filtered.map(|f| square(&f.sigma)),
+                bound: square(&trial.bound),
+                closed_form: own,
+                closed_form_in_equal_time: equal,
+            }
+        });
+        (!indices.is_empty()).then(|| (group, Figures::new(squares)))
+    };
+    Group::all().filter_map(of_group).collect()
+}
+
 /// Figures of each error term that has a bound in any run and was estimated by the filter.
 pub fn of_error_terms(trials: &[Trial]) -> Vec<(ErrorTerm, Figures)> {
     let has_sigma = |&k: &usize| trials.iter().any(|trial| trial.auxiliary_bound[k] > 0.0);
     let of_term = |term: ErrorTerm| {
         let is_of = |&k: &usize| AuxiliaryKind::of(k).is_some_and(|of| of.error_term() == term);
         let indices: Vec<usize> = (0..AUXILIARY).filter(is_of).filter(has_sigma).collect();
-        let square = |of: &AuxiliaryVector| {
-            let sum: f64 = indices.iter().map(|&k| of[k].powi(2)).sum();
-            sum / indices.len() as f64
-        };
+        let square = |of: &AuxiliaryVector| mean_square(of.as_slice(), &indices);
         let runs = trials.iter().filter_map(|trial| {
             let estimated = |f: &&Filtered| square(&f.auxiliary_sigma) > 0.0;
             let filtered = trial.filtered.as_ref().filter(estimated)?;
@@ -92,7 +115,12 @@ pub fn of_error_terms(trials: &[Trial]) -> Vec<(ErrorTerm, Figures)> {
     ErrorTerm::ALL.into_iter().filter_map(of_term).collect()
 }
 
+/// Over the entries at some indices.
+fn mean_square(of: &[f64], indices: &[usize]) -> f64 {
+    indices.iter().map(|&k| of[k].powi(2)).sum::<f64>() / indices.len() as f64
+}
+
 /// Root of the mean; NaN for no values.
-pub fn rms(squares: &[f64]) -> f64 {
+fn rms(squares: &[f64]) -> f64 {
     (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }

@@ -6,13 +6,14 @@ use statrs::distribution::{Binomial, DiscreteCDF};
 use statrs::function::erf::erf;
 
 use super::figures::Squares;
-use super::{Baseline, Figures, Trial};
+use super::{Figures, Trial};
 use crate::calibration::{PARAMETERS, ParameterMatrix, ParameterVector};
 use crate::imu::{InstallationForm, PerSensor};
 use crate::models;
 use crate::models::{ModelError, Place};
 use crate::simulation::Scenario;
-use crate::study::navigation::{FORTY_HOURS, INTERVAL, Mission, Motion, NavigationStudyError};
+use crate::study::StudyError;
+use crate::study::navigation::{FORTY_HOURS, INTERVAL, Mission, Motion};
 
 /// The trajectory of the mission that moves.
 const TRAJECTORY: &str = "flight";
@@ -105,22 +106,18 @@ impl Journey {
 }
 
 impl Way {
-    /// The model of a mission; the inner error if it cannot be navigated.
-    pub(super) fn of(
-        journey: Journey,
-        scenario: &Scenario,
-    ) -> Result<Result<Self, NavigationStudyError>, ModelError> {
+    /// The model of a mission.
+    pub(super) fn of(journey: Journey, scenario: &Scenario) -> Result<Self, StudyError> {
         let nominal = PerSensor::from_fn(|sensor| {
             let prior = scenario.instrument.prior(sensor, &scenario.installation);
             prior.mean(InstallationForm::General)
         });
-        let exposures = journey.mission(scenario)?.exposure(&nominal);
-        Ok(exposures.map(|exposures| Self {
+        let exposures = journey.mission(scenario)?.exposure(&nominal)?;
+        let end = exposures.last();
+        Ok(Self {
             journey,
-            by_parameter: exposures
-                .last()
-                .map_or_else(SMatrix::zeros, |end| end.position()),
-        }))
+            by_parameter: end.map_or_else(SMatrix::zeros, |end| end.position()),
+        })
     }
 
     /// Navigation accuracy of the calibrations of these runs.
@@ -141,16 +138,14 @@ impl Way {
     fn of_trial(&self, trial: &Trial) -> Position {
         let covariance =
             |of: &ParameterMatrix| self.by_parameter * of * self.by_parameter.transpose();
-        let closed = |part: usize| {
-            let error = trial.closed_form.get(part)?.as_ref()?;
-            Some(self.position(error))
-        };
+        let closed = trial.closed_form.each_ref();
+        let [own, equal] = closed.map(|error| Some(self.position(error.as_ref()?)));
         Position {
             filter: { trial.filtered.as_ref() }
                 .map(|f| (self.position(&f.error), covariance(&f.covariance))),
             bound: covariance(&trial.bound_covariance),
-            closed_form: closed(Baseline::OWN_TIME),
-            closed_form_in_equal_time: closed(Baseline::EQUAL_TIME),
+            closed_form: own,
+            closed_form_in_equal_time: equal,
         }
     }
 
@@ -239,7 +234,7 @@ mod tests {
     use super::*;
     use crate::calibration::{from_vector, to_vector};
     use crate::imu::Triad;
-    use crate::study::navigation::Pair;
+    use crate::study::navigation::{NavigationStudyError, Pair};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
@@ -315,7 +310,7 @@ mod tests {
     #[test]
     fn a_way_leads_where_navigation_with_the_estimate_does() {
         let scenario = Scenario::load("demo").unwrap();
-        let way = Way::of(Journey::Standing, &scenario).unwrap().unwrap();
+        let way = Way::of(Journey::Standing, &scenario).unwrap();
         let form = InstallationForm::General;
         let truth = PerSensor::from_fn(|_| Triad::ideal(form));
         let error = ParameterVector::from_fn(|i, _| 1e-8 * (1.0 + i as f64).sin());
@@ -326,7 +321,7 @@ mod tests {
         };
         let mission = Journey::Standing.mission(&scenario).unwrap();
         let end = mission.errors(&pair).unwrap().pop().unwrap();
-        let expected = end.error.position.xy();
+        let expected = end.error.unwrap().position.xy();
         let apart = way.position(&error) - expected;
         assert!(
             expected.norm() > 1000.0 && apart.norm() < 0.02 * expected.norm(),
@@ -338,12 +333,14 @@ mod tests {
     fn a_site_at_a_pole_is_refused_and_one_in_the_south_flown_from() {
         let mut scenario = Scenario::load("demo").unwrap();
         scenario.site.latitude = -1.2;
-        let way = Way::of(Journey::Standing, &scenario).unwrap();
-        assert!(way.is_ok());
+        assert!(Way::of(Journey::Standing, &scenario).is_ok());
         scenario.site.latitude = std::f64::consts::FRAC_PI_2;
         for journey in Journey::ALL {
-            let way = Way::of(journey, &scenario).unwrap();
-            assert!(matches!(way, Err(NavigationStudyError::NearPole(_))));
+            let way = Way::of(journey, &scenario);
+            assert!(matches!(
+                way,
+                Err(StudyError::Navigation(NavigationStudyError::NearPole(_)))
+            ));
         }
     }
 }

@@ -3,15 +3,16 @@
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
-use super::{AccuracyStudy, Baseline, StudyError};
+use super::{AccuracyStudy, Baseline};
 use crate::calibration::{
-    AUXILIARY, AuxiliaryVector, Epoch, ErrorTermTest, Estimate, FormTest, Nees, Nis, Options,
-    Outcome, PARAMETERS, ParameterMatrix, ParameterVector, Problem, UNWATCHED, auxiliary_vector,
-    bound, estimate, from_vector, in_general_form, nees, test_error_terms, to_vector,
+    AUXILIARY, AuxiliaryVector, ErrorTermTest, Estimate, FormTest, Nees, Nis, Options, Outcome,
+    PARAMETERS, ParameterMatrix, ParameterVector, Problem, UNWATCHED, auxiliary_vector, bound,
+    estimate, in_general_form, nees, test_error_terms, to_vector,
 };
 use crate::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
 use crate::run::Aiding;
 use crate::simulation::Runs;
+use crate::study::StudyError;
 
 /// One run. Errors are estimate minus truth; everything is in the general form.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -26,14 +27,12 @@ pub struct Trial {
     pub bound: ParameterVector,
     /// Covariance of the bound.
     pub(super) bound_covariance: ParameterMatrix,
-    /// σ of the bound at each of the [`moments`].
-    pub(super) bound_track: Vec<ParameterVector>,
     /// σ of the bound of the auxiliary constants; zero for constants without a bound.
     pub auxiliary_bound: AuxiliaryVector,
     /// Effect of the error terms on the filter; for the first run only.
     pub effects: Vec<ErrorTermTest>,
-    /// Error of the closed form for each part of its dwells; `None` if it failed.
-    pub(super) closed_form: Vec<Option<ParameterVector>>,
+    /// Error of the closed form in its own time and in the filter's; `None` if it failed.
+    pub(super) closed_form: [Option<ParameterVector>; 2],
 }
 
 /// Results of the filter in one run.
@@ -61,16 +60,6 @@ pub struct Filtered {
     pub rejected: usize,
     /// Test of the installation form.
     pub form_test: Option<FormTest>,
-    /// Error at each of the [`moments`] of the last pass.
-    pub(super) track: Vec<ParameterVector>,
-}
-
-/// Number of moments in the curve against time.
-const MOMENTS: usize = 40;
-
-/// Times at which errors are stored, s; the last is the end of a run of this duration.
-pub fn moments(duration: f64) -> impl Iterator<Item = f64> {
-    (1..=MOMENTS).map(move |k| duration * k as f64 / MOMENTS as f64)
 }
 
 impl AccuracyStudy {
@@ -94,7 +83,6 @@ impl AccuracyStudy {
         // What stays unmodelled is to show what it does.
         options.auto_terms = self.unmodelled.is_empty();
         let mut problem = Problem::new(&record, &options);
-        let duration = record.recording.imu.duration();
         let form = self.bound_form(&truth);
         let attainable = PerSensor::from_fn(|sensor| truth.get(sensor).in_form(form));
         let bound = bound(&problem, &attainable, &simulated.terms)
@@ -120,14 +108,11 @@ impl AccuracyStudy {
             },
             filtered: outcome
                 .ok()
-                .map(|outcome| Filtered::new(&outcome, &truth, &auxiliary, duration)),
+                .map(|outcome| Filtered::new(&outcome, &truth, &auxiliary)),
             effects,
             auxiliary_bound: bound.auxiliary.sigma(),
             bound: attained.sigma(),
             bound_covariance: attained.covariance,
-            bound_track: track(&bound.history, form, duration)
-                .map(|estimate| estimate.sigma())
-                .collect(),
             closed_form: baseline.errors(baseline_runs.simulate(self.seed, run)?, self.form),
         })
     }
@@ -143,14 +128,8 @@ impl AccuracyStudy {
 }
 
 impl Filtered {
-    fn new(
-        outcome: &Outcome,
-        truth: &PerSensor<Triad>,
-        auxiliary: &AuxiliaryVector,
-        duration: f64,
-    ) -> Self {
+    fn new(outcome: &Outcome, truth: &PerSensor<Triad>, auxiliary: &AuxiliaryVector) -> Self {
         let truth = to_vector(&in_general_form(truth));
-        let form = outcome.estimate.form();
         let estimate = outcome.estimate.in_general_form();
         let error = estimate.vector() - truth;
         let auxiliary_sigma = outcome.auxiliary.sigma();
@@ -170,9 +149,6 @@ impl Filtered {
             table: outcome.consistency.table,
             rejected: outcome.innovations.iter().filter(|i| !i.accepted).count(),
             form_test: outcome.form_test,
-            track: track(&outcome.history, form, duration)
-                .map(|estimate| estimate.vector() - truth)
-                .collect(),
         }
     }
 }
@@ -190,22 +166,4 @@ fn whole_nees(
     let error = error.iter().chain(auxiliary_error).copied();
     let error = DVector::from_iterator(PARAMETERS + AUXILIARY, error);
     nees(&error, &covariance, &Vec::from_iter(0..error.len()))
-}
-
-/// The values of a history at each of the moments, in the general form. The history has no correlations; to first
-/// order, the change of form does not need them.
-fn track(
-    history: &[Epoch],
-    form: InstallationForm,
-    duration: f64,
-) -> impl Iterator<Item = Estimate> {
-    moments(duration).filter_map(move |time| {
-        let after = history.partition_point(|moment| moment.time <= time);
-        let moment = history.get(after.saturating_sub(1))?;
-        let estimate = Estimate {
-            triads: from_vector(form, &moment.estimate),
-            covariance: ParameterMatrix::from_diagonal(&moment.sigma.map(|s| s * s)),
-        };
-        Some(estimate.in_general_form())
-    })
 }

@@ -16,9 +16,9 @@ use crate::calibration::{Group, PARAMETERS, ParameterMatrix};
 /// negative share belongs to a group that compensates another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Budget {
-    /// Stated RMS position error, m.
+    /// Stated RMS position error, nmile.
     pub claimed: f64,
-    /// Actual RMS position error, m.
+    /// Actual RMS position error, nmile.
     pub actual: f64,
     /// The part of each of [`Group::all`].
     pub parts: Vec<Part>,
@@ -29,7 +29,7 @@ pub struct Budget {
 pub struct Part {
     /// The group.
     pub group: Group,
-    /// RMS position error of this group alone, m.
+    /// RMS position error of this group alone, nmile.
     pub alone: f64,
     /// Its share of the variance, as in [`Budget`].
     pub share: f64,

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{ExperimentError, HOUR_PATH, POSITIONS};
+use super::{HOUR_PATH, POSITIONS};
 use crate::calibration::{
     Estimate, NoisePolicy, Options, ParameterMatrix, ParameterVector, Problem, UNWATCHED, estimate,
     in_general_form, six_position, to_vector,
@@ -10,16 +10,20 @@ use crate::calibration::{
 use crate::imu::InstallationForm;
 use crate::models::ModelError;
 use crate::simulation::{Scenario, Simulated};
+use crate::study::StudyError;
 use crate::turntable::TableError;
 
 /// An estimator with its path.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Estimator {
     /// The closed form on the paper's static positions.
+    #[serde(rename = "six-position")]
     ClosedForm,
     /// The filter on the scenario's path.
+    #[serde(rename = "ekf")]
     Filter,
     /// The filter on a path that takes the closed form's table time.
+    #[serde(rename = "ekf-equal-time")]
     LongFilter,
 }
 
@@ -103,7 +107,7 @@ impl Scenarios {
     }
 
     /// One instrument, the same for all methods.
-    pub(super) fn trial(&self, seed: u64, run: u64) -> Result<Trial, ExperimentError> {
+    pub(super) fn trial(&self, seed: u64, run: u64) -> Result<Trial, StudyError> {
         let mut calibrations = Vec::new();
         for (estimator, scenario) in &self.0 {
             let simulated = scenario.simulate(seed, run)?;

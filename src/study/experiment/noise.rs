@@ -8,7 +8,7 @@ use rand_distr::StandardNormal;
 
 use crate::earth::{ROTATION_RATE, normal_gravity};
 use crate::imu::{Noise, PerSensor};
-use crate::navigation::error_model::{ATTITUDE, INPUTS, InputMatrix};
+use crate::navigation::error_model::{ATTITUDE, INPUTS, InputMatrix, STATES};
 use crate::navigation::{ErrorMatrix, Instant, NavigationError, Solution};
 use crate::study::experiment::Spread;
 use crate::study::navigation::{INTERVAL, Mission, Motion, NavigationStudyError};
@@ -24,13 +24,8 @@ const DRAWS: usize = 20_000;
 
 type Inputs = SVector<f64, INPUTS>;
 type InputCovariance = SMatrix<f64, INPUTS, INPUTS>;
-
-/// Covariance of navigation errors, of the Gauss–Markov biases, and between them.
-struct Covariance {
-    errors: ErrorMatrix,
-    between: InputMatrix,
-    bias: InputCovariance,
-}
+/// Of the navigation errors and of the Gauss–Markov biases behind them.
+type Joint = SMatrix<f64, { STATES + INPUTS }, { STATES + INPUTS }>;
 
 /// Variances of the noise of the sensed rate and force.
 struct Variances {
@@ -67,17 +62,22 @@ pub fn position(
     let bias = InputCovariance::from_diagonal(&variances.bias);
     let aligned = aligned.unwrap_or_default();
     let mean = bias + InputCovariance::from_diagonal(&(variances.white / ALIGNMENT_TIME));
-    let mut covariance = Covariance {
-        errors: aligned * mean * aligned.transpose(),
-        between: aligned * bias,
-        bias,
+    let mut covariance = joint(
+        &(aligned * mean * aligned.transpose()),
+        &(aligned * bias),
+        &bias,
+    );
+    covariance.fill_lower_triangle_with_upper_triangle();
+    let mut advance = |step: &Step| {
+        let moved = step.transition * covariance * step.transition.transpose();
+        covariance = moved + step.added;
     };
     let duration = f64::from(mission.intervals) * INTERVAL;
     let end = match &mission.motion {
         Motion::Standing(at) => {
             let step = Step::new(&at.steady(), STANDING_STEP, &variances);
             for _ in 0..(duration / STANDING_STEP).round() as u64 {
-                covariance.advance(&step);
+                advance(&step);
             }
             *at
         }
@@ -85,7 +85,7 @@ pub fn position(
             let mut strides = trajectory.strides();
             for number in 0..(duration / MOVING_STEP).round() as u32 {
                 strides.pass((f64::from(number) + 0.5) * MOVING_STEP);
-                covariance.advance(&Step::new(strides.here(), MOVING_STEP, &variances));
+                advance(&Step::new(strides.here(), MOVING_STEP, &variances));
             }
             strides.pass(duration);
             strides.here().truth
@@ -93,16 +93,29 @@ pub fn position(
     };
     let by_state = NavigationError::by_state(&end).ok_or(NavigationStudyError::Upright)?;
     let by_state = by_state.fixed_rows::<2>(6).into_owned();
-    Ok(by_state * covariance.errors * by_state.transpose())
+    let errors = covariance.fixed_view::<STATES, STATES>(0, 0);
+    Ok(by_state * errors * by_state.transpose())
+}
+
+/// A matrix of four blocks, of which that of the biases by errors is zero.
+fn joint(errors: &ErrorMatrix, between: &InputMatrix, bias: &InputCovariance) -> Joint {
+    let mut joint = Joint::zeros();
+    joint
+        .fixed_view_mut::<STATES, STATES>(0, 0)
+        .copy_from(errors);
+    joint
+        .fixed_view_mut::<STATES, INPUTS>(0, STATES)
+        .copy_from(between);
+    joint
+        .fixed_view_mut::<INPUTS, INPUTS>(STATES, STATES)
+        .copy_from(bias);
+    joint
 }
 
 /// The linear model over a step, with process noise.
 struct Step {
-    errors: ErrorMatrix,
-    input: InputMatrix,
-    added: ErrorMatrix,
-    keep: Inputs,
-    bias_added: Inputs,
+    transition: Joint,
+    added: Joint,
 }
 
 impl Step {
@@ -113,28 +126,16 @@ impl Step {
             .map(|time| (-duration / time).exp());
         // Constant over the step with the variance of white noise's mean.
         let white = InputCovariance::from_diagonal(&(variances.white / duration));
+        let bias_added = variances.bias.zip_map(&keep, |v, k| v * (1.0 - k * k));
+        let diagonal = InputCovariance::from_diagonal;
         Self {
-            added: transition.input * white * transition.input.transpose(),
-            errors: transition.errors,
-            input: transition.input,
-            bias_added: variances.bias.zip_map(&keep, |v, k| v * (1.0 - k * k)),
-            keep,
+            transition: joint(&transition.errors, &transition.input, &diagonal(&keep)),
+            added: joint(
+                &(transition.input * white * transition.input.transpose()),
+                &InputMatrix::zeros(),
+                &diagonal(&bias_added),
+            ),
         }
-    }
-}
-
-impl Covariance {
-    fn advance(&mut self, step: &Step) {
-        let (a, g) = (&step.errors, &step.input);
-        let crossed = a * self.between * g.transpose();
-        self.errors = a * self.errors * a.transpose()
-            + crossed
-            + crossed.transpose()
-            + g * self.bias * g.transpose()
-            + step.added;
-        let keep = InputCovariance::from_diagonal(&step.keep);
-        self.between = (a * self.between + g * self.bias) * keep;
-        self.bias = keep * self.bias * keep + InputCovariance::from_diagonal(&step.bias_added);
     }
 }
 

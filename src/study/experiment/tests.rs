@@ -7,7 +7,7 @@ use crate::calibration::{Group, Options, ParameterMatrix, Problem, in_general_fo
 use crate::imu::{GaussMarkov, Noise};
 use crate::models::{Place, trajectory};
 use crate::study::navigation::Pair;
-use crate::units::{DEG_PER_H, MICRO_G, MICRO_G_PER_SQRT_HZ};
+use crate::units::{DEG_PER_H, MICRO_G, MICRO_G_PER_SQRT_HZ, NAUTICAL_MILE};
 
 /// The experiment at a low sample rate.
 fn study(minutes: u32) -> ExperimentStudy {
@@ -70,11 +70,11 @@ fn exposure_against_navigation(cases: &[(InstallationForm, u32, f64)]) {
             };
             let actual = mission.errors_from(&start, &pair).unwrap();
             let way = study.way(situation).unwrap();
-            let position = |moment: usize| actual[moment].error.position.xy();
+            let position = |moment: usize| actual[moment].error.unwrap().position.xy();
             let last = actual.len() - 1;
             let largest = (0..=last).map(|k| position(k).norm()).fold(0.0, f64::max);
             for k in (0..=last).step_by(60) {
-                let linear: Vector2<f64> = way.minutes[k].1 * error;
+                let linear: Vector2<f64> = way.minutes[k].1 * error * NAUTICAL_MILE;
                 let apart = (linear - position(k)).norm() / largest;
                 assert!(apart < within, "{situation:?}, {form:?}, {k} min: {apart}");
             }
@@ -87,7 +87,7 @@ fn a_gyro_bias_to_the_east_is_taken_for_heading_and_leaves_no_drift() {
     let drift = |situation, axis: usize| {
         let way = study(2400).way(situation).unwrap();
         let bias = parameter(Sensor::Gyro, 9 + axis);
-        (way.end().column(bias) * (0.01 * DEG_PER_H)).norm()
+        (way.end().column(bias) * (0.01 * DEG_PER_H)).norm() * NAUTICAL_MILE
     };
     let north = drift(Situation::SelfAligned, 1);
     let east = drift(Situation::SelfAligned, 0);

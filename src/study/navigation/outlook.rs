@@ -2,7 +2,7 @@
 
 use nalgebra::SVector;
 
-use super::{Epoch, INTERVAL, Mission, NavigationStudyError, Pair};
+use super::{INTERVAL, Mission, NavigationStudyError, Pair};
 use crate::calibration::Estimate;
 use crate::earth::{SEMI_MAJOR_AXIS, Site};
 use crate::imu::{PerSensor, Triad};
@@ -20,16 +20,6 @@ pub struct Outlook {
     /// Its 1σ predicted from the calibration's covariance, in the order of
     /// [`NavigationError::to_vector`]; `None` if the calibration states no σ.
     pub sigma: Option<SVector<f64, STATES>>,
-}
-
-/// Errors without a prediction.
-pub fn known(epochs: &[Epoch]) -> Vec<Outlook> {
-    let outlook = |epoch: &Epoch| Outlook {
-        time: epoch.time,
-        error: Some(epoch.error),
-        sigma: None,
-    };
-    epochs.iter().map(outlook).collect()
 }
 
 /// Predicted 1σ of each error.
@@ -125,7 +115,7 @@ impl Mission {
         let exposures = self.exposure(&estimate.triads)?;
         let moments = exposures.iter().enumerate().map(|(k, exposure)| Outlook {
             time: exposure.time,
-            error: actual.get(k).map(|moment| moment.error),
+            error: actual.get(k).and_then(|moment| moment.error),
             sigma: Some(sigma(&exposure.covariance(&estimate.covariance))),
         });
         Ok(moments.collect())

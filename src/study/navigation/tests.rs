@@ -94,7 +94,13 @@ fn an_exact_calibration_navigates_without_error_wherever_it_goes() {
         moving("flight", 240),
         moving("vehicle", 240),
     ] {
-        let end = mission.errors(&exact).unwrap().pop().unwrap().error;
+        let end = mission
+            .errors(&exact)
+            .unwrap()
+            .pop()
+            .unwrap()
+            .error
+            .unwrap();
         assert_eq!(end.to_vector().amax(), 0.0, "{end:?}");
     }
 }
@@ -151,7 +157,13 @@ fn errors_are_those_of_navigation_at_the_full_rate_of_an_instrument() {
         // What navigation itself errs by is taken away.
         let [ideal, computed] = sampled(trajectory, &wrong.sensed().unwrap(), period, steps);
         let expected = NavigationError::of(&computed, &ideal).to_vector();
-        let found = mission.errors(&wrong).unwrap().pop().unwrap().error;
+        let found = mission
+            .errors(&wrong)
+            .unwrap()
+            .pop()
+            .unwrap()
+            .error
+            .unwrap();
         let apart = found.to_vector() - expected;
         for (first, count) in [(0, 3), (3, 2), (6, 2)] {
             let relative = apart.rows(first, count).amax() / expected.rows(first, count).amax();
@@ -175,7 +187,7 @@ fn what_the_linear_model_predicts_of_each_error_is_what_navigation_does() {
             let mut largest = SVector::<f64, STATES>::zeros();
             let mut apart = SVector::<f64, STATES>::zeros();
             for (moment, exposure) in moments.iter().zip(&exposures) {
-                let actual = moment.error.to_vector();
+                let actual = moment.error.unwrap().to_vector();
                 largest = largest.sup(&actual.abs());
                 apart = apart.sup(&(exposure.by_parameter * error - actual).abs());
             }
@@ -218,7 +230,7 @@ fn predicted_sigma_holds_the_error(runs: usize) {
         .into_par_iter()
         .map(|run| {
             let moments = mission.errors(&pair(&draw(run), None)).unwrap();
-            moments.last().unwrap().error.position.xy()
+            moments.last().unwrap().error.unwrap().position.xy()
         })
         .collect();
     let count = |holds: &dyn Fn(&Vector2<f64>) -> bool| errors.iter().filter(|e| holds(e)).count();
@@ -256,7 +268,7 @@ fn a_standing_body_hides_gyro_scale_errors_that_a_turning_one_shows() {
     error[2] = 100.0 * PPM;
     let heading = |mission: Mission| {
         let moments = mission.errors(&pair(&error, None)).unwrap();
-        let headings = moments.iter().map(|m| m.error.attitude.z.abs());
+        let headings = moments.iter().map(|m| m.error.unwrap().attitude.z.abs());
         headings.fold(0.0, f64::max)
     };
     // A full circle shows 100 ppm of it: 130″.

@@ -161,10 +161,9 @@ impl Mission {
                 return Err(WarmingError::Outside.into());
             }
         }
-        let epochs = self.errors_by(&ErrorVector::zeros(), |interval| {
+        let mut moments = self.errors_by(&ErrorVector::zeros(), |interval| {
             pair.at(middle(interval)).sensed()
         })?;
-        let mut moments = outlook::known(&epochs);
         let Changing { estimate, thermal } = &pair.calibration;
         if estimate.estimated().next().is_none() {
             return Ok(moments);

@@ -4,8 +4,8 @@ use nalgebra::Vector3;
 
 use crate::calibration::{Position, six_position_triad};
 use crate::imu::{InstallationForm, Sensor, Triad};
+use crate::study::navigation::Quantity;
 use crate::study::table1::response::Moments;
-use crate::units::{DEGREE, NAUTICAL_MILE};
 
 /// Samples behind each figure of the table.
 pub const SAMPLES: usize = 50;
@@ -33,12 +33,13 @@ pub struct Published {
 }
 
 impl Published {
-    /// Mean and standard deviation of a quantity, rad, m/s or m.
+    /// Mean and standard deviation of each quantity in its unit.
     pub fn moments(&self) -> ByQuantity<Moments> {
-        Quantity::ALL.map(|quantity| Moments {
-            mean: self.mean[quantity as usize] * quantity.unit_value(),
-            std: self.std[quantity as usize] * quantity.unit_value(),
-        })
+        let of = |q: usize| Moments {
+            mean: self.mean[q],
+            std: self.std[q],
+        };
+        std::array::from_fn(of)
     }
 }
 
@@ -88,7 +89,7 @@ const LONG_SLIP: Reading = Reading {
     ..SLIP
 };
 
-/// The table in the units of [`Quantity::unit`].
+/// The table in the usual units of [`QUANTITIES`].
 pub static TABLE: [Published; 4] = [
     Published {
         sensor: Sensor::Gyro,
@@ -128,65 +129,14 @@ pub static TABLE: [Published; 4] = [
     },
 ];
 
-/// A navigation error; internally in rad, m/s and m.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
-    /// Pitch.
-    Pitch,
-    /// Roll.
-    Roll,
-    /// Heading.
-    Heading,
-    /// Horizontal velocity, the norm of east and north.
-    Velocity,
-    /// Horizontal position, the norm of east and north.
-    Position,
-}
+/// The errors in the paper's table, in its order; velocity and position are horizontal.
+pub const QUANTITIES: ByQuantity<Quantity> = {
+    let [pitch, roll, heading, _, _, velocity, _, _, position] = Quantity::ALL;
+    [pitch, roll, heading, velocity, position]
+};
 
-/// A value for each quantity, in the order of [`Quantity::ALL`].
+/// A value for each of [`QUANTITIES`].
 pub type ByQuantity<T> = [T; 5];
-
-impl Quantity {
-    /// All, in the order of the paper's table.
-    pub const ALL: ByQuantity<Self> = [
-        Self::Pitch,
-        Self::Roll,
-        Self::Heading,
-        Self::Velocity,
-        Self::Position,
-    ];
-
-    /// Name, unit in the paper, value of that unit in rad, m/s or m, and key in JSON.
-    fn entry(self) -> (&'static str, &'static str, f64, &'static str) {
-        match self {
-            Self::Pitch => ("pitch", "°", DEGREE, "pitch_deg"),
-            Self::Roll => ("roll", "°", DEGREE, "roll_deg"),
-            Self::Heading => ("heading", "°", DEGREE, "heading_deg"),
-            Self::Velocity => ("velocity", "m/s", 1.0, "velocity_m_s"),
-            Self::Position => ("position", "nmile", NAUTICAL_MILE, "position_nmile"),
-        }
-    }
-
-    /// Its name.
-    pub fn name(self) -> &'static str {
-        self.entry().0
-    }
-
-    /// Its unit in the paper.
-    pub fn unit(self) -> &'static str {
-        self.entry().1
-    }
-
-    /// Value of that unit in rad, m/s or m.
-    pub fn unit_value(self) -> f64 {
-        self.entry().2
-    }
-
-    /// Its key in JSON, with the unit.
-    pub fn key(self) -> &'static str {
-        self.entry().3
-    }
-}
 
 /// A reading of the paper.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,21 +1,18 @@
 //! Effect of constant sensor errors on the navigation of a body at rest.
 
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::Vector3;
 
-use super::paper::ByQuantity;
-use crate::imu::{PerSensor, Sensor};
-use crate::navigation::error_model::{INPUTS, STATES};
-use crate::navigation::{NavigationError, Sensitivity, Solution};
+use super::paper::{ByQuantity, QUANTITIES};
+use crate::calibration::parameter;
+use crate::earth::Site;
+use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+use crate::study::navigation::{Exposure, Mission, NavigationStudyError};
 
 /// Longest output step in s. The largest of a Schuler swing of 84 min lies within half a step of an
 /// output, and is at most 1.7e-4 above it.
 const STEP: f64 = 30.0;
-/// Pitch, roll, heading; velocity and position, east and north.
-const OUTPUTS: usize = 7;
-/// Their indices in [`NavigationError::to_vector`].
-const ROWS: [usize; OUTPUTS] = [0, 1, 2, 3, 4, 6, 7];
 
-/// Mean and standard deviation (`n − 1`), rad, m/s or m.
+/// Mean and standard deviation (`n − 1`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Moments {
     /// Mean.
@@ -37,126 +34,74 @@ impl Moments {
     }
 }
 
-/// A body at rest on the ellipsoid, level and heading north.
-pub fn standing(latitude: f64) -> Solution {
-    Solution {
-        attitude: Matrix3::identity(),
-        velocity: Vector3::zeros(),
-        latitude,
-        longitude: 0.0,
-        height: 0.0,
+/// A body at rest on the ellipsoid, level and heading north, for a time in s.
+pub fn standing(latitude: f64, duration: f64) -> Mission {
+    let steps = (duration / STEP).ceil().max(1.0);
+    Mission {
+        interval: duration / steps,
+        ..Mission::standing_level(&Site::with_normal_gravity(latitude, 0.0, 0.0), steps as u32)
     }
 }
 
-/// Navigation errors per each of the three errors of a triad, at evenly spaced times.
+/// Navigation errors by constant errors of the sensed rate and specific force, at evenly spaced times.
 ///
-/// At rest under constant sensor errors, the linear error model has constant coefficients: its
-/// response to each unit error is computed once, exactly at each output, and every sample is a linear
-/// combination of the responses.
-pub struct Response {
-    step: f64,
-    by_sensor: PerSensor<Vec<SMatrix<f64, OUTPUTS, 3>>>,
-}
+/// At rest under constant sensor errors, the linear error model has constant coefficients: its response to each
+/// unit error, that of the bias of an ideal instrument, is computed once, and every sample is a linear combination
+/// of the responses.
+pub struct Response(Vec<Exposure>);
 
 impl Response {
-    /// Response over a time in s, with height held and perfect alignment; `None` if roll and heading of the
-    /// body are not distinguishable.
-    pub(super) fn new(truth: &Solution, duration: f64) -> Option<Self> {
-        let steps = (duration / STEP).ceil().max(1.0);
-        let step = duration / steps;
-        let transition = truth.steady().linear_model().over(step);
-        let by_state = NavigationError::by_state(truth)?;
-        let outputs = SMatrix::<f64, OUTPUTS, STATES>::from_fn(|i, j| by_state[(ROWS[i], j)]);
-        let mut sensitivity = Sensitivity::<INPUTS>::zeros();
-        let mut by_sensor = PerSensor::<Vec<_>>::default();
-        for _ in 0..=steps as usize {
-            let response = outputs * sensitivity;
-            for (place, sensor) in Sensor::ALL.into_iter().enumerate() {
-                let of_triad = response.fixed_columns::<3>(3 * place).into_owned();
-                by_sensor.get_mut(sensor).push(of_triad);
-            }
-            sensitivity = transition.errors * sensitivity + transition.input;
-        }
-        Some(Self { step, by_sensor })
+    pub(super) fn new(mission: &Mission) -> Result<Self, NavigationStudyError> {
+        let ideal = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
+        mission.exposure(&ideal).map(Self)
     }
 
     /// Largest absolute error over the run.
     pub(super) fn largest(&self, sensor: Sensor, sensed: &Vector3<f64>) -> ByQuantity<f64> {
         let mut largest = [0.0; 5];
-        for response in self.by_sensor.get(sensor) {
-            let sizes = sizes(&(response * sensed));
-            for (largest, size) in largest.iter_mut().zip(sizes) {
-                *largest = f64::max(*largest, size);
+        for exposure in &self.0 {
+            for (largest, error) in largest.iter_mut().zip(errors(exposure, sensor, sensed)) {
+                *largest = f64::max(*largest, error.abs());
             }
         }
-        let [pitch, roll, heading, velocity, position] = largest;
-        [pitch, roll, heading, velocity.sqrt(), position.sqrt()]
+        largest
     }
 
-    /// Indices of about this many outputs, evenly spaced from the first on.
-    pub(super) fn thinned(&self, outputs: usize) -> impl Iterator<Item = usize> {
-        let count = self.by_sensor.gyro.len();
-        (0..count).step_by(count.div_ceil(outputs.max(1)))
-    }
-
-    /// Time of an output, s.
-    pub(super) fn time(&self, output: usize) -> f64 {
-        self.step * output as f64
-    }
-
-    /// Errors at an output: attitude with sign, velocity and position as norms.
-    pub(super) fn errors(
-        &self,
-        sensor: Sensor,
-        output: usize,
-        sensed: &Vector3<f64>,
-    ) -> ByQuantity<f64> {
-        let outputs = self.by_sensor.get(sensor)[output] * sensed;
-        let [.., velocity, position] = sizes(&outputs);
-        let [pitch, roll, heading] = [0, 1, 2].map(|angle| outputs[angle]);
-        [pitch, roll, heading, velocity.sqrt(), position.sqrt()]
+    /// About this many moments, evenly spaced from the first on.
+    pub(super) fn thinned(&self, moments: usize) -> impl Iterator<Item = &Exposure> {
+        self.0.iter().step_by(self.0.len().div_ceil(moments.max(1)))
     }
 }
 
-/// Magnitudes of the angles, squared norms of velocity and position.
-#[inline]
-fn sizes(outputs: &SVector<f64, OUTPUTS>) -> ByQuantity<f64> {
-    let square = |first: usize| outputs[first].powi(2) + outputs[first + 1].powi(2);
-    [
-        outputs[0].abs(),
-        outputs[1].abs(),
-        outputs[2].abs(),
-        square(3),
-        square(5),
-    ]
+/// Errors at one moment: attitude with its sign, velocity and position as norms.
+pub fn errors(exposure: &Exposure, sensor: Sensor, sensed: &Vector3<f64>) -> ByQuantity<f64> {
+    let bias = parameter(sensor, PER_TRIAD - 3);
+    let errors = exposure.by_parameter.fixed_columns::<3>(bias) * sensed;
+    QUANTITIES.map(|quantity| quantity.of(&errors))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::earth::normal_gravity;
     use crate::units::{DEG_PER_H, DEGREE, MICRO_G};
 
     #[test]
     fn an_accelerometer_error_tilts_by_twice_its_share_of_gravity_within_a_swing() {
-        let truth = standing(45.0 * DEGREE);
-        let force = truth.steady().force;
-        let response = Response::new(&truth, 3.0 * 3600.0).unwrap();
+        let response = Response::new(&standing(45.0 * DEGREE, 3.0 * 3600.0)).unwrap();
         let error = 100.0 * MICRO_G;
         let largest = response.largest(Sensor::Accel, &(Vector3::y() * error));
         // Level at first, the tilt swings about that which hides the error: from 0 to 2 ∇/g.
-        let expected = 2.0 * error / force.z;
+        let expected = 2.0 * error / normal_gravity(45.0 * DEGREE, 0.0) / DEGREE;
         assert!((largest[0] / expected - 1.0).abs() < 0.02, "{largest:?}");
     }
 
     #[test]
     fn a_coarser_output_would_not_have_lost_the_largest_error() {
-        let truth = standing(45.78 * DEGREE);
-        let response = Response::new(&truth, 40.0 * 3600.0).unwrap();
-        let mut sparse = Response::new(&truth, 40.0 * 3600.0).unwrap();
+        let mission = standing(45.78 * DEGREE, 40.0 * 3600.0);
+        let response = Response::new(&mission).unwrap();
+        let sparse = Response(response.0.iter().step_by(2).cloned().collect());
         for sensor in Sensor::ALL {
-            let mut keep = (0..).map(|k| k % 2 == 0);
-            let rows = sparse.by_sensor.get_mut(sensor);
-            rows.retain(|_| keep.next() == Some(true));
             let sensed = match sensor {
                 Sensor::Gyro => Vector3::new(0.01, -0.02, 0.03) * DEG_PER_H,
                 Sensor::Accel => Vector3::new(50.0, -70.0, 1.0) * MICRO_G,
