@@ -82,7 +82,7 @@ static MODELS: Dir = include_dir::include_dir!("$CARGO_MANIFEST_DIR/models");
 pub enum ModelError {
     /// Neither a file nor an embedded name.
     #[error(
-        "{named_in}no {room} model \"{name}\"{}: it is neither a file nor one of {known}",
+        "{named_in}no {room} model \"{name}\"{}: it is neither a file nor one of the models {known}",
         nearest.map_or_else(String::new, |nearest| format!(" (did you mean \"{nearest}\"?)"))
     )]
     Unknown {

@@ -237,8 +237,8 @@ impl<'a> Problem<'a> {
     pub(in crate::calibration) fn remarks(&self) -> Vec<Finding> {
         let left_out = self.left_out.iter().map(|name| {
             format!(
-                "{name}: left out, since no dwell was found in it; the instrument must stand for {LONG_ENOUGH} s or more \
-                 between turns."
+                "{name}: excluded because no dwell was found in it. Keep the instrument still for {LONG_ENOUGH} s or \
+                 more between turns."
             )
         });
         let doubts = self

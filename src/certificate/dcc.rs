@@ -291,7 +291,7 @@ fn measured(xml: &mut Xml, certificate: &Certificate) {
     }
     xml.element("dcc:influenceConditions", |xml| {
         xml.condition(
-            "temperature of the air",
+            "air temperature",
             "\\degreecelsius",
             laboratory.conditions.temperature_degc,
         );
@@ -337,9 +337,9 @@ fn description(certificate: &Certificate) -> String {
     let unit = unit.map(|unit| (unit.gyro.as_str(), unit.accel.as_str()));
     let (gyro, accel) = unit.unwrap_or_default();
     let mut text = format!(
-        "Scale factors over their nominal value minus one, entries of the installation matrix in rad, biases in rad/s \
-         and m/s². Nominal: gyros {for_gyros} {gyro} per second for 1 rad/s, accelerometers {for_accels} {accel} per \
-         second for 1 m/s². Body frame: {}.",
+        "Scale factors divided by their nominal value, minus one; entries of the installation matrix in rad; biases \
+         in rad/s and m/s². Nominal scale: gyros {for_gyros} {gyro} per second for 1 rad/s, accelerometers \
+         {for_accels} {accel} per second for 1 m/s². Body frame: {}.",
         certificate.body_frame().words(),
     );
     if let Some(temperature) = &certificate.calibration.temperature {

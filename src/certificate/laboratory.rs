@@ -65,7 +65,7 @@ impl TryFrom<String> for Day {
     type Error = &'static str;
 
     fn try_from(text: String) -> Result<Self, Self::Error> {
-        Self::parse(&text).ok_or("a day such as 2026-03-31")
+        Self::parse(&text).ok_or("a date such as 2026-03-31")
     }
 }
 
@@ -104,7 +104,7 @@ impl Place {
     pub fn words(self) -> &'static str {
         match self {
             Self::Laboratory => "in the laboratory",
-            Self::Customer => "at the customer's",
+            Self::Customer => "at the customer's site",
             Self::LaboratoryBranch => "in a branch of the laboratory",
             Self::Other => "elsewhere, see remarks",
         }
@@ -123,7 +123,7 @@ pub struct Condition {
 
 /// Equipment used for traceability.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
-#[serde(expecting = "name, serial number and certificate, three texts in quotes")]
+#[serde(expecting = "name, serial number and certificate as three strings in quotes")]
 pub struct Equipment {
     /// What it is.
     pub name: String,
@@ -148,11 +148,11 @@ impl DecisionRule {
     pub fn words(self) -> &'static str {
         match self {
             Self::GuardBand => {
-                "guard band w = U (ILAC-G8): pass if the value is within its limit by the expanded uncertainty, \
-                 fail where it is beyond it by that; between these pass and fail are conditional"
+                "guard band w = U (ILAC-G8): pass if the value is inside its limit by at least the expanded \
+                 uncertainty, fail if it is outside by at least that; between these, pass and fail are conditional"
             }
             Self::SimpleAcceptance => {
-                "simple acceptance (ILAC-G8): pass if the value is within its limit, regardless of its uncertainty"
+                "simple acceptance (ILAC-G8): pass if the value is within its limit, regardless of uncertainty"
             }
         }
     }

@@ -22,24 +22,21 @@ pub use results::{Measured, Quantity, temperature_words, to_twelve_digits};
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CertificateError {
     /// The calibration may not be used.
-    #[error(
-        "the calibration {reason}, expected one that may be used; a certificate of it would be wrong. Look at its \
-         findings."
-    )]
+    #[error("the calibration {reason}, so it cannot be certified. See its findings.")]
     NotUsable {
         /// The reason.
         reason: &'static str,
     },
     /// A required field is missing from the file.
-    #[error("no `{field}` in the calibration, expected a file of this version; calibrate again")]
+    #[error("the calibration has no `{field}` because it is from another version. Calibrate again")]
     Missing {
         /// The field.
         field: &'static str,
     },
     /// The decision rule for conformity is missing.
     #[error(
-        "no `decision.rule` in lab.toml, expected \"guard-band\" or \"simple-acceptance\"; ISO/IEC 17025, 7.8.6, \
-         asks for it where conformity is stated. Add it."
+        "lab.toml has no `decision.rule`, which ISO/IEC 17025, 7.8.6, requires for statements of conformity. Set it \
+         to \"guard-band\" or \"simple-acceptance\"."
     )]
     NoRule,
     /// The calibrations cannot be compared, or not with limits.

@@ -110,8 +110,7 @@ fn document(
     let (table_time, whole_time) = (minutes(run), minutes(still.run()));
     let closed_form = cut(still, table_time / whole_time)?;
     let note = format!(
-        "{}; the first part of each dwell, as if the table had been driven for the {table_time:.0} min of the \
-         filter's run",
+        "{}; first part of each dwell, equivalent to the {table_time:.0} min table time of the filter",
         note(&closed_form)
     );
     let methods = [
@@ -181,13 +180,13 @@ fn fly(run: &Run, estimates: &[&Estimate], truth: &PerSensor<Triad>) -> anyhow::
     let missions = [
         (
             "stationary and level",
-            "Stationary, gyro bias makes nearly all of the error, and only time at rest lowers its σ.",
+            "When stationary, gyro bias causes nearly all of the error, and only time at rest reduces its σ.",
             still,
         ),
         (
             "in flight",
-            "In flight turns and accelerations expose scale factors and installation, which the filter \
-             observes in minutes.",
+            "In flight, turns and accelerations excite scale factors and misalignments, which the filter observes in \
+             minutes.",
             flying,
         ),
     ];

@@ -38,11 +38,11 @@ With a turntable:
   turncal calibrate run.toml
 
 Advanced (each with --help):
-  merge        parts of a job that --shard split, as one result
-  study        Monte Carlo studies: accuracy, table1, experiment
-  schema       the JSON schema of run.toml
-  completions  a shell-completion script
-  man          the manual pages"
+  merge        merge the parts of a job split with --shard
+  study        run Monte Carlo studies: accuracy, table1, experiment
+  schema       print the JSON schema of run.toml
+  completions  print a shell-completion script
+  man          write the manual pages"
 )]
 pub struct Cli {
     #[command(subcommand)]

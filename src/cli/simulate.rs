@@ -53,9 +53,9 @@ impl Simulate {
         drop(activity);
         if simulated.geometry.rows_range(3..).amax() > 0.0 {
             tell!(
-                "note: the axes of the simulated table have errors of their own (non-orthogonality, wobble, \
-                 encoders), which the quaternions of its log cannot tell: a calibration from these files \
-                 will claim too small σ of installation. turncal study accuracy estimates them."
+                "note: the axes of the simulated table have errors (non-orthogonality, wobble, encoders) that the \
+                 quaternions in its log cannot show, so a calibration from these files will state misalignment σ \
+                 that are too small. turncal study accuracy estimates these errors."
             );
         }
         tell!(

@@ -78,7 +78,7 @@ impl CsvFile {
                 path,
                 Place::File,
                 "an empty file",
-                "a line of column names and rows below it",
+                "a line of column names followed by rows",
                 "Record or export the file again.",
             )
         })?;
@@ -120,9 +120,12 @@ impl CsvFile {
             return Ok(());
         }
         Err(self.error_here(
-            format_args!("row {}, and no memory for as many more", self.rows),
-            "a record that fits into memory",
-            "Give it more memory, or split the record.",
+            format_args!(
+                "{} rows so far and not enough memory for as many again",
+                self.rows
+            ),
+            "a recording that fits into memory",
+            "Use a computer with more memory, or split the recording.",
         ))
     }
 
@@ -185,7 +188,7 @@ impl Rows for CsvFile {
         if found != expected && !ends_in_delimiter {
             return Err(self.error_here(
                 format_args!("{found} fields"),
-                format_args!("{expected}, as in the header"),
+                format_args!("{expected} as in the header"),
                 "Complete or remove the row.",
             ));
         }
@@ -239,11 +242,11 @@ impl Rows for CsvFile {
     fn cut_off(&self, done: &str) -> Option<String> {
         let (file, line) = (self.file.display(), self.line);
         let what = match self.cut? {
-            Cut::Row => "is cut off: fields are missing. It is left out",
+            Cut::Row => "is truncated (fields are missing), so turncal ignored it",
             Cut::Number => &format!("has no line end, so its last number may lack digits. {done}"),
         };
         Some(format!(
-            "The last row of {file}, line {line}, {what}; look whether the file is whole."
+            "The last row of {file} (line {line}) {what}. Check that the file is complete."
         ))
     }
 
@@ -283,8 +286,8 @@ fn source(path: &Path) -> Result<Box<dyn BufRead>, FileError> {
                 true => "a directory",
                 false => "a device or pipe",
             },
-            "a regular file, for a log may be read more than once",
-            "Copy what it gives into a file and name that.",
+            "a regular file that can be read more than once",
+            "Save its output to a file and give that file.",
         ));
     }
     let file = File::open(path).map_err(refused)?;
@@ -305,23 +308,23 @@ fn stopped(file: &Path, stop: &Stop) -> FileError {
     match stop {
         Stop::System(error) => FileError::io(
             file,
-            "read on",
+            "continue reading",
             error,
-            "The file is damaged or cut off; copy or compress it again.",
+            "The file is damaged or truncated. Copy or compress it again.",
         ),
         Stop::Endless { line } => FileError::new(
             file,
             Place::Line(*line),
-            format_args!("more than {} KiB without a row that ends", LONGEST / 1024),
-            "rows of numbers, a line each",
+            format_args!("more than {} KiB without an end of line", LONGEST / 1024),
+            "one row of numbers per line",
             "Is this the right file? Record or export it again.",
         ),
         Stop::Malformed { line, what } => malformed(file, *line, *what),
         Stop::Binary => FileError::new(
             file,
             Place::File,
-            "a file of another kind",
-            "rows of text, or a log of a program that turncal knows",
+            "binary data of an unknown format",
+            "a text log or a supported binary log",
             "Convert the file.",
         ),
     }
@@ -330,18 +333,18 @@ fn stopped(file: &Path, stop: &Stop) -> FileError {
 fn malformed(file: &Path, line: u64, what: Malformed) -> FileError {
     let (found, expected, advice) = match what {
         Malformed::Quote => (
-            "a quote that is not closed".to_owned(),
-            "a row in each line, and fields in quotes closed in it".to_owned(),
+            "an unclosed quote".to_owned(),
+            "one row per line, with every quote closed".to_owned(),
             "Remove the quote or close it.",
         ),
         Malformed::Columns => (
-            "more columns than any log has".to_owned(),
-            format!("at most {MOST_COLUMNS}"),
+            "too many columns".to_owned(),
+            format!("at most {MOST_COLUMNS} columns"),
             "Is this the right file? Export the columns that are needed.",
         ),
         Malformed::Field => (
-            format!("a field of more than {} KiB", LONGEST_FIELD / 1024),
-            "numbers and names".to_owned(),
+            format!("a field longer than {} KiB", LONGEST_FIELD / 1024),
+            "short numbers or names".to_owned(),
             "Is this the right file? Record or export it again.",
         ),
     };

@@ -113,7 +113,7 @@ impl FileError {
 
     /// The system did not let a file be written.
     pub(super) fn unwritten(file: &Path, error: &std::io::Error) -> Self {
-        let advice = "Make room or choose another place.";
+        let advice = "Free some disk space or choose another location.";
         Self::io(file, "write the file", error, advice)
     }
 

@@ -142,7 +142,7 @@ impl ImuLog<'_> {
                 continue;
             }
             notes.extend(clock.uneven());
-            notes.extend(csv.cut_off("It is left out"));
+            notes.extend(csv.cut_off("turncal ignored it"));
             notes.extend_from_slice(csv.remarks());
             notes.extend(reading.notes());
             notes.extend(reading.stamps.notes(&self.source.file, parts.missing()));

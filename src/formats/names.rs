@@ -17,14 +17,14 @@ pub fn find(all: &[String], taken: &[usize], name: &str) -> Result<usize, [Strin
     match places[..] {
         [place] if !taken.contains(&place) => Ok(place),
         [_] => Err([
-            format!("`{name}` named for two quantities"),
-            "a column of its own for each".to_owned(),
+            format!("the column `{name}` used for two quantities"),
+            "a separate column for each".to_owned(),
             "Correct `columns` in run.toml.".to_owned(),
         ]),
         [_, ..] => Err([
             format!("two columns named `{name}`"),
-            "one".to_owned(),
-            "Name it by its number, the first being `1`, or rename one of them.".to_owned(),
+            "a unique name".to_owned(),
+            "Refer to it by its number (the first is `1`), or rename one of them.".to_owned(),
         ]),
         [] => {
             let advice = "Correct `columns` in run.toml or this header.";

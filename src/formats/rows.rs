@@ -156,7 +156,7 @@ impl LogRows {
             true => "an empty field".to_owned(),
             false => format!("`{shown}`"),
         };
-        let advice = "Correct the value or record the file again.";
+        let advice = "Correct the value, or repeat the recording.";
         FileError::new(
             self.file(),
             self.place(Some(column)),

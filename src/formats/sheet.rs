@@ -50,7 +50,7 @@ impl Sheet {
         let rows = columns.first().map_or(0, Vec::len);
         if rows < fewest {
             return Err(csv.error(
-                format_args!("{rows} rows"),
+                format_args!("only {rows} rows"),
                 format_args!("at least {fewest}"),
                 "Record a run with dwells and turns.",
             ));

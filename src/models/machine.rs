@@ -42,7 +42,7 @@ pub fn turntable(name_or_path: &str, named_in: &Place) -> Result<(Table, String)
     };
     if table.axes.is_empty() {
         return Err(
-            text.inconsistent("a table without axes; give one [[axis]] each, outermost first")
+            text.inconsistent("a table without axes; add one [[axis]] per axis, outermost first")
         );
     }
     Ok((table, text.name()))
@@ -67,8 +67,9 @@ pub fn path(
             moves.map_err(|message| text.inconsistent(message))?
         }
         _ => {
-            return Err(text
-                .inconsistent("expected either [axes] or [body], whichever the path turns about"));
+            return Err(text.inconsistent(
+                "expected either [axes] or [body], depending on the axes that the path turns about",
+            ));
         }
     };
     Ok((

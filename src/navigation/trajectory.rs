@@ -42,8 +42,8 @@ pub enum TrajectoryError {
     /// A climb or descent that is too steep.
     #[error(
         "segment {segment} climbs or descends at {climb:.2} m/s with {speed:.2} m/s of horizontal speed at \
-         its start or end; at least {:.0} times the climb rate is needed: change speed in a segment of its \
-         own, or climb more slowly",
+         its start or end; horizontal speed must be at least {:.0} times the climb rate: change speed in a separate \
+         segment, or climb more slowly",
         LEAST_GLIDE
     )]
     Steep {

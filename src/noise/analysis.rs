@@ -37,14 +37,14 @@ pub enum StretchError {
     },
     /// There is no standstill.
     #[error(
-        "found no standstill in the record, expected one of minutes or better hours: let the instrument \
-         stand undisturbed, or name a section of it with --segment"
+        "the recording has no standstill. Leave the instrument undisturbed for minutes, preferably hours, or name a \
+         section with --segment"
     )]
     NoStandstill,
     /// Too few samples.
     #[error(
-        "{name} has {found} samples, expected at least {FEWEST}, and for bias instability some minutes to \
-         hours: record longer standing still"
+        "{name} has {found} samples, but at least {FEWEST} are needed (minutes to hours for bias instability). \
+         Record a longer standstill"
     )]
     TooShort {
         /// Name of the stretch.
@@ -58,8 +58,8 @@ fn known(labels: &[String]) -> String {
     let mut quoted: Vec<String> = labels.iter().map(|label| format!("`{label}`")).collect();
     quoted.dedup();
     match quoted.join(", ").as_str() {
-        "" => "the run has no [segments]: leave --segment out, or add them to run.toml".to_owned(),
-        quoted => format!("there are {quoted}"),
+        "" => "the run has no [segments]; omit --segment, or add them to run.toml".to_owned(),
+        quoted => format!("known labels are {quoted}"),
     }
 }
 
@@ -113,7 +113,7 @@ impl Stretch {
             .map(|of| of.samples)
             .max_by_key(ExactSizeIterator::len)?;
         let name = if samples.len() == run.recording.imu.len() {
-            "the whole record".to_owned()
+            "the whole recording".to_owned()
         } else {
             format!("the longest standstill, {}", times(run, &samples))
         };

@@ -59,9 +59,7 @@ pub struct Stretch {
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SampleError {
     /// Triads of different length.
-    #[error(
-        "{gyro} samples of the gyros and {accel} of the accelerometers; give one of each for every period"
-    )]
+    #[error("{gyro} gyro samples but {accel} accelerometer samples; give one of each per period")]
     Lengths {
         /// Samples of the gyros.
         gyro: usize,
@@ -69,16 +67,16 @@ pub enum SampleError {
         accel: usize,
     },
     /// No samples.
-    #[error("no samples; give integrals of the output over each period")]
+    #[error("no samples; give the output integrated over each period")]
     Empty,
     /// A number that is not finite.
-    #[error("sample {sample} is not finite; leave it out or split the recording there")]
+    #[error("sample {sample} is not finite; remove it, or split the recording there")]
     NotFinite {
         /// The first such sample.
         sample: usize,
     },
     /// An invalid period.
-    #[error("a period of {period} s; give the length of a sample in s, above zero")]
+    #[error("the period is {period} s; give a sample period above zero, in s")]
     Period {
         /// The period, s.
         period: f64,

@@ -10,7 +10,10 @@ pub fn document(conversion: &Conversion) -> Document {
         .rate
         .map_or(String::new(), |rate| format!(" at {rate} Hz"));
     let mut document = Document::new(format!("{value} {}{at}", given.unit));
-    document.lead = vec![format!("Read as {}. The same is:", given.meaning)];
+    document.lead = vec![format!(
+        "Interpreted as {}. Equivalent values:",
+        given.meaning
+    )];
     let row = |&(value, of): &Line| {
         let name = format!("{:>11} {}", digits(value), of.unit);
         (name, of.meaning)

@@ -15,7 +15,7 @@ const STYLE: &str = include_str!("style.css");
 
 /// A file of a report that could not be written.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot write {path}: {source}; the directory must exist and be writable", path = path.display())]
+#[error("cannot write {path}: {source}. The directory must exist and be writable", path = path.display())]
 pub struct ReportError {
     /// The file.
     pub path: PathBuf,

@@ -81,11 +81,11 @@ pub fn costs(effects: &[ErrorTermTest]) -> Table {
     };
     let columns = std::iter::once("term".to_owned()).chain(Group::all().map(Group::short));
     Table::new(
-        "What each error term costs: σ with it over σ without it",
+        "Cost of each error term: σ with the term divided by σ without it",
         columns,
     )
     .section(effects.iter().filter(|effect| effect.on).map(row))
-    .note("RMS over the parameters of a group, the other terms as they were.")
+    .note("RMS over the parameters of a group, with the other terms unchanged.")
 }
 
 /// What those explain that were on or that the data show.
@@ -106,13 +106,13 @@ pub fn explained(effects: &[ErrorTermTest]) -> Table {
             .iter()
             .filter(move |e| e.on == on && (e.on || e.significant()))
     };
-    Table::new("What each error term explains", columns("term | | NIS | cost falls by | by chance | significant"))
+    Table::new("Effect of each error term", columns("term | | NIS | cost falls by | by chance | significant"))
         .sections([shown(true).map(row), shown(false).map(row)])
         .note(
-            "NIS of all observations without → with the term. Cost: −2 ln of likelihood and prior. By chance: \
-             the fall at a term's share of one false alarm in 1000 runs.",
+            "NIS of all observations without → with the term. Cost: −2 ln of likelihood and prior. By chance: fall \
+             expected by chance, at a total false-alarm rate of 1 in 1000 runs.",
         )
-        .note("Terms that are off are tried with their usual σ and shown where they are significant.")
+        .note("Terms that are off are tested with their usual σ and shown if significant.")
 }
 
 fn nis(effect: &ErrorTermTest) -> String {

@@ -218,7 +218,7 @@ impl Scenario {
             let number = duration * rate;
             if !(2.0..=MOST_SAMPLES).contains(&number) {
                 return Err(format!(
-                    "{duration:.1} s of path {} at {rate} Hz make {number:.3e} {what}; expected 2 to \
+                    "{duration:.1} s of path {} at {rate} Hz give {number:.3e} {what}; expected 2 to \
                      {MOST_SAMPLES:.0e}",
                     self.path_name
                 ));
@@ -331,13 +331,12 @@ impl ChamberFile {
     pub fn in_si(self) -> Result<Chamber, String> {
         let profile: Vec<(f64, f64)> = self.profile.iter().map(|(t, v)| (t.0, v.0)).collect();
         if profile.is_empty() || !profile.is_sorted_by(|a, b| a.0 < b.0) {
-            return Err("profile: expected at least one [time in s, temperature in °C], each later than the one \
-                        before"
+            return Err("profile: expected at least one [time in s, temperature in °C], in increasing order of time"
                 .to_owned());
         }
         if let Some((_, value)) = profile.iter().find(|(_, value)| value.abs() > 150.0) {
             return Err(format!(
-                "profile: found {value} °C, expected a chamber within ±150 °C"
+                "profile: found {value} °C, expected a chamber temperature within ±150 °C"
             ));
         }
         Ok(Chamber {

@@ -145,8 +145,8 @@ pub fn outliers(innovations: &[Innovation]) -> Option<Finding> {
     let most = dwells.rev().max_by_key(|of_dwell| of_dwell.len())?;
     let (rejected, dwell, time) = (rejected.len(), most[0].dwell + 1, most[0].time);
     let text = format!(
-        "{rejected} of {observations} observations were rejected as outliers, {} of them in dwell {dwell} from {time:.1} s \
-         on. Look there for a bump.",
+        "{rejected} of {observations} observations were rejected as outliers, {} of them in dwell {dwell}, which \
+         starts at {time:.1} s. Check that dwell for a bump.",
         most.len()
     );
     let figures = json!({

@@ -9,7 +9,7 @@ use crate::run::motion::LabelCheck;
 pub fn contradicted(contradicted: &[LabelCheck]) -> Option<Finding> {
     let each: Vec<String> = contradicted.iter().map(LabelCheck::to_string).collect();
     let text = format!(
-        "Labels and record disagree. Section {}.",
+        "Labels and recording disagree. Section {}.",
         each.join("; section ")
     );
     let figure = |check: &LabelCheck| {

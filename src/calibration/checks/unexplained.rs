@@ -26,7 +26,7 @@ pub fn not_converged(outcome: &Outcome) -> Option<Finding> {
         .last()
         .map_or(f64::NAN, |pass| pass.largest_step);
     let text = format!(
-        "Not converged: the last of {passes} passes still moved a parameter by {step:.2} σ. Use neither values nor \
+        "Not converged: the last of {passes} passes still moved a parameter by {step:.2} σ. Do not use the values or \
          σ. Check scale, units and axes in run.toml with turncal check."
     );
     let figures = json!({ "passes": passes, "largest_step_sigma": step });
@@ -61,7 +61,7 @@ fn rejected(name: &str, nis: f64, worst: f64) -> Option<Finding> {
     let text = format!(
         "Calibration rejected: {name} is {nis:.0}, far above anything a wrong noise figure could cause (limit \
          {limit:.0}). The largest residual is at {worst:.1} s: look there for lost, repeated or wrapped rows, a bump \
-         or another table position. If it is noise after all, rerun with --noise auto."
+         or a wrong table position. If it really is noise, rerun with --noise auto."
     );
     let figures = json!({ "nis": nis, "limit": limit, "worst": worst });
     (nis > limit).then(|| Finding::new(Kind::Unexplained, text, figures))

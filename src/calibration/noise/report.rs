@@ -80,11 +80,11 @@ impl fmt::Display for NoiseReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if !self.learnt {
             return match &self.test {
-                Some(_) => f.write_str("Noise as stated: the data do not contradict it."),
-                None => f.write_str("Noise as stated."),
+                Some(_) => f.write_str("Stated noise was used; the data agree with it."),
+                None => f.write_str("Stated noise was used."),
             };
         }
-        f.write_str("Noise learnt from the record:")?;
+        f.write_str("Noise estimated from the recording:")?;
         for (number, figures) in self.sources.iter().filter(|s| s.counts()).enumerate() {
             f.write_str(if number == 0 { " " } else { "; " })?;
             write!(f, "{figures}")?;

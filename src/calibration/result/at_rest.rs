@@ -166,7 +166,7 @@ impl AtRest {
             let of = (0..PARAMETERS).filter(is);
             of.filter_map(|index| parameter_name(form, index)).collect()
         };
-        let by = "an instrument that stands in one attitude";
+        let by = "an instrument at rest in one attitude";
         let hidden = names(&|sensor, is_bias| !is_bias || sensor == Sensor::Accel);
         let turned = names(&|_, is_bias| !is_bias);
         let findings = [not_observed(by, hidden), temperature_not_seen(turned)];

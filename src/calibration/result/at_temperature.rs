@@ -24,8 +24,8 @@ const ONE: PerSensor<Nominal> = PerSensor {
 pub enum TemperatureError {
     /// The temperature is out of range.
     #[error(
-        "{found} °C, expected {lowest} to {highest} °C: outside that the polynomials of the {} are not known; \
-         calibrate at temperatures that reach there", .sensor.name()
+        "{found} °C is outside {lowest} to {highest} °C, where the polynomials of the {} are valid. Calibrate over a \
+         range that includes it", .sensor.name()
     )]
     Outside {
         /// Which triad.
@@ -39,7 +39,7 @@ pub enum TemperatureError {
     },
     /// A coefficient of an unknown parameter, or of an invalid order.
     #[error(
-        "`{0}` in temperature.coefficients is not a parameter with a polynomial of order 1 to 5; correct the file"
+        "`{0}` in temperature.coefficients is not a parameter with a polynomial of order 1 to 5. Correct the file"
     )]
     Unknown(String),
 }

@@ -54,20 +54,20 @@ const ROUNDS: usize = 3;
 pub enum CorrectionError {
     /// The matrix has no inverse.
     #[error(
-        "the sensitivity matrix scale * installation of the {} has no inverse, for its axes lie in one \
-         plane; correct scale and installation in the calibration, or calibrate again", .0.name()
+        "the sensitivity matrix scale * installation of the {} has no inverse because its axes lie in one plane. \
+         Correct scale and installation in the calibration, or calibrate again", .0.name()
     )]
     Singular(Sensor),
     /// An unknown constant.
     #[error(
-        "`{0}` in terms is no parameter of a known term; calibrate again with this version, or remove \
-         the entry if it should have no effect"
+        "`{0}` in terms is not a parameter of a known error term. Calibrate again with this version, or remove the \
+         entry to ignore it"
     )]
     UnknownTerm(String),
     /// The unit differs from that of the run.
     #[error(
-        "the calibration is for {} output in `{calibration}`, the run's is in `{run}`; give the \
-         calibration of this instrument, or correct {}_unit in run.toml", .sensor.name(), .sensor.name()
+        "the calibration is for {} output in `{calibration}`, but the run uses `{run}`. Give the calibration of this \
+         instrument, or correct {}_unit in run.toml", .sensor.name(), .sensor.name()
     )]
     Unit {
         /// Which triad.
@@ -79,8 +79,8 @@ pub enum CorrectionError {
     },
     /// The scale differs from that of the run.
     #[error(
-        "{} {axis}: the calibration has {calibration:.6e} for one {}, the run's nominal scale is \
-         {run:.6e}; they must agree within a factor of two and in sign. Give the calibration of this \
+        "{} {axis}: the calibration has {calibration:.6e} per {}, but the nominal scale of the run is {run:.6e}. \
+         They must have the same sign and agree within a factor of two. Give the calibration of this \
          instrument, or correct scale in [imu.prior.{0}], output or body_axes in run.toml",
         .sensor.name(),
         match .sensor { Sensor::Gyro => "rad/s", Sensor::Accel => "m/s²" }

@@ -111,8 +111,8 @@ pub fn keep<'a>(
     let is_target = |input: &PathBuf| input.canonicalize().is_ok_and(|input| input == target);
     if inputs.into_iter().any(is_target) {
         bail!(
-            "{}: found an input of this command, expected a name that is free. Choose another name; \
-             replacing this file would delete what the output is made from.",
+            "{}: found an input of this command, expected an unused name. Choose another name, because replacing \
+             this file would delete the input.",
             output.display()
         );
     }

@@ -37,8 +37,8 @@ impl Estimation {
     pub fn check(&self) {
         if let (Method::SixPosition, Some(term)) = (self.method, self.with.first()) {
             let message = format!(
-                "--with {}: --method six-position estimates scale factors, installation and biases only; \
-                 leave --with out, or estimate it by --method ekf\n",
+                "--with {}: --method six-position estimates only scale factors, misalignments and biases; omit \
+                 --with, or use --method ekf\n",
                 term.name()
             );
             clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
@@ -68,8 +68,8 @@ impl Estimation {
     ) -> anyhow::Result<Problem<'a>> {
         if matches!(self.method, Method::SixPosition) {
             anyhow::bail!(
-                "--method six-position: the closed form is of one recording at one temperature; leave it out, or \
-                 calibrate each run by itself"
+                "--method six-position handles only one recording at one temperature; omit it, or calibrate each run \
+                 separately"
             );
         }
         let mut problem = Problem::together(runs, &self.options(), together)?;

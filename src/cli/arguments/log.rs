@@ -12,7 +12,7 @@ use super::{latitude, positive};
 
 /// What is stated of a log that has no run.toml.
 #[derive(Debug, Clone, PartialEq, Default, clap::Args)]
-#[command(next_help_heading = "Of a log without run.toml")]
+#[command(next_help_heading = "For a log without run.toml")]
 pub struct OfLog {
     /// File with the rows of the accelerometers, if the log has those of the gyros only
     #[arg(long, value_name = "ACCEL.csv", conflicts_with = "stream")]
@@ -100,7 +100,7 @@ pub fn run_file(text: &str) -> Result<PathBuf, String> {
     let path = run_or_log(text)?;
     match path.is_file() && path.extension().is_none_or(|end| end != "toml") {
         true => Err(format!(
-            "this is a log, expected the run.toml that describes it; turncal init {text} drafts one"
+            "found a log, expected the run.toml that describes it. Draft one with turncal init {text}"
         )),
         false => Ok(path),
     }

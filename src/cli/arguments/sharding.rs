@@ -35,7 +35,7 @@ impl Sharding {
             Some(shard),
         );
         if !delivery.force() && part_is_there(target, &part) {
-            tell!("part {shard} is there already");
+            tell!("part {shard} already exists");
             return Ok(true);
         }
         let begun = delivery.begin(inputs)?;

@@ -38,7 +38,7 @@ pub fn latitude(text: &str) -> Result<f64, String> {
 /// Hours of a navigation.
 pub fn hours(text: &str) -> Result<f64, String> {
     between(text, INTERVAL / HOUR, 1000.0)
-        .ok_or_else(|| "expected a number of hours, from a minute (0.0167) to 1000".to_owned())
+        .ok_or_else(|| "expected a number of hours from 0.0167 (one minute) to 1000".to_owned())
 }
 
 /// Seed of all random numbers.

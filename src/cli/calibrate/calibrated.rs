@@ -141,7 +141,7 @@ pub fn note(closed_form: &ClosedForm) -> String {
         }
         Reference::Labels => format!("{accel} labelled positions and {turns} labelled turns"),
         Reference::Gravity => {
-            format!("gravity in {accel} dwells and its direction over {turns} turns")
+            format!("gravity in {accel} dwells and its direction change over {turns} turns")
         }
     };
     let minutes = closed_form.standing_time / 60.0;
@@ -187,7 +187,7 @@ pub fn read_truth(path: &Path, run: &Run, body_frame: BodyFrame) -> anyhow::Resu
         && *unit != run.instrument.unit
     {
         bail!(
-            "{}: units are {} and {}, those of the run {} and {}; give the truth of this run",
+            "{}: units are {} and {}, but those of the run are {} and {}. Give the truth of this run",
             path.display(),
             unit.gyro,
             unit.accel,

@@ -83,7 +83,7 @@ impl Request<'_> {
         let inputs: Vec<&Path> = self.runs.iter().map(PathBuf::as_path).collect();
         let waiting = || {
             let name = printable(&target.display().to_string());
-            tell!("note: another turncal works in {name}; waiting until it is done");
+            tell!("note: another turncal process is using {name}; waiting for it to finish");
         };
         Ok(LotDirectory::open(
             target, part, self.force, &inputs, &waiting,
@@ -177,7 +177,7 @@ pub fn deliver(
     let failed: Vec<&str> = lot.failures().map(|(unit, _)| unit.name.as_str()).collect();
     if !failed.is_empty() {
         bail!(
-            "{} of {} units were not calibrated: {}; the reasons are in the warnings",
+            "{} of {} units were not calibrated: {} (see the warnings for reasons)",
             failed.len(),
             lot.rows.len(),
             failed.join(", ")
@@ -220,7 +220,7 @@ fn unit_names(runs: &[PathBuf]) -> anyhow::Result<Vec<String>> {
     }
     let twice = (0..full.len()).find(|&k| full[..k].contains(&full[k]));
     let twice = twice.map_or_else(String::new, |k| runs[k].display().to_string());
-    bail!("{twice}: found this run twice, expected each unit once; leave one out")
+    bail!("{twice}: found this run twice, expected each unit once. Remove one")
 }
 
 #[cfg(test)]

@@ -56,7 +56,7 @@ impl Merge {
         serde_json::from_value(parts.job.options.clone()).with_context(|| {
             let first = self.parts.first().map_or(Path::new(""), PathBuf::as_path);
             format!(
-                "{}: job.json does not state a study; make the parts again",
+                "{}: job.json does not describe a study. Make the parts again",
                 first.display()
             )
         })
@@ -67,7 +67,7 @@ impl Merge {
         let part = Part::new(parts.job.clone(), None);
         let waiting = || {
             let name = printable(&target.unwrap_or(Path::new("")).display().to_string());
-            tell!("note: another turncal works in {name}; waiting until it is done");
+            tell!("note: another turncal process is using {name}; waiting for it to finish");
         };
         let open =
             |target| LotDirectory::open(target, &part, self.delivery.force(), inputs, &waiting);

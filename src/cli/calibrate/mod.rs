@@ -107,8 +107,8 @@ impl Calibrate {
 
     fn lot(&self) -> anyhow::Result<()> {
         if self.truth.is_some() {
-            let message = "--truth is that of one run; compare units of a lot with their truths by turncal \
-                           compare\n";
+            let message = "--truth applies to one run; to compare units of a lot with their truths, use turncal \
+                compare\n";
             clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
         }
         let directory = Some(Path::new(lot::DIRECTORY)).filter(|_| !self.json);
@@ -247,10 +247,10 @@ impl Calibrate {
             _ => print(&calibration.to_json(Path::new("standard output"))?)?,
         }
         if !solution.converged() {
-            bail!("{name}: not converged; values and σ may not be used, see the findings");
+            bail!("{name}: not converged; do not use the values or σ, see the findings");
         }
         if !solution.is_usable() {
-            bail!("{name}: values may not be used, see the findings");
+            bail!("{name}: do not use the values, see the findings");
         }
         Ok(())
     }

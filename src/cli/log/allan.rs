@@ -16,7 +16,7 @@ use crate::cli::terminal::Activity;
 /// table [imu.noise] for run.toml. Takes the whole record if it is stationary, else its longest static
 /// interval.
 #[derive(Debug, clap::Args)]
-#[command(mut_arg("output", |output| output.help("Directory for a page and figures")))]
+#[command(mut_arg("output", |output| output.help("Directory for the report and figures")))]
 #[command(after_help = "Examples:
   turncal allan imu.csv
   turncal allan run.toml

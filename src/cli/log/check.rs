@@ -15,7 +15,7 @@ use crate::cli::terminal::Activity;
 /// and the parameters that it would not observe; changes to make. Problems that it finds do not change the exit
 /// status.
 #[derive(Debug, clap::Args)]
-#[command(mut_arg("output", |output| output.help("Directory for a page and a figure of the record")))]
+#[command(mut_arg("output", |output| output.help("Directory for the report and a figure of the recording")))]
 #[command(after_help = "Examples:
   turncal check imu.csv
   turncal check run.toml
@@ -36,7 +36,7 @@ impl Check {
         let activity = Activity::new("reading");
         let run = self.of_log.open(&self.run)?.run;
         let begun = self.delivery.begin(&[&self.run])?;
-        activity.next("looking at the run");
+        activity.next("checking the run");
         let survey = Survey::of(&run);
         drop(activity);
         begun.deliver(&check::document(&run, &survey))?;

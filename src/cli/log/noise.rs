@@ -17,7 +17,7 @@ use crate::cli::terminal::show;
   turncal noise 0.005 'deg/s/sqrt(Hz)' --rate 100
   turncal noise 1.7e-4 gyroscope_noise_density
 
-Units, also as deg/sqrt(h), ug/sqrt(Hz), m/s^2 and the like:\n{}", known()))]
+Units (also in the form deg/sqrt(h), ug/sqrt(Hz), m/s^2):\n{}", known()))]
 pub struct Noise {
     /// The figure
     #[arg(value_name = "VALUE", allow_negative_numbers = true, value_parser = positive)]

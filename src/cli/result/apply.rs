@@ -57,8 +57,7 @@ impl Apply {
             let name = output.to_string_lossy();
             if !(name.ends_with(".csv") || name.ends_with(".csv.gz")) {
                 let message = format!(
-                    "-o {name}: the rows are CSV; give a name that ends in .csv, or in .csv.gz to \
-                     compress them\n"
+                    "-o {name}: the output is CSV; give a name that ends in .csv, or in .csv.gz for compression\n"
                 );
                 clap::Error::raw(ErrorKind::ValueValidation, message).exit();
             }
@@ -71,7 +70,7 @@ impl Apply {
         let lost: usize = run.recording.imu.lost().iter().map(Range::len).sum();
         if let Some(missing) = run.recording.imu.missing().next().filter(|_| self.fill) {
             bail!(
-                "{}: {} rows are missing from {:.3} s on, too many to fill. Leave --fill out, or cut the log there",
+                "{}: {} rows are missing from {:.3} s on, too many to fill. Omit --fill, or split the log there",
                 self.run.display(),
                 missing.len(),
                 run.recording.imu.time(missing.start)
@@ -95,9 +94,10 @@ impl Apply {
             run.recording.imu.period,
             match (lost, self.fill) {
                 (0, _) => String::new(),
-                (lost, true) => format!(", {lost} of them lost in the log and interpolated"),
+                (lost, true) =>
+                    format!(", of which {lost} were missing in the log and interpolated"),
                 (lost, false) => format!(
-                    ", {lost} that the log has lost are left out (--fill interpolates them)"
+                    "; {lost} rows missing in the log were skipped (--fill interpolates them)"
                 ),
             },
             record.body_frame.words()
@@ -115,8 +115,9 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
         notes.push("the calibration did not converge".to_owned());
     }
     if record.unit.is_none() {
-        notes
-            .push("the calibration names no units; they are taken for those of the run".to_owned());
+        notes.push(
+            "the calibration states no units, so turncal assumed those of the run".to_owned(),
+        );
     }
     for sensor in Sensor::ALL {
         let scale = correction.sensitivity.get(sensor).diagonal();
@@ -128,8 +129,8 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
             .component_div(&run.instrument.prior.get(sensor).scale_sigma);
         if sigmas.max() > SUSPECT_SIGMAS {
             notes.push(format!(
-                "{} scale factors are up to {:.0} ppm off the run's nominal ones, {:.0} times the 1σ in \
-                 [imu.prior.{0}]: is this the calibration of this instrument?",
+                "{} scale factors differ by up to {:.0} ppm from the nominal values of the run, {:.0} times the 1σ \
+                 in [imu.prior.{0}]. Check that this calibration belongs to this instrument",
                 sensor.name(),
                 off.amax() / PPM,
                 sigmas.max()
@@ -140,12 +141,12 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
         notes.extend(of_temperature(thermal, run));
     }
     if correction.has(Term::TimeOffset) {
-        notes.push("the time offset of the accelerometers neglects Earth rate".to_owned());
+        notes
+            .push("the correction of the accelerometer time offset neglects Earth rate".to_owned());
     }
     if correction.has(Term::SizeEffect) && !run.recording.imu.continuous {
         notes.push(
-            "the record is not continuous, so the size effect is corrected without its part by \
-             angular acceleration"
+            "the recording is not continuous, so the size effect is corrected without its angular-acceleration part"
                 .to_owned(),
         );
     }
@@ -156,8 +157,8 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
 fn of_temperature(thermal: &ThermalRecord, run: &Run) -> Vec<String> {
     let Some(temperature) = &run.recording.imu.temperature else {
         return vec![format!(
-            "the run has no temperature, the calibration changes with it: all rows are corrected as at {} °C and \
-             have 0 in in_range",
+            "the calibration depends on temperature, but the run has none: all rows are corrected for {} °C and have \
+             0 in in_range",
             thermal.range.gyro.reference
         )];
     };
@@ -167,8 +168,8 @@ fn of_temperature(thermal: &ThermalRecord, run: &Run) -> Vec<String> {
             || highest > range.highest + TEMPERATURE_TOLERANCE;
         is_beyond.then(|| {
             format!(
-                "{}: the run is at {lowest:.1} to {highest:.1} °C, the calibration holds for {:.1} to \
-                 {:.1} °C; rows beyond have 0 in in_range",
+                "{}: the run covers {lowest:.1} to {highest:.1} °C, but the calibration is valid for {:.1} to {:.1} \
+                 °C; rows outside have 0 in in_range",
                 sensor.name(),
                 range.lowest,
                 range.highest

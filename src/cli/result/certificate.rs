@@ -105,7 +105,7 @@ impl Certificate {
         let overall = content.conformity.as_ref().and_then(Conformity::overall);
         match overall {
             Some(Decision::Fail | Decision::ConditionalFail) => {
-                let limits = "the certificate names the limits".to_owned();
+                let limits = "the certificate lists the limits".to_owned();
                 Err(NotMet(limits).into())
             }
             _ => Ok(()),

@@ -58,7 +58,7 @@ impl Export {
             None => print(text)?,
         }
         for note in exported.notes {
-            tell!("not held: {note}");
+            tell!("not included: {note}");
         }
         Ok(())
     }

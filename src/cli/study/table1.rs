@@ -15,7 +15,7 @@ use crate::cli::terminal::Activity;
 /// largest errors next to the paper's figures, under every reading of its text, and states which of these
 /// figures a correct program gives.
 #[derive(Debug, clap::Args)]
-#[command(mut_arg("output", |output| output.help("Directory for a report with the paper's Figures 2 to 9")))]
+#[command(mut_arg("output", |output| output.help("Directory for a report with Figures 2 to 9 of the paper")))]
 #[command(after_help = "Examples:
   turncal study table1 -o table1
   turncal study table1 --samples 4000 --json

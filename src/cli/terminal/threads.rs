@@ -15,7 +15,7 @@ pub fn with_threads<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, Threa
         // other thread, and where it cannot have them asks anew at each allocation.
         Ok(_) => {}
         Err(_) => {
-            tell!("note: the system does not let threads be started; working on one alone");
+            tell!("note: the system does not allow more threads; using one thread");
         }
     }
     let alone = ThreadPoolBuilder::new().num_threads(1).use_current_thread();

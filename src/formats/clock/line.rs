@@ -58,15 +58,15 @@ impl Uniform {
         let sample = ms(self.period);
         if let Some(wander) = &self.wander {
             return Some(format!(
-                "By their stamps samples wander by up to {} against an even clock of {sample} a sample: they are \
-                 integrated over its samples.",
+                "The time stamps drift by up to {} from a uniform clock of {sample} per sample. turncal resampled \
+                    the data to that clock by integration.",
                 ms(wander.largest() * self.period),
             ));
         }
         (self.jitter_max > self.period).then(|| {
             format!(
-                "Time stamps are early or late by up to {}, and a sample lasts {sample}. turncal took an even clock \
-                 through all of them.",
+                "Time stamps jitter by up to {}, more than the sample period of {sample}. turncal fitted a uniform \
+                    clock to them.",
                 ms(self.jitter_max),
             )
         })
@@ -138,8 +138,8 @@ impl Line {
             return Err(FileError::new(
                 file,
                 Place::Line(stamps[0].1),
-                format_args!("steps of {} s from row to row", nanoseconds(found)),
-                format_args!("sample_period_s = {period} as in run.toml"),
+                format_args!("a time step of {} s between rows", nanoseconds(found)),
+                format_args!("{period} s (sample_period_s in run.toml)"),
                 "Correct sample_period_s, time_unit or the time column.",
             ));
         }
@@ -355,7 +355,7 @@ fn gap(file: &Path, before: f64, (time, line): (f64, u64)) -> FileError {
         file,
         Place::Line(line),
         format_args!("a gap in time from {before} s to {time} s"),
-        "fewer rows missing than there are",
+        "fewer missing rows than recorded rows",
         "Correct the clock, or split the record there.",
     )
 }
@@ -364,9 +364,9 @@ fn not_forward(file: &Path, line: u64) -> FileError {
     FileError::new(
         file,
         Place::Line(line),
-        "times that do not go on from here",
-        "times that increase from row to row",
-        "Correct the time column or leave out the rows, or name another time column in run.toml.",
+        "times that stop increasing here",
+        "times that increase with every row",
+        "Correct the time column, remove these rows, or name another time column in run.toml.",
     )
 }
 

@@ -121,9 +121,9 @@ impl Stamps {
         self.standing += 1;
         if self.standing > MOST_AT_ONCE {
             return Err(csv.error_here(
-                format_args!("the same time in more than {MOST_AT_ONCE} rows"),
-                "times that increase",
-                "Name another time column, or leave it out and give sample_period_s.",
+                format_args!("the same time in more than {MOST_AT_ONCE} consecutive rows"),
+                "increasing times",
+                "Name another time column, or omit it and set sample_period_s.",
             ));
         }
         if is_same(place - 1) {
@@ -131,9 +131,9 @@ impl Stamps {
         }
         if !self.bursts {
             return Err(csv.error_here(
-                "the time of the row before again, a duplicate with other values",
+                "the same time as in the previous row, but other values",
                 "a later time",
-                "Remove the wrong one of both rows, or print times with more digits.",
+                "Remove the wrong row of the two, or log the time with more digits.",
             ));
         }
         if self.is_set_to(place, csv)? {
@@ -159,10 +159,7 @@ impl Stamps {
         }
         let time = self.time_of(csv, column)?;
         if time + self.usual_step() == time {
-            return Err(csv.not(
-                column,
-                "a time, not a number so large that the next row would have the same",
-            ));
+            return Err(csv.not(column, "a time small enough to resolve one sample period"));
         }
         if let Some(before) = self.time {
             let step = time - before;
@@ -213,12 +210,9 @@ impl Stamps {
         match TimeUnit::WORDS.iter().find(fits) {
             None => Ok(()),
             Some((unit, _)) => Err(csv.error_here(
-                format_args!(
-                    "times that go on by {} from row to row",
-                    nanoseconds(step * own)
-                ),
-                format_args!("{period} s, as sample_period_s says"),
-                format!("Give time_unit = \"{unit}\", or correct sample_period_s."),
+                format_args!("a time step of {} between rows", nanoseconds(step * own)),
+                format_args!("{period} s (sample_period_s in run.toml)"),
+                format!("Set time_unit = \"{unit}\", or correct sample_period_s."),
             )),
         }
     }
@@ -341,8 +335,8 @@ impl Stamps {
         self.set_before = Some(row);
         self.cut(step);
         self.set.push(format!(
-            "line {}: time goes from {} to {}: the clock was set, and nobody knows how long nothing was \
-             recorded. What follows is a stretch of its own; its times are taken {} s later.",
+            "line {}: the time jumps from {} to {} because the clock was set, so the length of the gap is unknown. \
+                turncal treats the rest as a separate stretch and shifts its times by {} s.",
             csv.line(),
             self.words(before),
             self.words(before + step),
@@ -354,9 +348,9 @@ impl Stamps {
     fn goes_back(&self, csv: &LogRows, before: f64, step: f64) -> FileError {
         let (from, to) = (self.words(before), self.words(before + step));
         csv.error_here(
-            format_args!("time going back from {from} to {to}"),
-            "times that increase",
-            "Put the rows in order, name another time column, or split the file where the clock was set.",
+            format_args!("a time that steps back from {from} to {to}"),
+            "increasing times",
+            "Sort the rows, name another time column, or split the file where the clock was set.",
         )
     }
 
@@ -399,8 +393,8 @@ impl Stamps {
         let ends = self.pauses.first().zip(self.pauses.last());
         notes.extend(ends.map(|(first, last)| {
             format!(
-                "{file}: nothing was recorded in {} pause(s), the first before line {}, for longer in all than \
-                 something was. {BREAK} s of each counts as missing rows, {} s more do not.",
+                "{file}: recording paused {} time(s), first before line {}, for longer in total than it ran. turncal \
+                    counts {BREAK} s of each pause as missing rows and ignores the other {} s.",
                 self.pauses.len(),
                 first.line,
                 nanoseconds(last.left_out)
@@ -409,26 +403,26 @@ impl Stamps {
         let (same, line) = self.at_once;
         notes.extend((same > 0).then(|| {
             format!(
-                "{same} row(s) of {file} have the time of the row before and other values, the first in line {line}: \
-                 each counts as a sample."
+                "{same} row(s) of {file} repeat the previous time with other values, the first in line {line}. Each \
+                    counts as a sample."
             )
         }));
         let (late, line) = self.out_of_order;
         notes.extend((late > 0).then(|| {
             format!(
-                "{late} row(s) of {file} come behind later ones, the first in line {line}: they are put in their place."
+                "{late} row(s) of {file} are out of order, the first in line {line}. turncal sorted them by time."
             )
         }));
         notes.extend(self.wraps_at.and_then(|size| match self.unit {
             TimeUnit::PerSecond(_) => Some(format!(
-                "{file}: the time wraps every {} s and is taken to go on.",
+                "{file}: the time counter wraps every {} s. turncal unwrapped it.",
                 nanoseconds(size)
             )),
             TimeUnit::Count => (missing > 0).then(|| {
                 format!(
-                    "Rows are missing, and the counter wraps every {} samples, {} s: as many more may be missing \
-                     at each place, or several times as many, and all after it be as much too early. Give a time that \
-                     does not wrap, or split the record there.",
+                    "Rows are missing, and the counter wraps every {} samples ({} s). Each gap may be longer by one \
+                        or more of these periods, and all later times too early by as much. Use a time that does not \
+                        wrap, or split the recording at the gaps.",
                     (size / self.period()).round(),
                     nanoseconds(size)
                 )

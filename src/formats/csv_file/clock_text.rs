@@ -132,8 +132,8 @@ impl ClockText {
     pub fn remark(self, name: &str) -> Option<String> {
         let digits = self.unpadded?;
         Some(format!(
-            "The fractions of a second in `{name}` have lost the zeros before them: they are read as whole numbers of \
-             10^-{digits} s."
+            "Fractions of a second in `{name}` have lost their leading zeros. turncal read them as whole multiples \
+                of 10^-{digits} s."
         ))
     }
 }

@@ -232,7 +232,8 @@ impl Looks {
             .filter_map(|(clock, name)| clock.as_ref()?.remark(name))
             .collect();
         remarks.extend(value(&says, "orientation").map(|letters| {
-            format!("The orientation {letters} that the file states is not applied: columns are taken as they stand.")
+            format!("turncal did not apply the orientation {letters} that the file states; the columns were used \
+                unchanged.")
         }));
         Ok(Some(Heading {
             delimiter: shape.delimiter,

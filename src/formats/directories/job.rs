@@ -159,15 +159,20 @@ impl Part {
     /// Reads the `job.json` of a directory.
     pub fn read(directory: &Path) -> Result<Self, FileError> {
         let path = directory.join(JOB_FILE);
-        let advice = "Give a directory that turncal wrote for a lot, or with --shard.";
+        let advice = "Give a directory that turncal wrote for a lot or with --shard.";
         let part: Self = small_file::json(&path, "a job", FORMAT, advice)?;
         let is_whole = match part.shard {
             Some(shard) => part.holds == shard.runs(part.job.runs),
             None => true,
         };
         if part.digest != digest_of(&part.job) || !is_whole {
-            let found = "a job that its digest or its runs do not fit";
-            return Err(FileError::of(&path, found, "it as it was written", advice));
+            let found = "a job whose digest or run list does not match";
+            return Err(FileError::of(
+                &path,
+                found,
+                "the job as turncal wrote it",
+                advice,
+            ));
         }
         Ok(part)
     }

@@ -138,8 +138,9 @@ impl LotDirectory {
         }
         let target = self.root.join(UNITS).join(name);
         let whole = WholeDirectory::create(&target, true, &[])?;
-        copy_all(&from, &whole.path())
-            .map_err(|error| FileError::io(&from, "copy the unit", &error, "Make room."))?;
+        copy_all(&from, &whole.path()).map_err(|error| {
+            FileError::io(&from, "copy the unit", &error, "Free some disk space.")
+        })?;
         whole.commit()?;
         Ok(unit)
     }
@@ -190,9 +191,9 @@ fn check_same(target: &Path, found: &Part, expected: &Part) -> Result<(), FileEr
     difference.map_or(Ok(()), |difference| {
         Err(FileError::of(
             target,
-            format_args!("a lot begun with other options: {difference}"),
-            "the job that was begun here, to continue it",
-            "Give the same options, choose another directory, or add --force to restart.",
+            format_args!("a lot started with other options ({difference})"),
+            "the options of the job started here",
+            "Use the same options, choose another directory, or add --force to restart.",
         ))
     })
 }
@@ -214,9 +215,9 @@ fn check_units(units: &Path, part: &Part) -> Result<(), FileError> {
     others.first().map_or(Ok(()), |other| {
         Err(FileError::of(
             units,
-            format_args!("unit `{other}`, which is not among the runs given"),
-            "units of this lot only",
-            "Give its run.toml, too, choose another directory, or add --force to restart.",
+            format_args!("unit `{other}`, which is not among the given runs"),
+            "only units of this lot",
+            "Also give its run.toml, choose another directory, or add --force to restart.",
         ))
     })
 }
@@ -227,16 +228,16 @@ fn read_unit(directory: &Path, key: Option<&str>) -> Result<(Unit, String), File
     let record: UnitRecord =
         small_file::json(&path, "a unit", FORMAT, "Calibrate the unit again.")?;
     let wrong = |found: &str| {
-        let (expected, advice) = ("the unit as it was written", "Calibrate it again.");
+        let (expected, advice) = ("the unit as turncal wrote it", "Calibrate it again.");
         Err(FileError::of(directory, found, expected, advice))
     };
     if key.is_some_and(|key| record.key != key) {
-        return wrong("another key");
+        return wrong("a different key");
     }
     let path = directory.join(CALIBRATION_FILE);
     let digest = fs::read(&path).ok().map(|bytes| digest_of_bytes(&bytes));
     if record.failure.is_none() && record.calibration_sha256 != digest {
-        return wrong("a calibration.json that is not the one that was written with it");
+        return wrong("a calibration.json that does not belong to it");
     }
     let calibrated = match (record.failure, record.nominal) {
         (Some(failure), _) => Err(failure),

@@ -23,7 +23,7 @@ pub fn write_part<T: Serialize>(directory: &Path, part: Part, runs: &[T]) -> Res
     };
     let results = rmp_serde::to_vec(runs).map_err(|error| {
         let path = directory.join(RESULTS);
-        let expected = "results that can be written";
+        let expected = "writable results";
         FileError::of(&path, error, expected, "Nothing was written.")
     })?;
     let part = Part {
@@ -73,7 +73,7 @@ impl Parts {
             .collect::<Result<Vec<_>, FileError>>()?;
         let Some((first, reference)) = parts.first() else {
             let (found, expected) = ("no part", "all parts of a job");
-            let advice = "Name the directories that --shard wrote.";
+            let advice = "Give the directories that --shard wrote.";
             return Err(FileError::of(Path::new("."), found, expected, advice));
         };
         for (directory, part) in &parts[1..] {
@@ -81,11 +81,12 @@ impl Parts {
                 return Err(FileError::of(
                     directory,
                     format_args!(
-                        "a part of another job than {}: {difference}",
+                        "a part of a different job than {} ({difference})",
                         first.display()
                     ),
-                    "parts of one job",
-                    "Merge parts that were made by one version with the same arguments on processors of one kind.",
+                    "parts of the same job",
+                    "Merge only parts made by the same version, with the same arguments, on processors of the same \
+                        type.",
                 ));
             }
         }
@@ -106,12 +107,12 @@ impl Parts {
             return Err(FileError::of(
                 directory,
                 format_args!(
-                    "run {} that is in {}, too",
+                    "run {}, which is also in {}",
                     self.name(*run),
                     other.display()
                 ),
-                "every run in one part",
-                "Leave one of the two out.",
+                "each run in one part only",
+                "Leave out one of the two.",
             ));
         }
         let is_there = |run: &u64| held.binary_search_by_key(run, |(run, _)| *run).is_ok();
@@ -129,7 +130,7 @@ impl Parts {
         let given = list(given.iter().map(String::as_str));
         Err(FileError::of(
             &first.0,
-            format_args!("no part with run {words}"),
+            format_args!("no part that contains run {words}"),
             format_args!("all {} runs; the parts given are {given}", self.job.runs),
             "Add the missing parts.",
         ))
@@ -164,11 +165,11 @@ impl Parts {
             let bytes = fs::read(&path)
                 .map_err(|error| FileError::io(&path, "read the part", &error, advice))?;
             let wrong = |found: String| {
-                let expected = "the results as they were written";
+                let expected = "the results as turncal wrote them";
                 FileError::of(&path, found, expected, advice)
             };
             if part.results.as_deref() != Some(digest_of_bytes(&bytes).as_str()) {
-                return Err(wrong("results that their digest does not fit".to_owned()));
+                return Err(wrong("results that do not match their digest".to_owned()));
             }
             let runs: Vec<T> =
                 rmp_serde::from_slice(&bytes).map_err(|error| wrong(error.to_string()))?;
@@ -201,8 +202,8 @@ fn difference(a: &Job, b: &Job) -> Option<String> {
             return Some(format!("{} and {} runs", a.runs, b.runs));
         }
         if a.names != b.names {
-            return Some("other units, or in another order".to_owned());
+            return Some("different units or a different order".to_owned());
         }
-        (a.specification != b.specification).then(|| "another specification".to_owned())
+        (a.specification != b.specification).then(|| "a different specification".to_owned())
     })
 }

@@ -20,9 +20,9 @@ pub use stage::abandon_unfinished;
 fn taken(target: &Path) -> FileError {
     FileError::of(
         target,
-        "something of this name already",
-        "a name that is free",
-        "Choose another name, or give --force to replace it.",
+        "an existing file or directory of this name",
+        "an unused name",
+        "Choose another name, or add --force to replace it.",
     )
 }
 
@@ -54,7 +54,7 @@ impl WholeDirectory {
                 let what = if is_link { "link" } else { "file" };
                 let found = format_args!("a {what} of this name");
                 let advice = format_args!("Choose another name or remove the {what}.");
-                let expected = "a directory or nothing";
+                let expected = "a directory or an unused name";
                 return Err(FileError::of(target, found, expected, advice));
             }
             let inside = |path: &&Path| match (path.canonicalize(), target.canonicalize()) {
@@ -70,7 +70,7 @@ impl WholeDirectory {
                 };
                 return Err(FileError::of(
                     target,
-                    format_args!("{name} in this directory"),
+                    format_args!("{name} in it"),
                     "a directory that can be replaced",
                     "Choose another name; replacing this one would delete files that are still needed.",
                 ));
@@ -135,17 +135,17 @@ pub fn clear_abandoned(directory: &Path) {
 /// Refuses a directory that holds anything beside what was written by a [`WholeDirectory`].
 fn only_output(directory: &Path) -> Result<(), FileError> {
     let foreign = manifest::foreign(directory)
-        .map_err(|error| unwritable(directory, "look into the directory", &error))?;
+        .map_err(|error| unwritable(directory, "list the directory", &error))?;
     foreign.map_or(Ok(()), |foreign| {
         Err(FileError::of(
             directory,
             format_args!(
-                "`{}` in it, which no list of what turncal wrote there (`{}`) names",
+                "`{}` in it, which turncal's list of its own files (`{}`) does not name",
                 foreign.display(),
                 manifest::FILE,
             ),
-            "a directory that holds only what turncal wrote",
-            "Move it elsewhere or choose another name; replacing the directory would delete it.",
+            "a directory with only files that turncal wrote",
+            "Move it elsewhere or choose another name, because replacing the directory would delete it.",
         ))
     })
 }
@@ -168,7 +168,7 @@ pub fn write_whole_with(
             return Err(FileError::of(
                 path,
                 "a directory of this name",
-                "a file or nothing",
+                "a file or an unused name",
                 "Choose another name.",
             ));
         }

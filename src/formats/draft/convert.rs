@@ -23,9 +23,14 @@ impl Draft {
         let of_text = |streams: &Streams| streams.written.is_some();
         let streams = self.streams.as_mut().filter(|streams| !of_text(streams));
         let Some(streams) = streams else {
-            let advice = "`turncal init` drafts a run.toml for it as it is.";
-            let expected = "a log of another program";
-            return Err(FileError::of(log, "rows of text", expected, advice));
+            let advice = "`turncal init` can draft a run.toml for it without conversion.";
+            let expected = "a log of another program, which needs no conversion";
+            return Err(FileError::of(
+                log,
+                "a text file with rows",
+                expected,
+                advice,
+            ));
         };
         let source = |stream| Source {
             stream: Some(stream),

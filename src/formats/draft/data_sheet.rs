@@ -40,7 +40,7 @@ impl Scale {
             value: Vector3::repeat(of_one / unit.times),
             off: 0.0,
             is_named: true,
-            why: format!("one is {} {}", short(unit.times), unit.word),
+            why: format!("1 unit of the file is {} {}", short(unit.times), unit.word),
         })
     }
 
@@ -49,18 +49,22 @@ impl Scale {
         let Axes { scale, sigma, .. } = gravity.axes;
         let is_sure = sigma < TOLERANCE;
         let mut by = match gravity.rests {
-            1 => " at rest".to_owned(),
-            rests => format!(" ± {} % by gravity at {rests} rests", percent(sigma)),
+            1 => " in one dwell".to_owned(),
+            rests => format!(
+                "  ± {} %, from gravity in {rests} \
+                dwells",
+                percent(sigma)
+            ),
         };
         if !is_sure {
-            by += ", if its zero offset is zero: gravity lies in too few directions to verify that";
+            by += ", if the zero offset is zero, which too few directions of gravity can verify";
         }
         let often = likely_for_g((scale * per_second).mean());
         let often = if is_sure { String::new() } else { often + ": " };
         // Zeros that are not known leave room for any figure.
         let others = if is_sure { &PER_G[..] } else { &[] };
         let sheet = |figure: f64| [&[2f64.powf(figure.log2().round())], others].concat();
-        let one = ("one g", STANDARD_GRAVITY);
+        let one = ("g", STANDARD_GRAVITY);
         Self::measured(&gravity.axes, per_second, one, sheet, [&by, &often])
     }
 
@@ -70,16 +74,16 @@ impl Scale {
         let by = match moves {
             Some(moves) => {
                 let sigma = percent(axes.sigma);
-                format!(" ± {sigma} % by the turns of gravity over {moves} moves")
+                format!("  ± {sigma} %, from the change of gravity direction in {moves} moves")
             }
-            None => " by the turns of gravity".to_owned(),
+            None => " , from the change of gravity direction".to_owned(),
         };
         // Pulses are made as each instrument makes them.
         let sheet = |_| match output {
             Output::Rate => PER_DEGREE.to_vec(),
             Output::Pulse | Output::Increment => Vec::new(),
         };
-        Self::measured(axes, row * DEGREE, ("1 deg/s", DEGREE), sheet, [&by, ""])
+        Self::measured(axes, row * DEGREE, ("deg/s", DEGREE), sheet, [&by, ""])
     }
 
     /// The figures of data sheets where they are as near as sheets allow, else those of the record.
@@ -108,8 +112,13 @@ impl Scale {
             },
             is_named: false,
             why: match is_stated {
-                true => format!("{} counts for {of}; {measured}{by}", axes.words(&stated)),
-                false => format!("for {of} {measured}{by}; {often}the data sheet knows better"),
+                true => format!(
+                    "{} counts per {of}; measured {measured}{by}",
+                    axes.words(&stated)
+                ),
+                false => {
+                    format!("{measured} counts per {of}{by}; {often}prefer the data-sheet value")
+                }
             },
             value: value.zip_map(&axes.scale, f64::copysign) / one,
         }
@@ -141,5 +150,8 @@ fn nearest(sheet: &[f64], measured: f64) -> Option<f64> {
 /// What registers often say for one g that say this with a zero that is not known.
 pub fn likely_for_g(per_g: f64) -> String {
     let power = 2f64.powf(per_g.log2().floor());
-    format!("often {power} or {} counts for one g", 2.0 * power)
+    format!(
+        "typical values are {power} and {} counts per g",
+        2.0 * power
+    )
 }

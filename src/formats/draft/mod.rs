@@ -38,8 +38,8 @@ const FEWEST_ROWS: usize = 100;
 /// Fewer samples at rest show no noise.
 const FEWEST_AT_REST: usize = 64;
 
-const NO_COLUMNS: &str = "no names or numbers showed them";
-const AXES_OF_PROGRAM: &str = "as the program that wrote the log has them";
+const NO_COLUMNS: &str = "not recognized by name or values";
+const AXES_OF_PROGRAM: &str = "axis convention of the program that wrote the log";
 
 /// What a log shows of the instrument and its record.
 #[derive(Debug, Clone, PartialEq)]

@@ -67,8 +67,8 @@ impl Rows {
             .filter(|&sensor| *self.wrapped.get(sensor));
         let why = |sensor: Sensor| {
             format!(
-                "signed numbers of 16 bits are written as unsigned ones in those of {}: take 65536 from what is 32768 \
-                 or more, and draft again",
+                "the columns of {} contain signed 16-bit values written as unsigned: subtract 65536 from values of \
+                 32768 and above, then run init again",
                 sensor.name()
             )
         };

@@ -81,7 +81,7 @@ impl Streams {
         }
         let Some((gyro, accel)) = chosen(&members, wanted) else {
             let advice = "Record the file again.";
-            let expected = "streams of samples";
+            let expected = "at least one stream of samples";
             return Err(FileError::of(file, "no samples", expected, advice));
         };
         let salvage = damage.is_some();
@@ -190,12 +190,13 @@ impl Streams {
             };
             let (time, unit) = (quoted(time), word_or_number(unit));
             let keys = format!("{{ {place}time = {time}, time_unit = {unit} }}");
-            let why = "accelerometers have a clock of their own; --with time-offset finds how far they are apart";
+            let why =
+                "accelerometers use their own clock; --with time-offset estimates the difference";
             page.line("accel_from", keys, why);
         }
         self.remarks.iter().for_each(|remark| page.remark(remark));
         if let Some(damage) = self.damage.as_ref().filter(|_| self.written.is_none()) {
-            let why = format_args!("remove the # to use the intact part. {damage}");
+            let why = format_args!("uncomment to use the intact part. {damage}");
             page.open("salvage = true", why);
         }
     }
@@ -271,10 +272,7 @@ impl Member {
 
     /// The names of a triad's columns.
     fn triad(&self, sensor: Sensor) -> Result<[&str; 3], FileError> {
-        let expected = sensor.pick(
-            "three columns of the gyros",
-            "three columns of the accelerometers",
-        );
+        let expected = sensor.pick("three gyro columns", "three accelerometer columns");
         let triad = self
             .triads
             .get(sensor)
@@ -284,7 +282,7 @@ impl Member {
 
     /// The column of time and its unit, by its steps where the log does not say it.
     fn time_by(&self, source: &Source) -> Result<(String, String), FileError> {
-        let missing = || self.missing("a column of time");
+        let missing = || self.missing("a time column");
         let (name, mut unit) = self.time.clone().ok_or_else(missing)?;
         if unit.is_empty() {
             let sheet = Sheet::of(source.open()?, FEWEST_ROWS)?;
@@ -321,7 +319,7 @@ fn listed(members: &[Member]) -> Vec<String> {
         lines.push(format!("{name}: {samples} samples of {shown}{more}"));
     }
     if !others.is_empty() {
-        lines.push(format!("and samples of other kinds: {}", others.join(", ")));
+        lines.push(format!("other streams: {}", others.join(", ")));
     }
     lines
 }

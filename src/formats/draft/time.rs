@@ -39,7 +39,7 @@ impl Clock {
     pub fn find(sheet: &Sheet, columns: &mut Columns) -> Self {
         let stated = sheet.rate.map(f64::recip);
         let Some((column, stamps)) = columns.time.zip(columns.stamps(sheet)) else {
-            return Self::without(stated, "no column goes forward like a time");
+            return Self::without(stated, "no column increases like a time");
         };
         let steps = Steps::of(&stamps);
         let name = Name::of_column(&sheet.names[column], &sheet.units[column]);
@@ -58,9 +58,9 @@ impl Clock {
         let (second, why) = if columns.nanoseconds.is_some() {
             (Some(1.0), "seconds and nanoseconds".to_owned())
         } else if named.is_some() {
-            (named, "as the file says".to_owned())
+            (named, "stated in the file".to_owned())
         } else if (steps.is_count || name.is_counter()) && name.is_time() < 2 {
-            (None, "steps of one: a counter of samples".to_owned())
+            (None, "steps of one, as in a sample counter".to_owned())
         } else if let Some(period) = known {
             let is_near = |second: &f64| (steps.mean * second / period).ln().abs() < STATED.ln();
             // Ticks of a clock of its own.

@@ -100,10 +100,18 @@ impl Hypothesis {
             (_, None) => String::new(),
             (Sensor::Accel, _) if self.fits() => format!("{} at rest", short(motion.gravity)),
             (Sensor::Accel, Some(factor)) => {
-                format!("at rest it is {} times gravity", short(factor))
+                format!("magnitude at rest is {} times gravity", short(factor))
             }
-            (Sensor::Gyro, _) if self.fits() => "gravity turns as far".to_owned(),
-            (Sensor::Gyro, Some(factor)) => format!("gravity turns {} times as far", short(factor)),
+            (Sensor::Gyro, _) if self.fits() => {
+                "integrated gyro angles match the change of gravity \
+                direction"
+                    .to_owned()
+            }
+            (Sensor::Gyro, Some(factor)) => format!(
+                "gravity direction changes by {} times the integrated gyro \
+                angle",
+                short(factor)
+            ),
         }
     }
 
@@ -114,7 +122,7 @@ impl Hypothesis {
             Some(_) if self.fits() => "; ",
             Some(_) => ", but ",
         };
-        format!("as the file says{link}{}", self.evidence(sensor, motion))
+        format!("stated in the file{link}{}", self.evidence(sensor, motion))
     }
 }
 
@@ -134,8 +142,8 @@ impl Quantities {
     pub fn unknown() -> Self {
         Self {
             output: Output::Rate,
-            output_why: "as most logs have it".to_owned(),
-            units: PerSensor::from_fn(|_| Unit::open("too few rows hold numbers to show it")),
+            output_why: "as in most logs".to_owned(),
+            units: PerSensor::from_fn(|_| Unit::open("too few numeric rows to tell")),
             opposed: false,
         }
     }
@@ -188,14 +196,14 @@ impl Quantities {
         let evidence = shown.map_or(String::new(), |of| of.evidence(sensor, rows.motion));
         let (chosen, why) = match (by_name, shown) {
             (Some(name), Some(shown)) if name.is_contradicted() => {
-                let why = format!("{evidence}, although the file says {}", name.word);
+                let why = format!("{evidence}, although the file states {}", name.word);
                 (shown, why)
             }
             (Some(name), _) if !name.is_contradicted() || sensor == Sensor::Accel => {
                 (name, name.why_named(sensor, rows.motion))
             }
             (None, Some(shown)) if !rows.whole && (named.is_none() || sensor == Sensor::Gyro) => {
-                let others = by_motion.map(|of| format!("; it may as well be {}", of.word));
+                let others = by_motion.map(|of| format!("; could also be {}", of.word));
                 (shown, evidence + &others.collect::<String>())
             }
             _ => {
@@ -220,11 +228,15 @@ impl Quantities {
         self.output = output;
         self.output_why = match output {
             Output::Pulse => {
-                "whole numbers whose sums vary less than they would if fractions were not carried over"
-                    .to_owned()
+                "integer counts that carry their remainder, as pulse outputs do".to_owned()
             }
-            Output::Increment => format!("gravity times {} s a row", short(rows.period)),
-            Output::Rate => "specific force at rest is g itself, not g times the sample period".to_owned(),
+            Output::Increment => format!(
+                "specific force at rest is g times {} s per row",
+                short(rows.period)
+            ),
+            Output::Rate => {
+                "specific force at rest is g itself, not g times the sample period".to_owned()
+            }
         };
     }
 
@@ -241,7 +253,7 @@ impl Quantities {
             word: Some("count"),
             why: why_count(
                 rows,
-                &format!("no known unit makes {} at rest", short(gravity)),
+                &format!("no known unit gives {} at rest", short(gravity)),
             ),
             likely: per_g.is_finite().then(|| likely_for_g(per_g)),
             ..Unit::default()
@@ -261,18 +273,21 @@ impl Quantities {
             // Without a clock each unit needs a period of its own.
             Some(angle) if !row.is_finite() && is_bare => {
                 let Some((word, period)) = usual_period(all, angle) else {
-                    return Unit::open("with no time from row to row turns do not show it");
+                    return Unit::open("cannot be estimated from turns without time stamps");
                 };
                 let rate = short(period.recip());
                 return Unit {
                     word: Some(word),
-                    ..Unit::open(&format!("gravity turns as far at about {rate} Hz"))
+                    ..Unit::open(&format!(
+                        "integrated gyro angles match the change of gravity direction at about \
+                        {rate} Hz"
+                    ))
                 };
             }
             None if is_bare && self.output != Output::Pulse => {
                 return Unit::open(match rows.motion.is_turned {
-                    true => "gravity turns too seldom or too roughly to show it",
-                    false => "gravity does not turn, so nothing shows it",
+                    true => "too few usable turns of gravity to estimate it",
+                    false => "gravity direction does not change, so it cannot be estimated",
                 });
             }
             _ => {}
@@ -283,7 +298,7 @@ impl Quantities {
                 name.word,
                 name.why_named(Sensor::Gyro, rows.motion)
             ),
-            None => why_count(rows, "no known unit fits the turns of gravity"),
+            None => why_count(rows, "no known unit fits the change of gravity direction"),
         };
         // Rows add up to the angle.
         let measured = angle.map(|angle| row / angle);
@@ -312,7 +327,7 @@ impl Quantities {
         for (sensor, StatedUnit(of)) in of_triads.into_iter().filter_map(|(k, of)| Some((k, of?))) {
             if let Of::Rows(_, output) = of.of {
                 self.output = output;
-                "as the stated unit is of it".clone_into(&mut self.output_why);
+                "follows from the stated unit".clone_into(&mut self.output_why);
             }
             let unit = self.units.get_mut(sensor);
             let found = unit.scale.take().filter(|_| of.word == "count");
@@ -349,7 +364,7 @@ impl Quantities {
         if gyro.word.is_none_or(|word| word == "count") && is_open(gyro) {
             if gyro.word.is_none() {
                 gyro.word = Some("count");
-                gyro.why = "no known unit fits the turns of gravity".to_owned();
+                gyro.why = "no known unit fits the change of gravity direction".to_owned();
             }
             gyro.scale = Some(Scale::of_turns(
                 &turns.axes,
@@ -390,7 +405,7 @@ fn scaled(sensor: Sensor, rows: &Rows) -> Option<Unit> {
     let of_it = Hypothesis::new(sensor, (unit.word, per_si), Output::Rate, rows);
     (of_it.factor.is_none() || of_it.fits()).then(|| Unit {
         word: Some("count"),
-        why: "as the file says".to_owned(),
+        why: "stated in the file".to_owned(),
         is_shown: true,
         scale: Some(scale),
         likely: None,
@@ -402,7 +417,7 @@ fn why_count(rows: &Rows, unfit: &str) -> String {
     match rows.named {
         _ if rows.whole => "whole numbers".to_owned(),
         Some(unit) => format!(
-            "{} has no word of its own here: a count with a scale",
+            "{} is not a built-in unit, so it is a count with a scale",
             unit.word
         ),
         None => unfit.to_owned(),

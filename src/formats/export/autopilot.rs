@@ -17,7 +17,7 @@ use crate::imu::{AXES, PerSensor, Sensor};
 use crate::units::{DEGREE, STANDARD_GRAVITY};
 
 const UPPER: [&str; 3] = ["X", "Y", "Z"];
-const UNCORRECTED: &str = "scale of gyros, and any misalignment";
+const UNCORRECTED: &str = "gyro scale factors and all misalignments";
 /// Orders of temperature that PX4 and ArduPilot have.
 const ORDERS: usize = 3;
 /// Temperature from which ArduPilot counts, °C, and the factor of its coefficients.
@@ -28,8 +28,8 @@ const COUNTS_PER_G: f64 = 2048.0;
 /// … and for one rad/s of one of ±2000 °/s.
 const COUNTS_PER_RAD_S: f64 = 16.4 / DEGREE;
 /// What autopilots leave off of a change with temperature.
-const OF_TEMPERATURE: &str = "change of scale factors and installation with temperature, of biases with its rate and \
-    of orders above three; biases are those of the sensor's own temperature";
+const OF_TEMPERATURE: &str = "change of scale factors and misalignments with temperature, change of biases with \
+    temperature rate, and orders above three; biases refer to the temperature of the sensor";
 /// One in INAV's gains.
 const INAV_ONE: f64 = 4096.0;
 
@@ -92,8 +92,8 @@ fn px4_line(name: &str, value: f32) -> String {
 pub fn px4(source: &Source) -> Exported {
     let axes = Axes::front_right_down(source);
     let held = held(&axes);
-    let id = "which device it is: PX4 takes the parameters whose CAL_ACC0_ID and CAL_GYRO0_ID are the device's; where \
-              the instrument is another than number 0, rename them";
+    let id = "device identity: PX4 uses the parameters whose CAL_ACC0_ID and CAL_GYRO0_ID match the device; rename \
+        them for an instrument other than number 0";
     let reads = ("#", "PX4 reads rad/s and m/s^2");
     let mut file = Document::correcting(source, &axes, reads, &held, &[UNCORRECTED, id]);
     let kind = |sensor: Sensor| sensor.pick("GYRO", "ACC");
@@ -130,8 +130,8 @@ pub fn ardupilot(source: &Source) -> Exported {
     let held = held(&axes);
     let notes = [
         UNCORRECTED,
-        "which instance it is: the second has INS_ACC2OFFS_X and so on",
-        "lasting gyro offsets: ArduPilot determines them again at every start, unless INS_GYR_CAL is 0",
+        "instance number: the second instance uses INS_ACC2OFFS_X and so on",
+        "permanent gyro offsets: ArduPilot re-estimates them at every start unless INS_GYR_CAL is 0",
     ];
     let reads = ("#", "ArduPilot reads rad/s and m/s^2");
     let mut file = Document::correcting(source, &axes, reads, &held, &notes);
@@ -172,7 +172,7 @@ fn counts(v: &Vector3<f64>, per_unit: f64) -> Vector3<f64> {
 
 fn of_counts(what: &str, counts: f64, unit: &str) -> String {
     format!(
-        "counts are of {what} with {counts:.0} for one {unit}; at another number n, times n / {counts:.0}"
+        "counts are for {what} with {counts:.0} counts per {unit}; for n counts per {unit}, multiply by n / {counts:.0}"
     )
 }
 
@@ -185,8 +185,8 @@ pub fn betaflight(source: &Source) -> Exported {
         gyro: Held::offset(Vector3::zeros()),
         accel: Held::offset(zero / per_unit),
     };
-    let notes = ["anything of the gyros, which it zeroes at every start"];
-    let reads = ("#", "lines for its command line,");
+    let notes = ["all gyro parameters, because it zeroes the gyros at every start"];
+    let reads = ("#", "commands for its command line,");
     let mut file = Document::correcting(source, &axes, reads, &held, &notes);
     file.comment(&of_counts("an accelerometer", COUNTS_PER_G, "g"));
     let [x, y, z] = [zero.x, zero.y, zero.z].map(|count| count as i64);
@@ -210,7 +210,7 @@ pub fn inav(source: &Source) -> Exported {
             offset: zero / per_unit,
         },
     };
-    let reads = ("#", "lines for its command line,");
+    let reads = ("#", "commands for its command line,");
     let mut file = Document::correcting(source, &axes, reads, &held, &[UNCORRECTED]);
     file.comment(&of_counts("an accelerometer", COUNTS_PER_G, "g"));
     file.comment(&of_counts("gyros", COUNTS_PER_RAD_S, "rad/s"));

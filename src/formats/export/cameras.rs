@@ -35,8 +35,8 @@ pub fn realsense(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let held = held(&axes);
     let notes = [
-        "rotation and translation to the depth sensor, which stay those of the drawing",
-        "the serial number behind the table, which is left empty",
+        "rotation and translation to the depth sensor, which keep their design values",
+        "the serial number after the table, which stays empty",
     ];
     let document = Document::correcting(source, &axes, ("#", "in memory"), &held, &notes);
     let mut imu = vec![0xff; 37 * 4 + 96];

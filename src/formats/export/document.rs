@@ -49,7 +49,7 @@ impl Document {
             document.comment(&line);
         }
         for note in document.notes.clone() {
-            document.comment(&format!("not held: {note}"));
+            document.comment(&format!("not included: {note}"));
         }
         document
     }

@@ -15,7 +15,7 @@ pub fn write(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let held = PerSensor::from_fn(|sensor| Held::offset(axes.triads.get(sensor).bias));
     let notes = [
-        "the sign of the bias: Gazebo draws it at random for each axis, so half of them have the opposite sign",
+        "the sign of the bias: Gazebo draws it at random for each axis, so half of the axes get the opposite sign",
     ];
     let reads = ("", "Gazebo writes rad/s and m/s^2, here");
     let mut file = Document::correcting(source, &axes, reads, &held, &notes);

@@ -21,7 +21,7 @@ pub fn write(source: &Source) -> Exported {
     let turn = crate::attitude::log(&own).norm() / ARCSEC;
     let notes = [
         format!(
-            "the body frame: its own is {turn:.1} arcsec from that of the calibration, by the rotation below"
+            "the body frame: its frame differs from that of the calibration by {turn:.1} arcsec (the rotation below)"
         ),
         SIGMA.to_owned(),
     ];

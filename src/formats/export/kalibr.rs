@@ -19,7 +19,7 @@ use crate::units::ARCSEC;
 
 /// What Kalibr and OpenVINS find themselves.
 const BIASES: &str =
-    "biases, which it finds itself, so no error is left of them; they are in a comment";
+    "biases, which it estimates itself, so they leave no error; a comment lists them";
 
 fn begin(source: &Source) -> Document {
     Document::holding(source, "#", [BIASES, SIGMA], |term| {
@@ -54,8 +54,8 @@ pub fn write(source: &Source) -> Exported {
     file.comment("measured = M C_gyro_i C_i_b w + A C_gyro_i C_i_b f + bias");
     let turned = crate::attitude::log(&imu_b).norm() / ARCSEC;
     file.comment(&format!(
-        "T_i_b takes the body frame above to the axes of the accelerometers, {turned:.1} arcsec \
-         away; what takes it for the identity gets u along those"
+        "T_i_b rotates the body frame above into the accelerometer axes, {turned:.1} arcsec away; a program that \
+         assumes the identity gets u along those axes"
     ));
     biases(&mut file, &axes);
     file.line("imu0:\n  model: scale-misalignment\n  T_i_b:");

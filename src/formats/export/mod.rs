@@ -48,28 +48,28 @@ const fn row(name: &'static str, about: &'static str, write: fn(&Source) -> Expo
 /// Every format.
 #[rustfmt::skip]
 static FORMATS: [Format; 20] = [
-    row("kalibr", "IMU intrinsics of Kalibr, model scale-misalignment", kalibr::write),
-    row("kf-gins", "The part of a KF-GINS configuration that is about the IMU", kf_gins::write),
+    row("kalibr", "IMU intrinsics for Kalibr, model scale-misalignment", kalibr::write),
+    row("kf-gins", "IMU section of a KF-GINS configuration", kf_gins::write),
     row("c", "A C99 header with constants and a function", code::c).with_temperature(),
-    row("octave", "A function file of Octave or MATLAB", code::octave),
-    row("text", "Every value with its name, σ and unit", text::write),
-    row("px4", "Parameters of PX4: CAL_GYRO0, CAL_ACC0", autopilot::px4).with_temperature(),
-    row("ardupilot", "Parameters of ArduPilot: INS_GYROFFS, INS_ACCOFFS, INS_ACCSCAL", autopilot::ardupilot)
+    row("octave", "An Octave or MATLAB function file", code::octave),
+    row("text", "All values with name, σ and unit", text::write),
+    row("px4", "PX4 parameters: CAL_GYRO0, CAL_ACC0", autopilot::px4).with_temperature(),
+    row("ardupilot", "ArduPilot parameters: INS_GYROFFS, INS_ACCOFFS, INS_ACCSCAL", autopilot::ardupilot)
         .with_temperature(),
-    row("open-vins-kalibr", "IMU intrinsics of OpenVINS, model kalibr", kalibr::open_vins_kalibr),
-    row("open-vins-rpng", "IMU intrinsics of OpenVINS, model rpng", kalibr::open_vins_rpng),
-    row("ikalibr", "IMU intrinsics of iKalibr", ikalibr::write),
-    row("imu-calib", "The accelerometers' calibration of the ROS package imu_calib", ros::imu_calib),
-    row("ros-covariance", "Covariances of ROS sensor_msgs/Imu; needs --run", ros::covariance),
-    row("dlio", "IMU intrinsics of DLIO (direct LiDAR-inertial odometry)", ros::dlio),
-    row("gazebo", "Noise of an IMU in Gazebo", gazebo::write),
-    row("mat", "A structure for MATLAB, a MAT file", mat::write),
-    row("betaflight", "Zeros of accelerometers for Betaflight", autopilot::betaflight),
+    row("open-vins-kalibr", "IMU intrinsics for OpenVINS, model kalibr", kalibr::open_vins_kalibr),
+    row("open-vins-rpng", "IMU intrinsics for OpenVINS, model rpng", kalibr::open_vins_rpng),
+    row("ikalibr", "IMU intrinsics for iKalibr", ikalibr::write),
+    row("imu-calib", "Accelerometer calibration for the ROS package imu_calib", ros::imu_calib),
+    row("ros-covariance", "Covariances for ROS sensor_msgs/Imu; needs --run", ros::covariance),
+    row("dlio", "IMU intrinsics for DLIO (direct LiDAR-inertial odometry)", ros::dlio),
+    row("gazebo", "IMU noise for Gazebo", gazebo::write),
+    row("mat", "A MATLAB structure (MAT file)", mat::write),
+    row("betaflight", "Accelerometer zeros for Betaflight", autopilot::betaflight),
     row("inav", "Zeros and gains for INAV", autopilot::inav),
-    row("realsense", "Memory of the IMU of a RealSense D400 camera, as rs-imu-calibration writes it",
+    row("realsense", "IMU calibration table of a RealSense D400 camera, as written by rs-imu-calibration",
         cameras::realsense),
-    row("depthai", "IMU calibration of a DepthAI (OAK) camera, JSON", cameras::depthai),
-    row("slimevr", "Calibration of a SlimeVR tracker", slimevr::write),
+    row("depthai", "IMU calibration for a DepthAI (OAK) camera, JSON", cameras::depthai),
+    row("slimevr", "Calibration for a SlimeVR tracker", slimevr::write),
 ];
 
 impl Format {
@@ -132,8 +132,8 @@ pub fn write(
     let exported = (format.write)(&Source::new(record, run)?);
     Ok(match &record.temperature {
         Some(thermal) if !format.holds_temperature => exported.without(format!(
-            "change with temperature; this is the calibration at {} °C, another temperature is written with \
-             --temperature-degc",
+            "change with temperature; this is the calibration at {} °C (use --temperature-degc for another \
+             temperature)",
             thermal.range.gyro.reference
         )),
         _ => exported,

@@ -11,12 +11,12 @@ use crate::imu::{PerSensor, Sensor};
 /// Row-major about x, y, z: the variance of a sample, density² × rate.
 pub fn covariance(source: &Source) -> Exported {
     let notes = [
-        "scale, misalignment and bias; publish what `turncal apply` writes, whose errors they are not",
-        "wander of biases, which is not white; `turncal allan` finds it",
+        "scale, misalignment and bias; publish the output of `turncal apply`, which has these errors removed",
+        "bias drift, which is not white; measure it with `turncal allan`",
     ];
     let mut file = Document::new(source, "#", notes);
     file.comment("");
-    file.comment("variance of a sample: density^2 times rate, (rad/s)^2 and (m/s^2)^2");
+    file.comment("variance per sample: density^2 times rate, (rad/s)^2 and (m/s^2)^2");
     for (key, sensor) in [
         ("angular_velocity_covariance", Sensor::Gyro),
         ("linear_acceleration_covariance", Sensor::Accel),
@@ -48,8 +48,7 @@ pub fn imu_calib(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let held = held(&axes);
     let notes = [
-        "biases of the gyros: imu_calib takes their mean at its start, and with it the rate of the Earth, up to \
-                  15.041 deg/h",
+        "gyro biases: imu_calib averages the gyros at its start, which includes Earth rate of up to 15.041 deg/h",
     ];
     let reads = ("#", "imu_calib reads rad/s and m/s^2, here");
     let mut file = Document::correcting(source, &axes, reads, &held, &notes);
@@ -64,7 +63,7 @@ pub fn dlio(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let held = held(&axes);
     let notes = [
-        "gyro scale and misalignment; the rotation from the log's axes to baselink, which DLIO applies first",
+        "gyro scale and misalignment; rotation from the log axes to baselink, which DLIO applies first",
     ];
     let reads = ("#", "DLIO reads rad/s and m/s^2, here");
     let mut file = Document::correcting(source, &axes, reads, &held, &notes);

@@ -23,14 +23,12 @@ pub fn write(source: &Source) -> Exported {
         accel: Held::all(accel),
     };
     let notes = [
-        "misalignment of gyros",
-        "sample rates and magnetometer, which stay as the tracker found them",
+        "gyro misalignment",
+        "sample rates and magnetometer, which keep the values found by the tracker",
     ];
     let reads = ("//", "SlimeVR reads counts, here");
     let mut file = Document::correcting(source, &axes, reads, &held, &notes);
-    file.comment(
-        "offsets are in the log's unit, which has to be counts of the tracker's own driver",
-    );
+    file.comment("offsets are in the unit of the log, which must be counts of the tracker driver");
     let list = |v: &Vector3<f64>| {
         let [x, y, z] = [v.x, v.y, v.z].map(|value| value as f32);
         format!("{{{x:?}f, {y:?}f, {z:?}f}}")

@@ -68,7 +68,7 @@ impl<'a> Source<'a> {
             (Some(Method::Ekf), Some(Aiding::Table)) => {
                 "Kalman filter, standstill and table attitude"
             }
-            (Some(Method::Ekf), _) => "Kalman filter, standstill alone",
+            (Some(Method::Ekf), _) => "Kalman filter, standstill only",
             (Some(Method::SixPosition), _) => "closed form from static positions",
             (None, _) => "not stated",
         };
@@ -87,8 +87,8 @@ impl<'a> Source<'a> {
             String::new(),
             EQUATION.to_owned(),
             format!(
-                "N: raw output per second, gyros in {}, accelerometers in {}; rows of pulses or \
-                 increments are divided by the sample period, rows of rates stand as they are",
+                "N: raw output per second, gyros in {}, accelerometers in {}; divide pulses or increments by the \
+                 sample period and use rates unchanged",
                 self.unit(Sensor::Gyro),
                 self.unit(Sensor::Accel)
             ),
@@ -96,8 +96,8 @@ impl<'a> Source<'a> {
                 "u: angular rate in rad/s, specific force in m/s^2, along: {}",
                 record.body_frame.words()
             ),
-            "axes of N and u: right, front, up; a log along front, right, down is (y, x, -z) of \
-             this, along front, left, up (y, -x, z)"
+            "axes of N and u: right, front, up; (y, x, -z) converts a log along front, right, down and (y, -x, z) \
+             one along front, left, up"
                 .to_owned(),
         ]);
         lines
@@ -122,8 +122,8 @@ impl<'a> Source<'a> {
     /// Why a figure of noise is missing.
     pub fn no_noise(&self) -> &'static str {
         match self.run {
-            Some(_) => "[imu.noise] of the run does not state it",
-            None => "`turncal allan` finds it; or export with --run RUN.toml",
+            Some(_) => "[imu.noise] in run.toml does not state it",
+            None => "measure it with `turncal allan` or export with --run RUN.toml",
         }
     }
 
@@ -172,7 +172,7 @@ impl<'a> Source<'a> {
             .collect();
         (!names.is_empty()).then(|| {
             format!(
-                "error terms are not corrected by it ({}); `turncal apply` corrects them",
+                "this format does not correct error terms ({}); `turncal apply` does",
                 names.join(", ")
             )
         })
@@ -263,7 +263,7 @@ impl Axes {
         file.comment(&format!("{what} along {};", self.words()));
         let [gyro, accel] = Sensor::ALL.map(|sensor| yaml_list(&self.triads.get(sensor).nominal));
         file.comment(&format!(
-            "divide the raw output for that: gyros by {gyro}, accelerometers by {accel}"
+            "to convert the raw output, divide gyros by {gyro} and accelerometers by {accel}"
         ));
     }
 }
@@ -340,8 +340,8 @@ impl Remainder {
             format!("{:.3} mg", 1e3 * self.constant.amax() / STANDARD_GRAVITY),
         );
         format!(
-            "{name}: the residual error is up to {:.1} ppm of scale and {:.1} arcsec of misalignment, together \
-             {example} in any direction, and {bias} of bias",
+            "{name}: the residual error is up to {:.1} ppm in scale and {:.1} arcsec in misalignment ({example} in \
+             any direction combined), and {bias} in bias",
             scale / PPM,
             across.amax() / ARCSEC
         )

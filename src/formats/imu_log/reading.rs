@@ -143,13 +143,13 @@ impl<'a> Reading<'a> {
         let file = self.log.source.file.display();
         let blank = (self.blank > 0).then(|| {
             format!(
-                "{} row(s) of {file} have nothing in the columns of both triads and are passed over.",
+                "{} row(s) of {file} are empty in the columns of both triads. turncal skipped them.",
                 self.blank
             )
         });
         let lacking = (self.lacking > 0).then(|| {
             format!(
-                "{} row(s) of {file} lack a value of the gyros or accelerometers and count as missing.",
+                "{} row(s) of {file} lack a gyro or accelerometer value and count as missing.",
                 self.lacking
             )
         });
@@ -160,8 +160,8 @@ impl<'a> Reading<'a> {
         let (found, advice) = match self.lacking {
             0 => (String::new(), "Record a run with dwells and turns."),
             lacking => (
-                format!(" and {lacking} rows that lack a value of the gyros or accelerometers"),
-                "If they are in rows of their own, `turncal init` drafts a run.toml that says so.",
+                format!("  and {lacking} rows that lack a gyro or accelerometer value"),
+                "If gyros and accelerometers are in separate rows, `turncal init` drafts a run.toml for that layout.",
             ),
         };
         csv.error(

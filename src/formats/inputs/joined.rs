@@ -181,9 +181,9 @@ fn apart(file: &Path, gyro: &Track, accel: &Track) -> FileError {
     };
     FileError::of(
         file,
-        format_args!("accelerometers from {}", of(accel)),
-        format_args!("times that overlap the gyros', {}", of(gyro)),
-        "Bring both streams to one clock, or correct time_unit.",
+        format_args!("an accelerometer stream from {}", of(accel)),
+        format_args!("times that overlap the gyro stream ({})", of(gyro)),
+        "Convert both streams to the same clock, or correct time_unit.",
     )
 }
 
@@ -200,8 +200,9 @@ fn remarks_of_both(gyro: Track, accel: Track) -> Vec<String> {
     let uneven = accel.clock.uneven();
     remarks.extend(uneven.map(|said| format!("Accelerometers: {said}")));
     remarks.push(format!(
-        "Gyros every {} s and accelerometers every {} s are two streams: accelerometers are integrated over the \
-         gyros' samples. If their clocks may be apart, estimate by how much: --with time-offset.",
+        "Gyros (every {} s) and accelerometers (every {} s) are separate streams, so turncal integrated the \
+         accelerometers over the gyro samples. If their clocks may differ, estimate the offset with --with \
+         time-offset.",
         rounded(gyro.clock.period),
         rounded(accel.clock.period)
     ));
@@ -257,12 +258,12 @@ impl Track {
         if stamps.of_rows.len() < 2 {
             return Err(rows.error(
                 format_args!("{} samples", stamps.of_rows.len()),
-                "a stream of samples",
-                "Name another stream, or record it again.",
+                "at least 2",
+                "Name another stream, or repeat the recording.",
             ));
         }
         let mut remarks = rows.remarks().to_vec();
-        remarks.extend(rows.cut_off("It is left out"));
+        remarks.extend(rows.cut_off("turncal ignored it"));
         remarks.extend(stamps.notes(rows.file(), 0));
         let clock = Uniform::new(&part.source.file, &stamps.of_rows, part.clock.period)
             .map_err(|error| rows.placed(error))?;

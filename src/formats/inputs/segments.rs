@@ -40,16 +40,16 @@ pub fn read(
             Err(csv.error_here(found, expected, "Correct or remove the row."))
         };
         if end <= start {
-            return wrong("a segment", "an end after the start".to_owned());
+            return wrong("a segment", "an end later than the start".to_owned());
         }
         let (first, last) = record;
         if start < first - slack || end > last + slack {
-            let expected = format!("times inside the IMU record, {first} s to {last} s");
+            let expected = format!("times within the IMU log ({first} s to {last} s)");
             return wrong("a segment", expected);
         }
         if row(start) == row(end) {
             let expected = format!(
-                "a segment several samples long (sample period {} s)",
+                "a segment of several samples (sample period {} s)",
                 imu.period
             );
             return wrong("no sample", expected);
@@ -65,7 +65,7 @@ pub fn read(
     }
     // A label that lacks letters is none, which is said elsewhere.
     notes.extend(
-        csv.cut_off("It is used")
+        csv.cut_off("turncal used it")
             .filter(|_| label_column + 1 != csv.header().len()),
     );
     Ok(segments)

@@ -64,7 +64,7 @@ impl<'a> Fields<'a> {
     ) -> Result<Clock<'a>, FileError> {
         if unit == Some(TimeUnit::Count) && period.is_none() {
             let path = format!("{table}.sample_period_s");
-            return Err(self.document.missing(&path, "what a count lasts"));
+            return Err(self.document.missing(&path, "the duration of one count"));
         }
         let seconds = TimeUnit::PerSecond(1.0);
         let (column, nanoseconds) = match column {
@@ -76,7 +76,7 @@ impl<'a> Fields<'a> {
         };
         if nanoseconds.is_some() && unit.is_some_and(|unit| unit != seconds) {
             let path = format!("{table}.time_unit");
-            let advice = "Choose it, or leave it out.";
+            let advice = "Set it to `s`, or remove it.";
             return Err(self.document.wrong(&path, "`s`", advice));
         }
         Ok(Clock {
@@ -115,7 +115,7 @@ impl<'a> Fields<'a> {
             Some(_) => Ok(Some((source, clock))),
             None => Err(self.document.missing(
                 "imu.accel_from.time",
-                "the column of its time, for two streams need both",
+                "the time column of the accelerometers, because separate streams both need one",
             )),
         }
     }

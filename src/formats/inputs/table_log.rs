@@ -58,9 +58,9 @@ impl AttitudeColumns<'_> {
         let norm = quaternion.norm();
         if (norm - 1.0).abs() > NORM_TOLERANCE {
             return Err(csv.error_here(
-                format_args!("a quaternion of norm {norm:.6}"),
-                format_args!("1 within {NORM_TOLERANCE}"),
-                "Correct the row, or the order of columns in run.toml: w, x, y, z.",
+                format_args!("a quaternion with norm {norm:.6}"),
+                format_args!("norm 1 within {NORM_TOLERANCE}"),
+                "Correct the row or the column order in run.toml (w, x, y, z).",
             ));
         }
         let angles = Some(angles).filter(|angles| !angles.is_empty());
@@ -78,7 +78,7 @@ impl<'a> Fields<'a> {
         let stated = (fields.time_unit, fields.sample_period_s);
         let attitude = self.attitude(fields)?;
         if fields.time_sigma_ms.is_some() {
-            let note = "turntable.time_sigma_ms is read but has no effect yet.";
+            let note = "turntable.time_sigma_ms currently has no effect.";
             self.notes.push(note.to_owned());
         }
         Ok(Some(TableLogFile {
@@ -106,7 +106,7 @@ impl<'a> Fields<'a> {
                 let count = letters.len();
                 return wrong(
                     "turntable.columns.angles",
-                    &format!("an angle for each of {count} axes, outermost first"),
+                    &format!("one angle column for each of the {count} axes, outermost first"),
                     "Complete `angles` or `axes`.",
                 );
             }
@@ -128,12 +128,12 @@ impl<'a> Fields<'a> {
             (None, Some(_)) => {
                 return wrong(
                     path,
-                    "it beside the columns of `angles`",
-                    "Name the columns of the angles, or remove the axes.",
+                    "axes together with columns of `angles`",
+                    "Name the angle columns, or remove the axes.",
                 );
             }
             (None, None) if columns.quaternion.is_none() => {
-                let meaning = "the columns of a quaternion or of `angles`";
+                let meaning = "columns of a quaternion or of `angles`";
                 return missing("turntable.columns.quaternion", meaning);
             }
             (None, None) => Vec::new(),
@@ -153,8 +153,8 @@ impl<'a> Fields<'a> {
             if stated.is_some() && angles == 0 {
                 return Err(self.document.wrong(
                     &format!("turntable.{key}"),
-                    "it with `angles` only, for a quaternion does not tell the axes apart",
-                    "Remove it, or give the angles of the table's axes, alone or with the quaternion.",
+                    "`angles` beside it, because a quaternion does not separate the axes",
+                    "Remove it, or add the angles of the table axes, with or without the quaternion.",
                 ));
             }
             axes += kind.of_table(angles, sigma(stated));
@@ -186,7 +186,7 @@ impl TableLogFile<'_> {
         let mut axes = Vec::new();
         while csv.advance()? && !csv.may_be_cut() {
             let (reading, angles) = self.attitude.reading(&csv, &places)?;
-            // A row twice says nothing new.
+            // A repeated row adds no information.
             if let Stamp::New(place) = stamps.take(&csv, |other| attitude[other] == reading)? {
                 attitude.insert(place, reading);
                 if let Some(angles) = angles {
@@ -194,7 +194,7 @@ impl TableLogFile<'_> {
                 }
             }
         }
-        notes.extend(csv.cut_off("It is left out"));
+        notes.extend(csv.cut_off("turncal ignored it"));
         notes.extend(stamps.notes(csv.file(), 0));
         attitude.shrink_to_fit();
         axes.shrink_to_fit();
@@ -203,9 +203,9 @@ impl TableLogFile<'_> {
             [first, .., last] => (*first, *last),
             _ => {
                 return Err(csv.error(
-                    "a single reading or none",
+                    "fewer than 2 readings",
                     "at least 2",
-                    "Log the table over the whole run, or remove [turntable].",
+                    "Log the table during the whole run, or remove [turntable].",
                 ));
             }
         };
@@ -213,8 +213,8 @@ impl TableLogFile<'_> {
         if last < start || first > end {
             return Err(csv.error(
                 format_args!("readings from {first} s to {last} s"),
-                format_args!("times that overlap the IMU record, {start} s to {end} s"),
-                "Bring both files to one clock.",
+                format_args!("times that overlap the IMU log ({start} s to {end} s)"),
+                "Convert both files to the same clock.",
             ));
         }
         Ok(TableLog {

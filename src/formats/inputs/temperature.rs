@@ -213,16 +213,16 @@ impl Channel {
             let (name, largest) = (&self.name, LARGEST);
             notes.push(format!(
                 "{file}, line {line}, column {name}: found {value}, expected a temperature within ±{largest} °C. \
-                 The column is not used; if it is in kelvin or fahrenheit, say temperature_unit = \"K\" or \"degF\" \
-                 in [imu]."
+                 turncal ignored the column. If it is in kelvin or fahrenheit, set temperature_unit = \"K\" or \
+                 \"degF\" in [imu]."
             ));
         }
         let (missing, line) = self.missing;
         if missing > 0 {
             let name = &self.name;
             notes.push(format!(
-                "{file}, column {name}: {missing} row(s) hold no temperature, the first in line {line}. It is \
-                 interpolated there."
+                "{file}, column {name}: {missing} row(s) contain no temperature, the first in line {line}. turncal \
+                 interpolated it."
             ));
         }
         notes

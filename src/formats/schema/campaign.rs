@@ -95,7 +95,7 @@ impl Campaign {
             .for_each(|one| one.run = directory.join(&one.run));
         named.sort_by(|a, b| a.run.cmp(&b.run));
         if let Some(pair) = named.windows(2).find(|pair| pair[0].run == pair[1].run) {
-            let advice = "Name every recording once.";
+            let advice = "List each recording once.";
             let found = format_args!("{} twice", pair[0].run.display());
             return Err(FileError::of(path, found, "each recording once", advice));
         }
@@ -230,8 +230,8 @@ fn own_parameters(
             let known: Vec<String> = Group::all().map(own_name).collect();
             return Err(document.wrong(
                 "own",
-                format_args!("names among {}", known.join(", ")),
-                "Name groups of parameters that each recording has for itself.",
+                format_args!("names from the list {}", known.join(", ")),
+                "Name parameter groups that differ freely between recordings.",
             ));
         };
         for i in group.parameters(form) {

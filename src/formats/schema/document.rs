@@ -12,39 +12,42 @@ use crate::formats::error::{FileError, Place, list, suggestion};
 
 /// What fields hold that must be there.
 const MEANINGS: [(&str, &str); 19] = [
-    ("accel", "the names of three columns, or of one"),
-    ("accel_unit", "the unit of a row"),
+    ("accel", "the names of three columns or of one"),
+    ("accel_unit", "the unit of the values"),
     ("column", "the column that identifies the instrument"),
-    ("columns", "the names of the columns"),
+    ("columns", "the column names"),
     ("file", "a file name"),
-    ("format", "the format of this file"),
-    ("gyro", "the names of three columns, or of one"),
-    ("gyro_unit", "the unit of a row"),
+    ("format", "the format name of this file"),
+    ("gyro", "the names of three columns or of one"),
+    ("gyro_unit", "the unit of the values"),
     (
         "imu",
-        "a table of the instrument: its file and the content of the file",
+        "a table that describes the log file of the instrument",
     ),
     (
         "number",
-        "the value of the column for the instrument to use",
+        "the value in that column for the instrument to use",
     ),
-    ("output", "the quantity of a row: pulse, increment or rate"),
-    ("position_sigma_arcsec", "a 1σ in seconds of arc"),
-    ("reading_sigma_arcsec", "a 1σ in seconds of arc"),
+    ("output", "the quantity in a row: pulse, increment or rate"),
+    ("position_sigma_arcsec", "a 1σ value in arcseconds"),
+    ("reading_sigma_arcsec", "a 1σ value in arcseconds"),
     (
         "recording",
-        "a [[recording]] for each run, with run = \"its run.toml\"",
+        "one [[recording]] per run, with run = \"its run.toml\"",
     ),
     ("run", "the path of a run.toml"),
-    ("sigma", "1σ of each of its parameters"),
-    ("time", "the name of a column"),
-    ("time_stamp", "which moment of a sample its time names"),
+    ("sigma", "the 1σ of each of its parameters"),
+    ("time", "a column name"),
+    (
+        "time_stamp",
+        "the moment within a sample that its time stamp marks",
+    ),
     ("uncertainty", "the expanded uncertainty, k = 2"),
 ];
 /// What serde expects, in words for users.
 const KINDS: [(&str, &str); 4] = [
     ("f64", "a finite number"),
-    ("a string", "a text in quotes"),
+    ("a string", "text in quotes"),
     ("a boolean", "true or false"),
     ("a map", "a table"),
 ];
@@ -67,7 +70,7 @@ impl<'a> Document<'a> {
         let mut table = self.parse()?;
         match table.get_mut().remove("format") {
             Some(said) if said.get_ref().as_str() == Some(format) => Ok(table),
-            Some(_) => Err(self.wrong("format", format_args!("`{format}`"), "Choose it.")),
+            Some(_) => Err(self.wrong("format", format_args!("`{format}`"), "Set this format.")),
             None => Err(self.missing("format", "")),
         }
     }
@@ -75,7 +78,7 @@ impl<'a> Document<'a> {
     /// All fields.
     pub fn parse(self) -> Result<Spanned<DeTable<'a>>, FileError> {
         DeTable::parse(self.text).map_err(|error| {
-            let found = format_args!("TOML that cannot be read ({})", error.message());
+            let found = format_args!("invalid TOML ({})", error.message());
             self.error(error.span(), found, "a TOML document", "Correct this line.")
         })
     }

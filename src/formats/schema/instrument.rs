@@ -60,7 +60,7 @@ impl<'a> Fields<'a> {
         let accel_from = self.accel_from(&source, of_gyro)?;
         if let (Some(of), Some(_)) = (&imu.instance, &accel_from) {
             let meaning = format!(
-                "one instrument without `{}`, as accel_from needs",
+                "a stream of one instrument without `{}`, which accel_from requires",
                 of.column
             );
             return Err(self.document.missing("imu.stream", &meaning));
@@ -105,8 +105,8 @@ impl<'a> Fields<'a> {
             return Ok(false);
         }
         if self.run.imu.output != Output::Rate || self.run.turntable.is_some() {
-            let meaning = "the name of a column; pulses, increments and runs with a [turntable] require either it or \
-                           sample_period_s";
+            let meaning = "a column name (pulses, increments and runs with a [turntable] need either this or \
+                sample_period_s)";
             return Err(self.document.missing("imu.columns.time", meaning));
         }
         clock.period = Some(USUAL_PERIOD);
@@ -184,14 +184,17 @@ impl<'a> Fields<'a> {
         if is_there(sensor) {
             let unit = imu.of(sensor).unit.map(str::to_owned);
             let path = format!("imu.{name}_unit");
-            let missing = || self.document.missing(&path, "the unit of the file");
+            let missing = || {
+                self.document
+                    .missing(&path, "the unit of the values in the file")
+            };
             return unit.ok_or_else(missing);
         }
         if imu.accel_from.is_some() || !Sensor::ALL.into_iter().any(is_there) {
             let path = format!("imu.columns.{name}");
             return Err(self.document.missing(&path, "the names of three columns"));
         }
-        let note = format!("The log has no columns of {name}: they are taken to be zero.");
+        let note = format!("The log has no {name} columns. turncal assumed zero output.");
         self.notes.push(note);
         Ok("count".to_owned())
     }
@@ -220,17 +223,18 @@ impl<'a> Fields<'a> {
         match (of.prior.scale.map(OneOrThree::vector), of_unit) {
             (None, Some(of_unit)) => Ok(Vector3::repeat(of_unit)),
             (None, None) => {
-                let meaning =
-                    "counts per second for one rad/s or m/s², for a count has no size of its own";
+                let meaning = "the counts per second for 1 rad/s or 1 m/s², because the size of a count varies by instrument";
                 Err(document.missing(&path, meaning))
             }
-            (Some(scale), _) if scale.iter().any(|&s| s == 0.0) => {
-                Err(document.wrong(&path, "no zeros", "Give the data sheet's scale factor."))
-            }
+            (Some(scale), _) if scale.iter().any(|&s| s == 0.0) => Err(document.wrong(
+                &path,
+                "non-zero values",
+                "Set the scale factor from the data sheet.",
+            )),
             (Some(scale), Some(of_unit)) if !is_near(&scale, of_unit) => Err(document.wrong(
                 &path,
-                format_args!("about {of_unit}, which is 1 rad/s or 1 m/s² in this unit"),
-                "Correct the scale or the unit, or leave the scale out.",
+                format_args!("about {of_unit} (1 rad/s or 1 m/s² in this unit)"),
+                "Correct the scale or the unit, or remove the scale.",
             )),
             (Some(scale), _) => Ok(scale),
         }
@@ -249,7 +253,7 @@ impl<'a> Fields<'a> {
             assumed.extend(stated.is_none().then_some(words));
             if !stated.iter().flatten().all(|&s| s > 0.0 && s <= most) {
                 let path = format!("imu.prior.{}.{key}", sensor.name());
-                let expected = format_args!("numbers above zero, at most {most}");
+                let expected = format_args!("numbers above zero and at most {most}");
                 return Err(self.document.wrong(&path, expected, "Correct this value."));
             }
             Ok(stated.unwrap_or(usual))
@@ -277,7 +281,7 @@ impl<'a> Fields<'a> {
         )?;
         if !assumed.is_empty() && of.columns.is_some() {
             self.notes.push(format!(
-                "run.toml does not state everything in [imu.prior.{}]. turncal assumed (1σ): {}.",
+                "[imu.prior.{}] in run.toml is incomplete. turncal assumed (1σ): {}.",
                 sensor.name(),
                 assumed.join(", ")
             ));
@@ -308,7 +312,7 @@ pub fn term_sigma(
         let most = (term.entry().largest / unit).round();
         if stated.0 > most {
             let path = format!("{table}.{}.sigma", term.name());
-            let expected = format_args!("a number above zero, at most {most}");
+            let expected = format_args!("a number above zero and at most {most}");
             return Err(document.wrong(&path, expected, "Correct this value."));
         }
         for parameter in term.parameters() {

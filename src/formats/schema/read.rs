@@ -173,8 +173,8 @@ impl InstrumentFields<'_> {
         }
         if !found.is_empty() {
             notes.push(format!(
-                "You stated no white noise. turncal starts with that of the quieter part of the record ({}) and \
-                 estimates the noise from there. State the data sheet's figures in [imu.noise] if you know them.",
+                "You stated no white noise. turncal starts from the noise of the quieter part of the recording ({}) \
+                 and estimates it from there. If you know the data-sheet values, state them in [imu.noise].",
                 found.join(", ")
             ));
         }
@@ -193,8 +193,8 @@ impl InstrumentFields<'_> {
         let Some(period) = angle.filter(|&period| period > 0.0) else {
             return Err(FileError::of(
                 &self.log.source.file,
-                "rows without a time, whose turns do not show how long a row lasts",
-                "a time column, or sample_period_s in run.toml",
+                "rows without time stamps, with turns too poor to estimate the sample period",
+                "a time column or sample_period_s in run.toml",
                 "Add sample_period_s to [imu].",
             ));
         };
@@ -202,8 +202,8 @@ impl InstrumentFields<'_> {
         let sigma = self.known.prior.gyro.scale_sigma.norm() / 3.0;
         let percent = 100.0 * sigma;
         notes.push(format!(
-            "run.toml does not state sample_period_s, and the log has no time. turncal found {period:.4} s ± \
-             {percent:.1} % from the turns, which widens the σ of the gyro scale factors as much."
+            "run.toml does not state sample_period_s, and the log has no time column. turncal estimated {period:.4} \
+             s ± {percent:.1} % from the turns, which widens the σ of the gyro scale factors by the same amount."
         ));
         Ok(imu.with_period(period, sigma))
     }
@@ -225,13 +225,13 @@ impl InstrumentFields<'_> {
         let judged = match off.abs() <= prior {
             true => format!("within its prior σ of {sigma:.2} ppm."),
             false => format!(
-                "beyond its prior σ of {sigma:.2} ppm: if the instrument's clock is right and the stamps are not, leave \
-                 the time column out."
+                "beyond its prior σ of {sigma:.2} ppm. If the instrument clock is right and the time stamps are \
+                 wrong, omit the time column."
             ),
         };
         Some(format!(
-            "Stamps come every {period} s, {ppm:.2} ppm {way} than sample_period_s says; stamps are taken, and the scale \
-             of the {triad} is by as much another, {judged}"
+            "The time stamps are {period} s apart, {ppm:.2} ppm {way} than sample_period_s. turncal used the time \
+             stamps, which changes the scale factor of the {triad} by the same amount, {judged}"
         ))
     }
 }
@@ -262,7 +262,7 @@ impl Fields<'_> {
         let file = &self.run.site;
         if file.latitude_deg.is_none() && self.run.turntable.is_some() {
             let meaning =
-                "a latitude, north positive: with a [turntable], Earth rate must be known";
+                "the latitude (north positive), because a [turntable] run needs a known Earth rate";
             return Err(self.document.missing("site.latitude_deg", meaning));
         }
         let longitude = file.longitude_deg.map_or(0.0, |degrees| degrees.0 * DEGREE);
@@ -317,7 +317,7 @@ fn place_note(site: &Site, has_gravity: bool, has_height: bool) -> Option<String
     }
     let costs = costs.join("; it ");
     (!costs.is_empty()).then(|| {
-        format!("You stated no {missing}. turncal {costs}. State {fields} in [site]{or_gravity}.")
+        format!("You stated no {missing}. turncal {costs}. Set {fields} in [site]{or_gravity}.")
     })
 }
 

@@ -146,7 +146,7 @@ pub struct ImuColumns {
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(
     untagged,
-    expecting = "the name of a column, or those of seconds and nanoseconds"
+    expecting = "a column name, or the names of the seconds and nanoseconds columns"
 )]
 pub enum TimeColumn {
     One(String),
@@ -158,7 +158,7 @@ pub enum TimeColumn {
 #[serde(
     untagged,
     deny_unknown_fields,
-    expecting = "the name of a column, or `gyro` and `accel` with the name of a column or three each"
+    expecting = "a column name, or `gyro` and `accel` with one or three column names each"
 )]
 pub enum TemperatureColumn {
     One(String),

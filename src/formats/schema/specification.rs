@@ -50,7 +50,7 @@ impl Specification {
         let file: SpecificationFile = document.fill(document.of_format(FORMAT)?)?;
         let confidence = file.confidence.unwrap_or(CONFIDENCE);
         if !(0.5..1.0).contains(&confidence) {
-            let expected = "a number from 0.5 to below 1";
+            let expected = "a number of at least 0.5 and below 1";
             return Err(document.wrong("confidence", expected, "Correct this value."));
         }
         let mut limits = Vec::new();
@@ -130,7 +130,7 @@ fn limits_of(
     match limits.is_empty() {
         true => Err(document.missing(
             &format!("{path}.within"),
-            "the largest distance from nominal that is allowed, or one axis by its name",
+            "the largest allowed deviation from nominal, or a limit for a named axis",
         )),
         false => Ok(limits),
     }
@@ -174,7 +174,10 @@ mod tests {
         for (text, expected) in [
             ("[gyro]\nscale = 500\n", "scale_ppm"),
             ("[gyro]\nscale_ppm = -5\n", "above zero"),
-            ("[accel]\nbias_ug = { nominal = 3.0 }\n", "largest distance"),
+            (
+                "[accel]\nbias_ug = { nominal = 3.0 }\n",
+                "largest allowed deviation",
+            ),
             (
                 "[gyro]\nscale_ppm = { within = 3, w = 1 }\n",
                 "unknown field `w`",

@@ -15,7 +15,7 @@ fn with_size(value: f64) -> Result<f64, &'static str> {
     match value {
         _ if !value.is_finite() => Err("a finite number"),
         _ if value == 0.0 || (1e-30..=1e30).contains(&value.abs()) => Ok(value),
-        _ => Err("a number whose magnitude is from 1e-30 to 1e30"),
+        _ => Err("a number with a magnitude from 1e-30 to 1e30"),
     }
 }
 
@@ -49,9 +49,9 @@ checked!(
     Positive, "a number above zero", |v| v > 0.0;
     /// Zero or above.
     #[derive(Default)]
-    NonNegative, "zero or a number above it", |v| v >= 0.0;
+    NonNegative, "a number of at least zero", |v| v >= 0.0;
     /// 1σ of an angle, ″: beyond half a turn no error of an angle is.
-    Angle, "a number above zero, at most 648000", |v| v > 0.0 && v <= 648_000.0;
+    Angle, "a number above zero and at most 648000", |v| v > 0.0 && v <= 648_000.0;
     /// °
     Latitude, "a latitude from -90 to 90", |v| v.abs() <= 90.0;
     /// °
@@ -96,7 +96,7 @@ impl<const N: usize> TryFrom<Vec<String>> for Names<N> {
 
     fn try_from(names: Vec<String>) -> Result<Self, Self::Error> {
         names.try_into().map(Self).map_err(|_| match N {
-            4 => "four columns, in the order w, x, y, z",
+            4 => "four columns in the order w, x, y, z",
             _ => "three texts in quotes",
         })
     }
@@ -128,7 +128,7 @@ by_words!(AxisOrder, TemperatureUnit, TimeStamp);
 
 /// A word, or what a tick of a clock of its own lasts, s.
 #[derive(Deserialize)]
-#[serde(untagged, expecting = "a unit of time, or what a tick lasts in s")]
+#[serde(untagged, expecting = "a unit of time, or the duration of a tick in s")]
 enum TimeUnitFile {
     Tick(Positive),
     Word(String),

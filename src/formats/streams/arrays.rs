@@ -53,8 +53,8 @@ impl Array {
         }
         Err(Broken::new(
             self.offset,
-            format_args!("{bytes} bytes of the array `{name}`"),
-            format_args!("items of {} bytes by its shape {:?}", self.size, self.shape),
+            format_args!("{bytes} bytes in the array `{name}`"),
+            format_args!("items of {} bytes in the shape {:?}", self.size, self.shape),
         ))
     }
 
@@ -198,7 +198,7 @@ impl Cursor {
         Broken::new(
             self.offset,
             format_args!("`{name}`: {error}"),
-            format_args!("{} rows of an array", self.rows),
+            format_args!("an array of {} rows", self.rows),
         )
     }
 }

@@ -6,10 +6,10 @@ use std::io::{self, Read, Seek, SeekFrom};
 pub trait Source: Read + Seek + Send {}
 impl<T: Read + Seek + Send> Source for T {}
 
-/// Why a file cannot be read on, and where.
+/// Why and where reading of a file stopped.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Broken {
-    /// Bytes from the begin of the file.
+    /// Offset from the start of the file, in bytes.
     pub offset: u64,
     pub found: String,
     pub expected: String,
@@ -25,7 +25,7 @@ impl Broken {
     }
 }
 
-/// A file read from its begin on.
+/// A file read from its start.
 pub struct Input {
     source: Box<dyn Source>,
     offset: u64,
@@ -65,12 +65,12 @@ impl Input {
         if count > self.left() {
             let found = match self.left() {
                 0 => "the end of the file".to_owned(),
-                left => format!("{left} bytes to the end of the file"),
+                left => format!("only {left} bytes before the end of the file"),
             };
             return Err(Broken::new(
                 self.offset,
                 found,
-                format_args!("{count} bytes of {what}"),
+                format_args!("{count} bytes for {what}"),
             ));
         }
         let read = (&mut self.source).take(count).read_to_end(into);
@@ -79,7 +79,11 @@ impl Input {
                 self.offset += count;
                 Ok(())
             }
-            Ok(_) => Err(Broken::new(self.offset, "a file that became shorter", what)),
+            Ok(_) => Err(Broken::new(
+                self.offset,
+                "a file that became shorter while being read",
+                what,
+            )),
             Err(error) => Err(Broken::new(self.offset, error, what)),
         }
     }
@@ -92,7 +96,7 @@ impl Input {
             return Err(Broken::new(self.offset, found, expected));
         }
         let sought = self.source.seek(SeekFrom::Start(offset));
-        sought.map_err(|error| Broken::new(offset, error, "a place in the file"))?;
+        sought.map_err(|error| Broken::new(offset, error, "a readable position in the file"))?;
         self.offset = offset;
         Ok(())
     }
@@ -100,8 +104,8 @@ impl Input {
     /// Skips `count` bytes.
     pub fn skip(&mut self, count: u64, what: &str) -> Result<(), Broken> {
         if count > self.left() {
-            let found = format!("{} bytes to the end of the file", self.left());
-            let expected = format!("{count} bytes of {what}");
+            let found = format!("only {} bytes before the end of the file", self.left());
+            let expected = format!("{count} bytes for {what}");
             return Err(Broken::new(self.offset, found, expected));
         }
         self.go_to(self.offset + count)
@@ -177,8 +181,8 @@ impl<'a> Slice<'a> {
         let bytes = bytes.ok_or_else(|| {
             Broken::new(
                 self.offset(),
-                format_args!("only {} bytes left in the record", self.left()),
-                format_args!("{count} bytes of {what}"),
+                format_args!("only {} bytes left in this part of the file", self.left()),
+                format_args!("{count} bytes for {what}"),
             )
         })?;
         self.at += count;

@@ -128,7 +128,10 @@ impl Undo {
                 let words = words(self.program, sensor, of);
                 match done.len() {
                     1 => words,
-                    _ => format!("Part of the samples, from number {}: {words}", of.first),
+                    _ => format!(
+                        "From sample {} on, for part of the samples: {words}",
+                        of.first
+                    ),
                 }
             })
         };
@@ -167,12 +170,12 @@ fn words(program: &str, sensor: Sensor, done: &Done) -> String {
     };
     match &done.applied {
         Some(of) if of.is_more => format!(
-            "{program} corrected its {triad} by {}{varies} and did more to them, turned axes or compensated \
-             temperature: this is not undone, so the calibration is that of corrected data.",
+            "{program} corrected its {triad} by {}{varies} and also rotated axes or compensated temperature. turncal \
+                cannot undo this, so the calibration applies to the corrected data.",
             of.name
         ),
         Some(of) => format!(
-            "{program} corrected its {triad} by {}{varies}: this is undone.",
+            "{program} corrected its {triad} by {}{varies}. turncal undid this correction.",
             of.name
         ),
         None => format!(

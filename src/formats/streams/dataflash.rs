@@ -118,7 +118,7 @@ impl Format {
             return Err(Broken::new(
                 offset,
                 format_args!("{name} of {length} bytes"),
-                format_args!("{place}, as its fields `{types}` take"),
+                format_args!("{place} bytes for its fields `{types}`"),
             ));
         }
         Ok(format)
@@ -160,8 +160,7 @@ impl Log for DataFlash {
             if self.input.left() == 0 {
                 return Ok(None);
             }
-            self.input
-                .take(3, &mut self.message, "a message's begin and type")?;
+            self.input.take(3, &mut self.message, "a message header")?;
             let Some(&[first, second, kind]) = self.message.first_chunk() else {
                 return Ok(None);
             };
@@ -169,7 +168,7 @@ impl Log for DataFlash {
                 return Err(Broken::new(
                     self.offset,
                     format_args!("the bytes {first:02x} {second:02x}"),
-                    "a3 95, with which a message begins",
+                    "the bytes a3 95 that start a message",
                 ));
             }
             let Some(format) = self.formats.get(&kind) else {
@@ -225,12 +224,12 @@ impl Log for DataFlash {
 impl DataFlash {
     fn format(&mut self) -> Result<(), Broken> {
         let mut content = Slice::new(&self.message, self.offset);
-        content.take(3, "a message's begin")?;
+        content.take(3, "a message header")?;
         let kind = content.whole(1, "a type")? as u8;
         let length = content.whole(1, "a length")?;
         let name = content.text(4, "a name")?;
-        let types = content.text(16, "the types of fields")?;
-        let labels = content.text(64, "the names of fields")?;
+        let types = content.text(16, "field types")?;
+        let labels = content.text(64, "field names")?;
         if kind != FMT {
             let format = Format::of(self.offset, &name, length, &types, &labels)?;
             self.formats.insert(kind, format);
@@ -244,8 +243,8 @@ impl DataFlash {
         let name_at = if length < 3 + 8 + 16 + 4 { 3 } else { 11 };
         let mut content = Slice::new(&self.message, self.offset);
         content.take(name_at, "a time")?;
-        let name = content.text(16, "a parameter's name")?;
-        let value = Kind::F32.number(content.take(4, "a parameter's value")?, false);
+        let name = content.text(16, "a parameter name")?;
+        let value = Kind::F32.number(content.take(4, "a parameter value")?, false);
         self.parameters.insert(name, value.unwrap_or(f64::NAN));
         self.changes += 1;
         Ok(())

@@ -33,7 +33,7 @@ pub fn open(input: Input) -> Result<Box<dyn Log>, Broken> {
     let file = file.map_err(broken)?;
     let end = file.superblock().eof_address;
     if end > length {
-        let expected = format!("{end} bytes of an HDF5 file");
+        let expected = format!("an HDF5 file of {end} bytes");
         return Err(Broken::new(length, "the end of the file", expected));
     }
     // Fields of MATLAB's structures are called as in a MAT file of version 5.
@@ -51,13 +51,13 @@ pub fn open(input: Input) -> Result<Box<dyn Log>, Broken> {
 fn broken(error: Error) -> Broken {
     let found = match error {
         // The crate's own words advise its callers.
-        Error::FileMarkedInUse { .. } => "a file that its writer has not closed".to_owned(),
+        Error::FileMarkedInUse { .. } => "a file that was not closed by its writer".to_owned(),
         Error::Format(FormatError::OffsetOverflow {
             offset: u64::MAX, ..
-        }) => "an address that is not defined, as that of a soft link".to_owned(),
+        }) => "an undefined address, such as that of a soft link".to_owned(),
         error => error.to_string(),
     };
-    Broken::new(0, found, "an HDF5 file of version 1.14 or before")
+    Broken::new(0, found, "an HDF5 file of version 1.14 or earlier")
 }
 
 /// The groups of a file, one after the other.
@@ -75,7 +75,7 @@ impl Walk {
         self.groups += 1;
         if self.groups > MOST_GROUPS {
             let found = format_args!("more than {MOST_GROUPS} groups");
-            return Err(Broken::new(0, found, "a file of one recording"));
+            return Err(Broken::new(0, found, "a file with one recording"));
         }
         let begin = match path {
             "" => String::new(),
@@ -114,8 +114,8 @@ fn array(name: String, dataset: Dataset, file: u64) -> Result<Option<Array>, Bro
     let row = inner.try_fold(size, |all, &size| all.checked_mul(size));
     let all = row.and_then(|row| row.checked_mul(shape.first().copied().unwrap_or(1)));
     let (Some(row), Some(all)) = (row, all) else {
-        let found = format_args!("`{name}` of the shape {shape:?}");
-        return Err(Broken::new(0, found, "a shape that can be counted"));
+        let found = format_args!("`{name}` with the shape {shape:?}");
+        return Err(Broken::new(0, found, "a shape with fewer items"));
     };
     let stored = Stored {
         dataset,
@@ -219,14 +219,14 @@ impl Stored {
     fn open(&self, skip: u64) -> io::Result<Box<dyn Read>> {
         let possible = self.possible()?;
         if self.all > possible {
-            let found = format!("the file holds at most {possible} of {} bytes", self.all);
+            let found = format!("the file contains at most {possible} of {} bytes", self.all);
             return Err(io::Error::other(found));
         }
         let row = self.row.max(1);
         let at_once = self.rows_at_once()?;
         let needed = at_once.saturating_mul(row).min(self.all);
         if !room::is_there((needed as usize).saturating_mul(2)) {
-            let found = format!("{needed} bytes to read at once do not fit into memory");
+            let found = format!("{needed} bytes must be read at once and do not fit into memory");
             return Err(io::Error::other(found));
         }
         let mut rows = Rows {

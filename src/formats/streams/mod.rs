@@ -121,7 +121,8 @@ static FORMATS: [Format; 9] = formats! {
     "ulog" ulog::open, "a PX4 ULog file", [b"ULog\x01\x12\x35"];
     "dataflash" dataflash::open, "an ArduPilot DataFlash log", [b"\xa3\x95\x80"];
     "mat" mat::open, "a MAT file", [b"MATLAB 5.0 MAT-file"];
-    "hdf5" hdf5::open, "an HDF5 file, as MAT files of version 7.3 are", [b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3 MAT-file"];
+    "hdf5" hdf5::open, "an HDF5 file (MAT files of version 7.3 included)", [b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3 \
+        MAT-file"];
     "mcap" mcap::open, "an MCAP file", [b"\x89MCAP0\r\n"];
     "rosbag" rosbag::open, "a ROS 1 bag", [b"#ROSBAG V2.0\n"];
     "rosbag" rosbag2::open, "a ROS 2 bag", [b"SQLite format 3\0"];
@@ -134,11 +135,11 @@ const CLOSED: [(&[u8], &str, &str); 2] = [
     (
         b"PAR1",
         "a Parquet file",
-        "Save it as CSV, in Python by pandas.read_parquet(file).to_csv('imu.csv', index=False).",
+        "Save it as CSV, in Python with pandas.read_parquet(file).to_csv('imu.csv', index=False).",
     ),
     (
         b"\xd0\xcf\x11\xe0",
-        "a workbook of Excel",
+        "an Excel workbook",
         "Save the sheet as CSV.",
     ),
 ];
@@ -165,7 +166,7 @@ pub fn open(path: &Path) -> Result<Option<Box<dyn Log>>, FileError> {
         .map_err(refused)?;
     let closed = CLOSED.iter().find(|(bytes, ..)| begin.starts_with(bytes));
     if let Some((_, found, advice)) = closed {
-        let expected = "rows of text, or a log of a program that turncal knows";
+        let expected = "a text log or a supported binary log";
         return Err(FileError::new(path, Place::File, found, expected, advice));
     }
     let Some(format) = FORMATS.iter().find(|format| format.is_of(&begin)) else {
@@ -175,7 +176,7 @@ pub fn open(path: &Path) -> Result<Option<Box<dyn Log>>, FileError> {
         return Err(FileError::new(
             path,
             Place::File,
-            format_args!("{}, which this build does not read", format.name),
+            format_args!("{}, which this build cannot read", format.name),
             format_args!("a build with the feature `{}`", format.feature),
             "Build turncal with its default features, or convert the file to CSV.",
         ));

@@ -63,7 +63,7 @@ pub fn open_archive(input: Input) -> Result<Box<dyn Log>, Broken> {
         });
     }
     if members.is_empty() {
-        let expected = "arrays `NAME.npy`; save the sheet of a workbook as CSV";
+        let expected = "arrays `NAME.npy` (save the sheet of a workbook as CSV)";
         return Err(Broken::new(0, "a ZIP archive without arrays", expected));
     }
     let file: File = Rc::new(RefCell::new(archive.into_inner()));
@@ -159,7 +159,7 @@ impl Read for Checked {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
         let count = self.bytes.read(into)?;
         if count == 0 && !into.is_empty() && self.bytes.crc().sum() != self.sum {
-            let what = "its check sum is not that of the archive";
+            let what = "its checksum differs from that in the archive";
             return Err(io::Error::new(io::ErrorKind::InvalidData, what));
         }
         Ok(count)

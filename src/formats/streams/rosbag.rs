@@ -63,7 +63,7 @@ impl Messages for Bag {
                     return Err(Broken::new(
                         self.offset,
                         "a record without `op`",
-                        "its kind",
+                        "its record type",
                     ));
                 }
             }
@@ -87,11 +87,15 @@ impl Bag {
             let mut chunk = Slice::packed(&self.chunk[self.at..], self.offset);
             for part in [&mut self.head, &mut self.data] {
                 part.clear();
-                part.extend_from_slice(chunk.measured(4, "a record of a chunk")?);
+                part.extend_from_slice(chunk.measured(4, "a record in a chunk")?);
             }
             self.at += chunk.position();
             if Head::of(&self.head, self.offset)?.field("op") == Some(&[CHUNK]) {
-                return Err(Broken::new(self.offset, "a chunk in a chunk", "messages"));
+                return Err(Broken::new(
+                    self.offset,
+                    "a chunk inside a chunk",
+                    "messages",
+                ));
             }
             return Ok(true);
         }
@@ -159,7 +163,7 @@ impl<'a> Head<'a> {
             Broken::new(
                 self.offset,
                 format_args!("no `{name}` of {size} bytes"),
-                "it",
+                "this field",
             )
         })?;
         Slice::new(field, self.offset).whole(size, name)

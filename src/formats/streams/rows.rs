@@ -182,7 +182,7 @@ impl Rows for StreamRows {
             expected,
         } = self.damage.as_ref()?;
         Some(format!(
-            "{}, byte {offset}: found {found}, expected {expected}; the {} samples of `{}` before it are used.",
+            "{}, byte {offset}: found {found}, expected {expected}. turncal used the {} samples of `{}` before it.",
             self.file.display(),
             self.samples,
             self.name
@@ -230,11 +230,14 @@ impl Rows for StreamRows {
 fn no_stream(file: &Path, log: &dyn Log, with_samples: &[usize], name: Option<&str>) -> FileError {
     let names = || with_samples.iter().map(|&k| &*log.streams()[k].name);
     let (found, expected) = match name {
-        _ if with_samples.is_empty() => ("no samples".to_owned(), "streams of samples".to_owned()),
+        _ if with_samples.is_empty() => (
+            "no samples".to_owned(),
+            "at least one stream of samples".to_owned(),
+        ),
         name => (
             format!("the streams {}", list(names())),
             name.map_or_else(
-                || "one stream, or `stream` in run.toml".to_owned(),
+                || "one stream or `stream` in run.toml".to_owned(),
                 |name| format!("a stream `{name}` with samples"),
             ),
         ),
@@ -256,8 +259,8 @@ fn changed(file: &Path) -> FileError {
     FileError::new(
         file,
         Place::File,
-        "another file than a moment ago",
-        "a file that stays as it is",
-        "Wait until it is written, and try again.",
+        "a file that changed while it was read",
+        "an unchanged file",
+        "Wait until it is complete, then try again.",
     )
 }

@@ -87,14 +87,14 @@ impl Database {
         let mut bytes = Vec::new();
         input.take(HEADER as u64, &mut bytes, "the header")?;
         let mut header = big_endian(&bytes[16..], 16);
-        let page = match header.whole(2, "the size of a page")? {
+        let page = match header.whole(2, "the page size")? {
             1 => 1 << 16,
             size => size as usize,
         };
         header.take(2, "versions")?;
         let usable = page.saturating_sub(header.whole(1, "reserved bytes")? as usize);
         if !page.is_power_of_two() || usable < 480 {
-            let found = format_args!("pages of {page} bytes, {usable} of them in use");
+            let found = format_args!("pages of {page} bytes with {usable} usable bytes");
             return Err(Broken::new(16, found, "pages of 512 to 65536 bytes"));
         }
         Ok(Self {
@@ -130,7 +130,7 @@ impl Database {
     fn read(&mut self, number: u64) -> Result<Page, Broken> {
         let place = number.checked_sub(1);
         let offset = place.and_then(|place| place.checked_mul(self.page as u64));
-        let wrong = |found| Broken::new(self.input.offset(), found, "a page of a table");
+        let wrong = |found| Broken::new(self.input.offset(), found, "a table page");
         let offset = offset.filter(|&offset| offset < self.length);
         let offset = offset.ok_or_else(|| wrong(format!("page {number}")))?;
         let mut bytes = Vec::new();
@@ -138,14 +138,14 @@ impl Database {
         self.input.take(self.page as u64, &mut bytes, "a page")?;
         let begin = if number == 1 { HEADER } else { 0 };
         let mut header = big_endian(&bytes[begin..], offset);
-        let kind = header.whole(1, "the kind of a page")?;
-        header.take(2, "a free block")?;
-        let cells = header.whole(2, "a count of cells")? as usize;
+        let kind = header.whole(1, "the page type")?;
+        header.take(2, "a free-block pointer")?;
+        let cells = header.whole(2, "the number of cells")? as usize;
         if kind != LEAF && kind != INTERIOR {
             return Err(Broken::new(
                 offset,
-                format!("a page of kind {kind}"),
-                "a page of a table",
+                format!("a page of type {kind}"),
+                "a table page",
             ));
         }
         Ok(Page {
@@ -181,16 +181,16 @@ impl Database {
                 continue;
             }
             let child = match cell < page.cells {
-                true => page.cell(cell)?.whole(4, "a page's number")?,
+                true => page.cell(cell)?.whole(4, "a page number")?,
                 // Behind all cells.
                 false => {
                     let mut header = big_endian(&page.bytes[page.begin + 8..], page.offset);
-                    header.whole(4, "a page's number")?
+                    header.whole(4, "a page number")?
                 }
             };
             if table.pages.len() > DEEPEST || table.left == 0 {
                 let offset = self.input.offset();
-                return Err(Broken::new(offset, "pages without end", "a tree of pages"));
+                return Err(Broken::new(offset, "a loop of pages", "a tree of pages"));
             }
             table.left -= 1;
             let page = self.read(child)?;
@@ -207,7 +207,7 @@ impl Database {
             return Err(Broken::new(
                 offset,
                 format!("a row of {size} bytes"),
-                "one within the file",
+                "a row within the file",
             ));
         }
         let (size, usable) = (size as usize, self.usable);
@@ -222,16 +222,17 @@ impl Database {
         if local == size {
             return Ok((id, payload));
         }
-        let mut next = cell.whole(4, "an overflow page's number")?;
+        let mut next = cell.whole(4, "an overflow page number")?;
         let mut bytes = Vec::new();
         while payload.len() < size {
             let place = next.checked_sub(1).map(|place| place * self.page as u64);
-            let place = place.ok_or_else(|| Broken::new(offset, "a row cut off", "all of it"))?;
+            let place =
+                place.ok_or_else(|| Broken::new(offset, "a truncated row", "a complete row"))?;
             self.input.go_to(place)?;
             self.input
                 .take(usable as u64, &mut bytes, "an overflow page")?;
             let mut page = big_endian(&bytes, place);
-            next = page.whole(4, "an overflow page's number")?;
+            next = page.whole(4, "an overflow page number")?;
             let part = (size - payload.len()).min(page.left());
             payload.extend(page.take(part, "an overflow page")?);
         }
@@ -243,10 +244,10 @@ impl Page {
     fn cell(&self, number: usize) -> Result<Slice<'_>, Broken> {
         let pointers = self.begin + if self.is_leaf { 8 } else { 12 };
         let pointer = self.bytes.get(pointers + 2 * number..).unwrap_or_default();
-        let place = big_endian(pointer, self.offset).whole(2, "a cell's place")? as usize;
+        let place = big_endian(pointer, self.offset).whole(2, "a cell pointer")? as usize;
         let cell = self.bytes.get(place..).ok_or_else(|| {
             let found = format!("a cell at byte {place} of a page");
-            Broken::new(self.offset, found, "one within it")
+            Broken::new(self.offset, found, "a position within the page")
         })?;
         Ok(big_endian(cell, self.offset + place as u64))
     }
@@ -277,7 +278,7 @@ fn record(payload: &[u8], id: i64, offset: u64) -> Result<Vec<Value>, Broken> {
     let mut values = Slice::packed(payload, offset).in_order(true);
     let head = varint(&mut values)? as usize;
     let begin = values.position();
-    let types = values.take(head.saturating_sub(begin), "the types of a row")?;
+    let types = values.take(head.saturating_sub(begin), "the column types of a row")?;
     let mut types = Slice::packed(types, offset);
     let mut row = Vec::new();
     while types.left() > 0 {

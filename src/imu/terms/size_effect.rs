@@ -8,7 +8,7 @@ use crate::units::STANDARD_GRAVITY;
 pub const ENTRY: TermEntry = TermEntry {
     name: "size-effect",
     title: "accel lever arm",
-    help: "Accelerometers: lever arms between the three",
+    help: "Accelerometers: lever arms between the three sensors",
     adds: "its row of ([w' x] + [w x]^2) r to f, r the lever arm",
     sensor: Sensor::Accel,
     unit: ("mm", 1e-3),

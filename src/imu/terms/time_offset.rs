@@ -10,7 +10,7 @@ use crate::imu::Sensor;
 pub const ENTRY: TermEntry = TermEntry {
     name: "time-offset",
     title: "accel time offset",
-    help: "Accelerometers: delay of their samples behind the gyros'",
+    help: "Accelerometers: delay of their samples relative to the gyros",
     adds: "-q w x f to f, accelerometers sampled later",
     sensor: Sensor::Accel,
     unit: ("ms", 1e-3),

@@ -91,8 +91,8 @@ mod tests {
         let said = notes(&imu);
         assert!(
             said[0].starts_with(
-                "From line 2001, 20.01 s, to 39.98 s rows come every 30.000 ms, elsewhere every 10.000 ms: the samples \
-                 between are interpolated, but at 499 of 666 places"
+                "From line 2001 (20.01 s) to 39.98 s the row interval is 30.000 ms instead of 10.000 ms: turncal \
+                 interpolated the samples between, but attitude and velocity restart at 499 of 666 places"
             ),
             "{said:?}"
         );

@@ -78,9 +78,8 @@ fn ratio(accuracy: &Accuracy) -> Plot {
     let panel = by_compared(accuracy, format!("RMS error / RMS bound{kind}"), y)
         .with_all(with_values(&ratios, 0.0));
     Plot::new("ratio.svg", "Error over bound", (1, 400), [panel]).caption(
-        "RMS error of the EKF over the Cramér–Rao bound, of each group of parameters and of the position after 40 \
-         h; bars: its 99 % interval. A bar that crosses the line at 1 says that nothing shows the filter to be \
-         worse than the best there can be.",
+        "RMS error of the EKF divided by the Cramér–Rao bound, for each parameter group and for the position after \
+         40 h; bars: 99 % interval. A bar that crosses the line at 1 is consistent with an optimal filter.",
     )
 }
 
@@ -101,12 +100,12 @@ fn gain(accuracy: &Accuracy) -> Plot {
             .with_all(with_values(&ratios, shift));
     }
     let equal = match accuracy.baseline.equal_time() {
-        Some(time) => format!(" Right, open: closed form in {}.", minutes(time)),
-        None => " Its positions cannot be had in the time of the EKF.".to_owned(),
+        Some(time) => format!("  Right, open: closed form in {}.", minutes(time)),
+        None => " Its positions do not fit into the time of the EKF.".to_owned(),
     };
     Plot::new("gain.svg", "Gain over the closed form", (1, 460), [panel]).caption(format!(
-        "RMS error of the closed form over that of the EKF in {}, logarithmic, with 99 % intervals. Above the line \
-         at 1 the EKF is better, below the closed form. Left, shaded: closed form in its own {}.{equal}",
+        "RMS error of the closed form divided by that of the EKF in {}, logarithmic, with 99 % intervals. Above the \
+         line at 1 the EKF is better, below it the closed form is. Left, shaded: closed form in its own {}.{equal}",
         minutes(accuracy.table_time),
         minutes(accuracy.baseline.table_time)
     ))
@@ -116,7 +115,7 @@ fn gain(accuracy: &Accuracy) -> Plot {
 fn against_time(accuracy: &Accuracy) -> Plot {
     let panels = accuracy.groups.iter().map(of_group_against_time);
     Plot::new("time.svg", "Accuracy against table time", (3, 340), panels).caption(
-        "RMS error over all runs at that time of the last pass, one panel for each group, both axes logarithmic. \
+        "RMS error over all runs during the last pass, one panel per group, both axes logarithmic. \
          Solid: EKF; dashed: its Cramér–Rao bound; rings: closed form with shorter dwells at all of its \
          positions.",
     )
@@ -189,9 +188,9 @@ pub fn errors(accuracy: &Accuracy) -> Plot {
             .noted(notes)
     });
     Plot::new("errors.svg", "Errors over claimed σ", (3, 300), panels).caption(
-        "Density of every parameter's error over the σ that the filter claims for it, all runs. Line: the standard \
-         normal density, which it follows if the σ are true; RMS is then 1. Where the axis ends beyond ±5 they are \
-         not, and the line is a spike at zero.",
+        "Density of parameter errors divided by the filter's σ, all runs. Line: standard normal density, which \
+         applies if the σ are correct (RMS 1). If the axis extends beyond ±5, the σ are too small and the line is a \
+         spike at zero.",
     )
 }
 
@@ -245,8 +244,8 @@ pub fn nees(accuracy: &Accuracy) -> Plot {
     let one = accuracy.anees.map_or((1.0, 1.0), |a| a.interval_of_one);
     let outside = all().filter(|nees| !(one.0..=one.1).contains(nees)).count();
     let mut caption = format!(
-        "Squared error over the claimed covariance, correlations included, one dot for each run; 1 on average if \
-         the σ are true. Shaded: 95 % interval of one run; {} of {} runs lie outside.",
+        "Squared error normalised by the stated covariance (with correlations), one dot per run; the mean is 1 if \
+         the σ are correct. Shaded: 95 % interval of one run; {} of {} runs lie outside.",
         count(outside),
         count(all().count())
     );
@@ -302,10 +301,10 @@ pub fn positions(accuracy: &Accuracy) -> Plot {
     let panels = accuracy.navigation.iter().zip(clouds);
     let panels = panels.map(|(of, cloud)| of_mission(of, cloud, reach));
     Plot::new("position.svg", "Position errors over predicted σ", (2, 570), panels).caption(
-        "Horizontal position error of the EKF after 40 h over the σ predicted from its covariance, one dot for \
-         each run, the same axes for all. Across: east over its σ; up: what north differs from that which east \
-         lets expect, over the σ of that. So the ellipses of all runs are circles: solid 1σ, dashed 2.45σ. Where \
-         the axes end far beyond ±4 the σ are too small, and the circles a speck in the middle.",
+        "Horizontal position error of the EKF after 40 h, divided by the σ predicted from its covariance; one dot \
+         per run, same axes for all. Horizontal axis: east error; vertical axis: north error given the east error. \
+         The error ellipses of all runs thus become circles: solid 1σ, dashed 2.45σ. If the axes extend far beyond \
+         ±4, the σ are too small and the circles shrink to a dot.",
     )
 }
 

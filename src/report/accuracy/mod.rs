@@ -24,7 +24,7 @@ pub fn document(accuracy: &Accuracy) -> Document {
         accuracy.study.scenario.name
     ));
     document.conclusions.heading = "Conclusions".to_owned();
-    document.warnings.heading = "To be noted".to_owned();
+    document.warnings.heading = "Notes".to_owned();
     verdict::say(&mut document, accuracy);
     document.both(facts(accuracy));
     document.both(tables::bound(accuracy));
@@ -123,7 +123,7 @@ fn table_time(accuracy: &Accuracy) -> String {
     let baseline = &accuracy.baseline;
     let cut = match baseline.equal_time() {
         Some(time) => format!(", also cut to {}", minutes(time)),
-        None => "; its positions cannot be had in the time of the EKF".to_owned(),
+        None => "; its positions do not fit into the time of the EKF".to_owned(),
     };
     let (filter, closed) = (minutes(accuracy.table_time), minutes(baseline.table_time));
     let path = &baseline.scenario.path_name;

@@ -57,9 +57,9 @@ pub fn bound(accuracy: &Accuracy) -> Table {
     let cells = |of: &Compared| against_bound(of.figures, of.unit_value);
     Table::new("EKF against the Cramér–Rao bound", columns(AGAINST_BOUND))
         .sections(sections(accuracy, cells))
-        .note("RMS over all runs and the parameters of a group; σ: as stated by the filter.")
-        .note("Position: horizontal, after 40 h from perfect alignment; flight: the trajectory of that name.")
-        .note("Bound: Bayesian, from a pass linearised at the truth. Interval: bootstrap over runs.")
+        .note("RMS over all runs and the parameters of a group; σ: stated by the filter.")
+        .note("Position: horizontal, after 40 h from perfect alignment; flight: on the trajectory `flight`.")
+        .note("Bound: Bayesian Cramér–Rao bound from a pass linearised at the truth. Interval: bootstrap over runs.")
 }
 
 /// Auxiliary parameters, term by term.
@@ -103,7 +103,7 @@ pub fn gain(accuracy: &Accuracy) -> Table {
     };
     Table::new("EKF against the closed form, RMS error", columns)
         .sections(sections(accuracy, cells))
-        .note("Gain: error of the closed form over error of the EKF, above 1 where the EKF is better.")
+        .note("Gain: error of the closed form divided by error of the EKF; above 1, the EKF is better.")
 }
 
 pub fn consistency(accuracy: &Accuracy) -> Table {
@@ -127,8 +127,9 @@ pub fn consistency(accuracy: &Accuracy) -> Table {
 "| mean | 95 % interval | 99.8 % interval | numbers | lag-one correlation | 99 % if white",
 ))
         .section(nees.into_iter().chain(nis))
-        .note("NEES/n: squared errors over the claimed covariance; NIS: squared innovations over theirs.")
-        .note("Both are one if σ are true; the intervals are χ².")
+        .note("NEES/n: squared errors normalised by the stated covariance; NIS: squared innovations normalised by \
+            theirs.")
+        .note("Both are 1 if σ are correct; intervals from χ².")
 }
 
 fn nis_row(name: &str, nis: &Nis) -> Vec<String> {
@@ -167,10 +168,13 @@ pub fn containment(accuracy: &Accuracy) -> Table {
             ]
         })
     });
-    Table::new("Position error after 40 h within its predicted σ", columns("| runs | within | claimed | 99 % interval | as claimed"))
-        .sections(sections)
-        .note("σ and ellipses: predicted from the covariance that the filter claims, by the linear error model.")
-        .note("Interval: binomial, of the share of the runs if the covariance is true.")
+    Table::new(
+        "Position error after 40 h within its predicted σ",
+        columns("| runs | within | claimed | 99 % interval | as claimed"),
+    )
+    .sections(sections)
+    .note("σ and ellipses: predicted from the filter covariance with the linear error model.")
+    .note("Interval: binomial, for the share of runs if the covariance is correct.")
 }
 
 /// 99 % of a normal distribution lie within this many σ.

@@ -104,7 +104,7 @@ pub fn noise_table(analysis: &NoiseAnalysis) -> String {
         let fields = of_triad(analysis, sensor);
         if fields.is_empty() {
             let name = sensor.name();
-            text += &format!("# {name}: nothing was found; state the data sheet's figure\n");
+            text += &format!("# {name}: not found; use the data-sheet value\n");
         }
         for Field {
             key,
@@ -133,8 +133,8 @@ fn of_triad(analysis: &NoiseAnalysis, sensor: Sensor) -> Vec<Field> {
     };
     let walk = quantity(Process::RandomWalk, sensor);
     let comment = match figures.random_walk_is_limit {
-        true => "a limit: its slope was not found",
-        false => "root of the mean square of the axes",
+        true => "upper limit; its slope was not detected",
+        false => "RMS of the axes",
     };
     let mut fields = vec![Field {
         key: walk.key,
@@ -156,7 +156,7 @@ fn of_triad(analysis: &NoiseAnalysis, sensor: Sensor) -> Vec<Field> {
         comment: format!("1σ of a Gauss–Markov process{stands_for}"),
     });
     let open = match figures.correlation_is_open {
-        true => "as long as the record can show; σ grows with its root",
+        true => "longest that the recording can show; σ grows with its square root",
         false => "",
     };
     fields.push(Field {
@@ -181,7 +181,7 @@ fn in_place_of(analysis: &NoiseAnalysis, sensor: Sensor) -> String {
     match stands_for.is_empty() {
         true => String::new(),
         false => format!(
-            " fitted to the same deviations in the place of {}",
+            "  fitted to the same deviations instead of {}",
             stands_for.join(" and ")
         ),
     }

@@ -59,7 +59,7 @@ pub fn coefficients(analysis: &NoiseAnalysis, sensor: Sensor) -> Table {
         .chain(axes)
         .chain(["triad".to_owned()]);
     let table = Table::new(title(sensor), headings).section(rows).note(
-        "± 1σ. <: its slope is not detected; 95 % upper limit. triad: the mean of the three variances.",
+        "± 1σ. <: slope not detected, 95 % upper limit. triad: from the mean of the three variances.",
     );
     match of_a_pulse(*analysis.pulse.get(sensor), sensor) {
         Some(note) => table.note(note),
@@ -79,7 +79,7 @@ fn of_a_pulse(pulse: f64, sensor: Sensor) -> Option<String> {
     let of = quantity(Process::Quantisation, sensor);
     (pulse > 0.0).then(|| {
         format!(
-            "One pulse makes Q = {} {}, where noise is more than a pulse.",
+            "One pulse corresponds to Q = {} {} if the noise exceeds a pulse.",
             three_digits(pulse / 12f64.sqrt() / of.value),
             of.unit
         )
@@ -135,7 +135,7 @@ pub fn deviations(analysis: &NoiseAnalysis, every: usize) -> Table {
     let mut table = Table::new("Overlapping Allan deviation", columns)
         .section(taus.step_by(every).map(row))
         .note(format!(
-            "Degrees of freedom: the fewest of the six. {}",
+            "Degrees of freedom: the smallest of the six. {}",
             words::INTERVALS
         ));
     table.optional = vec![7];

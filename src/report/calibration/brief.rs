@@ -15,7 +15,7 @@ pub fn add(document: &mut Document, report: &Report) {
     let mut facts = Facts::default();
     for (name, value) in [
         ("weakest", weakest(report)),
-        ("left out of the fit", tables::cross_validation(report)),
+        ("excluded from fit", tables::cross_validation(report)),
         ("navigation", navigation(report)),
         ("not covered", budget::unseen(report, estimate)),
     ] {

@@ -52,13 +52,13 @@ pub fn table(budget: &Budget, estimate: &Estimate) -> Table {
             coverage,
         ])
         .note(
-            "Standard uncertainty that each source adds, RMS over the parameters of a group; squares add to the \
-             variances of the estimate (JCGM 100). Sources below a thousandth of every variance are left out \
-             here; calibration.json has them all, parameter by parameter.",
+            "Standard uncertainty contributed by each source, RMS over the parameters of a group; squares add up to \
+             the variance of the estimate (JCGM 100). Sources below a thousandth of every variance are not shown; \
+             calibration.json lists all of them per parameter.",
         )
         .note(
-            "ν: degrees of freedom with which the size of a source is known, infinite where it is stated. k from \
-             Student's t with the effective degrees of freedom, the largest of the group.",
+            "ν: degrees of freedom of each source, infinite if stated. k: from Student's t with the effective \
+             degrees of freedom, largest of the group.",
         )
 }
 
@@ -137,9 +137,8 @@ pub fn figure(budget: &Budget, estimate: &Estimate) -> Plot {
         Sensor::ALL.map(panel),
     )
     .caption(
-        "Share of each source in the variance of every parameter. What takes most of a bar is what to improve: \
-         noise by more time at rest, the table's position by more positions, the prior by a path that shows the \
-         parameter.",
+        "Share of each source in the variance of every parameter. Improve the largest source first: noise with more \
+         time at rest, table position with more positions, the prior with a path that excites the parameter.",
     )
 }
 
@@ -169,7 +168,8 @@ pub fn unseen(report: &Report, estimate: &Estimate) -> Option<String> {
     let more = unseen.len() - named.len();
     named.extend((more > 0).then(|| format!("{more} more")));
     let named = named.join(", ");
-    (!named.is_empty()).then(|| format!("{named}: not visible in this record, so not in σ"))
+    (!named.is_empty())
+        .then(|| format!("{named}: not visible in this recording, so not included in σ"))
 }
 
 /// What is in no sum: error terms that are not estimated.
@@ -191,20 +191,20 @@ pub fn left_off(report: &Report, estimate: &Estimate) -> Table {
         Some(row)
     };
     Table::new(
-        "Error terms that are not estimated: what they may add",
+        "Possible effect of error terms that are not estimated",
         group_columns("term"),
     )
     .section(report.effects.iter().filter_map(row))
     .note(format!(
-        "Taken as exact: the site's latitude, of which 0.001° would move gyro biases by up to {} °/h{}.",
+        "Taken as exact: the latitude of the site (0.001° changes gyro biases by up to {} °/h){}.",
         three_digits(ROTATION_RATE * LATITUDE / DEG_PER_H),
         match report.run.site.gravity_sigma > 0.0 {
             true => "",
-            false => ", and gravity, of which 1 mGal is 1.02 ppm of every accelerometer's scale factor",
+            false => " and gravity (1 mGal changes every accelerometer scale factor by 1.02 ppm)",
         }
     ))
     .note(
-        "In no sum above. RMS change of the parameters of a group if the term is as large as the record allows \
-         (in brackets: as large as its usual σ). Where it matters, estimate the term with --with.",
+        "Not included in the sums above. RMS change of the parameters of a group if the term is as large as the data \
+         allow (in brackets: as large as its usual σ). If it matters, estimate the term with --with.",
     )
 }

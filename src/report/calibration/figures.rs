@@ -74,8 +74,8 @@ impl Report<'_> {
                 .with_all(error)
         };
         let mut caption =
-            "1σ of every parameter in the last pass, one panel for each group, logarithmic. Grey: \
-                           dwells; white: turns. A line that stays level was not observed."
+            "1σ of every parameter during the last pass, one panel per group, logarithmic. Grey: dwells; white: \
+             turns. A flat line means the parameter was not observed."
                 .to_owned();
         if truth.is_some() {
             caption += " Dashed: the largest true error in the group; it should end within a few σ of the lines.";
@@ -119,9 +119,9 @@ impl Report<'_> {
             panels.resize(panels.len().next_multiple_of(3), Panel::blank(""));
         }
         let caption = format!(
-            "Line: estimate as the instrument is turned, minus {minus}; band: its ±3σ. The vertical axis is linear \
-             within the final σ of the group and logarithmic beyond, and ends at {EXTENT} times that σ; what lies \
-             beyond is drawn at its edge. The line should stay in its band."
+            "Line: estimate over time, minus {minus}; band: its ±3σ. The vertical axis is linear within the final σ \
+             of the group, logarithmic beyond, and ends at {EXTENT} times that σ; larger values are drawn at the \
+             edge. The line should stay in its band."
         );
         let drawn = !outcome.history.is_empty() && !panels.is_empty();
         let heading = "Estimates and their ±3σ bands";
@@ -166,9 +166,9 @@ impl Report<'_> {
         let sentences = kinds.iter().map(|(name, _, nis)| sentence(name, nis));
         let sentences: Vec<String> = sentences.collect();
         let caption = format!(
-            "Innovations of the last pass in units of their own σ; they should look like white noise of unit \
-             variance. Solid lines: ±1σ; dashed: ±3σ. Where they are many the line runs through the extremes of \
-             each stretch. Crosses: rejected by the gate; at the edge: ±{EDGE}σ or more. {}",
+            "Innovations of the last pass divided by their σ; they should look like white noise of unit variance. \
+             Solid lines: ±1σ; dashed: ±3σ. Dense data are drawn by the extremes of each interval. Crosses: rejected \
+             by the gate; at the edge: ±{EDGE}σ or more. {}",
             sentences.join(" ")
         );
         let plot = Plot::new("innovations.svg", "Innovations", (3, 270), rows);
@@ -221,10 +221,10 @@ fn correlation(estimate: &Estimate) -> Option<Plot> {
     };
     (!indices.is_empty()).then(|| {
         Plot::matrix("correlation.svg", "Correlations", matrix).caption(format!(
-            "Correlation of the estimated parameters. Below the diagonal the side of a square grows with the \
-             magnitude; filled squares are positive, open ones negative. Above it stands the coefficient in \
-             hundredths where its magnitude is at least {WRITTEN}. Strongly correlated parameters were observed \
-             by this path as a sum or difference rather than each alone."
+            "Correlation of the estimated parameters. Below the diagonal, square size shows the magnitude; filled \
+             squares are positive, open ones negative. Above the diagonal, coefficients of at least {WRITTEN} in \
+             magnitude are written in hundredths. This path observes strongly correlated parameters as a sum or \
+             difference rather than individually."
         ))
     })
 }
@@ -253,9 +253,8 @@ fn errors(methods: &[(&str, &Estimate)], truth: &ParameterVector) -> Plot {
         let x = Axis::places(indices.iter().map(|&i| axis_name(form, i)));
         Panel::new(group.titled(), x, Axis::log("")).with_all(series)
     };
-    let mut caption = "Magnitude of each parameter's true error, logarithmic. The whisker reaches up to the 1σ \
-                       that the method claims: about two marks in three should lie below the top of their \
-                       whisker."
+    let mut caption = "Magnitude of the true error of each parameter, logarithmic. The whisker ends at the stated \
+        1σ; about two marks in three should be below its top."
         .to_owned();
     if methods.len() == 2 {
         caption += " Open rings: closed form; filled dots: EKF.";
@@ -303,11 +302,12 @@ fn path(report: &Report) -> Plot {
         panels.push(panel("azimuth of the body axes, °", y, &|axis| {
             azimuth(table, axis)
         }));
-        caption += "Elevation of each body axis above the horizon and its azimuth clockwise from North, as the \
-                    turntable reads them. Unlike heading, pitch and roll these are never singular; an axis has \
-                    no azimuth while it is within 10° of the plumb line. ";
+        caption += "Elevation of each body axis above the horizon and azimuth clockwise from North, from the \
+            turntable readings. Unlike heading, pitch and roll these have no singularity; azimuth is not drawn \
+            within 10° of the vertical. ";
     }
-    caption += "Rates are the raw gyro outputs about the body axes. Grey: dwells, numbered where there is room.";
+    caption +=
+        "Rates: raw gyro output about the body axes. Grey: dwells, numbered where space permits.";
     let y = Axis::linear("").including([0.0]).room(0.05, 0.16);
     panels.push(panel("rate about the body axes, °/s", y, &|axis| {
         samples(&report.run.recording.imu, Sensor::Gyro, axis, DEGREE)

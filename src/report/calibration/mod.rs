@@ -109,7 +109,7 @@ impl Report<'_> {
         let hidden = self.outcome.map_or(0, |outcome| outcome.unobserved().len());
         let determined = estimated - hidden;
         let of_it = match word {
-            Word::Failed => "values and σ may not be used",
+            Word::Failed => "do not use values or σ",
             _ => &format!("{determined} of {estimated} parameters determined"),
         };
         let findings = match self.findings.len() {
@@ -171,9 +171,9 @@ pub(super) fn run(report: &Report) -> Facts {
     }
     facts.push(
         "turntable",
-        report.table().map_or("its log was not used".to_owned(), |table| {
+        report.table().map_or("log not used".to_owned(), |table| {
             format!(
-                "{} readings; position {} ″ (1σ, new at every position), reading {} ″ (1σ, white)",
+                "{} readings; position {} ″ (1σ, independent at each position), reading {} ″ (1σ, white)",
                 count(table.time.len()),
                 sigma(run.table.position_sigma / ARCSEC),
                 sigma(run.table.reading_sigma / ARCSEC)
@@ -200,9 +200,8 @@ fn noise(sensor: Sensor, noise: &Noise) -> String {
 impl Report<'_> {
     /// The model, the method and the frame.
     pub(super) fn model(&self) -> Facts {
-        let symbols = "N: output per second over its nominal scale; u: angular rate or specific force along the \
-                       body axes; K: scale factors, given as departure from nominal; E: entries of C beside the \
-                       diagonal; D: bias";
+        let symbols = "N: output per second divided by its nominal scale; u: angular rate or specific force along \
+            the body axes; K: scale factors, shown as deviation from nominal; E: off-diagonal entries of C; D: bias";
         let equation = "N = K C u + D; u = (K C)⁻¹ (N − D)";
         let rows = [("equation", equation), ("symbols", symbols)];
         let mut facts = Facts::new("Model and method", rows);
@@ -212,10 +211,10 @@ impl Report<'_> {
         facts.push("body frame", self.body_frame.words());
         let (observed, found_in) = match self.table() {
             Some(_) => (
-                "zero velocity in dwells and the attitude of the table",
+                "zero velocity in dwells and table attitude",
                 "the table's log",
             ),
-            None => ("zero velocity in dwells", "the IMU's own readings"),
+            None => ("zero velocity in dwells", "the IMU readings"),
         };
         if let Some(outcome) = self.outcome {
             let filter = format!(

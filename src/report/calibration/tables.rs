@@ -74,8 +74,8 @@ pub fn weakest(outcome: &Outcome) -> Table {
     Table::new("Least observed directions", ["direction", "prior : σ"])
         .section(rows.map(|of| vec![of.words.clone(), improvement(1.0, of.remaining)]))
         .note(
-            "Combinations of parameters, each in units of its prior σ, that the data observed independently of \
-             each other. “With” joins errors of the same sign, “against” errors of opposite sign.",
+            "Combinations of parameters, each in units of its prior σ, that the data determine independently of each \
+             other. “With” joins errors of the same sign, “against” errors of opposite sign.",
         )
 }
 
@@ -131,8 +131,8 @@ pub fn consistency(outcome: &Outcome) -> Table {
         ]
     });
     Table::new("Consistency", columns("observation | NIS per scalar | 95 % interval | lag-one correlation | scalars")).section(rows).note(
-        "A NIS within its interval and a correlation near zero say that the innovations are as large and as \
-         white as the filter claims.",
+        "If NIS is within its interval and the correlation is near zero, the innovations are as large and as white \
+         as the filter predicts.",
     )
 }
 
@@ -188,8 +188,7 @@ pub fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
     let table = Table::new("Residuals at rest and after turns", columns).section(rows);
     match quality.held_out.is_some() {
         true => table.note(
-            "Cross-validation: in dwells whose observations a calibration did without, and over the turns that \
-             end in them.",
+            "Cross-validation: residuals in dwells excluded from the fit, and over the turns that end in them.",
         ),
         false => table,
     }

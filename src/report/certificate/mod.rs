@@ -163,7 +163,7 @@ fn method(certificate: &Certificate) -> Facts {
     facts.push(
         "model",
         format!(
-            "{}; N output per second, u angular rate or specific force along the body axes",
+            "{}; N: output per second; u: angular rate or specific force along the body axes",
             calibration.equation.as_deref().unwrap_or(EQUATION)
         ),
     );
@@ -202,7 +202,7 @@ fn evaluation(aiding: Option<Aiding>) -> &'static str {
 fn of_gravity(gravity: GravityRecord) -> String {
     let accuracy = match gravity.sigma_m_s2 > 0.0 {
         true => format!("U = {} m/s² (k = 2)", sigma(2.0 * gravity.sigma_m_s2)),
-        false => "taken as exact".to_owned(),
+        false => "assumed exact".to_owned(),
     };
     let digits = gravity.sigma_m_s2.max(1e-6);
     format!("{} m/s², {accuracy}", value(gravity.m_s2, digits))
@@ -227,22 +227,22 @@ fn verdict(conformity: &Conformity) -> String {
     let (limits, all) = (conformity.limits.len(), || conformity.limits.iter());
     let kept = all().filter(|of| of.decision == Decision::Pass).count();
     let first = match conformity.overall() {
-        Some(Decision::Pass) => format!("Every one of {limits} limits is kept."),
+        Some(Decision::Pass) => format!("All {limits} limits are met."),
         Some(worst) => format!(
-            "{kept} of {limits} limits are kept; overall: {}.",
+            "{kept} of {limits} limits are met; overall: {}.",
             worst.words()
         ),
-        None => "No limit concerns a parameter that was calibrated.".to_owned(),
+        None => "No limit applies to a calibrated parameter.".to_owned(),
     };
     let risk = all().map(|of| of.risk).fold(0.0, f64::max);
     let mut text = format!(
-        "{first} Decision rule: {}. Largest probability that a decision below is wrong: {}.",
+        "{first} Decision rule: {}. Largest probability of a wrong decision below: {}.",
         conformity.rule.words(),
         probability(risk)
     );
     if !conformity.not_decided.is_empty() {
         text += &format!(
-            " Not calibrated, so not decided: {}.",
+            "  Not decided because not calibrated: {}.",
             conformity.not_decided.join(", ")
         );
     }
@@ -280,11 +280,12 @@ fn limits(conformity: &Conformity) -> Table {
             probability(of.risk),
         ]
     });
-    Table::new("Conformity with the specification", columns("parameter | value | U (k = 2) | limits | unit | decision | wrong with"))
+    Table::new("Conformity with the specification", columns("parameter | value | U (k = 2) | limits | unit | \
+        decision | risk"))
         .section(rows)
         .note(
-            "In the general installation form. Wrong with: probability that the parameter is outside a limit that it \
-             passes (false acceptance) or inside one that it fails, given this calibration (JCGM 106, 9.3).",
+            "In the general installation form. Risk: probability, given this calibration, that the decision is wrong \
+             (false acceptance or false rejection; JCGM 106, 9.3).",
         )
 }
 
@@ -306,8 +307,8 @@ fn found(as_found: &AsFound) -> Table {
         ]
     });
     Table::new("As found and as left", columns("parameter | as found | as left | change | U (k = 2) | unit | change/U")).section(rows).note(format!(
-        "As found: the parameters of {}, with which the item was received; as left: those of this calibration. A \
-         change beyond its U shows that the item has drifted since. Body frame of both: {}.",
+        "As found: parameters from {}, valid when the item was received; as left: parameters from this calibration. \
+         A change beyond its U shows that the item has drifted. Body frame of both: {}.",
         as_found.earlier,
         as_found.body_frame.words()
     ))

@@ -71,8 +71,8 @@ mod tests {
             sample.x = -sample.x;
         }
         let said = terminal::text(&checked(&run), None);
-        for said_so in ["the table's log", "gravity's direction"] {
-            let expected = format!("Gyros and {said_so} do not turn alike");
+        for said_so in ["the table log", "the gravity direction"] {
+            let expected = format!("Gyros and {said_so} disagree about the angle");
             assert!(said.contains(&expected), "{said}");
         }
     }

@@ -56,7 +56,7 @@ pub fn signed(angle: f64) -> String {
 /// The log in a sentence or two.
 pub fn log(run: &Run, survey: &Survey) -> String {
     let mut text = format!(
-        "Stationary for {} s in all, at most {} s at a time; {}.",
+        "Stationary for {} s in total, at most {} s at a time; {}.",
         three_digits(survey.standing),
         three_digits(survey.longest),
         match (&run.recording.table, run.recording.segments.len()) {
@@ -67,7 +67,7 @@ pub fn log(run: &Run, survey: &Survey) -> String {
     );
     if let Some(log) = &run.recording.imu.log {
         text += &format!(
-            " {} rows; stamps are off the uniform clock by {} µs RMS, {} µs at most.",
+            " {} rows; time stamps deviate from a uniform clock by {} µs RMS, {} µs at most.",
             count(log.rows),
             value(log.jitter_rms / MICROSECOND, 1.0),
             value(log.jitter_max / MICROSECOND, 1.0)
@@ -105,7 +105,8 @@ fn warming(run: &Run) -> String {
         three_digits(last * MINUTE),
         match span < SOAKED {
             true => "soaked within 1 K",
-            false => "not soaked, parameters may change meanwhile; see calibrate --temperature",
+            false =>
+                "not soaked, so parameters may change during the recording (see calibrate --temperature)",
         }
     )
 }
@@ -134,7 +135,7 @@ fn of_units(run: &Run, survey: &Survey) -> Vec<String> {
     let wrong = places(rests, |rest| off(rest) > WRONG_FORCE);
     if let Some(&first) = wrong.first() {
         findings.push(format!(
-            "Specific force at rest is {} m/s² in {}, not gravity's {}: correct accel_unit, the scale or the bias in \
+            "Specific force at rest is {} m/s² in {}, but gravity is {}. Correct accel_unit, or the scale or bias in \
              [imu.prior.accel].",
             three_digits(rests[first].force.norm()),
             dwells(&wrong),
@@ -146,8 +147,8 @@ fn of_units(run: &Run, survey: &Survey) -> Vec<String> {
     });
     if !tilted.is_empty() {
         findings.push(format!(
-            "In {} the accelerometers observe another axis up than the table's log: check body_axes, the order of \
-             quaternion or angles, and that the table's zero is as C_b_n = I has it.",
+            "In {} the accelerometers and the table log disagree about which axis is up. Check body_axes, the order \
+             of the quaternion or angles, and that C_b_n = I at table zero.",
             dwells(&tilted)
         ));
     }
@@ -158,17 +159,17 @@ fn of_units(run: &Run, survey: &Survey) -> Vec<String> {
     for (wrong, by) in [
         (
             places(turns, |turn| far(turn, turn.off_table)),
-            "the table's log",
+            "the table log",
         ),
         (
             places(turns, |turn| far(turn, turn.off_gravity)),
-            "gravity's direction",
+            "the gravity direction",
         ),
     ] {
         if let Some(&first) = wrong.first() {
             findings.push(format!(
-                "Gyros and {by} do not turn alike in {} of {} turns (first at {} s): check gyro_unit, scale, signs and \
-                 the order of axes.",
+                "Gyros and {by} disagree about the angle in {} of {} turns (first at {} s). Check gyro_unit, scale, \
+                 signs and axis order.",
                 wrong.len(),
                 turns.len(),
                 value(run.recording.imu.time(turns[first].samples.start), 1.0)
@@ -209,8 +210,8 @@ fn of_motion(survey: &Survey) -> Vec<String> {
     let mut findings = Vec::new();
     if survey.rests.len() < 2 {
         findings.push(format!(
-            "There are fewer than two dwells: leave the instrument stationary for {LONG_ENOUGH} s or more between turns; \
-             if it was, check bias_sigma of the gyros and the noise figures."
+            "The recording has fewer than two dwells. Keep the instrument stationary for {LONG_ENOUGH} s or more \
+             between turns. If it was, check bias_sigma of the gyros and the noise figures."
         ));
         return findings;
     }
@@ -218,8 +219,8 @@ fn of_motion(survey: &Survey) -> Vec<String> {
     let missing: Vec<String> = missing.map(|way| way_up(way / 2, way % 2 == 1)).collect();
     if !missing.is_empty() && survey.directions < DIRECTIONS {
         findings.push(format!(
-            "Of the six positions {} are missing, and there are {} directions of up that differ by {}°; the nine \
-             parameters of the accelerometers without a table need all six or {DIRECTIONS} directions.",
+            "Of the six positions, {} are missing, and only {} upward directions differ by {}° or more. Without a \
+             table, the nine accelerometer parameters need all six positions or {DIRECTIONS} directions.",
             missing.join(", "),
             survey.directions,
             degrees(APART)
@@ -230,7 +231,7 @@ fn of_motion(survey: &Survey) -> Vec<String> {
     let unturned: Vec<String> = unturned.map(|axis| AXES[axis].to_string()).collect();
     if !unturned.is_empty() {
         findings.push(format!(
-            "Nothing turns by more than {}° about {}: the scale of that gyro shows only in such a turn.",
+            "No turn exceeds {}° about {}, so the scale factor of that gyro cannot be determined. Add such a turn.",
             degrees(WORTH),
             unturned.join(" and ")
         ));
@@ -245,7 +246,7 @@ fn of_methods(survey: &Survey) -> Vec<String> {
         .filter_map(|(_, expected)| expected.as_ref().ok())
         .collect();
     let [first, others @ ..] = &expected[..] else {
-        let text = "No method can calibrate from this run; the table of methods says why.";
+        let text = "No method can calibrate this run; the table of methods gives the reasons.";
         return vec![text.to_owned()];
     };
     let by_none = |name: &&String| others.iter().all(|other| other.unobserved.contains(name));
@@ -254,8 +255,7 @@ fn of_methods(survey: &Survey) -> Vec<String> {
     match always.is_empty() {
         true => Vec::new(),
         false => vec![format!(
-            "By every method {} would stay above half the σ that [imu.prior] states: more positions and turns \
-             would show them.",
+            "With every method, σ of {} would stay above half of the prior. Add positions and turns.",
             always.join(", ")
         )],
     }

@@ -27,7 +27,12 @@ pub fn document(comparison: &Comparison) -> Document {
     document.warnings.items = comparison
         .calibrations()
         .filter(|calibration| !calibration.converged)
-        .map(|calibration| format!("{} did not converge: its σ mean nothing.", calibration.name))
+        .map(|calibration| {
+            format!(
+                "{} did not converge, so its σ are meaningless.",
+                calibration.name
+            )
+        })
         .collect();
     document.page(figure(comparison));
     document.both(parameters(comparison));
@@ -85,14 +90,14 @@ fn parameters(comparison: &Comparison) -> Table {
     let rows = |group: Group| group.among(&comparison.parameters).into_iter().map(row);
     let table = Table::new("Parameters", beside_reference(comparison))
         .sections(by_triad(|group| rows(group).collect()))
-        .note("Calibrations: difference to the reference ± the 1σ that the calibration claims.")
+        .note("Calibrations: difference from the reference ± the 1σ of the calibration.")
         .note(format!(
-            "z: difference in σ of the difference, ! beyond {FLAGGED}."
+            "z: difference divided by its σ; ! beyond {FLAGGED}."
         ));
     let table = match comparison.stated_nominal {
         Some(_) => table,
         None => table.note(
-            "K of the reference is in the file's quantity: no file states nominal scale factors.",
+            "K of the reference is in the unit of the file, because no file states nominal scale factors.",
         ),
     };
     match comparison.against_truth {
@@ -164,8 +169,8 @@ fn groups(comparison: &Comparison) -> Table {
     Table::new("Groups", columns)
         .sections(by_triad(row))
         .section([last])
-        .note("Largest and RMS: of the differences to the reference. RMS σ: of the claimed 1σ.")
-        .note("NEES/n, its 95 % interval and n: one if the σ are true, correlations included.")
+        .note("Largest and RMS: of the differences from the reference. RMS σ: of the stated 1σ.")
+        .note("NEES/n, its 95 % interval and n: 1 if the covariance is correct.")
 }
 
 fn nees(nees: Option<Nees>) -> [String; 3] {
@@ -206,8 +211,8 @@ fn auxiliary(comparison: &Comparison) -> Table {
     Table::new("Auxiliary parameters", beside_reference(comparison))
         .section((0..AUXILIARY).filter_map(row))
         .note(
-            "Error terms of instrument and table: values ± the 1σ that each calibration claims; z: \
-             difference to the reference in its σ, where both have it.",
+            "Error terms of instrument and table: value ± 1σ of each calibration; z: difference from the reference \
+             divided by its σ, if both have the term.",
         )
 }
 
@@ -238,12 +243,12 @@ fn scatter(comparison: &Comparison) -> Table {
     table
         .sections(by_triad(rows))
         .section([all])
-        .note("Mean weighted by the claimed σ, ± its 1σ; scatter: sample standard deviation.")
+        .note("Mean: weighted by the stated σ, ± its 1σ; scatter: sample standard deviation.")
         .note(
-            "χ² of the scatter against the claimed σ, n its degrees of freedom; p: probability of as much or \
-             more. Near 0 the σ are too small, near 1 too large.",
+            "χ² of the scatter against the stated σ, n its degrees of freedom; p: probability of a larger value. \
+             Near 0 the σ are too small, near 1 too large.",
         )
-        .note("All: with correlations, over the calibrations that give them.")
+        .note("All: with correlations, for the calibrations that state them.")
 }
 
 fn chi_square(chi_square: Option<ChiSquare>) -> [String; 3] {
@@ -349,9 +354,8 @@ const APART: f64 = 20.0;
 pub(super) fn figure(comparison: &Comparison) -> Plot {
     let panels = Group::all().map(|group| panel(comparison, group));
     Plot::new("differences.svg", "Differences to the reference", (3, 320), panels).caption(format!(
-        "Each calibration minus the reference, {}; bars: the 1σ that it claims. About two bars in three should \
-         reach a true value. Where one calibration is far coarser than another, the axis is logarithmic away \
-         from zero.",
+        "Each calibration minus the reference, {}; bars: stated 1σ. About two bars in three should include the true \
+         value. If one calibration is much less accurate than another, the axis is logarithmic away from zero.",
         comparison.reference.name
     ))
 }

@@ -65,8 +65,8 @@ fn distribution(experiment: &Experiment) -> Plot {
     let panels = experiment.navigations.iter().map(panel);
     Plot::new("distribution.svg", "Position error at the end", (1, 330), panels).caption(
         "Horizontal position error at the end, logarithmic, the same axis for all. Dots: instruments; thick line \
-         with its value: median; box: the middle half; line beyond: 95 % are below; dashed: median of what the \
-         noise of the instrument alone makes.",
+         with value: median; box: middle half; whisker: 95 % of instruments are below its end; dashed: median error \
+         due to instrument noise alone.",
     )
 }
 
@@ -123,8 +123,8 @@ fn against_time(experiment: &Experiment) -> Plot {
     let panels = experiment.navigations.iter().map(panel);
     Plot::new("time.svg", "Median position error against time", (1, 330), panels).caption(
         "Median over all instruments of the horizontal position error, logarithmic, the same axes for all. Colour: \
-         what calibrated; solid: general form, dashed: six-angle, dotted: three-angle. The lines of general and \
-         six-angle lie upon each other where both forms give the same.",
+         calibration method; solid: general form, dashed: six-angle, dotted: three-angle. The general and six-angle \
+         lines coincide where both forms give the same result.",
     )
 }
 
@@ -172,9 +172,9 @@ fn budget(experiment: &Experiment) -> Plot {
         Panel::new(title, x, y.clone()).with_all(bars.flatten())
     };
     Plot::new("budget.svg", "Error budget", (1, 360), shown.map(panel)).caption(format!(
-        "Root mean square of the position error at the end that each group would make alone, and of all together, \
-         from the claimed covariance in the general form, and of the errors there were; logarithmic, the same axis \
-         for both. Bars from left to right: {}; one without a number is less than the axis shows.",
+        "RMS position error at the end due to each group alone and due to all together, predicted from the stated \
+         covariance in the general form, and actual; logarithmic, same axis for both. Bars from left to right: {}; a \
+         bar without a number is below the axis range.",
         names.join(", ")
     ))
 }

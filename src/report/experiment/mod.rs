@@ -20,7 +20,7 @@ pub fn document(experiment: &Experiment) -> Document {
     let title = format!("The turntable experiment with {instruments} simulated instruments");
     let mut document = Document::new(title);
     document.conclusions.heading = "Conclusions".to_owned();
-    document.warnings.heading = "To be noted".to_owned();
+    document.warnings.heading = "Notes".to_owned();
     say(&mut document, experiment);
     document.both(facts(experiment));
     tables::tables(experiment)
@@ -58,22 +58,22 @@ fn facts(experiment: &Experiment) -> Facts {
         (
             "navigation",
             format!(
-                "{} h; stationary and level, heading North, and moving along {}; height held to the true one",
+                "{} h; stationary and level, heading North, and moving along {}; height fixed to the true value",
                 three_digits(hours(experiment)),
                 study.trajectory_name
             ),
         ),
         (
             "alignment",
-            "stationary: levelled by the calibrated accelerometers, North from the calibrated gyros, or given; \
+            "stationary: level from the calibrated accelerometers and North from the calibrated gyros, or given; \
              moving: given"
                 .to_owned(),
         ),
         (
             "noise",
             format!(
-                "left out of the errors of the methods, as it is the same for all; the line \"noise alone\" has \
-                 what it makes in alignment of {} and navigation",
+                "not included in the errors of the methods, because it is the same for all; the line \"noise alone\" \
+                 shows its effect in alignment of {} and navigation",
                 minutes(ALIGNMENT_TIME)
             ),
         ),
@@ -200,7 +200,7 @@ fn compared(
     let judged = match () {
         () if low > 1.0 => "the EKF is better",
         () if high < 1.0 => "the closed form is better",
-        () => "no significant difference with this number of instruments",
+        () => "no significant difference for this number of instruments",
     };
     let text = format!(
         "{}, {} h: median {} nmile after {}, {} after {}, ratio {by} ({interval}): {judged}.",
@@ -233,7 +233,7 @@ fn limit(experiment: &Experiment, situation: Situation) -> Option<String> {
         Some(format!("{}: {most}", estimator_name(experiment, estimator)))
     });
     Some(format!(
-        "{}, most of the variance is made by: {}. Noise alone would leave a median of {} nmile.",
+        "{}, the largest contributors to the variance are: {}. Noise alone would give a median of {} nmile.",
         capital(situation_name(situation)),
         of.collect::<Option<Vec<_>>>()?.join("; "),
         nmile(navigated.noise.median)
@@ -259,11 +259,11 @@ fn failures(experiment: &Experiment) -> Vec<String> {
             ),
             (
                 rejected,
-                "instruments have data that reject the form.".to_owned(),
+                "instruments have data that do not fit the form.".to_owned(),
             ),
             (
                 diverged,
-                "calibrations did not converge; they are counted as they are.".to_owned(),
+                "calibrations did not converge; the figures include them.".to_owned(),
             ),
         ] {
             if number > 0 {

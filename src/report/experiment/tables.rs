@@ -69,8 +69,8 @@ fn errors(experiment: &Experiment, navigated: &Navigated) -> Table {
         .sections(by_estimator.map(|of_estimator| of_estimator.iter().map(row)))
         .section([last])
         .note(
-            "Over all instruments. Largest: of all minutes. Closed form : EKF: ratio of the medians in the same \
-             installation form, above 1 where the EKF is better; intervals by bootstrap.",
+            "Over all instruments. Largest: maximum over all minutes. Closed form : EKF: ratio of the medians in the \
+             same installation form (above 1, the EKF is better); intervals by bootstrap.",
         )
 }
 
@@ -99,7 +99,7 @@ fn paper(experiment: &Experiment, navigated: &Navigated) -> Table {
             .map(|&(sensor, form, paper)| row(sensor, form, Some(paper)))
     });
     let situation = situation_name(navigated.situation);
-    let title = format!("Beside the paper: one triad's errors alone, {situation}");
+    let title = format!("Comparison with the paper: errors of one triad alone, {situation}");
     let table = Table::new(title, columns).section(general).sections(of_paper).note(
         "Position error at the end; the other triad is exact. Paper: one instrument on one table, closed form \
          (Zhao, Jiang, Li 2016, Figure 10), neither noise nor latitude stated.",
@@ -107,7 +107,7 @@ fn paper(experiment: &Experiment, navigated: &Navigated) -> Table {
     match hours(experiment) {
         PAPER_HOURS => table,
         hours => table.note(format!(
-            "The paper's are of {PAPER_HOURS} h, these of {} h.",
+            "The paper navigates for {PAPER_HOURS} h, this study for {} h.",
             three_digits(hours)
         )),
     }
@@ -148,9 +148,9 @@ fn budget(experiment: &Experiment, navigated: &Navigated) -> Table {
             total("all, actual", &|w| w.budget.actual),
         ])
         .note(
-            "General form, from the claimed covariance averaged over all instruments. Alone: what the group would \
-             make by itself. Share: of the variance, what two groups make together going half to each; below zero \
-             where a group makes up for another.",
+            "General form, from the stated covariance averaged over all instruments. Alone: effect of the group by \
+             itself. Share: part of the variance, with the covariance of two groups split equally; negative if a \
+             group compensates another.",
         )
 }
 

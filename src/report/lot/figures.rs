@@ -13,8 +13,7 @@ pub fn parameters(lot: &Lot) -> Plot {
         panel.with_all(limits.into_iter().map(|y| Series::level(y).dashed()))
     });
     Plot::new("lot.svg", "Every unit", (2, 330), panels).caption(
-        "Units in the order given, with their own 1σ; long lines: limits that all axes share. Crosses are apart \
-         from the lot.",
+        "Units in the given order, with their 1σ; long lines: limits common to all axes. Crosses: outliers.",
     )
 }
 
@@ -25,7 +24,7 @@ pub fn noise(lot: &Lot) -> Plot {
         ..panel(lot, &title, &quantities, &names)
     });
     Plot::new("noise.svg", "Noise at rest", (2, 330), panels).caption(
-        "White-noise density of each axis in the dwells, with its 1σ; logarithmic. Crosses are apart from the lot.",
+        "White-noise density of each axis in the dwells, with its 1σ; logarithmic. Crosses: outliers.",
     )
 }
 

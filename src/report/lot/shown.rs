@@ -76,7 +76,7 @@ pub fn with_sigma((of, own): (f64, f64)) -> String {
 /// A trend in a sentence.
 pub fn change(quantity: Quantity, trend: &Trend) -> String {
     let (what, unit) = match trend.against {
-        Against::Serial => ("the serial number", "for each number"),
+        Against::Serial => ("the serial number", "per number"),
         Against::Date => ("the date", "a day"),
     };
     let [slope, own] = [trend.slope, trend.sigma].map(|of| shown_spread(quantity, of));
@@ -145,7 +145,7 @@ pub fn verdict(lot: &Lot) -> Option<(Word, String)> {
         _ => Word::Fail,
     };
     let words = format!(
-        "{failed} of {} limits exceeded, {passed} kept, {open} undecided ({} % each)",
+        "{failed} of {} limits exceeded, {passed} met, {open} undecided ({} % confidence each)",
         all().count(),
         100.0 * specification.confidence
     );

@@ -87,7 +87,7 @@ impl Navigation<'_> {
             Some(Sensor::Gyro) => "of the gyros; the accelerometers are exact",
             Some(Sensor::Accel) => "of the accelerometers; the gyros are exact",
         };
-        let start = "perfect alignment, velocity and position; height is held to the true one";
+        let start = "perfect alignment, velocity and position; height fixed to the true value";
         let warming = self.warming.map(|(warming, _)| {
             let words = format!(
                 "from {} to {} °C with a time constant of {} h",
@@ -111,19 +111,21 @@ impl Navigation<'_> {
         let name = self.calibration;
         let mut warnings = Vec::new();
         if !self.converged {
-            warnings.push(format!("{name} did not converge: its σ mean nothing."));
+            warnings.push(format!(
+                "{name} did not converge, so its σ are meaningless."
+            ));
         }
         if let Some((_, false)) = self.warming {
             warnings.push(format!(
-                "{name} does not change with temperature: its σ are those of the temperature that it was made at."
+                "{name} does not include temperature, so its σ are valid only at its calibration temperature."
             ));
         }
         if self.moments.iter().any(|m| m.sigma.is_none()) {
-            warnings.push(format!("{name} claims no σ, so none is predicted."));
+            warnings.push(format!("{name} states no σ, so none is predicted."));
         }
         if self.terms {
-            let text = "Error terms other than K, E and D are assumed exact: these are the errors that K, E and D \
-                        leave.";
+            let text =
+                "Only errors of K, E and D are included; other error terms are assumed exact.";
             warnings.push(text.to_owned());
         }
         warnings
@@ -140,13 +142,13 @@ impl Navigation<'_> {
         let table = Table::new("Errors", columns("| unit | largest | after h | at the end | σ | error/σ"))
             .sections(rows.chunks(3).map(<[_]>::to_vec))
             .note(
-                "Computed minus true. σ: of the error at the end, predicted from the calibration's covariance; \
-                 of horizontal errors the root of the mean square.",
+                "Computed minus true. σ: of the error at the end, predicted from the covariance of the calibration \
+                 (RMS for horizontal errors).",
             );
         match self.drift() {
             None => table,
             Some(drift) => table.note(format!(
-                "Position at the end over the time: {} nmile/h, {} nmile/{PAPER_HOURS} h.",
+                "Position error at the end divided by time: {} nmile/h, {} nmile/{PAPER_HOURS} h.",
                 three_digits(drift),
                 three_digits(drift * PAPER_HOURS),
             )),
@@ -174,8 +176,7 @@ impl Navigation<'_> {
 
     /// Attitude, velocity and position against time with their predicted σ as a band.
     fn figures(&self) -> [Plot; 3] {
-        let horizontal =
-            " Horizontal: length of both components, with the root of its predicted mean square.";
+        let horizontal = " Horizontal: magnitude of both components, with its predicted RMS.";
         let figures = [
             ("attitude.svg", "Attitude error", ""),
             ("velocity.svg", "Velocity error", horizontal),
@@ -188,9 +189,9 @@ impl Navigation<'_> {
             let hours = || Axis::hours(self.hours());
             let panels = quantities.map(|of| of.panel(hours(), HOUR.recip(), &errors));
             Plot::new(file, heading, (1, 210), panels).caption(format!(
-                "Computed minus true. Line: actual error by full navigation; band: ±1σ predicted from the \
-                 calibration's covariance by the linear model, within which the error of two calibrations in \
-                 three lies at any one time.{more}"
+                "Computed minus true. Line: actual error from full navigation; band: ±1σ predicted from the \
+                 covariance of the calibration with the linear model, which contains the errors of about two \
+                 calibrations in three at any time.{more}"
             ))
         })
     }

@@ -159,15 +159,14 @@ fn table(navigated: &[Navigated]) -> Table {
         .section(position)
         .section([pitch, roll, heading].map(end))
         .note(format!(
-            "{} stationary and level at the site of the run, heading North, from perfect alignment, height \
-             held: as long as predicted errors stay small (1° and 1 % of the Earth's radius). σ: predicted from \
-             the covariance of the calibration by the linear error model; of horizontal errors the root of the \
-             mean square.",
+            "{} stationary and level at the site of the run, heading North, from perfect alignment, with fixed \
+             height, while predicted errors stay small (1° and 1 % of the Earth radius). σ: predicted from the \
+             covariance of the calibration with the linear error model (RMS for horizontal errors).",
             long(navigated)
         ))
         .note(match known {
-            true => "Errors are computed minus true. Drift: position error at the end over the time.",
-            false => "The truth is not known, so no error is shown.",
+            true => "Errors are computed minus true. Drift: position error at the end divided by time.",
+            false => "The truth is unknown, so errors are not shown.",
         })
 }
 
@@ -177,14 +176,14 @@ fn figure(navigated: &[Navigated], last: &str) -> Plot {
         true => (
             "Position error in navigation",
             format!(
-                "Computed minus true, by full navigation from perfect alignment, stationary and level, height \
-                 held. Band: ±1σ of the {last} predicted from its covariance."
+                "Computed minus true, from full navigation with perfect alignment, stationary and level, with fixed \
+                 height. Band: ±1σ of the {last} predicted from its covariance."
             ),
         ),
         false => (
             "Predicted position error in navigation",
-            "±1σ of the error predicted from the covariance of the calibration, from perfect alignment, \
-             stationary and level, height held."
+            "±1σ of the error predicted from the covariance of the calibration, with perfect alignment, stationary \
+             and level, with fixed height."
                 .to_owned(),
         ),
     };

@@ -383,8 +383,8 @@ impl<'a> Layout<'a> {
 pub enum PdfError {
     /// A character has no glyph.
     #[error(
-        "found the character {character:?} in {text:?}, expected Latin, Greek or Cyrillic: the fonts of the \
-         certificate have no other. Write it in those."
+        "found the character {character:?} in {text:?}, expected Latin, Greek or Cyrillic, which the certificate \
+         fonts support. Rewrite the text in these scripts."
     )]
     NoGlyph {
         /// The character.

@@ -47,8 +47,8 @@ fn caption(table: &Table1, column: &Column, quantities: &[Quantity]) -> String {
         false => format!("all {drawn} samples"),
     };
     let mut text = format!(
-        "{}, as stated: errors of {samples} thin, mean of all thick, mean ± one standard deviation dashed. The axes \
-         are the same for both forms of a triad.",
+        "{}, as stated. Thin: errors of {samples}; thick: mean of all; dashed: mean ± one standard deviation. Both \
+         forms of a triad have the same axes.",
         title(column.published)
     );
     if quantities.iter().all(|&q| flat(table, column, q)) {
@@ -57,7 +57,7 @@ fn caption(table: &Table1, column: &Column, quantities: &[Quantity]) -> String {
             format!("{} {largest:.0e} {}", q.name(), q.unit())
         });
         let largest = largest.collect::<Vec<_>>().join(", ");
-        text += &format!(" Nothing is left but rounding; largest: {largest}.");
+        text += &format!(" Only rounding errors remain; largest: {largest}.");
     }
     text
 }

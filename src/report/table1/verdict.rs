@@ -9,7 +9,7 @@ use crate::study::table1::{Column, Kind, Quantity, Row, Verdict};
 pub fn short(verdict: &Verdict) -> &'static str {
     match verdict {
         Verdict::Reproduced => "reproduced",
-        Verdict::Zero => "zero; the paper's are rounding",
+        Verdict::Zero => "zero; rounding errors in the paper",
         Verdict::UnderAnotherReading(_) => "reproduced under another reading",
         Verdict::NotReproducible(_) => "not reproducible",
     }
@@ -55,8 +55,8 @@ pub fn sentence(column: &Column) -> String {
     match &column.verdict {
         Verdict::Reproduced => "reproduced as stated.".to_owned(),
         Verdict::Zero => {
-            "zero except for rounding, because K C is recovered exactly; the paper's figures are \
-                          rounding in its own program."
+            "zero except for rounding, because K C is recovered exactly; the figures in the paper are rounding \
+             errors of its program."
                 .to_owned()
         }
         Verdict::UnderAnotherReading(reading) => {
@@ -76,7 +76,7 @@ pub fn sentence(column: &Column) -> String {
                 text.push_str(", which gives zero because K C is recovered exactly");
             }
             if let Some(slip) = slip {
-                text += &format!("; a slip gives the paper's figures: {}", slip.name);
+                text += &format!("; a slip reproduces the figures in the paper: {}", slip.name);
             }
             text + "."
         }

@@ -24,7 +24,7 @@ pub fn copied(run: &Run) -> Option<String> {
         words.collect()
     })?;
     Some(format!(
-        "These columns are the same in every row: {pairs}. A column is named twice, or copied."
+        "These columns are the same in every row: {pairs}. A column is named twice or was copied."
     ))
 }
 

@@ -66,7 +66,7 @@ impl fmt::Display for LabelCheck {
         let Segment { label, start, .. } = &self.segment;
         let said = self.disagreement.as_deref().unwrap_or_default();
         let used = match self.as_labelled.is_some() {
-            true => "used with other borders",
+            true => "used with corrected limits",
             false => "not used",
         };
         write!(f, "`{label}` at {start:.1} s {said} ({used})")
@@ -122,13 +122,13 @@ impl Record<'_> {
         let verdict = Verdict::Position { off, moving };
         if off >= OTHER_AXIS {
             let words = format!(
-                "has another axis up, {:.0}° off the label's: correct the label or body_axes",
+                "has a different axis up, {:.0}° from the label: correct the label or body_axes",
                 off / DEGREE
             );
             return (verdict, Some(words), None);
         }
         let is_still = moving <= MOVING * (segment.end - segment.start) && !turns;
-        let words = (!is_still).then(|| format!("is not still for {moving:.1} s: shorten it"));
+        let words = (!is_still).then(|| format!("moves for {moving:.1} s: shorten it"));
         (verdict, words, Some(section.samples))
     }
 

@@ -293,7 +293,7 @@ impl FoundCause {
                 figures["term"] = json!(name);
                 let text = format!(
                     "The data show an error that scale factors, misalignments and biases cannot explain: {name}. turncal \
-                     estimated it with them, as --with {name} does. Apply the values together with this term"
+                     estimated it with them, as --with {name} does. Use the values only together with this term"
                 );
                 (Kind::ErrorTermEstimated, text)
             }
@@ -323,15 +323,15 @@ impl FoundCause {
                     String::new()
                 };
                 let text = format!(
-                    "The table's readings in dwell {number} are wrong{by} (at {time:.1} s). turncal left them out. Look \
-                     there for a bump or a wrong reading"
+                    "The table readings in dwell {number} are wrong{by} (at {time:.1} s). turncal excluded them. \
+                     Check the log there for a bump or a wrong reading"
                 );
                 (Kind::PositionWrong, text)
             }
             DisturbanceKind::Slip => {
                 let text = format!(
                     "In the move before dwell {number} (at {time:.1} s) the gyros missed a turn of {angle}. turncal \
-                     estimated it. Look there for lost samples, an exceeded range or a loose mount"
+                     estimated this angle. Check the log there for lost samples, an exceeded range or a loose mount"
                 );
                 (Kind::MoveWrong, text)
             }
@@ -339,7 +339,7 @@ impl FoundCause {
                 let value = self.value / DEG_PER_H;
                 let text = format!(
                     "The gyros sense an Earth rate that differs from the one at latitude_deg by {:+.4}, {:+.4}, {:+.4} °/h \
-                     (East, North, Up). turncal estimated it. Check latitude_deg, and the table's north and level",
+                     (East, North, Up). turncal estimated it. Check latitude_deg and the north and level of the table",
                     value.x, value.y, value.z
                 );
                 (Kind::EarthRateWrong, text)
@@ -350,9 +350,9 @@ impl FoundCause {
                     Sensor::Accel => (MICRO_G, "µg"),
                 };
                 let text = format!(
-                    "The {} bias stepped by {:.3} {name} before dwell {number} (at {time:.1} s). turncal estimated the \
-                     step; the calibration has the mean of both biases. Look there for a shock, or a change of supply \
-                     or temperature",
+                    "The {} bias stepped by {:.3} {name} before dwell {number} (at {time:.1} s). turncal estimated \
+                     the step; the calibration contains the mean of both biases. Look for a shock or a change of \
+                     supply voltage or temperature at that time",
                     sensor.name(),
                     self.value.norm() / unit,
                 );

@@ -114,8 +114,8 @@ impl ErrorTermTest {
              {limit:.0}). Next: rerun with --with {term}."
         );
         for (names, words) in [
-            (&alternatives, "This path cannot tell it from"),
-            (&further, "Also significant with it on"),
+            (&alternatives, "This path cannot separate it from"),
+            (&further, "With it on, also significant"),
         ] {
             if !names.is_empty() {
                 text += &format!(" {words}: {}.", names.join(", "));
@@ -123,7 +123,7 @@ impl ErrorTermTest {
         }
         if let Some(growth) = growth {
             text += &format!(
-                " Until you do, σ are widened {} to cover it.",
+                " Until then, σ are widened {} to cover it.",
                 widened_by(growth)
             );
         }

@@ -61,11 +61,11 @@ impl Mounting {
 /// What the motion is known from.
 fn known_from(problem: &Problem, motion: &Motion) -> &'static str {
     match problem.model.aiding {
-        Aiding::Table => "the table's attitudes",
+        Aiding::Table => "the table attitudes",
         Aiding::Velocity if motion.labels.is_empty() => {
-            "gravity's direction before and after moves, and Earth rate"
+            "the gravity direction before and after moves and Earth rate"
         }
-        Aiding::Velocity => "labels, and gravity's direction before and after moves",
+        Aiding::Velocity => "the labels and the gravity direction before and after moves",
     }
 }
 

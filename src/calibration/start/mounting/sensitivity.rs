@@ -75,7 +75,7 @@ impl Sensitivity {
             Axes::One(axis) => format!(" of {}", AXES[axis]),
         };
         causes.push(format!(
-            "prior.{name}.scale{axis}, which is {times} times the stated one"
+            "prior.{name}.scale{axis} (should be {times} times the stated value)"
         ));
         // If a row lasts longer by a factor, the same turn takes a rate smaller by that factor.
         let lasts = match (self.output, self.sensor) {
@@ -85,7 +85,7 @@ impl Sensitivity {
         };
         if let Some(lasts) = lasts.filter(|_| self.axes == Axes::All) {
             causes.push(format!(
-                "sample_period_s or time_unit, if a row lasts {} times as long as stated",
+                "sample_period_s or time_unit (if a row lasts {} times as long as stated)",
                 three_digits(lasts)
             ));
         }
@@ -100,12 +100,12 @@ impl fmt::Display for Sensitivity {
         match self.sensor {
             Sensor::Gyro => write!(
                 f,
-                "the record turns as if {} were {times} times as sensitive as run.toml states",
+                "the turns fit only if {} are {times} times as sensitive as run.toml states",
                 self.named("the gyros")
             )?,
             Sensor::Accel => write!(
                 f,
-                "of gravity {} show {} m/s² at rest, {times} times as much as they should",
+                "{} measure gravity as {} m/s² at rest, {times} times the true value",
                 self.named("the accelerometers"),
                 three_digits(factor * STANDARD_GRAVITY)
             )?,
@@ -114,11 +114,15 @@ impl fmt::Display for Sensitivity {
             && !others.is_empty()
         {
             let others: Vec<String> = others.iter().map(|&other| three_digits(other)).collect();
-            write!(f, " ({} times is hardly less likely)", others.join(", "))?;
+            write!(
+                f,
+                "  (a factor of {} is almost as likely)",
+                others.join(", ")
+            )?;
         }
         write!(
             f,
-            ". In [imu] correct one of these: {}",
+            ". Correct one of these in [imu]: {}",
             self.causes(factor).join("; ")
         )
     }

@@ -34,28 +34,27 @@ impl fmt::Display for Mounting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "the axes are not as run.toml has them: {}; by {} the record is e^{:.0} times likelier so. In \
-             [imu] of run.toml write\n  {}",
+            "the axes in run.toml are wrong: {} (e^{:.0} times more likely, from {}). In [imu] of run.toml write\n  {}",
             said(&self.orders),
-            self.known_from,
             self.log_ratio,
+            self.known_from,
             self.line
         )?;
         if !self.others.is_empty() {
             write!(
                 f,
-                "\nThis record does not tell it from\n  {}",
+                "\nThis recording cannot separate it from\n  {}",
                 self.others.join("\n  ")
             )?;
         }
         if self.or_latitude {
-            f.write_str("\nA latitude of the other sign would explain it as well.")?;
+            f.write_str("\nA latitude of opposite sign would explain the data equally well.")?;
         }
         for sensor in &self.prior_differs {
             write!(
                 f,
-                "\n[imu.prior.{}] speaks of the columns as they are then read, in that order: bring its scale \
-                 and bias to it, too, where they are those of the columns.",
+                "\n[imu.prior.{}] refers to the columns in the new order and sign. If its scale and bias are those \
+                 of the columns, rearrange them as well.",
                 sensor.name()
             )?;
         }
@@ -68,13 +67,13 @@ fn said(orders: &PerSensor<AxisOrder>) -> String {
     let PerSensor { gyro, accel } = orders;
     if gyro == accel && gyro.is_rotation() {
         return format!(
-            "the instrument is turned by {}, both triads alike",
+            "both triads are rotated together by {}",
             turn(&gyro.matrix())
         );
     }
     if gyro == accel {
         return format!(
-            "both triads are left-handed alike, {}",
+            "both triads are left-handed in the same way, {}",
             axes(Sensor::Gyro, gyro)
         );
     }
@@ -109,7 +108,7 @@ fn turn(rotation: &Matrix3<f64>) -> String {
 /// Such as `gyro x is what comes in as -y, gyro y is what comes in as x (turned by 90° about z)`.
 fn of_triad(sensor: Sensor, order: &AxisOrder) -> String {
     let how = if order.is_rotation() {
-        format!("turned by {}", turn(&order.matrix()))
+        format!("rotated by {}", turn(&order.matrix()))
     } else {
         "left-handed".to_owned()
     };
@@ -123,7 +122,7 @@ fn axes(sensor: Sensor, order: &AxisOrder) -> String {
         .map(|axis| {
             let sign = if order.reversed[axis] { "−" } else { "" };
             let source = AXES[order.source[axis]];
-            format!("{name} {} is what comes in as {sign}{source}", AXES[axis])
+            format!("{name} {} is read as {sign}{source}", AXES[axis])
         })
         .collect();
     axes.join(", ")

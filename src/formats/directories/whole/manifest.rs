@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 /// The list's name in its directory.
 pub const FILE: &str = ".turncal";
 
-const FIRST_LINE: &str = "turncal-output/1: turncal wrote what is listed here, and --force replaces \
-                          this directory only while it holds nothing else";
+const FIRST_LINE: &str = "turncal-output/1: turncal wrote the files listed here; --force replaces this directory \
+    only if it contains nothing else";
 
 /// The list of all that is in a directory.
 pub fn of_all(directory: &Path) -> io::Result<String> {

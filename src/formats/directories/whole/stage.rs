@@ -65,8 +65,8 @@ impl Stage {
         if target.file_name().is_none() {
             return Err(FileError::of(
                 target,
-                "a path without a name of its own",
-                "the name of something to be written",
+                "a path without a final name",
+                "the name of a file or directory to write",
                 "Give a name that does not end in `..` or `/`.",
             ));
         }
@@ -101,7 +101,7 @@ impl Stage {
                     |file| {
                         FileError::of(
                             target,
-                            format_args!("a file, {}, on the way", file.display()),
+                            format_args!("the file {} in the path", file.display()),
                             "directories",
                             "Choose another name.",
                         )
@@ -141,7 +141,7 @@ impl Stage {
         if exists && fs::rename(&old, &self.target).is_err() {
             unfinished.remove(&self.beside);
             let doing = format!(
-                "put the output in place; the old one is in {}",
+                "put the output in place (the old output is in {})",
                 self.beside.display()
             );
             return Err(FileError::io(

@@ -61,8 +61,8 @@ impl KalibrImu {
                 return wrong(found, "a number above zero", "Correct this value.");
             };
             if figures.insert(key, number).is_some() {
-                let found = format!("`{key}` for the second time");
-                return wrong(found, "it once", "Leave the lines of one IMU in the file.");
+                let found = format!("a second `{key}`");
+                return wrong(found, "one line per key", "Keep only the lines of one IMU.");
             }
         }
         let noise = |sensor| {
@@ -104,7 +104,7 @@ fn missing(path: &Path, key: &str, others: &[&str]) -> FileError {
         Some(other) => format!("Rename `{other}`, or add the line."),
         None => "Add the line.".to_owned(),
     };
-    FileError::of(path, found, "a noise density of each triad", advice)
+    FileError::of(path, found, "a noise density for each triad", advice)
 }
 
 #[cfg(test)]
@@ -185,7 +185,7 @@ update_rate:                 200.0      #Hz (for discretization of the values ab
             ("update_rate: inf\n", &["line 1", "above zero"]),
             (
                 "update_rate: 200\nimu1:\n update_rate: 100\n",
-                &["line 3", "second time", "one IMU"],
+                &["line 3", "a second", "one IMU"],
             ),
         ] {
             let error = read(text).unwrap_err();

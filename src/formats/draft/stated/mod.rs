@@ -69,7 +69,7 @@ impl StatedUnit {
             let words: Vec<&str> = words.into_iter().collect();
             let example = sensor.pick("1/131 deg/s", "1/16384 g");
             let words = words.join(", ");
-            format!("expected one of {words}, or what one count is, such as '{example}'")
+            format!("expected one of {words}, or the size of one count, such as '{example}'")
         })
     }
 }

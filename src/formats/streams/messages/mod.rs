@@ -98,8 +98,8 @@ impl Topics {
     #[cfg_attr(not(feature = "mcap"), allow(unused_variables))]
     fn stream(&mut self, number: u32, data: &[u8], offset: u64) -> Result<usize, Broken> {
         let stream = self.of_number.get(&number).copied().ok_or_else(|| {
-            let found = format_args!("a message of channel {number}");
-            Broken::new(offset, found, "a channel that was described before it")
+            let found = format_args!("a message on channel {number}");
+            Broken::new(offset, found, "a channel described earlier in the file")
         })?;
         #[cfg(feature = "mcap")]
         if let Reader::Json(columns) = &mut self.readers[stream]
@@ -132,7 +132,7 @@ impl Reader {
     pub fn of_ros(name: &str, definition: &str, encoding: Encoding) -> Self {
         match ros::Message::parse(name, definition, encoding) {
             Ok(message) => Self::Ros(message),
-            Err(wrong) => Self::Unknown(format!("its definition cannot be read: {wrong}")),
+            Err(wrong) => Self::Unknown(format!("turncal cannot read its definition ({wrong})")),
         }
     }
 

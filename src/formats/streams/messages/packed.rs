@@ -13,12 +13,16 @@ pub fn unpack(method: &str, packed: &[u8], size: u64, offset: u64) -> Result<Vec
         return Err(Broken::new(
             offset,
             format_args!("a chunk of {size} bytes"),
-            format_args!("at most {LONGEST}"),
+            format_args!("at most {LONGEST} bytes"),
         ));
     }
     let mut unpacked = Vec::new();
     let broken = |error: &dyn std::fmt::Display| {
-        Broken::new(offset, error, format_args!("a chunk packed by {method}"))
+        Broken::new(
+            offset,
+            error,
+            format_args!("a chunk compressed with {method}"),
+        )
     };
     let read = match method {
         "" | "none" => {
@@ -40,8 +44,8 @@ pub fn unpack(method: &str, packed: &[u8], size: u64, offset: u64) -> Result<Vec
         other => {
             return Err(Broken::new(
                 offset,
-                format_args!("a chunk packed by `{other}`"),
-                "none, lz4, zstd or bz2",
+                format_args!("a chunk compressed with `{other}`"),
+                "no compression, lz4, zstd or bz2",
             ));
         }
     };
@@ -50,7 +54,7 @@ pub fn unpack(method: &str, packed: &[u8], size: u64, offset: u64) -> Result<Vec
         return Err(Broken::new(
             offset,
             format_args!("{} bytes in a chunk", unpacked.len()),
-            format_args!("{size}, as it says"),
+            format_args!("{size} bytes as its header states"),
         ));
     }
     Ok(unpacked)

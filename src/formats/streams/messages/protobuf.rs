@@ -62,7 +62,7 @@ impl Message {
     /// The numbers of a message; NaN in messages that it lacks.
     pub fn values(&self, bytes: &[u8], offset: u64, row: &mut Vec<f64>) -> Result<(), Broken> {
         let message = DynamicMessage::decode(self.descriptor.clone(), bytes)
-            .map_err(|error| Broken::new(offset, error, "a message of Protocol Buffers"))?;
+            .map_err(|error| Broken::new(offset, error, "a Protocol Buffers message"))?;
         let values = self.paths.iter().map(|path| number(&message, path));
         row.extend(values.map(|value| value.unwrap_or(f64::NAN)));
         Ok(())

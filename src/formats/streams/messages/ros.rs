@@ -99,7 +99,7 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     fn encapsulation(&mut self) -> Result<(), Broken> {
-        let head = self.bytes.take(4, "the head of a message")?;
+        let head = self.bytes.take(4, "a message header")?;
         (self.bytes.big_endian, self.widest) = match head[1] {
             0 => (true, 8),
             1 => (false, 8),
@@ -108,8 +108,8 @@ impl Reader<'_> {
             _ => {
                 return Err(Broken::new(
                     self.bytes.offset(),
-                    format_args!("a message that begins with {head:02x?}"),
-                    "the four bytes of CDR: 0, then 0, 1, 6 or 7",
+                    format_args!("a message that starts with {head:02x?}"),
+                    "a CDR header (0, then 0, 1, 6 or 7)",
                 ));
             }
         };
@@ -134,7 +134,7 @@ impl Reader<'_> {
 
     fn pass(&mut self, bytes: usize) -> Result<(), Broken> {
         self.bytes
-            .take(bytes, "a field that the message definition declares")
+            .take(bytes, "a field of the message definition")
             .map(|_| ())
     }
 

@@ -31,24 +31,24 @@ impl Header {
                 Ok(read) if read as u64 == count => Ok(bytes),
                 Ok(read) => Err(Broken::new(
                     offset,
-                    format_args!("{read} bytes to the end of an array"),
-                    format_args!("{count} bytes of {what}"),
+                    format_args!("only {read} bytes before the end of the array"),
+                    format_args!("{count} bytes for {what}"),
                 )),
                 Err(error) => Err(Broken::new(offset, error, what)),
             }
         };
-        let first = take(8, "an array's first bytes")?;
+        let first = take(8, "the first bytes of an array")?;
         let width = if first[6] == 1 { 2 } else { 4 };
-        let length = take(width, "the length of the head")?;
+        let length = take(width, "the length of the header")?;
         let length = Slice::new(&length, offset).whole(width as usize, "a length")?;
         if length > LONGEST_HEADER {
-            let found = format_args!("a head of {length} bytes");
-            return Err(Broken::new(offset, found, "a short one"));
+            let found = format_args!("a header of {length} bytes");
+            return Err(Broken::new(offset, found, "a shorter header"));
         }
-        let bytes = take(length, "the head")?;
+        let bytes = take(length, "the header")?;
         let text = String::from_utf8_lossy(&bytes);
         let wrong =
-            |what: &str| Broken::new(offset, format_args!("the head `{}`", text.trim()), what);
+            |what: &str| Broken::new(offset, format_args!("the header `{}`", text.trim()), what);
         let head = format!("head = {}", as_toml(text.trim()));
         let Ok(Document { head }) = toml::from_str(&head) else {
             return Err(wrong(
@@ -64,7 +64,7 @@ impl Header {
             begin: 8 + width + length,
         };
         let described = header.describe(name, &head.descr);
-        described.ok_or_else(|| wrong("a type of numbers"))?;
+        described.ok_or_else(|| wrong("a numeric type"))?;
         Ok(header)
     }
 
@@ -72,10 +72,10 @@ impl Header {
     pub fn left_out(&self) -> Option<String> {
         let are = match self.left_out.len() {
             0 => return None,
-            1 => "holds text and is",
-            _ => "hold text and are",
+            1 => "contains text and was",
+            _ => "contain text and were",
         };
-        Some(format!("{} {are} left out.", self.left_out.join(", ")))
+        Some(format!("{} {are} ignored.", self.left_out.join(", ")))
     }
 
     fn describe(&mut self, name: &str, items: &Descr) -> Option<()> {

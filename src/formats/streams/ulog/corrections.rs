@@ -37,7 +37,7 @@ impl Parameters {
     }
 
     pub fn take(&mut self, content: &mut Slice) -> Result<(), Broken> {
-        let key = content.measured_text(1, "a parameter's name")?;
+        let key = content.measured_text(1, "a parameter name")?;
         let offset = content.offset();
         let (kind, name) = match key.split_once(' ') {
             Some(("float", name)) => (Kind::F32, name),

@@ -44,7 +44,7 @@ impl Layout {
             .ok_or_else(|| {
                 (
                     format!("a field of type `{format}`"),
-                    "a type of a number or a format of this file",
+                    "a numeric type or a format defined in this file",
                 )
             })?;
         for field in fields.split(';').filter(|field| !field.trim().is_empty()) {
@@ -66,8 +66,8 @@ impl Layout {
                 self.number(topic, name, kind, formats, depth)?;
                 if self.length > MOST {
                     return Err((
-                        format!("a topic `{topic}` of more than {MOST} bytes"),
-                        "less",
+                        format!("a topic `{topic}` longer than {MOST} bytes"),
+                        "a shorter topic",
                     ));
                 }
             }
@@ -114,7 +114,7 @@ impl Layout {
                 Broken::new(
                     offset,
                     format_args!("{} bytes of data", data.len()),
-                    format_args!("the {} that their format has", self.length),
+                    format_args!("the {} bytes of their format", self.length),
                 )
             })?;
             row.push(number);

@@ -79,7 +79,11 @@ impl Log for Ulog {
                 b'I' => self.information(),
                 b'A' => self.subscribe()?,
                 b'D' => {
-                    let number = self.content().whole(2, "the number of a topic")? as u16;
+                    let number = self.content().whole(
+                        2,
+                        "a topic \
+                        number",
+                    )? as u16;
                     if let Some(topic) = self.topics.get(&number) {
                         let data = self.message.get(2..).unwrap_or_default();
                         for sensor in Sensor::ALL {
@@ -95,8 +99,8 @@ impl Log for Ulog {
                     }
                     return Err(Broken::new(
                         self.offset,
-                        format_args!("data of topic {number}"),
-                        "a topic that was named before its data",
+                        format_args!("data for topic {number}"),
+                        "a topic subscribed before its data",
                     ));
                 }
                 // More that is said of the log, its text messages, marks and lost data.
@@ -104,8 +108,8 @@ impl Log for Ulog {
                 other => {
                     return Err(Broken::new(
                         self.offset,
-                        format_args!("a message of kind {other}"),
-                        "one of ULog's kinds",
+                        format_args!("a message of type {other}"),
+                        "a message type of ULog",
                     ));
                 }
             }
@@ -170,10 +174,10 @@ impl Ulog {
             return Ok(None);
         }
         self.input
-            .take(3, &mut self.message, "a message's size and kind")?;
+            .take(3, &mut self.message, "the size and type of a message")?;
         let mut head = Slice::new(&self.message, self.offset);
-        let size = head.whole(2, "a message's size")?;
-        let kind = head.whole(1, "a message's kind")? as u8;
+        let size = head.whole(2, "a message size")?;
+        let kind = head.whole(1, "a message type")? as u8;
         let end = self.offset + 3 + size;
         // A message that the appended data cut off never ended.
         let cut = self
@@ -197,13 +201,13 @@ impl Ulog {
         if unknown {
             return Err(Broken::new(
                 self.offset,
-                "a flag of a later version of the format",
-                "data that this version can read",
+                "a flag of a later format version",
+                "a format version that turncal supports",
             ));
         }
         let mut offsets = Vec::new();
         for _ in 0..3 {
-            let offset = content.whole(8, "the place of appended data")?;
+            let offset = content.whole(8, "the offset of appended data")?;
             if offset > self.offset {
                 offsets.push(offset);
             }
@@ -241,9 +245,9 @@ impl Ulog {
     fn subscribe(&mut self) -> Result<(), Broken> {
         let mut content = self.content();
         let instance = content.whole(1, "an instance")?;
-        let number = content.whole(2, "the number of a topic")? as u16;
+        let number = content.whole(2, "a topic number")? as u16;
         let length = content.left();
-        let name = content.text(length, "the name of a topic")?;
+        let name = content.text(length, "a topic name")?;
         let layout = Layout::of(&name, &self.formats)
             .map_err(|(found, expected)| Broken::new(self.offset, found, expected))?;
         let undo = corrections::of_topic(&name, &layout.columns);

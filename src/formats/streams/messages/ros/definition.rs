@@ -88,7 +88,9 @@ impl Parser {
                     "" => (kind, Many::Any),
                     bounded if bounded.starts_with("<=") => (kind, Many::Any),
                     fixed => {
-                        let size = fixed.parse().map_err(|_| format!("the field `{line}`"))?;
+                        let size = fixed
+                            .parse()
+                            .map_err(|_| format!("a malformed field `{line}`"))?;
                         (kind, Many::Fixed(size))
                     }
                 },
