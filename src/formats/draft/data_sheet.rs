@@ -51,7 +51,7 @@ impl Scale {
         let mut by = match gravity.rests {
             1 => " in one dwell".to_owned(),
             rests => format!(
-                "  ± {} %, from gravity in {rests} \
+                " ± {} %, from gravity in {rests} \
                 dwells",
                 percent(sigma)
             ),
@@ -74,7 +74,7 @@ impl Scale {
         let by = match moves {
             Some(moves) => {
                 let sigma = percent(axes.sigma);
-                format!("  ± {sigma} %, from the change of gravity direction in {moves} moves")
+                format!(" ± {sigma} %, from the change of gravity direction in {moves} moves")
             }
             None => " , from the change of gravity direction".to_owned(),
         };

@@ -160,7 +160,7 @@ impl<'a> Reading<'a> {
         let (found, advice) = match self.lacking {
             0 => (String::new(), "Record a run with dwells and turns."),
             lacking => (
-                format!("  and {lacking} rows that lack a gyro or accelerometer value"),
+                format!(" and {lacking} rows that lack a gyro or accelerometer value"),
                 "If gyros and accelerometers are in separate rows, `turncal init` drafts a run.toml for that layout.",
             ),
         };

@@ -153,7 +153,7 @@ impl<'a> Fields<'a> {
             if stated.is_some() && angles == 0 {
                 return Err(self.document.wrong(
                     &format!("turntable.{key}"),
-                    "`angles` beside it, because a quaternion does not separate the axes",
+                    "`angles` in the table log, because a quaternion does not separate the axes",
                     "Remove it, or add the angles of the table axes, with or without the quaternion.",
                 ));
             }

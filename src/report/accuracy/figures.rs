@@ -100,7 +100,7 @@ fn gain(accuracy: &Accuracy) -> Plot {
             .with_all(with_values(&ratios, shift));
     }
     let equal = match accuracy.baseline.equal_time() {
-        Some(time) => format!("  Right, open: closed form in {}.", minutes(time)),
+        Some(time) => format!(" Right, open: closed form in {}.", minutes(time)),
         None => " Its positions do not fit into the time of the EKF.".to_owned(),
     };
     Plot::new("gain.svg", "Gain over the closed form", (1, 460), [panel]).caption(format!(

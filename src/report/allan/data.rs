@@ -181,7 +181,7 @@ fn in_place_of(analysis: &NoiseAnalysis, sensor: Sensor) -> String {
     match stands_for.is_empty() {
         true => String::new(),
         false => format!(
-            "  fitted to the same deviations instead of {}",
+            " fitted to the same deviations instead of {}",
             stands_for.join(" and ")
         ),
     }

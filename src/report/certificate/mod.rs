@@ -242,7 +242,7 @@ fn verdict(conformity: &Conformity) -> String {
     );
     if !conformity.not_decided.is_empty() {
         text += &format!(
-            "  Not decided because not calibrated: {}.",
+            " Not decided because not calibrated: {}.",
             conformity.not_decided.join(", ")
         );
     }

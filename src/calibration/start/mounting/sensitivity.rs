@@ -116,7 +116,7 @@ impl fmt::Display for Sensitivity {
             let others: Vec<String> = others.iter().map(|&other| three_digits(other)).collect();
             write!(
                 f,
-                "  (a factor of {} is almost as likely)",
+                " (a factor of {} is almost equally likely)",
                 others.join(", ")
             )?;
         }
