@@ -25,11 +25,10 @@ use crate::cli::terminal::{Activity, show_brief};
 
 /// Simulates a calibration and compares it with the truth
 ///
-/// Simulates an instrument with the paper's errors on a three-axis table: ten minutes with turns for the
-/// filter, and an hour of static positions for the paper's closed form. Calibrates it by both methods,
-/// compares both with the truth, navigates 40 h with each and writes a report. DIR is the filter's run
-/// directory and contains ekf/ with its calibration, six-position/ with the static run and its
-/// calibration, and report/.
+/// Simulates an instrument with the paper's errors on a three-axis table: ten minutes with turns for the filter, and an
+/// hour of static positions for the paper's closed form. Calibrates it with both methods, compares both with the truth,
+/// navigates for 40 h with each and writes a report. DIR is the run directory of the filter. It contains ekf/ with the
+/// filter calibration, six-position/ with the static run and its calibration, and report/.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:  turncal demo -o my-demo --seed 3")]
 pub struct Demo {
@@ -99,7 +98,7 @@ impl Demo {
     }
 }
 
-/// The report on the filter's calibration, beside the closed form in the same time and in its whole time.
+/// Report on the filter calibration, with the closed form from the same table time and from its full time.
 fn document(
     (problem, solution, assessment): (&Problem, &Solution, &Assessment),
     (still, whole): (&Problem, &ClosedForm),
@@ -153,12 +152,12 @@ fn document(
     Ok(document)
 }
 
-/// The static positions that the paper's closed form takes.
+/// Static positions used by the closed form of the paper.
 fn static_positions(seed: Option<u64>) -> anyhow::Result<Simulated> {
     simulated(&Scenario::load("demo-six-position")?, seed)
 }
 
-/// The closed form from the first part of each dwell that makes this part of the run's time.
+/// Closed form from the first part of each dwell, so that the total is this fraction of the run time.
 fn cut(problem: &Problem, part: f64) -> anyhow::Result<ClosedForm> {
     let imu = &problem.run().recording.imu;
     let at_rest: f64 = problem.dwells().map(|dwell| dwell.duration(imu)).sum();

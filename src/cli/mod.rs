@@ -1,4 +1,4 @@
-//! Commands: each parses its arguments, calls the library and says what came of it.
+//! Commands: each parses its arguments, calls the library and reports the result.
 
 mod arguments;
 mod calibrate;
@@ -20,7 +20,7 @@ pub use terminal::{leave_nothing_behind, with_threads};
 
 use clap::{Parser, Subcommand};
 
-/// Calibrates an inertial measurement unit on a turntable, with honest accuracies.
+/// Calibrates an inertial measurement unit on a turntable or by hand, with realistic uncertainties.
 #[derive(Debug, Parser)]
 #[command(
     version,
@@ -80,7 +80,7 @@ enum Command {
 }
 
 impl Cli {
-    /// Does what the command line asks for.
+    /// Runs the command line.
     pub fn run(&self) -> anyhow::Result<()> {
         match &self.command {
             Command::Demo(demo) => demo.run(),

@@ -38,8 +38,7 @@ fn help(term: ErrorTerm) -> &'static str {
     }
 }
 
-/// Ends the program, with its status for wrong usage, if this is an error of the table and the table is
-/// not observed.
+/// Exits with the status for wrong usage if this is a table error and the table is not observed.
 pub fn needs_table(term: ErrorTerm, aiding: Option<Aiding>) {
     let of_table = matches!(term, ErrorTerm::TableBase | ErrorTerm::TableAxes(_));
     if of_table && aiding == Some(Aiding::Velocity) {
@@ -51,7 +50,7 @@ pub fn needs_table(term: ErrorTerm, aiding: Option<Aiding>) {
     }
 }
 
-/// Switches an error term on in a problem.
+/// Switches on an error term in a problem.
 pub fn switch_on(term: ErrorTerm, problem: &mut Problem) -> anyhow::Result<()> {
     if !problem.model.can_have(term) {
         bail!(

@@ -9,17 +9,17 @@ use turncal::study::Shard;
 use super::{Delivery, shard};
 use crate::cli::terminal::Runs;
 
-/// The part of a study that is to be made.
+/// Part of a study to compute.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub struct Sharding {
-    /// Make part i of M of the runs into DIR, for turncal merge
+    /// Compute part i of M of the runs and write it to DIR for turncal merge
     #[arg(long, value_name = "i/M", value_parser = shard, requires = "output", conflicts_with = "json", help_heading = "Advanced")]
     shard: Option<Shard>,
 }
 
 impl Sharding {
-    /// Makes the requested part of a study of `runs` runs, unless that part exists; returns false if the whole study
-    /// is requested. `trials` makes runs by their numbers, and reports each.
+    /// Computes the requested part of a study of `runs` runs, unless that part exists; returns false if the whole study
+    /// is requested. `trials` computes runs by number and reports each.
     pub fn make<T: Serialize>(
         self,
         (job, study, runs): (JobKind, &impl Serialize, u64),

@@ -20,10 +20,10 @@ use super::calibrated::{Calibrated, write_report};
 use crate::cli::arguments::{Estimation, OfLog};
 use crate::cli::terminal::{Runs, piece_by_piece, show};
 
-/// Written where no directory is named.
+/// Default output directory.
 pub const DIRECTORY: &str = "lot-calibration";
 
-/// What is asked of a lot.
+/// Request for a lot.
 pub struct Request<'a> {
     pub runs: &'a [PathBuf],
     pub of_log: &'a OfLog,
@@ -90,7 +90,7 @@ impl Request<'_> {
         )?)
     }
 
-    /// A unit as it is kept, else calibrated.
+    /// A stored unit, or else a newly calibrated one.
     fn unit(
         &self,
         run: &Path,
@@ -113,7 +113,7 @@ impl Request<'_> {
         Ok(unit)
     }
 
-    /// The unit with its report; a failure is its result, too.
+    /// The unit with its report; a failure is also a result.
     fn calibrate(&self, path: &Path, name: &str) -> (Unit, Option<Document>) {
         let calibrated = self.calibrated(path);
         let unit = |meta, calibrated| Unit {
@@ -157,7 +157,7 @@ impl Request<'_> {
 
 type Meta = BTreeMap<String, String>;
 
-/// Writes and prints what is said of a lot; one with units that were not calibrated is a failure.
+/// Writes and prints the report of a lot; fails if a unit was not calibrated.
 pub fn deliver(
     lot: &Lot,
     directory: Option<(&LotDirectory, &Path)>,
@@ -189,13 +189,13 @@ pub fn deliver(
     }
 }
 
-/// All is done, but units do not meet their specification.
+/// The lot was calibrated, but units do not meet their specification.
 #[derive(Debug, thiserror::Error)]
 #[error("the specification is not met: {0}")]
 pub struct NotMet(pub String);
 
-/// A name for each unit: of its run's directory, or of its file where that is not called run.toml, with as many
-/// directories above as it takes to tell all apart.
+/// A name for each unit: its run directory, or its file if that is not called run.toml, with as many parent directories
+/// as needed to make names unique.
 fn unit_names(runs: &[PathBuf]) -> anyhow::Result<Vec<String>> {
     let full: Vec<PathBuf> = runs
         .iter()

@@ -1,4 +1,4 @@
-//! `turncal merge`: parts of a job as one result.
+//! `turncal merge`: merges the parts of a job.
 
 use std::path::{Path, PathBuf};
 
@@ -16,8 +16,8 @@ use crate::cli::arguments::Delivery;
 
 /// Merges the parts of a sharded job; the result is identical to a single run
 ///
-/// Parts are directories written with --shard, of a lot or of a study. Their order, number and machines do not
-/// matter; missing or duplicate runs, and parts of another job, are refused.
+/// Parts are directories of a lot or a study, written with --shard. Their order, number and machines do not matter;
+/// missing or duplicate runs and parts of a different job are refused.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:
   turncal study accuracy --runs 500 --shard 1/2 -o part-1

@@ -16,16 +16,15 @@ use turncal::units::PPM;
 use crate::cli::arguments::{OfLog, keep, run_or_log};
 use crate::cli::terminal::{Activity, stream};
 
-/// A scale factor that deviates by more than this many σ of the run is hardly one of its instrument.
+/// A scale factor that differs by more than this many prior σ probably belongs to another instrument.
 const SUSPECT_SIGMAS: f64 = 10.0;
 
-/// Turns a run's raw samples into angular rate and specific force
+/// Converts the raw samples of a run to angular rate and specific force
 ///
-/// Writes one row per sample: start and end in s, angular rate in rad/s and specific force in m/s², both
-/// averaged over the sample, along right, front and up of the calibration's body frame. Error terms of the
-/// calibration are corrected, too, and temperature dependence by the run's temperature; the correction of the
-/// time offset neglects Earth rate. The file is itself a record for a run.toml: output = "rate",
-/// time_stamp = "end".
+/// Writes one row per sample: start and end in s, angular rate in rad/s and specific force in m/s², both averaged over
+/// the sample, along right, front and up in the body frame of the calibration. Error terms of the calibration are also
+/// corrected, as is temperature dependence if the run has a temperature; the correction of the time offset neglects
+/// Earth rate. The output can itself be the log of a run.toml: output = "rate", time_stamp = "end".
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal apply result/calibration.json run.toml -o calibrated.csv.gz
@@ -34,7 +33,7 @@ pub struct Apply {
     /// The calibration
     #[arg(value_name = "CALIBRATION.json")]
     calibration: PathBuf,
-    /// The run's run.toml, or a log, or - for rows of text on standard input
+    /// A run.toml, a log, or - for text on standard input
     #[arg(value_name = "RUN.toml|LOG", value_parser = run_or_log)]
     run: PathBuf,
     #[command(flatten)]
@@ -42,7 +41,7 @@ pub struct Apply {
     /// File to write, `.csv` or `.csv.gz` [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Interpolate lost rows and write them with 1 in a column `filled`, except in gaps too long for calibrate to
+    /// Interpolate missing rows and mark them with 1 in a column `filled`, except in gaps too long for calibrate to
     /// bridge
     #[arg(long)]
     fill: bool,
@@ -153,7 +152,7 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
     notes
 }
 
-/// Where the run's temperature is unknown, or beyond that of the calibration.
+/// Notes if the temperature of the run is unknown or outside the range of the calibration.
 fn of_temperature(thermal: &ThermalRecord, run: &Run) -> Vec<String> {
     let Some(temperature) = &run.recording.imu.temperature else {
         return vec![format!(

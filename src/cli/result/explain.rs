@@ -6,7 +6,7 @@ use turncal::report::wrapped;
 
 use crate::cli::terminal::{columns, print};
 
-/// Explains a finding: its meaning, its cause and the remedy
+/// Explains a finding: meaning, cause and remedy
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal explain W07
