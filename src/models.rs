@@ -1,8 +1,7 @@
-//! What a user may edit: instruments, installations, tables, paths, scenarios and trajectories as TOML
-//! files.
+//! Files that a user may edit: instruments, installations, tables, paths, scenarios and trajectories in TOML.
 //!
-//! The files of the `models/` folder are embedded. A path to an existing file wins over an embedded
-//! name, on the command line and in a user's scenario; an embedded scenario names embedded models.
+//! The files of the `models/` folder are embedded. An existing file takes precedence over an embedded name, on the
+//! command line and in the scenario of a user; embedded scenarios use only embedded models.
 
 mod catalogue;
 mod instrument;
@@ -26,9 +25,9 @@ pub use trajectory::trajectory;
 /// A folder of models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Room {
-    /// Instruments: noise, pulses, and how they differ before calibration.
+    /// Instruments: noise, pulses, and tolerances before calibration.
     Imu,
-    /// Installation forms and how large their angles are.
+    /// Installation forms and sizes of their angles.
     Installation,
     /// Turntables.
     Turntable,
@@ -36,14 +35,14 @@ pub enum Room {
     Path,
     /// Whole simulated runs.
     Scenario,
-    /// Recordings of one instrument, to be simulated.
+    /// Simulated recordings of one instrument.
     Campaign,
     /// Trajectories to navigate along.
     Trajectory,
 }
 
 impl Room {
-    /// All folders, those first that commands name most.
+    /// All folders, in order of frequency of use.
     pub const ALL: [Self; 7] = [
         Self::Scenario,
         Self::Campaign,
@@ -77,7 +76,7 @@ impl Room {
 
 static MODELS: Dir = include_dir::include_dir!("$CARGO_MANIFEST_DIR/models");
 
-/// Why a model cannot be had.
+/// Error in finding or reading a model.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelError {
     /// Neither a file nor an embedded name.
@@ -90,14 +89,14 @@ pub enum ModelError {
         named_in: String,
         /// Which folder.
         room: &'static str,
-        /// What was asked for.
+        /// Requested name.
         name: String,
-        /// The nearest embedded name, if one is near.
+        /// The most similar embedded name, if any.
         nearest: Option<&'static str>,
         /// All embedded names.
         known: String,
     },
-    /// A file that cannot be read, or is not what it should be.
+    /// An unreadable or invalid file.
     #[error(transparent)]
     File(#[from] FileError),
 }
@@ -107,7 +106,7 @@ pub fn names(room: Room) -> impl Iterator<Item = &'static str> {
     room.embedded().map(|(name, _)| name)
 }
 
-/// Where a model is named, which decides what its name can mean.
+/// Place where a model is named, which determines how its name is resolved.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
     /// On the command line: a path from the working directory, or an embedded name.
@@ -123,9 +122,9 @@ pub enum Place {
 pub struct Text {
     /// The file's content.
     pub text: String,
-    /// What to call the file in messages.
+    /// File name for messages.
     pub file: String,
-    /// Where the models are that it names.
+    /// Place of the models that it names.
     pub place: Place,
 }
 
@@ -149,13 +148,13 @@ impl Text {
         }
     }
 
-    /// Values that do not fit together: what is wrong and what to do.
+    /// Inconsistent values: problem and remedy.
     pub(crate) fn inconsistent(&self, message: impl Into<String>) -> ModelError {
         inconsistent(&self.file, message)
     }
 }
 
-/// The same of a file by its name.
+/// The same for a named file.
 pub(crate) fn inconsistent(file: &str, message: impl Into<String>) -> ModelError {
     let error = FileError {
         file: file.into(),

@@ -88,7 +88,7 @@ pub enum CalibrationError {
     /// Stopped by the progress callback.
     #[error("stopped before the iterations ended; nothing was written")]
     Stopped,
-    /// A statement of run.toml that the record contradicts.
+    /// A statement in run.toml that the recording contradicts.
     #[error("{}{contradiction}", .recording.iter().map(|name| format!("{name}: ")).collect::<String>())]
     Contradicted {
         /// The run, if there are several.
@@ -96,7 +96,7 @@ pub enum CalibrationError {
         /// The contradicted statement.
         contradiction: Box<Contradiction>,
     },
-    /// Samples that no error within the prior explains, or unrealistic noise figures.
+    /// Samples that no error within the prior can explain, or unrealistic noise figures.
     #[error(
         "the filter diverged at {time:.2} s because the samples do not fit run.toml. Check latitude, units, noise \
          figures (zero only for noise-free data), the prior σ, and the samples at that time"
@@ -137,7 +137,7 @@ pub enum ComparisonError {
         /// The other unit.
         found: String,
     },
-    /// An axis that is not near the body axis of its name.
+    /// An axis far from the body axis of its name.
     #[error(
         "{name}: the {} {axis} axis is 90° or more from body {axis} (by the sign of the scale factor in the \
          reference), or the matrix K·C is singular. Convert the calibrations to the same body axes and signs \
@@ -151,7 +151,7 @@ pub enum ComparisonError {
         /// Which axis.
         axis: char,
     },
-    /// `parameters` and `covariance` that do not fit.
+    /// Mismatch of `parameters` and `covariance`.
     #[error(
         "{name}: covariance needs one row and one column per entry of parameters, and each entry must be a parameter \
          of the installation form. Write the calibration again"

@@ -21,10 +21,9 @@ pub enum BudgetSource {
     AttitudeAtRest,
     /// Turning at standstill, without a table.
     RotationAtRest,
-    /// Velocity at the first sample, and position in every dwell: the IMU's distance from the table's
-    /// centre.
+    /// Velocity at the first sample, and position in every dwell (distance of the IMU from the table centre).
     Place,
-    /// Position errors of the table, new at every position.
+    /// Position errors of the table, independent at each position.
     TablePosition,
     /// Readings of the table.
     TableReading,
@@ -32,7 +31,7 @@ pub enum BudgetSource {
     TableLevel,
     /// North of the table's base.
     TableNorth,
-    /// Axes of the table that are not at right angles.
+    /// Non-orthogonality of the table axes.
     TableSquareness,
     /// Wobble of its axes.
     TableWobble,
@@ -52,17 +51,17 @@ pub enum BudgetSource {
     Term(Term),
     /// Second-order effects of the installation form in poorly known angles.
     Curvature,
-    /// Headings that Earth rate does not determine.
+    /// Headings not determined by Earth rate.
     Headings,
     /// Scatter of the dwells beyond all noise.
     DwellScatter,
     /// Rounding of rates to steps wider than their noise.
     Rounding,
-    /// Sample period, if it is not determined by a clock.
+    /// Sample period, if not determined by a clock.
     Period,
     /// Error terms that the data show, but that are not estimated.
     ErrorTermsLeftOff,
-    /// Bias variation that may exist although the noise estimated from the record does not include it.
+    /// Possible bias variation that the estimated noise does not include.
     UnseenVariation,
 }
 

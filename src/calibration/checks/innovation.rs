@@ -48,7 +48,7 @@ pub struct Innovation {
     pub accepted: bool,
     /// Number of its dwell.
     pub dwell: usize,
-    /// Whether it shows the errors of the move before its dwell, which it does not if rows are lost in between.
+    /// Whether it shows the errors of the move before its dwell; false if rows are missing in between.
     pub after_move: bool,
 }
 
@@ -89,7 +89,7 @@ impl Consistency {
 /// Mean normalised innovation squared.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Nis {
-    /// Mean per scalar observation; one if σ are correct. NaN without observations.
+    /// Mean per scalar observation; one if σ are correct, NaN without observations.
     pub mean: f64,
     /// Number of scalar observations.
     pub count: usize,

@@ -14,9 +14,9 @@ use crate::units::{DEGREE, PPM};
 
 /// Parameters farther from their prior than this many of its σ contradict it.
 const CONTRADICTS: f64 = 5.0;
-/// Part of the prior variance by which rounding changes unobserved parameters.
+/// Fraction of the prior variance by which rounding changes unobserved parameters.
 const ROUNDING: f64 = 1e-9;
-/// Two vectors are alike if they differ by less than this part of their common part.
+/// Two vectors are similar if they differ by less than this fraction of their common part.
 const ALIKE: f64 = 0.5;
 
 /// The finding on parameters of an estimate that are too far from their prior, if any.
@@ -49,7 +49,7 @@ pub fn far_from_prior(model: &Model, estimate: &Estimate) -> Option<Finding> {
     (!far.is_empty()).then(|| Finding::new(kind, text, figures))
 }
 
-/// Whether a parameter is a scale factor that no careless prior explains.
+/// Whether a parameter is a scale factor too far from its prior for a careless prior.
 fn is_another_scale(model: &Model, estimate: &Estimate, index: usize) -> bool {
     let (_, of_triad) = sensor_and_parameter(index);
     let factor = estimate.vector()[index] / model.prior_mean[index];
@@ -60,9 +60,9 @@ fn is_another_scale(model: &Model, estimate: &Estimate, index: usize) -> bool {
 /// The finding on parameters for which the data alone contradict the prior, if the estimate includes the prior. The
 /// test uses the covariance of the distance between estimate and a correct prior.
 ///
-/// A prior that is too tight holds the estimate, so that the distance itself shows nothing. With
-/// `P⁻¹ = S⁻¹ + V⁻¹` of prior and data, the distance of the estimate is `P V⁻¹` times that of the data, and its
-/// covariance for a correct prior is `P S⁻¹ P V⁻¹`: normalised, it equals the distance of data and prior over both σ.
+/// Too tight a prior constrains the estimate, so the distance alone is not informative. With `P⁻¹ = S⁻¹ + V⁻¹` of prior
+/// and data, the distance of the estimate is `P V⁻¹` times that of the data, and its covariance for a correct prior is
+/// `P S⁻¹ P V⁻¹`: normalised, it equals the distance of data and prior over both σ.
 pub fn far_by_data(
     model: &Model,
     estimate: &Estimate,

@@ -1,4 +1,4 @@
-//! Results that may not be used: of iterations without convergence, or with residuals that no noise figure explains.
+//! Results that must not be used: without convergence, or with residuals that no noise figure explains.
 
 use serde_json::json;
 
@@ -12,7 +12,7 @@ const SO_WRONG: f64 = 1e-2;
 /// Limit of NIS, or of χ² over its degrees of freedom.
 ///
 /// 1σ of a stated noise figure is a factor of three, as everywhere in noise estimation. Its error exceeds the limit of
-/// NIS, its square, in one case of a hundred. Beyond that, samples and model do not belong together.
+/// NIS, its square, in one case of a hundred. Beyond that, the samples do not match the model.
 fn limit() -> f64 {
     let sigmas = chi_square_limit(1.0, 2.0 * SO_WRONG).sqrt();
     (2.0 * LOG_SIGMA * sigmas).exp()

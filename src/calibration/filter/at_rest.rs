@@ -23,14 +23,14 @@ pub struct Map {
     pub table: Linear,
 }
 
-/// The moving states, of this number, that are in `g`: nothing in a dwell depends on the position.
+/// The moving states in `g`, of this number; in a dwell, nothing depends on position.
 pub fn begins(moving: usize) -> Vec<usize> {
     let is_position = |place: &usize| (POSITION..POSITION + 3).contains(place);
     (0..moving).filter(|place| !is_position(place)).collect()
 }
 
 impl Filter {
-    /// The states that move in a dwell: navigation errors, the turn at rest, varying biases.
+    /// The states that move in a dwell: navigation errors, rotation at rest, varying biases.
     pub fn moving(&self) -> Vec<usize> {
         let varying = self.layout.varying_biases.iter().map(|of| of.0);
         self.moving_in_moves().into_iter().chain(varying).collect()

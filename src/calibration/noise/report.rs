@@ -21,7 +21,7 @@ pub struct NoiseReport {
     /// The test of the stated noise; `None` if nothing was tested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub test: Option<NoiseTest>,
-    /// Every source that the record can have.
+    /// Every possible source of the recording.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sources: Vec<SourceFigures>,
 }
@@ -48,7 +48,7 @@ pub struct SourceFigures {
     pub name: String,
     /// Unit of the figures.
     pub unit: String,
-    /// The stated value, or the one seen in dwells before the filter; `None` if there is neither.
+    /// The stated value, or the one measured in dwells before the filter; `None` if neither exists.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stated: Option<f64>,
     /// The value used.
@@ -136,7 +136,7 @@ impl fmt::Display for SourceFigures {
     }
 }
 
-/// A unit of noise as tables have it, such as °/√h.
+/// A noise unit as in tables, such as °/√h.
 fn symbol(unit: &str) -> String {
     let marks = [
         ("deg", "°"),

@@ -1,4 +1,4 @@
-//! The sources of noise: a row for each, and the place of its σ in the model.
+//! The sources of noise, one row each, and the position of its σ in the model.
 
 use serde::{Deserialize, Serialize};
 

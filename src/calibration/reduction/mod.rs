@@ -30,7 +30,7 @@ pub struct Reduction {
     pub log_determinant: f64,
     /// Initial attitude of each stretch.
     pub attitudes: Vec<Smoothed>,
-    /// States that belong to one recording only, for each recording; empty if there are none.
+    /// States that belong to a single recording, for each recording; empty if none.
     pub own: Vec<Smoothed>,
     /// Gravity at the last site, if there are several.
     pub gravity: Option<Smoothed>,
@@ -234,7 +234,7 @@ impl Smoothed {
         )
     }
 
-    /// Covariance with the constants, a row each.
+    /// Covariance with the constants, one row each.
     pub fn with_constants(&self, posterior: &Posterior) -> DMatrix<f64> {
         &posterior.covariance * self.by_constants.transpose()
     }

@@ -13,7 +13,7 @@ use crate::calibration::{
 };
 use crate::imu::{Nominal, PerSensor, Sensor, ThermalModel, ThermalState};
 
-/// Of triads that stay in the file's quantity.
+/// Converts triads that stay in the quantity of the file.
 const ONE: PerSensor<Nominal> = PerSensor {
     gyro: Nominal(Vector3::new(1.0, 1.0, 1.0)),
     accel: Nominal(Vector3::new(1.0, 1.0, 1.0)),
@@ -71,7 +71,7 @@ impl Calibration {
     /// The same for these values of the functions of temperature.
     ///
     /// # Errors
-    /// If coefficients are of no parameter.
+    /// If a coefficient belongs to no parameter.
     pub fn in_state(&self, state: &ThermalState) -> Result<Self, TemperatureError> {
         let Some(thermal) = self.thermal(&ONE)? else {
             return Ok(self.clone());
@@ -107,8 +107,8 @@ impl Calibration {
         })
     }
 
-    /// Covariance of its parameters, normalised by nominal scales: by its σ alone where it gives no correlations, zero
-    /// where it claims nothing. `None` where it is not of the parameters that it names.
+    /// Covariance of its parameters, normalised by nominal scales: from σ alone if correlations are missing, zero if
+    /// neither is stated. `None` if it does not match the named parameters.
     pub(crate) fn covariance_by(&self, nominal: &PerSensor<Nominal>) -> Option<ParameterMatrix> {
         let form = self.installation_form.unwrap_or_default();
         let factor = |index| factor(nominal, index);
@@ -139,10 +139,10 @@ impl Calibration {
         Some(covariance)
     }
 
-    /// How its parameters change with temperature, normalised by nominal scales; `None` if they do not.
+    /// Temperature dependence of its parameters, normalised by nominal scales; `None` if constant.
     ///
     /// # Errors
-    /// If coefficients are of no parameter.
+    /// If a coefficient belongs to no parameter.
     pub(crate) fn thermal(
         &self,
         nominal: &PerSensor<Nominal>,

@@ -39,14 +39,13 @@ pub struct Calibrated {
     pub in_range: bool,
 }
 
-/// Scale factors of one instrument are within this factor of its nominal ones.
+/// Largest ratio between scale factors of an instrument and their nominal values.
 const SCALE_FACTOR: f64 = 2.0;
 
-/// Axes that span less than this of a cube do not span the space.
+/// Axes whose volume is below this fraction of a cube do not span the space.
 const SMALLEST_VOLUME: f64 = 1e-6;
 
-/// A term changes what it responds to itself by a hundredth at most, so three rounds leave a
-/// millionth of it.
+/// A term changes its own input by at most a hundredth, so three iterations leave a millionth.
 const ROUNDS: usize = 3;
 
 /// Errors in applying a calibration.
@@ -214,8 +213,8 @@ impl Correction {
         self.changing.is_some()
     }
 
-    /// The same at the temperature of a run at a time in s, and whether it holds there. Where the run has none, or a
-    /// triad would be singular there, it is that of the reference temperature.
+    /// The same at the temperature of a run at a time in s, and whether it is valid there. Without a temperature, or if
+    /// a triad would be singular, the reference temperature is used.
     fn at(&self, run: &Run, time: f64) -> (Self, bool) {
         let temperature = run.recording.imu.temperature.as_ref();
         let known = self

@@ -1,8 +1,8 @@
-//! Causes of deviations of a record from its model: single events (a wrong position of the table, a turn that the
-//! gyros did not sense, a step of biases), and error terms.
+//! Causes of deviations of a recording from its model: single events (a wrong table position, a rotation that the gyros
+//! did not sense, a bias step) and error terms.
 //!
-//! They are searched before noise is estimated, which would grow to explain them. The effect of each on the estimate
-//! follows from its score and information, without another pass (Rao 1948, "Large sample tests of statistical
+//! They are searched before noise is estimated, because noise would grow to explain them. The effect of each on the
+//! estimate follows from its score and information, without another pass (Rao 1948, "Large sample tests of statistical
 //! hypotheses", Mathematical Proceedings of the Cambridge Philosophical Society 44(1)).
 
 mod score;
@@ -142,8 +142,8 @@ fn of_readings(innovations: &[Innovation]) -> Vec<FoundCause> {
     dwells.filter_map(of_dwell).collect()
 }
 
-/// All that may have happened once in the dwells that are tried, then all error terms that are off and that the record can
-/// hold, by their scores; and the number of causes if all dwells were tried.
+/// All possible single events in the tested dwells, then all disabled error terms that the recording can show, with
+/// their scores; and the number of causes if all dwells were tested.
 fn by_score(
     problem: &Problem,
     (priors, iterated): (&[AttitudePrior], &Iterated),
@@ -235,7 +235,7 @@ impl FoundCause {
         }
     }
 
-    /// A lasting cause (Earth rate) gets the chance level found while it is estimated; other causes are unchanged.
+    /// A permanent cause (Earth rate) gets the chance level found while it is estimated; other causes are unchanged.
     pub fn beside_what_it_leaves(self, left: &Causes) -> Self {
         match self.is_lasting() {
             true => self.beside(left.chance, self.limit),

@@ -3,7 +3,7 @@
 /// Severity of a finding, which determines the verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
-    /// The values may not be used.
+    /// The values must not be used.
     Failed,
     /// The values may be used if the finding is taken into account.
     Care,

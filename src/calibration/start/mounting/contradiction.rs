@@ -1,22 +1,22 @@
-//! What `run.toml` states and the record contradicts, in words.
+//! Messages about statements in `run.toml` that the recording contradicts.
 
 use std::fmt;
 
 use super::sensitivity::Sensitivity;
 use super::statement::Mounting;
 
-/// What `run.toml` states and the record contradicts.
+/// A statement in `run.toml` that the recording contradicts.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Contradiction {
     /// Axes that are swapped, reversed or left-handed.
     Axes(Mounting),
-    /// A triad that is this many times as sensitive as stated.
+    /// A triad with a sensitivity different from the stated one.
     Sensitivity(Sensitivity),
-    /// Quaternions of the table in another order, or of the inverse, in words.
+    /// Table quaternions in a different order or inverted, in words.
     Quaternions(String),
-    /// Motion that nothing explains that is tried.
+    /// Motion that no hypothesis explains.
     Unexplained,
-    /// Columns of gyros named for accelerometers, and the other way round.
+    /// Gyro and accelerometer columns swapped.
     Exchanged,
 }
 

@@ -1,4 +1,4 @@
-//! A triad of another sensitivity than is stated, in words.
+//! Message about a triad with a sensitivity different from the stated one.
 
 use std::fmt;
 
@@ -7,19 +7,19 @@ use crate::number::three_digits;
 use crate::run::Run;
 use crate::units::{DEGREE, STANDARD_GRAVITY};
 
-/// Half way to the sensitivity of the next range, which differs by two.
+/// Halfway to the sensitivity of the next range, which differs by a factor of two.
 pub const NEXT_RANGE: f64 = std::f64::consts::SQRT_2;
 
-/// A triad of another sensitivity than is stated, or one axis of it.
+/// A triad, or one axis of it, with a sensitivity different from the stated one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensitivity {
     /// Which triad.
     pub sensor: Sensor,
     /// Which axes.
     pub axes: Axes,
-    /// How many times as sensitive as stated: the likeliest, and others that are hardly less likely.
+    /// Factors relative to the stated sensitivity: the most likely, and others that are hardly less likely.
     pub factors: Vec<f64>,
-    /// What its rows hold, where a file says so.
+    /// Quantity of its rows, if a file states it.
     output: Option<Output>,
     /// The unit that is stated.
     unit: String,
@@ -58,7 +58,7 @@ impl Sensitivity {
         }
     }
 
-    /// What may be wrong, as run.toml has it.
+    /// Possible causes, in terms of run.toml.
     fn causes(&self, factor: f64) -> Vec<String> {
         let name = self.sensor.name();
         let mut causes = Vec::new();
@@ -128,8 +128,7 @@ impl fmt::Display for Sensitivity {
     }
 }
 
-/// Units that are stated for another: of a triad, the stated one, the true one, and how many times as sensitive the triad
-/// then is.
+/// Units commonly confused: triad, stated unit, true unit, and the resulting sensitivity factor.
 const UNITS: [(Sensor, &str, &str, f64); 6] = [
     (Sensor::Gyro, "rad/s", "deg/s", 1.0 / DEGREE),
     (Sensor::Gyro, "deg/s", "rad/s", DEGREE),
