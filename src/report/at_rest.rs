@@ -1,15 +1,15 @@
-//! The report of outputs at rest against temperature.
+//! Report on outputs at rest against temperature.
 
 use crate::calibration::{AtRest, AxisAtRest, Calibration, parameter};
 use crate::imu::{AXES, PARAMETERS as PER_TRIAD, RATE};
 use crate::report::prelude::*;
 use crate::run::Run;
 
-/// Points of a curve, and seconds that are drawn at most.
+/// Maximum number of points of a curve and of drawn seconds.
 const POINTS: usize = 101;
 const DRAWN: usize = 1500;
 
-/// Everything that is said of it.
+/// The complete report.
 pub fn document(at_rest: &AtRest, run: &Run, calibration: &Calibration) -> Document {
     let name = &run.recording.name;
     let mut document = Document::new(format!("{name}: outputs at rest against temperature"));
@@ -38,7 +38,7 @@ fn name(of: &AxisAtRest) -> String {
     format!("{} {}", of.sensor.name(), AXES[of.axis])
 }
 
-/// Order of the polynomial, and whether it follows the rate.
+/// Order of the polynomial, and whether it has a rate term.
 fn order(of: &AxisAtRest) -> String {
     let order = of.functions.iter().filter(|&&f| f != RATE).count();
     match of.functions.contains(&RATE) {

@@ -1,9 +1,9 @@
-//! The report of a study of campaigns.
+//! Report on a study of campaigns.
 
 use crate::report::prelude::*;
 use crate::study::CampaignAccuracy;
 
-/// Everything that is said of a study.
+/// The complete report on a study.
 pub fn document(accuracy: &CampaignAccuracy) -> Document {
     let study = &accuracy.study;
     let mut document = Document::new(format!("Accuracy of campaigns: {}", study.campaign.name));

@@ -3,7 +3,7 @@
 use crate::noise::conventions::{Conversion, Line};
 use crate::report::prelude::*;
 
-/// How the figure was taken, and a line for each convention.
+/// Interpretation of the figure, and one line per convention.
 pub fn document(conversion: &Conversion) -> Document {
     let (value, given) = conversion.given;
     let at = conversion
@@ -34,7 +34,7 @@ fn data(&(value, of): &Line) -> Value {
     json!({ "value": value, "unit": of.unit, "meaning": of.meaning })
 }
 
-/// Five digits, with a power of ten where that is shorter.
+/// Five digits, with a power of ten if shorter.
 fn digits(value: f64) -> String {
     if value != 0.0 && !(1e-3..1e6).contains(&value) {
         return format!("{value:.4e}");

@@ -1,4 +1,4 @@
-//! How auxiliary parameters, those beside the parameters of the triads, are spoken of.
+//! Names of auxiliary parameters, in addition to those of the triads.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +21,7 @@ pub fn title(block: ErrorTerm) -> &'static str {
     }
 }
 
-/// Symbol and SI value of the unit that its parameters are shown in.
+/// Symbol and SI value of the display unit of its parameters.
 pub fn unit(block: ErrorTerm) -> (&'static str, f64) {
     match block {
         ErrorTerm::Instrument(term) => term.entry().unit,
@@ -31,7 +31,7 @@ pub fn unit(block: ErrorTerm) -> (&'static str, f64) {
     }
 }
 
-/// Rows of the table of parameters; errors where `errors` asks for them and the truth states them.
+/// Rows of the parameter table; with errors if requested by `errors` and stated in the truth.
 pub fn rows(
     auxiliary: &Auxiliary,
     truth: &BTreeMap<String, TermRecord>,
@@ -59,7 +59,7 @@ pub fn rows(
     auxiliary.estimated().filter_map(row).collect()
 }
 
-/// Prior over posterior σ, with words where the data did not observe the parameter.
+/// Prior σ divided by posterior σ, with a note if the parameter was not observed.
 pub fn improvement(prior: f64, posterior: f64) -> String {
     let ratio = prior / posterior;
     if !ratio.is_finite() {
@@ -88,7 +88,7 @@ pub fn costs(effects: &[ErrorTermTest]) -> Table {
     .note("RMS over the parameters of a group, with the other terms unchanged.")
 }
 
-/// What those explain that were on or that the data show.
+/// Effect of the terms that were on or are significant.
 pub fn explained(effects: &[ErrorTermTest]) -> Table {
     let row = |effect: &ErrorTermTest| {
         let yes_no = |yes: bool, words: [&str; 2]| words[usize::from(!yes)].to_owned();

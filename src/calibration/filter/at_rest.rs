@@ -36,11 +36,11 @@ impl Filter {
         self.moving_in_moves().into_iter().chain(varying).collect()
     }
 
-    /// `g`, of this size: what moves when it begins except the position; rates
-    /// and specific forces by which constants drive the errors of attitude and velocity.
+    /// `g`, of this size: the moving states at the start except position, and the rates and specific forces through
+    /// which constants drive the attitude and velocity errors.
     ///
-    /// Attitude errors are those from the attitude of the table, `φ − τ`, which its readings show: what the
-    /// Earth's rate and gravity make of τ is constant, too.
+    /// Attitude errors are relative to the table, `φ − τ`, as observed by its readings; the effect of Earth rate and
+    /// gravity on τ is also constant.
     pub fn map(&self, rest: &Rest, block: &Block, size: usize) -> Map {
         let mut given = self.none(size);
         let table = self.table_map(rest);

@@ -1,6 +1,6 @@
-//! Information of a record on the constants, at one linearisation point and with given noise.
+//! Information of a recording about the constants, at one linearisation point and with given noise.
 //!
-//! The Kalman filter has the moving and the redrawn states; constants are columns that it propagates (see
+//! The Kalman filter has the moving and the reset states; constants are columns that it propagates (see
 //! [`super::filter::columns`]). Each dwell gives whitened rows `[G ν]` with `ν = G c + noise of σ 1`: with a prior,
 //! they give the estimate of any subset of the constants, without another pass.
 

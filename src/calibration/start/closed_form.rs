@@ -75,9 +75,9 @@ impl ClosedForm {
 
 /// Calibrates both triads of a run without a filter.
 ///
-/// With a table's log, it uses the dwells: the paper's six positions of a triad (Earth rate or gravity along each
-/// body axis, in both directions) if there are such, else all dwells. Without a table it uses labelled sections;
-/// without those, every dwell and turn with gravity as the only reference. For exactly opposite positions, least
+/// With a table log, it uses the dwells: the six positions of the paper for a triad (Earth rate or gravity along each
+/// body axis, in both directions) if present, otherwise all dwells. Without a table, it uses labelled sections or,
+/// without labels, every dwell and turn with gravity as the only reference. For exactly opposite positions, least
 /// squares equals the half sums and half differences of the paper.
 ///
 /// # Errors

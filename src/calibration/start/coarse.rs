@@ -49,9 +49,8 @@ impl CoarseStart {
 
 /// Both triads and the initial attitudes by least squares over whole dwells and moves.
 ///
-/// With a table, its attitudes are known. Without, accelerometers follow from `|f| = g` over the
-/// dwells, gyros from the direction of gravity before and after each move, and gyro biases together
-/// with the heading from the rates at rest.
+/// With a table, its attitudes are known. Without one, the accelerometers follow from `|f| = g` in the dwells, the
+/// gyros from the gravity direction before and after each move, and gyro biases and heading from the rates at rest.
 ///
 /// # Errors
 /// [`CalibrationError`] if there is no dwell, or data and prior contradict each other.
@@ -156,12 +155,11 @@ pub fn calibrated(problem: &Problem, dwells: &[Vec<AtRest>]) -> Result<Turned, C
     turned(problem, dwells, &mut at, &Sensor::ALL)
 }
 
-/// Attitudes, headings and gyro biases by these triads, and the equations there.
+/// Attitudes, headings and gyro biases for these triads, and the equations there.
 ///
-/// With the gyros the accelerometers are found, whose installation the magnitude of gravity alone shows badly where
-/// every dwell has an axis nearly up or down. Over a move between two dwells the gyros must carry the direction of
-/// gravity from where the accelerometers observed it before to where they observe it after; at rest they must sense
-/// Earth rate.
+/// The accelerometers are estimated together with the gyros, because the magnitude of gravity alone hardly determines
+/// their misalignments if every dwell has an axis nearly up or down. Over a move between two dwells, the gyros must
+/// carry the gravity direction observed before it to that observed after it; at rest they must sense Earth rate.
 fn turned(
     problem: &Problem,
     dwells: &[Vec<AtRest>],

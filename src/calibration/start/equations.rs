@@ -1,7 +1,7 @@
-//! Linear equations for the errors of both triads about one point: least squares, its covariance, residuals.
+//! Linear equations for the errors of both triads about one point: least squares, covariance, residuals.
 //!
-//! A row is a residual, its partials by the unknowns, and the sources of its error. The unknowns are the parameters of
-//! a form, or the entries of `A = K C` and `D` of each triad ([`of_sensitivity`]).
+//! A row consists of a residual, its partial derivatives with respect to the unknowns, and its error sources. The
+//! unknowns are the parameters of a form, or the entries of `A = K C` and `D` of each triad ([`of_sensitivity`]).
 
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3, Vector4};
 

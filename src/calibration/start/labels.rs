@@ -1,7 +1,6 @@
-//! Rows by labels: the instrument is put with each axis up and down and turned about each by hand.
+//! Equations from labels: the instrument is placed by hand with each axis up and down and turned about each axis.
 //!
-//! Which way is north is not known, but it is the same way in all sections with one heading, and a turn carries it
-//! along.
+//! North is unknown, but common to all sections with the same heading, and turns carry it along.
 //!
 //! Source: Ferraris, Grimaldi, Parvis 1995, "Procedure for effortless in-field calibration of
 //! three-axial rate gyro and accelerometers", *Sensors and Materials* 7(5), without the gyros'
@@ -197,11 +196,11 @@ fn force_by_hand(
     }
 }
 
-/// An input along or about an axis that is within a degree or so of where it should be, and this noise.
+/// An input along or about an axis that is misplaced by about a degree, with this noise.
 ///
-/// To first order that turns the input into the other two axes. Along the axis it takes off the second
-/// order: half the sum of two squared angles. That is the square of σ in the mean, the same for all
-/// positions ([`shortened`]), and scatters by as much.
+/// To first order, the misplacement rotates the input into the other two axes. Along the axis it reduces the input to
+/// second order, by half the sum of two squared angles. The mean of this is σ², the same for all positions
+/// ([`shortened`]), with an equal scatter.
 fn set_by_hand(
     sigma: f64,
     input: Vector3<f64>,

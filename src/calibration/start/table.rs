@@ -25,11 +25,11 @@ pub fn sensed(site: &Site, sensor: Sensor) -> Vector3<f64> {
     }
 }
 
-/// Mean outputs in some dwells of the problem's first run under the inputs that the table's attitudes make; `None`
-/// without a table.
+/// Mean outputs in some dwells of the first run of the problem, with inputs from the table attitudes; `None` without a
+/// table.
 ///
-/// An attitude that is wrong by `C_true = (I + [e×]) C_read` gives the input an error of `C_readᵀ [u_n×] e`: of the
-/// base, of the axes, of the position that the table took up, of its readings there.
+/// An attitude error `C_true = (I + [e×]) C_read` causes an input error of `C_readᵀ [u_n×] e`, from base, axes,
+/// position and readings.
 pub fn positions(problem: &Problem, dwells: &[Dwell], sensor: Sensor) -> Option<Observed> {
     let (run, model) = (problem.run(), &problem.model);
     let axes = &model.geometry.axes;

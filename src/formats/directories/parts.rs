@@ -1,4 +1,4 @@
-//! Parts of a job: written by one machine each, put together by one.
+//! Parts of a job: written by one machine each, and merged by one.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,9 +10,9 @@ use super::digest::digest_of_bytes;
 use super::job::{JOB_FILE, Job, Part};
 use crate::formats::error::{FileError, list};
 
-/// Results of the runs of a study, as MessagePack: numbers come back to the bit.
+/// Results of the runs of a study as MessagePack, which preserves every bit of a number.
 const RESULTS: &str = "runs.msgpack";
-/// As many missing runs are named.
+/// Maximum number of missing runs named.
 const NAMED: usize = 5;
 
 /// Writes a part of a study into an existing directory.
@@ -34,7 +34,7 @@ pub fn write_part<T: Serialize>(directory: &Path, part: Part, runs: &[T]) -> Res
     write(JOB_FILE, &part.to_json())
 }
 
-/// Whether a directory holds this part of a study, whole.
+/// Whether a directory contains this part of a study completely.
 pub fn part_is_there(directory: &Path, part: &Part) -> bool {
     let Ok(found) = Part::read(directory) else {
         return false;
@@ -55,16 +55,15 @@ pub fn part_is_there(directory: &Path, part: &Part) -> bool {
 pub struct Parts {
     /// The job.
     pub job: Job,
-    /// Directory of each with what it says of itself.
+    /// Directory of each part with its job record.
     parts: Vec<(PathBuf, Part)>,
 }
 
 impl Parts {
-    /// Reads what directories say of themselves.
+    /// Reads the job records of directories.
     ///
-    /// # Errors
-    /// [`FileError`] if one is no part, if they are parts of different jobs, or if a run is in none or in two of
-    /// them.
+    /// # Errors [`FileError`] if one is not a part, if they are parts of different jobs, or if a run is in none or in
+    /// two of them.
     pub fn read(directories: &[PathBuf]) -> Result<Self, FileError> {
         let read = |directory: &PathBuf| Ok((directory.clone(), Part::read(directory)?));
         let parts = directories
@@ -98,7 +97,7 @@ impl Parts {
         Ok(parts)
     }
 
-    /// Every run in one part.
+    /// Checks that every run is in exactly one part.
     fn check_all_there(&self) -> Result<(), FileError> {
         let mut held = self.held();
         held.sort();
@@ -146,7 +145,7 @@ impl Parts {
         .collect()
     }
 
-    /// A run as messages call it: by its number, of a lot by its unit.
+    /// Name of a run in messages: its number, or its unit in a lot.
     fn name(&self, run: u64) -> String {
         let name = usize::try_from(run).ok();
         let name = name.and_then(|run| self.job.names.get(run));
@@ -156,7 +155,7 @@ impl Parts {
     /// The results of all runs of a study, in the order of their numbers.
     ///
     /// # Errors
-    /// [`FileError`] if results are not as they were written.
+    /// [`FileError`] if the results were modified.
     pub fn results<T: DeserializeOwned>(&self) -> Result<Vec<T>, FileError> {
         let mut all: Vec<(u64, T)> = Vec::new();
         for (directory, part) in &self.parts {
@@ -195,7 +194,7 @@ impl Parts {
     }
 }
 
-/// How jobs differ in anything.
+/// Any difference between jobs.
 fn difference(a: &Job, b: &Job) -> Option<String> {
     a.difference(b).or_else(|| {
         if a.runs != b.runs {

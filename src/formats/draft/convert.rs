@@ -9,13 +9,13 @@ use super::streams::{Streams, Written};
 use crate::formats::source::Source;
 use crate::formats::{FileError, write_rows};
 
-/// Of gyros, and of accelerometers in the same stream.
+/// File of the gyros, and of accelerometers in the same stream.
 const GYRO_FILE: &str = "imu.csv.gz";
 const ACCEL_FILE: &str = "accelerometers.csv.gz";
 
 impl Draft {
-    /// Writes the streams that hold the instrument as rows of text, with this draft for them, into a directory
-    /// that is there; a damaged log only if what is whole of it is to be used.
+    /// Writes the streams of the instrument as text, with this draft for them, into an existing directory; a damaged
+    /// log only if its intact part is to be used.
     ///
     /// # Errors
     /// [`FileError`] if the log is text already, is damaged, or cannot be read or written.

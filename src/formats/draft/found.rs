@@ -1,16 +1,16 @@
-//! What a log shows, and how sure that is.
+//! Fields detected in a log, with their certainty.
 
 use super::motion::Motion;
 use super::units::short;
 use super::{AXES_OF_PROGRAM, Draft, NO_COLUMNS};
 use crate::imu::Sensor;
 
-/// How sure something is.
+/// Certainty of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Certainty {
-    /// The log states it and the motion agrees, or the motion alone shows it, or the user states it.
+    /// Stated in the log and confirmed by motion, determined by motion alone, or stated by the user.
     Certain,
-    /// The log states it, or it is usual; the motion does not show it.
+    /// Stated in the log or typical, but not confirmed by motion.
     Guess,
     /// Neither.
     Unknown,
@@ -27,21 +27,21 @@ impl Certainty {
     }
 }
 
-/// One thing that was found in a log.
+/// A detected field.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
-    /// Of what, such as `gyros`.
+    /// Name, such as `gyros`.
     pub what: &'static str,
     /// What was found.
     pub value: String,
-    /// How sure it is.
+    /// Its certainty.
     pub certainty: Certainty,
     /// Why.
     pub why: String,
 }
 
 impl Draft {
-    /// What was found, in the order in which it is shown.
+    /// Detected fields, in display order.
     pub fn found(&self) -> Vec<Found> {
         vec![
             self.time_found(),
@@ -52,7 +52,7 @@ impl Draft {
         ]
     }
 
-    /// The first thing that stands between the draft and a run: what the log has, what is needed, what to do.
+    /// The first open field that prevents a run: evidence in the log, requirement, remedy.
     pub(in crate::formats) fn open_question(&self) -> Option<[String; 3]> {
         let (field, why) = self.page("log").open.into_iter().next()?;
         let is_zero = |motion: &Motion| motion.gravity == 0.0;

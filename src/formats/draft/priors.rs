@@ -1,5 +1,4 @@
-//! What is known before calibration: scale and bias as the record shows them, the rest as is usual in the class
-//! of its noise.
+//! Prior: scale and bias from the recording, the rest typical for the class of its noise.
 
 use nalgebra::Vector3;
 
@@ -11,10 +10,10 @@ use crate::formats::schema::page::Page;
 use crate::imu::Sensor;
 use crate::units::{ARCSEC, DEG_PER_SQRT_H, DEGREE, MICRO_G_PER_SQRT_HZ, PPM};
 
-/// Knowledge before calibration that is usual in a class of instruments, 1σ.
+/// Typical prior of a class of instruments, 1σ.
 struct Class {
     name: &'static str,
-    /// White noise of the gyros below which an instrument is of this class, rad/√s.
+    /// Gyro white noise below which an instrument belongs to this class, rad/√s.
     angle_random_walk: f64,
     /// The same of the accelerometers, (m/s)/√s.
     velocity_random_walk: f64,
@@ -50,7 +49,7 @@ const CLASSES: [Class; 3] = [
 ];
 
 impl Draft {
-    /// By the noise of the gyros, else that of the accelerometers.
+    /// From the gyro noise, otherwise the accelerometer noise.
     fn class(&self) -> &'static Class {
         let walk = |sensor| self.white_noise(sensor);
         let is_of = |class: &&Class| match (walk(Sensor::Gyro), walk(Sensor::Accel)) {
@@ -146,13 +145,13 @@ impl Draft {
         }
     }
 
-    /// Output of the gyros at rest, the file's quantity a row.
+    /// Gyro output at rest, in the quantity of the file per row.
     fn rest(&self) -> Option<Vector3<f64>> {
         self.motion.as_ref().map(|motion| motion.rest)
     }
 
-    /// What the record shows a register to say at zero, with its σ, where it is none that its class has: in the
-    /// file's quantity a row.
+    /// Register zero estimated from the recording, with its σ, if it is not typical for the class; in the quantity of
+    /// the file per row.
     fn own_zero(
         &self,
         sensor: Sensor,
@@ -176,7 +175,7 @@ impl Draft {
     }
 }
 
-/// One number for three that are the same.
+/// One number for three equal ones.
 fn three(values: &Vector3<f64>) -> String {
     let [x, y, z] = <[f64; 3]>::from(*values).map(seven);
     if x == y && y == z {

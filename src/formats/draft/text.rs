@@ -1,4 +1,4 @@
-//! The draft as TOML: its lines, each with the reason, and what they leave open.
+//! The draft as TOML: lines with reasons, and open fields.
 
 use super::name::axes_of_program;
 use super::units::short;
@@ -9,8 +9,8 @@ use crate::formats::schema::page::Page;
 use crate::imu::{Noise, NoiseKeys, Output, Sensor};
 
 impl Draft {
-    /// The draft as a `run.toml` in which the log is named so. Lines with `TODO` must be completed before it
-    /// can be read; the others are guesses, each with its reason.
+    /// The draft as a `run.toml` with this name for the log. Lines with `TODO` must be completed before it can be read;
+    /// the others are guesses, each with its reason.
     pub fn to_toml(&self, file: &str) -> String {
         self.page(file).text
     }
@@ -209,7 +209,7 @@ impl Draft {
         }
     }
 
-    /// Which other columns could be a triad, and whether only numbers told the triads.
+    /// Remarks on alternative triad columns and on identification by value.
     fn doubts_of_triads(&self, page: &mut Page) {
         let columns = &self.columns;
         for sensor in Sensor::ALL {
@@ -233,7 +233,7 @@ impl Draft {
         }
     }
 
-    /// What stands for a column of time.
+    /// Substitute for a time column.
     fn without_time(&self, page: &mut Page) {
         let why = &self.clock.why;
         if self.clock.is_stated {
@@ -250,7 +250,7 @@ impl Draft {
         }
     }
 
-    /// That an axis points down, or the accelerometers have the sign of gravity.
+    /// Remark that an axis points down or that the accelerometers output gravity.
     pub(super) fn down_words(&self, down: usize) -> String {
         format!(
             "{} is negative: the axis points down, or the accelerometers output gravity instead of specific force, \
@@ -259,7 +259,7 @@ impl Draft {
         )
     }
 
-    /// Where gyros do not turn as the accelerometers' columns lie.
+    /// Remark on gyro columns that do not match the accelerometer axes.
     fn turned_axes(&self, page: &mut Page) {
         let turns = self
             .registers
@@ -353,7 +353,7 @@ pub fn seven(value: f64) -> f64 {
     format!("{value:.6e}").parse().unwrap_or(value)
 }
 
-/// A word in quotes, or a number as it is.
+/// A word in quotes, or a number unchanged.
 pub fn word_or_number(text: &str) -> String {
     match text.parse::<f64>() {
         Ok(_) => text.to_owned(),

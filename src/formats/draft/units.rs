@@ -1,4 +1,4 @@
-//! What a row holds, and in which units: each that `run.toml` has is held against gravity at rest or its turns.
+//! Quantity and units of a row: each unit of `run.toml` is compared with gravity at rest or its rotation.
 
 use nalgebra::Vector3;
 
@@ -15,7 +15,8 @@ use crate::formats::{Sheet, unit_scale};
 use crate::imu::{Output, PerSensor, Sensor};
 use crate::units::STANDARD_GRAVITY;
 
-/// Gravity at rest tells units that differ by more than this factor, for raw sensors are off by tenths; and so do turns.
+/// Gravity at rest and turns distinguish units that differ by more than this factor, because raw sensors may be off by
+/// tenths.
 const TOLD_APART: PerSensor<f64> = PerSensor {
     gyro: 1.3,
     accel: 1.25,
@@ -23,17 +24,17 @@ const TOLD_APART: PerSensor<f64> = PerSensor {
 /// Sums of pulses vary less than sums of readings by more than this factor.
 const PULSE_SUMS: f64 = 0.5;
 
-/// What is known of the unit of a triad.
+/// Unit of a triad, as far as known.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Unit {
-    /// The word for `run.toml`, if it is known.
+    /// Its name in `run.toml`, if known.
     pub word: Option<&'static str>,
     pub why: String,
-    /// Whether motion shows it, or the user states it.
+    /// Whether it is confirmed by motion or stated by the user.
     pub is_shown: bool,
-    /// For counts, where something shows it …
+    /// Scale of counts, if determined …
     pub scale: Option<Scale>,
-    /// … and what is likely where nothing does.
+    /// … and typical values otherwise.
     pub likely: Option<String>,
 }
 
@@ -52,11 +53,11 @@ pub struct Quantities {
     pub output: Output,
     pub output_why: String,
     pub units: PerSensor<Unit>,
-    /// Whether gyros and accelerometers turn opposite ways.
+    /// Whether gyros and accelerometers have opposite signs.
     pub opposed: bool,
 }
 
-/// A unit that rows may have.
+/// A possible unit of the rows.
 struct Hypothesis {
     word: &'static str,
     output: Output,
@@ -94,7 +95,7 @@ impl Hypothesis {
         self.factor.is_some() && !self.fits()
     }
 
-    /// What motion says of it.
+    /// Evidence from motion.
     fn evidence(&self, sensor: Sensor, motion: &Motion) -> String {
         match (sensor, self.factor) {
             (_, None) => String::new(),
@@ -115,7 +116,7 @@ impl Hypothesis {
         }
     }
 
-    /// Why rows have it that the file names.
+    /// Reason for the unit named in the file.
     fn why_named(&self, sensor: Sensor, motion: &Motion) -> String {
         let link = match self.factor {
             None => "",
@@ -129,16 +130,16 @@ impl Hypothesis {
 /// The rows of a triad.
 struct Rows<'a> {
     motion: &'a Motion,
-    /// s, not a number where nothing tells it.
+    /// Period in s; NaN if unknown.
     period: f64,
-    /// The unit that the file names.
+    /// Unit named in the file.
     named: Option<name::Unit>,
     /// Whether they are whole numbers.
     whole: bool,
 }
 
 impl Quantities {
-    /// Where too few rows hold numbers to show anything.
+    /// If there are too few numeric rows.
     pub fn unknown() -> Self {
         Self {
             output: Output::Rate,
@@ -223,7 +224,7 @@ impl Quantities {
         }
     }
 
-    /// Takes what rows hold by the accelerometers.
+    /// Sets the row quantity from the accelerometers.
     fn hold(&mut self, output: Output, rows: &Rows) {
         self.output = output;
         self.output_why = match output {
@@ -318,7 +319,7 @@ impl Quantities {
         }
     }
 
-    /// Takes the units that the user states.
+    /// Applies the units stated by the user.
     pub fn state(&mut self, stated: &Stated) {
         let of_triads = [
             (Sensor::Gyro, stated.gyro_unit),
@@ -347,7 +348,7 @@ impl Quantities {
         self.units.get(sensor).word == Some("count")
     }
 
-    /// Takes in what the record shows of the registers behind its counts.
+    /// Applies the registers detected behind the counts.
     pub fn of_registers(&mut self, found: &Registers, period: Option<f64>) {
         let period = period.unwrap_or(f64::NAN);
         let (per_second, row) = (self.per_second(period), self.row(period));
@@ -384,7 +385,7 @@ impl Quantities {
         }
     }
 
-    /// What a row of gyros is summed over to make an angle.
+    /// Factor from a gyro row to its integral.
     fn row(&self, period: f64) -> f64 {
         period * self.per_second(period)
     }
@@ -397,7 +398,7 @@ impl Quantities {
     }
 }
 
-/// A unit of which the file states how many of `run.toml`'s one is, unless motion contradicts it.
+/// A unit that the file states as a multiple of one in `run.toml`, unless motion contradicts it.
 fn scaled(sensor: Sensor, rows: &Rows) -> Option<Unit> {
     let unit = rows.named?;
     let scale = Scale::of_unit(sensor, unit)?;
@@ -412,7 +413,7 @@ fn scaled(sensor: Sensor, rows: &Rows) -> Option<Unit> {
     })
 }
 
-/// Why a triad is taken to hold counts.
+/// Reason for treating a triad as counts.
 fn why_count(rows: &Rows, unfit: &str) -> String {
     match rows.named {
         _ if rows.whole => "whole numbers".to_owned(),
@@ -424,7 +425,7 @@ fn why_count(rows: &Rows, unfit: &str) -> String {
     }
 }
 
-/// The only unit with which rows that turn by this angle come at a usual period, and the period.
+/// The only unit that gives a usual period for rows with this rotation, and the period.
 fn usual_period(all: &[Hypothesis], angle: f64) -> Option<(&'static str, f64)> {
     let periods = all.iter().map(|of| (of.word, of.per_si * angle));
     let mut usual = periods.filter(|(_, period)| PERIODS.contains(period));

@@ -9,11 +9,11 @@ use crate::report::prelude::*;
 use crate::study::accuracy::{Position, Region};
 use crate::study::{Accuracy, Figures, GroupAccuracy, NavigationAccuracy, Ratio};
 
-/// The narrowest axis about a ratio of one.
+/// Smallest range of the axis around a ratio of one.
 const NEAR: f64 = 0.04;
-/// A ratio beyond this or below its inverse makes its axis logarithmic.
+/// If a ratio exceeds this value or is below its inverse, its axis is logarithmic.
 const FAR: f64 = 2.0;
-/// Lines that end nearer than this factor have one name.
+/// Lines whose ends differ by less than this factor share one name.
 const TOGETHER: f64 = 2.0;
 
 pub fn figures(accuracy: &Accuracy) -> Vec<Plot> {
@@ -28,7 +28,7 @@ pub fn figures(accuracy: &Accuracy) -> Vec<Plot> {
     plots
 }
 
-/// Ratios with their place on the axis.
+/// Ratios with their positions on the axis.
 fn ratios(accuracy: &Accuracy, of: impl Fn(&Figures) -> Option<Ratio>) -> Vec<(f64, Ratio)> {
     let all = compared(accuracy).into_iter().enumerate();
     all.filter_map(|(place, compared)| Some((place as f64, of(compared.figures)?)))
@@ -36,13 +36,13 @@ fn ratios(accuracy: &Accuracy, of: impl Fn(&Figures) -> Option<Ratio>) -> Vec<(f
         .collect()
 }
 
-/// A panel with a place for each that is compared and a line at 1.
+/// A panel with a position for each compared item and a line at 1.
 fn by_compared(accuracy: &Accuracy, title: String, y: Axis) -> Panel {
     let x = Axis::places(compared(accuracy).into_iter().map(|of| of.title));
     Panel::new(title, x, y).with(Series::level(1.0).width(1.5))
 }
 
-/// A mark at each ratio with its interval, and its value beyond that, away from 1.
+/// A mark at each ratio with its interval, and its value outside it, away from 1.
 fn with_values(ratios: &[(f64, Ratio)], shift: f64) -> Vec<Series> {
     let at = |&(x, ratio): &(f64, Ratio)| ((x + shift, ratio.value), ratio.interval);
     let values = ratios.iter().map(|(x, ratio)| {
@@ -147,18 +147,18 @@ fn of_group_against_time(of: &GroupAccuracy) -> Panel {
         .with(rings.label("closed form"))
 }
 
-/// Half the width of the axis of errors in σ, unless more than one in twenty lies beyond.
+/// Half the range of the axis of errors in σ, unless more than one in twenty lies outside.
 const REACH: f64 = 5.0;
 const BEYOND: f64 = 0.05;
 const BINS: usize = 24;
 /// Points of a curve.
 const CURVE: usize = 301;
-/// Runs this many times above the upper end of the interval of NEES make its axis logarithmic.
+/// If a run exceeds the upper end of the NEES interval by this factor, the axis is logarithmic.
 const FAR_NEES: f64 = 4.0;
-/// The least half width of the axes of positions, in σ.
+/// Minimum half range of the position axes, in σ.
 const POSITION_REACH: f64 = 4.0;
 
-/// Normalised errors of each group over the density that the claimed σ promise.
+/// Normalised errors of each group, with the density implied by the stated σ.
 pub fn errors(accuracy: &Accuracy) -> Plot {
     let panels = Group::all().map(|group| {
         let values = normalised(accuracy, group);
@@ -194,7 +194,7 @@ pub fn errors(accuracy: &Accuracy) -> Plot {
     )
 }
 
-/// Errors over σ of the parameters of a group that have a σ.
+/// Errors divided by σ for the parameters of a group that have a σ.
 fn normalised(accuracy: &Accuracy, group: Group) -> Vec<f64> {
     accuracy
         .filtered()
@@ -286,7 +286,7 @@ pub fn nees(accuracy: &Accuracy) -> Plot {
     Plot::new("nees.svg", "NEES of every run", (1, 420), [panel]).caption(caption)
 }
 
-/// Position errors after each mission over the σ that were predicted of them.
+/// Position errors after each mission, divided by their predicted σ.
 pub fn positions(accuracy: &Accuracy) -> Plot {
     let clouds: Vec<Vec<Point>> = accuracy
         .navigation

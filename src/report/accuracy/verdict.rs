@@ -1,4 +1,4 @@
-//! What the figures say, in sentences.
+//! Conclusions from the figures, in sentences.
 
 use std::cmp::Ordering;
 
@@ -9,9 +9,9 @@ use crate::imu::Output;
 use crate::report::prelude::*;
 use crate::study::{Accuracy, Figures, Ratio};
 
-/// Fewer runs than this make a rough interval.
+/// With fewer runs than this, intervals are approximate.
 const FEW: usize = 30;
-/// NIS that whole pulses leave a filter, whose noise is taken for Gaussian.
+/// Range of NIS due to pulses, which the filter treats as Gaussian noise.
 const PULSES: std::ops::RangeInclusive<f64> = 0.9..=1.1;
 
 /// Every sentence, the most important first.
@@ -72,7 +72,7 @@ fn convergence(accuracy: &Accuracy) -> (bool, String) {
     (false, text)
 }
 
-/// Where a number lies from its interval.
+/// Position of a number relative to its interval.
 fn side(of: f64, (low, high): (f64, f64)) -> (Ordering, &'static str) {
     match of {
         of if of < low => (Ordering::Less, "below"),
@@ -81,7 +81,7 @@ fn side(of: f64, (low, high): (f64, f64)) -> (Ordering, &'static str) {
     }
 }
 
-/// What has a ratio on a chosen side of 1, named with it.
+/// Names of the items with a ratio on the chosen side of 1.
 fn named(
     accuracy: &Accuracy,
     of: impl Fn(&Figures) -> Option<Ratio>,
@@ -148,7 +148,7 @@ fn nees(accuracy: &Accuracy) -> (bool, String) {
     (side(of.mean, of.interval_998).0.is_eq(), text)
 }
 
-/// What innovations are that are not as large or not as white as they should be.
+/// Sentences on innovations of the wrong size or whiteness.
 fn innovations(accuracy: &Accuracy, name: &str, nis: &Nis) -> Vec<(bool, String)> {
     let mut sentences = Vec::new();
     if let (Ordering::Less | Ordering::Greater, side) = side(nis.mean, nis.interval) {

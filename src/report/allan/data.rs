@@ -1,4 +1,4 @@
-//! The analysis by name. Deviations are in deg/h and µg, intervals of 95 %.
+//! The analysis as named values. Deviations are in deg/h and µg; intervals are 95 %.
 
 use crate::formats::NoiseKeys;
 use crate::imu::Sensor;
@@ -90,14 +90,14 @@ fn axis(axis: &AxisNoise, sensor: Sensor) -> Value {
     })
 }
 
-/// A field of `[imu.noise]` with what has to be said of it.
+/// A field of `[imu.noise]` with its comment.
 struct Field {
     key: &'static str,
     value: f64,
     comment: String,
 }
 
-/// `[imu.noise]` with all that was found, ready to be pasted.
+/// `[imu.noise]` with all detected processes, ready to paste.
 pub fn noise_table(analysis: &NoiseAnalysis) -> String {
     let mut text = "[imu.noise]\n".to_owned();
     for &sensor in &analysis.sensors {
@@ -119,7 +119,7 @@ pub fn noise_table(analysis: &NoiseAnalysis) -> String {
     text
 }
 
-/// The same fields to all digits.
+/// The same fields with all digits.
 pub fn fields(analysis: &NoiseAnalysis) -> Map<String, Value> {
     let fields = Sensor::ALL.map(|sensor| of_triad(analysis, sensor));
     let fields = fields.into_iter().flatten();
@@ -167,7 +167,7 @@ fn of_triad(analysis: &NoiseAnalysis, sensor: Sensor) -> Vec<Field> {
     fields
 }
 
-/// What the process stands for, if it was not found as such.
+/// The process that it represents, if not detected as such.
 fn in_place_of(analysis: &NoiseAnalysis, sensor: Sensor) -> String {
     let found = analysis.triads.get(sensor).mean.found();
     let stands_for = [Process::BiasInstability, Process::RateRandomWalk].into_iter();

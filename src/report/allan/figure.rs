@@ -1,13 +1,13 @@
-//! Allan deviation against cluster time, a panel for each axis.
+//! Allan deviation against cluster time, one panel per axis.
 
 use super::quantity::{deviation_unit, quantity};
 use crate::imu::{AXES, Sensor};
 use crate::noise::{AxisNoise, Found, NoiseAnalysis, Process};
 use crate::report::prelude::*;
 
-/// A process is drawn where it makes at least this part of the variance.
+/// A process is drawn where it contributes at least this fraction of the variance.
 const SEEN: f64 = 0.02;
-/// Points in a decade of a drawn line.
+/// Points per decade of a drawn line.
 const POINTS: f64 = 24.0;
 
 pub fn figure(analysis: &NoiseAnalysis, sensor: Sensor) -> Plot {

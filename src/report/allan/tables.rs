@@ -6,7 +6,7 @@ use crate::imu::{AXES, Sensor};
 use crate::noise::{AxisNoise, Found, NoiseAnalysis, Process, TriadNoise, of_kind};
 use crate::report::prelude::*;
 
-/// What was found in a triad: a row for each process, a column for each axis and one for their mean.
+/// Results for a triad: one row per process, one column per axis and one for their mean.
 pub fn coefficients(analysis: &NoiseAnalysis, sensor: Sensor) -> Table {
     let triad = analysis.triads.get(sensor);
     let columns: Vec<&AxisNoise> = triad.axes.iter().chain([&triad.mean]).collect();
@@ -74,7 +74,7 @@ fn title(sensor: Sensor) -> &'static str {
     }
 }
 
-/// What the quantisation by pulses makes.
+/// Quantisation due to pulses.
 fn of_a_pulse(pulse: f64, sensor: Sensor) -> Option<String> {
     let of = quantity(Process::Quantisation, sensor);
     (pulse > 0.0).then(|| {
@@ -104,7 +104,7 @@ fn correlation_time(found: Found) -> String {
     }
 }
 
-/// Allan deviations of all axes at every so-manieth cluster time.
+/// Allan deviations of all axes at cluster times with this interval.
 pub fn deviations(analysis: &NoiseAnalysis, every: usize) -> Table {
     let freedom = |triad: &TriadNoise, point: usize| {
         let of = |axis: &AxisNoise| Some(*axis.identified.as_ref()?.freedom.get(point)?);

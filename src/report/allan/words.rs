@@ -1,19 +1,19 @@
-//! What has to be said of an analysis.
+//! Sentences about an analysis.
 
 use super::quantity::quantity;
 use crate::imu::{AXES, Sensor};
 use crate::noise::{Hidden, Identified, NoiseAnalysis, Process, TriadNoise, of_kind};
 use crate::report::prelude::*;
 
-/// Random walks of the axes of a triad that differ by more than this factor are not alike.
+/// Random walks of the axes of a triad count as different beyond this ratio.
 const UNLIKE: f64 = 1.5;
-/// Departures of the variance from all models that are not worth a word.
+/// Deviations of the variance from all models below this fraction are not reported.
 const SMALL: f64 = 0.02;
 
 pub const INTERVALS: &str = "The 95 % interval of a deviation s with ν degrees of freedom is s √(ν/χ²₀.₉₇₅) to s \
     √(ν/χ²₀.₀₂₅) (NIST SP 1065, 5.3).";
 
-/// What is left out at the short end, in a sentence.
+/// Excluded short cluster times, in a sentence.
 fn left_out(of: &Identified, taus: &[f64]) -> Option<String> {
     let from = taus.get(of.first).filter(|_| of.first > 0)?;
     Some(format!(
@@ -32,7 +32,7 @@ pub const METHOD: &str = "Overlapping Allan variance of the rate (NIST SP 1065, 
     noise, or sensor bandwidth) are excluded. Bias instability B is the coefficient of flicker noise, whose floor is \
     0.664 B.";
 
-/// What forbids to trust the figures, or to use them without thought.
+/// Warnings about the figures.
 pub fn warnings(analysis: &NoiseAnalysis) -> Vec<String> {
     let mut warnings = Vec::new();
     if !analysis.stretch.stands {
@@ -110,7 +110,7 @@ fn unlike(triad: &TriadNoise, sensor: Sensor) -> Option<String> {
     })
 }
 
-/// Of each slope that a triad does not show: what it is below, and how it could be seen.
+/// For each undetected slope of a triad: its upper limit, and how to measure it.
 pub fn advice(analysis: &NoiseAnalysis) -> Vec<String> {
     let mut sentences = Vec::new();
     for &sensor in &analysis.sensors {

@@ -1,4 +1,4 @@
-//! Where the uncertainty comes from: tables and stacked bars.
+//! Sources of the uncertainty: tables and stacked bars.
 
 use super::super::terms::title;
 use super::report::Report;
@@ -7,16 +7,16 @@ use crate::earth::ROTATION_RATE;
 use crate::imu::Sensor;
 use crate::report::prelude::*;
 
-/// So many sources have a colour of their own; the others share one.
+/// Number of sources with separate colours; the others share one.
 const SHOWN: usize = 5;
-/// A latitude is usually stated to this, rad.
+/// Usual resolution of a stated latitude, rad.
 const LATITUDE: f64 = 1e-3 * DEGREE;
-/// So many error terms are named that a record would not show.
+/// Maximum number of unobservable error terms that are named.
 const NAMED_TERMS: usize = 3;
-/// A source is named where it adds at least this part of a variance.
+/// A source is named if it contributes at least this fraction of a variance.
 const NAMED: f64 = 1e-3;
 
-/// RMS of a group's standard uncertainties by source, and together.
+/// RMS of the standard uncertainties of a group, by source and combined.
 pub fn table(budget: &Budget, estimate: &Estimate) -> Table {
     let row = |name: &str, u: ParameterVector, freedom: &str| {
         let mut row = vec![name.to_owned()];
@@ -62,7 +62,7 @@ pub fn table(budget: &Budget, estimate: &Estimate) -> Table {
         )
 }
 
-/// The sources that add anything worth naming, the largest first.
+/// The relevant sources, the largest first.
 fn shown<'a>(budget: &'a Budget, estimate: &Estimate) -> Vec<&'a BudgetPart> {
     let shares = |part| estimate.estimated().map(move |i| share(part, estimate, i));
     let parts = budget.parts.iter();
@@ -78,7 +78,7 @@ fn share(part: &BudgetPart, estimate: &Estimate, index: usize) -> f64 {
     part.covariance[(index, index)] / estimate.covariance[(index, index)]
 }
 
-/// The source of most of the variances of a group, with its share.
+/// The largest source of the variance of a group, with its share.
 pub fn largest(budget: &Budget, group: &[usize]) -> Option<String> {
     let sum = |part: &BudgetPart| group.iter().map(|&i| part.covariance[(i, i)]).sum::<f64>();
     let all: f64 = budget.parts.iter().map(sum).sum();
@@ -90,7 +90,7 @@ pub fn largest(budget: &Budget, group: &[usize]) -> Option<String> {
     (all > 0.0).then(|| format!("{} {percent:.0} %", part.source.name()))
 }
 
-/// Shares of every variance, one bar a parameter.
+/// Shares of every variance, one bar per parameter.
 pub fn figure(budget: &Budget, estimate: &Estimate) -> Plot {
     let parts = shown(budget, estimate);
     let own = &parts[..parts.len().min(SHOWN)];
@@ -142,7 +142,7 @@ pub fn figure(budget: &Budget, estimate: &Estimate) -> Plot {
     )
 }
 
-/// What σ do not hold: error terms that the record would not show and that change a group by more than its σ.
+/// Effects not included in σ: undetectable error terms that change a group by more than its σ.
 pub fn unseen(report: &Report, estimate: &Estimate) -> Option<String> {
     let claimed = estimate.sigma();
     let worst = |test: &ErrorTermTest| {
@@ -172,7 +172,7 @@ pub fn unseen(report: &Report, estimate: &Estimate) -> Option<String> {
         .then(|| format!("{named}: not visible in this recording, so not included in σ"))
 }
 
-/// What is in no sum: error terms that are not estimated.
+/// Effects not included in any sum: error terms that are not estimated.
 pub fn left_off(report: &Report, estimate: &Estimate) -> Table {
     let cell = |group: Group, of: &ParameterVector| {
         let spread = group.spread(of, &group.estimated(estimate));

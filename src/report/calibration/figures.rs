@@ -9,17 +9,17 @@ use crate::recording::{ImuSamples, TableLog};
 use crate::report::calibration::report::Report;
 use crate::report::prelude::*;
 
-/// Where the axis of estimates ends, in final σ: with the prior on it the end could not be read.
+/// End of the axis of estimates, in final σ; with the prior included, the final values would be unreadable.
 const EXTENT: f64 = 300.0;
 /// Beyond this an innovation is drawn at the edge.
 const EDGE: f64 = 6.0;
 /// Up to this many innovations are drawn as dots, more as a line through the extremes.
 const DOTS: usize = 150;
-/// Weaker correlations are not written out: they would only hide the strong ones.
+/// Weaker correlations are not written, because they would hide the strong ones.
 const WRITTEN: f64 = 0.2;
 
 impl Report<'_> {
-    /// Every figure that there is something to show in.
+    /// All figures with data.
     pub(super) fn figures(&self) -> Vec<Plot> {
         let mut plots = Vec::new();
         plots.extend(match (self.truth_vector(), self.methods().as_slice()) {
@@ -37,7 +37,7 @@ impl Report<'_> {
         plots
     }
 
-    /// The filter's result where it has one time: several recordings have each their own.
+    /// The filter result if it has a single time axis, which several recordings do not.
     pub(super) fn against_time(&self) -> Option<&Outcome> {
         self.outcome.filter(|outcome| outcome.alone.len() < 2)
     }
@@ -47,7 +47,7 @@ impl Report<'_> {
         Axis::linear("time, s").between(start, end)
     }
 
-    /// σ of each parameter against time, with the largest true error where the truth is known.
+    /// σ of each parameter against time, with the largest true error if the truth is known.
     pub(super) fn sigma(&self, outcome: &Outcome) -> Option<Plot> {
         let (history, form) = (&outcome.history, outcome.estimate.form());
         let truth = self.truth_vector();
@@ -175,7 +175,7 @@ impl Report<'_> {
         (!kinds.is_empty()).then(|| plot.caption(caption))
     }
 
-    /// A line across a turn would show what was not observed.
+    /// A line across a turn would suggest observations that do not exist.
     fn interrupted_by_turns(&self, points: &[(f64, f64)]) -> Vec<(f64, f64)> {
         let dwell = |t: f64| self.dwells.partition_point(|dwell| dwell.end < t);
         let pieces = points.chunk_by(|a, b| dwell(a.0) == dwell(b.0));
@@ -229,7 +229,7 @@ fn correlation(estimate: &Estimate) -> Option<Plot> {
     })
 }
 
-/// Magnitude of each parameter's error by each method, with the σ that it claims.
+/// Magnitude of the error of each parameter for each method, with its stated σ.
 fn errors(methods: &[(&str, &Estimate)], truth: &ParameterVector) -> Plot {
     let form = methods[0].1.form();
     let panel = |group: Group| {
@@ -271,9 +271,9 @@ fn method_mark(name: &str) -> (Mark, Color) {
     }
 }
 
-/// Nearer to the plumb line than this an axis has no azimuth worth drawing.
+/// Closer to the vertical than this, the azimuth of an axis is not drawn.
 const STEEP: f64 = 80.0 * DEGREE;
-/// Azimuth up to which a curve may run past ±180° before it continues at the other end, °.
+/// Azimuth up to which a curve may exceed ±180° before it wraps, °.
 const PAST: f64 = 190.0;
 
 /// Elevation and azimuth of the body axes from the table, and body rates from the gyros.
@@ -321,7 +321,7 @@ fn elevation(table: &TableLog, axis: usize) -> Series {
     Series::line(line.map(|(&t, attitude)| (t, axis_elevation(&matrix(attitude), axis) / DEGREE)))
 }
 
-/// Azimuth of a body axis clockwise from North in degrees, interrupted where it jumps and where it is steep.
+/// Azimuth of a body axis clockwise from North in degrees, interrupted at jumps and near the vertical.
 fn azimuth(table: &TableLog, axis: usize) -> Series {
     let gap = (f64::NAN, f64::NAN);
     let (mut last, mut line) = (f64::NAN, Vec::new());

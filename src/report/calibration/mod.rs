@@ -1,4 +1,4 @@
-//! The report of a calibration, and of both methods side by side.
+//! Report on a calibration, and comparison of both methods.
 
 mod brief;
 mod budget;
@@ -19,7 +19,7 @@ pub use super::navigation::Navigated;
 pub use report::{ClosedForm, Report};
 
 impl Report<'_> {
-    /// Everything that is said of the calibration. Its figures by name are in the calibration's own file.
+    /// The complete report on the calibration. Its named values are in the calibration file.
     pub fn document(&self) -> Document {
         let mut document = Document::new(self.title);
         document.verdict = self.verdict();
@@ -65,7 +65,7 @@ impl Report<'_> {
         document
     }
 
-    /// What ran on what.
+    /// Methods and data.
     fn lead(&self) -> Vec<String> {
         let imu = &self.run.recording.imu;
         let how = match self.table() {
@@ -101,7 +101,7 @@ impl Report<'_> {
 }
 
 impl Report<'_> {
-    /// Whether the calibration may be used, and how much of it was determined.
+    /// Whether the calibration can be used, and how many parameters were determined.
     pub(super) fn verdict(&self) -> Option<(Word, String)> {
         let word = Verdict::of(self.findings).word;
         let estimate = self.estimate()?;
@@ -121,7 +121,7 @@ impl Report<'_> {
     }
 }
 
-/// What was calibrated, by what its run says of it.
+/// The calibrated instrument, from the metadata of its run.
 pub(super) fn item(report: &Report) -> Facts {
     let meta = &report.run.recording.meta;
     let first = ["instrument", "serial", "date"];
@@ -132,7 +132,7 @@ pub(super) fn item(report: &Report) -> Facts {
     Facts::new("", rows)
 }
 
-/// What was recorded, where, and what was known before.
+/// Recording, site and prior.
 pub(super) fn run(report: &Report) -> Facts {
     let run = report.run;
     let (imu, site) = (&run.recording.imu, &run.site);

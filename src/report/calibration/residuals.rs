@@ -4,7 +4,7 @@ use super::tables::{ANGLE, FORCE, readable};
 use crate::calibration::{DwellResidual, Quality};
 use crate::report::prelude::*;
 
-/// Residuals of gravity's magnitude and direction against time; dwells that were left out of a fit as rings.
+/// Residuals of the magnitude and direction of gravity against time; dwells excluded from a fit as rings.
 pub fn figure(quality: &Quality) -> Plot {
     let panel = |name: &str, units, of: fn(&DwellResidual) -> Option<f64>| {
         let points = |dwells: &[DwellResidual]| -> Vec<Point> {

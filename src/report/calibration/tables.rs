@@ -1,4 +1,4 @@
-//! The tables, alike for terminal and page.
+//! The tables, the same for terminal and page.
 
 use super::super::terms;
 use super::super::terms::improvement;
@@ -7,11 +7,11 @@ use crate::calibration::{Estimate, Measures, Nis, Outcome, Quality, Spread, para
 use crate::recording::TableLog;
 use crate::report::prelude::*;
 
-/// How many of the directions that were observed are shown.
+/// Number of observed directions shown.
 const WEAKEST: usize = 3;
 
 impl Report<'_> {
-    /// Every parameter with its accuracy, and its error where the truth is known.
+    /// Every parameter with its accuracy, and its error if the truth is known.
     pub(super) fn parameters(&self, estimate: &Estimate) -> Table {
         let prior = self.outcome.map(|outcome| outcome.prior_sigma);
         let truth = self.truth_vector();
@@ -66,7 +66,7 @@ impl Report<'_> {
     }
 }
 
-/// The directions that the data observed least: all that were not observed, and some that were.
+/// The least observed directions: all unobserved ones and some observed ones.
 pub fn weakest(outcome: &Outcome) -> Table {
     let observability = &outcome.observability;
     let shown = observability.unobserved().count() + WEAKEST;
@@ -113,7 +113,7 @@ pub fn nis(outcome: &Outcome) -> Vec<String> {
     observed(outcome).map(shown).collect()
 }
 
-/// How the innovations agree with their covariance.
+/// Consistency of the innovations with their covariance.
 pub fn consistency(outcome: &Outcome) -> Table {
     let rows = observed(outcome).map(|(name, nis)| {
         let (low, high) = nis.interval;
@@ -136,7 +136,7 @@ pub fn consistency(outcome: &Outcome) -> Table {
     )
 }
 
-/// Residuals in dwells that were left out of the fit, in a line.
+/// Residuals in dwells excluded from the fit, on one line.
 pub fn cross_validation(report: &Report) -> Option<String> {
     let held_out = report.quality?.held_out.as_ref()?;
     let of = |name: &str, spread: &Spread, units: &[(&'static str, f64); 2]| {
@@ -152,7 +152,7 @@ pub fn cross_validation(report: &Report) -> Option<String> {
     (!parts.is_empty()).then(|| format!("{} ({} dwells)", parts.join("; "), held_out.gravity.count))
 }
 
-/// Each residual over the whole record and over what was held out; empty where there is nothing to measure.
+/// Each residual over the whole recording and over the excluded dwells; empty without data.
 pub fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
     let turns = match table {
         Some(_) => "attitude after a turn, gyros minus table",
@@ -194,7 +194,7 @@ pub fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
     }
 }
 
-/// The smallest unit in which a figure is below a thousand, else the largest.
+/// The smallest unit in which a value is below a thousand, otherwise the largest.
 pub fn readable(units: &[(&'static str, f64); 2], figure: f64) -> (&'static str, f64) {
     match figure < 1000.0 * units[0].1 {
         true => units[0],

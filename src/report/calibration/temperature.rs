@@ -1,4 +1,4 @@
-//! What changes with temperature, and what differs between recordings.
+//! Temperature dependence and differences between recordings.
 
 use crate::calibration::{
     Estimate, Outcome, ParameterMatrix, ParameterVector, SeparateEstimate, Thermal, parameter_name,
@@ -10,7 +10,7 @@ use crate::report::prelude::*;
 /// Points of a curve.
 const POINTS: usize = 81;
 
-/// Adds tables and figures, where anything changes or differs.
+/// Adds tables and figures, if anything changes or differs.
 pub fn add(document: &mut Document, outcome: &Outcome) {
     if let Some(thermal) = &outcome.thermal {
         document.both(orders(outcome, thermal));
@@ -26,7 +26,7 @@ pub fn add(document: &mut Document, outcome: &Outcome) {
     document.both(differences(outcome));
 }
 
-/// Change of all parameters from those at the reference, and σ of what they are then.
+/// Change of all parameters from those at the reference, and σ of the resulting values.
 fn there(
     outcome: &Outcome,
     thermal: &Thermal,
@@ -85,7 +85,7 @@ fn orders(outcome: &Outcome, thermal: &Thermal) -> Table {
         ))
 }
 
-/// What heating and cooling differ by.
+/// Differences between heating and cooling.
 fn hysteresis(outcome: &Outcome, thermal: &Thermal) -> Table {
     let form = outcome.estimate.form();
     let rows = thermal.coefficients.iter().enumerate();
@@ -109,7 +109,7 @@ fn hysteresis(outcome: &Outcome, thermal: &Thermal) -> Table {
     .section(rows)
 }
 
-/// Every parameter against temperature, with what each recording alone says.
+/// Every parameter against temperature, with the estimate of each recording alone.
 fn curves(outcome: &Outcome, thermal: &Thermal) -> Plot {
     let form = outcome.estimate.form();
     let reference = outcome.estimate.vector();
@@ -159,7 +159,7 @@ fn own_temperature(alone: &SeparateEstimate, index: usize) -> Option<f64> {
     Some(axes.iter().sum::<f64>() / 3.0)
 }
 
-/// What each recording alone says less the curve.
+/// Estimate of each recording alone minus the curve.
 fn departures(outcome: &Outcome, thermal: &Thermal) -> Plot {
     let form = outcome.estimate.form();
     let panel = |group: Group| {
@@ -224,7 +224,7 @@ fn residuals(outcome: &Outcome) -> Plot {
     )
 }
 
-/// Each recording with its temperature and how far it alone is from all together.
+/// Each recording with its temperature and its distance from the joint estimate.
 fn recordings(outcome: &Outcome) -> Table {
     if outcome.alone.len() < 2 {
         return Table::default();
@@ -254,7 +254,7 @@ fn recordings(outcome: &Outcome) -> Table {
     )
 }
 
-/// By how much parameters differ between recordings: repeatability.
+/// Differences of parameters between recordings (repeatability).
 fn differences(outcome: &Outcome) -> Table {
     let form = outcome.estimate.form();
     let rows = outcome.repeatability();

@@ -1,4 +1,4 @@
-//! A calibration certificate in words: a document, and what stands on every page of it.
+//! A calibration certificate: a document, and the content of every page margin.
 
 mod results;
 
@@ -17,10 +17,9 @@ use crate::imu::ParameterKind;
 use crate::report::prelude::*;
 use crate::run::Aiding;
 
-/// A certificate's files: PDF, XML and the calibration, which are in the PDF, too.
+/// Files of a certificate: PDF, XML and the calibration; the latter two are also embedded in the PDF.
 ///
-/// # Errors
-/// [`PdfError`] where a text cannot be shown.
+/// # Errors [`PdfError`] if a text cannot be shown.
 pub fn files(
     certificate: &Certificate,
     calibration: Vec<u8>,
@@ -70,7 +69,7 @@ fn frame(certificate: &Certificate) -> Frame {
     }
 }
 
-/// Everything that it says, in the order of ISO/IEC 17025, 7.8.2 and 7.8.4.
+/// The complete content, in the order of ISO/IEC 17025, 7.8.2 and 7.8.4.
 pub fn document(certificate: &Certificate) -> Document {
     let laboratory = &certificate.laboratory;
     let (issue, item) = (&laboratory.certificate, &laboratory.item);
@@ -249,7 +248,7 @@ fn verdict(conformity: &Conformity) -> String {
     text
 }
 
-/// A probability, as small as matters.
+/// A probability, down to the smallest relevant value.
 fn probability(of: f64) -> String {
     match of < 1e-6 {
         true => "below 0.0001 %".to_owned(),
@@ -314,7 +313,7 @@ fn found(as_found: &AsFound) -> Table {
     ))
 }
 
-/// Who authorises the certificate, with room for date and signature.
+/// Authorising person, with space for date and signature.
 fn signature(certificate: &Certificate) -> Facts {
     let Authorised { name, function } = &certificate.laboratory.authorised;
     let mut facts = Facts::new("Authorisation", [("name", format!("{name}, {function}"))]);

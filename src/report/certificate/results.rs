@@ -18,7 +18,7 @@ pub fn name(measured: &str) -> String {
     name.replace(['.', '_'], " ")
 }
 
-/// Every parameter with its expanded uncertainty, and what both are.
+/// Every parameter with its expanded uncertainty, and their definitions.
 pub fn results(certificate: &Certificate) -> Table {
     let has_budget = certificate.calibration.budget.is_some();
     let row = |of: &Measured| {
@@ -94,7 +94,7 @@ fn nominal(certificate: &Certificate, sensor: Sensor, input: &str) -> String {
     format!("{} {unit}{per} for 1 {input}", of.join(", "))
 }
 
-/// What the error terms that have results add to the model's input.
+/// Input added to the model by the error terms with results.
 fn of_terms(certificate: &Certificate) -> String {
     let has = |term: &Term| {
         let mut all = certificate.terms.iter();

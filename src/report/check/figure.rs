@@ -1,4 +1,4 @@
-//! The record: what the gyros and accelerometers say against time, with dwells, turns and faults.
+//! The recording: gyro and accelerometer output against time, with dwells, turns and faults.
 
 use super::super::calibration::figures::samples;
 use super::words;

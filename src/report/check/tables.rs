@@ -52,7 +52,7 @@ pub fn columns_of_log(run: &Run) -> impl Iterator<Item = (Sensor, char, &ColumnF
     })
 }
 
-/// A whole number as it is, others to four digits.
+/// A whole number unchanged, others to four digits.
 fn exactly(x: f64) -> String {
     if x.fract() == 0.0 {
         whole(x)
@@ -103,7 +103,7 @@ pub fn faults(run: &Run) -> Table {
     }
 }
 
-/// The file's column in which a fault is; `None` if it is in whole rows.
+/// The file column of a fault; `None` if whole rows are affected.
 pub fn column_of<'r>(run: &'r Run, fault: &Fault) -> Option<&'r str> {
     let (sensor, axis) = fault.axis?;
     Some(&run.recording.imu.log.as_ref()?.columns.get(sensor)[axis].name)

@@ -1,4 +1,4 @@
-//! What has to be said of a run before it is calibrated.
+//! Findings about a run before calibration.
 
 use crate::calibration::Contradiction;
 use crate::imu::{AXES, Sensor};
@@ -7,23 +7,23 @@ use crate::run::motion::{LabelCheck, Rest, Turn};
 use crate::run::{LONG_ENOUGH, Run};
 use crate::survey::{APART, Survey};
 
-/// Specific force at rest further from gravity than this part of it has a wrong unit or scale.
+/// Specific force at rest that differs from gravity by more than this fraction indicates a wrong unit or scale.
 const WRONG_FORCE: f64 = 0.15;
-/// Turns and directions further off than this have a wrong unit, sign or axis, rad …
+/// Turns and directions with larger errors indicate a wrong unit, sign or axis, rad …
 const WRONG_ANGLE: f64 = 5.0 * DEGREE;
-/// … where that is more than this part of the turn.
+/// … if larger than this fraction of the turn.
 const WRONG_PART: f64 = 0.1;
-/// A turn of at least this much about a body axis shows its gyro's scale, rad.
+/// Smallest turn about a body axis that determines the scale factor of its gyro, rad.
 const WORTH: f64 = 60.0 * DEGREE;
-/// Parameters of the accelerometers without a table: as many directions of up are needed.
+/// Number of accelerometer parameters without a table, and of upward directions needed.
 const DIRECTIONS: usize = 9;
-/// An instrument whose temperature spans less, K, has soaked.
+/// Temperature span below which an instrument counts as soaked, K.
 const SOAKED: f64 = 1.0;
 const MICROSECOND: f64 = 1e-6;
-/// Largest number of places that are named; beyond it only their number is given.
+/// Maximum number of places named; beyond it, only their number is given.
 const NAMED: usize = 4;
 
-/// A degree sign behind a number.
+/// A degree sign after a number.
 pub fn degrees(angle: f64) -> String {
     value(angle / DEGREE, 1.0)
 }
@@ -33,7 +33,7 @@ pub fn way_up(axis: usize, down: bool) -> String {
     format!("{} {}", AXES[axis], if down { "down" } else { "up" })
 }
 
-/// Such as `x +360.0°`; about several axes only how far.
+/// Such as `x +360.0°`; for a turn about several axes, only the angle.
 pub fn turn(turn: &Turn) -> String {
     match turn.body_axis() {
         Some(axis) => format!("{} {}°", AXES[axis], signed(turn.angle)),
@@ -42,7 +42,7 @@ pub fn turn(turn: &Turn) -> String {
     }
 }
 
-/// Components of a turn's axis.
+/// Components of the axis of a turn.
 pub fn direction(turn: &Turn) -> String {
     let parts: Vec<String> = turn.axis.iter().map(|&part| value(part, 0.1)).collect();
     format!("({})", parts.join(", "))
@@ -85,7 +85,7 @@ pub fn log(run: &Run, survey: &Survey) -> String {
     text
 }
 
-/// How fast the instrument warms or cools, and whether it has soaked.
+/// Temperature rate of the instrument, and whether it has soaked.
 fn warming(run: &Run) -> String {
     let imu = &run.recording.imu;
     let Some(temperature) = &imu.temperature else {
@@ -111,7 +111,7 @@ fn warming(run: &Run) -> String {
     )
 }
 
-/// What to look at and what to change, a sentence or two each.
+/// Findings and recommended changes, one or two sentences each.
 pub fn findings(run: &Run, survey: &Survey) -> Vec<String> {
     let mut findings = [&run.recording.doubts[..], &run.recording.notes].concat();
     findings.extend(survey.contradiction.iter().map(of_contradiction));
@@ -122,7 +122,7 @@ pub fn findings(run: &Run, survey: &Survey) -> Vec<String> {
     findings
 }
 
-/// What the methods refuse, in a sentence.
+/// A contradiction that makes the methods fail, in a sentence.
 fn of_contradiction(contradiction: &Contradiction) -> String {
     capital(&contradiction.to_string())
 }
@@ -179,7 +179,7 @@ fn of_units(run: &Run, survey: &Survey) -> Vec<String> {
     findings
 }
 
-/// Places of those of which something is true.
+/// Indices of the elements with a property.
 fn places<T>(all: &[T], which: impl Fn(&T) -> bool) -> Vec<usize> {
     (0..all.len()).filter(|&place| which(&all[place])).collect()
 }
@@ -195,7 +195,7 @@ fn dwells(places: &[usize]) -> String {
     }
 }
 
-/// What a label and the record disagree in.
+/// Disagreement between a label and the recording.
 pub fn of_label(check: &LabelCheck) -> Option<String> {
     let said = check.disagreement.as_ref()?;
     let at = value(check.segment.start, 1.0);
@@ -205,7 +205,7 @@ pub fn of_label(check: &LabelCheck) -> Option<String> {
     ))
 }
 
-/// What positions and turns lack.
+/// Missing positions and turns.
 fn of_motion(survey: &Survey) -> Vec<String> {
     let mut findings = Vec::new();
     if survey.rests.len() < 2 {
@@ -239,7 +239,7 @@ fn of_motion(survey: &Survey) -> Vec<String> {
     findings
 }
 
-/// Parameters that no method could see.
+/// Parameters that no method could observe.
 fn of_methods(survey: &Survey) -> Vec<String> {
     let methods = survey.methods.iter();
     let expected: Vec<_> = methods

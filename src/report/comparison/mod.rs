@@ -1,4 +1,4 @@
-//! The report of calibrations side by side.
+//! Report on a comparison of calibrations.
 
 use crate::calibration::result::TermRecord;
 use crate::calibration::{
@@ -9,10 +9,10 @@ use crate::imu::{InstallationForm, Sensor};
 use crate::report::prelude::*;
 use crate::report::terms::unit;
 
-/// Beyond this many σ a difference is flagged.
+/// Differences beyond this many σ are flagged.
 const FLAGGED: f64 = 3.0;
 
-/// Everything that is said of a comparison.
+/// The complete report on a comparison.
 pub fn document(comparison: &Comparison) -> Document {
     let mut document = Document::new("Comparison of calibrations");
     let reference = match comparison.against_truth {
@@ -55,7 +55,7 @@ fn by_triad(rows: impl Fn(Group) -> Vec<Vec<String>>) -> [Vec<Vec<String>>; 2] {
     })
 }
 
-/// The reference's and for each calibration two columns.
+/// A column for the reference and two for each calibration.
 fn beside_reference(comparison: &Comparison) -> Vec<String> {
     let mut columns = cells!["", comparison.reference.name.as_str(), "unit"];
     for side in &comparison.sides {
@@ -106,7 +106,7 @@ fn parameters(comparison: &Comparison) -> Table {
     }
 }
 
-/// The smallest σ that any calibration claims for some parameters: what is finer means nothing.
+/// The smallest σ that any calibration states for some parameters; finer digits are meaningless.
 fn finest(comparison: &Comparison, indices: &[usize]) -> Option<f64> {
     comparison
         .calibrations()
@@ -116,7 +116,7 @@ fn finest(comparison: &Comparison, indices: &[usize]) -> Option<f64> {
         .reduce(f64::min)
 }
 
-/// The reference's own value; scale factors in the file's quantity where nothing states what they should be.
+/// The value of the reference; scale factors in the quantity of the file if no nominal value is stated.
 fn reference_value(comparison: &Comparison, index: usize) -> String {
     let own = comparison.reference.sigma().map(|s| s[index]);
     let (departure, scale) = (comparison.departure(index), comparison.scale_factor(index));
@@ -134,7 +134,7 @@ fn reference_value(comparison: &Comparison, index: usize) -> String {
     }
 }
 
-/// A number in a unit with its own σ, else with the digits of the finest.
+/// A number in a unit with its σ, otherwise with the digits of the finest.
 fn with_sigma(of: f64, own: Option<f64>, finest: Option<f64>, unit: f64) -> String {
     match (own.filter(|own| *own > 0.0), finest) {
         (Some(own), _) => plus_minus(of / unit, own / unit),
@@ -181,7 +181,7 @@ fn nees(nees: Option<Nees>) -> [String; 3] {
     })
 }
 
-/// Auxiliary parameters that any calibration has.
+/// Auxiliary parameters of any calibration.
 fn auxiliary(comparison: &Comparison) -> Table {
     fn of<'a>(calibration: &'a Canonical, name: &str) -> Option<&'a TermRecord> {
         calibration.constants.get(name)
@@ -216,7 +216,7 @@ fn auxiliary(comparison: &Comparison) -> Table {
         )
 }
 
-/// From three calibrations on.
+/// For three or more calibrations.
 fn scatter(comparison: &Comparison) -> Table {
     let table = Table::new(
         "Scatter",
@@ -310,7 +310,7 @@ fn name(index: usize) -> String {
     parameter_name(InstallationForm::General, index).unwrap_or_default()
 }
 
-/// Of a group's differences.
+/// Statistics of the differences of a group.
 fn spread(comparison: &Comparison, group: Group, side: &Side) -> Value {
     let indices = group.among(&comparison.parameters);
     let of = |v: &ParameterVector| group.spread(v, &indices);
@@ -323,7 +323,7 @@ fn spread(comparison: &Comparison, group: Group, side: &Side) -> Value {
     })
 }
 
-/// The reference's value is in the file's quantity for scale factors, in the group's unit for others.
+/// The value of the reference is in the quantity of the file for scale factors, otherwise in the unit of the group.
 fn parameter(comparison: &Comparison, index: usize) -> Value {
     let group = Group::of(index);
     let unit = group.unit_value();
@@ -348,7 +348,7 @@ fn chi2(of: ChiSquare) -> Value {
     json!({ "chi2": of.value, "degrees_of_freedom": of.freedom, "p": of.p })
 }
 
-/// Calibrations that reach this many times further than others make an axis logarithmic.
+/// The axis is logarithmic if the ranges of calibrations differ by more than this factor.
 const APART: f64 = 20.0;
 
 pub(super) fn figure(comparison: &Comparison) -> Plot {
@@ -393,13 +393,13 @@ fn panel(comparison: &Comparison, group: Group) -> Panel {
     .with_all(series)
 }
 
-/// How far points reach from zero with their σ.
+/// Largest distance of points from zero, including σ.
 fn reach(points: &[Point]) -> f64 {
     let reaches = points.iter().map(|(off, sigma)| off.abs() + sigma);
     reaches.fold(0.0, f64::max)
 }
 
-/// The axis of calibrations that reach as far as this, and what its title says of it.
+/// The axis for calibrations with these ranges, and its title.
 fn axis(reaches: impl Iterator<Item = f64>) -> (Axis, &'static str) {
     let (least, most) = positive_range(reaches);
     match most > APART * least {

@@ -7,9 +7,9 @@ use crate::report::prelude::*;
 use crate::study::Experiment;
 use crate::study::experiment::{Estimator, Navigated, Situation, Worth};
 
-/// Half the height of a box, in places of the axis.
+/// Half the height of a box, in axis positions.
 const HALF: f64 = 0.2;
-/// Below this nothing is worth a place on the axis of time, nmile.
+/// Lower end of the error axis against time, nmile.
 const LEAST: f64 = 0.01;
 
 pub fn figures(experiment: &Experiment) -> [Plot; 3] {
@@ -128,14 +128,14 @@ fn against_time(experiment: &Experiment) -> Plot {
     )
 }
 
-/// Hours against nmile; the start, where there is no error, has no place on a logarithmic axis.
+/// Hours against nmile, without the start, where the error is zero and the axis is logarithmic.
 fn course(worth: &Worth) -> Vec<Point> {
     let points = worth.against_time.iter();
     let points = points.map(|&(time, metres)| (time / HOUR, miles(metres)));
     points.filter(|point| point.0 > 0.0).collect()
 }
 
-/// Which group of parameters makes how much of the position error.
+/// Contribution of each parameter group to the position error.
 fn budget(experiment: &Experiment) -> Plot {
     let names = Estimator::ALL.map(|estimator| estimator_name(experiment, estimator));
     let shown = experiment
@@ -179,7 +179,7 @@ fn budget(experiment: &Experiment) -> Plot {
     ))
 }
 
-/// The height of a bar above it.
+/// The bar height, above the bar.
 fn height_in_words(top: Point) -> Series {
     // Three digits of a small number would not fit above its bar.
     let number = if top.1 < 1.0 {
@@ -190,7 +190,7 @@ fn height_in_words(top: Point) -> Series {
     Series::words(top, Anchor::Above, number)
 }
 
-/// Of each group alone, of all as claimed and as they were, nmile.
+/// Each group alone, all together as stated, and actual, nmile.
 fn heights(worth: &Worth) -> Vec<f64> {
     let budget = &worth.budget;
     let alone = budget.parts.iter().map(|part| part.alone);

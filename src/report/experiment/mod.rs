@@ -1,4 +1,4 @@
-//! The report of the turntable experiment.
+//! Report on the turntable experiment.
 
 mod figures;
 mod tables;
@@ -14,7 +14,7 @@ use crate::study::experiment::{
     ALIGNMENT_TIME, Budget, Estimator, Method, Situation, Spread, Worth,
 };
 
-/// Everything that is said of the experiment.
+/// The complete report on the experiment.
 pub fn document(experiment: &Experiment) -> Document {
     let instruments = count(experiment.trials.len());
     let title = format!("The turntable experiment with {instruments} simulated instruments");
@@ -121,7 +121,7 @@ fn spread(metres: &Spread) -> Value {
     })
 }
 
-/// Intervals are of 99 %, by bootstrap over instruments.
+/// Intervals are 99 %, by bootstrap over instruments.
 fn method(experiment: &Experiment, place: usize, worth: &Worth) -> Value {
     let calibrations = || {
         experiment
@@ -162,7 +162,7 @@ fn method(experiment: &Experiment, place: usize, worth: &Worth) -> Value {
     })
 }
 
-/// What is compared with the closed form: in equal time stationary, in a sixth of it moving.
+/// Filter compared with the closed form: equal time if stationary, a sixth of it if moving.
 const COMPARED: [(Situation, Estimator); 4] = [
     (Situation::SelfAligned, Estimator::LongFilter),
     (Situation::SelfAligned, Estimator::Filter),
@@ -170,7 +170,7 @@ const COMPARED: [(Situation, Estimator); 4] = [
     (Situation::Moving, Estimator::Filter),
 ];
 
-/// Says what is better, what makes most of the error, and which calibrations failed.
+/// Reports the better method, the largest error contribution, and failed calibrations.
 pub(super) fn say(document: &mut Document, experiment: &Experiment) {
     for text in failures(experiment) {
         document.say(false, text);
@@ -240,7 +240,7 @@ fn limit(experiment: &Experiment, situation: Situation) -> Option<String> {
     ))
 }
 
-/// Calibrations that failed, did not converge, or whose data reject the form.
+/// Calibrations that failed, did not converge, or have data that reject the form.
 fn failures(experiment: &Experiment) -> Vec<String> {
     let trials = &experiment.trials;
     let mut sentences = Vec::new();

@@ -1,4 +1,4 @@
-//! The tables, alike for terminal and page.
+//! The tables, the same for terminal and page.
 
 use crate::calibration::Group;
 use crate::imu::{InstallationForm, Sensor};
@@ -7,7 +7,7 @@ use crate::study::Experiment;
 use crate::study::experiment::{Estimator, Method, Navigated, Situation, Worth};
 use crate::study::navigation::INTERVAL;
 
-/// The paper's position errors by one triad's errors after 40 h, nmile (Zhao, Jiang, Li 2016, §3.3, Figure 10).
+/// Position errors in the paper due to one triad after 40 h, nmile (Zhao, Jiang, Li 2016, §3.3, Figure 10).
 pub const PAPER: [(Sensor, InstallationForm, f64); 4] = [
     (Sensor::Gyro, InstallationForm::SixAngle, 6.10),
     (Sensor::Accel, InstallationForm::SixAngle, 4.16),
@@ -179,7 +179,7 @@ pub fn method_kind(estimator: Estimator) -> &'static str {
     }
 }
 
-/// Such as `EKF 10 min`, to the minute: the facts hold the rest.
+/// Such as `EKF 10 min`, to the minute; the facts give the exact value.
 pub fn estimator_name(experiment: &Experiment, estimator: Estimator) -> String {
     let time = timed(experiment).find(|(method, _)| method.estimator == estimator);
     let minutes = time.map_or(f64::NAN, |(_, time)| time / 60.0);
@@ -198,7 +198,7 @@ pub fn miles(metres: f64) -> f64 {
     metres / NAUTICAL_MILE
 }
 
-/// What a method is worth in the general form.
+/// Error budget of a method in the general form.
 pub fn in_general(navigated: &Navigated, estimator: Estimator) -> Option<&Worth> {
     let general = Method {
         estimator,

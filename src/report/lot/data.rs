@@ -1,4 +1,4 @@
-//! The figures of a lot by name; the unit of each is in its `unit`.
+//! Named values of a lot; `unit` states the unit of each.
 
 use crate::lot::{
     Against, Check, FALSE_ALARM, FALSE_TREND, Lot, Quantity, Row, Sample, Statistics, Verdict,
@@ -20,7 +20,7 @@ pub fn data(lot: &Lot) -> Value {
     })
 }
 
-/// The limits that are not kept for certain, by unit and parameter.
+/// Limits exceeded or undecided, by unit and parameter.
 fn reasons(lot: &Lot) -> Vec<String> {
     let of_row = |row: &Row| {
         let open = row
@@ -107,7 +107,7 @@ const HEADER: [&str; 9] = [
     "unit", "serial", "date", "quantity", "unit_of_value", "value", "sigma", "apart", "verdict",
 ];
 
-/// As CSV. A unit without a calibration has one row without values.
+/// The lot as CSV. A unit without a calibration has one row without values.
 pub fn csv(lot: &Lot) -> String {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let mut write = |cells: &[String]| {

@@ -1,4 +1,4 @@
-//! Figures of a lot: every unit's values with their σ, the mean, the limits.
+//! Figures of a lot: values of every unit with σ, mean and limits.
 
 use super::shown::{shown, together};
 use crate::lot::{Lot, Quantity, Sample};
@@ -28,7 +28,7 @@ pub fn noise(lot: &Lot) -> Plot {
     )
 }
 
-/// Series for each quantity: bars and marks, crosses where a unit is apart.
+/// Series for each quantity: bars and marks, with crosses for outliers.
 fn panel(lot: &Lot, title: &str, quantities: &[Quantity], names: &[String]) -> Panel {
     let of_quantity = |(n, (&quantity, name)): (usize, (&Quantity, &String))| {
         let shift = beside(n, quantities.len(), 0.7);
@@ -49,7 +49,7 @@ fn panel(lot: &Lot, title: &str, quantities: &[Quantity], names: &[String]) -> P
     Panel::new(title, units, Axis::linear("").room(0.05, 0.05)).with_all(series)
 }
 
-/// Limits that all parameters of a group share.
+/// Limits common to all parameters of a group.
 fn limits(lot: &Lot, quantities: &[Quantity]) -> Vec<f64> {
     let Some(specification) = &lot.specification else {
         return Vec::new();

@@ -1,4 +1,4 @@
-//! The report of a lot: every parameter of every unit, mean and spread, limits, outliers, trends.
+//! Report on a lot: every parameter of every unit, mean and spread, limits, outliers, trends.
 
 mod data;
 mod figures;
@@ -15,7 +15,7 @@ use crate::imu::AXES;
 use crate::lot::{FALSE_ALARM, FALSE_TREND, Lot, Row, Verdict};
 use crate::report::prelude::*;
 
-/// Everything that is said of a lot.
+/// The complete report on a lot.
 pub fn document(lot: &Lot) -> Document {
     let mut document = Document::new(match &lot.rows[..] {
         [row] => row.unit.name.clone(),
@@ -146,7 +146,7 @@ fn outliers(lot: &Lot) -> Vec<Sentence> {
     }
 }
 
-/// Units of one type have one nominal scale: who states another is named, where most state the same.
+/// Units of one type have one nominal scale; units with a different one are named if most state the same.
 fn nominal(lot: &Lot) -> Vec<Sentence> {
     let stated = lot.rows.iter().filter(|row| row.unit.calibrated.is_ok());
     let other = |row: &Row| {
@@ -168,7 +168,7 @@ fn nominal(lot: &Lot) -> Vec<Sentence> {
     }
 }
 
-/// What the units' own calibrations warn of, by kind.
+/// Findings of the unit calibrations, by kind.
 fn findings(lot: &Lot) -> Vec<Sentence> {
     let mut kinds: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
     let calibrated = lot.rows.iter().filter_map(|row| {

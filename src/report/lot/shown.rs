@@ -1,4 +1,4 @@
-//! How quantities of a lot are spoken of.
+//! Names and units of the quantities of a lot.
 
 use crate::calibration::Word;
 use crate::imu::{AXES, InstallationForm, Sensor};
@@ -65,7 +65,7 @@ pub fn spread_symbol(quantity: Quantity) -> &'static str {
     }
 }
 
-/// A value with its σ, or with three digits where it has none.
+/// A value with its σ, or with three digits without σ.
 pub fn with_sigma((of, own): (f64, f64)) -> String {
     match own > 0.0 {
         true => plus_minus(of, own),
@@ -97,7 +97,7 @@ pub fn chance(p: f64) -> String {
     }
 }
 
-/// A spread with its own σ, or what it stays below.
+/// A spread with its σ, or its upper limit.
 pub fn spread(quantity: Quantity, of: &Spread) -> String {
     let shown = |x: f64| shown_spread(quantity, x);
     match of.sigma {
@@ -108,8 +108,7 @@ pub fn spread(quantity: Quantity, of: &Spread) -> String {
     }
 }
 
-/// Quantities that are shown together: the heading, the name of each, and which they are. First the groups of
-/// parameters, then the noise of each triad.
+/// Quantities shown together: heading, names and quantities. First the parameter groups, then the noise of each triad.
 pub fn together(lot: &Lot) -> Vec<(String, Vec<String>, Vec<Quantity>)> {
     let those = |is: &dyn Fn(Quantity) -> bool| -> Vec<Quantity> {
         let all = lot.statistics.iter().map(|of| of.quantity);
@@ -133,7 +132,7 @@ pub fn together(lot: &Lot) -> Vec<(String, Vec<String>, Vec<Quantity>)> {
     groups.chain(noises).collect()
 }
 
-/// Of all limits of all units, how many are exceeded, kept or neither for certain.
+/// Number of limits over all units that are exceeded, met or undecided.
 pub fn verdict(lot: &Lot) -> Option<(Word, String)> {
     let specification = lot.specification.as_ref()?;
     let all = || lot.rows.iter().flat_map(|row| &row.checks);

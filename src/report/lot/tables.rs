@@ -7,7 +7,7 @@ use crate::imu::Sensor;
 use crate::lot::{Calibrated, Check, FALSE_ALARM, Lot, Quantity, Row, Sample, Statistics, Verdict};
 use crate::report::prelude::*;
 
-/// One row a unit.
+/// One row per unit.
 pub fn units(lot: &Lot) -> Table {
     let mut columns = cells!["unit", "serial", "date"];
     if lot.specification.is_some() {
@@ -143,7 +143,7 @@ fn row(of: &Statistics) -> Vec<String> {
     ]
 }
 
-/// χ²/n, whose size means nothing where it is far beyond chance.
+/// χ²/n, whose exact size is not meaningful far beyond chance.
 fn ratio(of: f64) -> String {
     const FAR: f64 = 1000.0;
     match of > FAR {
@@ -152,7 +152,7 @@ fn ratio(of: f64) -> String {
     }
 }
 
-/// Every parameter of every unit, a table for each group, and one of noise for each triad.
+/// Every parameter of every unit, one table per group, and one of noise per triad.
 pub fn values(lot: &Lot) -> Vec<Table> {
     let tables = together(lot).into_iter();
     let tables = tables.filter(|(.., quantities)| !quantities.is_empty());
@@ -178,7 +178,7 @@ pub fn values(lot: &Lot) -> Vec<Table> {
     tables.map(table).collect()
 }
 
-/// Limits that are not kept, or of which that cannot be said.
+/// Limits that are exceeded or undecided.
 pub fn undecided(lot: &Lot) -> Table {
     let row = |row: &Row, check: &Check| {
         let quantity = check.quantity();

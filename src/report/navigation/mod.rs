@@ -1,5 +1,5 @@
-//! The report of a navigation: errors with their predicted σ as table, as figures against time in the manner of
-//! the paper's Figures 2 to 10, minute by minute as CSV, and hour by hour as JSON.
+//! Report on a navigation: errors with predicted σ as a table, as figures against time like Figures 2 to 10 of the
+//! paper, per minute as CSV, and per hour as JSON.
 
 mod outlook;
 mod quantity;
@@ -17,27 +17,27 @@ use quantity::Quantity;
 pub use outlook::{Flown, Navigated, add_missions};
 pub(super) use outlook::{add, line};
 
-/// Hours over which the paper gives the drift of position.
+/// Hours over which the paper states the position drift.
 const PAPER_HOURS: f64 = 40.0;
 
-/// A navigation with what it was made of.
+/// A navigation with its input.
 #[derive(Debug, Clone, Copy)]
 pub struct Navigation<'a> {
     /// Name of the calibration.
     pub calibration: &'a str,
     /// Name of the truth.
     pub truth: &'a str,
-    /// False if the calibration says that its method did not converge.
+    /// False if the calibration states that its method did not converge.
     pub converged: bool,
     /// Whether one of the two has error terms in addition to K, E and D, which navigation does not use.
     pub terms: bool,
-    /// What fixes the body axes.
+    /// Definition of the body axes.
     pub body_frame: BodyFrame,
-    /// The triad whose errors were navigated with; `None` for both.
+    /// The triad whose errors were included; `None` for both.
     pub only: Option<Sensor>,
-    /// How the body moved, and how long.
+    /// Motion of the body and its duration.
     pub mission: &'a Mission,
-    /// How the instrument warmed up meanwhile, if it did, and whether the calibration follows that.
+    /// Warm-up of the instrument, if any, and whether the calibration includes temperature.
     pub warming: Option<(&'a Warming, bool)>,
     /// Name of the trajectory, if it moved.
     pub trajectory: Option<&'a str>,
@@ -46,7 +46,7 @@ pub struct Navigation<'a> {
 }
 
 impl Navigation<'_> {
-    /// Everything that is said of the navigation.
+    /// The complete report on the navigation.
     pub fn document(&self) -> Document {
         let (calibration, truth) = (self.calibration, self.truth);
         let title = format!("Navigation error of {calibration} against {truth}");
@@ -131,7 +131,7 @@ impl Navigation<'_> {
         warnings
     }
 
-    /// Position error at the end over the time, nmile/h.
+    /// Position error at the end divided by time, nmile/h.
     fn drift(&self) -> Option<f64> {
         let last = self.moments.last().filter(|last| last.time > 0.0)?;
         Some(last.error?.horizontal_position() / NAUTICAL_MILE / (last.time / HOUR))
@@ -196,7 +196,7 @@ impl Navigation<'_> {
         })
     }
 
-    /// A row a minute: time, errors, predicted σ where there is one.
+    /// One row per minute: time, errors, and predicted σ if available.
     fn csv(&self) -> String {
         let with_sigma = self.moments.iter().all(|m| m.sigma.is_some());
         let keys = Quantity::ALL.map(|quantity| quantity.key);

@@ -1,5 +1,4 @@
-//! What the calibrations of one run are worth: their navigation errors side by side, or where the truth is not
-//! known their predicted σ alone.
+//! Navigation errors of the calibrations of one run, or only their predicted σ if the truth is unknown.
 
 use super::quantity::Quantity;
 use crate::report::prelude::*;
@@ -7,27 +6,27 @@ use crate::study::navigation::{NavigationStudyError, Outlook};
 
 const HEADING: &str = "Navigation with this calibration";
 
-/// The navigation errors that one method's calibration leads to, stationary and level at the run's site.
+/// Navigation errors with the calibration of one method, stationary and level at the site of the run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Navigated {
     /// `EKF` or `closed form`.
     pub method: &'static str,
-    /// The errors, as far as they are known.
+    /// The errors, if known.
     pub outlook: Vec<Outlook>,
 }
 
 /// One way of navigating by several calibrations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flown {
-    /// How the body moved, such as `stationary and level`.
+    /// Motion of the body, such as `stationary and level`.
     pub how: &'static str,
-    /// What it shows, in a sentence.
+    /// Its conclusion, in a sentence.
     pub shows: &'static str,
-    /// The end of it by each calibration, in the order of the methods.
+    /// The final state with each calibration, in the order of the methods.
     pub ends: Vec<Outlook>,
 }
 
-/// Adds position errors at the end of each mission by each method, a row for each mission.
+/// Adds position errors at the end of each mission for each method, one row per mission.
 pub fn add_missions(document: &mut Document, methods: &[String], missions: &[Flown]) {
     let [.., horizontal] = Quantity::ALL;
     let of_missions = missions.iter().flat_map(|flown| [flown.how, "σ"]);

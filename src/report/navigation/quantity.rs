@@ -1,4 +1,4 @@
-//! What is reported of a navigation error, and in which unit.
+//! Reported components of a navigation error, with units.
 
 use nalgebra::SVector;
 
@@ -6,10 +6,10 @@ use crate::navigation::error_model::STATES;
 use crate::report::prelude::*;
 use crate::study::navigation::Outlook;
 
-/// Lines this many times apart share an axis that is logarithmic.
+/// Lines that differ by more than this factor share a logarithmic axis.
 const APART: f64 = 20.0;
 
-/// Units of one kind with their size in SI, the usual one first.
+/// Units of one kind with their SI value, the usual one first.
 type Units = &'static [(&'static str, f64)];
 const ANGLES: Units = &[("°", DEGREE), ("″", ARCSEC)];
 const SPEEDS: Units = &[("m/s", 1.0), ("cm/s", 0.01), ("mm/s", 0.001)];
@@ -22,9 +22,9 @@ pub struct Quantity {
     pub name: &'static str,
     /// Its name in documents, with its unit.
     pub key: &'static str,
-    /// Place in [`Outlook::sigma`]; of a horizontal length that of its first component.
+    /// Index in [`Outlook::sigma`]; for a horizontal length, that of its first component.
     place: usize,
-    /// Whether it has a sign, and a normal distribution where parameters have one.
+    /// Whether it is signed, with a normal distribution if parameters have one.
     pub is_component: bool,
     units: Units,
 }
@@ -69,8 +69,7 @@ impl Quantity {
         self.units[0].1
     }
 
-    /// A unit in which values up to this one, in the usual unit, have few zeros; and how many of it
-    /// make the usual unit.
+    /// A convenient unit for values up to this one (in the usual unit), and its ratio to the usual unit.
     pub fn readable_unit(self, largest: f64) -> (&'static str, f64) {
         let size = largest * self.unit_value();
         let fits = self.units.iter().find(|(_, value)| size >= 0.5 * value);
@@ -83,7 +82,7 @@ impl Quantity {
         Some(self.of(&moment.error.as_ref()?.to_vector()))
     }
 
-    /// Predicted 1σ in the usual unit; of a horizontal length the root of its mean square.
+    /// Predicted 1σ in the usual unit (RMS for a horizontal length).
     pub fn sigma(self, moment: &Outlook) -> Option<f64> {
         Some(self.of(moment.sigma.as_ref()?))
     }
@@ -97,8 +96,8 @@ impl Quantity {
         si / self.unit_value()
     }
 
-    /// Errors by name against time, over the band of ±σ of the last, in a readable unit; bounds of σ where no error
-    /// is known. `second` is the length of a second on the axis of time.
+    /// Errors by name against time, over the ±σ band of the last, in a readable unit; only σ bounds if no error is
+    /// known. `second` is the length of a second on the axis of time.
     pub fn panel(self, time: Axis, second: f64, navigated: &[(&str, &[Outlook])]) -> Panel {
         let curve = |moments: &[Outlook], of: &dyn Fn(&Outlook) -> Option<f64>| -> Vec<Point> {
             let points = moments.iter();

@@ -1,4 +1,4 @@
-//! The paper's Figures 2 to 9: every sample's course, their mean and standard deviation.
+//! Figures 2 to 9 of the paper: the curve of every sample, their mean and standard deviation.
 
 use super::verdict::title;
 use crate::imu::{InstallationForm, Sensor};
@@ -6,7 +6,7 @@ use crate::report::prelude::*;
 use crate::study::Table1;
 use crate::study::table1::{Column, Quantity};
 
-/// A course that stays within this part of its axis is a straight line.
+/// A curve within this fraction of its axis is drawn as a straight line.
 const FLAT: f64 = 1e-4;
 
 const ATTITUDE: [Quantity; 3] = [Quantity::Pitch, Quantity::Roll, Quantity::Heading];
@@ -66,7 +66,7 @@ fn flat(table: &Table1, column: &Column, quantity: Quantity) -> bool {
     extent(column, quantity) < FLAT * common_extent(table, column, quantity)
 }
 
-/// Largest magnitude of what is drawn of a column.
+/// Largest drawn magnitude of a column.
 fn extent(column: &Column, quantity: Quantity) -> f64 {
     let q = quantity as usize;
     let samples = column.courses.samples.iter().flatten().map(|e| e[q].abs());

@@ -1,4 +1,4 @@
-//! The report of the paper's Table 1: tables and verdicts, and the paper's Figures 2 to 9.
+//! Report on Table 1 of the paper: tables and verdicts, and Figures 2 to 9 of the paper.
 
 mod figures;
 mod verdict;
@@ -9,10 +9,10 @@ use crate::study::table1::{AGREEMENT, ByQuantity, Column, Moments, Quantity, Row
 
 /// Smaller figures, in the units shown, are shown as zero.
 const ZERO: f64 = 5e-10;
-/// A difference of more standard errors than this is only said to be more.
+/// Differences of more standard errors are shown only as larger than this.
 const MANY: f64 = 100.0;
 
-/// Everything that is said of the study.
+/// The complete report on the study.
 pub fn document(table: &Table1) -> Document {
     let title = "Cost of a simplified installation form: Table 1 of the paper";
     let mut document = Document::new(title);

@@ -1,4 +1,4 @@
-//! What can be said of the paper's figures, in words.
+//! Verdicts on the figures in the paper, in words.
 
 use crate::imu::{InstallationForm, Sensor};
 use crate::study::Table1;
@@ -42,7 +42,7 @@ fn split(row: &Row) -> (Vec<&'static str>, Vec<&'static str>) {
     (names(agree), names(apart))
 }
 
-/// A sentence for each of the paper's columns.
+/// A sentence for each column in the paper.
 pub fn sentences(table: &Table1) -> Vec<String> {
     let columns = table.columns.iter();
     columns
@@ -50,7 +50,7 @@ pub fn sentences(table: &Table1) -> Vec<String> {
         .collect()
 }
 
-/// A verdict with what it rests on.
+/// A verdict with its basis.
 pub fn sentence(column: &Column) -> String {
     match &column.verdict {
         Verdict::Reproduced => "reproduced as stated.".to_owned(),
@@ -83,7 +83,7 @@ pub fn sentence(column: &Column) -> String {
     }
 }
 
-/// A column of the paper's in words.
+/// A column of the paper in words.
 pub fn title(published: &Published) -> &'static str {
     match (published.sensor, published.form) {
         (Sensor::Gyro, InstallationForm::ThreeAngle) => "Gyros, three-angle form (Eq. 10)",

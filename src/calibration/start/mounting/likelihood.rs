@@ -1,7 +1,7 @@
-//! How likely a record's motion makes each order of a triad's axes.
+//! Likelihood of each axis order of a triad, given the motion of a recording.
 //!
-//! All is written along the axes of the columns as they stand: an order turns what is known, not what was
-//! measured. So errors of the triads mean the same under each.
+//! All vectors are in the axes of the columns: an order rotates the known quantities, not the measurements, so the
+//! errors of the triads have the same meaning for each.
 
 use nalgebra::{Matrix3, Vector1, Vector3};
 

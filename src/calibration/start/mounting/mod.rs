@@ -1,11 +1,10 @@
-//! Axes that are swapped, reversed or left-handed, in either triad or between instrument and table: found
-//! before the first pass, and named with the line of `run.toml` that puts them right.
+//! Axes that are swapped, reversed or left-handed, in either triad or between instrument and table: found before the
+//! first pass and reported with the corrected line for `run.toml`.
 //!
-//! Each of the 48 signed permutations of each triad is a hypothesis, and the marginal likelihood of what
-//! the record shows is its weight: prior errors of the triads are integrated out, and so are factors by
-//! which prior and noise may be stated too small. So nothing is decided by a residual's size, only by one
-//! mounting being likelier than another. A likelihood ratio of X in favour of a wrong hypothesis comes up
-//! at most once in X records.
+//! Each of the 48 signed permutations of each triad is a hypothesis, weighted by its marginal likelihood: the prior
+//! errors of the triads are integrated out, as are factors by which prior and noise may be stated too small. The
+//! decision thus depends only on likelihood ratios, not on the size of residuals. A likelihood ratio of X in favour of
+//! a wrong hypothesis occurs at most once in X recordings.
 
 mod contradiction;
 mod likelihood;

@@ -1,8 +1,8 @@
-//! What `run.toml` states and the record contradicts, before any estimate: axes, the sensitivity of a triad, triads whose
-//! columns are exchanged.
+//! Statements in `run.toml` that the recording contradicts, before any estimate: axes, the sensitivity of a triad,
+//! swapped triads.
 //!
-//! Each statement has rivals, and the likelihood of the motion under each is its weight, as for axes. Another
-//! sensitivity of the gyros is only looked for where they miss a turn.
+//! Each statement competes with alternatives, weighted by the likelihood of the motion, as for axes. A different gyro
+//! sensitivity is searched only if the gyros miss a turn.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -106,10 +106,10 @@ pub fn is_beyond_tolerance(factor: f64, sigma: f64) -> bool {
     factor.abs().ln().abs() > (CARELESS * sigma).clamp(WIDEST_TOLERANCE, NEXT_RANGE.ln())
 }
 
-/// The accelerometers whose specific force at rest is another than gravity, and how many times it is that.
+/// The accelerometers whose specific force at rest differs from gravity, with the ratio.
 ///
-/// Where the attitudes tell the axes apart, `Σ (f_i / s_i)² = 1` of all dwells gives the sensitivity of each; else the
-/// magnitude gives that of the triad.
+/// If the attitudes separate the axes, `Σ (f_i / s_i)² = 1` over all dwells gives the sensitivity of each; otherwise
+/// the magnitude gives that of the triad.
 fn by_magnitude(run: &Run, motion: &Motion) -> Option<(Axes, f64)> {
     let mut forces: Vec<Vector3<f64>> = motion.rests.iter().map(|rest| rest.accel.found).collect();
     if forces.is_empty() {

@@ -21,7 +21,7 @@ pub struct Sensitivity {
     pub factors: Vec<f64>,
     /// Quantity of its rows, if a file states it.
     output: Option<Output>,
-    /// The unit that is stated.
+    /// The stated unit.
     unit: String,
 }
 

@@ -10,10 +10,10 @@ use crate::formats::small_file;
 use crate::imu::{GaussMarkov, Noise, PerSensor, Sensor};
 
 const RATE: &str = "update_rate";
-/// Of the Gauss–Markov bias that stands for a random walk, s: longer than most recordings.
+/// Correlation time of the Gauss–Markov bias that represents a random walk, s; longer than most recordings.
 const CORRELATION_TIME: f64 = 3600.0;
 
-/// What a file of Kalibr states of an IMU.
+/// IMU noise from a Kalibr file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KalibrImu {
     /// Samples a second.
@@ -23,7 +23,7 @@ pub struct KalibrImu {
 }
 
 impl KalibrImu {
-    /// Reads the lines `key: value` of one IMU; keys that do not concern noise are passed over.
+    /// Reads the lines `key: value` of one IMU; keys unrelated to noise are ignored.
     ///
     /// # Errors
     /// [`FileError`] if the file cannot be read, lacks a noise density, or states a wrong number or a key twice.
@@ -82,7 +82,7 @@ impl KalibrImu {
     }
 }
 
-/// The keys of a triad's white noise, and of the random walk of its bias.
+/// Keys of the white noise and the bias random walk of a triad.
 fn keys(sensor: Sensor) -> [&'static str; 2] {
     sensor.pick(
         ["gyroscope_noise_density", "gyroscope_random_walk"],
@@ -90,7 +90,7 @@ fn keys(sensor: Sensor) -> [&'static str; 2] {
     )
 }
 
-/// A bias that grows like the random walk over times short against its correlation time.
+/// A bias that grows like the random walk over times much shorter than its correlation time.
 fn bias_of(walk: f64) -> GaussMarkov {
     GaussMarkov {
         sigma: walk * (CORRELATION_TIME / 2.0).sqrt(),
