@@ -129,7 +129,7 @@ pub struct Text {
 }
 
 impl Text {
-    /// The file's name without folder and extension.
+    /// The file name without folder and extension.
     pub fn name(&self) -> String {
         Path::new(&self.file)
             .file_stem()
@@ -164,7 +164,7 @@ pub(crate) fn inconsistent(file: &str, message: impl Into<String>) -> ModelError
     error.into()
 }
 
-/// Finds a model: the file at `name_or_path` if there is one, else the embedded model of that name.
+/// Finds a model: the file at `name_or_path` if it exists, otherwise the embedded model with that name.
 ///
 /// # Errors
 /// If there is neither, or the file cannot be read.

@@ -1,7 +1,7 @@
 //! The certificate as a Digital Calibration Certificate: PTB's DCC 3.3.0 with D-SI 2.2.1 quantities.
 //!
-//! Values are in SI: scale factors relative to nominal, angles in rad, biases in rad/s and m/s², each a quantity of its
-//! own with its expanded uncertainty; the covariance of all of them follows.
+//! Values are in SI: scale factors relative to nominal, angles in rad, biases in rad/s and m/s², each as a separate
+//! quantity with its expanded uncertainty, followed by the covariance of all.
 
 use std::fmt::Write;
 
@@ -15,7 +15,7 @@ use super::{
 /// Coverage probability of every uncertainty.
 const PROBABILITY: f64 = 0.9545;
 
-/// XML in the making: elements open and close in order, texts are escaped.
+/// XML under construction: elements open and close in order, and texts are escaped.
 struct Xml {
     text: String,
     open: Vec<&'static str>,
@@ -27,7 +27,7 @@ impl Xml {
         self.text.extend(std::iter::repeat_n("  ", self.open.len()));
     }
 
-    /// An element with what is in it; `tag` may have attributes that need no escape.
+    /// An element with its content; `tag` may have attributes that need no escaping.
     fn element(&mut self, name: &'static str, content: impl FnOnce(&mut Self)) {
         self.with(name, "", content);
     }
@@ -118,7 +118,7 @@ impl Xml {
         });
     }
 
-    /// A value with its unit and, where it has one, its uncertainty.
+    /// A value with its unit and, if available, its uncertainty.
     fn real(&mut self, value: f64, unit: &str, expanded: Option<Expanded>) {
         self.element("si:real", |xml| {
             xml.leaf("si:value", &number(value));
@@ -328,7 +328,7 @@ fn equipments(xml: &mut Xml, equipments: &[Equipment]) {
     });
 }
 
-/// What the values are.
+/// Description of the values.
 fn description(certificate: &Certificate) -> String {
     let nominal = &certificate.provenance.nominal;
     let [for_gyros, for_accels] = [nominal.gyro, nominal.accel]
@@ -349,7 +349,7 @@ fn description(certificate: &Certificate) -> String {
     text
 }
 
-/// One parameter as readers of certificates look for it.
+/// One parameter as expected by certificate readers.
 fn quantity(xml: &mut Xml, of: &Measured) {
     xml.with("dcc:quantity", " refType=\"basic_measuredValue\"", |xml| {
         xml.words("dcc:name", &of.name);
@@ -382,7 +382,7 @@ fn together(xml: &mut Xml, results: &[Measured], covariance: &[Vec<f64>]) {
     });
 }
 
-/// The region that holds all values together.
+/// The joint coverage region.
 fn ellipsoid(xml: &mut Xml, results: &[Measured], covariance: &[Vec<f64>]) {
     xml.element("si:ellipsoidalRegionXMLList", |xml| {
         xml.element("si:covarianceMatrix", |xml| {
@@ -414,7 +414,7 @@ fn of_ellipsoid(dimensions: usize) -> f64 {
     square.map_or(1.0, f64::sqrt)
 }
 
-/// Name and release of the program that made the calibration; PTB's rules want a letter before a release's numbers.
+/// Name and release of the calibration program; PTB rules require a letter before the release number.
 fn program(certificate: &Certificate) -> (String, String) {
     let program = &certificate.provenance.program;
     let (name, release) = program.split_once(' ').unwrap_or((program, "0"));

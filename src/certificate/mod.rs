@@ -21,7 +21,7 @@ pub use results::{Measured, Quantity, temperature_words, to_twelve_digits};
 /// Errors of a certificate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CertificateError {
-    /// The calibration may not be used.
+    /// The calibration must not be used.
     #[error("the calibration {reason}, so it cannot be certified. See its findings.")]
     NotUsable {
         /// The reason.
@@ -39,7 +39,7 @@ pub enum CertificateError {
          to \"guard-band\" or \"simple-acceptance\"."
     )]
     NoRule,
-    /// The calibrations cannot be compared, or not with limits.
+    /// The calibrations cannot be compared with each other or with limits.
     #[error(transparent)]
     Comparison(#[from] ComparisonError),
     /// A calibration that cannot be applied.
@@ -56,7 +56,7 @@ pub struct Certificate {
     pub calibration: Calibration,
     /// Origin of the calibration.
     pub provenance: Provenance,
-    /// SHA-256 of the calibration's file.
+    /// SHA-256 of the calibration file.
     pub sha256: String,
     /// Every parameter with its expanded uncertainty.
     pub results: Vec<Measured>,
@@ -71,10 +71,10 @@ pub struct Certificate {
 }
 
 impl Certificate {
-    /// The certificate of a calibration whose file has this SHA-256.
+    /// The certificate of a calibration; the SHA-256 is that of its file.
     ///
     /// # Errors
-    /// [`CertificateError`] if the calibration may not be used, or something is missing.
+    /// [`CertificateError`] if the calibration must not be used, or a field is missing.
     pub fn new(
         calibration: Calibration,
         sha256: String,

@@ -141,7 +141,7 @@ pub fn terms(calibration: &Calibration) -> Vec<Measured> {
     (0..TERM_PARAMETERS).filter_map(measured).collect()
 }
 
-/// States the temperatures at which the results are valid, and where their temperature coefficients are found.
+/// States the temperatures at which the results are valid, and the location of their temperature coefficients.
 pub fn temperature_words(of: &ThermalRecord, number: impl Fn(f64) -> String) -> String {
     let triad = |(name, sensor): (&str, Sensor)| {
         let range = of.range.get(sensor);

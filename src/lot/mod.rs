@@ -110,7 +110,7 @@ impl Lot {
     }
 }
 
-/// The calibration of a unit, if it can be compared with units of this output; else the reason.
+/// The calibration of a unit, if comparable with units of this output; otherwise the reason.
 fn usable<'a>(
     unit: &'a Unit,
     output: Option<&PerSensor<String>>,

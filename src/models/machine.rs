@@ -15,7 +15,7 @@ use crate::units::{ARCSEC, DEGREE};
 /// Finds and reads a turntable; returns it with its name.
 ///
 /// # Errors
-/// If there is none of that name or it is malformed.
+/// If it does not exist or is malformed.
 pub fn turntable(name_or_path: &str, named_in: &Place) -> Result<(Table, String), ModelError> {
     let text = text(Room::Turntable, name_or_path, named_in)?;
     let file: TableFile = text.parse()?;
@@ -52,7 +52,7 @@ pub fn turntable(name_or_path: &str, named_in: &Place) -> Result<(Table, String)
 /// the site.
 ///
 /// # Errors
-/// If there is none of that name or it is malformed.
+/// If it does not exist or is malformed.
 pub fn path(
     name_or_path: &str,
     named_in: &Place,
@@ -154,7 +154,7 @@ struct AxesFile {
     rate_deg_per_s: Positive,
     acceleration_deg_per_s2: Positive,
     dwell_s: NonNegative,
-    /// How often the steps are gone through.
+    /// Number of repetitions of the steps.
     #[serde(default = "once")]
     repeat: NonZeroU16,
     steps: Vec<AxesStepFile>,

@@ -15,9 +15,9 @@ use leg::Leg;
 pub use segment::{Change, Segment, Start};
 pub use strides::{Stride, Strides};
 
-/// The least horizontal speed over the climb rate: beyond, pitch would be steeper than a body flies.
+/// Minimum ratio of horizontal speed to climb rate, to limit the pitch angle.
 const LEAST_GLIDE: f64 = 2.0;
-/// The least time in s that all segments together take.
+/// Minimum total duration of all segments, s.
 const LEAST_ROUND: f64 = 1.0;
 
 /// A start and segments, which repeat.

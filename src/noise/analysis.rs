@@ -1,4 +1,4 @@
-//! The stretch of a run that is analysed, and its noise.
+//! The analysed stretch of a run, and its noise.
 
 use std::ops::Range;
 
@@ -8,9 +8,9 @@ use crate::imu::{PerSensor, Sensor};
 use crate::recording::Segment;
 use crate::run::Run;
 
-/// Part of a stretch that must lie within one standstill.
+/// Minimum fraction of a stretch within one standstill.
 const STANDING: f64 = 0.95;
-/// Fewest samples that show the slopes of the Allan deviation.
+/// Minimum number of samples for the slopes of the Allan deviation.
 const FEWEST: usize = 256;
 
 /// A stretch of samples.
@@ -18,7 +18,7 @@ const FEWEST: usize = 256;
 pub struct Stretch {
     /// Its samples.
     pub samples: Range<usize>,
-    /// Its name, such as `the whole record`.
+    /// Its name, such as `the whole recording`.
     pub name: String,
     /// Whether the instrument is at rest during it, according to its own output.
     pub stands: bool,

@@ -19,7 +19,7 @@ use super::process::Process;
 const WEIGHTS: [f64; 3] = [1.0, -2.0, 1.0];
 /// Near the ends and the middle of a cluster, lags are spaced by the shorter cluster divided by this number.
 const STEPS: i64 = 16;
-/// Further away each step is longer than the one before by this factor.
+/// Farther away, each step is longer than the previous one by this factor.
 const GROWTH: f64 = 1.1;
 /// Correlation times tried per octave.
 const PER_OCTAVE: f64 = 2.0;

@@ -61,7 +61,7 @@ pub struct Convention {
     /// Its symbol.
     pub unit: &'static str,
     scale: Scale,
-    /// Its name and users. Keys of programs, in backticks, are accepted as names of the unit, too.
+    /// Its name and users. Program keys in backticks are also accepted as unit names.
     pub meaning: &'static str,
     /// Other spellings of the unit, normalised.
     also: &'static [&'static str],
@@ -342,7 +342,7 @@ fn hint(unit: &str) -> String {
         .map_or_else(String::new, |(_, unit)| format!(" Did you mean `{unit}`?"))
 }
 
-/// All units, a line for each quantity.
+/// All units, one line per quantity.
 pub fn known() -> String {
     let unit = |row: &Convention| match row.scale.strength(1.0, None) {
         Some(_) => row.unit.to_owned(),

@@ -18,8 +18,8 @@ pub struct ImuSamples {
     /// Stretches of consecutive samples, in order; at least one. Between two stretches at least one sample is
     /// lost.
     pub stretches: Vec<Stretch>,
-    /// Whether samples are consecutive in time as far as is known; if not, they are concatenated sections,
-    /// and only a labelled section or a dwell is continuous.
+    /// Whether samples are consecutive in time; if not, they are concatenated sections, and only a labelled section or
+    /// a dwell is continuous.
     pub continuous: bool,
     /// Integrals of the normalised gyro output over each sample, rad.
     pub gyro: Series,
@@ -51,7 +51,7 @@ impl ImuSamples {
 pub struct Stretch {
     /// The samples.
     pub samples: Range<usize>,
-    /// Time at which the first of them begins, s.
+    /// Start time of the first of them, s.
     pub start: f64,
 }
 
@@ -183,18 +183,18 @@ impl ImuSamples {
         self.gyro.is_empty()
     }
 
-    /// Time in s at which the first sample begins.
+    /// Start time of the first sample, s.
     pub fn start(&self) -> f64 {
         self.time(0)
     }
 
-    /// Time in s at which the last sample ends.
+    /// End time of the last sample, s.
     pub fn end(&self) -> f64 {
         self.time(self.len())
     }
 
-    /// Time in s at which sample `k` begins, or at which the last sample of its stretch ends; before the first stretch,
-    /// its clock is extrapolated.
+    /// Start time of sample `k` in s, or end time of the last sample of its stretch; the clock of the first stretch is
+    /// extrapolated backwards.
     pub fn time(&self, k: usize) -> f64 {
         let begun = self.stretches.partition_point(|s| s.samples.start <= k);
         self.stretches

@@ -1,4 +1,4 @@
-//! Increments of a triad in sequence, packed if there are too many of them.
+//! Increments of a triad in sequence, packed if numerous.
 
 mod packed;
 
@@ -32,7 +32,7 @@ impl Series {
         self.len() == 0
     }
 
-    /// Whether they are packed: then reading takes longer, and holding many at once takes memory.
+    /// Whether they are packed, which makes reading slower; unpacking many at once takes memory.
     pub fn is_packed(&self) -> bool {
         self.packed.is_some()
     }

@@ -16,11 +16,11 @@ use crate::models::{self, InstallationModel, Instrument, ModelError, Place, Room
 use crate::turntable::{Imperfection, Motion, Path, Table, TableError};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, PPM};
 
-/// At which instruments are what their model says, °C.
+/// Temperature at which instruments match their model, °C.
 const ROOM_TEMPERATURE: f64 = 25.0;
-/// Steps of the true motion in one sample of the IMU.
+/// Steps of the true motion per IMU sample.
 const STEPS: u32 = 4;
-/// The longest record that is simulated in memory; it takes some gigabytes.
+/// The longest simulated recording, which takes several gigabytes of memory.
 const MOST_SAMPLES: f64 = 2e7;
 
 /// Complete definition of a simulated run, except its random numbers.
@@ -118,7 +118,7 @@ impl Scenario {
         Ok(scenario)
     }
 
-    /// The same scenario along another path, by embedded name or path of its file.
+    /// The same scenario with a different path, given by embedded name or file.
     ///
     /// # Errors
     /// If it does not exist, is malformed, or does not fit the table.
@@ -162,7 +162,7 @@ impl Scenario {
         self
     }
 
-    /// Whether its runs have the states of a block.
+    /// Whether its runs include an error term.
     pub fn has(&self, block: ErrorTerm) -> bool {
         let sees_table = self.body_frame == BodyFrame::Table;
         let errors = &self.table.errors;
@@ -204,7 +204,7 @@ impl Scenario {
         Ok(motion.dwells().map(|(start, end)| end - start).sum())
     }
 
-    /// What would otherwise fail only when it is simulated.
+    /// Checks that would otherwise fail only in simulation.
     fn check(&self) -> Result<(), String> {
         // With the errors of a real table, so that a path that cannot have them is found here.
         let real = Imperfection::draw(&self.table, || 1.0);

@@ -1,5 +1,5 @@
-//! Accuracy of the filter and consistency of its σ over many simulated runs, compared with the
-//! truth, the Cramér–Rao bound, and the closed form on the paper's static positions.
+//! Accuracy of the filter and consistency of its σ over many simulated runs, compared with the truth, the Cramér–Rao
+//! bound, and the closed form on the static positions of the paper.
 //!
 //! Everything is compared in the general form and in the body frame of the table.
 
@@ -50,7 +50,7 @@ pub struct AccuracyStudy {
 /// Errors of a study.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
-    /// The closed form's static positions or the trajectory of navigation cannot be read.
+    /// The static positions of the closed form or the navigation trajectory cannot be read.
     #[error(transparent)]
     Model(#[from] ModelError),
     /// The table cannot follow the path.
@@ -125,18 +125,16 @@ pub struct GroupAccuracy {
 }
 
 impl AccuracyStudy {
-    /// Makes all runs on all cores; `done` is called after each. The result does not depend on the number
-    /// of cores.
+    /// Computes all runs on all cores; `done` is called after each. The result does not depend on the number of cores.
     ///
-    /// # Errors
-    /// [`StudyError`] if runs cannot be made. A run on which the filter fails is not an error: it is
+    /// # Errors [`StudyError`] if runs cannot be computed. A run in which the filter fails is not an error; it is
     /// counted.
     pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Accuracy, StudyError> {
         let all: Vec<u64> = (0..self.runs).collect();
         self.result(self.trials(&all, done)?)
     }
 
-    /// Makes some of the runs, given by their numbers; `done` is called after each.
+    /// Computes the runs with these numbers; `done` is called after each.
     ///
     /// # Errors
     /// As [`Self::run`].
@@ -196,7 +194,7 @@ impl Accuracy {
         (self.study.form, self.study.scenario.installation.form)
     }
 
-    /// NIS over all runs of each kind of observation that there was.
+    /// NIS over all runs for each kind of observation made.
     pub fn nis(&self) -> impl Iterator<Item = (&'static str, &Nis)> {
         let kinds = [
             ("zero velocity", &self.velocity),

@@ -1,5 +1,5 @@
-//! The paper's turntable experiment (§3.3, Figure 10) as a simulation: instruments are calibrated by
-//! the closed form and by the filter, and navigate with the errors that remain.
+//! The paper's turntable experiment (§3.3, Figure 10) as a simulation: instruments are calibrated with the closed form
+//! and with the filter, and navigate with the remaining errors.
 //!
 //! The navigation error of a calibration is `error(t) = (S(t) + Φ(t) X₀) δθ`: S is the effect of the
 //! parameter errors δθ during the mission, X₀ their effect on the initial alignment. Both are linear, so
@@ -29,9 +29,9 @@ pub use budget::{Budget, Part};
 pub use method::{Calibrated, Estimator, Method, Trial};
 pub use noise::ALIGNMENT_TIME;
 
-/// The paper's static positions, on which the closed form is made.
+/// The static positions of the paper, used by the closed form.
 const POSITIONS: &str = "six-position";
-/// A path of the filter that takes the closed form's table time.
+/// A filter path with the table time of the closed form.
 const HOUR_PATH: &str = "three-axis-hour";
 /// Minutes between two points of a curve against time.
 const EVERY: usize = 10;
@@ -39,24 +39,24 @@ const EVERY: usize = 10;
 /// What is studied.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ExperimentStudy {
-    /// What is simulated; its path is the filter's short one.
+    /// The simulated scenario, with the short filter path.
     pub scenario: Scenario,
-    /// How the body moves where it moves.
+    /// Trajectory of the moving body.
     pub trajectory: Trajectory,
     /// Name of the trajectory.
     pub trajectory_name: String,
-    /// How many intervals of [`super::navigation::INTERVAL`] each navigation lasts.
+    /// Duration of each navigation in intervals of [`super::navigation::INTERVAL`].
     pub intervals: u32,
     /// Number of instruments.
     pub samples: u64,
-    /// Seed; each instrument has its own streams of it.
+    /// Seed; each instrument has its own random streams.
     pub seed: u64,
 }
 
-/// An experiment that cannot be made.
+/// Errors of the experiment.
 #[derive(Debug, thiserror::Error)]
 pub enum ExperimentError {
-    /// A path that belongs to the experiment cannot be had.
+    /// A path of the experiment is not available.
     #[error(transparent)]
     Model(#[from] ModelError),
     /// The table cannot follow a path.
@@ -70,11 +70,11 @@ pub enum ExperimentError {
 /// Situation in which an instrument navigates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Situation {
-    /// It stands level, heading North, and has found its attitude by itself.
+    /// Stationary and level, heading North, self-aligned.
     SelfAligned,
-    /// It stands so and was given its attitude.
+    /// Stationary and level, heading North, with given attitude.
     Aligned,
-    /// It follows the trajectory and was given its attitude at the start.
+    /// Moving along the trajectory, with given initial attitude.
     Moving,
 }
 
@@ -96,19 +96,18 @@ pub struct Experiment {
     pub navigations: Vec<Navigated>,
 }
 
-/// What the methods are worth in one situation.
+/// Results of the methods in one situation.
 #[derive(Debug, Clone)]
 pub struct Navigated {
     /// The situation.
     pub situation: Situation,
     /// Each of [`Method::all`].
     pub methods: Vec<Worth>,
-    /// Horizontal position error at the end in m that the noise of alignment and navigation makes by
-    /// itself, after any calibration.
+    /// Final horizontal position error in m due to alignment and navigation noise alone, after any calibration.
     pub noise: Spread,
 }
 
-/// What a method is worth: horizontal position errors in m over all instruments.
+/// Results of a method: horizontal position errors in m over all instruments.
 #[derive(Debug, Clone)]
 pub struct Worth {
     /// The method.
@@ -119,20 +118,20 @@ pub struct Worth {
     pub at_end: Spread,
     /// 99 % bootstrap interval of the median at the end.
     pub median_interval: (f64, f64),
-    /// The largest of all minutes.
+    /// Maximum over all minutes.
     pub largest: Spread,
-    /// At the end by the errors of one triad alone.
+    /// At the end, due to the errors of one triad alone.
     pub by_one: PerSensor<Spread>,
     /// Time in s against the median.
     pub against_time: Vec<(f64, f64)>,
-    /// Median of the closed form in the same installation form over that of this method, both at the
-    /// end; `None` for the closed form itself.
+    /// Final median of the closed form in the same installation form divided by that of this method; `None` for the
+    /// closed form.
     pub gain: Option<Ratio>,
-    /// What the claimed covariance says of the error at the end.
+    /// Budget of the final error from the stated covariance.
     pub budget: Budget,
 }
 
-/// How a length is distributed.
+/// Distribution of a length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spread {
     /// Half of all are below.
@@ -141,7 +140,7 @@ pub struct Spread {
     pub mean: f64,
     /// Root of the mean square.
     pub rms: f64,
-    /// A quarter of all are below the first, three quarters below the second.
+    /// First and third quartile.
     pub quartiles: (f64, f64),
     /// 68 % are below.
     pub below_68: f64,
@@ -150,7 +149,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Of some lengths; NaN of none.
+    /// Distribution of these lengths; NaN if empty.
     fn of(lengths: impl Iterator<Item = f64>) -> Self {
         let mut sorted: Vec<f64> = lengths.collect();
         sorted.sort_by(f64::total_cmp);
@@ -166,16 +165,15 @@ impl Spread {
     }
 }
 
-/// Horizontal position error, east and north in m, by parameter errors.
+/// Horizontal position error, east and north in m, due to parameter errors.
 type ByParameter = SMatrix<f64, 2, PARAMETERS>;
 
 impl ExperimentStudy {
     /// Runs the whole study on all cores; `done` is called after each instrument. The result does not
     /// depend on the number of cores.
     ///
-    /// # Errors
-    /// [`ExperimentError`] if runs or missions cannot be made. A calibration that fails is no error:
-    /// it is counted.
+    /// # Errors [`ExperimentError`] if runs or missions cannot be computed. A failed calibration is not an error; it is
+    /// counted.
     pub fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Experiment, ExperimentError> {
         let all: Vec<u64> = (0..self.samples).collect();
         self.result(self.trials(&all, done)?)
@@ -199,7 +197,7 @@ impl ExperimentStudy {
         all.collect()
     }
 
-    /// What all instruments say, in the order of their numbers.
+    /// The result of all instruments, in the order of their numbers.
     ///
     /// # Errors
     /// As [`Self::run`].
@@ -253,17 +251,16 @@ impl ExperimentStudy {
     }
 }
 
-/// The instrument that missions are followed with: what an error does depends on the instrument by
-/// less than one part in a hundred.
+/// The instrument used to compute missions; the effect of an error depends on the instrument by less than 1 %.
 fn ideal() -> PerSensor<Triad> {
     PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General))
 }
 
-/// A mission, followed once.
+/// A mission, computed once.
 struct Way {
     situation: Situation,
     noise: Spread,
-    /// Time and what each parameter's error does to the position.
+    /// Time, and effect of each parameter error on the position.
     minutes: Vec<(f64, ByParameter)>,
 }
 
@@ -315,7 +312,7 @@ impl Way {
         }
     }
 
-    /// Over the instruments that both methods calibrated.
+    /// Ratio over the instruments calibrated by both methods.
     fn gain(&self, place: usize, method: Method, trials: &[Trial]) -> Option<Ratio> {
         let baseline = Method::all()
             .position(|m| m.estimator == Estimator::ClosedForm && m.form == method.form)
@@ -339,7 +336,7 @@ impl Way {
     }
 }
 
-/// The errors of one triad; the other has none.
+/// The errors of one triad, with the other exact.
 fn of_triad(error: &ParameterVector, sensor: Sensor) -> ParameterVector {
     let mut only = ParameterVector::zeros();
     let first = parameter(sensor, 0);

@@ -19,7 +19,7 @@ pub use ends::saturated;
 
 /// Rows in which noise is measured at one level.
 const BLOCK: usize = 64;
-/// Part of the blocks that may be quieter than noise at rest: axes stuck for long.
+/// Fraction of blocks that may be quieter than noise at rest, for axes stuck for a long time.
 const STUCK_PART: f64 = 0.1;
 /// Number of rows whose sum is nearly free of rounding.
 const SUM: usize = 4;
@@ -40,7 +40,7 @@ pub struct Axis<'a> {
     step: f64,
     /// Whether values are whole pulses, the remainder being carried into the next.
     pulses: bool,
-    /// Runs of rows equal to the row before them.
+    /// Runs of rows equal to the previous row.
     runs: Vec<Range<usize>>,
     /// Variance of the noise at rest, steps², from rows that are not at an extreme: an axis clipped over a whole dwell
     /// shows no noise there.
@@ -76,8 +76,7 @@ impl<'a> Axis<'a> {
         }
     }
 
-    /// Rows that repeat the row before them for longer than a working axis does, without the first of the
-    /// equal values.
+    /// Rows that repeat the previous row for longer than a working axis does, without the first of the equal values.
     pub fn stuck(&self, limit: Limit) -> Vec<Range<usize>> {
         if self.step <= 0.0 {
             return Vec::new();

@@ -1,4 +1,4 @@
-//! Moves as the gyros and as the table saw them: how far, and when.
+//! Moves according to gyros and table: angle and time.
 
 use std::ops::Range;
 
@@ -13,7 +13,7 @@ use crate::run::{Dwell, Run};
 use crate::statistics::{SIGMA_OF_MEDIAN, median, median_of_axes};
 use crate::units::{DEGREE, PPM};
 
-/// Below this angle between two readings, a table is taken to have turned the shorter way, rad.
+/// Below this angle between two readings, the table is assumed to have turned the shorter way, rad.
 const SHORTER_WAY: f64 = 1.0;
 
 /// A move from one dwell to the next.
@@ -32,8 +32,8 @@ struct Move {
     interval: f64,
 }
 
-/// The angle of some steps in all, rad, their mean time, s, and the fastest rate, rad/s. Steps: time in the middle and
-/// duration, s, and angle, rad. Those are at rest that turn by less than `noise` and less than rate `zero` makes.
+/// Total angle of steps, rad, their mean time, s, and the maximum rate, rad/s. Each step has mid-time and duration, s,
+/// and angle, rad. Steps below `noise` and below the effect of rate `zero` count as rest.
 fn way(steps: impl Iterator<Item = (f64, f64, f64)>, noise: f64, zero: f64) -> [f64; 3] {
     let (mut all, mut moment, mut fastest) = (0.0, 0.0, 0.0f64);
     for (time, duration, angle) in steps {
@@ -49,7 +49,7 @@ fn way(steps: impl Iterator<Item = (f64, f64, f64)>, noise: f64, zero: f64) -> [
 /// Reports moves for which gyros and table differ in angle or time; if there are none, a gyro scale factor that all moves
 /// together contradict.
 ///
-/// This shows rows that one log has lost, clocks that drift apart and a log of another run, whatever the time stamps.
+/// This reveals missing rows in one log, clock drift and logs from different runs, for any time stamps.
 pub fn clock(run: &Run) -> Option<String> {
     let moves = moves(run, run.recording.table.as_ref()?);
     let is_another = |m: &&Move| (m.gyros - m.table).abs() > m.tolerance;

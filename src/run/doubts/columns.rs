@@ -1,4 +1,4 @@
-//! Columns that no working instrument produces.
+//! Columns impossible for a working instrument.
 
 use nalgebra::Vector3;
 use statrs::function::erf::erf;

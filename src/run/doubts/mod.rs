@@ -1,4 +1,4 @@
-//! Checks of a run when it is read: facts that may be true, but are so unusual that they are reported.
+//! Checks of a run on input: unusual but possible facts that are reported.
 
 mod clock;
 mod columns;

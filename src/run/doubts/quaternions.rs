@@ -1,4 +1,4 @@
-//! Quaternions of the table in another order, or of the inverse rotation.
+//! Table quaternions in a different order, or of the inverse rotation.
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 

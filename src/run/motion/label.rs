@@ -1,4 +1,4 @@
-//! Comparison of labelled sections with the record.
+//! Comparison of labelled sections with the recording.
 
 use std::fmt;
 use std::ops::Range;
@@ -15,9 +15,9 @@ use crate::run::dwells::imu::standstills;
 use crate::run::turning::tolerance;
 use crate::units::DEGREE;
 
-/// An axis farther than this from the plumb line contradicts its label, rad.
+/// An axis farther than this from the vertical contradicts its label, rad.
 const OTHER_AXIS: f64 = 30.0 * DEGREE;
-/// Largest part of its time for which a section labelled as a position may move.
+/// Maximum fraction of time for which a section labelled as a position may move.
 const MOVING: f64 = 0.05;
 /// A section with a faster rate at its start or end starts or ends within a turn, rad/s …
 const TURNING: f64 = 15.0 * DEGREE;
@@ -31,11 +31,11 @@ const END: f64 = 0.1;
 pub struct LabelCheck {
     /// The section.
     pub segment: Segment,
-    /// Verdict of the record on it.
+    /// Result of the comparison.
     pub verdict: Verdict,
-    /// Disagreement of label and record, worded to follow `section … `.
+    /// Disagreement between label and recording, worded to follow `section … `.
     pub disagreement: Option<String>,
-    /// The samples in which the record agrees with the label, if there are any.
+    /// The samples that agree with the label, if any.
     pub as_labelled: Option<Range<usize>>,
 }
 
@@ -61,7 +61,7 @@ pub enum Verdict {
 }
 
 impl fmt::Display for LabelCheck {
-    /// The disagreement of label and record, and whether the section is used nevertheless.
+    /// The disagreement between label and recording, and whether the section is used.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Segment { label, start, .. } = &self.segment;
         let said = self.disagreement.as_deref().unwrap_or_default();

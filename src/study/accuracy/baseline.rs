@@ -1,5 +1,5 @@
-//! The baseline of the comparison: the closed form on the paper's static positions, with the same
-//! instrument and the same noise.
+//! The baseline of the comparison: the closed form on the static positions of the paper, with the same instrument and
+//! noise.
 
 use super::StudyError;
 use crate::calibration::{
@@ -12,8 +12,7 @@ use crate::run::Dwell;
 use crate::simulation::{Scenario, Simulated};
 use crate::turntable::Table;
 
-/// The runs of the closed form. It is also evaluated on the first part of every dwell, as if the dwells
-/// were shorter.
+/// The runs of the closed form, which is also evaluated on the first part of every dwell, equivalent to shorter dwells.
 #[derive(Debug, Clone)]
 pub struct Baseline {
     /// The simulated scenario.

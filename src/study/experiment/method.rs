@@ -15,11 +15,11 @@ use crate::turntable::TableError;
 /// An estimator with its path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Estimator {
-    /// The closed form on the paper's static positions.
+    /// The closed form on the static positions of the paper.
     ClosedForm,
-    /// The filter on the scenario's path.
+    /// The filter on the path of the scenario.
     Filter,
-    /// The filter on a path that takes the closed form's table time.
+    /// The filter on a path with the table time of the closed form.
     LongFilter,
 }
 
