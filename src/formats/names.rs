@@ -1,10 +1,10 @@
-//! Names of columns, each of which means one quantity.
+//! Column names, each for one quantity.
 
 use super::error::{choice, nearest};
 use crate::shown::excerpt;
 
-/// The place of a column by its name, or by its number where none is called so; none of those that are taken. Else
-/// what was found and expected, and what to do.
+/// Index of an unused column by name or, if no column has this name, by number. Otherwise the content found, the
+/// content expected and the remedy.
 pub fn find(all: &[String], taken: &[usize], name: &str) -> Result<usize, [String; 3]> {
     let mut places: Vec<usize> = (0..all.len()).filter(|&place| all[place] == name).collect();
     if let Ok(number) = name.parse::<usize>()

@@ -1,4 +1,4 @@
-//! Files that are read as a whole: descriptions and results, never records.
+//! Files read as a whole: descriptions and results, never recordings.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
@@ -9,10 +9,10 @@ use serde::de::DeserializeOwned;
 
 use super::error::FileError;
 
-/// A file of any length may be named, and a device that never ends.
+/// Length limit, because any file or an endless device may be named.
 const MOST_BYTES: u64 = 1 << 24;
 
-/// All bytes of a file that holds `what`.
+/// All bytes of a file that contains `what`.
 pub fn bytes(path: &Path, what: &str, advice: &str) -> Result<Vec<u8>, FileError> {
     let read = || {
         let mut bytes = Vec::new();

@@ -1,7 +1,7 @@
 //! Parameters of PX4, ArduPilot, Betaflight and INAV: offsets, and scales of accelerometers.
 //!
-//! PX4 and ArduPilot make `(n − offset) ⊙ scale` of accelerometers and `n − offset` of gyros, in sensor axes, and turn
-//! these to body axes (`SENS_BOARD_ROT`, `AHRS_ORIENTATION`) behind that. INAV and Betaflight do the same in whole counts.
+//! PX4 and ArduPilot compute `(n − offset) ⊙ scale` for accelerometers and `n − offset` for gyros, in sensor axes, and
+//! then rotate to body axes (`SENS_BOARD_ROT`, `AHRS_ORIENTATION`). INAV and Betaflight do the same in whole counts.
 //!
 //! Source: PX4-Autopilot, `src/lib/sensor_calibration` and `src/modules/temperature_compensation`; ArduPilot,
 //! `AP_InertialSensor_Backend.cpp`, `_rotate_and_correct_accel`, and `AP_InertialSensor_tempcal.cpp`, `correct_sensor`;
@@ -18,19 +18,19 @@ use crate::units::{DEGREE, STANDARD_GRAVITY};
 
 const UPPER: [&str; 3] = ["X", "Y", "Z"];
 const UNCORRECTED: &str = "gyro scale factors and all misalignments";
-/// Orders of temperature that PX4 and ArduPilot have.
+/// Polynomial orders in temperature supported by PX4 and ArduPilot.
 const ORDERS: usize = 3;
-/// Temperature from which ArduPilot counts, °C, and the factor of its coefficients.
+/// Reference temperature of ArduPilot, °C, and the factor of its coefficients.
 const ARDUPILOT_REFERENCE: f64 = 35.0;
 const ARDUPILOT_FACTOR: f64 = 1e6;
-/// Counts for one g of a 16-bit sensor of ±16 g, to which Betaflight and INAV set those that they know …
+/// Counts per g of a 16-bit sensor with ±16 g, the setting of Betaflight and INAV …
 const COUNTS_PER_G: f64 = 2048.0;
-/// … and for one rad/s of one of ±2000 °/s.
+/// … and per rad/s with ±2000 °/s.
 const COUNTS_PER_RAD_S: f64 = 16.4 / DEGREE;
-/// What autopilots leave off of a change with temperature.
+/// Temperature dependence that autopilots cannot represent.
 const OF_TEMPERATURE: &str = "change of scale factors and misalignments with temperature, change of biases with \
     temperature rate, and orders above three; biases refer to the temperature of the sensor";
-/// One in INAV's gains.
+/// Unit gain in INAV.
 const INAV_ONE: f64 = 4096.0;
 
 /// Offsets of both triads, and scales of the accelerometers, as far as numbers of 32 bits hold them.
@@ -49,7 +49,7 @@ fn held(axes: &Axes) -> PerSensor<Held> {
     })
 }
 
-/// Parameters by the names that a program has for offset and scale of an axis.
+/// Parameters with the names of a program for offset and scale of an axis.
 fn parameters(
     file: &mut Document,
     held: &PerSensor<Held>,
@@ -123,8 +123,8 @@ pub fn px4(source: &Source) -> Exported {
     file.finish().without(OF_TEMPERATURE)
 }
 
-/// ArduPilot's temperature: `n − p(T) + p(T_cal)` before the offsets are taken off, with
-/// `p(T) = (c₁ d + c₂ d² + c₃ d³) 10⁻⁶`, d = T − 35 °C.
+/// ArduPilot's temperature: `n − p(T) + p(T_cal)` before the offsets are subtracted, with `p(T) = (c₁ d + c₂ d² + c₃
+/// d³) 10⁻⁶`, d = T − 35 °C.
 pub fn ardupilot(source: &Source) -> Exported {
     let axes = Axes::front_right_down(source);
     let held = held(&axes);
@@ -176,7 +176,7 @@ fn of_counts(what: &str, counts: f64, unit: &str) -> String {
     )
 }
 
-/// Betaflight takes `acc_calibration` from the counts of each axis and zeroes the gyros at every start.
+/// Betaflight subtracts `acc_calibration` from the counts of each axis and zeroes the gyros at every start.
 pub fn betaflight(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let per_unit = COUNTS_PER_G / STANDARD_GRAVITY;
@@ -194,8 +194,8 @@ pub fn betaflight(source: &Source) -> Exported {
     file.finish()
 }
 
-/// INAV makes `(counts − acczero) accgain / 4096` of accelerometers; zeros of gyros are used where it does not find them
-/// itself.
+/// INAV computes `(counts − acczero) accgain / 4096` for accelerometers; gyro zeros are used if it does not estimate
+/// them.
 pub fn inav(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let PerSensor { gyro, accel } = &axes.triads;

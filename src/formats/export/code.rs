@@ -58,7 +58,7 @@ static inline void turncal_calibrate(const double raw[6], double calibrated[6])
 }
 ";
 
-/// Numbers to the last bit.
+/// Numbers with full precision.
 fn numbers<'a>(values: impl IntoIterator<Item = &'a f64>) -> String {
     let values: Vec<String> = values.into_iter().map(|v| format!("{v:e}")).collect();
     values.join(", ")
@@ -95,7 +95,7 @@ const OCTAVE: &str = "  if size(raw, 2) ~= 6
        bsxfun(@minus, raw(:, 4:6), accel_bias) * accel_correction.'];
 end";
 
-/// A function for C that calibrates at a temperature.
+/// A C function that calibrates at a temperature.
 fn at_temperature(source: &Source, file: &mut Document) {
     let Some(thermal) = &source.record.temperature else {
         return;

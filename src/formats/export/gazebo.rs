@@ -1,8 +1,8 @@
 //! The noise of an IMU in Gazebo (SDFormat).
 //!
 //! A sample is the true value plus white noise of `stddev`, plus a bias drawn from `bias_mean` ± `bias_stddev` with
-//! either sign, plus a walk pulled back with `dynamic_bias_correlation_time`, whose standard deviation in the long
-//! run is `dynamic_bias_stddev √(τ/2)`.
+//! either sign, plus a correlated walk with `dynamic_bias_correlation_time`, whose stationary standard deviation is
+//! `dynamic_bias_stddev √(τ/2)`.
 //!
 //! Source: gz-sensors, `GaussianNoiseModel.cc`; SDFormat 1.6 and later, `noise.sdf`.
 

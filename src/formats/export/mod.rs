@@ -1,6 +1,6 @@
-//! What other programs read: calibrated samples, and calibrations in their own formats.
+//! Exports for other programs: calibrated samples and calibrations.
 //!
-//! Every format says in comments what `N` and `u` are, and names what it cannot hold.
+//! Every format defines `N` and `u` in comments and names its omissions.
 
 mod autopilot;
 mod cameras;
@@ -32,7 +32,7 @@ pub struct Format {
     /// What reads it.
     pub about: &'static str,
     write: fn(&Source) -> Exported,
-    /// Whether it has a change with temperature, or says what it leaves of it.
+    /// Whether it represents temperature dependence, or states its omission.
     holds_temperature: bool,
 }
 
@@ -78,7 +78,7 @@ impl Format {
         &FORMATS
     }
 
-    /// The format of this name.
+    /// The format with this name.
     pub fn named(name: &str) -> Option<&'static Self> {
         FORMATS.iter().find(|format| format.name == name)
     }
@@ -107,23 +107,23 @@ impl clap::ValueEnum for Format {
 pub struct Exported {
     /// The file.
     pub bytes: Vec<u8>,
-    /// What the format does not hold, a sentence each. The file says it, too.
+    /// Omissions of the format, one sentence each, which are also in the file.
     pub notes: Vec<String>,
 }
 
 impl Exported {
-    /// The same where something more is not held.
+    /// The same with further omissions.
     fn without(mut self, note: impl Into<String>) -> Self {
         self.notes.push(note.into());
         self
     }
 }
 
-/// Writes a calibration in a format. A run of the same instrument gives noise figures, sample rate and
-/// the nominal scales that counts are to be divided by, for formats that want rad/s and m/s².
+/// Writes a calibration in a format. A run of the same instrument gives noise figures, sample rate and the nominal
+/// scales by which counts are divided, for formats in rad/s and m/s².
 ///
 /// # Errors
-/// If the calibration has no inverse or an unknown term, or is not one of the run's instrument.
+/// If the calibration has no inverse or an unknown term, or does not belong to the instrument of the run.
 pub fn write(
     record: &Calibration,
     format: &Format,

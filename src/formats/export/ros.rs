@@ -8,7 +8,7 @@ use super::document::{Document, yaml_list};
 use super::source::{Axes, Held, Source};
 use crate::imu::{PerSensor, Sensor};
 
-/// Row-major about x, y, z: the variance of a sample, density² × rate.
+/// Row-major about x, y, z: variance per sample, density² × rate.
 pub fn covariance(source: &Source) -> Exported {
     let notes = [
         "scale, misalignment and bias; publish the output of `turncal apply`, which has these errors removed",
@@ -35,7 +35,7 @@ pub fn covariance(source: &Source) -> Exported {
     file.finish()
 }
 
-/// All of the accelerometers, and the offset of the gyros.
+/// All accelerometer parameters, and gyro offsets.
 fn held(axes: &Axes) -> PerSensor<Held> {
     PerSensor {
         gyro: Held::offset(axes.triads.gyro.bias),
@@ -43,7 +43,7 @@ fn held(axes: &Axes) -> PerSensor<Held> {
     }
 }
 
-/// `SM n − bias` of the accelerometers, so the bias is in corrected units.
+/// `SM n − bias` for the accelerometers, so the bias is in corrected units.
 pub fn imu_calib(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let held = held(&axes);
@@ -58,7 +58,7 @@ pub fn imu_calib(source: &Source) -> Exported {
     file.finish()
 }
 
-/// `sm n − bias` of the accelerometers and `n − bias` of the gyros, along the axes of `baselink`.
+/// `sm n − bias` for the accelerometers and `n − bias` for the gyros, along the axes of `baselink`.
 pub fn dlio(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let held = held(&axes);

@@ -1,7 +1,7 @@
 //! SlimeVR's calibration of a tracker, as the fields of its `SoftFusionSensorConfig`.
 //!
-//! It makes `A_Ainv (counts − A_B)` of accelerometers and `G_Sens ⊙ (counts − G_off)` of gyros, then scales both by the
-//! sensor's nominal sensitivity.
+//! It computes `A_Ainv (counts − A_B)` for accelerometers and `G_Sens ⊙ (counts − G_off)` for gyros, then scales both
+//! by the nominal sensitivity of the sensor.
 //!
 //! Source: SlimeVR-Tracker-ESP, `src/configuration/SensorConfig.h` and `src/sensors/softfusion`.
 

@@ -10,8 +10,8 @@ use crate::imu::AxisOrder;
 use crate::recording::{ImuSamples, LabelledMotion, Segment};
 use crate::units::DEGREE;
 
-/// Reads the sections of a run with these samples, which are stamped `lag` samples after they begin; what
-/// the file leaves open goes to `notes`.
+/// Reads the sections of a run with these samples, with stamps `lag` samples after their start; `notes` receives
+/// remarks about the file.
 pub fn read(
     file: &Path,
     imu: &ImuSamples,
@@ -71,7 +71,7 @@ pub fn read(
     Ok(segments)
 }
 
-/// What a label says, its axes being those of the file.
+/// Motion stated by a label, in the axes of the file.
 fn motion_of(label: &str, axes: AxisOrder) -> Option<LabelledMotion> {
     let axis = |name: &str| {
         let index = ["x", "y", "z"].into_iter().position(|axis| axis == name)?;

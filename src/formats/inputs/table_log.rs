@@ -1,4 +1,4 @@
-//! The turntable's log: readings of the attitude of its mounting face.
+//! The turntable log: attitude readings of its mounting face.
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
@@ -13,28 +13,27 @@ use crate::recording::{ImuSamples, TableLog};
 use crate::turntable::{AxisAngles, AxisError, TableAccuracy, TableGeometry, axis_angles};
 use crate::units::{ARCSEC, DEGREE};
 
-/// Four components printed to four decimals meet it. What is off by more is no quaternion.
+/// Tolerance of the norm, met by four components with four decimals; larger deviations are not quaternions.
 const NORM_TOLERANCE: f64 = 1e-4;
 
-/// What axes are called by which a table turns when all its angles are zero.
+/// Names of the rotation axes when all angles are zero.
 pub const LETTERS: [(&str, Vector3<f64>); 3] = [
     ("x", Vector3::new(1.0, 0.0, 0.0)),
     ("y", Vector3::new(0.0, 1.0, 0.0)),
     ("z", Vector3::new(0.0, 0.0, 1.0)),
 ];
-/// How a row gives `C_b_n`, and where the table's axes stand.
+/// Columns for `C_b_n` and the axis angles.
 pub struct AttitudeColumns<'a> {
-    /// Those of a quaternion `[w, x, y, z]`, body right-front-up to East-North-Up, if there is one; then those of angles in
+    /// Columns of a quaternion `[w, x, y, z]`, body right-front-up to East-North-Up, if any, followed by angles in
     /// degrees, outermost first.
     names: Vec<&'a str>,
-    /// The axes of the angles. Without a quaternion the attitude is `C_b_n = R(axis₁, outer) R(axis₂, middle) R(axis₃,
+    /// The axes of the angles. Without a quaternion, the attitude is `C_b_n = R(axis₁, outer) R(axis₂, middle) R(axis₃,
     /// inner)`.
     axes: Vec<Vector3<f64>>,
 }
 
 impl AttitudeColumns<'_> {
-    /// The attitude that a row says, its columns being at these places, and the angles of the axes; `None` if there is
-    /// only a quaternion.
+    /// Attitude in a row, with columns at these indices, and axis angles; `None` if there is only a quaternion.
     fn reading(
         &self,
         csv: &LogRows,
@@ -70,7 +69,7 @@ impl AttitudeColumns<'_> {
 }
 
 impl<'a> Fields<'a> {
-    /// What `[turntable]` says, if it is there.
+    /// Settings in `[turntable]`, if present.
     pub fn table_log(&mut self) -> Result<Option<TableLogFile<'a>>, FileError> {
         let Some(fields) = &self.run.turntable else {
             return Ok(None);
@@ -144,7 +143,7 @@ impl<'a> Fields<'a> {
         Ok(AttitudeColumns { names, axes })
     }
 
-    /// What is stated of the errors of a table with this number of angles.
+    /// Stated errors of a table with this number of angles.
     fn geometry(&self, fields: &TurntableFile, angles: usize) -> Result<TableGeometry, FileError> {
         let sigma = |stated: Option<Angle>| stated.map_or(0.0, |sigma| sigma.0 * ARCSEC);
         let mut axes = TableGeometry::default().axes;
@@ -167,7 +166,7 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// What `run.toml` says of the file.
+/// Log settings in `run.toml`.
 pub struct TableLogFile<'a> {
     pub source: Source<'a>,
     pub clock: Clock<'a>,
@@ -176,7 +175,7 @@ pub struct TableLogFile<'a> {
 }
 
 impl TableLogFile<'_> {
-    /// Reads the log of a run with these samples; what the file leaves open goes to `notes`.
+    /// Reads the log of a run with these samples; `notes` receives remarks about the file.
     pub fn read(&self, imu: &ImuSamples, notes: &mut Vec<String>) -> Result<TableLog, FileError> {
         let mut csv = self.source.open()?;
         let mut stamps = self.clock.start(&mut csv)?.without_bursts();

@@ -1,6 +1,6 @@
-//! `calibration.json` and `truth.json`: read with every value that cannot be refused, written whole.
+//! `calibration.json` and `truth.json`: validated on reading, written completely.
 //!
-//! A calibration that was reached here is written whatever its size, because its findings say what it is worth.
+//! An estimated calibration is written with any values, because its findings describe its quality.
 
 use std::collections::HashSet;
 use std::ops::RangeInclusive;
@@ -16,25 +16,24 @@ use crate::imu::{AXES, PARAMETERS, PerSensor, Sensor, Term, ThermalRange, Triad}
 use crate::shown::excerpt;
 use crate::units::{DEGREE, STANDARD_GRAVITY};
 
-/// An entry of an installation matrix beyond this is of an axis across the one that it is named for.
+/// A larger entry of an installation matrix belongs to an axis perpendicular to its name.
 const INSTALLATION: f64 = 100.0;
-/// A bias, in rad/s or m/s², beyond the range of any instrument: registers that read half their range at zero
-/// included.
+/// Bias limit, in rad/s or m/s², beyond the range of any instrument, including registers with zero at mid-range.
 const BIAS: f64 = 1e6;
-/// Scale factors, in the file's quantity for one rad/s or m/s².
+/// Scale factors, in the quantity of the file per rad/s or m/s².
 const SCALES: RangeInclusive<f64> = 1e-12..=1e15;
 /// Gravity anywhere near the surface of the Earth, m/s².
 const GRAVITY: RangeInclusive<f64> = 9.7..=9.9;
-/// Errors of a table's base and axes are small angles, rad.
+/// Maximum error of table base and axes, which are small angles, rad.
 const TABLE: f64 = 180.0 * DEGREE;
-/// Digits that another program may have rounded a correlation to.
+/// Rounding tolerance of correlations written by other programs.
 const ROUNDING: f64 = 1e-6;
 
-/// What is wrong: what was found, and what was expected.
+/// An error: content found and content expected.
 type Wrong = (String, String);
 type Checked = Result<(), Wrong>;
 
-/// Refuses what does not hold.
+/// Refuses a violated condition.
 macro_rules! expect {
     ($holds:expr, $expected:expr, $($found:tt)+) => {
         let holds: bool = $holds;
@@ -68,7 +67,7 @@ impl Calibration {
         Ok(record)
     }
 
-    /// The record as the bytes of its file, `path` being named in errors.
+    /// The record as file bytes; `path` is used in error messages.
     pub fn to_json(&self, path: &Path) -> Result<Vec<u8>, FileError> {
         let expected = "values that JSON can represent".to_owned();
         let written = || small_file::pretty(self).map_err(|error| (error.to_string(), expected));
@@ -76,7 +75,7 @@ impl Calibration {
         bytes.map_err(|wrong| refused(path, &wrong))
     }
 
-    /// Writes the record whole or not at all; an existing file only with `force`.
+    /// Writes the complete record or nothing; an existing file is replaced only with `force`.
     pub fn write(&self, path: &Path, force: bool) -> Result<(), FileError> {
         write_whole(path, &self.to_json(path)?, force)
     }
@@ -204,7 +203,7 @@ impl Calibration {
         at.map_or_else(|found| Err((found.to_string(), expected())), |_| Ok(()))
     }
 
-    /// Refuses values beyond what an instrument has.
+    /// Refuses values impossible for an instrument.
     fn check_sizes(&self) -> Checked {
         let mut sizes: Vec<(String, f64, RangeInclusive<f64>)> = Vec::new();
         let about_zero = |largest: f64| -largest..=largest;
@@ -263,8 +262,7 @@ impl Calibration {
         Ok(())
     }
 
-    /// Refuses what is no covariance: not symmetric, or with a combination of parameters of negative
-    /// variance.
+    /// Refuses an invalid covariance: not symmetric, or not positive semidefinite.
     fn check_correlations(&self) -> Checked {
         let size = self.parameters.len();
         if size == 0 {

@@ -1,4 +1,4 @@
-//! The instrument as `run.toml` describes it: its record, noise, unit, nominal scale and prior.
+//! The instrument as described in `run.toml`: log, noise, unit, nominal scale and prior.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use crate::imu::{
 };
 use crate::units::{ARCSEC, DEGREE, PPM};
 
-/// 1σ of the scale factors, misalignments and biases of a sensor of which nothing is stated: usual of consumer MEMS.
+/// Default 1σ of scale factors, misalignments and biases, typical of consumer MEMS.
 pub const USUAL_SCALE: f64 = 50_000.0 * PPM;
 pub const USUAL_INSTALLATION: f64 = 2.0 * DEGREE;
 /// rad/s and m/s².
@@ -25,16 +25,16 @@ pub const USUAL_BIAS: PerSensor<f64> = PerSensor {
     gyro: 2.0 * DEGREE,
     accel: 1.0,
 };
-/// The period of rows of which none is known, until their motion shows it, s.
+/// Assumed sample period until estimated from motion, s.
 pub const USUAL_PERIOD: f64 = 0.01;
-/// 1σ of a scale factor of which nothing is known, of the scale factor.
+/// Maximum relative 1σ of a scale factor.
 const WIDEST_SCALE: f64 = 10.0;
-/// 1σ of a bias beyond the range of any instrument, rad/s or m/s².
+/// Maximum 1σ of a bias, beyond the range of any instrument, rad/s or m/s².
 const WIDEST_BIAS: f64 = 1e6;
-/// Beyond any error of an angle, ″.
+/// Maximum angle error, ″.
 const HALF_TURN: f64 = 648_000.0;
 
-/// What a `run.toml` says, as it is read; remarks on what is assumed or without effect go to `notes`.
+/// Content of a `run.toml` while reading; `notes` receives remarks on assumptions and fields without effect.
 pub struct Fields<'a> {
     pub document: Document<'a>,
     pub run: &'a RunFile,
@@ -42,11 +42,11 @@ pub struct Fields<'a> {
     pub notes: Vec<String>,
 }
 
-/// What `[imu]` and the tables below it say.
+/// Content of `[imu]` and its subtables.
 pub struct InstrumentFields<'a> {
     pub log: ImuLog<'a>,
     pub known: Instrument,
-    /// Whether neither run.toml nor a time column tells how long a row lasts.
+    /// Whether the sample period is stated neither in run.toml nor by a time column.
     pub without_period: bool,
 }
 
@@ -99,7 +99,7 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// The usual period where none is stated; how long a row lasts can only be found of rates that stand alone.
+    /// The default period if none is stated; the period can only be estimated for rates without other logs.
     fn with_usual_period(&self, clock: &mut Clock) -> Result<bool, FileError> {
         if clock.column.is_some() || clock.period.is_some() {
             return Ok(false);
@@ -136,7 +136,7 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// Noise of a triad at rest and in moves; zero where it is not stated.
+    /// Noise of a triad at rest and in moves; zero if not stated.
     fn noise(&self, sensor: Sensor) -> Result<(Noise, MotionNoise), FileError> {
         let keys = NoiseKeys::of(sensor);
         let get = |name: &str| self.run.imu.noise.get(name).map(|value| value.0);
@@ -240,7 +240,7 @@ impl<'a> Fields<'a> {
         }
     }
 
-    /// The prior of a triad of this nominal scale, along right-front-up; what is not stated is wide.
+    /// The prior of a triad with this nominal scale, along right-front-up; wide defaults if not stated.
     fn prior(&mut self, sensor: Sensor, nominal: Vector3<f64>) -> Result<Prior, FileError> {
         let (of, axes) = (
             self.run.imu.of(sensor),
@@ -296,7 +296,7 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// 1σ of the parameters of the terms that a table of them switches on, in SI; zero for the others.
+/// 1σ of the parameters of enabled error terms, in SI; zero for the others.
 pub fn term_sigma(
     document: Document,
     table: &str,

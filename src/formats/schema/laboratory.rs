@@ -1,4 +1,4 @@
-//! `lab.toml`: what a laboratory states in a calibration certificate.
+//! `lab.toml`: laboratory data for a calibration certificate.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use crate::formats::small_file;
 /// The version of the format.
 const FORMAT: &str = "turncal-laboratory/1";
 
-/// Tables and fields that ISO/IEC 17025 asks for in every certificate.
+/// Tables and fields required in every certificate by ISO/IEC 17025.
 const REQUIRED: [(&str, &[&str]); 8] = [
     ("laboratory", &["name", "street", "city", "country"]),
     ("customer", &["name", "street", "city", "country"]),
@@ -29,10 +29,10 @@ const REQUIRED: [(&str, &[&str]); 8] = [
 ];
 
 impl Laboratory {
-    /// Reads and checks a lab.toml. `meta` holds what the run said of the item, by which `[item]` is completed.
+    /// Reads and checks a lab.toml. `meta` contains metadata of the run, which complete `[item]`.
     ///
     /// # Errors
-    /// [`FileError`] that names every required field that is missing, or the first that cannot be right.
+    /// [`FileError`] that names every required field that is missing, or the first invalid one.
     pub fn read(path: &Path, meta: impl Fn(&str) -> Option<String>) -> Result<Self, FileError> {
         let text = small_file::text(path, "the laboratory data", "Give the path of a lab.toml.")?;
         let document = Document::of(path, &text);
@@ -118,7 +118,7 @@ fn check_complete(
     ))
 }
 
-/// Texts are not empty, and white space in them is put in order, as a page and XML want it.
+/// Refuses empty texts and normalises white space for page and XML.
 fn say_something(
     document: Document,
     path: &str,

@@ -1,4 +1,4 @@
-//! The fields of `run.toml`: what is read and what is written.
+//! The fields of `run.toml`.
 
 use std::collections::BTreeMap;
 
@@ -29,7 +29,7 @@ pub const META: [&str; 8] = [
     "notes",
 ];
 
-/// A run: an instrument's log, what is known of it, and how it was moved
+/// A run: log of an instrument, prior knowledge, and motion
 #[derive(Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -52,7 +52,7 @@ pub struct SiteFile {
     pub latitude_deg: Option<Latitude>,
     pub longitude_deg: Option<Longitude>,
     pub height_m: Option<Height>,
-    /// Its digits are its accuracy where none is stated.
+    /// Its digits define its accuracy if none is stated.
     #[cfg_attr(feature = "cli", schemars(with = "Option<Gravity>"))]
     pub gravity_m_s2: Option<Spanned<Gravity>>,
     pub gravity_sigma_mgal: Option<Milligals>,
@@ -89,7 +89,7 @@ pub struct ImuFile {
     pub terms: BTreeMap<String, TermFile>,
 }
 
-/// What `[imu]` says of a triad.
+/// Settings of a triad in `[imu]`.
 pub struct TriadFields<'a> {
     pub columns: Option<&'a Names<3>>,
     pub unit: Option<&'a str>,
@@ -110,7 +110,7 @@ impl ImuFile {
     }
 }
 
-/// What it does not say is as in `[imu]`.
+/// Defaults are those of `[imu]`.
 #[derive(Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -123,7 +123,7 @@ pub struct AccelFromFile {
     pub sample_period_s: Option<Positive>,
 }
 
-/// The column that tells instruments apart, and what it says of the one that is meant.
+/// The column that distinguishes instruments, and its value for the selected one.
 #[derive(Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -226,7 +226,7 @@ pub struct TurntableFile {
     pub time_sigma_ms: Option<Positive>,
 }
 
-/// Keys of errors of the axes, in the order of [`crate::turntable::AxisError::ALL`].
+/// Keys of axis errors, in the order of [`crate::turntable::AxisError::ALL`].
 pub const AXIS_ERRORS: [&str; 3] = [
     "nonorthogonality_sigma_arcsec",
     "wobble_sigma_arcsec",
@@ -234,7 +234,7 @@ pub const AXIS_ERRORS: [&str; 3] = [
 ];
 
 impl TurntableFile {
-    /// 1σ of errors of the axes, in the same order.
+    /// 1σ of axis errors, in the same order.
     pub fn axis_errors(&self) -> [Option<Angle>; 3] {
         [
             self.nonorthogonality_sigma_arcsec,
@@ -263,7 +263,7 @@ pub struct SegmentsFile {
     pub position_sigma_deg: Option<Positive>,
 }
 
-/// The JSON schema of `run.toml`, for editors that complete and check it.
+/// The JSON schema of `run.toml`, for completion and checks in editors.
 #[cfg(feature = "cli")]
 pub fn json_schema() -> serde_json::Value {
     let mut schema = schemars::schema_for!(RunFile);

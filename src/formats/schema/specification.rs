@@ -1,4 +1,4 @@
-//! `specification.toml`: within which limits units of a type must be.
+//! `specification.toml`: limits for units of a type.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -14,7 +14,7 @@ use crate::lot::{Limit, Specification};
 
 /// The version of the format.
 const FORMAT: &str = "turncal-specification/1";
-/// Unless the file says otherwise.
+/// Default confidence.
 const CONFIDENCE: f64 = 0.95;
 
 #[derive(Deserialize)]
@@ -73,7 +73,7 @@ impl Specification {
     }
 }
 
-/// The key of a group in its sensor's table, and its unit in SI.
+/// The key of a group in the table of its sensor, and its unit in SI.
 fn key(group: Group) -> (String, f64) {
     let (key, unit) = DayToDay::key(group);
     (key[group.sensor().name().len() + 1..].to_owned(), unit)

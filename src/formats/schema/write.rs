@@ -21,15 +21,13 @@ use crate::run::Run;
 use crate::turntable::AxisError;
 use crate::units::{ARCSEC, DEGREE, MILLIGAL, PPM};
 
-/// Columns of the angles of a table's axes, outermost first.
+/// Columns of the table axis angles, outermost first.
 const ANGLES: [&str; 3] = ["outer", "middle", "inner"];
 
-/// Writes a run into a directory that is there: `run.toml`, `imu.csv.gz`, `table.csv.gz`,
-/// `segments.csv`, `truth.json`.
+/// Writes a run into an existing directory: `run.toml`, `imu.csv.gz`, `table.csv.gz`, `segments.csv`, `truth.json`.
 ///
-/// [`Run::read`] returns the same run, except for rounding in the last digit, its name (which is the
-/// directory's) and its notes. The same run gives the same bytes. `run.instrument.unit` must be a unit of this
-/// `output`.
+/// [`Run::read`] returns the same run, except for rounding in the last digit, its name (that of the directory) and its
+/// notes. The same run gives the same bytes. `run.instrument.unit` must be a unit of this `output`.
 pub fn write_run(
     directory: &Path,
     run: &Run,
@@ -175,12 +173,12 @@ fn segment_rows(file: &mut dyn Write, segments: &[Segment]) -> io::Result<()> {
     csv.flush()
 }
 
-/// A number to fifteen digits: all that a conversion of units leaves true.
+/// A number to fifteen digits, the accuracy of a unit conversion.
 fn short(value: f64) -> f64 {
     format!("{value:.14e}").parse().unwrap_or(value)
 }
 
-/// A value in a file's unit; `None` if it is not above zero.
+/// A value in the unit of the file; `None` if it is not above zero.
 fn above_zero(value: f64, unit: f64) -> Option<f64> {
     Some(short(value / unit)).filter(|&value| value > 0.0)
 }

@@ -1,7 +1,7 @@
-//! ArduPilot's DataFlash logs.
+//! ArduPilot DataFlash logs.
 //!
-//! Messages begin with the bytes A3 95 and their type; those of type 128 (`FMT`) say what the others hold. What
-//! `IMU`, `ACC` and `GYR` hold is corrected by the parameters `INS_…`, which `PARM` messages give.
+//! Messages start with the bytes A3 95 and their type; type 128 (`FMT`) defines the content of the others. `IMU`, `ACC`
+//! and `GYR` are corrected with the parameters `INS_…` in `PARM` messages.
 //!
 //! Source: ArduPilot, `libraries/AP_Logger/LogStructure.h`.
 
@@ -14,7 +14,7 @@ use crate::imu::{PerSensor, Sensor};
 
 const BEGIN: [u8; 2] = [0xa3, 0x95];
 const FMT: u8 = 0x80;
-/// The column that tells instances apart.
+/// The column that distinguishes instances.
 const INSTANCE: &str = "I";
 
 pub fn open(input: Input) -> Result<Box<dyn Log>, Broken> {
@@ -41,7 +41,7 @@ struct DataFlash {
     input: Input,
     formats: BTreeMap<u8, Format>,
     parameters: BTreeMap<String, f64>,
-    /// How often one of them was set.
+    /// Number of parameter changes.
     changes: u64,
     streams: Vec<Stream>,
     /// By type and instance.
@@ -57,9 +57,9 @@ struct Format {
     name: String,
     length: u64,
     columns: Vec<Column>,
-    /// Place, kind and factor of each number.
+    /// Offset, kind and factor of each number.
     places: Vec<(usize, Kind, f64)>,
-    /// Place of the instance.
+    /// Offset of the instance.
     instance: Option<usize>,
 }
 
@@ -124,13 +124,13 @@ impl Format {
         Ok(format)
     }
 
-    /// Whether it may be an instrument's.
+    /// Whether it may belong to an instrument.
     fn is_inertial(&self) -> bool {
         let stem = self.name.trim_end_matches(|c: char| c.is_ascii_digit());
         ["IMU", "ACC", "GYR"].contains(&stem)
     }
 
-    /// What of it is corrected.
+    /// Its corrections.
     fn undo(&self) -> Undo {
         let corrected = PerSensor::from_fn(|sensor| {
             let names = sensor.pick(["GyrX", "GyrY", "GyrZ"], ["AccX", "AccY", "AccZ"]);
@@ -285,7 +285,7 @@ impl DataFlash {
     }
 }
 
-/// What ArduPilot's parameters of an instance, from 0, say.
+/// Corrections from the ArduPilot parameters of an instance, from 0.
 fn applied(parameters: &BTreeMap<String, f64>, sensor: Sensor, instance: u8) -> Option<Applied> {
     let kind = sensor.pick("GYR", "ACC");
     // A damaged log may have an instance 255.

@@ -1,6 +1,6 @@
-//! HDF5 files, and MAT files of version 7.3 (`save -v7.3`), which are HDF5 behind a header of 512 bytes.
+//! HDF5 files, and MAT files of version 7.3 (`save -v7.3`), which are HDF5 after a header of 512 bytes.
 //!
-//! The crate `hdf5-pure` reads the format; its datasets become arrays here, called by their paths.
+//! The crate `hdf5-pure` reads the format; its datasets become arrays named by path.
 //!
 //! Source: The HDF Group, "HDF5 File Format Specification Version 4.0".
 
@@ -16,14 +16,14 @@ use super::arrays::{Array, Arrays, Field, Open};
 use super::bytes::{Broken, Input, Kind};
 use crate::room;
 
-/// Groups within groups, and groups of a file: a group may contain itself.
+/// Limits of group depth and number, because a group may contain itself.
 const DEEPEST: usize = 8;
 const MOST_GROUPS: usize = 1024;
 /// Numbers of an array within an item.
 const MOST_NUMBERS: usize = 64;
-/// Bytes of what is read at a time, where rows and chunks are shorter.
+/// Bytes read at once, if rows and chunks are shorter.
 const AT_ONCE: u64 = 1 << 16;
-/// Nothing deflated is shorter by more.
+/// Maximum compression ratio of deflate.
 const DEFLATE: u64 = 1040;
 
 pub fn open(input: Input) -> Result<Box<dyn Log>, Broken> {
@@ -60,9 +60,9 @@ fn broken(error: Error) -> Broken {
     Broken::new(0, found, "an HDF5 file of version 1.14 or earlier")
 }
 
-/// The groups of a file, one after the other.
+/// Traversal of the groups of a file.
 struct Walk {
-    /// Between the names of a group and of what is in it.
+    /// Separator between the names of a group and its members.
     between: &'static str,
     /// Bytes of the file.
     file: u64,
@@ -95,7 +95,7 @@ impl Walk {
     }
 }
 
-/// A dataset as an array; `None` if it holds no numbers.
+/// A dataset as an array; `None` if not numeric.
 fn array(name: String, dataset: Dataset, file: u64) -> Result<Option<Array>, Broken> {
     let of_it = |error| {
         let Broken { found, .. } = broken(error);
@@ -144,7 +144,7 @@ fn is_no_number_to_matlab(dataset: &Dataset) -> bool {
     class == Some("char") || attributes.contains_key("MATLAB_empty")
 }
 
-/// Adds the numbers of an item that begins at this place.
+/// Adds the numbers of an item that starts at this offset.
 fn numbers(name: &str, item: &Datatype, place: usize, into: &mut Vec<Field>) {
     match item {
         Datatype::Enumeration { base_type, .. } => numbers(name, base_type, place, into),
@@ -215,7 +215,7 @@ struct Stored {
 }
 
 impl Stored {
-    /// The bytes from this one on.
+    /// The bytes from this offset on.
     fn open(&self, skip: u64) -> io::Result<Box<dyn Read>> {
         let possible = self.possible()?;
         if self.all > possible {
@@ -239,7 +239,7 @@ impl Stored {
         Ok(Box::new(rows))
     }
 
-    /// One long row, or short ones of whole chunks: to read a part of a chunk unpacks all of it.
+    /// One long row, or short ones in whole chunks, because reading a part of a chunk unpacks all of it.
     fn rows_at_once(&self) -> io::Result<u64> {
         let row = self.row.max(1);
         if row >= AT_ONCE {
@@ -252,7 +252,7 @@ impl Stored {
         Ok(chunk.saturating_mul(chunks).min(self.all / row + 1))
     }
 
-    /// The most bytes that the file can give, because the crate allocates what damaged sizes state.
+    /// Maximum number of bytes in the file, because the crate allocates sizes stated by damaged files.
     fn possible(&self) -> io::Result<u64> {
         let layout = self.dataset.layout().map_err(io::Error::other)?;
         Ok(match layout {

@@ -1,4 +1,4 @@
-//! MATLAB's MAT files of version 5 (`save -v6`, `-v7`).
+//! MATLAB MAT files of version 5 (`save -v6`, `-v7`).
 //!
 //! Source: MathWorks, "MAT-File Format", 2023: a header of 128 bytes, then elements of a type, a size and content,
 //! padded to eight bytes.
@@ -69,7 +69,7 @@ pub fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
     Ok(Box::new(Arrays::new(arrays)))
 }
 
-/// The content of the element in a compressed one; nothing if it is no array.
+/// The content of a compressed element; empty if it is not an array.
 fn unpack(packed: &[u8], offset: u64, big_endian: bool) -> Result<Vec<u8>, Broken> {
     let broken = |error: std::io::Error| Broken::new(offset, error, "a zlib-compressed element");
     let mut decoder = ZlibDecoder::new(packed);
@@ -207,7 +207,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(text).into_owned()
 }
 
-/// Adds the columns of an array, those of the fields of a structure by their names.
+/// Adds the columns of an array; fields of a structure are named after it.
 fn matrix(
     mut slice: Slice,
     name: &str,

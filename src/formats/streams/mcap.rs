@@ -1,7 +1,7 @@
 //! MCAP: messages of ROS 1 and 2, Protocol Buffers and JSON whose schemas are in the file.
 //!
-//! Source: mcap.dev, "MCAP Format Specification": magic bytes, then records of an opcode, a length of eight bytes
-//! and content; chunks hold records, packed.
+//! Source: mcap.dev, "MCAP Format Specification": magic bytes, then records with an opcode, an eight-byte length and
+//! content; chunks contain compressed records.
 
 use std::collections::BTreeMap;
 
@@ -41,11 +41,11 @@ struct Schema {
 struct Mcap {
     input: Input,
     schemas: BTreeMap<u16, Schema>,
-    /// Records of the chunk that is read, and how far it is.
+    /// Records of the current chunk, and the position in it.
     chunk: Vec<u8>,
     at: usize,
     record: Vec<u8>,
-    /// Where the record, or the chunk that it is in, is.
+    /// Offset of the record or of its chunk.
     offset: u64,
     is_ended: bool,
 }
@@ -78,7 +78,7 @@ impl Messages for Mcap {
 }
 
 impl Mcap {
-    /// Takes the next record, from the chunk if one is open; its opcode, or none at the end of the data.
+    /// Reads the next record, from the chunk if one is open; returns its opcode, or `None` at the end of the data.
     fn next_record(&mut self) -> Result<Option<u8>, Broken> {
         if self.at < self.chunk.len() {
             let mut chunk = Slice::packed(&self.chunk[self.at..], self.offset);

@@ -9,7 +9,7 @@ use super::bytes::{Broken, Input};
 use super::messages::{MessageLog, Messages, Reader, Topics, ros::Encoding};
 use super::sqlite::{Database, Row, Table};
 
-/// The definition of `sensor_msgs/msg/Imu`, which earlier bags lack.
+/// Definition of `sensor_msgs/msg/Imu`, missing in earlier bags.
 const IMU: &str = "std_msgs/Header header
 geometry_msgs/Quaternion orientation
 float64[9] orientation_covariance

@@ -7,11 +7,11 @@ use super::bytes::{Broken, Input, Slice};
 const HEADER: usize = 100;
 const INTERIOR: u64 = 5;
 const LEAF: u64 = 13;
-/// Pages within pages: a tree of 2³² pages is less deep.
+/// Maximum depth of pages; a tree of 2³² pages is less deep.
 const DEEPEST: usize = 32;
 
 pub enum Value {
-    /// Or a number that is not whole, which is in none of the columns that are read.
+    /// Null, or a real number, which does not occur in the columns read.
     Null,
     Whole(i64),
     Bytes(Vec<u8>),
@@ -37,12 +37,12 @@ impl Value {
     }
 }
 
-/// Values by the names of the table's columns.
+/// Values by column name.
 #[derive(Default)]
 pub struct Row {
     columns: Vec<String>,
     values: Vec<Value>,
-    /// Where it is in the file.
+    /// Its offset in the file.
     pub offset: u64,
 }
 
@@ -55,18 +55,18 @@ impl Row {
     }
 }
 
-/// A place in a table.
+/// A position in a table.
 pub struct Table {
     columns: Vec<String>,
-    /// Pages on the way to it, each with the next of its cells.
+    /// Pages from the root, each with its next cell.
     pages: Vec<(Page, usize)>,
-    /// Pages that may still be read: a damaged tree may turn back on itself.
+    /// Remaining number of pages to read, because a damaged tree may contain a loop.
     left: u64,
 }
 
 struct Page {
     bytes: Vec<u8>,
-    /// Where it is in the file, and its own header in it.
+    /// Its offset in the file, and the offset of its header.
     offset: u64,
     begin: usize,
     is_leaf: bool,
@@ -76,7 +76,7 @@ struct Page {
 pub struct Database {
     input: Input,
     page: usize,
-    /// Bytes of a page that are used.
+    /// Usable bytes of a page.
     usable: usize,
     length: u64,
 }
@@ -105,7 +105,7 @@ impl Database {
         })
     }
 
-    /// The begin of a table; `None` if there is no table of this name.
+    /// The start of a table; `None` if no table has this name.
     pub fn table(&mut self, name: &str) -> Result<Option<Table>, Broken> {
         let columns = ["type", "name", "tbl_name", "rootpage", "sql"];
         let mut schema = self.begin(1, columns.map(str::to_owned).to_vec())?;
@@ -198,7 +198,7 @@ impl Database {
         }
     }
 
-    /// Number and content of a row, the end of which may be on further pages.
+    /// Number and content of a row, which may continue on overflow pages.
     fn payload(&mut self, cell: &mut Slice) -> Result<(i64, Vec<u8>), Broken> {
         let offset = cell.offset();
         let size = varint(cell)?;
@@ -257,7 +257,7 @@ fn big_endian(bytes: &[u8], offset: u64) -> Slice<'_> {
     Slice::new(bytes, offset).in_order(true)
 }
 
-/// Seven bits a byte, the first ones first; the ninth byte has eight.
+/// A variable-length integer: seven bits per byte, most significant first; the ninth byte has eight.
 fn varint(slice: &mut Slice) -> Result<u64, Broken> {
     let mut value = 0;
     for byte in 0..9 {
@@ -273,7 +273,7 @@ fn varint(slice: &mut Slice) -> Result<u64, Broken> {
     Ok(value)
 }
 
-/// The values of a row, its number standing in for one that is left out.
+/// The values of a row; its number replaces an omitted one.
 fn record(payload: &[u8], id: i64, offset: u64) -> Result<Vec<Value>, Broken> {
     let mut values = Slice::packed(payload, offset).in_order(true);
     let head = varint(&mut values)? as usize;
@@ -304,7 +304,7 @@ fn record(payload: &[u8], id: i64, offset: u64) -> Result<Vec<Value>, Broken> {
     Ok(row)
 }
 
-/// The names of a table's columns by the statement that made it.
+/// Column names of a table, from its CREATE statement.
 fn columns_of(sql: &str) -> Vec<String> {
     let (_, columns) = sql.split_once('(').unwrap_or_default();
     let names = columns

@@ -34,7 +34,7 @@ pub enum Shape {
     Level(f64),
     /// A line from bottom to top.
     Upright(f64),
-    /// Words beside a point.
+    /// Text next to a point.
     Words(Point, Anchor, String),
 }
 
@@ -193,7 +193,7 @@ impl Series {
         Self::level(0.0).color(Color::Quiet).width(0.75)
     }
 
-    /// Words beside a point.
+    /// Text next to a point.
     pub fn words(at: Point, anchor: Anchor, text: impl Into<String>) -> Self {
         Self::new(Shape::Words(at, anchor, text.into())).color(Color::Ink)
     }

@@ -1,10 +1,10 @@
-//! Records that a log packs together.
+//! Compressed records of a log.
 
 use std::io::Read;
 
 use crate::formats::streams::bytes::Broken;
 
-/// Chunks are of some megabytes; what claims more is damaged or a bomb.
+/// Maximum chunk size: real chunks have a few megabytes, and larger claims are damage or decompression bombs.
 const LONGEST: u64 = 1 << 27;
 
 /// Unpacks a chunk into `size` bytes by the method that the file names.

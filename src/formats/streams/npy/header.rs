@@ -1,4 +1,4 @@
-//! The head of an array: a Python dictionary of its type, order and shape.
+//! The header of an array: a Python dictionary with type, order and shape.
 
 use std::io::Read;
 
@@ -8,14 +8,14 @@ use super::super::arrays::Field;
 use super::super::bytes::{Broken, Kind, Slice};
 use super::LONGEST_HEADER;
 
-/// Longer arrays within an item are no columns.
+/// Maximum length of an array within an item that becomes columns.
 const MOST_NUMBERS: usize = 64;
 
 pub struct Header {
     /// The numbers in each item of the array, and its size in bytes.
     pub fields: Vec<Field>,
     pub size: usize,
-    /// Names of what is no number.
+    /// Names of non-numeric fields.
     left_out: Vec<String>,
     pub first_is_fastest: bool,
     pub shape: Vec<usize>,
@@ -68,7 +68,7 @@ impl Header {
         Ok(header)
     }
 
-    /// What is no number and is left out, in a sentence.
+    /// Remark on omitted non-numeric fields.
     pub fn left_out(&self) -> Option<String> {
         let are = match self.left_out.len() {
             0 => return None,
@@ -121,7 +121,7 @@ impl Header {
     }
 }
 
-/// The kind of a number, whether it is big-endian, and its size in bytes; no kind for what is no number.
+/// Kind of a number (`None` if not numeric), byte order, and size in bytes.
 fn item_kind(text: &str) -> Option<(Option<(Kind, bool)>, usize)> {
     let (order, rest) = text.split_at_checked(1)?;
     let (letter, size) = rest.split_at_checked(1)?;
@@ -141,7 +141,7 @@ fn item_kind(text: &str) -> Option<(Option<(Kind, bool)>, usize)> {
     Some((Some((kind, order == ">")), size))
 }
 
-/// A head by the name that makes it a TOML document.
+/// A header with the name that makes it a TOML document.
 #[derive(Deserialize)]
 struct Document {
     head: Head,
@@ -169,7 +169,7 @@ enum Named {
     Array(String, String, Vec<usize>),
 }
 
-/// A Python dictionary as TOML has it, which has other brackets, colons and words for truth.
+/// Converts a Python dictionary to TOML, which differs in brackets, colons and booleans.
 fn as_toml(text: &str) -> String {
     let mut quote = None;
     let outside = |c: char| match c {

@@ -1,13 +1,13 @@
-//! Where the numbers of a topic are in its messages.
+//! Layout of the numbers in the messages of a topic.
 
 use std::collections::BTreeMap;
 
 use super::super::Column;
 use super::super::bytes::{Broken, Kind};
 
-/// More numbers than a message of 65,535 bytes holds.
+/// Limit above the capacity of a message of 65,535 bytes.
 const MOST: usize = 1 << 16;
-/// Topics within topics: those of PX4 go one deep.
+/// Maximum nesting of topics; PX4 uses one level.
 const DEEPEST: usize = 8;
 
 pub struct Layout {
@@ -16,7 +16,7 @@ pub struct Layout {
     length: usize,
 }
 
-/// What was found, what was expected.
+/// Content found and content expected.
 type Wrong = (String, &'static str);
 
 impl Layout {
@@ -105,7 +105,7 @@ impl Layout {
         kind.number(data.get(place..)?, false)
     }
 
-    /// The numbers of a message whose data begin at this place of the file.
+    /// The numbers of a message whose data start at this offset of the file.
     pub fn values(&self, data: &[u8], offset: u64, row: &mut Vec<f64>) -> Result<(), Broken> {
         row.clear();
         for &(place, kind) in &self.places {
@@ -123,7 +123,7 @@ impl Layout {
     }
 }
 
-/// The unit of a field, by PX4's message definitions.
+/// The unit of a field, from the PX4 message definitions.
 fn unit(topic: &str, name: &str) -> &'static str {
     let of = |start: &str| name.starts_with(start);
     let is_axis = matches!(name, "x" | "y" | "z");

@@ -1,4 +1,4 @@
-//! PX4's ULog.
+//! PX4 ULog.
 //!
 //! Source: PX4 User Guide, "ULog File Format": a header of 16 bytes, then messages, each with its size in two
 //! bytes, its kind in one and its content.
@@ -16,10 +16,10 @@ use corrections::Parameters;
 use layout::Layout;
 
 const HEADER: u64 = 16;
-/// The only incompatible flag that is known: data are appended.
+/// The only known incompatible flag: appended data.
 const APPENDED: u8 = 1;
 
-/// Topics of what an instrument senses, without filters behind it.
+/// Topics of unfiltered instrument output.
 const INERTIAL: [&str; 4] = [
     "sensor_accel",
     "sensor_gyro",
@@ -38,15 +38,15 @@ pub fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
 
 struct Ulog {
     input: Input,
-    /// Fields of each named format, as they are written.
+    /// Fields of each named format, as written.
     formats: BTreeMap<String, String>,
     parameters: Parameters,
-    /// Whether it says that PX4 wrote it, whose axes are front, right, down.
+    /// Whether PX4 wrote it, with axes front, right, down.
     is_px4: bool,
     streams: Vec<Stream>,
-    /// By the number that data messages have.
+    /// Topics by the number in data messages.
     topics: HashMap<u16, Topic>,
-    /// Where data were appended behind a message that may be cut.
+    /// Offset of data appended after a possibly truncated message.
     appended: Vec<u64>,
     message: Vec<u8>,
     offset: u64,
@@ -58,7 +58,7 @@ struct Topic {
     stream: usize,
     layout: Layout,
     undo: Undo,
-    /// Columns of the devices that are selected.
+    /// Columns of the selected devices.
     selects: PerSensor<Option<usize>>,
 }
 
@@ -140,7 +140,7 @@ impl Log for Ulog {
 }
 
 impl Ulog {
-    /// At the first message, where these devices are the selected ones.
+    /// Starts at the first message, with these selected devices.
     fn begin(input: Input, selected: PerSensor<Option<f64>>) -> Self {
         Self {
             input,
@@ -217,7 +217,7 @@ impl Ulog {
         Ok(())
     }
 
-    /// What is said of the log; nothing of it is needed.
+    /// Information about the log, mostly unused.
     fn information(&mut self) {
         let mut content = self.content();
         let length = content.length(1, "the length of a name").unwrap_or(0);
