@@ -102,7 +102,7 @@ pub enum CalibrationError {
          figures (zero only for noise-free data), the prior σ, and the samples at that time"
     )]
     Diverged {
-        /// Time in the record, s.
+        /// Time in the recording, s.
         time: f64,
     },
 }

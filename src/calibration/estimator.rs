@@ -38,7 +38,7 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
             let solved = with_causes(settled(solved, progress)?, progress)?;
             with_noise(problem, solved, progress)?
         }
-        // By hand only the record itself tells how much a move leaves.
+        // By hand only the recording itself tells how much a move leaves.
         Aiding::Velocity => with_causes(with_noise(problem, solved, progress)?, progress)?,
     };
     outcome(&solved.as_stated(problem), solved, form_test)
@@ -130,7 +130,7 @@ fn with_noise<'a>(
     progress: Progress,
 ) -> Result<Solved<'a>, CalibrationError> {
     let learnt = learn(&solved.as_stated(problem), solved.clone(), progress);
-    // Noise that the filter cannot run with, as of a record without any, leaves the stated one.
+    // Noise that the filter cannot run with, as of a recording without any, leaves the stated one.
     Ok(solved.better(learnt)?.unwrap_or(solved))
 }
 

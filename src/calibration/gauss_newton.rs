@@ -21,7 +21,7 @@ const MOST_OUTLIERS: f64 = 0.05;
 /// Maximum number of halvings of a step after a failed pass: to a thousandth.
 const MOST_SHORTENED: usize = 10;
 
-/// One pass over the record.
+/// One pass over the recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pass {
     /// The largest step of any parameter from the linearisation point, in σ.

@@ -26,7 +26,7 @@ pub struct PassResult {
     pub innovations: Vec<Innovation>,
 }
 
-/// Runs a pass through the events of a record.
+/// Runs a pass through the events of a recording.
 pub fn pass(
     problem: &Problem,
     script: &Script,

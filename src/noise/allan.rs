@@ -23,7 +23,7 @@ pub fn mean(curves: &[&Curve]) -> Curve {
 /// Minimum number of clusters for an Allan variance.
 const FEWEST_CLUSTERS: usize = 4;
 
-/// Lengths of clusters in samples: two per octave, from one sample to a quarter of the record.
+/// Lengths of clusters in samples: two per octave, from one sample to a quarter of the recording.
 pub fn cluster_sizes(samples: usize) -> Vec<usize> {
     let longest = samples / FEWEST_CLUSTERS;
     let mut sizes: Vec<usize> = (0..)

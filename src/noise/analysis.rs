@@ -65,7 +65,7 @@ fn known(labels: &[String]) -> String {
 
 impl Stretch {
     /// The longest segment with this label; without a label, the longest standstill, or the longest segment
-    /// of a record that is not continuous.
+    /// of a recording that is not continuous.
     ///
     /// # Errors
     /// [`StretchError`] if there is none, or if it is too short.

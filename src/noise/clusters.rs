@@ -1,4 +1,4 @@
-//! The cluster times of a record, and the covariance of Allan variances at them under a mixture of processes.
+//! The cluster times of a recording, and the covariance of Allan variances at them under a mixture of processes.
 //!
 //! An overlapping Allan variance is a mean of squared second differences `D`; for Gaussian noise
 //! `cov(⟨D₁²⟩, ⟨D₂²⟩) = 2 Σ cov(D₁, D₂)²` over all pairs of places. With strengths squared `c_p` that is

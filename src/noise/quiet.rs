@@ -1,4 +1,4 @@
-//! White noise of a record without stated noise.
+//! White noise of a recording without stated noise.
 
 use crate::imu::Sensor;
 use crate::recording::ImuSamples;

@@ -49,7 +49,7 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Labels of the segments, in their order in the record, repetitions included.
+    /// Labels of the segments, in their order in the recording, repetitions included.
     pub(crate) fn labels(&self) -> Vec<String> {
         self.segments.iter().map(|s| s.label.clone()).collect()
     }

@@ -89,7 +89,7 @@ impl ImuSamples {
         sensor.pick(&self.gyro, &self.accel)
     }
 
-    /// Whether they are packed, as in long records.
+    /// Whether they are packed, as in long recordings.
     pub fn is_packed(&self) -> bool {
         self.gyro.is_packed()
     }

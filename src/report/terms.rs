@@ -109,8 +109,8 @@ pub fn explained(effects: &[ErrorTermTest]) -> Table {
     Table::new("Effect of each error term", columns("term | | NIS | cost falls by | by chance | significant"))
         .sections([shown(true).map(row), shown(false).map(row)])
         .note(
-            "NIS of all observations without → with the term. Cost: −2 ln of likelihood and prior. By chance: fall \
-             expected by chance, at a total false-alarm rate of 1 in 1000 runs.",
+            "NIS of all observations without → with the term. Cost: −2 ln of likelihood and prior. By chance: limit \
+             of the fall by chance, at a total false-alarm rate of 1 in 1000 runs.",
         )
         .note("Terms that are off are tested with their usual σ and shown if significant.")
 }

@@ -20,7 +20,7 @@ use crate::run::{Dwell, Run};
 /// Residuals of gravity and turns after a calibration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
-    /// Residuals over the whole record.
+    /// Residuals over the whole recording.
     pub all: Measures,
     /// Cross-validation: residuals of a calibration without every other dwell, over these dwells and the turns that
     /// end in them; `None` if the other dwells do not give a calibration.

@@ -1,4 +1,4 @@
-//! Report on the noise of a record.
+//! Report on the noise of a recording.
 
 use std::fmt;
 

@@ -226,7 +226,7 @@ pub fn calibrated_as_held(
     };
     // What equations are linearised at follows noise, and noise that.
     for _ in 0..NOISE_ROUNDS {
-        // What noise on trial leads nowhere with is not the noise of this record.
+        // What noise on trial leads nowhere with is not the noise of this recording.
         let Ok(turned) = with(&by_hand) else {
             return Ok((stated, None));
         };

@@ -12,8 +12,8 @@ use crate::calibration::{CalibrationError, Model, Source};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{PerSensor, Sensor, Triad};
 
-/// Gyro bias to within Earth rate: mean output at rest. If the prior is so wrong that a move looks like a different
-/// one, no iteration can recover.
+/// Gyro bias, accurate to Earth rate: the mean output at rest. If the prior is so wrong that a move looks like a
+/// different one, no iteration can recover.
 pub fn gyro_bias_at_rest(dwells: &[Vec<AtRest>]) -> Vector3<f64> {
     let dwells = || dwells.iter().flatten();
     let outputs: Vector3<f64> = dwells().map(|dwell| dwell.mean.gyro.output).sum();

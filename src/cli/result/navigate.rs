@@ -53,7 +53,7 @@ pub struct Navigate {
         value_parser = latitude
     )]
     latitude_deg: Option<f64>,
-    /// Height above the ellipsoid in metres [default: 0, or that of the trajectory; shifts the trajectory]
+    /// Height above the ellipsoid in metres [default: 0, or that of the trajectory, which shifts with it]
     #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = height)]
     height_m: Option<f64>,
     /// Attitude at rest, in degrees

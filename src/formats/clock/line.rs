@@ -354,7 +354,7 @@ fn gap(file: &Path, before: f64, (time, line): (f64, u64)) -> FileError {
         Place::Line(line),
         format_args!("a gap in time from {before} s to {time} s"),
         "fewer missing rows than recorded rows",
-        "Correct the clock, or split the record there.",
+        "Correct the clock, or split the recording there.",
     )
 }
 

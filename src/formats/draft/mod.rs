@@ -154,7 +154,7 @@ impl Draft {
             draft.columns.names.clone_from(&streams.names);
             if let Some(time) = &streams.time {
                 draft.clock.unit.clone_from(&time.gyro.1);
-                "as the file says".clone_into(&mut draft.clock.why);
+                "stated in the file".clone_into(&mut draft.clock.why);
                 draft.clock.certainty = Certainty::Certain;
             }
         }

@@ -25,7 +25,7 @@ const CANDIDATES: [(usize, usize); 12] = [
     (3, 32),
     (1, MOST),
 ];
-/// The same for a hole at the start or end of the record.
+/// The same for a hole at the start or end of the recording.
 const ONE_SIDED: [(usize, usize); 4] = [(0, 1), (0, 4), (0, 16), (0, MOST)];
 /// A hole and its neighbours may span this many times their own length, other holes included.
 const REACH: usize = 4;

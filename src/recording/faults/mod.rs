@@ -22,7 +22,7 @@ pub use repair::{Repaired, Rows};
 pub use slower::Slower;
 use spikes::spikes;
 
-/// Samples of a record that do not show the instrument's input.
+/// Samples of a recording that do not show the instrument's input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fault {
     /// The kind of fault.

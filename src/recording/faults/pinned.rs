@@ -25,7 +25,7 @@ const STUCK_PART: f64 = 0.1;
 const SUM: usize = 4;
 /// Number of rows next to a run whose mean is taken.
 const NEXT: usize = 4 * SUM;
-/// Parts of the record in which repeats of repeats are counted.
+/// Parts of the recording in which repeats of repeats are counted.
 const PARTS: usize = 32;
 /// Rows on either side of a run that show how a motion continues.
 const CLOSE: usize = 16;
@@ -143,7 +143,7 @@ impl<'a> Axis<'a> {
     }
 
     /// The same for the quieter side of these rows, because a motion may start or end on the other; zero at the start
-    /// and the end of the record.
+    /// and the end of the recording.
     fn unrest_beside(&self, rows: &Range<usize>) -> f64 {
         let Some(before) = rows.start.checked_sub(CLOSE) else {
             return 0.0;
@@ -316,7 +316,7 @@ fn repeats_at_best(variance: f64) -> f64 {
     erf((8.0 * variance).sqrt().recip())
 }
 
-/// Fraction of repeats that are repeated again, in the parts of the record with most of them; the longest run
+/// Fraction of repeats that are repeated again, in the parts of the recording with most of them; the longest run
 /// of each part is excluded, because the axis may be stuck there.
 fn repeats_of_repeats(values: &[f64]) -> f64 {
     let part = values.len().div_ceil(PARTS).max(BLOCK);

@@ -1,4 +1,4 @@
-//! Parts of a record with a lower rate of rows: the same number of rows is missing at each place.
+//! Parts of a recording with a lower rate of rows: the same number of rows is missing at each place.
 
 use std::f64::consts::LN_2;
 use std::ops::Range;
@@ -7,7 +7,7 @@ use super::chance::Limit;
 use super::{Fault, FaultKind};
 use crate::recording::ImuSamples;
 
-/// A part of a record with a lower rate of rows.
+/// A part of a recording with a lower rate of rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slower {
     /// From the first sample without a row to the last.

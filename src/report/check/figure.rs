@@ -17,7 +17,7 @@ pub fn figure(run: &Run, survey: &Survey) -> Plot {
         caption += " Crosses: log faults in the samples of the triad; missing and duplicate rows appear in both.";
     }
     let panels = Sensor::ALL.map(|sensor| panel(run, survey, sensor));
-    Plot::new("record.svg", "Record", (1, 310), panels).caption(caption)
+    Plot::new("record.svg", "Recording", (1, 310), panels).caption(caption)
 }
 
 fn panel(run: &Run, survey: &Survey, sensor: Sensor) -> Panel {

@@ -127,7 +127,7 @@ pub fn standstills(run: &Run) -> Vec<Range<usize>> {
     let [gyro, accel] = Sensor::ALL.map(|sensor| Windows::of(run, sensor, length));
     let rate = STILL_SIGMAS * gyro.sigma + STILL_RATE;
     let force = STILL_SIGMAS * SQRT_2 * accel.sigma + STILL_FORCE;
-    // Beyond the record, or what is known of it.
+    // Beyond the recording, or what is known of it.
     let unknown = |k: usize| accel.means.get(k).is_none_or(|mean| mean.x.is_nan());
     let steady = |k: usize, beside: usize| {
         unknown(beside) || (accel.means[k] - accel.means[beside]).norm() < force

@@ -39,7 +39,7 @@ pub struct LabelCheck {
     pub as_labelled: Option<Range<usize>>,
 }
 
-/// Motion of a section according to the record.
+/// Motion of a section according to the recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Verdict {
     /// The label is neither a position nor a turn.
@@ -73,7 +73,7 @@ impl fmt::Display for LabelCheck {
     }
 }
 
-/// Checks every labelled section against the record, given its dwells.
+/// Checks every labelled section against the recording, given its dwells.
 pub fn checks(run: &Run, rests: &[Rest]) -> Vec<LabelCheck> {
     let standstills = standstills(run);
     let record = Record {
@@ -184,7 +184,7 @@ impl Record<'_> {
             ..after.map_or(samples.end, |dwell| dwell.start.max(samples.end))
     }
 
-    /// Time of some samples outside all dwells, s. In a record of sections, dwells follow from labels.
+    /// Time of some samples outside all dwells, s. In a recording of sections, dwells follow from labels.
     fn moving(&self, samples: &Range<usize>) -> f64 {
         let dwells = self.rests.iter().map(|rest| &rest.dwell.samples);
         let standing: usize = dwells.map(|dwell| common(dwell, samples).len()).sum();

@@ -22,7 +22,7 @@ const SIGMAS: [f64; 5] = [-2.0, -1.0, 0.0, 1.0, 2.0];
 /// the stated noise is used, if the biases of both triads vary in the model already, or if a table is read, whose
 /// attitudes show bias variation.
 ///
-/// A short record hardly shows a slowly varying bias, and the likelihood that selected the noise prefers the simpler
+/// A short recording hardly shows a slowly varying bias, and the likelihood that selected the noise prefers the simpler
 /// model. If the data contradict the stated noise, its statement of constant biases is not reliable either. Constant
 /// and varying biases of a triad then have equal prior probabilities, with σ lognormal around the usual value, as for
 /// any stated figure. The mean square error of the estimate averages these models by their posterior probabilities

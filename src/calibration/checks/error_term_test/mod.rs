@@ -31,7 +31,7 @@ pub struct ErrorTermTest {
     /// RMS σ of each of [`Group::all`] with the term divided by that without it; `None` if the group has no σ.
     pub sigma_factors: [Option<f64>; 6],
     /// Decrease of the cost, −2 ln of likelihood and prior, with the term; for varying biases, which
-    /// are not constant, decrease of −2 ln of the likelihood of the whole record.
+    /// are not constant, decrease of −2 ln of the likelihood of the whole recording.
     pub gain: f64,
     /// Limit of the gain at this term's share of the false-alarm rate: χ² with as many degrees of freedom as the
     /// term has observed states; for varying biases, from the rule that a likelihood ratio exceeds 1/p with probability
@@ -40,7 +40,7 @@ pub struct ErrorTermTest {
     /// −2 ln of the p-value of the gain, by which terms with different numbers of states
     /// are compared.
     pub significance: f64,
-    /// Its role as an explanation of the record.
+    /// Its role as an explanation of the recording.
     pub role: Role,
     /// Cost per scalar observation, which is NIS, without it …
     pub without: f64,

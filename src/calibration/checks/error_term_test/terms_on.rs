@@ -17,7 +17,7 @@ pub struct UnmodelledEffect {
     pub shown: ParameterVector,
 }
 
-/// A term as an explanation of a record.
+/// A term as an explanation of a recording.
 pub struct Explanation {
     /// ln of the likelihood ratio of the model with this term and the others that are on to the model without any.
     pub ln_likelihood_ratio: f64,
