@@ -59,7 +59,7 @@ pub enum Table1Error {
     Model(#[from] ModelError),
     /// East-North-Up has no heading near a pole.
     #[error(
-        "latitude {:.3}° is too near to a pole for East-North-Up: stay within ±{:.1}°",
+        "latitude {:.3}° is too close to a pole for East-North-Up: stay within ±{:.1}°",
         .0 / DEGREE,
         LARGEST_LATITUDE / DEGREE
     )]

@@ -353,7 +353,7 @@ const APART: f64 = 20.0;
 
 pub(super) fn figure(comparison: &Comparison) -> Plot {
     let panels = Group::all().map(|group| panel(comparison, group));
-    Plot::new("differences.svg", "Differences to the reference", (3, 320), panels).caption(format!(
+    Plot::new("differences.svg", "Differences from the reference", (3, 320), panels).caption(format!(
         "Each calibration minus the reference, {}; bars: stated 1σ. About two bars in three should include the true \
          value. If one calibration is much less accurate than another, the axis is logarithmic away from zero.",
         comparison.reference.name
