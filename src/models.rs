@@ -87,7 +87,7 @@ pub enum ModelError {
     Unknown {
         /// The file that names it, with a colon; empty for the command line.
         named_in: String,
-        /// Which folder.
+        /// The folder.
         room: &'static str,
         /// Requested name.
         name: String,

@@ -63,7 +63,7 @@ pub enum CalibrationError {
         .sensor.name()
     )]
     Singular {
-        /// Which triad.
+        /// The triad.
         sensor: Sensor,
     },
     /// No usable labelled section.
@@ -126,7 +126,7 @@ pub enum ComparisonError {
          calibrations in the same unit", .sensor.name()
     )]
     Unit {
-        /// Which triad.
+        /// The triad.
         sensor: Sensor,
         /// The first record that states a unit.
         name: String,
@@ -146,9 +146,9 @@ pub enum ComparisonError {
     Turned {
         /// The record.
         name: String,
-        /// Which triad.
+        /// The triad.
         sensor: Sensor,
-        /// Which axis.
+        /// The axis.
         axis: char,
     },
     /// Mismatch of `parameters` and `covariance`.

@@ -223,7 +223,7 @@ fn administrative(xml: &mut Xml, certificate: &Certificate) {
     });
 }
 
-/// What was calibrated.
+/// The calibrated item.
 fn item(xml: &mut Xml, item: &Item) {
     xml.element("dcc:items", |xml| {
         xml.element("dcc:item", |xml| {

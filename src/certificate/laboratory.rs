@@ -124,11 +124,11 @@ pub struct Condition {
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
 #[serde(expecting = "name, serial number and certificate as three strings in quotes")]
 pub struct Equipment {
-    /// What it is.
+    /// Its name.
     pub name: String,
     /// Its serial number.
     pub serial: String,
-    /// Its own certificate.
+    /// Its certificate.
     pub certificate: String,
 }
 
@@ -203,7 +203,7 @@ pub struct Issue {
     pub place: Place,
 }
 
-/// What was calibrated.
+/// The calibrated item.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Item {
@@ -258,7 +258,7 @@ pub struct Traceability {
 pub struct Authorised {
     /// Who.
     pub name: String,
-    /// As what.
+    /// The function.
     pub function: String,
 }
 

@@ -1,7 +1,7 @@
 //! Deviation of computed navigation from the truth: exact and nonlinear.
 //!
 //! True and computed solution obey the same equations (those of [`super::Strapdown`]). Their difference obeys the
-//! difference of these equations, without approximation: with `E = Ĉ Cᵀ` (hats on what is computed)
+//! difference of these equations, without approximation: with `E = Ĉ Cᵀ` (hats mark computed quantities)
 //!
 //! `Ė = E [C δω×] + E [ω_in×] − [ω̂_in×] E`, `δω = ω̂_ib − ω_ib`,
 //!

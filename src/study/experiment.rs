@@ -36,7 +36,7 @@ const HOUR_PATH: &str = "three-axis-hour";
 /// Minutes between two points of a curve against time.
 const EVERY: usize = 10;
 
-/// What is studied.
+/// Configuration of the study.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ExperimentStudy {
     /// The simulated scenario, with the short filter path.
@@ -86,7 +86,7 @@ impl Situation {
 /// The result.
 #[derive(Debug, Clone)]
 pub struct Experiment {
-    /// What was studied.
+    /// Configuration of the study.
     pub study: ExperimentStudy,
     /// Table time of each of [`Method::all`], s.
     pub table_times: Vec<f64>,

@@ -28,7 +28,7 @@ pub enum TemperatureError {
          range that includes it", .sensor.name()
     )]
     Outside {
-        /// Which triad.
+        /// The triad.
         sensor: Sensor,
         /// The temperature.
         found: f64,

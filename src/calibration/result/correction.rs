@@ -69,7 +69,7 @@ pub enum CorrectionError {
          instrument, or correct {}_unit in run.toml", .sensor.name(), .sensor.name()
     )]
     Unit {
-        /// Which triad.
+        /// The triad.
         sensor: Sensor,
         /// Unit of the calibration.
         calibration: String,
@@ -85,9 +85,9 @@ pub enum CorrectionError {
         match .sensor { Sensor::Gyro => "rad/s", Sensor::Accel => "m/s²" }
     )]
     Scale {
-        /// Which triad.
+        /// The triad.
         sensor: Sensor,
-        /// Which axis.
+        /// The axis.
         axis: char,
         /// Diagonal of `K C`, in the file's quantity per second.
         calibration: f64,

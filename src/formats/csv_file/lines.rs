@@ -59,7 +59,7 @@ impl From<io::Error> for Stop {
 /// The lines of a file, with a look-ahead at the first ones.
 pub struct Lines {
     source: Box<dyn BufRead>,
-    /// What ends a line.
+    /// Line ending.
     end: u8,
     ahead: VecDeque<Line>,
     /// The remaining input.

@@ -21,7 +21,7 @@ const FORMAT: &str = "turncal-job/1";
 pub struct Job {
     /// Always [`FORMAT`].
     format: String,
-    /// What kind.
+    /// Its kind.
     pub job: JobKind,
     /// The program's version.
     pub version: String,
@@ -39,7 +39,7 @@ pub struct Job {
     pub specification: Option<crate::lot::Specification>,
 }
 
-/// What kind of job.
+/// Kind of job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum JobKind {

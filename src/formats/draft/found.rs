@@ -32,11 +32,11 @@ impl Certainty {
 pub struct Found {
     /// Name, such as `gyros`.
     pub what: &'static str,
-    /// What was found.
+    /// Its value.
     pub value: String,
     /// Its certainty.
     pub certainty: Certainty,
-    /// Why.
+    /// The reason.
     pub why: String,
 }
 

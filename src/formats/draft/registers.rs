@@ -76,7 +76,7 @@ impl Rows {
     }
 }
 
-/// What counts show.
+/// Registers detected from counts.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Registers {
     pub has_rests: bool,

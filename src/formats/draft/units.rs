@@ -47,7 +47,7 @@ impl Unit {
     }
 }
 
-/// What rows hold.
+/// Quantity of the rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantities {
     pub output: Output,

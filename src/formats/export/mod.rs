@@ -29,7 +29,7 @@ use source::Source;
 pub struct Format {
     /// Its name on the command line.
     pub name: &'static str,
-    /// What reads it.
+    /// Programs that read it.
     pub about: &'static str,
     write: fn(&Source) -> Exported,
     /// Whether it represents temperature dependence, or states its omission.

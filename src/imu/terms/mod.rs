@@ -1,8 +1,8 @@
 //! Error terms of an instrument, in addition to `K`, `E` and `D`: each adds `t(q)` to the input of a triad, `N = K C (u
 //! + t(q)) + D`, with its own parameters `q`.
 //!
-//! A term is a [`TermEntry`] in a file of its own and a line of the registry below. Options, files,
-//! simulation, estimation, budget, report and exports read the entry.
+//! A term is a [`TermEntry`] in a separate file and a line of the registry below. Options, files, simulation,
+//! estimation, budget, report and exports read the entry.
 //!
 //! Source: IEEE Std 1293-2018, §5.3 (accelerometers: second and third order, cross coupling,
 //! asymmetry); IEEE Std 952-2020, §5 (gyros: acceleration sensitivity, asymmetry and nonlinearity of the

@@ -22,7 +22,7 @@ const NAMES: f32 = 128.0;
 /// Space between table columns.
 const GAP: f32 = 14.0;
 
-/// What is drawn on a page.
+/// Drawn content of a page.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Drawn {
     Text {
@@ -37,7 +37,7 @@ pub enum Drawn {
     },
 }
 
-/// How letters are.
+/// Font style.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Style {
     pub size: f32,
@@ -389,7 +389,7 @@ pub enum PdfError {
     NoGlyph {
         /// The character.
         character: char,
-        /// Where it stands.
+        /// Its position.
         text: String,
     },
     /// The file would violate the standard.

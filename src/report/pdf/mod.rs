@@ -25,7 +25,7 @@ pub struct Attached {
     pub name: String,
     /// Its MIME type.
     pub mime: &'static str,
-    /// What it is.
+    /// Its description.
     pub description: String,
     /// Whether it has the same content as the pages, in machine-readable form.
     pub alternative: bool,

@@ -95,7 +95,7 @@ impl Axis {
         self
     }
 
-    /// Holds these, too.
+    /// Includes these values.
     pub fn including(mut self, values: impl IntoIterator<Item = f64>) -> Self {
         self.including.extend(values);
         self

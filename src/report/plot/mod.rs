@@ -18,11 +18,11 @@ pub struct Plot {
     pub heading: String,
     /// Instructions for reading it, one or two sentences.
     pub caption: String,
-    /// What is drawn.
+    /// Its content.
     pub body: Body,
 }
 
-/// What is drawn.
+/// Its content.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Body {
     /// Panels row by row.

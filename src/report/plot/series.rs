@@ -3,9 +3,9 @@
 /// A series drawn with one pen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// What.
+    /// Its shape.
     pub shape: Shape,
-    /// How.
+    /// Its pen.
     pub pen: Pen,
     /// Name at the right end of the panel.
     pub label: Option<String>,
@@ -98,9 +98,9 @@ pub enum Color {
 pub enum Dash {
     /// None.
     Solid,
-    /// Long ones.
+    /// Long dashes.
     Dashed,
-    /// Short ones.
+    /// Short dashes.
     Dotted,
 }
 

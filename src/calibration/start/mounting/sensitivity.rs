@@ -13,9 +13,9 @@ pub const NEXT_RANGE: f64 = std::f64::consts::SQRT_2;
 /// A triad, or one axis of it, with a sensitivity different from the stated one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensitivity {
-    /// Which triad.
+    /// The triad.
     pub sensor: Sensor,
-    /// Which axes.
+    /// The axes.
     pub axes: Axes,
     /// Factors relative to the stated sensitivity: the most likely, and others that are hardly less likely.
     pub factors: Vec<f64>,

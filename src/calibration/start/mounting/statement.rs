@@ -62,7 +62,7 @@ impl fmt::Display for Mounting {
     }
 }
 
-/// What is wrong.
+/// The error in words.
 fn said(orders: &PerSensor<AxisOrder>) -> String {
     let PerSensor { gyro, accel } = orders;
     if gyro == accel && gyro.is_rotation() {

@@ -37,7 +37,7 @@ pub struct Stated {
 /// 1σ tolerances of an instrument before calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tolerances {
-    /// Of which kind.
+    /// Its kind.
     pub of: String,
     /// Scale factor, relative.
     pub scale: PerSensor<f64>,

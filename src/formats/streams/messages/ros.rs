@@ -45,7 +45,7 @@ enum FieldKind {
 #[derive(Clone, Copy, PartialEq)]
 enum Many {
     One,
-    /// So many.
+    /// A fixed number.
     Fixed(usize),
     /// Number stated in the message.
     Any,
