@@ -26,7 +26,7 @@ pub struct GainCache<const M: usize, const G: usize> {
     pub course: Vec<Point<M, G>>,
 }
 
-/// A point of a sequence.
+/// What is known after an event of a sequence.
 pub struct Point<const M: usize, const G: usize> {
     /// The event that led to it.
     event: Event,
@@ -40,7 +40,7 @@ enum Event {
     Begin,
     /// A step of this model.
     Step(usize),
-    /// Three navigation errors from a state on are observed, each with this variance.
+    /// Three navigation errors are observed, starting at this state, each with this variance.
     Observed(usize, f64),
 }
 
@@ -111,7 +111,7 @@ impl<const M: usize, const G: usize> GainCache<M, G> {
         from + 1
     }
 
-    /// The point after an observation of three navigation errors from a state on, each with this variance; `None`
+    /// The point after an observation of three navigation errors, starting at `state`, each with this variance; `None`
     /// if their covariance is not positive definite.
     pub fn observe(&mut self, from: usize, state: usize, variance: f64) -> Option<usize> {
         let event = Event::Observed(state, variance);

@@ -41,8 +41,8 @@ pub fn leave_nothing_behind() {
     }
 }
 
-/// Whether the process was started with a signal ignored, as by `nohup`; this is kept. Assumed false if the system does
-/// not tell.
+/// Whether the process was started with a signal ignored, as by `nohup`; it then stays ignored. False if the system
+/// does not provide this.
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

@@ -34,7 +34,7 @@ pub fn log_columns(run: &Run) -> Table {
     Table::new(
         "Columns",
         columns(
-            "column | body axis | smallest | times | largest | times | unit | step | as a rate",
+            "column | body axis | smallest | count | largest | count | unit | step | step as rate",
         ),
     )
     .section(rows)

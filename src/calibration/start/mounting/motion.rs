@@ -36,7 +36,7 @@ pub struct Sensed {
 pub struct Move {
     /// The dwell before it, by number.
     pub from: usize,
-    /// `C` from the body axes after it to those before, by the table.
+    /// Rotation matrix from the body axes after the move to those before it, according to the table.
     pub known: Option<Matrix3<f64>>,
     /// Rotation from the gyros, unchanged and with all of them reversed.
     pub turns: [Turned; 2],

@@ -65,7 +65,7 @@ impl Stage {
         if target.file_name().is_none() {
             return Err(FileError::of(
                 target,
-                "a path without a final name",
+                "a path that does not end in a name",
                 "the name of a file or directory to write",
                 "Give a name that does not end in `..` or `/`.",
             ));
