@@ -1,4 +1,4 @@
-//! Calibrates a recording that is in memory: increments of both triads at 100 Hz, without a table.
+//! Calibrates a recording in memory: increments of both triads at 100 Hz, without a table.
 //!
 //! Run it with `cargo run --release --example from_arrays`.
 

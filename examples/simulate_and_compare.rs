@@ -1,5 +1,5 @@
-//! Simulates a run on a turntable, calibrates it by the filter and by the closed form, and holds both
-//! against the truth.
+//! Simulates a run on a turntable, calibrates it with the filter and with the closed form, and compares both with the
+//! truth.
 //!
 //! Run it with `cargo run --release --example simulate_and_compare`.
 

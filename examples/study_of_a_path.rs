@@ -1,5 +1,5 @@
-//! What a path of one's own would show of an instrument: the Cramér–Rao bound of every parameter group,
-//! here of the nineteen positions from two start attitudes.
+//! Evaluates a custom path: the Cramér–Rao bound of every parameter group, here for the nineteen positions from two
+//! start attitudes.
 //!
 //! Run it with `cargo run --release --example study_of_a_path`.
 

@@ -51,7 +51,7 @@ pub fn orthonormalised(c: &Matrix3<f64>) -> Matrix3<f64> {
     c * (Matrix3::identity() * 1.5 - c.tr_mul(c) * 0.5)
 }
 
-/// The mean of attitudes that are close together; `None` without attitudes.
+/// The mean of attitudes that are close together; `None` for an empty list.
 pub fn mean(attitudes: &[UnitQuaternion<f64>]) -> Option<Matrix3<f64>> {
     let first = attitudes.first()?;
     let back = first.inverse();
@@ -108,7 +108,7 @@ pub fn tilt(direction: &Vector3<f64>) -> Vector3<f64> {
     across.try_normalize(0.0).unwrap_or(Vector3::x()) * angle
 }
 
-/// Some attitude `C_b_n` in which this unit vector along body axes is up.
+/// An attitude `C_b_n` in which this unit vector in body axes points up.
 pub fn level(up: &Vector3<f64>) -> Matrix3<f64> {
     let across = Vector3::ith(up.iamin(), 1.0);
     let east = across.cross(up).normalize();

@@ -35,7 +35,7 @@ pub fn normal_gravity(latitude: f64, height: f64) -> f64 {
             + 3.0 * h * h)
 }
 
-/// Derivatives of [`normal_gravity`] by latitude, m/s² per rad, and by height, m/s² per m.
+/// Derivatives of [`normal_gravity`] with respect to latitude, m/s² per rad, and height, m/s² per m.
 pub fn normal_gravity_gradient(latitude: f64, height: f64) -> (f64, f64) {
     let (s, c) = latitude.sin_cos();
     let s2 = s * s;
@@ -82,7 +82,7 @@ impl Curvature {
         }
     }
 
-    /// Derivatives of the radii by latitude, m per rad.
+    /// Derivatives of the radii with respect to latitude, m per rad.
     pub fn slope(latitude: f64) -> Self {
         let (s, c) = latitude.sin_cos();
         let at = Self::at(latitude);
@@ -103,7 +103,7 @@ pub struct Site {
     pub longitude: f64,
     /// Height above the ellipsoid in m.
     pub height: f64,
-    /// Magnitude of gravity in m/s², plumb-line gravity with its centrifugal part.
+    /// Magnitude of gravity in m/s², including the centrifugal part.
     pub gravity: f64,
     /// Its 1σ in m/s². The scale factors of all three accelerometers share its error.
     pub gravity_sigma: f64,
@@ -125,7 +125,7 @@ pub const ANOMALY_SIGMA: f64 = 30.0 * MILLIGAL;
 const ANYWHERE: (f64, f64) = (9.806, 0.015);
 
 impl Site {
-    /// An unknown site on the Earth. If a latitude is needed nevertheless, it is that of the mean gravity.
+    /// An unknown site on the Earth. If a latitude is still needed, it is the one with mean gravity.
     pub fn unknown() -> Self {
         let (gravity, gravity_sigma) = ANYWHERE;
         Self {
@@ -138,7 +138,7 @@ impl Site {
         }
     }
 
-    /// A site with normal gravity, known to within the usual anomaly.
+    /// A site with normal gravity, whose σ is the usual anomaly.
     pub fn with_normal_gravity(latitude: f64, longitude: f64, height: f64) -> Self {
         Self {
             latitude,
@@ -159,7 +159,7 @@ impl Site {
         }
     }
 
-    /// Gravity in East-North-Up, m/s². It points down, so a body at rest senses minus this.
+    /// Gravity in East-North-Up, m/s². It points down, so a body at rest senses the negative of it.
     pub fn gravity_n(&self) -> Vector3<f64> {
         Vector3::new(0.0, 0.0, -self.gravity)
     }

@@ -1,10 +1,10 @@
 //! Calibration of an inertial measurement unit on a turntable: scale factors K, installation matrix E and
 //! biases D of gyros and accelerometers, with a σ of each.
 //!
-//! An error-state extended Kalman filter runs a strapdown navigation solution through a recording and
-//! attributes its errors at rest (velocity, attitude of the table) to the parameters; passes over the
-//! whole recording, each linearised at the estimate of the one before, are the iterations of a
-//! Gauss–Newton method. The closed form from static positions (Zhao, Jiang, Li 2016) is the baseline.
+//! An error-state extended Kalman filter runs a strapdown navigation solution through a recording and estimates the
+//! parameters from its errors at rest (velocity and table attitude). Passes over the whole recording, each linearised
+//! at the previous estimate, are the iterations of a Gauss–Newton method. The closed form from static positions (Zhao,
+//! Jiang, Li 2016) is the baseline.
 //!
 //! # Calibrate
 //! ```
@@ -34,19 +34,19 @@
 //! |---|---|
 //! | navigation frame n | East-North-Up at the site |
 //! | body frame b | right-front-up: the table's mounting face, or fixed by the accelerometers without a table ([`imu::BodyFrame`]) |
-//! | attitude | `C_b_n` takes body to navigation; heading is clockwise from North |
+//! | attitude | `C_b_n` transforms body to navigation; heading is clockwise from North |
 //! | instrument | `N = K C u + D`, u the angular rate in rad/s or the specific force in m/s² ([`imu`]) |
 //! | navigation errors | computed − true, `C_computed = (I − [φ×]) C_true` |
 //! | parameter errors | true − estimated |
-//! | units | SI and radians everywhere; [`units`] and [`formats`] convert at the edges |
+//! | units | SI and radians everywhere; [`units`] and [`formats`] convert at input and output |
 //!
 //! # Rooms
 //! A [`recording::Recording`] is data. A [`run::Run`] adds prior knowledge: instrument, site, table.
-//! [`calibration::Options`] select the estimated quantities; a [`calibration::Problem`] preprocesses all of it
-//! once. Data flow one way: [`formats`] read runs, [`calibration`] solves, [`study`] evaluates by navigation and
-//! Monte Carlo, [`lot`] compares units of one type, `report` presents the results. [`earth`], [`attitude`],
-//! [`imu`], [`turntable`] and [`navigation`] do not depend on these; [`simulation`] generates runs from
-//! [`models`]; [`survey`] examines a run before calibration, [`noise`] its noise.
+//! [`calibration::Options`] select the estimated quantities; a [`calibration::Problem`] preprocesses all of it once.
+//! Data flow in one direction: [`formats`] read runs, [`calibration`] solves, [`study`] evaluates by navigation and
+//! Monte Carlo, [`lot`] compares units of one type, `report` presents the results. [`earth`], [`attitude`], [`imu`],
+//! [`turntable`] and [`navigation`] do not depend on these; [`simulation`] generates runs from [`models`]; [`survey`]
+//! examines a run before calibration, [`noise`] its noise.
 //!
 //! # Features
 //! `report` (pages, figures, tables), `certificate` (calibration certificates as PDF/A-3 and XML, with

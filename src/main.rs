@@ -1,6 +1,6 @@
 //! The `turncal` command.
 
-/// A line on standard error. A reader that has seen enough, such as `head`, is no failure.
+/// Prints a line on standard error. A closed pipe, as with `head`, is not a failure.
 macro_rules! tell {
     ($($words:tt)*) => {
         let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("{}\n", format_args!($($words)*)));

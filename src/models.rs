@@ -1,8 +1,7 @@
-//! What a user may edit: instruments, installations, tables, paths, scenarios and trajectories as TOML
-//! files.
+//! Files that a user may edit: instruments, installations, tables, paths, scenarios and trajectories in TOML.
 //!
-//! The files of the `models/` folder are embedded. A path to an existing file wins over an embedded
-//! name, on the command line and in a user's scenario; an embedded scenario names embedded models.
+//! The files of the `models/` folder are embedded. An existing file takes precedence over an embedded name, on the
+//! command line and in the scenario of a user; embedded scenarios use only embedded models.
 
 mod by_hand;
 mod catalogue;
@@ -29,9 +28,9 @@ pub use trajectory::trajectory;
 /// A folder of models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Room {
-    /// Instruments: noise, pulses, and how they differ before calibration.
+    /// Instruments: noise, pulses, and tolerances before calibration.
     Imu,
-    /// Installation forms and how large their angles are.
+    /// Installation forms and sizes of their angles.
     Installation,
     /// Turntables.
     Turntable,
@@ -39,7 +38,7 @@ pub enum Room {
     Path,
     /// Whole simulated runs.
     Scenario,
-    /// Recordings of one instrument, to be simulated.
+    /// Simulated recordings of one instrument.
     Campaign,
     /// Trajectories to navigate along.
     Trajectory,
@@ -48,7 +47,7 @@ pub enum Room {
 }
 
 impl Room {
-    /// All folders, those first that commands name most.
+    /// All folders, in order of frequency of use.
     pub const ALL: [Self; 8] = [
         Self::Scenario,
         Self::Campaign,
@@ -84,27 +83,27 @@ impl Room {
 
 static MODELS: Dir = include_dir::include_dir!("$CARGO_MANIFEST_DIR/models");
 
-/// Why a model cannot be had.
+/// Error in finding or reading a model.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelError {
     /// Neither a file nor an embedded name.
     #[error(
-        "{named_in}no {room} model \"{name}\"{}: it is neither a file nor one of {known}",
+        "{named_in}no {room} model \"{name}\"{}: it is neither a file nor one of the models {known}",
         nearest.map_or_else(String::new, |nearest| format!(" (did you mean \"{nearest}\"?)"))
     )]
     Unknown {
         /// The file that names it, with a colon; empty for the command line.
         named_in: String,
-        /// Which folder.
+        /// The folder.
         room: &'static str,
-        /// What was asked for.
+        /// Requested name.
         name: String,
-        /// The nearest embedded name, if one is near.
+        /// The most similar embedded name, if any.
         nearest: Option<&'static str>,
         /// All embedded names.
         known: String,
     },
-    /// A file that cannot be read, or is not what it should be.
+    /// An unreadable or invalid file.
     #[error(transparent)]
     File(#[from] FileError),
 }
@@ -114,7 +113,7 @@ pub fn names(room: Room) -> impl Iterator<Item = &'static str> {
     room.embedded().map(|(name, _)| name)
 }
 
-/// Where a model is named, which decides what its name can mean.
+/// Place where a model is named, which determines how its name is resolved.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Place {
     /// On the command line: a path from the working directory, or an embedded name.
@@ -130,14 +129,14 @@ pub enum Place {
 pub struct Text {
     /// The file's content.
     pub text: String,
-    /// What to call the file in messages.
+    /// File name for messages.
     pub file: String,
-    /// Where the models are that it names.
+    /// Place of the models that it names.
     pub place: Place,
 }
 
 impl Text {
-    /// The file's name without folder and extension.
+    /// The file name without folder and extension.
     pub fn name(&self) -> String {
         Path::new(&self.file)
             .file_stem()
@@ -156,13 +155,13 @@ impl Text {
         }
     }
 
-    /// Values that do not fit together: what is wrong and what to do.
+    /// Inconsistent values: problem and remedy.
     pub(crate) fn inconsistent(&self, message: impl Into<String>) -> ModelError {
         inconsistent(&self.file, message)
     }
 }
 
-/// The same of a file by its name.
+/// The same for a named file.
 pub(crate) fn inconsistent(file: &str, message: impl Into<String>) -> ModelError {
     let error = FileError {
         file: file.into(),
@@ -172,7 +171,7 @@ pub(crate) fn inconsistent(file: &str, message: impl Into<String>) -> ModelError
     error.into()
 }
 
-/// Finds a model: the file at `name_or_path` if there is one, else the embedded model of that name.
+/// Finds a model: the file at `name_or_path` if it exists, otherwise the embedded model with that name.
 ///
 /// # Errors
 /// If there is neither, or the file cannot be read.

@@ -1,4 +1,4 @@
-//! Numbers as a reader wants them: digits up to the second that σ leaves meaning to.
+//! Number formatting: digits up to the second significant digit of σ.
 
 use crate::units::{HOUR, MINUTE};
 
@@ -13,7 +13,7 @@ fn decimals(sigma: f64) -> usize {
     }
 }
 
-/// A value with the digits that its σ leaves meaning to; a dash if it is not a number.
+/// A value with the digits that are significant given its σ; a dash if it is not a number.
 pub fn value(value: f64, sigma: f64) -> String {
     if !value.is_finite() {
         return "–".to_owned();
@@ -26,7 +26,7 @@ pub fn value(value: f64, sigma: f64) -> String {
     }
 }
 
-/// A quantity that is its own measure of accuracy, to two digits.
+/// An accuracy, to two digits.
 pub fn sigma(sigma: f64) -> String {
     value(sigma, sigma)
 }
@@ -95,13 +95,13 @@ pub fn count(n: usize) -> String {
     text
 }
 
-/// An interval with the digits that its width leaves meaning to.
+/// An interval with the digits that are significant given its width.
 pub fn interval((low, high): (f64, f64)) -> String {
     let fine = 0.5 * (high - low);
     format!("{}…{}", value(low, fine), value(high, fine))
 }
 
-/// A value with the digits that its interval leaves meaning to, and the interval.
+/// A value with the digits that are significant given its interval, and the interval.
 pub fn with_interval(of: f64, (low, high): (f64, f64)) -> [String; 2] {
     [value(of, 0.5 * (high - low)), interval((low, high))]
 }
@@ -141,7 +141,7 @@ pub fn minutes(seconds: f64) -> String {
     format!("{} min", three_digits(seconds / MINUTE))
 }
 
-/// A tick of an axis whose ticks are `step` apart.
+/// An axis tick label for ticks `step` apart.
 pub fn tick(x: f64, step: f64) -> String {
     if x == 0.0 {
         return "0".to_owned();
@@ -150,7 +150,7 @@ pub fn tick(x: f64, step: f64) -> String {
     value(x, 10f64.powi(1 - places as i32))
 }
 
-/// A power of ten, written out while that is short.
+/// A power of ten, written out if short.
 pub fn power_of_ten(exponent: i32) -> String {
     if (-3..=4).contains(&exponent) {
         let step = 10f64.powi(exponent);

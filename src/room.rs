@@ -1,12 +1,12 @@
-//! Whether there is memory for what comes.
+//! Check of available memory.
 
 use std::hint::black_box;
 
 /// Whether this number of bytes can be allocated now.
 ///
-/// An allocation that fails within a calculation ends the program, and safe code cannot catch that. What a
-/// step will take is therefore asked for as a whole before it begins, where an error can still be given, and
-/// let go again; memory that is never touched costs nothing.
+/// A failed allocation during a calculation aborts the program, and safe code cannot catch it. The memory for a whole
+/// step is therefore allocated before the step starts, when an error can still be returned, and then released;
+/// untouched memory costs nothing.
 pub fn is_there(bytes: usize) -> bool {
     let mut room: Vec<u8> = Vec::new();
     let granted = room.try_reserve_exact(bytes).is_ok();

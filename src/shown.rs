@@ -1,4 +1,4 @@
-//! Text of others as it is shown.
+//! Display of external text.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ pub fn excerpt(text: &str) -> String {
     }
 }
 
-/// No file system has longer names.
+/// Longest file name of any file system.
 const LONGEST_NAME: usize = 255;
 
 /// A path as given, except that names too long for a file are cut.

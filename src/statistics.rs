@@ -6,7 +6,7 @@ use statrs::function::beta::beta_reg;
 use statrs::function::gamma::ln_gamma;
 use statrs::statistics::{Data, OrderStatistics};
 
-/// False-alarm rate of a whole list of checks; each check has its share of it.
+/// False-alarm rate of a whole list of checks, divided among them.
 pub const FALSE_ALARM: f64 = 1e-3;
 
 /// σ of a normal distribution over the median of its absolute deviations.
@@ -47,7 +47,7 @@ pub fn ln_survival(freedom: f64, x: f64) -> f64 {
     a * z.ln() - z - ln_gamma(a) + fraction.ln()
 }
 
-/// Degrees of freedom from which t is the normal distribution and its first correction, to 1e-7.
+/// Degrees of freedom above which t equals the normal distribution with its first correction, to 1e-7.
 const MANY: f64 = 1e4;
 
 /// The limit that Student's t exceeds with probability `chance`, which is below one half; `degrees` of freedom are at
@@ -78,12 +78,12 @@ pub fn student_limit(degrees: f64, chance: f64) -> f64 {
     }
 }
 
-/// The median of some numbers, which are reordered; `None` without values.
+/// The median of these numbers, which are reordered; `None` for an empty list.
 pub fn median(values: &mut [f64]) -> Option<f64> {
     (!values.is_empty()).then(|| Data::new(values).median())
 }
 
-/// Median of each axis; `None` without vectors.
+/// Median of each axis; `None` for an empty list.
 pub fn median_of_axes(vectors: &[Vector3<f64>]) -> Option<Vector3<f64>> {
     let of = |axis: usize| median(&mut vectors.iter().map(|v| v[axis]).collect::<Vec<_>>());
     Some(Vector3::new(of(0)?, of(1)?, of(2)?))

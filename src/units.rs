@@ -1,7 +1,7 @@
-//! Units at the edges: one SI or radian value per named unit.
+//! Units for input and output: one SI or radian value per named unit.
 //!
-//! Inside the crate everything is SI and radians. A value enters as `x * UNIT` and leaves as
-//! `x / UNIT`; nothing else converts.
+//! Inside the crate, all values are in SI units and radians. Input is converted by `x * UNIT` and output by `x / UNIT`;
+//! there are no other conversions.
 
 use std::f64::consts::PI;
 

@@ -13,7 +13,7 @@ use crate::imu::{PerSensor, TermVector, ThermalCoefficients, Triad};
 /// The bound of a run: the least covariance of any estimator.
 #[derive(Debug, Clone)]
 pub struct Bound {
-    /// The truth, with the covariance that is the bound.
+    /// The truth, with the bound as its covariance.
     pub estimate: Estimate,
     /// Covariance of the parameters of error terms and table.
     pub auxiliary: Auxiliary,
@@ -104,7 +104,7 @@ fn pass_at(problem: &Problem, truth: Linearisation) -> Result<PassResult, Calibr
 }
 
 /// Bound for the variances of any joint estimator of several recordings, at a truth with these temperature
-/// coefficients: of the parameters of both triads at the reference, then of the coefficients that are on.
+/// coefficients: first the parameters of both triads at the reference, then the enabled coefficients.
 ///
 /// # Errors
 /// [`CalibrationError`] as for [`super::estimate`].

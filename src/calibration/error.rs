@@ -13,14 +13,14 @@ use crate::run::motion::LabelCheck;
 pub enum CalibrationError {
     /// Table aiding without a table.
     #[error(
-        "the run has no [turntable]: attitudes of a table need its log; name it in run.toml, or leave \
-         --aiding table out"
+        "the run has no [turntable], which --aiding table requires. Add the table log to run.toml, or omit --aiding \
+         table"
     )]
     NoTable,
     /// A log with only one triad.
     #[error(
-        "the log has no columns of {0}, and a calibration needs both triads: name the columns in run.toml, or see the \
-         noise of the triad that is there by `turncal allan`", .sensor.name()
+        "the log has no {0} columns, and a calibration needs both triads. Name the columns in run.toml, or analyse \
+         the noise of the other triad with `turncal allan`", .sensor.name()
     )]
     OneTriad {
         /// The missing triad.
@@ -28,8 +28,8 @@ pub enum CalibrationError {
     },
     /// Not enough memory for a calibration.
     #[error(
-        "{samples} samples were read, and there is no memory to calibrate them, about {megabytes} MB; give it \
-         more, or split the record"
+        "not enough memory to calibrate {samples} samples (about {megabytes} MB needed). Free some memory, or split \
+         the recording"
     )]
     NoMemory {
         /// Number of samples of all runs.
@@ -39,9 +39,9 @@ pub enum CalibrationError {
     },
     /// Temperature-dependent parameters with a recording that has no temperature.
     #[error(
-        "recording {number}, {recording}, has no temperature that could be used, which parameters are to follow: \
-         name the column in its run.toml (columns, `temperature`), or temperature_degc in [meta] or beside the \
-         recording in the campaign; or calibrate it apart"
+        "recording {number}, {recording}, has no usable temperature, which the temperature model needs. Name the \
+         column in its run.toml (columns, `temperature`), state temperature_degc in [meta] or for this recording in \
+         the campaign, or calibrate it separately"
     )]
     NoTemperature {
         /// Its name.
@@ -51,26 +51,26 @@ pub enum CalibrationError {
     },
     /// No dwell.
     #[error(
-        "no still interval (dwell) was found. Hold the sensor still for at least {LONG_ENOUGH} s between turns, at \
-         best with each axis up and each axis down. Check the table's log, and reading_sigma_arcsec if it is noisier \
-         than stated; without a log, the gyros' prior bias and noise figures"
+        "no still interval (dwell) was found. Hold the sensor still for at least {LONG_ENOUGH} s between turns, \
+         preferably with each axis up and down. With a table, check its log and reading_sigma_arcsec; without one, \
+         check the prior gyro bias and the noise figures"
     )]
     NoDwells,
     /// A prior with σ of zero, or a diverged estimate.
     #[error(
-        "the {} data contradict [imu.prior.{0}] (the fit diverged: K·C became singular). Check scale and units there, \
-         and whether an axis is dead, stuck or wrapped, rows are lost or the table's log is of another run",
+        "the {} data contradict [imu.prior.{0}] (the fit diverged: K·C became singular). Check scale and units \
+         there. Also check for dead, stuck or wrapped axes, lost rows, and a table log from a different run",
         .sensor.name()
     )]
     Singular {
-        /// Which triad.
+        /// The triad.
         sensor: Sensor,
     },
     /// No usable labelled section.
     #[error(
-        "of the sections {} none tells how the instrument stands or turns, or a part of each is lost; \
-         name positions and turns such as `x_up`, `x_down`, `rot_x+360`, or leave [segments] out and let \
-         every dwell and turn count", quoted(.labels)
+        "none of the sections {} has a label for a position or turn, or each is partly missing. Use labels such as \
+         `x_up`, `x_down` and `rot_x+360`, or remove [segments] so that turncal uses every dwell and \
+         turn", quoted(.labels)
     )]
     NoSections {
         /// Labels of the sections.
@@ -78,8 +78,8 @@ pub enum CalibrationError {
     },
     /// Every labelled section contradicts its label.
     #[error(
-        "no labelled section does what its label says, expected at least one: {}; correct [segments], or \
-         leave it out and let every dwell and turn count", .contradicted.iter().map(LabelCheck::to_string).collect::<Vec<_>>().join("; ")
+        "no labelled section matches its label: {}. Correct [segments], or remove it so that turncal uses every \
+         dwell and turn", .contradicted.iter().map(LabelCheck::to_string).collect::<Vec<_>>().join("; ")
     )]
     LabelsContradicted {
         /// The contradicted sections.
@@ -88,7 +88,7 @@ pub enum CalibrationError {
     /// Stopped by the progress callback.
     #[error("stopped before the iterations ended; nothing was written")]
     Stopped,
-    /// A statement of run.toml that the record contradicts.
+    /// A statement in run.toml that the recording contradicts.
     #[error("{}{contradiction}", .recording.iter().map(|name| format!("{name}: ")).collect::<String>())]
     Contradicted {
         /// The run, if there are several.
@@ -96,13 +96,13 @@ pub enum CalibrationError {
         /// The contradicted statement.
         contradiction: Box<Contradiction>,
     },
-    /// Samples that no error within the prior explains, or unrealistic noise figures.
+    /// Samples that no error within the prior can explain, or unrealistic noise figures.
     #[error(
-        "the filter diverged at {time:.2} s: samples and run.toml do not fit each other; check latitude, \
-         units, noise figures (zero only without noise), the prior's σ, and the samples there"
+        "the filter diverged at {time:.2} s because the samples do not fit run.toml. Check latitude, units, noise \
+         figures (zero only for noise-free data), the prior σ, and the samples at that time"
     )]
     Diverged {
-        /// Time in the record, s.
+        /// Time in the recording, s.
         time: f64,
     },
 }
@@ -116,15 +116,17 @@ fn quoted(labels: &[String]) -> String {
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum ComparisonError {
     /// Only one calibration.
-    #[error("a single calibration and no truth; give a second calibration, or a truth")]
+    #[error(
+        "one calibration without a truth cannot be compared. Give a second calibration or a truth"
+    )]
     Single,
     /// Outputs of different quantities.
     #[error(
-        "{other} has the {} unit `{found}`, {name} has `{expected}`: their numbers cannot be \
-         compared; give calibrations of outputs in the same unit", .sensor.name()
+        "{other} has the {} unit `{found}` and {name} has `{expected}`, so they cannot be compared. Give \
+         calibrations in the same unit", .sensor.name()
     )]
     Unit {
-        /// Which triad.
+        /// The triad.
         sensor: Sensor,
         /// The first record that states a unit.
         name: String,
@@ -135,24 +137,24 @@ pub enum ComparisonError {
         /// The other unit.
         found: String,
     },
-    /// An axis that is not near the body axis of its name.
+    /// An axis far from the body axis of its name.
     #[error(
-        "{name}: the {} {axis} axis is a right angle or more away from body {axis} (by the sign of \
-         the reference's scale factor), or the matrix K·C is singular; bring the calibrations to \
-         the same body axes and signs first", .sensor.name()
+        "{name}: the {} {axis} axis is 90° or more from body {axis} (by the sign of the scale factor in the \
+         reference), or the matrix K·C is singular. Convert the calibrations to the same body axes and signs \
+         first", .sensor.name()
     )]
     Turned {
         /// The record.
         name: String,
-        /// Which triad.
+        /// The triad.
         sensor: Sensor,
-        /// Which axis.
+        /// The axis.
         axis: char,
     },
-    /// `parameters` and `covariance` that do not fit.
+    /// Mismatch of `parameters` and `covariance`.
     #[error(
-        "{name}: covariance needs one row and one column for each name in parameters, and each must \
-         be a parameter of the record's installation form; write the calibration again"
+        "{name}: covariance needs one row and one column per entry of parameters, and each entry must be a parameter \
+         of the installation form. Write the calibration again"
     )]
     Covariance {
         /// The record.

@@ -1,4 +1,4 @@
-//! The estimator: coarse start, and Gauss–Newton iterations with the linearisation held until nothing moves.
+//! The estimator: coarse start, then Gauss–Newton iterations, each with a fixed linearisation, until convergence.
 
 use crate::calibration::checks::cause::{Causes, settling};
 use crate::calibration::checks::form::form_test;
@@ -12,7 +12,7 @@ use crate::calibration::{
 };
 use crate::run::Aiding;
 
-/// Number of dwells per cause: more causes would explain noise.
+/// Least number of dwells per cause; more causes would fit noise.
 const DWELLS_OF_ONE: usize = 6;
 
 /// Estimates both triads from zero velocity in dwells and, if observed, the attitude of the table.
@@ -38,13 +38,13 @@ pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, Calibr
             let solved = with_causes(settled(solved, progress)?, progress)?;
             with_noise(problem, solved, progress)?
         }
-        // By hand only the record itself tells how much a move leaves.
+        // By hand only the recording itself tells how much a move leaves.
         Aiding::Velocity => with_causes(with_noise(problem, solved, progress)?, progress)?,
     };
     outcome(&solved.as_stated(problem), solved, form_test)
 }
 
-/// The outcome, with the errors that no pass models added to its covariance.
+/// The outcome, with unmodelled errors added to its covariance.
 fn outcome(
     as_stated: &Problem,
     solved: Solved,
@@ -61,8 +61,7 @@ fn outcome(
     Ok(outcome)
 }
 
-/// Drops the settling time after each stop, repeatedly until no more is found; unchanged if it is longer than a table
-/// needs to settle.
+/// Drops the settling time after each stop, until none is found; unchanged if it exceeds the settling time of a table.
 fn settled<'a>(before: Solved<'a>, progress: Progress) -> Result<Solved<'a>, CalibrationError> {
     let mut solved = before.clone();
     loop {
@@ -79,7 +78,7 @@ fn settled<'a>(before: Solved<'a>, progress: Progress) -> Result<Solved<'a>, Cal
     }
 }
 
-/// Includes the causes that the record shows, the likeliest first, until none is significant.
+/// Includes the causes found in the recording, the most likely first, until none is significant.
 fn with_causes<'a>(
     mut solved: Solved<'a>,
     progress: Progress,
@@ -95,7 +94,7 @@ fn with_causes<'a>(
     Ok(solved)
 }
 
-/// Includes the likeliest cause that is significant against its residuals; also returns the causes that then remain.
+/// Includes the most likely cause that is significant; also returns the remaining causes.
 fn with_one<'a>(
     solved: &Solved<'a>,
     causes: &Causes,
@@ -131,12 +130,12 @@ fn with_noise<'a>(
     progress: Progress,
 ) -> Result<Solved<'a>, CalibrationError> {
     let learnt = learn(&solved.as_stated(problem), solved.clone(), progress);
-    // Noise that the filter cannot run with, as of a record without any, leaves the stated one.
+    // Noise that the filter cannot run with, as of a recording without any, leaves the stated one.
     Ok(solved.better(learnt)?.unwrap_or(solved))
 }
 
-/// Iterates with a prior that the estimate does not contradict: a wrong one would turn correct
-/// observations into outliers, and its own error into noise.
+/// Iterates with a prior that the estimate does not contradict, because a wrong prior would turn correct observations
+/// into outliers and its error into noise.
 fn with_wide_prior<'a>(
     solved: Solved<'a>,
     progress: Progress,

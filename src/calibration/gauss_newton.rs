@@ -8,20 +8,20 @@ use crate::calibration::{
     Problem, Script, pass,
 };
 
-/// A cost that rises by more than this part indicates a step that was too long. Each pass knows only the cost
-/// of its own linearised problem, so a small rise is not significant.
+/// A cost increase by more than this fraction indicates that a step was too long. Each pass knows only the cost of its
+/// own linearised problem, so a small rise is not significant.
 const COST_RISE: f64 = 0.1;
-/// After a step longer than this part of the one before, all further steps are halved.
+/// After a step longer than this fraction of the previous one, all further steps are halved.
 const SHRINKS: f64 = 0.8;
-/// Number of passes after which the gate's decisions are fixed, so that an observation at its edge does not toggle.
+/// Number of passes after which the gate decisions are fixed, so that an observation at its limit does not toggle.
 const DECIDED_AFTER: usize = 4;
-/// If more than this part of all observations are beyond the gate, they are not outliers.
+/// If more than this fraction of observations is beyond the gate, they are not outliers.
 const MOST_OUTLIERS: f64 = 0.05;
 
-/// Most halvings of a step to a point where no pass can be made: to a thousandth.
+/// Maximum number of halvings of a step after a failed pass: to a thousandth.
 const MOST_SHORTENED: usize = 10;
 
-/// One pass over the record.
+/// One pass over the recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pass {
     /// The largest step of any parameter from the linearisation point, in σ.
@@ -77,8 +77,8 @@ impl Iterated {
     }
 }
 
-/// Iterates from a first point, each pass linearised at the estimate of the one before. `gate` is already
-/// decided, or decides by innovations.
+/// Iterates from a first point, each pass linearised at the previous estimate. `gate` is either fixed or decides by
+/// innovations.
 pub fn iterate(
     problem: &Problem,
     priors: &[AttitudePrior],
@@ -138,7 +138,7 @@ pub fn iterate(
     }
 }
 
-/// A pass at a point; if it fails, at half the distance from the pass before, and so on.
+/// A pass at a point; if it fails, at half the distance from the previous pass, and so on.
 fn pass_towards(
     problem: &Problem,
     priors: &[AttitudePrior],
@@ -158,7 +158,7 @@ fn pass_towards(
     made
 }
 
-/// Part of all observations that are beyond the gate or were rejected.
+/// Fraction of observations that are beyond the gate or were rejected.
 fn beyond(result: &PassResult, gate: f64) -> f64 {
     let beyond = |i: &&Innovation| !i.accepted || i.distance() > gate;
     result.innovations.iter().filter(beyond).count() as f64 / result.innovations.len() as f64

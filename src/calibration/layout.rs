@@ -1,28 +1,28 @@
-//! The states of the filter, which move or are redrawn, and the constants, whose effect on the states it propagates, as
-//! named groups that depend on the options of a problem. No other file uses an index directly.
+//! States of the filter, which evolve or are reset, and constants, whose effect on the states it propagates, as named
+//! groups that depend on the options of a problem. No other file uses indices directly.
 //!
 //! | states | number | meaning |
 //! |---|---|---|
 //! | attitude | 3 | φ, `C_computed = (I − [φ×]) C_true`, East-North-Up, rad |
 //! | velocity | 3 | δV = computed − true, East-North-Up, m/s |
 //! | position | 3 | δp = computed − true, East-North-Up, m |
-//! | gravity | 1 | true − stated magnitude of gravity, m/s²; where recordings are of several sites and it has a σ |
-//! | Earth rate | 3 | true − computed Earth rate along East, North and Up, rad/s; without a table, where it is drawn for each stretch whose heading is not known |
-//! | Gauss–Markov bias | 3 a triad | what its biases are off D now, rad/s or m/s²; where noise figures state one |
-//! | of the recording | one for each parameter that is not common to all, and 3 of its mounting, rad | by how much it differs in this recording, see [`crate::calibration::several::day_to_day::Difference`] |
+//! | gravity | 1 | true − stated magnitude of gravity, m/s²; for recordings at several sites, if gravity has a σ |
+//! | Earth rate | 3 | true − computed Earth rate along East, North and Up, rad/s; without a table; reset for each stretch with unknown heading |
+//! | Gauss–Markov bias | 3 per triad | current deviation of the biases from D, rad/s or m/s²; if the noise figures state one |
+//! | recording differences | one per parameter that is not common to all, and 3 for the mounting, rad | difference in this recording, see [`crate::calibration::several::day_to_day::Difference`] |
 //! | table position | 3 | τ, error of the current table position, `C_table = (I − [τ×]) C_true`, rad; with a table |
-//! | turn at rest | 3 | what φ has become more since the body came to rest, rad; without a table |
+//! | rotation at rest | 3 | increase of φ since the body came to rest, rad; without a table |
 //! | initial attitude | 3 | φ at the first sample of the stretch, rad |
 //!
 //! | constants | number | meaning |
 //! |---|---|---|
-//! | parameters | up to 24 | δθ = true − estimated, see [`super::parameters`]; those that form and body frame leave free |
-//! | error terms | one for each parameter that is on | true − estimated, see [`crate::imu::Term`] |
-//! | temperature | one for each coefficient that is on | true − estimated, see [`crate::imu::ThermalModel`] |
-//! | gravity | 1 | as above, where all recordings are of one site |
-//! | table base | one for each of East, North, Up that is on | ε, error of the table's level and north, `C_table = (I − [ε×]) C_true`, rad; where a σ of it is stated |
+//! | parameters | up to 24 | δθ = true − estimated, see [`super::parameters`]; those left free by form and body frame |
+//! | error terms | one per enabled parameter | true − estimated, see [`crate::imu::Term`] |
+//! | temperature | one per enabled coefficient | true − estimated, see [`crate::imu::ThermalModel`] |
+//! | gravity | 1 | as above, if all recordings are at one site |
+//! | table base | one per enabled axis (East, North, Up) | ε, error of table level and north, `C_table = (I − [ε×]) C_true`, rad; if its σ is stated |
 //! | disturbances | 3 each | see [`super::constants::Disturbance`] |
-//! | table axes | one for each error that is on | tilt, wobble and encoder error of the table's axes, see [`crate::turntable::axis_response`], rad |
+//! | table axes | one per enabled error | tilt, wobble and encoder error of the table axes, see [`crate::turntable::axis_response`], rad |
 
 use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::several::day_to_day::OwnState;
@@ -51,13 +51,13 @@ pub struct Layout {
     pub varying_biases: Vec<(usize, Sensor, usize)>,
     /// State of each quantity that differs between recordings.
     pub own: Vec<(usize, OwnState)>,
-    /// Error of the table's position, if it is a state.
+    /// Error of the table position, if it is a state.
     pub table_position: Option<usize>,
     /// Increase of the attitude error since the body came to rest, if it is a state.
     pub turn_at_rest: Option<usize>,
     /// Attitude error at the first sample of the stretch.
     pub initial_attitude: usize,
-    /// Source of each state: its prior, or the noise that redraws it.
+    /// Source of each state: its prior, or the noise that resets it.
     pub sources: Vec<BudgetSource>,
     /// The constants, in the order of their columns.
     pub constants: Vec<Constant>,

@@ -123,7 +123,7 @@ pub fn singular(triads: &PerSensor<Triad>) -> CalibrationError {
 /// Prior of the attitude at the first sample of a stretch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AttitudePrior {
-    /// `C_b_n`: a reading of the table or, without, the coarse alignment.
+    /// `C_b_n`: a table reading or, without a table, the coarse alignment.
     pub mean: Matrix3<f64>,
     /// 1σ about East, North and Up, rad; the last is that of the heading.
     pub sigma: Vector3<f64>,
@@ -134,10 +134,10 @@ pub struct AttitudePrior {
 
 /// 1σ of an initial attitude known from one reading only, which may be wrong, rad.
 const READ_ATTITUDE: f64 = DEGREE;
-/// σ of the initial level without a table, over its σ from the prior of the accelerometers: the data that gave this
-/// level are observations, too, and these have to determine it.
+/// σ of the initial level without a table, divided by its σ from the accelerometer prior: the data that gave this level
+/// are also observations and must determine it.
 const LEVEL_SIGMAS: f64 = 10.0;
-/// 1σ of the initial heading without a table, rad, if Earth rate shows it well; else …
+/// 1σ of the initial heading without a table, rad, if Earth rate determines it well; otherwise …
 const HEADING: f64 = 15.0 * DEGREE;
 /// … this many times its σ from Earth rate.
 const HEADING_SIGMAS: f64 = 3.0;

@@ -1,7 +1,7 @@
 //! Calibration: closed form, coarse start, filter and Gauss–Newton iterations, and the checks of a result.
 //!
-//! A [`Problem`] takes runs and [`Options`]; [`estimate`] and [`six_position`] solve it; [`bound`] gives the
-//! Cramér–Rao bound. Nothing here prints, reads files or draws.
+//! A [`Problem`] takes runs and [`Options`]; [`estimate`] and [`six_position`] solve it; [`bound`] gives the Cramér–Rao
+//! bound. This module does not print, read files or draw.
 
 mod checks;
 mod constants;

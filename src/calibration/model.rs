@@ -1,4 +1,4 @@
-//! Estimated quantities of a run with their prior: small, and cheap to copy and modify.
+//! Estimated quantities of a run with their prior; cheap to copy and modify.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::run::{Aiding, Run};
 use crate::turntable::{AxisError, TableGeometry};
 use crate::units::ARCSEC;
 
-/// Default 1σ of a table's level, rad.
+/// Default 1σ of the level of a table, rad.
 pub const USUAL_LEVEL: f64 = 10.0 * ARCSEC;
 /// Default 1σ of its north, rad.
 pub const USUAL_NORTH: f64 = 60.0 * ARCSEC;
@@ -43,14 +43,14 @@ pub struct Model {
     pub noise: PerSensor<Noise>,
     /// Noise added during moves.
     pub motion_noise: PerSensor<MotionNoise>,
-    /// White 1σ, at standstill, of the integral of each triad's output: attitude in rad, velocity in m/s;
-    /// `None`: in each stretch the value that its run states or shows.
+    /// White 1σ, at standstill, of the integral of each triad's output: attitude in rad, velocity in m/s; `None`: in
+    /// each stretch, the value stated in or estimated from its run.
     pub standstill_sigma: PerSensor<Option<f64>>,
     /// Unwanted rotation of the body in dwells without a table: 1σ density of a random walk,
     /// rad/√s. Gyros sense it, so it is not part of their noise.
     pub turning_at_rest: f64,
-    /// Whether velocity is reset after each move: without a table's log, a move adds more noise to velocity than
-    /// information, except about terms that no other observation shows.
+    /// Whether velocity is reset after each move: without a table log, a move adds more noise than information to
+    /// velocity, except about terms visible in no other observation.
     pub velocity_anew: bool,
     /// 1σ of each parameter of the instrument's error terms, around zero; zero if a term is off.
     pub term_sigma: TermVector,
@@ -60,17 +60,17 @@ pub struct Model {
     pub day_to_day: DayToDay,
     /// 1σ of gravity at the site, m/s²; common to all dwells of a recording.
     pub gravity_sigma: f64,
-    /// 1σ per axis of the table's position error, rad; zero without a table.
+    /// 1σ per axis of the table position error, rad; zero without a table.
     pub position_sigma: f64,
     /// 1σ per axis of a reading of the table, rad; zero without a table.
     pub reading_sigma: f64,
-    /// 1σ of table errors that its readings do not include; zero if off.
+    /// 1σ of table errors not included in its readings; zero if off.
     pub geometry: TableGeometry,
     /// Single events that are estimated.
     pub(in crate::calibration) disturbances: Vec<Disturbance>,
     /// Number of table axes with angle readings; zero if there are none.
     table_axes: usize,
-    /// The source whose variance is multiplied, with the factor: used to compute its share of the budget.
+    /// The source with scaled variance, and the factor; used to compute its share of the budget.
     pub(in crate::calibration) varied: Option<(BudgetSource, f64)>,
 }
 
@@ -145,7 +145,7 @@ impl Model {
         *self.standstill_sigma.get_mut(sensor) = Some(sigma);
     }
 
-    /// The same with the noise of another model.
+    /// The same model with the noise of another.
     pub(in crate::calibration) fn with_noise_of(&self, other: &Self) -> Self {
         Self {
             noise: other.noise,
@@ -233,8 +233,8 @@ impl Model {
     }
 }
 
-/// Default 1σ of each error of a table's axes, rad, for this position error: the part of a table's error
-/// that repeats with angle may be as large as the part that does not.
+/// Default 1σ of each error of a table's axes, rad, for this position error: the repeatable part of a table error may
+/// be as large as the non-repeatable part.
 pub fn usual_axis_error(kind: AxisError, position_sigma: f64) -> f64 {
     match kind {
         AxisError::Tilt => USUAL_TILT,

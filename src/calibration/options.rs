@@ -21,19 +21,19 @@ use crate::statistics::FALSE_ALARM;
 pub struct Options {
     /// Form of the installation matrix.
     pub form: InstallationForm,
-    /// Observations at rest; `None`: the table's attitude if there is a table log, else zero velocity.
+    /// Observations at rest; `None`: table attitude if there is a table log, otherwise zero velocity.
     pub aiding: Option<Aiding>,
     /// Error terms to estimate in addition to those with a σ stated for instrument or table.
     pub terms: Vec<ErrorTerm>,
-    /// Whether error terms that the data support are estimated, too.
+    /// Whether error terms supported by the data are also estimated.
     pub auto_terms: bool,
     /// Noise policy.
     pub noise: NoisePolicy,
-    /// Probability that the gate rejects any observation of a record without outliers.
+    /// Probability that the gate rejects any observation of a recording without outliers.
     pub false_rejection: f64,
     /// Convergence limit: largest step of any parameter, in σ.
     pub converged_sigma: f64,
-    /// Most passes over the record.
+    /// Maximum number of passes over the recording.
     pub passes: usize,
 }
 

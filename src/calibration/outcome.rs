@@ -16,7 +16,7 @@ use crate::calibration::{
 };
 use crate::imu::Sensor;
 
-/// Least χ² difference of opposite headings for an observed heading.
+/// Minimum χ² difference between opposite headings for an observed heading.
 const HEADING_SEEN: f64 = 6.0;
 
 /// The result of the filter on one run.
@@ -29,7 +29,7 @@ pub struct Outcome {
     /// The other parts of the covariance of the estimate, by their source;
     /// [`crate::calibration::Solution::assess`] adds more.
     pub covariance_parts: BTreeMap<BudgetSource, ParameterMatrix>,
-    /// 1σ of every parameter before the run.
+    /// Prior 1σ of every parameter.
     pub prior_sigma: ParameterVector,
     /// Prior of the initial attitude of each stretch.
     pub prior_attitudes: Vec<AttitudePrior>,
@@ -74,14 +74,14 @@ pub struct Outcome {
     pub noise: NoiseReport,
     /// Steps of each dwell after a stop that are skipped.
     pub settling: usize,
-    /// Causes found in the record that were not part of the problem.
+    /// Causes found in the recording that were not part of the problem.
     pub causes: Vec<FoundCause>,
     /// Findings that a calibration engineer must know before using the figures.
     pub findings: Vec<Finding>,
 }
 
 impl Outcome {
-    /// What was found, with what noise and the scatter of dwells make of it.
+    /// The estimate, with the effects of noise and dwell scatter.
     pub(in crate::calibration) fn by_noise(
         as_stated: &Problem,
         solved: Solved,
@@ -180,13 +180,13 @@ impl Outcome {
         problem.with(|model| model.prior_sigma = self.model.prior_sigma)
     }
 
-    /// Which observations were let in.
+    /// Accepted observations.
     pub(in crate::calibration) fn accepted(&self) -> Vec<bool> {
         let each = self.innovations.iter();
         each.map(|innovation| innovation.accepted).collect()
     }
 
-    /// What happens in a problem at the point where the record was linearised.
+    /// Events of a problem at the linearisation point.
     pub(in crate::calibration) fn script<'a>(
         &'a self,
         problem: &'a Problem,
@@ -194,7 +194,7 @@ impl Outcome {
         Script::new(problem, &self.prior_attitudes, &self.linearised_at)
     }
 
-    /// What the record says of the constants of a problem there.
+    /// Information of the recording about the constants there.
     pub(in crate::calibration) fn reduction(
         &self,
         problem: &Problem,
@@ -202,7 +202,7 @@ impl Outcome {
         self.script(problem)?.reduce(problem, &self.accepted())
     }
 
-    /// With what is known of those constants beforehand.
+    /// The same with the prior of those constants.
     pub(in crate::calibration) fn posterior(
         &self,
         problem: &Problem,
@@ -212,7 +212,7 @@ impl Outcome {
         reduction.posterior(&Prior::new(constants, &problem.model, &self.linearised_at))
     }
 
-    /// A part of the covariance of the estimate that no pass includes; zero if there is none.
+    /// A part of the covariance of the estimate that no pass includes; zero if absent.
     pub fn part(&self, source: BudgetSource) -> ParameterMatrix {
         self.covariance_parts
             .get(&source)
@@ -220,7 +220,7 @@ impl Outcome {
             .unwrap_or_default()
     }
 
-    /// Sets such a part of the covariance of the estimate, in place of its former value.
+    /// Replaces such a part of the covariance of the estimate.
     pub(in crate::calibration) fn set_part(&mut self, source: BudgetSource, part: ParameterMatrix) {
         self.estimate.covariance += part - self.part(source);
         self.covariance_parts.insert(source, part);

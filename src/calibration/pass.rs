@@ -1,4 +1,4 @@
-//! A pass of the filter through a record: estimate, covariance, and accepted observations.
+//! A pass of the filter over a recording: estimate, covariance and accepted observations.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -26,7 +26,7 @@ pub struct PassResult {
     pub innovations: Vec<Innovation>,
 }
 
-/// Runs a pass through the events of a record.
+/// Runs a pass through the events of a recording.
 pub fn pass(
     problem: &Problem,
     script: &Script,
@@ -85,8 +85,8 @@ impl PassResult {
         })
     }
 
-    /// Of the initial attitude of the last stretch: 1σ about East, North and Up, rad, and covariance with each parameter
-    /// over it.
+    /// Initial attitude of the last stretch: 1σ about East, North and Up, rad, and its covariance with each parameter
+    /// divided by this 1σ.
     pub fn last_attitude(&self) -> (Vector3<f64>, AttitudeCovariance) {
         let mut across = AttitudeCovariance::zeros();
         let Some(attitude) = self.reduction.attitudes.last() else {

@@ -16,7 +16,7 @@ use crate::recording::{Recording, TableLog};
 use crate::run::{Aiding, Dwell, LONG_ENOUGH, Position, Run};
 use crate::statistics::chi_square_limit;
 
-/// 1σ of the initial velocity of a body at rest, m/s, in addition to that of its sway.
+/// 1σ of the initial velocity of a body at rest, m/s, in addition to its sway.
 const INITIAL_VELOCITY: f64 = 1e-3;
 
 /// Runs of one instrument with the model to estimate.
@@ -45,7 +45,7 @@ pub struct Stretch<'a> {
     pub recording: usize,
     pub dwells: Vec<Dwell>,
     pub steps: Vec<Step>,
-    /// White 1σ at standstill as the run states or shows it: attitude in rad, velocity in m/s.
+    /// White 1σ at standstill, stated in or estimated from the run: attitude in rad, velocity in m/s.
     pub standstill_sigma: PerSensor<f64>,
 }
 
@@ -131,12 +131,12 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The same, observed only in some of its dwells, selected by number.
+    /// The same problem, observed only in the dwells with these numbers.
     pub(in crate::calibration) fn observed_in(&self, used: impl Fn(usize) -> bool) -> Self {
         self.with_dwells(|number, _, dwell| used(number).then(|| dwell.clone()))
     }
 
-    /// The same with what becomes of each of its dwells, told by number.
+    /// The same problem with each dwell, given by number, transformed.
     pub(in crate::calibration) fn with_dwells(
         &self,
         become_of: impl Fn(usize, &Stretch, &Dwell) -> Option<Dwell>,
@@ -161,7 +161,7 @@ impl<'a> Problem<'a> {
         .with_stretches(stretches)
     }
 
-    /// The same without the first steps of each dwell after a move; a dwell keeps half of itself.
+    /// The same without the first steps of each dwell after a move; at least half of each dwell is kept.
     pub(in crate::calibration) fn settled(&self, steps: usize) -> Self {
         if steps == 0 {
             return self.clone();
@@ -212,8 +212,8 @@ impl<'a> Problem<'a> {
         first.map_or(0.0, |stretch| stretch.standstill_sigma(&self.model, sensor))
     }
 
-    /// Variance at standstill over the least that is ever taken, of attitude in rad² (gyros) or velocity in
-    /// m²/s²; of several stretches the mean.
+    /// Variance at standstill in excess of the floor, of attitude in rad² (gyros) or velocity in m²/s²; the mean of
+    /// several stretches.
     pub(in crate::calibration) fn standstill_variance(&self, sensor: Sensor) -> f64 {
         let of = |stretch: &Stretch| {
             let sigma = stretch.standstill_sigma(&self.model, sensor);
@@ -233,12 +233,12 @@ impl<'a> Problem<'a> {
         std::iter::once(self.run).chain(self.others.iter().copied())
     }
 
-    /// What hardly fits the recordings of what is stated of them, what their reader found, and which of them are left out.
+    /// Contradictions between recordings and statements, reader notes, and excluded recordings.
     pub(in crate::calibration) fn remarks(&self) -> Vec<Finding> {
         let left_out = self.left_out.iter().map(|name| {
             format!(
-                "{name}: left out, since no dwell was found in it; the instrument must stand for {LONG_ENOUGH} s or more \
-                 between turns."
+                "{name}: excluded because no dwell was found in it. Keep the instrument still for {LONG_ENOUGH} s or \
+                 more between turns."
             )
         });
         let doubts = self
@@ -249,7 +249,7 @@ impl<'a> Problem<'a> {
         doubts.map(Finding::of_statement).chain(notes).collect()
     }
 
-    /// Sentences on recordings, each once, with the names of those that it is about unless it is about all.
+    /// Sentences about recordings, each once, with the names of the recordings concerned, unless all are.
     fn of_recordings(&self, of: impl Fn(&Recording) -> &Vec<String>) -> Vec<String> {
         let mut found: Vec<(&String, Vec<&str>)> = Vec::new();
         for run in self.runs() {
@@ -268,7 +268,7 @@ impl<'a> Problem<'a> {
         found.into_iter().map(named).collect()
     }
 
-    /// What is observed at the end of a step, in order.
+    /// Observations at the end of a step, in order.
     pub(in crate::calibration) fn observed(
         &self,
         step: &Step,
@@ -322,8 +322,8 @@ impl<'a> Stretch<'a> {
         }
     }
 
-    /// Variance of an observation per axis, rad² or m²/s², with that of a whole pulse; of a table's attitude that of the
-    /// mean of this many readings.
+    /// Variance of an observation per axis, rad² or m²/s², including pulses; for a table attitude, that of the mean of
+    /// this many readings.
     pub fn observation_variance(&self, model: &Model, kind: Observation, readings: usize) -> f64 {
         let sensor = match kind {
             Observation::Velocity => Sensor::Accel,
@@ -343,7 +343,7 @@ impl<'a> Stretch<'a> {
         own + pulse * model.weight(BudgetSource::Pulses)
     }
 
-    /// Variance of the position per axis at the begin of a dwell, m².
+    /// Variance of the position per axis at the start of a dwell, m².
     pub fn position_variance(&self, model: &Model) -> f64 {
         self.run.standstill.position_sigma.powi(2) * model.weight(BudgetSource::Place)
     }
@@ -354,13 +354,13 @@ impl<'a> Stretch<'a> {
         of_model.unwrap_or(*self.standstill_sigma.get(sensor))
     }
 
-    /// What the table says of the attitude at its first sample, where it says anything.
+    /// Table attitude at the first sample, if there is one.
     pub fn attitude_of_table(&self) -> Option<AttitudePrior> {
         let reading = first_reading(self.table, &self.dwells)?;
         Some(AttitudePrior::of_reading(&self.run.table, reading))
     }
 
-    /// From where this one ends to where another of the same recording begins, s.
+    /// Time from the end of this stretch to the start of another in the same recording, s.
     pub fn time_until(&self, next: &Self) -> f64 {
         let imu = &self.run.recording.imu;
         let ends = self.dwells.last().map(|dwell| dwell.samples.end);
@@ -374,7 +374,7 @@ impl<'a> Stretch<'a> {
         INITIAL_VELOCITY.hypot(self.standstill_sigma.accel)
     }
 
-    /// Uncertainty at its first sample of errors referred to a point where the attitude is `at`.
+    /// Uncertainty at the first sample, for errors relative to a point with attitude `at`.
     pub fn start(&self, prior: &AttitudePrior, at: &Matrix3<f64>) -> Start {
         Start {
             attitude: to_tilt_and_heading(&(prior.mean * at.transpose())),
@@ -394,7 +394,7 @@ impl<'a> Stretch<'a> {
     }
 }
 
-/// The stretches of a run: a break between two dwells parts them.
+/// The stretches of a run, separated by breaks between dwells.
 fn stretches<'a>(run: &'a Run, recording: usize, model: &Model) -> Vec<Stretch<'a>> {
     let table = run.observed_table(model.aiding);
     let dwells = run.dwells(model.aiding);

@@ -12,11 +12,11 @@ use crate::room;
 use crate::run::Run;
 use crate::units::DEGREE;
 
-/// Bytes of the passes, their history and innovations for each sample: 200 to 235, as measured.
+/// Bytes per sample for the passes, their history and innovations: 200 to 235 measured.
 const BYTES_A_SAMPLE: usize = 256;
-/// The same of a packed record.
+/// The same for a packed recording.
 const BYTES_A_PACKED_SAMPLE: usize = 8;
-/// Bytes of what does not grow with the record: threads, error terms that are tried, the report.
+/// Bytes that do not grow with the recording: threads, error term tests, report.
 const BYTES_BESIDE: usize = 16 << 20;
 
 /// Result of a method for a problem.
@@ -40,7 +40,7 @@ pub struct Assessment {
 }
 
 impl Problem<'_> {
-    /// Solves the problem by a method; fails if the record contradicts run.toml.
+    /// Solves the problem with a method; fails if the recording contradicts run.toml.
     ///
     /// # Errors
     /// [`CalibrationError`] if the runs cannot give a calibration by this method.
@@ -134,9 +134,9 @@ impl Solution {
         }
     }
 
-    /// Tests error terms and judges the residuals of gravity and turns. The effect of error terms that the data
-    /// show, but that are not estimated, is added to the covariance of the estimate; if the noise was estimated, so is
-    /// the effect of bias variations too small to be seen.
+    /// Tests error terms and evaluates the residuals of gravity and turns. The effect of significant error terms that
+    /// are not estimated is added to the covariance of the estimate; if the noise was estimated, so is the effect of
+    /// undetectable bias variations.
     ///
     /// # Errors
     /// [`CalibrationError`] if the problem is not the one of the solution.
@@ -178,7 +178,7 @@ impl Solution {
         })
     }
 
-    /// Findings that must be known before using the figures.
+    /// Findings to read before using the results.
     pub fn findings(&self, assessment: &Assessment) -> Vec<Finding> {
         match self {
             Self::Filter(outcome) => outcome.findings_with(&assessment.error_terms),
@@ -186,7 +186,7 @@ impl Solution {
         }
     }
 
-    /// The calibration, in the file's quantity.
+    /// The calibration, in the quantity of the file.
     pub fn calibration(&self, problem: &Problem, assessment: &Assessment) -> Calibration {
         match self {
             Self::Filter(outcome) => {

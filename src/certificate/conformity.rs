@@ -10,7 +10,7 @@ use crate::calibration::{ComparisonError, parameter_name};
 use crate::imu::InstallationForm;
 use crate::lot::{Limit, Specification, probability_outside};
 
-/// Guard band over σ: the expanded uncertainty with k = 2.
+/// Guard band divided by σ: the expanded uncertainty with k = 2.
 const GUARD: f64 = 2.0;
 
 /// Decision on a limit.
@@ -18,9 +18,9 @@ const GUARD: f64 = 2.0;
 pub enum Decision {
     /// Within the limit.
     Pass,
-    /// The value is within the limit by less than its uncertainty.
+    /// The value is inside the limit by less than its uncertainty.
     ConditionalPass,
-    /// The value is beyond the limit by less than its uncertainty.
+    /// The value is outside the limit by less than its uncertainty.
     ConditionalFail,
     /// Outside the limit.
     Fail,

@@ -1,7 +1,7 @@
 //! The certificate as a Digital Calibration Certificate: PTB's DCC 3.3.0 with D-SI 2.2.1 quantities.
 //!
-//! Values are in SI: scale factors relative to nominal, angles in rad, biases in rad/s and m/s², each a quantity of its
-//! own with its expanded uncertainty; the covariance of all of them follows.
+//! Values are in SI: scale factors relative to nominal, angles in rad, biases in rad/s and m/s², each as a separate
+//! quantity with its expanded uncertainty, followed by the covariance of all.
 
 use std::fmt::Write;
 
@@ -16,7 +16,7 @@ use crate::number::to_twelve_digits;
 /// Coverage probability of every uncertainty.
 const PROBABILITY: f64 = 0.9545;
 
-/// XML in the making: elements open and close in order, texts are escaped.
+/// XML under construction: elements open and close in order, and texts are escaped.
 struct Xml {
     text: String,
     open: Vec<&'static str>,
@@ -28,7 +28,7 @@ impl Xml {
         self.text.extend(std::iter::repeat_n("  ", self.open.len()));
     }
 
-    /// An element with what is in it; `tag` may have attributes that need no escape.
+    /// An element with its content; `tag` may have attributes that need no escaping.
     fn element(&mut self, name: &'static str, content: impl FnOnce(&mut Self)) {
         self.with(name, "", content);
     }
@@ -119,7 +119,7 @@ impl Xml {
         });
     }
 
-    /// A value with its unit and, where it has one, its uncertainty.
+    /// A value with its unit and, if available, its uncertainty.
     fn real(&mut self, value: f64, unit: &str, expanded: Option<Expanded>) {
         self.element("si:real", |xml| {
             xml.leaf("si:value", &number(value));
@@ -224,7 +224,7 @@ fn administrative(xml: &mut Xml, certificate: &Certificate) {
     });
 }
 
-/// What was calibrated.
+/// The calibrated item.
 fn item(xml: &mut Xml, item: &Item) {
     xml.element("dcc:items", |xml| {
         xml.element("dcc:item", |xml| {
@@ -292,7 +292,7 @@ fn measured(xml: &mut Xml, certificate: &Certificate) {
     }
     xml.element("dcc:influenceConditions", |xml| {
         xml.condition(
-            "temperature of the air",
+            "air temperature",
             "\\degreecelsius",
             laboratory.conditions.temperature_degc,
         );
@@ -329,7 +329,7 @@ fn equipments(xml: &mut Xml, equipments: &[Equipment]) {
     });
 }
 
-/// What the values are.
+/// Description of the values.
 fn description(certificate: &Certificate) -> String {
     let nominal = &certificate.provenance.nominal;
     let [for_gyros, for_accels] = [nominal.gyro, nominal.accel]
@@ -338,9 +338,9 @@ fn description(certificate: &Certificate) -> String {
     let unit = unit.map(|unit| (unit.gyro.as_str(), unit.accel.as_str()));
     let (gyro, accel) = unit.unwrap_or_default();
     let mut text = format!(
-        "Scale factors over their nominal value minus one, entries of the installation matrix in rad, biases in rad/s \
-         and m/s². Nominal: gyros {for_gyros} {gyro} per second for 1 rad/s, accelerometers {for_accels} {accel} per \
-         second for 1 m/s². Body frame: {}.",
+        "Scale factors divided by their nominal value, minus one; entries of the installation matrix in rad; biases \
+         in rad/s and m/s². Nominal scale: gyros {for_gyros} {gyro} per second for 1 rad/s, accelerometers \
+         {for_accels} {accel} per second for 1 m/s². Body frame: {}.",
         certificate.body_frame().words(),
     );
     if let Some(temperature) = &certificate.calibration.temperature {
@@ -350,7 +350,7 @@ fn description(certificate: &Certificate) -> String {
     text
 }
 
-/// One parameter as readers of certificates look for it.
+/// One parameter as expected by certificate readers.
 fn quantity(xml: &mut Xml, of: &Measured) {
     // The name that calibration.json has is a valid xs:ID.
     let attributes = format!(" id=\"{}\" refType=\"basic_measuredValue\"", of.name);
@@ -385,7 +385,7 @@ fn together(xml: &mut Xml, results: &[Measured], covariance: &[Vec<f64>]) {
     });
 }
 
-/// The region that holds all values together.
+/// The joint coverage region.
 fn ellipsoid(xml: &mut Xml, results: &[Measured], covariance: &[Vec<f64>]) {
     xml.element("si:ellipsoidalRegionXMLList", |xml| {
         xml.element("si:covarianceMatrix", |xml| {
@@ -417,7 +417,7 @@ fn of_ellipsoid(dimensions: usize) -> f64 {
     square.map_or(1.0, f64::sqrt)
 }
 
-/// Name and release of the program that made the calibration; PTB's rules want a letter before a release's numbers.
+/// Name and release of the calibration program; PTB rules require a letter before the release number.
 fn program(certificate: &Certificate) -> (String, String) {
     let program = &certificate.provenance.program;
     let (name, release) = program.split_once(' ').unwrap_or((program, "0"));

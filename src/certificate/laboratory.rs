@@ -1,5 +1,4 @@
-//! Statements of a calibration laboratory on itself, its customer and the item, which do not follow from
-//! data.
+//! Statements of a calibration laboratory about itself, its customer and the item, which do not follow from data.
 
 use serde::Deserialize;
 
@@ -65,7 +64,7 @@ impl TryFrom<String> for Day {
     type Error = &'static str;
 
     fn try_from(text: String) -> Result<Self, Self::Error> {
-        Self::parse(&text).ok_or("a day such as 2026-03-31")
+        Self::parse(&text).ok_or("a date such as 2026-03-31")
     }
 }
 
@@ -90,7 +89,7 @@ pub enum Place {
 }
 
 impl Place {
-    /// As the Digital Calibration Certificate spells it.
+    /// Spelling in the Digital Calibration Certificate.
     pub fn code(self) -> &'static str {
         match self {
             Self::Laboratory => "laboratory",
@@ -104,7 +103,7 @@ impl Place {
     pub fn words(self) -> &'static str {
         match self {
             Self::Laboratory => "in the laboratory",
-            Self::Customer => "at the customer's",
+            Self::Customer => "at the customer's site",
             Self::LaboratoryBranch => "in a branch of the laboratory",
             Self::Other => "elsewhere, see remarks",
         }
@@ -123,13 +122,13 @@ pub struct Condition {
 
 /// Equipment used for traceability.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
-#[serde(expecting = "name, serial number and certificate, three texts in quotes")]
+#[serde(expecting = "name, serial number and certificate as three strings in quotes")]
 pub struct Equipment {
-    /// What it is.
+    /// Its name.
     pub name: String,
     /// Its serial number.
     pub serial: String,
-    /// Its own certificate.
+    /// Its certificate.
     pub certificate: String,
 }
 
@@ -137,7 +136,7 @@ pub struct Equipment {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DecisionRule {
-    /// A limit is met if the value is within it by the expanded uncertainty: guard band w = U.
+    /// A limit is met if the value is inside it by at least the expanded uncertainty (guard band w = U).
     GuardBand,
     /// A limit is met if the value is within it.
     SimpleAcceptance,
@@ -148,11 +147,11 @@ impl DecisionRule {
     pub fn words(self) -> &'static str {
         match self {
             Self::GuardBand => {
-                "guard band w = U (ILAC-G8): pass if the value is within its limit by the expanded uncertainty, \
-                 fail where it is beyond it by that; between these pass and fail are conditional"
+                "guard band w = U (ILAC-G8): pass if the value is inside its limit by at least the expanded \
+                 uncertainty, fail if it is outside by at least that; between these, pass and fail are conditional"
             }
             Self::SimpleAcceptance => {
-                "simple acceptance (ILAC-G8): pass if the value is within its limit, regardless of its uncertainty"
+                "simple acceptance (ILAC-G8): pass if the value is within its limit, regardless of uncertainty"
             }
         }
     }
@@ -167,19 +166,19 @@ pub struct Laboratory {
     pub contact: Contact,
     /// The customer of the calibration.
     pub customer: Contact,
-    /// What identifies the certificate.
+    /// Identification of the certificate.
     pub certificate: Issue,
     /// The calibrated item.
     pub item: Item,
-    /// The laboratory's own method.
+    /// Method of the laboratory.
     pub method: Method,
     /// The conditions of the calibration.
     pub conditions: Conditions,
-    /// How results are traceable to the SI.
+    /// Traceability of results to the SI.
     pub traceability: Traceability,
-    /// Who authorises the certificate.
+    /// Person who authorises the certificate.
     pub authorised: Authorised,
-    /// How conformity is decided.
+    /// Decision rule for conformity.
     #[serde(default)]
     pub decision: DecisionStated,
     /// Anything else.
@@ -204,11 +203,11 @@ pub struct Issue {
     pub place: Place,
 }
 
-/// What was calibrated.
+/// The calibrated item.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Item {
-    /// What it is, such as `inertial measurement unit`.
+    /// Description, such as `inertial measurement unit`.
     pub name: String,
     /// Its manufacturer.
     pub manufacturer: Option<String>,
@@ -222,11 +221,11 @@ pub struct Item {
     pub state: String,
 }
 
-/// How it was calibrated.
+/// Calibration method.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Method {
-    /// The laboratory's own procedure.
+    /// Procedure of the laboratory.
     pub procedure: String,
     /// Additions to, deviations or exclusions from it.
     pub deviations: Option<String>,
@@ -246,7 +245,7 @@ pub struct Conditions {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Traceability {
-    /// In the laboratory's words.
+    /// In the words of the laboratory.
     pub statement: String,
     /// Equipment that provides it.
     #[serde(default)]
@@ -259,11 +258,11 @@ pub struct Traceability {
 pub struct Authorised {
     /// Who.
     pub name: String,
-    /// As what.
+    /// The function.
     pub function: String,
 }
 
-/// What is stated of conformity.
+/// Statement of conformity.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DecisionStated {

@@ -21,28 +21,25 @@ pub use results::{Measured, Quantity, in_words, temperature_words};
 /// Errors of a certificate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum CertificateError {
-    /// The calibration may not be used.
-    #[error(
-        "the calibration {reason}, expected one that may be used; a certificate of it would be wrong. Look at its \
-         findings."
-    )]
+    /// The calibration must not be used.
+    #[error("the calibration {reason}, so it cannot be certified. See its findings.")]
     NotUsable {
         /// The reason.
         reason: &'static str,
     },
     /// A required field is missing from the file.
-    #[error("no `{field}` in the calibration, expected a file of this version; calibrate again")]
+    #[error("the calibration has no `{field}` because it is from another version. Calibrate again")]
     Missing {
         /// The field.
         field: &'static str,
     },
     /// The decision rule for conformity is missing.
     #[error(
-        "no `decision.rule` in lab.toml, expected \"guard-band\" or \"simple-acceptance\"; ISO/IEC 17025, 7.8.6, \
-         asks for it where conformity is stated. Add it."
+        "lab.toml has no `decision.rule`, which ISO/IEC 17025, 7.8.6, requires for statements of conformity. Set it \
+         to \"guard-band\" or \"simple-acceptance\"."
     )]
     NoRule,
-    /// The calibrations cannot be compared, or not with limits.
+    /// The calibrations cannot be compared with each other or with limits.
     #[error(transparent)]
     Comparison(#[from] ComparisonError),
     /// A calibration that cannot be applied.
@@ -59,7 +56,7 @@ pub struct Certificate {
     pub calibration: Calibration,
     /// Origin of the calibration.
     pub provenance: Provenance,
-    /// SHA-256 of the calibration's file.
+    /// SHA-256 of the calibration file.
     pub sha256: String,
     /// Every parameter with its expanded uncertainty.
     pub results: Vec<Measured>,
@@ -74,10 +71,10 @@ pub struct Certificate {
 }
 
 impl Certificate {
-    /// The certificate of a calibration whose file has this SHA-256.
+    /// The certificate of a calibration; the SHA-256 is that of its file.
     ///
     /// # Errors
-    /// [`CertificateError`] if the calibration may not be used, or something is missing.
+    /// [`CertificateError`] if the calibration must not be used, or a field is missing.
     pub fn new(
         calibration: Calibration,
         sha256: String,

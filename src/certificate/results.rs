@@ -141,12 +141,12 @@ pub fn terms(calibration: &Calibration) -> Vec<Measured> {
     (0..TERM_PARAMETERS).filter_map(measured).collect()
 }
 
-/// States the temperatures at which the results are valid, and where their temperature coefficients are found.
+/// States the temperatures at which the results are valid, and the location of their temperature coefficients.
 pub fn temperature_words(of: &ThermalRecord, number: impl Fn(f64) -> String) -> String {
     let triad = |(name, sensor): (&str, Sensor)| {
         let range = of.range.get(sensor);
         format!(
-            "{name} at {} °C, known from {} to {} °C",
+            "{name} at {} °C, valid from {} to {} °C",
             number(range.reference),
             number(range.lowest),
             number(range.highest)
@@ -154,8 +154,8 @@ pub fn temperature_words(of: &ThermalRecord, number: impl Fn(f64) -> String) -> 
     };
     let triads = [("gyros", Sensor::Gyro), ("accelerometers", Sensor::Accel)].map(triad);
     format!(
-        "The results are those at the reference temperature: {}. They change with temperature; the coefficients, with \
-         their equation and their covariance, are in the attached calibration.json.",
+        "The results apply at the reference temperature: {}. They change with temperature; the attached \
+         calibration.json contains the coefficients with their equation and covariance.",
         triads.join("; ")
     )
 }

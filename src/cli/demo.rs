@@ -35,11 +35,10 @@ use crate::cli::terminal::{Activity, show_brief};
 
 /// Simulates a calibration and compares it with the truth
 ///
-/// Simulates an instrument with the paper's errors on a three-axis table: ten minutes with turns for the
-/// filter, and an hour of static positions for the paper's closed form. Calibrates it by both methods,
-/// compares both with the truth, navigates 40 h with each and writes a report. DIR is the filter's run
-/// directory and contains ekf/ with its calibration, six-position/ with the static run and its
-/// calibration, and report/.
+/// Simulates an instrument with the paper's errors on a three-axis table: ten minutes with turns for the filter, and an
+/// hour of static positions for the paper's closed form. Calibrates it with both methods, compares both with the truth,
+/// navigates for 40 h with each and writes a report. DIR is the run directory of the filter. It contains ekf/ with the
+/// filter calibration, six-position/ with the static run and its calibration, and report/.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal demo -o my-demo --seed 3
@@ -175,7 +174,7 @@ impl Demo {
     }
 }
 
-/// The report on the filter's calibration, beside the closed form in the same time and in its whole time.
+/// Report on the filter calibration, with the closed form from the same table time and from its full time.
 fn document(
     (problem, solution, assessment): (&Problem, &Solution, &Assessment),
     (still, whole): (&Problem, &ClosedForm),
@@ -186,8 +185,7 @@ fn document(
     let (table_time, whole_time) = (minutes(run), minutes(still.run()));
     let closed_form = cut(still, table_time / whole_time)?;
     let note = format!(
-        "{}; the first part of each dwell, as if the table had been driven for the {table_time:.0} min of the \
-         filter's run",
+        "{}; first part of each dwell, equivalent to the {table_time:.0} min table time of the filter",
         note(&closed_form)
     );
     let methods = [
@@ -230,12 +228,12 @@ fn document(
     Ok(document)
 }
 
-/// The static positions that the paper's closed form takes.
+/// Static positions used by the closed form of the paper.
 fn static_positions(seed: Option<u64>) -> anyhow::Result<Simulated> {
     simulated(&Scenario::load("demo-six-position")?, seed)
 }
 
-/// The closed form from the first part of each dwell that makes this part of the run's time.
+/// Closed form from the first part of each dwell, so that the total is this fraction of the run time.
 fn cut(problem: &Problem, part: f64) -> anyhow::Result<ClosedForm> {
     let imu = &problem.run().recording.imu;
     let at_rest: f64 = problem.dwells().map(|dwell| dwell.duration(imu)).sum();
@@ -257,13 +255,13 @@ fn fly(run: &Run, estimates: &[&Estimate], truth: &PerSensor<Triad>) -> anyhow::
     let missions = [
         (
             "stationary and level",
-            "Stationary, gyro bias makes nearly all of the error, and only time at rest lowers its σ.",
+            "When stationary, gyro bias causes nearly all of the error, and only time at rest reduces its σ.",
             still,
         ),
         (
             "in flight",
-            "In flight turns and accelerations expose scale factors and installation, which the filter \
-             observes in minutes.",
+            "In flight, turns and accelerations excite scale factors and misalignments, which the filter observes in \
+             minutes.",
             flying,
         ),
     ];

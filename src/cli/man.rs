@@ -12,8 +12,8 @@ use crate::cli::terminal::print;
 
 /// Writes the manual pages
 ///
-/// Writes one page for turncal and one for each command into DIR, in addition to its other files; without -o, the
-/// page of turncal itself is written to standard output.
+/// Writes one page for turncal and one per command into DIR, and keeps other files there; without -o, writes the
+/// turncal page to standard output.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal man | man -l -
@@ -44,7 +44,7 @@ impl Manual {
     }
 }
 
-/// A command's page and those of the commands below it.
+/// Pages of a command and its subcommands.
 fn collect(
     command: &clap::Command,
     directory: &Path,

@@ -1,4 +1,4 @@
-//! Commands: each parses its arguments, calls the library and says what came of it.
+//! Commands: each parses its arguments, calls the library and reports the result.
 
 mod arguments;
 mod calibrate;
@@ -21,7 +21,7 @@ pub use terminal::{leave_nothing_behind, with_threads};
 
 use clap::{Parser, Subcommand};
 
-/// Calibrates an inertial measurement unit on a turntable, with honest accuracies.
+/// Calibrates an inertial measurement unit on a turntable or by hand, with realistic uncertainties.
 #[derive(Debug, Parser)]
 #[command(
     version,
@@ -39,11 +39,11 @@ With a turntable:
   turncal calibrate run.toml
 
 Advanced (each with --help):
-  merge        parts of a job that --shard split, as one result
-  study        Monte Carlo studies: accuracy, table1, experiment
-  schema       the JSON schema of run.toml
-  completions  a shell-completion script
-  man          the manual pages"
+  merge        merge the parts of a job split with --shard
+  study        run Monte Carlo studies: accuracy, table1, experiment
+  schema       print the JSON schema of run.toml
+  completions  print a shell-completion script
+  man          write the manual pages"
 )]
 pub struct Cli {
     #[command(subcommand)]
@@ -82,7 +82,7 @@ enum Command {
 }
 
 impl Cli {
-    /// Does what the command line asks for.
+    /// Runs the command line.
     pub fn run(&self) -> anyhow::Result<()> {
         match &self.command {
             Command::Demo(demo) => demo.run(),

@@ -4,7 +4,7 @@ use turncal::formats::run_schema;
 
 use crate::cli::terminal::print;
 
-/// Prints the JSON schema of run.toml, with which editors complete and check it
+/// Prints the JSON schema of run.toml, for completion and checks in editors
 ///
 /// Save it and name it in the first line of a run.toml: #:schema ./run.schema.json
 #[derive(Debug, clap::Args)]

@@ -16,8 +16,7 @@ use crate::cli::terminal::Activity;
 
 /// Simulates a run directory with known truth from a scenario
 ///
-/// Writes run.toml, its logs and truth.json. The scenario is a TOML file or the name of an embedded
-/// one, as shown by turncal list.
+/// Writes run.toml, its logs and truth.json. The scenario is a TOML file or an embedded name from turncal list.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:  turncal simulate nineteen-position -o my-run --seed 7
@@ -29,7 +28,7 @@ pub struct Simulate {
     /// Directory to write
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// Seed of all random numbers [default: the scenario's]
+    /// Seed of all random numbers [default: from the scenario]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
     #[command(flatten)]
@@ -53,9 +52,9 @@ impl Simulate {
         drop(activity);
         if simulated.geometry.rows_range(3..).amax() > 0.0 {
             tell!(
-                "note: the axes of the simulated table have errors of their own (non-orthogonality, wobble, \
-                 encoders), which the quaternions of its log cannot tell: a calibration from these files \
-                 will claim too small σ of installation. turncal study accuracy estimates them."
+                "note: the axes of the simulated table have errors (non-orthogonality, wobble, encoders) that the \
+                 quaternions in its log cannot show, so a calibration from these files will state misalignment σ \
+                 that are too small. turncal study accuracy estimates these errors."
             );
         }
         tell!(
@@ -107,7 +106,7 @@ impl Simulate {
     }
 }
 
-/// A simulated run with this seed or the scenario's own.
+/// Simulates a run with this seed or the seed of the scenario.
 pub fn simulated(scenario: &Scenario, seed: Option<u64>) -> anyhow::Result<Simulated> {
     scenario
         .simulate(seed.unwrap_or(scenario.seed), 0)
@@ -124,7 +123,7 @@ fn true_terms(simulated: &Simulated) -> BTreeMap<String, TermRecord> {
     on.filter_map(term).collect()
 }
 
-/// Writes a simulated run with its truth into a directory that is there.
+/// Writes a simulated run with its truth into an existing directory.
 pub fn write(simulated: &Simulated, directory: &Path) -> anyhow::Result<()> {
     let truth = Calibration {
         terms: true_terms(simulated),

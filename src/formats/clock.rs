@@ -10,17 +10,17 @@ pub use line::{Line, Uniform};
 pub use stamps::{Stamp, Stamps};
 pub use wander::Wander;
 
-/// What the numbers of a time column are.
+/// Meaning of the numbers in a time column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TimeUnit {
-    /// This many of them are a second.
+    /// Number per second.
     PerSecond(f64),
     /// Samples are counted.
     Count,
 }
 
 impl TimeUnit {
-    /// The words for it in `run.toml`.
+    /// Its names in `run.toml`.
     pub const WORDS: [(&'static str, Self); 5] = [
         ("s", Self::PerSecond(1.0)),
         ("ms", Self::PerSecond(1e3)),
@@ -30,23 +30,23 @@ impl TimeUnit {
     ];
 }
 
-/// What times of rows may do but go on.
+/// Allowed interruptions of row times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Breaks {
-    /// Nothing: rows of another file are put beside these.
+    /// None, because the rows are combined with another file.
     None,
-    /// Pause for as long as they like.
+    /// Pauses of any length.
     Pauses,
-    /// Start over where the clock was set: nothing else goes by them.
+    /// Restarts where the clock was set, because nothing else depends on the times.
     Settings,
 }
 
-/// What `run.toml` says of a log's time.
+/// Time settings of a log in `run.toml`.
 #[derive(Debug, Clone, Copy)]
 pub struct Clock<'a> {
-    /// None where rows just follow one another.
+    /// `None` if rows are simply consecutive.
     pub column: Option<&'a str>,
-    /// A column of nanoseconds beside one of whole seconds.
+    /// A nanosecond column in addition to one of whole seconds.
     pub nanoseconds: Option<&'a str>,
     pub unit: TimeUnit,
     /// s

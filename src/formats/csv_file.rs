@@ -1,4 +1,4 @@
-//! Rows of numbers below a line of names, plain or gzipped, read row by row without keeping their text.
+//! Rows of numbers below a line of names, plain or gzipped, read row by row without storing the text.
 
 mod clock_text;
 mod heading;
@@ -20,28 +20,29 @@ use heading::{Heading, Looks};
 use lines::{LONGEST, Lines, Stop};
 use row::{LONGEST_FIELD, MOST_COLUMNS, Malformed, Row};
 
-/// Bytes that a value takes while a record is read: it is held as it stands, repaired and in SI. To ask for
-/// what a calibration takes would refuse what may find room.
+/// Bytes per value while a recording is read: as read, repaired and in SI. Checking for the memory of a whole
+/// calibration would refuse logs that may fit.
 const BYTES_A_VALUE: usize = 32;
-/// The same where no column is taken, for all are only looked at.
+/// The same if columns are only examined.
 const BYTES_LOOKED_AT: usize = 16;
-/// The same where rows are packed as they come.
+/// The same if rows are packed while reading.
 const BYTES_PACKED: usize = 4;
-/// What a gzipped file begins with.
+/// First bytes of a gzipped file.
 const GZIP: [u8; 2] = [0x1f, 0x8b];
-/// So many rows always find room.
+/// Number of rows that always fit.
 const FEW_ROWS: usize = 1 << 12;
 
-/// A file of rows at one of them.
+/// A file of rows, positioned at one row.
 ///
-/// Commas, semicolons, tabs or blanks part the fields, as most rows show. Lines that begin with `#`, `%` or `//` are
-/// comments; those above the names, or above rows of numbers without names, are a preamble. Columns without names are
-/// called `1`, `2`, …. Numbers may have a decimal comma where commas do not part them; a time may be that of a clock.
+/// Fields are separated by commas, semicolons, tabs or blanks, whichever most rows use. Lines that begin with `#`, `%`
+/// or `//` are comments; those above the names, or above rows of numbers without names, are a preamble. Columns without
+/// names are called `1`, `2`, …. Numbers may have a decimal comma if commas are not separators; a time may be a clock
+/// time.
 pub struct CsvFile {
     file: PathBuf,
     lines: Lines,
     heading: Heading,
-    /// Of rows of several kinds the word of those that are given out, and its column.
+    /// For rows of several kinds, the tag of the selected ones and its column.
     tag: Option<(usize, String)>,
     row: Row,
     rows: usize,
@@ -50,7 +51,7 @@ pub struct CsvFile {
     cut: Option<Cut>,
 }
 
-/// What the end of a file without a line end leaves open.
+/// Uncertainty at the end of a file without a line ending.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Cut {
     /// Its last row lacks fields.
@@ -60,7 +61,7 @@ enum Cut {
 }
 
 impl CsvFile {
-    /// Opens a file and reads its header; of rows that tags tell apart those with this one.
+    /// Opens a file and reads its header; for tagged rows, selects those with this tag.
     pub fn open(path: &Path, tag: Option<&str>) -> Result<Self, FileError> {
         let stopped = |stop: Stop| stopped(path, &stop);
         let mut lines = Lines::open(source(path)?).map_err(stopped)?;
@@ -78,7 +79,7 @@ impl CsvFile {
                 path,
                 Place::File,
                 "an empty file",
-                "a line of column names and rows below it",
+                "a line of column names followed by rows",
                 "Record or export the file again.",
             )
         })?;
@@ -98,7 +99,7 @@ impl CsvFile {
         })
     }
 
-    /// The tags that tell rows of several kinds apart.
+    /// Tags of rows of several kinds.
     pub fn tags(path: &Path) -> Result<Vec<String>, FileError> {
         let lines = Lines::open(source(path)?).map_err(|stop| stopped(path, &stop))?;
         Ok(Looks::of(lines.ahead())
@@ -106,7 +107,7 @@ impl CsvFile {
             .map_or_else(Vec::new, |tags| tags.names))
     }
 
-    /// Makes sure, as rows become more, that there is room for what is made of them.
+    /// Checks, as the number of rows grows, that there is enough memory.
     fn reserve(&self, used: usize) -> Result<(), FileError> {
         if self.rows < FEW_ROWS || !self.rows.is_power_of_two() {
             return Ok(());
@@ -120,9 +121,12 @@ impl CsvFile {
             return Ok(());
         }
         Err(self.error_here(
-            format_args!("row {}, and no memory for as many more", self.rows),
-            "a record that fits into memory",
-            "Give it more memory, or split the record.",
+            format_args!(
+                "{} rows so far and not enough memory for as many again",
+                self.rows
+            ),
+            "a recording that fits into memory",
+            "Use a computer with more memory, or split the recording.",
         ))
     }
 
@@ -156,7 +160,7 @@ impl Rows for CsvFile {
         &self.heading.remarks
     }
 
-    /// False also at a last row that the end of the file cuts off.
+    /// Also false at a truncated last row.
     fn advance(&mut self, used: &[usize]) -> Result<bool, FileError> {
         let split = loop {
             let more = self.lines.advance();
@@ -185,7 +189,7 @@ impl Rows for CsvFile {
         if found != expected && !ends_in_delimiter {
             return Err(self.error_here(
                 format_args!("{found} fields"),
-                format_args!("{expected}, as in the header"),
+                format_args!("{expected} as in the header"),
                 "Complete or remove the row.",
             ));
         }
@@ -212,7 +216,7 @@ impl Rows for CsvFile {
         String::from_utf8_lossy(self.bytes(column))
     }
 
-    /// Also of what loggers write for nothing.
+    /// Also true for placeholders of loggers.
     fn is_blank(&self, column: usize) -> bool {
         let bytes = self.bytes(column);
         bytes.is_empty() || bytes.eq_ignore_ascii_case(b"nan")
@@ -239,11 +243,11 @@ impl Rows for CsvFile {
     fn cut_off(&self, done: &str) -> Option<String> {
         let (file, line) = (self.file.display(), self.line);
         let what = match self.cut? {
-            Cut::Row => "is cut off: fields are missing. It is left out",
+            Cut::Row => "is truncated (fields are missing), so turncal ignored it",
             Cut::Number => &format!("has no line end, so its last number may lack digits. {done}"),
         };
         Some(format!(
-            "The last row of {file}, line {line}, {what}; look whether the file is whole."
+            "The last row of {file} (line {line}) {what}. Check that the file is complete."
         ))
     }
 
@@ -252,7 +256,7 @@ impl Rows for CsvFile {
     }
 }
 
-/// The error of a tag that tells no rows of a file apart.
+/// Error for a tag in a file without tagged rows.
 fn no_tag(path: &Path, tag: &str) -> FileError {
     FileError::new(
         path,
@@ -283,8 +287,8 @@ fn source(path: &Path) -> Result<Box<dyn BufRead>, FileError> {
                 true => "a directory",
                 false => "a device or pipe",
             },
-            "a regular file, for a log may be read more than once",
-            "Copy what it gives into a file and name that.",
+            "a regular file that can be read more than once",
+            "Save its output to a file and give that file.",
         ));
     }
     let file = File::open(path).map_err(refused)?;
@@ -305,23 +309,23 @@ fn stopped(file: &Path, stop: &Stop) -> FileError {
     match stop {
         Stop::System(error) => FileError::io(
             file,
-            "read on",
+            "continue reading",
             error,
-            "The file is damaged or cut off; copy or compress it again.",
+            "The file is damaged or truncated. Copy or compress it again.",
         ),
         Stop::Endless { line } => FileError::new(
             file,
             Place::Line(*line),
-            format_args!("more than {} KiB without a row that ends", LONGEST / 1024),
-            "rows of numbers, a line each",
+            format_args!("more than {} KiB without an end of line", LONGEST / 1024),
+            "one row of numbers per line",
             "Is this the right file? Record or export it again.",
         ),
         Stop::Malformed { line, what } => malformed(file, *line, *what),
         Stop::Binary => FileError::new(
             file,
             Place::File,
-            "a file of another kind",
-            "rows of text, or a log of a program that turncal knows",
+            "binary data of an unknown format",
+            "a text log or a supported binary log",
             "Convert the file.",
         ),
     }
@@ -330,18 +334,18 @@ fn stopped(file: &Path, stop: &Stop) -> FileError {
 fn malformed(file: &Path, line: u64, what: Malformed) -> FileError {
     let (found, expected, advice) = match what {
         Malformed::Quote => (
-            "a quote that is not closed".to_owned(),
-            "a row in each line, and fields in quotes closed in it".to_owned(),
+            "an unclosed quote".to_owned(),
+            "one row per line, with every quote closed".to_owned(),
             "Remove the quote or close it.",
         ),
         Malformed::Columns => (
-            "more columns than any log has".to_owned(),
-            format!("at most {MOST_COLUMNS}"),
+            "too many columns".to_owned(),
+            format!("at most {MOST_COLUMNS} columns"),
             "Is this the right file? Export the columns that are needed.",
         ),
         Malformed::Field => (
-            format!("a field of more than {} KiB", LONGEST_FIELD / 1024),
-            "numbers and names".to_owned(),
+            format!("a field longer than {} KiB", LONGEST_FIELD / 1024),
+            "short numbers or names".to_owned(),
             "Is this the right file? Record or export it again.",
         ),
     };

@@ -13,10 +13,10 @@ use crate::run::Run;
 
 /// The log on standard input.
 const STANDARD_INPUT: &str = "-";
-/// What rows of standard input are called as a file.
+/// File name for rows of standard input.
 const PIPED: &str = "stdin.csv";
 
-/// A run, and where it was a log alone, the draft by which it was read.
+/// A run and, for a log without run.toml, the draft used to read it.
 #[derive(Debug)]
 pub struct Opened {
     /// The run.
@@ -28,16 +28,16 @@ pub struct Opened {
 struct Log {
     path: PathBuf,
     draft: Draft,
-    /// Rows of standard input, until they are written beside a result.
+    /// Rows of standard input, until written next to a result.
     piped: Option<TempDir>,
 }
 
 impl Opened {
-    /// Reads a `run.toml`, told by its ending, a log, or rows of text on standard input (`-`). What is found in a log is
-    /// shown before anything can be wrong with it.
+    /// Reads a `run.toml` (by extension), a log, or text on standard input (`-`). Detected fields of a log are shown
+    /// before any error.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read, or if what must be known of a log is neither found nor stated.
+    /// [`FileError`] if it cannot be read, or if required fields of a log are neither detected nor stated.
     pub fn new(
         path: &Path,
         stream: Option<&str>,
@@ -79,7 +79,7 @@ impl Opened {
         self.log.is_some()
     }
 
-    /// Writes the `run.toml` by which a log was read into the directory of a result.
+    /// Writes the `run.toml` used to read a log into a result directory.
     ///
     /// # Errors
     /// [`FileError`] if it cannot be written.

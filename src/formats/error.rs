@@ -1,19 +1,19 @@
-//! The one error of this room: where, what was found, what was expected, what to do.
+//! Error type of this module: place, content found, content expected, remedy.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
 use crate::shown::{self, LONGEST, excerpt};
 
-/// Why a file could not be read or written, in one sentence or a few.
+/// Error in reading or writing a file.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{}{place}: {message}", shown::path(file))]
 pub struct FileError {
     /// The file at fault.
     pub file: PathBuf,
-    /// Where in the file.
+    /// Place in the file.
     pub place: Place,
-    /// What was found, what was expected, what to do.
+    /// Content found, content expected, remedy.
     pub message: String,
 }
 
@@ -48,7 +48,7 @@ pub enum Place {
         stream: String,
         /// Where it is in the file.
         byte: u64,
-        /// The column that is at fault, if one is.
+        /// The column at fault, if any.
         column: Option<String>,
     },
 }
@@ -83,7 +83,7 @@ impl fmt::Display for Place {
 }
 
 impl FileError {
-    /// An error at a place: `found …, expected …. What to do.` What was found is cut where it is long.
+    /// An error at a place: `found …, expected …. Remedy.` Long content is shortened.
     pub(super) fn new(
         file: &Path,
         place: Place,
@@ -101,7 +101,7 @@ impl FileError {
         }
     }
 
-    /// The same of the file as a whole.
+    /// The same for the whole file.
     pub(super) fn of(
         file: &Path,
         found: impl fmt::Display,
@@ -111,13 +111,13 @@ impl FileError {
         Self::new(file, Place::File, found, expected, advice)
     }
 
-    /// The system did not let a file be written.
+    /// The system refused to write a file.
     pub(super) fn unwritten(file: &Path, error: &std::io::Error) -> Self {
-        let advice = "Make room or choose another place.";
+        let advice = "Free some disk space or choose another location.";
         Self::io(file, "write the file", error, advice)
     }
 
-    /// The system refused to do something with a file.
+    /// The system refused an operation on a file.
     pub(super) fn io(file: &Path, doing: &str, error: &std::io::Error, advice: &str) -> Self {
         Self {
             file: file.to_owned(),
@@ -127,7 +127,7 @@ impl FileError {
     }
 }
 
-/// The candidate most like a misspelt name, if one is like it at all.
+/// The candidate most similar to a misspelt name, if any.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     candidates
         .into_iter()
@@ -137,7 +137,7 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .map(|(_, candidate)| candidate)
 }
 
-/// How much like a name another is, from 0 to 1.
+/// Similarity of two names, from 0 to 1.
 fn likeness(name: &str, other: &str) -> f64 {
     // This takes the product of both lengths, and those of names that are alike differ little.
     if name.len() > LONGEST || other.len() > 4 * name.len() {
@@ -146,7 +146,7 @@ fn likeness(name: &str, other: &str) -> f64 {
     strsim::normalized_damerau_levenshtein(&name.to_lowercase(), &other.to_lowercase())
 }
 
-/// `Did you mean … ?`, or else the advice given.
+/// `Did you mean … ?`, or otherwise the given advice.
 pub fn suggestion<'a>(
     name: &str,
     candidates: impl IntoIterator<Item = &'a str>,
@@ -158,11 +158,10 @@ pub fn suggestion<'a>(
     )
 }
 
-/// So many characters of names that could be meant are shown.
+/// Maximum number of characters of candidate names shown.
 const ROOM: usize = 2 * LONGEST;
 
-/// All names that could be meant, where there is room for them; else those most like the one that is wanted first,
-/// and how many others there are.
+/// All candidate names, if they fit; otherwise the most similar first, and the number of others.
 pub fn choice<'a>(wanted: &str, names: impl IntoIterator<Item = &'a str>) -> String {
     let names: Vec<&str> = names.into_iter().collect();
     let all = list(names.iter().copied());

@@ -16,7 +16,7 @@ use crate::recording::{FileColumn, ImuSamples, NamedColumns};
 use parts::Sizes;
 use reading::Reading;
 
-/// Which moment of a sample its time stamp names.
+/// The moment of a sample that its time stamp marks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TimeStamp {
     Start,
@@ -25,14 +25,14 @@ pub enum TimeStamp {
 }
 
 impl TimeStamp {
-    /// The words for it in `run.toml`.
+    /// Its names in `run.toml`.
     pub const WORDS: [(&'static str, Self); 3] = [
         ("end", Self::End),
         ("start", Self::Start),
         ("middle", Self::Middle),
     ];
 
-    /// From the begin of a sample to its stamp, in samples.
+    /// Time from the start of a sample to its stamp, in samples.
     pub fn lag(self) -> f64 {
         match self {
             Self::Start => 0.0,
@@ -42,15 +42,15 @@ impl TimeStamp {
     }
 }
 
-/// What `run.toml` says of the file.
+/// Log settings in `run.toml`.
 pub struct ImuLog<'a> {
     pub source: Source<'a>,
     pub clock: Clock<'a>,
-    /// Where the accelerometers are, if not in the rows of the gyros.
+    /// Source of the accelerometers, if not in the gyro rows.
     pub accel_from: Option<(Source<'a>, Clock<'a>)>,
-    /// Of rows of several instruments those that have this number in this column.
+    /// Column and number of the selected instrument, if the log has several.
     pub instance: Option<(&'a str, f64)>,
-    /// Without names where the log has the other triad alone.
+    /// Empty names for a missing triad.
     pub triads: PerSensor<[&'a str; 3]>,
     pub temperature: Option<TemperatureColumns<'a>>,
     pub output: Output,
@@ -59,18 +59,18 @@ pub struct ImuLog<'a> {
     pub continuous: bool,
     /// Along right-front-up.
     pub nominal: PerSensor<Nominal>,
-    /// Largest magnitude of a row's value.
+    /// Largest magnitude of a row value.
     pub full_scale: PerSensor<Option<f64>>,
 }
 
-/// Where the values of a sample stand in a row.
+/// Column indices of the values of a sample.
 #[derive(Clone)]
 pub struct Layout {
-    /// Gyro x, y, z and accelerometer x, y, z as they stand.
+    /// Gyro x, y, z and accelerometer x, y, z, in file order.
     names: [FileColumn; 6],
-    /// None of a triad that is not there.
+    /// `None` for a missing triad.
     places: [Option<usize>; 6],
-    /// Right, front or up, whichever each lies along.
+    /// Body axis of each (right, front or up).
     body_axes: [usize; 6],
 }
 
@@ -79,7 +79,7 @@ fn sensor(column: usize) -> Sensor {
 }
 
 impl Layout {
-    /// Rad and m/s by the nominal scale for one of each column's unit in a row.
+    /// Rad and m/s per unit of each column in a row, from nominal scales.
     fn units(&self, log: &ImuLog, period: f64) -> [f64; 6] {
         let unit = |k: usize| log.seconds(period) / log.nominal.get(sensor(k)).0[self.body_axes[k]];
         std::array::from_fn(unit)
@@ -89,14 +89,14 @@ impl Layout {
         std::array::from_fn(|k| *log.full_scale.get(sensor(k)))
     }
 
-    /// The columns of a triad that lie along right, front and up.
+    /// The columns of a triad along right, front and up.
     fn columns(&self, sensor: Sensor) -> [usize; 3] {
         let first = 3 * sensor as usize;
         let along = |axis: usize| (first..first + 3).find(|&k| self.body_axes[k] == axis);
         [0, 1, 2].map(|axis| along(axis).unwrap_or(first + axis))
     }
 
-    /// One rad and m/s along right, front and up in the unit of the column that lies along it.
+    /// One rad and m/s along right, front and up, in the unit of the corresponding column.
     fn body_nominal(&self, log: &ImuLog, sensor: Sensor) -> Vector3<f64> {
         let columns = self.columns(sensor);
         Vector3::from_fn(|axis, _| {
@@ -114,7 +114,7 @@ impl Layout {
 }
 
 impl ImuLog<'_> {
-    /// What a row's value is to be taken for to be an integral over its sample.
+    /// Factor that converts a row value to an integral over its sample.
     fn seconds(&self, period: f64) -> f64 {
         match self.output {
             Output::Pulse | Output::Increment => 1.0,
@@ -122,8 +122,7 @@ impl ImuLog<'_> {
         }
     }
 
-    /// Reads the samples, finds what is wrong with them, and bridges it; what the file leaves open goes to
-    /// `notes`.
+    /// Reads the samples, finds and bridges faults; `notes` receives remarks about the file.
     pub fn read(&self, notes: &mut Vec<String>) -> Result<ImuSamples, FileError> {
         self.read_by(Sizes::default(), notes)
     }
@@ -142,7 +141,7 @@ impl ImuLog<'_> {
                 continue;
             }
             notes.extend(clock.uneven());
-            notes.extend(csv.cut_off("It is left out"));
+            notes.extend(csv.cut_off("turncal ignored it"));
             notes.extend_from_slice(csv.remarks());
             notes.extend(reading.notes());
             notes.extend(reading.stamps.notes(&self.source.file, parts.missing()));
@@ -162,7 +161,7 @@ impl ImuLog<'_> {
         }
     }
 
-    /// The columns of the record by the names that the file gives them.
+    /// The columns with their names in the file.
     fn named_columns(&self, layout: &Layout) -> NamedColumns {
         NamedColumns {
             time: self.clock_of_rows().column.map(str::to_owned),

@@ -1,7 +1,7 @@
-//! Files: runs in, calibrations in and out, what other programs read.
+//! Files: input of runs, input and output of calibrations, exports for other programs.
 //!
 //! A [`crate::run::Run`] read here is in SI, on right-front-up body axes and in normalised outputs (see
-//! [`crate::imu::Nominal`]); the files' units and axes end at this door.
+//! [`crate::imu::Nominal`]); file units and axes are converted here.
 
 mod clock;
 mod csv_file;

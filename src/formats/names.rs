@@ -1,10 +1,10 @@
-//! Names of columns, each of which means one quantity.
+//! Column names, each for one quantity.
 
 use super::error::{choice, nearest};
 use crate::shown::excerpt;
 
-/// The place of a column by its name, or by its number where none is called so; none of those that are taken. Else
-/// what was found and expected, and what to do.
+/// Index of an unused column by name or, if no column has this name, by number. Otherwise the content found, the
+/// content expected and the remedy.
 pub fn find(all: &[String], taken: &[usize], name: &str) -> Result<usize, [String; 3]> {
     let mut places: Vec<usize> = (0..all.len()).filter(|&place| all[place] == name).collect();
     if let Ok(number) = name.parse::<usize>()
@@ -17,14 +17,14 @@ pub fn find(all: &[String], taken: &[usize], name: &str) -> Result<usize, [Strin
     match places[..] {
         [place] if !taken.contains(&place) => Ok(place),
         [_] => Err([
-            format!("`{name}` named for two quantities"),
-            "a column of its own for each".to_owned(),
+            format!("the column `{name}` used for two quantities"),
+            "a separate column for each".to_owned(),
             "Correct `columns` in run.toml.".to_owned(),
         ]),
         [_, ..] => Err([
             format!("two columns named `{name}`"),
-            "one".to_owned(),
-            "Name it by its number, the first being `1`, or rename one of them.".to_owned(),
+            "a unique name".to_owned(),
+            "Refer to it by its number (the first is `1`), or rename one of them.".to_owned(),
         ]),
         [] => {
             let advice = "Correct `columns` in run.toml or this header.";

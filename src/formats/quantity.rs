@@ -1,4 +1,4 @@
-//! Units: the words that `run.toml` has for them, how large each is, and how files spell them.
+//! Units: names in `run.toml`, sizes, and spellings in files.
 
 use Of::{Count, Other, Rows, Time};
 use Output::{Increment, Rate};
@@ -8,20 +8,20 @@ use crate::imu::{Output, Sensor};
 use crate::noise::normalised;
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, STANDARD_GRAVITY};
 
-/// The words for what a row holds.
+/// Names of row quantities.
 pub const OUTPUTS: [(&str, Output); 3] = [
     ("pulse", Output::Pulse),
     ("increment", Output::Increment),
     ("rate", Output::Rate),
 ];
 
-/// The word for what a row holds.
+/// Name of a row quantity.
 pub fn output_word(output: Output) -> &'static str {
     let known = OUTPUTS.iter().find(|(_, known)| *known == output);
     known.map_or("", |(word, _)| word)
 }
 
-/// What a unit is of.
+/// Quantity of a unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Of {
     /// A triad's rows.
@@ -32,7 +32,7 @@ pub enum Of {
     Other,
 }
 
-/// A unit: its word, what it is of, how many of it are one in SI, and its normalised spellings.
+/// A unit: name, quantity, number per SI unit, and normalised spellings.
 type Row = (&'static str, Of, f64, &'static [&'static str]);
 
 #[rustfmt::skip]
@@ -61,7 +61,7 @@ const UNITS: [Row; 22] = [
     ("Pa", Other, 1.0, &["pa"]),
 ];
 
-/// Units that files have and `run.toml` has not: how many of one of its they are.
+/// File units that `run.toml` lacks, as multiples of its units.
 const MULTIPLES: [(&str, f64, &[&str]); 5] = [
     ("m/s^2", 1e-2, &["cm/s2", "gal"]),
     ("m/s^2", 1e-3, &["mm/s2"]),
@@ -70,8 +70,8 @@ const MULTIPLES: [(&str, f64, &[&str]); 5] = [
     ("g", 1e-6, &["ug"]),
 ];
 
-/// Units of a triad's rows: the file's quantity per second for one rad/s or m/s². A count has no
-/// nominal scale of its own.
+/// Units of the rows of a triad: quantity of the file per second for one rad/s or m/s². A count has no inherent nominal
+/// scale.
 pub fn units(sensor: Sensor, output: Output) -> impl Iterator<Item = (&'static str, Option<f64>)> {
     let usable = move |row: &&Row| row.1 == Count || row.1 == Rows(sensor, output);
     let scaled = |&(word, of, per_si, _): &Row| (word, (of != Count).then_some(per_si));
@@ -84,7 +84,7 @@ pub fn units_of_time() -> impl Iterator<Item = (&'static str, f64)> {
     of_time.map(|&(word, _, per_si, _)| (word, per_si.recip()))
 }
 
-/// The unit that a text spells: its word in `run.toml`, how many of that it is, and what of.
+/// The unit in a text: name in `run.toml`, multiple of it, and quantity.
 pub fn spelled(text: &str) -> Option<(&'static str, f64, Of)> {
     let text = normalised(text);
     let has = |spellings: &[&str]| spellings.contains(&text.as_str());
@@ -94,8 +94,8 @@ pub fn spelled(text: &str) -> Option<(&'static str, f64, Of)> {
     Some((word, multiple.map_or(1.0, |&(_, times, _)| times), of))
 }
 
-/// What a unit of rows says of the nominal scale of a triad: the file's quantity per second for one
-/// rad/s or m/s²; `None` for counts and unknown units.
+/// Nominal scale of a triad implied by a row unit: quantity of the file per second for one rad/s or m/s²; `None` for
+/// counts and unknown units.
 pub fn unit_scale(sensor: Sensor, unit: &str) -> Option<f64> {
     let mut all = OUTPUTS
         .iter()

@@ -1,4 +1,4 @@
-//! Rows of numbers, whatever a file holds them in.
+//! Rows of numbers, independent of the file format.
 
 use std::borrow::Cow;
 use std::fmt::Display;
@@ -8,47 +8,47 @@ use super::error::{FileError, Place};
 use super::names;
 use crate::recording::FileColumn;
 
-/// A file that gives rows of numbers one after the other.
+/// A file that provides rows of numbers in sequence.
 pub trait Rows {
     fn file(&self) -> &Path;
 
     /// The names of the columns.
     fn header(&self) -> &[String];
 
-    /// The units of the columns; none at all where the file says none.
+    /// The column units; empty if the file states none.
     fn units(&self) -> &[String];
 
-    /// What the file says of the rate of rows, Hz.
+    /// Stated row rate, Hz.
     fn rate(&self) -> Option<f64> {
         None
     }
 
-    /// What was done to the values, a sentence each.
+    /// Modifications of the values, one sentence each.
     fn remarks(&self) -> &[String];
 
-    /// Error of the integrals of the accelerometers' columns over any rows, in the columns' unit times s: what
-    /// putting two streams on one grid left.
+    /// Error of integrals of the accelerometer columns over any rows, in the column unit times s, from combining two
+    /// streams.
     fn integral_error(&self) -> [f64; 3] {
         [0.0; 3]
     }
 
-    /// Goes to the next row, of which these columns are used; false at the end.
+    /// Advances to the next row, of which these columns are used; false at the end.
     fn advance(&mut self, used: &[usize]) -> Result<bool, FileError>;
 
-    /// The number in a column of the row; NaN is none.
+    /// The number in a column of the row; NaN if missing.
     fn value(&self, column: usize) -> f64;
 
-    /// What stands in a column of the row.
+    /// The text in a column of the row.
     fn shown(&self, column: usize) -> Cow<'_, str> {
         self.value(column).to_string().into()
     }
 
-    /// Whether nothing stands in a column of the row.
+    /// Whether a column of the row is blank.
     fn is_blank(&self, column: usize) -> bool {
         self.value(column).is_nan()
     }
 
-    /// Line of a text, sample of another file.
+    /// Line number of a text, or sample number of another file.
     fn line(&self) -> u64;
 
     /// The place of the row or of a column in it …
@@ -59,26 +59,26 @@ pub trait Rows {
         Place::File
     }
 
-    /// An error of a row that names its line, with what its number counts in this file.
+    /// Converts the line in an error to the numbering of this file.
     fn placed(&self, error: FileError) -> FileError {
         error
     }
 
-    /// Whether the row is the last and no line end shows that its last number is whole.
+    /// Whether the row is the last one and lacks a line ending, so that its last number may be truncated.
     fn may_be_cut(&self) -> bool {
         false
     }
 
-    /// What the end of the file leaves open, in a sentence, with what was done about its last row.
+    /// Remark on a truncated end of the file, with the treatment of its last row.
     fn cut_off(&self, _done: &str) -> Option<String> {
         None
     }
 
-    /// Takes less memory for granted: rows are packed as they come.
+    /// Assumes less memory per row, because rows are packed while reading.
     fn pack(&mut self) {}
 }
 
-/// A file at one of its rows, and the columns of it that are used.
+/// A file at one of its rows, with the columns in use.
 pub struct LogRows {
     rows: Box<dyn Rows>,
     used: Vec<usize>,
@@ -100,7 +100,7 @@ impl LogRows {
         }
     }
 
-    /// The index of a named column, which nothing else may be.
+    /// Index of a named column, which becomes exclusive.
     pub fn column(&mut self, name: &str) -> Result<usize, FileError> {
         let found = names::find(self.header(), &self.used, name);
         let place = found.map_err(|[found, expected, advice]| {
@@ -110,7 +110,7 @@ impl LogRows {
         Ok(place)
     }
 
-    /// The same of a name that a minus may precede, which turns the sign of the column's values.
+    /// The same for a name with an optional minus, which reverses the sign of the values.
     pub fn signed_column(&mut self, name: &str) -> Result<(usize, FileColumn), FileError> {
         let literal = self.header().iter().any(|known| known == name);
         let bare = name.strip_prefix('-').filter(|_| !literal);
@@ -121,12 +121,12 @@ impl LogRows {
         Ok((self.column(&column.name)?, column))
     }
 
-    /// Goes to the next row; false at the end.
+    /// Advances to the next row; false at the end.
     pub fn advance(&mut self) -> Result<bool, FileError> {
         self.rows.advance(&self.used)
     }
 
-    /// Takes less memory for granted: rows are packed as they come.
+    /// Assumes less memory per row, because rows are packed while reading.
     pub fn pack(&mut self) {
         self.rows.pack();
     }
@@ -149,14 +149,14 @@ impl LogRows {
         }
     }
 
-    /// The error of a row's value that is not what it should be.
+    /// The error for an invalid value in a row.
     pub fn not(&self, column: usize, expected: &str) -> FileError {
         let shown = self.shown(column);
         let found = match shown.is_empty() {
             true => "an empty field".to_owned(),
             false => format!("`{shown}`"),
         };
-        let advice = "Correct the value or record the file again.";
+        let advice = "Correct the value, or repeat the recording.";
         FileError::new(
             self.file(),
             self.place(Some(column)),
@@ -166,7 +166,7 @@ impl LogRows {
         )
     }
 
-    /// An error of the whole file.
+    /// An error about the whole file.
     pub fn error(
         &self,
         found: impl Display,
@@ -176,7 +176,7 @@ impl LogRows {
         FileError::new(self.file(), Place::File, found, expected, advice)
     }
 
-    /// An error of the row.
+    /// An error about the row.
     pub fn error_here(
         &self,
         found: impl Display,

@@ -1,4 +1,4 @@
-//! The columns of a file of rows, as they stand.
+//! The columns of a file of rows, unchanged.
 
 use std::path::Path;
 
@@ -6,21 +6,21 @@ use super::FileError;
 use super::rows::LogRows;
 use super::source::Source;
 
-/// The columns of a file of which nothing is known yet.
+/// The columns of an unknown file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sheet {
     pub names: Vec<String>,
-    /// What the row below the names says of each, empty without such a row.
+    /// Units from the row below the names; empty without such a row.
     pub units: Vec<String>,
-    /// What comments say of the rate of rows, Hz.
+    /// Row rate stated in comments, Hz.
     pub rate: Option<f64>,
-    /// NaN where there is no number.
+    /// NaN for missing numbers.
     pub columns: Vec<Vec<f64>>,
     /// Whether the file has further rows.
     pub goes_on: bool,
 }
 
-/// So many numbers, 48 MiB, show what a file is: more than an hour of both triads at 200 Hz.
+/// Maximum number of values read to identify a file, 48 MiB: more than an hour of both triads at 200 Hz.
 const MOST: usize = 6 << 20;
 
 impl Sheet {
@@ -50,7 +50,7 @@ impl Sheet {
         let rows = columns.first().map_or(0, Vec::len);
         if rows < fewest {
             return Err(csv.error(
-                format_args!("{rows} rows"),
+                format_args!("only {rows} rows"),
                 format_args!("at least {fewest}"),
                 "Record a run with dwells and turns.",
             ));
@@ -74,7 +74,7 @@ impl Sheet {
         columns.iter().any(|&k| self.columns[k][row].is_finite())
     }
 
-    /// Leaves the rows of which this is true.
+    /// Keeps the rows that satisfy a condition.
     pub fn retain(&mut self, keep: impl Fn(&Self, usize) -> bool) {
         let kept: Vec<bool> = (0..self.rows()).map(|row| keep(self, row)).collect();
         for column in &mut self.columns {

@@ -1,4 +1,4 @@
-//! Files that are read as a whole: descriptions and results, never records.
+//! Files read as a whole: descriptions and results, never recordings.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
@@ -9,10 +9,10 @@ use serde::de::DeserializeOwned;
 
 use super::error::FileError;
 
-/// A file of any length may be named, and a device that never ends.
+/// Length limit, because any file or an endless device may be named.
 const MOST_BYTES: u64 = 1 << 24;
 
-/// All bytes of a file that holds `what`.
+/// All bytes of a file that contains `what`.
 pub fn bytes(path: &Path, what: &str, advice: &str) -> Result<Vec<u8>, FileError> {
     let read = || {
         let mut bytes = Vec::new();
@@ -20,7 +20,7 @@ pub fn bytes(path: &Path, what: &str, advice: &str) -> Result<Vec<u8>, FileError
         file.take(MOST_BYTES + 1).read_to_end(&mut bytes)?;
         if bytes.len() as u64 > MOST_BYTES {
             let most = MOST_BYTES >> 20;
-            let why = format!("it is longer than {most} MiB, as no file of this kind is");
+            let why = format!("it is longer than {most} MiB, the limit for such files");
             return Err(io::Error::new(ErrorKind::FileTooLarge, why));
         }
         Ok(bytes)
@@ -31,7 +31,7 @@ pub fn bytes(path: &Path, what: &str, advice: &str) -> Result<Vec<u8>, FileError
 /// The text of such a file.
 pub fn text(path: &Path, what: &str, advice: &str) -> Result<String, FileError> {
     String::from_utf8(bytes(path, what, advice)?).map_err(|_| {
-        let error = io::Error::new(ErrorKind::InvalidData, "it is not text in UTF-8");
+        let error = io::Error::new(ErrorKind::InvalidData, "it is not UTF-8 text");
         FileError::io(path, &format!("read {what}"), &error, advice)
     })
 }

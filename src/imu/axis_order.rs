@@ -28,7 +28,7 @@ impl AxisOrder {
         source: [1, 0, 2],
         reversed: [true, false, false],
     };
-    /// The words of `run.toml` for a file's axes, brought to right, front, up.
+    /// Names of file axes in `run.toml`, with the conversion to right, front, up.
     pub const WORDS: [(&'static str, Self); 3] = [
         ("rfu", Self::IDENTITY),
         ("frd", Self::FRONT_RIGHT_DOWN),
@@ -63,8 +63,8 @@ impl AxisOrder {
         Vector3::from_fn(|axis, _| self.sign(axis) * v[self.source[axis]])
     }
 
-    /// One value of each axis, such as a σ or a nominal scale, which no sign changes: a reversed axis turns the sign of
-    /// input and output alike.
+    /// One value per axis, such as a σ or a nominal scale, which is independent of sign: a reversed axis changes the
+    /// sign of both input and output.
     pub fn each(&self, v: Vector3<f64>) -> Vector3<f64> {
         Vector3::from(self.source.map(|axis| v[axis]))
     }

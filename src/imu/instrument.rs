@@ -17,12 +17,11 @@ pub struct Instrument {
     pub prior: PerSensor<Prior>,
     /// Noise of each triad.
     pub noise: PerSensor<Noise>,
-    /// Whether white noise is stated; otherwise it is estimated from the quieter part of the record.
+    /// Whether white noise is stated; otherwise it is estimated from the quieter part of the recording.
     pub noise_is_stated: PerSensor<bool>,
     /// Noise added during moves.
     pub motion_noise: PerSensor<MotionNoise>,
-    /// 1σ of each parameter of the error terms before calibration, around zero; zero where a term is
-    /// off.
+    /// Prior 1σ of each error-term parameter, around zero; zero if a term is off.
     pub term_sigma: TermVector,
 }
 

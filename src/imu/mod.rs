@@ -1,10 +1,9 @@
 //! The instrument: output of a triad of gyros or accelerometers as a function of its input.
 //!
-//! `N = K C u + D` (Zhao, Jiang, Li 2016, Eq. 6; the second line of the printed Eq. 6 says `N_g`
-//! where the accelerometer is meant). `u` is the angular rate in rad/s or the specific force in
-//! m/s² along the body axes, `K` diagonal, `C` the installation matrix, `N` the output per second.
-//! Inside the crate `N` is divided by the nominal scale of its axis, so that `K ≈ 1` and `D` is in
-//! rad/s or m/s²; [`Nominal`] undoes it at the edges.
+//! `N = K C u + D` (Zhao, Jiang, Li 2016, Eq. 6; the second line of the printed Eq. 6 says `N_g` where the
+//! accelerometer is meant). `u` is the angular rate in rad/s or the specific force in m/s² along the body axes, `K`
+//! diagonal, `C` the installation matrix, `N` the output per second. Inside the crate `N` is divided by the nominal
+//! scale of its axis, so that `K ≈ 1` and `D` is in rad/s or m/s²; [`Nominal`] converts back on input and output.
 
 use serde::{Deserialize, Serialize};
 
@@ -46,7 +45,7 @@ pub enum Sensor {
 }
 
 impl Sensor {
-    /// Both, in the order of every file and state vector.
+    /// Both triads, in the order of all files and state vectors.
     pub const ALL: [Self; 2] = [Self::Gyro, Self::Accel];
 
     /// The name that files and parameter names use.

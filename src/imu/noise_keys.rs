@@ -11,7 +11,7 @@ pub struct NoiseKeys {
     pub random_walk: (&'static str, f64),
     /// 1σ of a Gauss–Markov bias, and its unit in rad/s or m/s².
     pub gauss_markov: (&'static str, f64),
-    /// Its former name, which is read, too; data sheets use it for the floor of the Allan deviation.
+    /// Its former name, which is still accepted; data sheets use it for the floor of the Allan deviation.
     pub former: &'static str,
     /// Its correlation time in s.
     pub correlation_time: &'static str,

@@ -40,14 +40,14 @@ pub struct GaussMarkov {
 /// velocity. Simulations do not generate it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct MotionNoise {
-    /// Part that grows with the speed of a move, √s: 1σ over the root of ∫|ω − ω_ie|² dt or ∫|f + g|² dt.
+    /// Part that grows with the speed of a move, √s: 1σ divided by the root of ∫|ω − ω_ie|² dt or ∫|f + g|² dt.
     pub by_motion: f64,
     /// Part that grows with the duration of a move, rad/√s or (m/s)/√s.
     pub by_duration: f64,
 }
 
 impl GaussMarkov {
-    /// The random walk that it resembles over times short against its correlation time, rad/s/√s or m/s²/√s.
+    /// The equivalent random walk over times much shorter than its correlation time, rad/s/√s or m/s²/√s.
     pub fn walk(&self) -> f64 {
         self.sigma * (2.0 / self.correlation_time).sqrt()
     }

@@ -42,7 +42,7 @@ pub struct ThermalRange {
 }
 
 impl ThermalRange {
-    /// Least half span used to scale a range, so that an empty range can be scaled, K.
+    /// Minimum half span of a range, so that an empty range can be scaled, K.
     const LEAST: f64 = 0.5;
 
     /// The range scaled to [−1, 1].
@@ -126,7 +126,7 @@ pub struct ThermalModel {
 }
 
 impl ThermalModel {
-    /// Triad, parameter and function of each coefficient that is on.
+    /// Triad, parameter and function of each enabled coefficient.
     pub fn on(&self) -> impl Iterator<Item = (Sensor, usize, usize)> + '_ {
         // Column by column.
         let of_triad = move |sensor| {

@@ -152,8 +152,7 @@ impl Triad {
         }
     }
 
-    /// The name of a parameter in files, such as `gyro.installation.xy`; `None` if the form does not
-    /// have it, or no form has.
+    /// The name of a parameter in files, such as `gyro.installation.xy`; `None` if the form (or every form) lacks it.
     pub fn parameter_name(
         sensor: Sensor,
         form: InstallationForm,
@@ -171,7 +170,7 @@ impl Triad {
     }
 }
 
-/// The three kinds of parameter, each with a unit of its own.
+/// The three kinds of parameter, each with its own unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ParameterKind {
     /// Scale factor, relative.
@@ -222,8 +221,8 @@ impl Prior {
     }
 }
 
-/// The nominal scale of a triad: the file's quantity per second for one rad/s or one m/s², axis by
-/// axis. It alone converts between a file's numbers and the normalised model.
+/// The nominal scale of a triad: the file's quantity per second for one rad/s or one m/s², axis by axis. It is the only
+/// conversion between the numbers in a file and the normalised model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nominal(pub Vector3<f64>);
 

@@ -110,7 +110,7 @@ impl Lot {
     }
 }
 
-/// The calibration of a unit, if it can be compared with units of this output; else the reason.
+/// The calibration of a unit, if comparable with units of this output; otherwise the reason.
 fn usable<'a>(
     unit: &'a Unit,
     output: Option<&PerSensor<String>>,
@@ -118,7 +118,7 @@ fn usable<'a>(
     let calibrated = unit.calibrated.as_ref().map_err(Clone::clone)?;
     let own = calibrated.calibration.unit.as_ref();
     if calibrated.calibration.converged == Some(false) {
-        return Err("not converged; values and σ may not be used".to_owned());
+        return Err("not converged; do not use the values or σ".to_owned());
     }
     if output.is_none() || own == output {
         return Ok(calibrated);
@@ -128,7 +128,7 @@ fn usable<'a>(
         None => "not stated".to_owned(),
     });
     Err(format!(
-        "outputs are {own}, those of most units of the lot {of_lot}; give units of one type"
+        "outputs are {own}, but most units of the lot have {of_lot}. Give units of one type"
     ))
 }
 

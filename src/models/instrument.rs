@@ -99,7 +99,7 @@ impl InstallationModel {
     /// Finds and reads one.
     ///
     /// # Errors
-    /// If there is none of that name or it is malformed.
+    /// If it does not exist or is malformed.
     pub fn load(name_or_path: &str, named_in: &Place) -> Result<Self, ModelError> {
         let file: InstallationFile = text(Room::Installation, name_or_path, named_in)?.parse()?;
         Ok(Self {
@@ -108,7 +108,7 @@ impl InstallationModel {
         })
     }
 
-    /// One draw of the form's angles.
+    /// One draw of the angles of the form.
     pub fn draw(&self, rng: &mut impl Rng) -> SVector<f64, ANGLES> {
         let mut angles = SVector::<f64, ANGLES>::zeros();
         for angle in angles.iter_mut().take(self.form.angle_names().len()) {
@@ -122,7 +122,7 @@ impl Instrument {
     /// Finds and reads one.
     ///
     /// # Errors
-    /// If there is none of that name or it is malformed.
+    /// If it does not exist or is malformed.
     pub fn load(name_or_path: &str, named_in: &Place) -> Result<Self, ModelError> {
         let text = text(Room::Imu, name_or_path, named_in)?;
         let InstrumentFile { gyro, accel, terms } = text.parse()?;

@@ -15,7 +15,7 @@ use crate::units::{ARCSEC, DEGREE};
 /// Finds and reads a turntable; returns it with its name.
 ///
 /// # Errors
-/// If there is none of that name or it is malformed.
+/// If it does not exist or is malformed.
 pub fn turntable(name_or_path: &str, named_in: &Place) -> Result<(Table, String), ModelError> {
     let text = text(Room::Turntable, name_or_path, named_in)?;
     let file: TableFile = text.parse()?;
@@ -42,7 +42,7 @@ pub fn turntable(name_or_path: &str, named_in: &Place) -> Result<(Table, String)
     };
     if table.axes.is_empty() {
         return Err(
-            text.inconsistent("a table without axes; give one [[axis]] each, outermost first")
+            text.inconsistent("a table without axes; add one [[axis]] per axis, outermost first")
         );
     }
     Ok((table, text.name()))
@@ -52,7 +52,7 @@ pub fn turntable(name_or_path: &str, named_in: &Place) -> Result<(Table, String)
 /// the site.
 ///
 /// # Errors
-/// If there is none of that name or it is malformed.
+/// If it does not exist or is malformed.
 pub fn path(
     name_or_path: &str,
     named_in: &Place,
@@ -67,8 +67,9 @@ pub fn path(
             moves.map_err(|message| text.inconsistent(message))?
         }
         _ => {
-            return Err(text
-                .inconsistent("expected either [axes] or [body], whichever the path turns about"));
+            return Err(text.inconsistent(
+                "expected either [axes] or [body], depending on the axes that the path turns about",
+            ));
         }
     };
     Ok((
@@ -153,7 +154,7 @@ struct AxesFile {
     rate_deg_per_s: Positive,
     acceleration_deg_per_s2: Positive,
     dwell_s: NonNegative,
-    /// How often the steps are gone through.
+    /// Number of repetitions of the steps.
     #[serde(default = "once")]
     repeat: NonZeroU16,
     steps: Vec<AxesStepFile>,

@@ -8,14 +8,14 @@ use crate::formats::{Document, FileError, NonNegative};
 use crate::imu::{ParameterKind, Sensor, Triad, TriadVector};
 use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
 
-/// 1σ over the instruments of a grade of each parameter's change with temperature.
+/// 1σ, over the instruments of a grade, of the temperature dependence of each parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ThermalVariation {
-    /// For one kelvin, by kind of parameter.
+    /// Per kelvin, by kind of parameter.
     first: [f64; 3],
-    /// For one kelvin squared.
+    /// Per kelvin squared.
     second: [f64; 3],
-    /// Of a bias for one K/s.
+    /// Of a bias, per K/s.
     rate: f64,
 }
 
@@ -46,7 +46,7 @@ impl ThermalVariation {
 /// Seconds in a minute: rates are stated per K/min.
 const MINUTE: f64 = 60.0;
 
-/// `[gyro.temperature]` or `[accel.temperature]` of an instrument's file: 1σ of each, zero where it is not stated.
+/// `[gyro.temperature]` or `[accel.temperature]` in an instrument file: 1σ of each, zero if not stated.
 pub type ThermalFile = BTreeMap<String, NonNegative>;
 
 /// Scale for 1 K and 1 K² in ppm, installation for 1 K in arc seconds, and bias for 1 K, 1 K² and 1 K/min in °/h or µg.

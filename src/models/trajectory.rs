@@ -10,7 +10,7 @@ use crate::units::DEGREE;
 /// Finds and reads a trajectory; returns it with its name.
 ///
 /// # Errors
-/// If there is none of that name, or it is malformed or cannot be followed.
+/// If it does not exist, is malformed or cannot be followed.
 pub fn trajectory(
     name_or_path: &str,
     named_in: &Place,

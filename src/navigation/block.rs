@@ -52,9 +52,9 @@ pub struct Block {
     pub navigation: Arc<ErrorMatrix>,
     /// Transition from the parameter errors of each triad.
     pub parameters: Arc<PerSensor<ParameterBlock>>,
-    /// Transition from the error of gravity's magnitude, true − stated, in m/s².
+    /// Transition from the error of the magnitude of gravity, true − stated, in m/s².
     pub gravity: ErrorVector,
-    /// Transition from the parameter errors of error terms that are on.
+    /// Transition from the parameter errors of enabled error terms.
     pub terms: Vec<TermColumn>,
     /// Functions of temperature in the block: the transition from a coefficient's error is that from its
     /// parameter's error times its function. `None` if parameters do not depend on temperature.

@@ -142,7 +142,7 @@ impl ErrorModel {
 /// States before inputs.
 type Joined = SMatrix<f64, { STATES + INPUTS }, { STATES + INPUTS }>;
 
-/// Derivatives of the transport rate by velocity, and by latitude, longitude and height.
+/// Derivatives of the transport rate with respect to velocity, and to latitude, longitude and height.
 fn transport_slopes(truth: &Solution, transport: &Vector3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
     let (tan, sec) = (truth.latitude.tan(), 1.0 / truth.latitude.cos());
     let slope = Curvature::slope(truth.latitude);
@@ -170,12 +170,12 @@ pub struct Transition {
     pub input: InputMatrix,
 }
 
-/// `∂x/∂θ`, navigation errors by `N` unknown constants: the input errors themselves (`N = 6`) or the parameters of
-/// both triads ([`PARAMETERS`], [`SensedErrors`]). Zero where navigation starts without errors.
+/// `∂x/∂θ`, navigation errors with respect to `N` unknown constants: the input errors themselves (`N = 6`) or the
+/// parameters of both triads ([`PARAMETERS`], [`SensedErrors`]). Zero where navigation starts without errors.
 pub type Sensitivity<const N: usize = PARAMETERS> = SMatrix<f64, STATES, N>;
 
-/// `∂ε/∂θ`, errors of the sensed rate and force by parameter errors δθ = true − estimated:
-/// `(K̂Ĉ)⁻¹ ∂(K C u + D)/∂θ`, linear in `[u; 1]`.
+/// `∂ε/∂θ`, errors of the sensed rate and force with respect to parameter errors δθ = true − estimated: `(K̂Ĉ)⁻¹ ∂(K C
+/// u + D)/∂θ`, linear in `[u; 1]`.
 #[derive(Debug, Clone)]
 pub struct SensedErrors(PerSensor<Response>);
 
@@ -227,7 +227,7 @@ impl Linearisation {
         }
     }
 
-    /// The same with the effect of each parameter multiplied by its own weight.
+    /// The same with the effect of each parameter multiplied by a weight.
     pub fn weighted(&self, weight: impl Fn(usize) -> f64) -> Self {
         let mut weighted = self.clone();
         for (parameter, mut forcing) in weighted.forcing.row_iter_mut().enumerate() {

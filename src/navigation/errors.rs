@@ -32,10 +32,10 @@ pub fn blocks<const N: usize>(blocks: &[(usize, usize, Matrix3<f64>)]) -> SMatri
     whole
 }
 
-/// `R` rows of `N` columns, kept transposed: what is done to all columns goes through memory without a stride.
+/// `R` rows of `N` columns, stored transposed, so that operations on all columns access memory contiguously.
 pub type Rows<const R: usize, const N: usize> = SMatrix<f64, N, R>;
 
-/// A short time at the site.
+/// A short time interval at the site.
 pub struct Span {
     /// Rotation of the Earth, rad.
     pub earth_turn: Vector3<f64>,
@@ -46,7 +46,8 @@ pub struct Span {
 }
 
 impl Span {
-    /// Propagates errors of any cause: Earth rotation turns them, force couples with tilt, velocity changes position.
+    /// Propagates errors of any origin: Earth rotation rotates them, force couples with tilt, velocity changes
+    /// position.
     #[inline]
     pub fn carry<const N: usize>(&self, errors: &mut Rows<STATES, N>) {
         for cause in 0..N {

@@ -52,8 +52,8 @@ impl Increments {
     }
 }
 
-/// Sums over consecutive samples of a body at rest, of the uncalibrated outputs of the triads: from these sums, the
-/// motion follows to second order for any calibration, without the samples.
+/// Sums over consecutive samples of a body at rest, of the uncalibrated outputs of the triads: they give the motion to
+/// second order for any calibration, without the samples.
 ///
 /// At rest, everything except noise and vibration is the same in every sample, so products are formed of the
 /// deviations from the mean. A calibration `u = A N − b` acts on the sums exactly:
@@ -64,8 +64,8 @@ pub struct Sums {
     pub samples: usize,
     /// Σ N of both triads.
     total: PerSensor<Vector3<f64>>,
-    /// Σ (2k − n − 1)/2 Ñ_k + (Ñ_n − Ñ_0)/12 of both triads: how much later than on average it came. Sample 0
-    /// is the one before the first.
+    /// Σ (2k − n − 1)/2 Ñ_k + (Ñ_n − Ñ_0)/12 of both triads: first moments of arrival time. Sample 0 is the one before
+    /// the first.
     later: PerSensor<Vector3<f64>>,
     /// ½ Σ_{j<k} Ñ_j × Ñ_k + Σ Ñ_{k−1} × Ñ_k / 12 of the gyros.
     coning: Vector3<f64>,

@@ -1,4 +1,4 @@
-//! A triad, ready for use sample by sample.
+//! A triad, prepared for sample-by-sample use.
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
@@ -8,8 +8,8 @@ use crate::imu::{PARAMETERS as PER_TRIAD, Triad};
 /// other.
 pub const INPUTS: usize = 12;
 
-/// `(K̂Ĉ)⁻¹ ∂(K C u + D)/∂θ`, errors of a triad's corrected input by its parameter errors δθ = true − estimated:
-/// for each parameter a column, the weights of `b = [u; 1]` for one axis after the other.
+/// `(K̂Ĉ)⁻¹ ∂(K C u + D)/∂θ`, errors of the corrected input of a triad with respect to its parameter errors δθ = true −
+/// estimated: one column per parameter, with the weights of `b = [u; 1]` axis by axis.
 pub type Response = SMatrix<f64, INPUTS, PER_TRIAD>;
 
 /// The response of a triad with this correction `(K̂Ĉ)⁻¹`.

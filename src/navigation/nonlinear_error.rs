@@ -1,16 +1,16 @@
 //! Deviation of computed navigation from the truth: exact and nonlinear.
 //!
-//! True and computed solution obey the same equations (those of [`super::Strapdown`]). Their difference obeys
-//! the difference of these, in which nothing is left out: with `E = Ĉ Cᵀ` (hats on what is computed)
+//! True and computed solution obey the same equations (those of [`super::Strapdown`]). Their difference obeys the
+//! difference of these equations, without approximation: with `E = Ĉ Cᵀ` (hats mark computed quantities)
 //!
 //! `Ė = E [C δω×] + E [ω_in×] − [ω̂_in×] E`, `δω = ω̂_ib − ω_ib`,
 //!
 //! `δV̇ = E C f̂ − C f + â − a`, `δL̇ = L̂̇ − L̇`, `δλ̇ = λ̂̇ − λ̇`,
 //!
-//! `a` what gravity and the turning frame add to specific force. All of it is slow beside the body's motion and
-//! in proportion to the errors of the instrument, so steps of seconds keep more digits than navigating the
-//! samples of any instrument and taking the truth away. E is kept as a quaternion, whose vector part has the
-//! digits of a small turn.
+//! where `a` is the contribution of gravity and the rotating frame to specific force. All terms are slow compared with
+//! the motion of the body and proportional to the instrument errors, so steps of seconds preserve more digits than
+//! navigating the samples of an instrument and subtracting the truth. E is stored as a quaternion, whose vector part
+//! keeps the digits of a small rotation.
 
 use nalgebra::{Matrix3, SVector, UnitQuaternion, Vector3};
 
@@ -23,20 +23,18 @@ use crate::attitude::skew;
 /// Errors of the sensed angular rate (rad/s), then of specific force (m/s²), computed − true, along body axes.
 pub type InputError = SVector<f64, INPUTS>;
 
-/// Place of the scalar part of the quaternion of `E`.
+/// Index of the scalar part of the quaternion of `E`.
 const SCALAR: usize = STATES;
 
-/// The vector part in the place of attitude, East-North-Up's velocity and position as in an [`ErrorVector`], and the
-/// scalar part.
+/// The vector part in place of attitude, velocity and position as in an [`ErrorVector`], and the scalar part.
 type Errors = SVector<f64, { STATES + 1 }>;
 
-/// Computed minus true navigation, its height held to the true one: E takes East-North-Up to where it is computed.
+/// Computed minus true navigation, with the height fixed to the true one: E rotates true to computed East-North-Up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NonlinearError(Errors);
 
 impl NonlinearError {
-    /// The errors at the start, in the order of [`super::ErrorModel`]; those of the vertical channel, which is
-    /// held, are ignored.
+    /// The errors at the start, in the order of [`super::ErrorModel`]; those of the fixed vertical channel are ignored.
     pub fn new(start: &ErrorVector) -> Self {
         let turn = UnitQuaternion::from_scaled_axis(-start.fixed_rows::<3>(ATTITUDE));
         let mut errors = start.push(turn.w);
@@ -47,10 +45,9 @@ impl NonlinearError {
         Self(errors)
     }
 
-    /// Continues by a step of this duration in s, driven thus at start, middle and end.
+    /// Advances by a step of this duration in s, with this forcing at start, middle and end.
     ///
-    /// # Errors
-    /// If the computed position comes too near to a pole.
+    /// # Errors If the computed position comes too close to a pole.
     pub fn advance(&mut self, duration: f64, driven: [&Forcing; 3]) -> Result<(), NearPole> {
         let mut next = step(&self.0, duration, driven, Forcing::rate);
         let norm = next[SCALAR].hypot(next.fixed_rows::<3>(ATTITUDE).norm());
@@ -73,7 +70,7 @@ impl NonlinearError {
     }
 }
 
-/// Velocity and position that are computed; attitude is left as it is.
+/// Computed velocity and position; the attitude is unchanged.
 fn moved(truth: &Solution, errors: &Errors) -> Solution {
     Solution {
         velocity: truth.velocity + errors.fixed_rows::<3>(VELOCITY),

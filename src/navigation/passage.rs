@@ -18,7 +18,7 @@ use crate::imu::{PerSensor, Sensed, Sensor, Term, TermVector, ThermalState};
 /// `C_b_n b_k` ([`INPUTS`]) hold the derivative with respect to every parameter of any installation form.
 #[derive(Debug, Clone, Default)]
 struct Part {
-    /// ∫C_b_n b_k dt with the gyros' input in b.
+    /// ∫C_b_n b_k dt with the gyro input in b.
     gyro: Rows<3, INPUTS>,
     /// ∫[(∫f_n dt)×] C_b_n b_k dt with the gyros' input in b.
     forced: Rows<3, INPUTS>,
@@ -28,7 +28,7 @@ struct Part {
     noise: NoiseInput,
 }
 
-/// What one term parameter does.
+/// Effect of one term parameter.
 #[derive(Debug, Clone)]
 struct TermErrors {
     parameter: usize,
@@ -42,7 +42,7 @@ struct TermErrors {
     errors: Rows<STATES, 1>,
 }
 
-/// The error model of samples, one after the other, taken together in short parts.
+/// The error model of successive samples, combined in short parts.
 #[derive(Debug, Clone)]
 pub struct Passage {
     /// Samples since the last part ended.
@@ -50,16 +50,16 @@ pub struct Passage {
     duration: f64,
     /// Φ of the navigation errors.
     navigation: Rows<STATES, STATES>,
-    /// What `C_b_n b_k` at the input of each triad makes of the navigation errors.
+    /// Effect of `C_b_n b_k` at the input of each triad on the navigation errors.
     inputs: PerSensor<Rows<STATES, INPUTS>>,
-    /// The same of a constant pull downwards.
+    /// The same for a constant downward acceleration.
     gravity: Rows<STATES, 1>,
     terms: Vec<TermErrors>,
     noise: NoiseInputs,
 }
 
 impl Passage {
-    /// Of no time, on an Earth of this rate in `n`, with these term parameters on; as many parts are to come.
+    /// An empty interval, with this Earth rate in `n` and these term parameters, and capacity for this many parts.
     pub fn new(earth_rate: &Vector3<f64>, terms: &[usize], parts: usize) -> Self {
         let of_term = |&parameter: &usize| {
             Some(TermErrors {
@@ -107,8 +107,8 @@ impl Passage {
         part.noise.duration += period;
     }
 
-    /// Adds the motion of a sample of a move: the turn over that of the Earth, rad, and the change of
-    /// velocity over that of gravity, m/s.
+    /// Adds the motion of a sample of a move: the rotation relative to the Earth, rad, and the velocity change in
+    /// excess of gravity, m/s.
     #[inline]
     pub fn add_motion(&mut self, turned: &Vector3<f64>, change: &Vector3<f64>, period: f64) {
         let noise = &mut self.part.noise;
@@ -117,8 +117,8 @@ impl Passage {
         noise.moving += period;
     }
 
-    /// Adds a sample's worth of error terms of these values: attitude at its middle, what the body senses in it,
-    /// velocity change by specific force in `n`.
+    /// Adds the error terms of a sample, with these values: attitude at its middle, sensed motion, velocity change by
+    /// specific force in `n`.
     pub fn add_terms(
         &mut self,
         attitude: &Matrix3<f64>,
@@ -139,8 +139,8 @@ impl Passage {
         }
     }
 
-    /// Takes all errors over the samples that were added since the last part. `bridged` is the covariance, in
-    /// `n`, that interpolated samples of each triad add to the integral of its input over it, rad² and (m/s)².
+    /// Propagates all errors over the samples added since the last part. `bridged` is the covariance, in `n`, added by
+    /// interpolated samples of each triad to the integral of its input over it, rad² and (m/s)².
     pub fn end_part(&mut self, bridged: Option<Box<PerSensor<Matrix3<f64>>>>) {
         let mut part = std::mem::take(&mut self.part);
         let over = part.noise.span(&self.noise.earth_rate);
@@ -162,7 +162,7 @@ impl Passage {
         self.noise.parts.push(part.noise);
     }
 
-    /// The block of all parts, which ends in this computed state.
+    /// The block of all parts, ending in this computed state.
     pub fn block(
         self,
         state: State,
@@ -198,8 +198,8 @@ fn add_outer(sum: &mut Rows<3, INPUTS>, matrix: &Matrix3<f64>, weights: &Vector4
     }
 }
 
-/// Takes errors over a part in which a triad's input errs by this integral. An error of a gyro tilts,
-/// and its tilts make this of specific force.
+/// Propagates errors over a part with this integrated input error of a triad. A gyro error causes tilt, which couples
+/// with specific force.
 #[inline]
 fn drive<const N: usize>(
     errors: &mut Rows<STATES, N>,

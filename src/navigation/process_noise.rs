@@ -12,7 +12,7 @@ use crate::imu::PerSensor;
 pub struct ProcessNoise {
     /// Angle or velocity random walk, rad/√s or (m/s)/√s.
     pub random_walk: f64,
-    /// Noise of moves that grows with their speed: 1σ over the root of ∫|ω − ω_ie|² dt (gyros) or ∫|f + g|² dt
+    /// Noise of moves that grows with their speed: 1σ divided by the root of ∫|ω − ω_ie|² dt (gyros) or ∫|f + g|² dt
     /// (accelerometers), √s. Scale nonlinearity, bandwidth, timing and size effect grow in this way.
     pub by_motion: f64,
     /// Noise of moves that grows with their duration, rad/√s or (m/s)/√s.

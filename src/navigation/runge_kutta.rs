@@ -1,9 +1,9 @@
-//! Integration of fourth order.
+//! Fourth-order integration.
 
 use nalgebra::SMatrix;
 
-/// What `at` has become after a step of this duration in s (Runge and Kutta, fourth order), driven thus at start, middle
-/// and end.
+/// The value of `at` after a step of this duration in s (fourth-order Runge–Kutta), with these derivatives at start,
+/// middle and end.
 #[inline]
 pub fn step<const R: usize, const C: usize, F>(
     at: &SMatrix<f64, R, C>,

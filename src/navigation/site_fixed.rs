@@ -16,11 +16,12 @@ use crate::imu::{
 };
 use crate::recording::{ImuSamples, Near};
 
-/// Within this time, s, what happened first is taken to act on all that follows as a whole; the sensitivity of
-/// navigation to errors is of second order in it.
+/// Length of a part, s, within which the effect of earlier errors is treated as a whole; the sensitivity of navigation
+/// is accurate to second order in it.
 const PART: f64 = 0.1;
-/// Rounds in which the input is found that error terms add to. A time offset of one sample of 10 ms at 200 °/s turns
-/// specific force by 0.03, and each round leaves that part of the one before: a part of 10⁻⁶ of the offset's own effect.
+/// Number of iterations for the input with error terms. A time offset of one sample of 10 ms at 200 °/s rotates
+/// specific force by 0.03, and each iteration leaves this fraction of the previous error: 10⁻⁶ of the effect of the
+/// offset.
 const ROUNDS: usize = 4;
 
 /// The whole number of samples nearest to a time, at least one.
@@ -40,27 +41,27 @@ pub struct Navigator<'a> {
     triads: PerSensor<Triad>,
     instrument: PerSensor<Instrument>,
     thermal: Option<Thermal>,
-    /// Parameters of error terms that are on, whatever their values.
+    /// Enabled parameters of error terms.
     on: Vec<usize>,
     /// Values of all parameters of error terms; zero where off.
     terms: TermVector,
-    /// Whether any of them has a value.
+    /// Whether any of them is nonzero.
     shifted: bool,
     /// The current state.
     pub state: State,
 }
 
-/// How the triads change with temperature.
+/// Temperature dependence of the triads.
 #[derive(Debug, Clone)]
 struct Thermal {
     model: Arc<ThermalModel>,
     coefficients: PerSensor<ThermalCoefficients>,
-    /// Of the samples that navigation is at.
+    /// Temperature functions of the current samples.
     state: ThermalState,
 }
 
 impl<'a> Navigator<'a> {
-    /// Starts at a state with these triads; `None` if the sensitivity of one is singular.
+    /// Starts at a state with these triads; `None` if a sensitivity is singular.
     pub fn new(
         imu: &'a ImuSamples,
         site: &Site,
@@ -84,7 +85,7 @@ impl<'a> Navigator<'a> {
         })
     }
 
-    /// The same with triads that change with temperature; those it has are at the reference.
+    /// The same with temperature-dependent triads; the current ones are at the reference.
     pub fn with_thermal(
         mut self,
         model: Arc<ThermalModel>,
@@ -127,7 +128,7 @@ impl<'a> Navigator<'a> {
         })
     }
 
-    /// The same with these parameters of error terms on, and values of all of them, zero where off.
+    /// The same with these enabled error-term parameters, and values of all parameters (zero if off).
     pub fn with_terms(mut self, on: Vec<usize>, values: TermVector) -> Self {
         self.on = on;
         self.shifted = values != TermVector::zeros();
@@ -135,8 +136,8 @@ impl<'a> Navigator<'a> {
         self
     }
 
-    /// Increments along body axes of sample `k`, corrected by the triads (Eq. 11) and, at about this
-    /// attitude, by error terms; and where these are on, what the body then senses.
+    /// Increments of sample `k` along body axes, corrected by the triads (Eq. 11) and, near this attitude, by error
+    /// terms; and, with error terms, the sensed motion.
     #[inline]
     fn increments(&self, k: usize, attitude: &Matrix3<f64>) -> (Increments, Option<Sensed>) {
         let of_triads = self.of_triads(k);
@@ -154,7 +155,7 @@ impl<'a> Navigator<'a> {
         (increments, Some(sensed))
     }
 
-    /// Increments over a time without what error terms add to them; what is sensed becomes that without them.
+    /// Removes the contribution of error terms from increments over a time; the sensed motion is updated.
     fn without_terms(&self, of_triads: Increments, sensed: &mut Sensed, period: f64) -> Increments {
         let mut increments = of_triads;
         // Triads see u + t(u), and u is what is looked for.
@@ -177,7 +178,7 @@ impl<'a> Navigator<'a> {
         }
     }
 
-    /// What the body senses that turns evenly, from increments over a time, at about this attitude.
+    /// Sensed motion of a steadily rotating body, from increments over a time, near this attitude.
     fn sensed(&self, increments: &Increments, attitude: &Matrix3<f64>, period: f64) -> Sensed {
         let rate = increments.angle / period;
         Sensed {
@@ -188,8 +189,7 @@ impl<'a> Navigator<'a> {
         }
     }
 
-    /// Navigates through these samples of the record and returns their block. If the record has a
-    /// sample before the first of them, coning and sculling use it.
+    /// Navigates through these samples and returns their block. Coning and sculling use the previous sample, if any.
     pub fn advance(&mut self, samples: Range<usize>) -> Block {
         let few = samples_of(PART, self.imu.period);
         let parts = samples.len().div_ceil(few);
@@ -268,8 +268,7 @@ impl<'a> Navigator<'a> {
         self.block(passage)
     }
 
-    /// The same of samples of which some are interpolated, given the block of as many where the table stands
-    /// in the same attitude.
+    /// The same for samples with interpolated ones, given the block of the same number in the same attitude.
     pub fn standing_like(&self, block: &Block, samples: &Range<usize>) -> Block {
         let mut like = block.clone();
         for part in &mut like.noise.parts {
@@ -278,14 +277,14 @@ impl<'a> Navigator<'a> {
         like
     }
 
-    /// Is where the samples led to.
+    /// Sets the state reached after the samples.
     fn arrive(&mut self, mut state: State) {
         state.attitude = orthonormalised(&state.attitude);
         self.state = state;
     }
 
-    /// Takes a state through this motion over a time in which the Earth turns so, and gives the velocity change
-    /// by specific force.
+    /// Advances a state by this motion over a time with this Earth rotation, and returns the velocity change by
+    /// specific force.
     #[inline(always)]
     fn follow(
         &self,

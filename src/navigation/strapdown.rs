@@ -47,8 +47,8 @@ impl Solution {
         Vector3::new(-north, east, east * (sin / cos))
     }
 
-    /// Acceleration relative to the Earth in East-North-Up, m/s², under a specific force in the same
-    /// axes: Coriolis, transport and normal gravity added.
+    /// Acceleration relative to the Earth in East-North-Up, m/s², for a specific force in the same axes, including
+    /// Coriolis, transport and normal gravity.
     #[inline]
     pub fn acceleration(&self, force: &Vector3<f64>) -> Vector3<f64> {
         let turning = earth_rate_n(self.latitude) * 2.0 + self.transport_rate();
@@ -114,12 +114,12 @@ impl Instant {
     }
 }
 
-/// Treatment of height, which diverges e-fold in ten minutes if it is free.
+/// Treatment of height, whose error grows e-fold in ten minutes if free.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Height {
     /// Free height.
     Free,
-    /// Height (m) and vertical velocity (m/s) are those of a reference at the end of the step.
+    /// Height (m) and vertical velocity (m/s) are set to those of a reference at the end of the step.
     Held {
         /// Height above the ellipsoid in m.
         height: f64,
@@ -128,7 +128,7 @@ pub enum Height {
     },
 }
 
-/// Navigation came too near to a pole.
+/// Navigation came too close to a pole.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error(
     "navigation reached latitude {:.3}°, and East-North-Up has no heading near a pole: stay within ±{:.1}°",
@@ -158,7 +158,7 @@ impl Strapdown {
     /// Starts at a solution; every step is `period` seconds long.
     ///
     /// # Errors
-    /// If the start is too near to a pole.
+    /// If the start is too close to a pole.
     pub fn new(start: Solution, period: f64) -> Result<Self, NearPole> {
         within_reach(start.latitude)?;
         Ok(Self {
@@ -176,7 +176,7 @@ impl Strapdown {
     /// Navigates through one step.
     ///
     /// # Errors
-    /// If the step leads too near to a pole; the solution is then unchanged.
+    /// If the step leads too close to a pole; the solution is then unchanged.
     pub fn advance(&mut self, increments: &Increments, height: Height) -> Result<(), NearPole> {
         let (period, start) = (self.period, self.solution);
         let before = self.before.unwrap_or(*increments);
@@ -206,7 +206,7 @@ impl Strapdown {
 }
 
 impl Height {
-    /// A state after part of a step from this start; height and vertical velocity those of the reference.
+    /// A state within a step from this start, with height and vertical velocity of the reference.
     #[inline]
     fn hold(self, mut state: Solution, start: &Solution, part: f64, period: f64) -> Solution {
         let Self::Held { height, velocity } = self else {
@@ -231,14 +231,15 @@ impl Solution {
         }
     }
 
-    /// Rates of what changes slowly at this velocity and position under no specific force: turn of East-North-Up,
+    /// Rates of the slow quantities at this velocity and position without specific force: rotation of East-North-Up,
     /// velocity, position.
     #[inline]
     pub(super) fn coasting(&self) -> ErrorVector {
         self.slow(&Vector3::zeros(), &Vector3::zeros())
     }
 
-    /// The same when East-North-Up has turned so since the step began, under a specific force along body axes.
+    /// The same with a specific force along body axes, after this rotation of East-North-Up since the start of the
+    /// step.
     #[inline]
     fn slow(&self, turn: &Vector3<f64>, force: &Vector3<f64>) -> ErrorVector {
         let rate = earth_rate_n(self.latitude) + self.transport_rate();

@@ -15,9 +15,9 @@ use leg::Leg;
 pub use segment::{Change, Segment, Start};
 pub use strides::{Stride, Strides};
 
-/// The least horizontal speed over the climb rate: beyond, pitch would be steeper than a body flies.
+/// Minimum ratio of horizontal speed to climb rate, to limit the pitch angle.
 const LEAST_GLIDE: f64 = 2.0;
-/// The least time in s that all segments together take.
+/// Minimum total duration of all segments, s.
 const LEAST_ROUND: f64 = 1.0;
 
 /// A start and segments, which repeat.
@@ -42,8 +42,8 @@ pub enum TrajectoryError {
     /// A climb or descent that is too steep.
     #[error(
         "segment {segment} climbs or descends at {climb:.2} m/s with {speed:.2} m/s of horizontal speed at \
-         its start or end; at least {:.0} times the climb rate is needed: change speed in a segment of its \
-         own, or climb more slowly",
+         its start or end; horizontal speed must be at least {:.0} times the climb rate: change speed in a separate \
+         segment, or climb more slowly",
         LEAST_GLIDE
     )]
     Steep {

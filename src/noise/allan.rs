@@ -20,10 +20,10 @@ pub fn mean(curves: &[&Curve]) -> Curve {
     }
 }
 
-/// Fewest clusters of a record that give an Allan variance.
+/// Minimum number of clusters for an Allan variance.
 const FEWEST_CLUSTERS: usize = 4;
 
-/// Lengths of clusters in samples: two per octave, from one sample to a quarter of the record.
+/// Lengths of clusters in samples: two per octave, from one sample to a quarter of the recording.
 pub fn cluster_sizes(samples: usize) -> Vec<usize> {
     let longest = samples / FEWEST_CLUSTERS;
     let mut sizes: Vec<usize> = (0..)
@@ -34,8 +34,8 @@ pub fn cluster_sizes(samples: usize) -> Vec<usize> {
     sizes
 }
 
-/// Overlapping Allan variance of a rate whose integrals over samples of `period` s are given, at
-/// clusters of these sizes; clusters longer than half the record are left out.
+/// Overlapping Allan variance of a rate whose integrals over samples of `period` s are given, at clusters of these
+/// sizes; clusters longer than half the recording are omitted.
 ///
 /// With θ the running integral, `σ²(τ) = ⟨(θ(t+2τ) − 2θ(t+τ) + θ(t))²⟩ / 2τ²` over every t: Riley, NIST
 /// SP 1065, 5.2.4.

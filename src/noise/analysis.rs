@@ -1,4 +1,4 @@
-//! The stretch of a run that is analysed, and its noise.
+//! The analysed stretch of a run, and its noise.
 
 use std::ops::Range;
 
@@ -8,9 +8,9 @@ use crate::imu::{PerSensor, Sensor};
 use crate::recording::Segment;
 use crate::run::Run;
 
-/// Part of a stretch that must lie within one standstill.
+/// Minimum fraction of a stretch within one standstill.
 const STANDING: f64 = 0.95;
-/// Fewest samples that show the slopes of the Allan deviation.
+/// Minimum number of samples for the slopes of the Allan deviation.
 const FEWEST: usize = 256;
 
 /// A stretch of samples.
@@ -18,7 +18,7 @@ const FEWEST: usize = 256;
 pub struct Stretch {
     /// Its samples.
     pub samples: Range<usize>,
-    /// Its name, such as `the whole record`.
+    /// Its name, such as `the whole recording`.
     pub name: String,
     /// Whether the instrument is at rest during it, according to its own output.
     pub stands: bool,
@@ -37,14 +37,14 @@ pub enum StretchError {
     },
     /// There is no standstill.
     #[error(
-        "found no standstill in the record, expected one of minutes or better hours: let the instrument \
-         stand undisturbed, or name a section of it with --segment"
+        "the recording has no standstill. Leave the instrument undisturbed for minutes, preferably hours, or name a \
+         section with --segment"
     )]
     NoStandstill,
     /// Too few samples.
     #[error(
-        "{name} has {found} samples, expected at least {FEWEST}, and for bias instability some minutes to \
-         hours: record longer standing still"
+        "{name} has {found} samples, but at least {FEWEST} are needed (minutes to hours for bias instability). \
+         Record a longer standstill"
     )]
     TooShort {
         /// Name of the stretch.
@@ -58,14 +58,14 @@ fn known(labels: &[String]) -> String {
     let mut quoted: Vec<String> = labels.iter().map(|label| format!("`{label}`")).collect();
     quoted.dedup();
     match quoted.join(", ").as_str() {
-        "" => "the run has no [segments]: leave --segment out, or add them to run.toml".to_owned(),
-        quoted => format!("there are {quoted}"),
+        "" => "the run has no [segments]; omit --segment, or add them to run.toml".to_owned(),
+        quoted => format!("known labels are {quoted}"),
     }
 }
 
 impl Stretch {
     /// The longest segment with this label; without a label, the longest standstill, or the longest segment
-    /// of a record that is not continuous.
+    /// of a recording that is not continuous.
     ///
     /// # Errors
     /// [`StretchError`] if there is none, or if it is too short.
@@ -113,7 +113,7 @@ impl Stretch {
             .map(|of| of.samples)
             .max_by_key(ExactSizeIterator::len)?;
         let name = if samples.len() == run.recording.imu.len() {
-            "the whole record".to_owned()
+            "the whole recording".to_owned()
         } else {
             format!("the longest standstill, {}", times(run, &samples))
         };

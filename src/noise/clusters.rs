@@ -1,4 +1,4 @@
-//! The cluster times of a record, and the covariance of Allan variances at them under a mixture of processes.
+//! The cluster times of a recording, and the covariance of Allan variances at them under a mixture of processes.
 //!
 //! An overlapping Allan variance is a mean of squared second differences `D`; for Gaussian noise
 //! `cov(⟨D₁²⟩, ⟨D₂²⟩) = 2 Σ cov(D₁, D₂)²` over all pairs of places. With strengths squared `c_p` that is
@@ -19,7 +19,7 @@ use super::process::Process;
 const WEIGHTS: [f64; 3] = [1.0, -2.0, 1.0];
 /// Near the ends and the middle of a cluster, lags are spaced by the shorter cluster divided by this number.
 const STEPS: i64 = 16;
-/// Further away each step is longer than the one before by this factor.
+/// Farther away, each step is longer than the previous one by this factor.
 const GROWTH: f64 = 1.1;
 /// Correlation times tried per octave.
 const PER_OCTAVE: f64 = 2.0;

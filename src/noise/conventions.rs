@@ -61,7 +61,7 @@ pub struct Convention {
     /// Its symbol.
     pub unit: &'static str,
     scale: Scale,
-    /// Its name and users. Keys of programs, in backticks, are accepted as names of the unit, too.
+    /// Its name and users. Program keys in backticks are also accepted as unit names.
     pub meaning: &'static str,
     /// Other spellings of the unit, normalised.
     also: &'static [&'static str],
@@ -99,10 +99,10 @@ static QUANTITIES: [Quantity; 6] = [
         row("°/s/√Hz", Linear(DEGREE), "rate noise density: data sheets of MEMS gyros", &[]),
         row("m°/s/√Hz", Linear(1e-3 * DEGREE), "rate noise density (mdps/√Hz): data sheets of MEMS gyros", &[]),
         row("rad/s/√Hz", Linear(1.0), "rate noise density: Kalibr `gyroscope_noise_density`", &["rad/sqrts"]),
-        row("″/√s", Linear(ARCSEC), "angle random walk in a second", &[]),
+        row("″/√s", Linear(ARCSEC), "angle random walk over one second", &[]),
         row("rad²/s", Power(1.0), "power spectral density (rad/s)²/Hz, two-sided: Q of a Kalman filter, GTSAM",
             &["rad/s2/hz", "rad2/s2/hz"]),
-        row("°²/h", Power(DEG_PER_SQRT_H), "angle variance in an hour", &[]),
+        row("°²/h", Power(DEG_PER_SQRT_H), "angle variance over one hour", &[]),
         row("rad/s", Samples(1.0), "1σ of each rate sample", &[]),
         row("°/s", Samples(DEGREE), "1σ of each rate sample", &[]),
         row("°/h", Samples(DEG_PER_H), "1σ of each rate sample", &[]),
@@ -126,15 +126,15 @@ static QUANTITIES: [Quantity; 6] = [
     ] },
     Quantity { sensor: Sensor::Gyro, name: "gyro rate random walk", conventions: &[
         row("°/h/√h", Linear(DEG_PER_H / SQRT_H), "rate random walk: IEEE Std 952", &["deg/h1.5", "deg/h3/2"]),
-        row("°/h/√s", Linear(DEG_PER_H), "rate random walk in a second", &[]),
+        row("°/h/√s", Linear(DEG_PER_H), "rate random walk over one second", &[]),
         row("rad/s²/√Hz", Linear(1.0), "Kalibr `gyroscope_random_walk`; rad/s/√s", &["rad/s/sqrts"]),
         row("°/s²/√Hz", Linear(DEGREE), "the same in degrees: logs of MEMS gyros; °/s/√s", &["deg/s/sqrts"]),
-        row("°/s/√h", Linear(DEGREE / SQRT_H), "rate random walk in an hour", &[]),
+        row("°/s/√h", Linear(DEGREE / SQRT_H), "rate random walk over one hour", &[]),
         row("rad²/s³", Power(1.0), "power spectral density of the bias rate: Q of a Kalman filter", &[]),
     ] },
     Quantity { sensor: Sensor::Accel, name: "accelerometer bias random walk", conventions: &[
         row("µg/√h", Linear(MICRO_G / SQRT_H), "acceleration random walk: IEEE Std 1293", &[]),
-        row("µg/√s", Linear(MICRO_G), "acceleration random walk in a second", &[]),
+        row("µg/√s", Linear(MICRO_G), "acceleration random walk over one second", &[]),
         row("m/s³/√Hz", Linear(1.0), "Kalibr `accelerometer_random_walk`; m/s²/√s", &["m/s2/sqrts"]),
         row("m²/s⁵", Power(1.0), "power spectral density of the bias rate: Q of a Kalman filter", &[]),
     ] },
@@ -181,8 +181,7 @@ pub type Line = (f64, &'static Convention);
 pub enum ConversionError {
     /// Unknown unit.
     #[error(
-        "`{unit}` is not a known unit of noise.{} Known units (also spelt as deg/sqrt(h), ug/sqrt(Hz), m/s^2 \
-         and the like):
+        "`{unit}` is not a known noise unit.{} Known units (also in the form deg/sqrt(h), ug/sqrt(Hz), m/s^2):
 {}",
         hint(unit),
         known()
@@ -193,8 +192,7 @@ pub enum ConversionError {
     },
     /// A figure per sample needs the sample rate.
     #[error(
-        "`{unit}` is the noise of each sample and has no meaning without the sample rate: add --rate with \
-         the rate in Hz"
+        "`{unit}` is noise per sample, which needs the sample rate: add --rate with the rate in Hz"
     )]
     NoRate {
         /// As given.
@@ -344,7 +342,7 @@ fn hint(unit: &str) -> String {
         .map_or_else(String::new, |(_, unit)| format!(" Did you mean `{unit}`?"))
 }
 
-/// All units, a line for each quantity.
+/// All units, one line per quantity.
 pub fn known() -> String {
     let unit = |row: &Convention| match row.scale.strength(1.0, None) {
         Some(_) => row.unit.to_owned(),

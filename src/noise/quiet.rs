@@ -1,16 +1,16 @@
-//! White noise of a record without stated noise.
+//! White noise of a recording without stated noise.
 
 use crate::imu::Sensor;
 use crate::recording::ImuSamples;
 
-/// Lengths of the sums that are compared, s. The first is right unless whole pulses show in it.
+/// Lengths of the compared sums, s. The first is used unless pulses dominate.
 const SUMS: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
-/// A third of normal deviates is below this, σ: if three quarters of a record are at rest, the first quarter of all is the
-/// first third of these. If half of it or all of it is, the noise is 1.6 or 0.74 times what it should be.
+/// A third of normal deviates is below this, σ. If three quarters of a recording are at rest, the first quartile of all
+/// is the first third of these; if half or all of it is at rest, the estimate is 1.6 or 0.74 times the true noise.
 const FIRST_THIRD: f64 = 0.430_727;
 
-/// Random walk of a triad, rad/√s or (m/s)/√s, as the quieter part of a record shows it: by second differences of sums,
-/// which neither a bias nor its drift changes. Sums are made longer until these differences are as large as a pulse.
+/// Random walk of a triad, rad/√s or (m/s)/√s, from the quieter part of a recording: from second differences of sums,
+/// which are independent of bias and drift. Sums are lengthened until these differences reach the size of a pulse.
 pub fn white_noise(imu: &ImuSamples, sensor: Sensor) -> f64 {
     let pulse = *imu.pulse.get(sensor);
     let mut found = 0.0;

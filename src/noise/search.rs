@@ -18,8 +18,7 @@ use super::fit::{Mixture, Weighted, allan_variance};
 use super::identify::{Found, Hidden, Identified, of_kind};
 use super::process::Process;
 
-/// Least increase of twice the log-likelihood for each process: three standard deviations,
-/// squared.
+/// Minimum increase of twice the log-likelihood per process: three standard deviations, squared.
 const SIGNIFICANT: f64 = 9.0;
 /// Additional increase for a correlation time: two standard deviations, squared, because it only distinguishes
 /// between processes.
@@ -337,7 +336,7 @@ impl<'a> Search<'a> {
         subsets().chain(with_markov)
     }
 
-    /// The combination, among those that can be fitted, with the least figure.
+    /// The combination with the smallest figure among those that can be fitted.
     fn least(
         &self,
         combinations: impl Iterator<Item = Vec<Process>>,
@@ -348,7 +347,7 @@ impl<'a> Search<'a> {
             .min_by(|a, b| figure(a).total_cmp(&figure(b)))
     }
 
-    /// Refines the correlation time, if there is one, between those tried.
+    /// Refines the correlation time, if any, between the tested ones.
     fn refined(&self, mut best: Candidate) -> Candidate {
         let shortest = self.clusters.shortest_time(self.tau()[0]);
         let mut step = std::f64::consts::SQRT_2;
@@ -431,7 +430,7 @@ fn found(weighted: &Weighted, mixture: &[(Process, f64)]) -> Option<Vec<Found>> 
     Some(mixture.iter().enumerate().filter_map(found).collect())
 }
 
-/// Every combination of slopes, none at all included.
+/// Every combination of slopes, including the empty one.
 fn subsets() -> impl Iterator<Item = Vec<Process>> {
     (0..1 << Process::SLOPES.len()).map(|bits| {
         let chosen = Process::SLOPES.into_iter().enumerate();

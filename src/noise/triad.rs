@@ -35,7 +35,7 @@ pub struct AxisNoise {
     pub identified: Option<Identified>,
     /// Number of jumps beyond noise.
     pub knocks: usize,
-    /// Whether its samples vary by rounding only.
+    /// Whether its samples vary only by rounding.
     pub is_constant: bool,
 }
 
@@ -127,8 +127,7 @@ impl AxisNoise {
         self.identified.as_ref().map_or(&[], |of| &of.hidden)
     }
 
-    /// Lowest Allan deviation with its cluster time, if it is not the last: commonly read off as
-    /// bias instability.
+    /// Lowest Allan deviation with its cluster time, if not the last; often quoted as bias instability.
     pub fn minimum(&self) -> Option<(f64, f64)> {
         let Curve { tau, variance } = &self.curve;
         let points = tau.iter().zip(variance);

@@ -32,24 +32,24 @@ use crate::turntable::AxisAngles;
 pub struct Recording {
     /// A short name for titles and file names.
     pub name: String,
-    /// Instrument, serial number, operator and the like, copied into calibration and report.
+    /// Instrument, serial number, operator and similar data, copied into calibration and report.
     pub meta: BTreeMap<String, String>,
     /// The instrument's samples.
     pub imu: ImuSamples,
-    /// The turntable's readings, if there are any.
+    /// Turntable readings, if any.
     pub table: Option<TableLog>,
-    /// Labelled sections, if there are any.
+    /// Labelled sections, if any.
     pub segments: Vec<Segment>,
-    /// The files that it was read from; empty for a simulated recording.
+    /// Source files; empty for a simulated recording.
     pub files: Vec<PathBuf>,
-    /// Faults of the files that were repaired, and statements without effect, a sentence each.
+    /// Repaired file faults and statements without effect, one sentence each.
     pub notes: Vec<String>,
-    /// Statements that hardly fit the record, a few sentences each.
+    /// Statements that contradict the recording, a few sentences each.
     pub doubts: Vec<String>,
 }
 
 impl Recording {
-    /// Labels of the segments, in their order in the record, repetitions included.
+    /// Labels of the segments, in their order in the recording, repetitions included.
     pub(crate) fn labels(&self) -> Vec<String> {
         self.segments.iter().map(|s| s.label.clone()).collect()
     }

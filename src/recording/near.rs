@@ -11,7 +11,7 @@ use crate::imu::PerSensor;
 /// Number of samples that are unpacked ahead.
 const AHEAD: usize = 1024;
 
-/// A moving window of samples of a record; if the record is not packed, all samples.
+/// A moving window of samples of a recording; if the recording is not packed, all samples.
 #[derive(Debug, Clone)]
 pub struct Near<'a> {
     imu: &'a ImuSamples,
@@ -20,7 +20,7 @@ pub struct Near<'a> {
 }
 
 impl<'a> Near<'a> {
-    /// A window at the start of a record.
+    /// A window at the start of a recording.
     pub fn new(imu: &'a ImuSamples) -> Self {
         let mut near = Self {
             imu,

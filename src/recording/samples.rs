@@ -18,8 +18,8 @@ pub struct ImuSamples {
     /// Stretches of consecutive samples, in order; at least one. Between two stretches at least one sample is
     /// lost.
     pub stretches: Vec<Stretch>,
-    /// Whether samples are consecutive in time as far as is known; if not, they are concatenated sections,
-    /// and only a labelled section or a dwell is continuous.
+    /// Whether samples are consecutive in time; if not, they are concatenated sections, and only a labelled section or
+    /// a dwell is continuous.
     pub continuous: bool,
     /// Integrals of the normalised gyro output over each sample, rad.
     pub gyro: Series,
@@ -51,7 +51,7 @@ impl ImuSamples {
 pub struct Stretch {
     /// The samples.
     pub samples: Range<usize>,
-    /// Time at which the first of them begins, s.
+    /// Start time of the first of them, s.
     pub start: f64,
 }
 
@@ -59,9 +59,7 @@ pub struct Stretch {
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SampleError {
     /// Triads of different length.
-    #[error(
-        "{gyro} samples of the gyros and {accel} of the accelerometers; give one of each for every period"
-    )]
+    #[error("{gyro} gyro samples but {accel} accelerometer samples; give one of each per period")]
     Lengths {
         /// Samples of the gyros.
         gyro: usize,
@@ -69,16 +67,16 @@ pub enum SampleError {
         accel: usize,
     },
     /// No samples.
-    #[error("no samples; give integrals of the output over each period")]
+    #[error("no samples; give the output integrated over each period")]
     Empty,
     /// A number that is not finite.
-    #[error("sample {sample} is not finite; leave it out or split the recording there")]
+    #[error("sample {sample} is not finite; remove it, or split the recording there")]
     NotFinite {
         /// The first such sample.
         sample: usize,
     },
     /// An invalid period.
-    #[error("a period of {period} s; give the length of a sample in s, above zero")]
+    #[error("the period is {period} s; give a sample period above zero, in s")]
     Period {
         /// The period, s.
         period: f64,
@@ -91,7 +89,7 @@ impl ImuSamples {
         sensor.pick(&self.gyro, &self.accel)
     }
 
-    /// Whether they are packed, as in long records.
+    /// Whether they are packed, as in long recordings.
     pub fn is_packed(&self) -> bool {
         self.gyro.is_packed()
     }
@@ -185,18 +183,18 @@ impl ImuSamples {
         self.gyro.is_empty()
     }
 
-    /// Time in s at which the first sample begins.
+    /// Start time of the first sample, s.
     pub fn start(&self) -> f64 {
         self.time(0)
     }
 
-    /// Time in s at which the last sample ends.
+    /// End time of the last sample, s.
     pub fn end(&self) -> f64 {
         self.time(self.len())
     }
 
-    /// Time in s at which sample `k` begins, or at which the last sample of its stretch ends; before the first stretch,
-    /// its clock is extrapolated.
+    /// Start time of sample `k` in s, or end time of the last sample of its stretch; the clock of the first stretch is
+    /// extrapolated backwards.
     pub fn time(&self, k: usize) -> f64 {
         let begun = self.stretches.partition_point(|s| s.samples.start <= k);
         self.stretches

@@ -1,10 +1,10 @@
-//! Labelled sections of a record.
+//! Labelled sections of a recording.
 
 use std::ops::Range;
 
 use nalgebra::Vector3;
 
-/// A labelled section of the record.
+/// A labelled section of the recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Segment {
     /// Stamp of its first row, s.

@@ -1,4 +1,4 @@
-//! Increments of a triad in sequence, packed if there are too many of them.
+//! Increments of a triad in sequence, packed if numerous.
 
 mod packed;
 
@@ -32,7 +32,7 @@ impl Series {
         self.len() == 0
     }
 
-    /// Whether they are packed: then reading takes longer, and holding many at once takes memory.
+    /// Whether they are packed, which makes reading slower; unpacking many at once takes memory.
     pub fn is_packed(&self) -> bool {
         self.packed.is_some()
     }
@@ -47,7 +47,7 @@ impl Series {
         self.part(k..k + 1).first().copied().unwrap_or_default()
     }
 
-    /// A range of increments; fewer at the end of the record.
+    /// A range of increments; fewer at the end of the recording.
     pub fn part(&self, samples: Range<usize>) -> Cow<'_, [Vector3<f64>]> {
         let end = samples.end.min(self.len());
         let samples = samples.start.min(end)..end;

@@ -119,8 +119,8 @@ impl Channel {
     }
 }
 
-/// Value and slope per s, at a knot, of the parabola through the surrounding knots: a straight line would cut the
-/// corners of a ramp by hundredths of a kelvin.
+/// Value and slope per s, at a knot, of the parabola through the surrounding knots: linear interpolation would round
+/// the corners of a ramp by hundredths of a kelvin.
 fn parabola(values: &[f64], knot: usize) -> (f64, f64) {
     let over = knot.saturating_sub(OVER)..(knot + OVER + 1).min(values.len());
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());

@@ -1,23 +1,23 @@
-//! The report of outputs at rest against temperature.
+//! Report on outputs at rest against temperature.
 
 use crate::calibration::{AtRest, AxisAtRest, Calibration, parameter};
 use crate::imu::{AXES, PARAMETERS as PER_TRIAD, RATE};
 use crate::report::prelude::*;
 use crate::run::Run;
 
-/// Points of a curve, and seconds that are drawn at most.
+/// Maximum number of points of a curve and of drawn seconds.
 const POINTS: usize = 101;
 const DRAWN: usize = 1500;
 
-/// Everything that is said of it.
+/// The complete report.
 pub fn document(at_rest: &AtRest, run: &Run, calibration: &Calibration) -> Document {
     let name = &run.recording.name;
     let mut document = Document::new(format!("{name}: outputs at rest against temperature"));
     let range = at_rest.range.gyro;
     document.lead.push(format!(
-        "Run {name} stands in one attitude for {:.0} s while its temperature goes from {:.1} to {:.1} °C. Biases \
-         against temperature are all that it shows; those of the accelerometers hold what their scale factors do \
-         to gravity in this attitude.",
+        "Run {name} stays in one attitude for {:.0} s while its temperature covers {:.1} to {:.1} °C. It can show \
+         only bias against temperature; the accelerometer values also contain the scale-factor error times gravity \
+         in this attitude.",
         run.recording.imu.duration(),
         range.lowest,
         range.highest
@@ -38,7 +38,7 @@ fn name(of: &AxisAtRest) -> String {
     format!("{} {}", of.sensor.name(), AXES[of.axis])
 }
 
-/// Order of the polynomial, and whether it follows the rate.
+/// Order of the polynomial, and whether it has a rate term.
 fn order(of: &AxisAtRest) -> String {
     let order = of.functions.iter().filter(|&&f| f != RATE).count();
     match of.functions.contains(&RATE) {
@@ -71,15 +71,15 @@ fn table(at_rest: &AtRest) -> Table {
     Table::new(
         "Outputs against temperature",
         columns(
-            "output | unit | at the reference ± 1σ | order | RMS about its mean | RMS left | cross-validated | \
-             of a cubic | largest hysteresis",
+            "output | unit | at the reference ± 1σ | order | RMS about its mean | RMS residual | cross-validated | \
+             cubic | largest hysteresis",
         ),
     )
     .sections(sections)
     .note(format!(
-        "Reference: {:.1} °C. Cross-validated: RMS of every other 100 s by a fit to the others; the order and whether it \
-         follows the rate are those for which it is least. Of a cubic: the same of a cubic in temperature. Hysteresis: \
-         cooling less heating at the same temperature.",
+        "Reference: {:.1} °C. Cross-validated: RMS of alternate 100 s blocks against a fit to the others; the order \
+         and the rate term minimise it. Cubic: the same for a cubic in temperature. Hysteresis: cooling minus \
+         heating at the same temperature.",
         at_rest.range.gyro.reference
     ))
 }
@@ -118,9 +118,9 @@ fn curves(at_rest: &AtRest) -> Plot {
         at_rest.axes.iter().map(panel),
     );
     Plot::new("temperature.svg", heading, (3, 300), panels).caption(
-        "Change from the output at the reference temperature. Line: polynomial at a temperature that does not change; \
-         band: ±1σ of a second about it, by cross-validation. Where heating and cooling lie apart the instrument is not \
-         at the temperature of its sensor, or has hysteresis.",
+        "Change from the output at the reference temperature. Line: polynomial at constant temperature; band: ±1σ of \
+         one-second means, by cross-validation. If heating and cooling differ, the temperature sensor lags the \
+         instrument, or the instrument has hysteresis.",
     )
 }
 
@@ -135,12 +135,11 @@ fn hysteresis(at_rest: &AtRest) -> Plot {
             .with(Series::line(points))
     };
     let (heading, panels) = (
-        "Hysteresis: cooling less heating",
+        "Hysteresis: cooling minus heating",
         at_rest.axes.iter().map(panel),
     );
-    Plot::new("hysteresis.svg", heading, (3, 220), panels).caption(
-        "Mean output while it cools less that while it heats, at the same temperature within 2 K.",
-    )
+    Plot::new("hysteresis.svg", heading, (3, 220), panels)
+        .caption("Mean output during cooling minus mean output during heating, in 2 K bins.")
 }
 
 fn data(at_rest: &AtRest) -> Value {

@@ -1,16 +1,16 @@
-//! The report of a study of campaigns.
+//! Report on a study of campaigns.
 
 use super::accuracy::tables::against_bound;
 use crate::report::prelude::*;
 use crate::study::CampaignAccuracy;
 
-/// Everything that is said of a study.
+/// The complete report on a study.
 pub fn document(accuracy: &CampaignAccuracy) -> Document {
     let study = &accuracy.study;
     let mut document = Document::new(format!("Accuracy of campaigns: {}", study.campaign.name));
     document.lead.push(format!(
-        "{} simulated campaigns of {} recording(s), seed {}; {} gave no calibration. Errors are those of the \
-         parameters at the reference temperature and of the Legendre coefficients that were chosen.",
+        "{} simulated campaigns of {} recording(s), seed {}; {} gave no calibration. Errors refer to the parameters \
+         at the reference temperature and the selected Legendre coefficients.",
         study.runs,
         study.campaign.recordings.len(),
         study.seed,
@@ -21,8 +21,8 @@ pub fn document(accuracy: &CampaignAccuracy) -> Document {
         document.say(
             good,
             format!(
-                "NEES/n of all parameters and coefficients is {anees:.4}; with true σ it lies between {:.4} and \
-                 {:.4} in 99 % of such studies.",
+                "NEES/n of all parameters and coefficients is {anees:.4} (99 % interval for correct σ: {:.4} to \
+                 {:.4}).",
                 interval.0, interval.1
             ),
         );
@@ -53,7 +53,7 @@ fn figures(accuracy: &CampaignAccuracy) -> Table {
         columns("| unit | campaigns | RMS error | RMS σ | RMS bound | error/bound | 99 % interval"),
     )
     .sections(sections)
-    .note("Bound: Cramér–Rao, linearised at the truth with the orders that were chosen.")
+    .note("Bound: Cramér–Rao bound, linearised at the truth with the selected orders.")
 }
 
 fn orders(accuracy: &CampaignAccuracy) -> Table {
@@ -61,7 +61,7 @@ fn orders(accuracy: &CampaignAccuracy) -> Table {
         let (right, all) = accuracy.right_orders(group);
         vec![group.short(), format!("{right} of {all}")]
     });
-    Table::new("Orders chosen as they are", ["", "campaigns"]).section(rows)
+    Table::new("Orders selected correctly", ["", "campaigns"]).section(rows)
 }
 
 fn data(accuracy: &CampaignAccuracy) -> Value {

@@ -3,14 +3,17 @@
 use crate::noise::conventions::{Conversion, Line};
 use crate::report::prelude::*;
 
-/// How the figure was taken, and a line for each convention.
+/// Interpretation of the figure, and one line per convention.
 pub fn document(conversion: &Conversion) -> Document {
     let (value, given) = conversion.given;
     let at = conversion
         .rate
         .map_or(String::new(), |rate| format!(" at {rate} Hz"));
     let mut document = Document::new(format!("{value} {}{at}", given.unit));
-    document.lead = vec![format!("Read as {}. The same is:", given.meaning)];
+    document.lead = vec![format!(
+        "Interpreted as {}. Equivalent values:",
+        given.meaning
+    )];
     let row = |&(value, of): &Line| {
         let name = format!("{:>11} {}", digits(value), of.unit);
         (name, of.meaning)
@@ -31,7 +34,7 @@ fn data(&(value, of): &Line) -> Value {
     json!({ "value": value, "unit": of.unit, "meaning": of.meaning })
 }
 
-/// Five digits, with a power of ten where that is shorter.
+/// Five digits, with a power of ten if shorter.
 fn digits(value: f64) -> String {
     if value != 0.0 && !(1e-3..1e6).contains(&value) {
         return format!("{value:.4e}");

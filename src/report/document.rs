@@ -17,7 +17,7 @@ pub struct Document {
     pub lead: Vec<String>,
     /// Findings of a calibration, the most severe first.
     pub findings: Vec<Finding>,
-    /// Short version for one screen, in place of the blocks; if empty, the blocks are shown.
+    /// One-screen version instead of the blocks; if empty, the blocks are shown.
     pub brief: Vec<Block>,
     /// Warnings for the use of the figures.
     pub warnings: List,
@@ -56,7 +56,7 @@ pub enum Block {
 /// Pairs of a name and a value below a heading.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Facts {
-    /// What they are about.
+    /// Subject.
     pub heading: String,
     /// Name and value.
     pub rows: Vec<(String, String)>,
@@ -65,7 +65,7 @@ pub struct Facts {
 /// Sentences below a heading.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct List {
-    /// What they are about.
+    /// Subject.
     pub heading: String,
     /// A sentence or two each.
     pub items: Vec<String>,

@@ -1,4 +1,4 @@
-//! How the six groups are spoken of: names, and the unit of each.
+//! Names and units of the six groups.
 
 use crate::calibration::{Estimate, ParameterVector, parameter_name};
 use crate::imu::{InstallationForm, ParameterKind, RATE, Sensor};
@@ -33,12 +33,12 @@ impl Group {
         self.entry().unit
     }
 
-    /// The unit in the model's normalised SI values.
+    /// The unit in normalised SI values of the model.
     pub fn unit_value(self) -> f64 {
         self.entry().value
     }
 
-    /// What a reader is shown for a parameter's value: scale factors as departure from nominal.
+    /// The displayed value of a parameter: scale factors as deviation from nominal.
     pub fn shown(self, value: f64) -> f64 {
         match self.kind() {
             ParameterKind::Scale => (value - 1.0) / self.unit_value(),
@@ -46,7 +46,7 @@ impl Group {
         }
     }
 
-    /// Those of some parameters that are in the group.
+    /// Selects the parameters in the group.
     pub fn among(self, parameters: &[usize]) -> Vec<usize> {
         let all = parameters.iter().copied();
         all.filter(|&index| Self::of(index) == self).collect()
@@ -58,8 +58,7 @@ impl Group {
         Some(rms)
     }
 
-    /// Largest magnitude and root mean square of some of a vector's entries, in the group's unit;
-    /// `None` if there are none.
+    /// Largest magnitude and RMS of some entries of a vector, in the unit of the group; `None` if there are none.
     pub fn spread(self, v: &ParameterVector, indices: &[usize]) -> Option<(f64, f64)> {
         let values = || indices.iter().map(|&i| (v[i] / self.unit_value()).abs());
         let mean_square = values().map(|x| x * x).sum::<f64>() / indices.len() as f64;
@@ -77,20 +76,20 @@ pub fn triad_name(sensor: Sensor) -> &'static str {
     }
 }
 
-/// Headings of a table with a column for each group, after that of its rows.
+/// Headings of a table with one column per group, after the row heading.
 pub fn group_columns(of_rows: &str) -> Vec<String> {
     let columns = Group::all().map(|group| format!("{}, {}", group.short(), group.unit()));
     std::iter::once(of_rows.to_owned()).chain(columns).collect()
 }
 
-/// The end of a parameter's name, such as `x` or `xy`.
+/// The suffix of a parameter name, such as `x` or `xy`.
 pub fn axis_name(form: InstallationForm, index: usize) -> String {
     parameter_name(form, index)
         .and_then(|name| name.rsplit('.').next().map(str::to_owned))
         .unwrap_or_default()
 }
 
-/// Which function of temperature a coefficient is of; `None` for a parameter at the reference.
+/// The temperature function of a coefficient; `None` for a parameter at the reference.
 pub fn function_name(function: Option<usize>) -> String {
     match function {
         None => "at the reference".to_owned(),
@@ -102,7 +101,7 @@ pub fn function_name(function: Option<usize>) -> String {
     }
 }
 
-/// A short name for a figure's margin, such as `gyro E xy`.
+/// A short name for the margin of a figure, such as `gyro E xy`.
 pub fn short_name(form: InstallationForm, index: usize) -> String {
     format!("{} {}", Group::of(index).short(), axis_name(form, index))
 }

@@ -1,4 +1,4 @@
-//! A document as files: a page that needs nothing else, every figure, and what else it holds.
+//! A document as files: a self-contained page, every figure, and further files.
 
 use std::path::{Path, PathBuf};
 use std::{fs, io};
@@ -15,16 +15,16 @@ const STYLE: &str = include_str!("style.css");
 
 /// A file of a report that could not be written.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot write {path}: {source}; the directory must exist and be writable", path = path.display())]
+#[error("cannot write {path}: {source}. The directory must exist and be writable", path = path.display())]
 pub struct ReportError {
     /// The file.
     pub path: PathBuf,
-    /// What the system said.
+    /// The system error.
     pub source: io::Error,
 }
 
-/// The files of a document by name: `index.html`, which holds the figures and needs neither other files nor a
-/// network, every figure as an SVG file of its own, and the document's further files.
+/// The files of a document by name: `index.html`, which contains the figures and needs no other files or network, every
+/// figure as a separate SVG file, and further files of the document.
 pub fn files(document: &Document) -> Vec<(String, String)> {
     let drawn: Vec<String> = document.plots().map(svg::draw).collect();
     let page = ("index.html".to_owned(), page(document, &drawn));
@@ -45,8 +45,8 @@ pub fn write(document: &Document, directory: &Path) -> Result<(), ReportError> {
     Ok(())
 }
 
-/// The page: warnings first, then what the figures show, then all else in its order. `drawn` gives the SVG
-/// document of each plot in order.
+/// The page: warnings first, then conclusions, then the other parts in order. `drawn` contains the SVG document of each
+/// plot in order.
 pub(super) fn page(document: &Document, drawn: &[String]) -> String {
     let mut drawn = drawn.iter();
     let parts = document
@@ -90,7 +90,7 @@ pub(super) fn page(document: &Document, drawn: &[String]) -> String {
     page.into_string()
 }
 
-/// What is wrong and what to do; all else about it folded away.
+/// Problem and remedy, with details collapsed.
 fn of_finding(finding: &Finding) -> Markup {
     let (what, next) = finding.headline();
     let explanation = Kind::named(&finding.kind).map(Kind::explanation);
@@ -106,7 +106,7 @@ fn of_finding(finding: &Finding) -> Markup {
     }
 }
 
-/// Blocks below a fold's heading; those before the first fold have none.
+/// Blocks below the heading of a collapsed section; those before the first have none.
 fn of_part<'a>(part: &[(PageOnly, Block)], drawn: &mut impl Iterator<Item = &'a String>) -> Markup {
     let blocks = html! { @for (_, block) in part { (of_block(block, drawn)) } };
     match part {

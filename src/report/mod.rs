@@ -1,12 +1,12 @@
-//! What a result says, and how it is shown.
+//! Reports of results and their presentation.
 //!
-//! A result fills a [`Document`]: facts, tables, plots, findings, and its figures by name. Three renderers turn
-//! any document into text ([`terminal`]), a page with figures ([`write()`]) or JSON ([`json`]); they know nothing of
-//! calibration. A plot is a value, too ([`plot`]), and one renderer draws them all ([`svg`]).
+//! A result fills a [`Document`]: facts, tables, plots, findings, and its figures by name. Three renderers turn any
+//! document into text ([`terminal`]), a page with figures ([`write()`]) or JSON ([`json`]); they do not depend on
+//! calibration. A plot is also a value ([`plot`]), and one renderer draws all plots ([`svg`]).
 //!
-//! Nothing is estimated here. What is worked out is what showing needs: differences, units, extremes.
+//! Nothing is estimated here, except quantities for display: differences, units, extremes.
 //!
-//! A figure is added to a result by handing its document one more plot:
+//! To add a figure to a result, add a plot to its document:
 //!
 //! ```
 //! use turncal::report::plot::{Axis, Panel, Plot, Series};
@@ -54,7 +54,7 @@ mod tests;
 pub use document::{Document, Facts};
 pub use html::{ReportError, files, write};
 
-/// The figures of a document by name as JSON.
+/// The named values of a document as JSON.
 pub fn json(document: &Document) -> String {
     format!("{:#}\n", document.data)
 }

@@ -1,4 +1,4 @@
-//! What every result needs to say what it has to say.
+//! Common imports of all reports.
 
 pub(super) use serde_json::{Map, Value, json};
 

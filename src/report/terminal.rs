@@ -6,19 +6,19 @@ use textwrap::{Options, WordSplitter};
 use super::document::{Block, Document, Facts, List, Table};
 use crate::calibration::{Finding, Level};
 
-/// Least width, in letters, of the lines into which a column heading is broken.
+/// Minimum width, in characters, of the lines of a broken column heading.
 const HEADING: usize = 9;
 /// Between two columns.
 const GAP: usize = 2;
 
 /// Lines of one screen.
 const SCREEN: usize = 40;
-/// The width of a screen that is not known.
+/// Assumed screen width if unknown.
 const USUAL_WIDTH: usize = 80;
-/// What stands before the words of a finding: its code.
+/// Prefix of a finding: its code.
 const CODE: &str = "       ";
 
-/// What one screen has room for: the verdict, findings in a line or two each, and a few figures.
+/// One-screen form: verdict, findings in one or two lines each, and a few figures.
 pub fn brief(document: &Document, width: Option<usize>) -> String {
     let width = width.unwrap_or(USUAL_WIDTH);
     let mut head = vec![cut(&titled(document), width)];
@@ -33,13 +33,13 @@ pub fn brief(document: &Document, width: Option<usize>) -> String {
     laid([head, findings].into_iter().chain(brief).collect())
 }
 
-/// The title with what was done on what.
+/// Title with method and data.
 fn titled(document: &Document) -> String {
     let first = document.lead.first().map_or("", String::as_str);
     format!("{}: {first}", document.title)
 }
 
-/// What is wrong and what to do about it, as far as there is room; what needs nothing done is named in a line.
+/// Problems and remedies, as far as space permits; notes are only named, on one line.
 fn findings(all: &[Finding], width: usize, room: usize) -> Vec<String> {
     let of_one = |finding: &Finding| {
         let (what, next) = finding.headline();
@@ -67,7 +67,7 @@ fn findings(all: &[Finding], width: usize, room: usize) -> Vec<String> {
     lines
 }
 
-/// As much of a line as has room.
+/// A line cut to the available width.
 fn cut(text: &str, width: usize) -> String {
     if display_width(text) <= width {
         return text.to_owned();
@@ -82,9 +82,8 @@ fn cut(text: &str, width: usize) -> String {
     text.chars().take_while(fits).chain(['…']).collect()
 }
 
-/// The document as text: what was done, tables, and last, where a reader looks first, conclusions and warnings.
-/// Lines are at most `width` letters long; without a width, as for a file or a pipe, they are as long as they
-/// are, so that each row and each sentence is one line.
+/// The document as text: method, tables, and at the end, where a reader looks first, conclusions and warnings. Lines
+/// have at most `width` characters; without a width, as for a file or a pipe, each row and each sentence is one line.
 pub fn text(document: &Document, width: Option<usize>) -> String {
     let mut parts = vec![paragraphs(&[&document.title], width)];
     let verdict = document.verdict.as_ref();
@@ -129,8 +128,8 @@ fn laid(parts: Vec<Vec<String>>) -> String {
     printable(&lines.collect::<String>())
 }
 
-/// Lines of at most `width` letters, all but the first behind an indent; what is laid out is left as it is.
-fn wrapped(text: &str, indent: &str, width: Option<usize>) -> Vec<String> {
+/// Lines of at most `width` characters, indented except for the first; preformatted text is unchanged.
+pub fn wrapped(text: &str, indent: &str, width: Option<usize>) -> Vec<String> {
     let fits = |width: &usize| display_width(text) > *width;
     let Some(width) = width.filter(fits) else {
         return vec![text.to_owned()];
@@ -169,8 +168,8 @@ fn headed(heading: &str, lines: impl Iterator<Item = String>) -> Vec<String> {
     heading.into_iter().chain(lines).collect()
 }
 
-/// A table that is made narrower step by step: headings in several lines, then without the columns that it can
-/// do without, at last in parts below each other that repeat the first column.
+/// A table narrowed step by step: headings on several lines, then without optional columns, and finally split into
+/// parts that repeat the first column.
 fn table(of: &Table, width: Option<usize>) -> Vec<String> {
     let mut lines = headed(&of.heading, std::iter::empty());
     let all: Vec<usize> = (0..of.columns.len()).collect();
@@ -240,7 +239,7 @@ fn column_width(of: &Table, column: usize, broken: bool) -> usize {
     lines.max().unwrap_or(0).max(cell_width(of, column))
 }
 
-/// Some columns with a rule before each section: the first to the left, the others to the right.
+/// Some columns with a rule before each section: the first left-aligned, the others right-aligned.
 fn laid_out(of: &Table, columns: &[usize], broken: bool) -> Vec<String> {
     let widths = columns
         .iter()
@@ -278,14 +277,13 @@ fn laid_out(of: &Table, columns: &[usize], broken: bool) -> Vec<String> {
     lines
 }
 
-/// The text with a 0 for every digit: how a result is shown, whatever its figures are.
+/// The text with 0 for every digit: the form of a result, independent of its values.
 #[cfg(test)]
 pub(super) fn layout(document: &Document, width: usize) -> String {
     text(document, Some(width)).replace(|letter: char| letter.is_ascii_digit(), "0")
 }
 
-/// Text without what a terminal would obey instead of show: controls other than line ends, and marks that turn
-/// the direction of writing, are escaped.
+/// Text with terminal controls (except line ends) and bidirectional marks escaped.
 pub fn printable(text: &str) -> String {
     let obeyed = |c: char| {
         let turns = matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');

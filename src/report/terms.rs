@@ -1,4 +1,4 @@
-//! How auxiliary parameters, those beside the parameters of the triads, are spoken of.
+//! Names of auxiliary parameters, in addition to those of the triads.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +21,7 @@ pub fn title(block: ErrorTerm) -> &'static str {
     }
 }
 
-/// Symbol and SI value of the unit that its parameters are shown in.
+/// Symbol and SI value of the display unit of its parameters.
 pub fn unit(block: ErrorTerm) -> (&'static str, f64) {
     match block {
         ErrorTerm::Instrument(term) => term.entry().unit,
@@ -31,7 +31,7 @@ pub fn unit(block: ErrorTerm) -> (&'static str, f64) {
     }
 }
 
-/// Rows of the table of parameters; errors where `errors` asks for them and the truth states them.
+/// Rows of the parameter table; with errors if requested by `errors` and stated in the truth.
 pub fn rows(
     auxiliary: &Auxiliary,
     truth: &BTreeMap<String, TermRecord>,
@@ -83,7 +83,7 @@ pub fn parameter_row(
     row
 }
 
-/// Prior over posterior σ, with words where the data did not observe the parameter.
+/// Prior σ divided by posterior σ, with a note if the parameter was not observed.
 pub fn improvement(prior: f64, posterior: f64) -> String {
     let ratio = prior / posterior;
     if !ratio.is_finite() {
@@ -105,14 +105,14 @@ pub fn costs(effects: &[ErrorTermTest]) -> Table {
     };
     let columns = std::iter::once("term".to_owned()).chain(Group::all().map(Group::short));
     Table::new(
-        "What each error term costs: σ with it over σ without it",
+        "Cost of each error term: σ with the term divided by σ without it",
         columns,
     )
     .section(effects.iter().filter(|effect| effect.on).map(row))
-    .note("RMS over the parameters of a group, the other terms as they were.")
+    .note("RMS over the parameters of a group, with the other terms unchanged.")
 }
 
-/// What those explain that were on or that the data show.
+/// Effect of the terms that were on or are significant.
 pub fn explained(effects: &[ErrorTermTest]) -> Table {
     let row = |effect: &ErrorTermTest| {
         let yes_no = |yes: bool, words: [&str; 2]| words[usize::from(!yes)].to_owned();
@@ -130,13 +130,13 @@ pub fn explained(effects: &[ErrorTermTest]) -> Table {
             .iter()
             .filter(move |e| e.on == on && (e.on || e.significant()))
     };
-    Table::new("What each error term explains", columns("term | | NIS | cost falls by | by chance | significant"))
+    Table::new("Effect of each error term", columns("term | | NIS | cost falls by | by chance | significant"))
         .sections([shown(true).map(row), shown(false).map(row)])
         .note(
-            "NIS of all observations without → with the term. Cost: −2 ln of likelihood and prior. By chance: \
-             the fall at a term's share of one false alarm in 1000 runs.",
+            "NIS of all observations without → with the term. Cost: −2 ln of likelihood and prior. By chance: limit \
+             of the fall by chance, at a total false-alarm rate of 1 in 1000 runs.",
         )
-        .note("Terms that are off are tried with their usual σ and shown where they are significant.")
+        .note("Terms that are off are tested with their usual σ and shown if significant.")
 }
 
 fn nis(effect: &ErrorTermTest) -> String {

@@ -34,7 +34,7 @@ pub struct Run {
     pub site: Site,
     /// Accuracy of the table's readings; without effect if there are none.
     pub table: TableAccuracy,
-    /// How still the IMU is while the table is at rest.
+    /// Motion of the IMU while the table is at rest.
     pub standstill: Standstill,
     /// 1σ per axis of the attitude of a labelled position, and of the end of a labelled turn, rad.
     pub segment_sigma: f64,
@@ -53,7 +53,7 @@ impl Run {
         }
     }
 
-    /// The default observation: the table's attitude if there is a table log, else zero velocity.
+    /// The default observation: table attitude if there is a table log, otherwise zero velocity.
     pub fn aiding(&self) -> Aiding {
         match self.recording.table {
             Some(_) => Aiding::Table,
@@ -75,9 +75,9 @@ impl Run {
 #[serde(rename_all = "kebab-case")]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Aiding {
-    /// Zero velocity in every dwell, and the attitude of the table
+    /// Zero velocity in every dwell, and table attitude
     Table,
-    /// Zero velocity alone; the accelerometers define the body axes
+    /// Zero velocity only; the accelerometers define the body axes
     Velocity,
 }
 
@@ -91,7 +91,7 @@ impl Aiding {
     }
 }
 
-/// How still the IMU is while the table is at rest.
+/// Motion of the IMU while the table is at rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Standstill {
     /// White 1σ of the integral of each triad's output at standstill: attitude in rad, velocity in m/s;
@@ -100,8 +100,8 @@ pub struct Standstill {
     /// Unwanted rotation of the body at rest if no table is observed: 1σ density of a random walk,
     /// rad/√s.
     pub turning: f64,
-    /// 1σ of the IMU's position while the table is at rest, m. At least the IMU's distance from the
-    /// table's centre, because the IMU moves that far between positions.
+    /// 1σ of the IMU's position while the table is at rest, m. At least the distance of the IMU from the table centre,
+    /// because the IMU moves that far between positions.
     pub position_sigma: f64,
 }
 

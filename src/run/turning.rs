@@ -18,7 +18,7 @@ const OTHER_ANGLE: f64 = 0.1;
 /// … or by more than this many σ of the gyros' scale factor, whichever is larger.
 pub const SCALE_SIGMAS: f64 = 5.0;
 
-/// Largest relative error of a turn by the gyros that still agrees with a label or the table.
+/// Maximum relative error of a gyro turn that still agrees with a label or the table.
 pub fn tolerance(run: &Run) -> f64 {
     OTHER_ANGLE.max(SCALE_SIGMAS * run.instrument.prior.gyro.scale_sigma.amax())
 }

@@ -18,20 +18,20 @@ use crate::models::{self, ModelError, Place, Room};
 use crate::recording::Temperature;
 use crate::turntable::TableError;
 
-/// Recordings of one instrument, to be simulated.
+/// Simulated recordings of one instrument.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SimulatedCampaign {
     /// A short name for titles and file names.
     pub name: String,
     /// The scenario common to all recordings.
     pub scenario: Scenario,
-    /// Name of each recording, and its own chamber, if any.
+    /// Name of each recording, and its chamber, if any.
     pub recordings: Vec<(String, Option<Chamber>)>,
     /// σ of the differences between recordings.
     pub day_to_day: DayToDay,
 }
 
-/// Streams of random numbers of one campaign: more than it may have recordings.
+/// Random streams per campaign; more than its maximum number of recordings.
 const STREAMS: u64 = 1 << 10;
 
 impl SimulatedCampaign {

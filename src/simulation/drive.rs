@@ -16,9 +16,9 @@ pub struct Drive {
     pub(super) duration: f64,
     /// Integrals over each sample: see [`true_increments`].
     pub(super) ideal: PerSensor<Vec<Vector3<f64>>>,
-    /// When the table is read, and in which position, told by number, and attitude a perfect one is then.
+    /// Time, position number and attitude of a perfect table at each reading.
     pub(super) read: Vec<(f64, usize, Matrix3<f64>)>,
-    /// Its axes in the position that it has or leaves at each of these times.
+    /// Axis angles in the position held or left at each of these times.
     pub(super) axes: Vec<AxisAngles>,
 }
 
@@ -30,10 +30,9 @@ pub struct Runs {
 }
 
 impl Runs {
-    /// Of a scenario.
+    /// For a scenario.
     ///
-    /// # Errors
-    /// If the table cannot follow the path.
+    /// # Errors If the table cannot follow the path.
     pub fn new(scenario: &Scenario) -> Result<Self, TableError> {
         let none = Imperfection::none(&scenario.table);
         Ok(Self {
@@ -78,7 +77,7 @@ impl Drive {
         })
     }
 
-    /// Whether it is that of this imperfection and these error terms.
+    /// Whether it has this imperfection and these error terms.
     pub(super) fn is_of(&self, imperfection: &Imperfection, terms: &TermVector) -> bool {
         (&self.imperfection, &self.terms) == (imperfection, terms)
     }

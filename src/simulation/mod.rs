@@ -1,7 +1,7 @@
 //! Simulated runs with known truth: an instrument on a table that follows a path.
 //!
-//! Everything happens in memory. Truth, noise, the table's imperfections, its position errors and its
-//! readings draw from generators of their own, so that changing one leaves the others as they were.
+//! Everything happens in memory. Truth, noise, the table's imperfections, its position errors and its readings draw
+//! from separate generators, so that changing one does not affect the others.
 
 mod campaign;
 mod drive;
@@ -70,7 +70,7 @@ impl Simulated {
     }
 }
 
-/// What draws random numbers, each from a stream of its own.
+/// Sources of random numbers, each with a separate stream.
 #[derive(Clone, Copy)]
 enum Draws {
     GyroTruth,
@@ -86,7 +86,7 @@ enum Draws {
 impl Draws {
     const COUNT: u64 = 8;
 
-    /// Of what temperature adds; apart from all others, which stay as they were.
+    /// Stream for temperature effects, separate from all others.
     fn thermal(seed: u64, stream: u64) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(seed ^ THERMAL);
         rng.set_stream(stream);
@@ -100,9 +100,9 @@ impl Draws {
     }
 }
 
-/// Makes another seed of one: `thermal!` in ASCII.
+/// Derives a second seed: `thermal!` in ASCII.
 const THERMAL: u64 = 0x7468_6572_6d61_6c21;
-/// Within this time, s, no instrument's temperature makes a difference.
+/// Interval in which temperature changes are negligible, s.
 const WARMED_EVERY: f64 = 0.1;
 
 fn normal(rng: &mut ChaCha8Rng) -> Vector3<f64> {
@@ -119,8 +119,8 @@ impl Scenario {
         self.simulate_recording(seed, stream, stream, &Difference::default())
     }
 
-    /// The same of the instrument of one stream with all else from another, as of one of its recordings, in which
-    /// its parameters differ by `own`.
+    /// The same for the instrument of one stream with all other random numbers from another, as for one of its
+    /// recordings, with parameter differences `own`.
     ///
     /// # Errors
     /// If the table cannot follow the path.
@@ -134,7 +134,7 @@ impl Scenario {
         self.simulate_on(None, seed, instrument, stream, own)
     }
 
-    /// The same on a drive that was made before, if it is the one that this recording has.
+    /// The same with an existing drive, if it matches this recording.
     fn simulate_on(
         &self,
         made: Option<&Drive>,
@@ -183,7 +183,7 @@ impl Scenario {
         })
     }
 
-    /// What an instrument puts out on a drive, and the temperature that is recorded with it.
+    /// Output of an instrument on a drive, with the recorded temperature.
     fn samples(
         &self,
         drive: &Drive,
@@ -217,7 +217,7 @@ impl Scenario {
         }
     }
 
-    /// The run that these samples and the table's log are of.
+    /// The run with these samples and the table log.
     fn recorded(&self, imu: ImuSamples, table: TableLog) -> Run {
         let meta = [
             ("instrument", &self.instrument.name),
@@ -244,7 +244,7 @@ impl Scenario {
         }
     }
 
-    /// What is known of the instrument before it is calibrated.
+    /// Prior of the instrument.
     fn known_instrument(&self) -> Instrument {
         let nominal = |sensor: Sensor| {
             let per_unit = match self.output {
@@ -328,7 +328,7 @@ impl Scenario {
             .collect()
     }
 
-    /// The table's log: `exp(−[τ×]) C_b_n`, τ the error of the position in force and white noise.
+    /// The table's log: `exp(−[τ×]) C_b_n`, with τ the current position error plus white noise.
     fn readings(&self, drive: &Drive, seed: u64, stream: u64) -> TableLog {
         let errors = &self.table.errors;
         let mut positions = Draws::Positions.generator(seed, stream);

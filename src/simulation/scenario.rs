@@ -16,11 +16,11 @@ use crate::models::{self, InstallationModel, Instrument, ModelError, Place, Room
 use crate::turntable::{Imperfection, Motion, Path, Table, TableError};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, PPM};
 
-/// At which instruments are what their model says, °C.
+/// Temperature at which instruments match their model, °C.
 const ROOM_TEMPERATURE: f64 = 25.0;
-/// Steps of the true motion in one sample of the IMU.
+/// Steps of the true motion per IMU sample.
 const STEPS: u32 = 4;
-/// The longest record that is simulated in memory; it takes some gigabytes.
+/// The longest simulated recording, which takes several gigabytes of memory.
 const MOST_SAMPLES: f64 = 2e7;
 
 /// Complete definition of a simulated run, except its random numbers.
@@ -118,7 +118,7 @@ impl Scenario {
         Ok(scenario)
     }
 
-    /// The same scenario along another path, by embedded name or path of its file.
+    /// The same scenario with a different path, given by embedded name or file.
     ///
     /// # Errors
     /// If it does not exist, is malformed, or does not fit the table.
@@ -162,7 +162,7 @@ impl Scenario {
         self
     }
 
-    /// Whether its runs have the states of a block.
+    /// Whether its runs include an error term.
     pub fn has(&self, block: ErrorTerm) -> bool {
         let sees_table = self.body_frame == BodyFrame::Table;
         let errors = &self.table.errors;
@@ -204,7 +204,7 @@ impl Scenario {
         Ok(motion.dwells().map(|(start, end)| end - start).sum())
     }
 
-    /// What would otherwise fail only when it is simulated.
+    /// Checks that would otherwise fail only in simulation.
     fn check(&self) -> Result<(), String> {
         // With the errors of a real table, so that a path that cannot have them is found here.
         let real = Imperfection::draw(&self.table, || 1.0);
@@ -218,7 +218,7 @@ impl Scenario {
             let number = duration * rate;
             if !(2.0..=MOST_SAMPLES).contains(&number) {
                 return Err(format!(
-                    "{duration:.1} s of path {} at {rate} Hz make {number:.3e} {what}; expected 2 to \
+                    "{duration:.1} s of path {} at {rate} Hz give {number:.3e} {what}; expected 2 to \
                      {MOST_SAMPLES:.0e}",
                     self.path_name
                 ));
@@ -331,13 +331,12 @@ impl ChamberFile {
     pub fn in_si(self) -> Result<Chamber, String> {
         let profile: Vec<(f64, f64)> = self.profile.iter().map(|(t, v)| (t.0, v.0)).collect();
         if profile.is_empty() || !profile.is_sorted_by(|a, b| a.0 < b.0) {
-            return Err("profile: expected at least one [time in s, temperature in °C], each later than the one \
-                        before"
+            return Err("profile: expected at least one [time in s, temperature in °C], in increasing order of time"
                 .to_owned());
         }
         if let Some((_, value)) = profile.iter().find(|(_, value)| value.abs() > 150.0) {
             return Err(format!(
-                "profile: found {value} °C, expected a chamber within ±150 °C"
+                "profile: found {value} °C, expected a chamber temperature within ±150 °C"
             ));
         }
         Ok(Chamber {

@@ -15,12 +15,12 @@ use crate::recording::{TEMPERATURE_SPACING, Temperature};
 /// A climatic chamber, with the thermal response of the instrument.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Chamber {
-    /// Time in s and temperature of the chamber in °C. Between the points it is linear; before the first and
-    /// after the last it is constant. The instrument has soaked at the first.
+    /// Time in s and temperature of the chamber in °C. Linear between points, constant before the first and after the
+    /// last. The instrument starts soaked at the first.
     pub profile: Vec<(f64, f64)>,
     /// Time constant of the instrument in the chamber, s; zero follows at once.
     pub time_constant: f64,
-    /// White noise of a mean over one second of its temperature sensor, K.
+    /// White noise of one-second means of its temperature sensor, K.
     pub sensor_noise: f64,
 }
 
@@ -28,7 +28,7 @@ pub struct Chamber {
 const STEP: f64 = 1.0;
 
 impl Chamber {
-    /// Always at this temperature, °C.
+    /// A constant temperature, °C.
     pub fn soak(temperature: f64) -> Self {
         Self {
             profile: vec![(0.0, temperature)],
@@ -84,7 +84,7 @@ impl Warming {
         (self.values[k] + rate * (at - k as f64) * STEP, rate)
     }
 
-    /// What its sensor records.
+    /// Sensor output.
     pub fn recorded(&self, duration: f64, noise: f64, rng: &mut ChaCha8Rng) -> Option<Temperature> {
         let spans = (duration / TEMPERATURE_SPACING).ceil() as usize;
         let middle = 0.5 * TEMPERATURE_SPACING;

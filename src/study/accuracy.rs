@@ -1,5 +1,5 @@
-//! Accuracy of the filter and consistency of its σ over many simulated runs, compared with the
-//! truth, the Cramér–Rao bound, and the closed form on the paper's static positions.
+//! Accuracy of the filter and consistency of its σ over many simulated runs, compared with the truth, the Cramér–Rao
+//! bound, and the closed form on the static positions of the paper.
 //!
 //! Everything is compared in the general form and in the body frame of the table.
 
@@ -139,7 +139,7 @@ impl Accuracy {
         (self.study.form, self.study.scenario.installation.form)
     }
 
-    /// NIS over all runs of each kind of observation that there was.
+    /// NIS over all runs for each kind of observation made.
     pub fn nis(&self) -> impl Iterator<Item = (&'static str, &Nis)> {
         let kinds = [
             ("zero velocity", &self.velocity),

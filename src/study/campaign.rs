@@ -26,7 +26,7 @@ pub struct CampaignStudy {
     pub runs: u64,
     /// Seed; each campaign has its own random streams.
     pub seed: u64,
-    /// Whether biases may follow the rate of temperature.
+    /// Whether biases may depend on the temperature rate.
     pub rate: bool,
 }
 
@@ -208,7 +208,7 @@ fn compare(
     })
 }
 
-/// The selected order of a group, and whether its biases follow the rate.
+/// The selected order of a group, and whether its biases have a rate term.
 fn order(outcome: &Outcome, group: Group) -> (usize, bool) {
     let parameters = group.parameters(outcome.estimate.form());
     let first = parameters.first().copied().unwrap_or(0);

@@ -1,5 +1,5 @@
-//! The paper's turntable experiment (§3.3, Figure 10) as a simulation: instruments are calibrated by
-//! the closed form and by the filter, and navigate with the errors that remain.
+//! The paper's turntable experiment (§3.3, Figure 10) as a simulation: instruments are calibrated with the closed form
+//! and with the filter, and navigate with the remaining errors.
 //!
 //! The navigation error of a calibration is `error(t) = (S(t) + Φ(t) X₀) δθ`: S is the effect of the
 //! parameter errors δθ during the mission, X₀ their effect on the initial alignment. Both are linear, so
@@ -28,38 +28,38 @@ pub use budget::{Budget, Part};
 pub use method::{Calibrated, Estimator, Method, Trial};
 pub use noise::ALIGNMENT_TIME;
 
-/// The paper's static positions, on which the closed form is made.
+/// The static positions of the paper, used by the closed form.
 const POSITIONS: &str = "six-position";
-/// A path of the filter that takes the closed form's table time.
+/// A filter path with the table time of the closed form.
 const HOUR_PATH: &str = "three-axis-hour";
 /// Minutes between two points of a curve against time.
 const EVERY: usize = 10;
 
-/// What is studied.
+/// Configuration of the study.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct ExperimentStudy {
-    /// What is simulated; its path is the filter's short one.
+    /// The simulated scenario, with the short filter path.
     pub scenario: Scenario,
-    /// How the body moves where it moves.
+    /// Trajectory of the moving body.
     pub trajectory: Trajectory,
     /// Name of the trajectory.
     pub trajectory_name: String,
-    /// How many intervals of [`super::navigation::INTERVAL`] each navigation lasts.
+    /// Duration of each navigation in intervals of [`super::navigation::INTERVAL`].
     pub intervals: u32,
     /// Number of instruments.
     pub samples: u64,
-    /// Seed; each instrument has its own streams of it.
+    /// Seed; each instrument has its own random streams.
     pub seed: u64,
 }
 
 /// Situation in which an instrument navigates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Situation {
-    /// It stands level, heading North, and has found its attitude by itself.
+    /// Stationary and level, heading North, self-aligned.
     SelfAligned,
-    /// It stands so and was given its attitude.
+    /// Stationary and level, heading North, with given attitude.
     Aligned,
-    /// It follows the trajectory and was given its attitude at the start.
+    /// Moving along the trajectory, with given initial attitude.
     Moving,
 }
 
@@ -71,7 +71,7 @@ impl Situation {
 /// The result.
 #[derive(Debug, Clone)]
 pub struct Experiment {
-    /// What was studied.
+    /// Configuration of the study.
     pub study: ExperimentStudy,
     /// Table time of each of [`Method::all`], s.
     pub table_times: Vec<f64>,
@@ -81,7 +81,7 @@ pub struct Experiment {
     pub navigations: Vec<Navigated>,
 }
 
-/// What the methods are worth in one situation.
+/// Results of the methods in one situation.
 #[derive(Debug, Clone)]
 pub struct Navigated {
     /// The situation.
@@ -104,20 +104,20 @@ pub struct Worth {
     pub at_end: Spread,
     /// 99 % bootstrap interval of the median at the end.
     pub median_interval: (f64, f64),
-    /// The largest of all minutes.
+    /// Maximum over all minutes.
     pub largest: Spread,
-    /// At the end by the errors of one triad alone.
+    /// At the end, due to the errors of one triad alone.
     pub by_one: PerSensor<Spread>,
     /// Time in s against the median.
     pub against_time: Vec<(f64, f64)>,
-    /// Median of the closed form in the same installation form over that of this method, both at the
-    /// end; `None` for the closed form itself.
+    /// Final median of the closed form in the same installation form divided by that of this method; `None` for the
+    /// closed form.
     pub gain: Option<Ratio>,
-    /// What the claimed covariance says of the error at the end.
+    /// Budget of the final error from the stated covariance.
     pub budget: Budget,
 }
 
-/// How a length is distributed.
+/// Distribution of a length.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spread {
     /// Half of all are below.
@@ -126,7 +126,7 @@ pub struct Spread {
     pub mean: f64,
     /// Root of the mean square.
     pub rms: f64,
-    /// A quarter of all are below the first, three quarters below the second.
+    /// First and third quartile.
     #[serde(skip)]
     pub quartiles: (f64, f64),
     /// 68 % are below.
@@ -138,7 +138,7 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// Of some lengths; NaN of none.
+    /// Distribution of these lengths; NaN if empty.
     fn of(lengths: impl Iterator<Item = f64>) -> Self {
         let mut sorted: Vec<f64> = lengths.collect();
         sorted.sort_by(f64::total_cmp);
@@ -222,17 +222,16 @@ impl ExperimentStudy {
     }
 }
 
-/// The instrument that missions are followed with: what an error does depends on the instrument by
-/// less than one part in a hundred.
+/// The instrument used to compute missions; the effect of an error depends on the instrument by less than 1 %.
 fn ideal() -> PerSensor<Triad> {
     PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General))
 }
 
-/// A mission, followed once.
+/// A mission, computed once.
 struct Way {
     situation: Situation,
     noise: Spread,
-    /// Time and what each parameter's error does to the position.
+    /// Time, and effect of each parameter error on the position.
     minutes: Vec<(f64, ByParameter)>,
 }
 
@@ -284,7 +283,7 @@ impl Way {
         }
     }
 
-    /// Over the instruments that both methods calibrated.
+    /// Ratio over the instruments calibrated by both methods.
     fn gain(&self, place: usize, method: Method, trials: &[Trial]) -> Option<Ratio> {
         let baseline = Method::all()
             .position(|m| m.estimator == Estimator::ClosedForm && m.form == method.form)
@@ -308,7 +307,7 @@ impl Way {
     }
 }
 
-/// The errors of one triad; the other has none.
+/// The errors of one triad, with the other exact.
 fn of_triad(error: &ParameterVector, sensor: Sensor) -> ParameterVector {
     let mut only = ParameterVector::zeros();
     let first = parameter(sensor, 0);

@@ -92,8 +92,8 @@ pub enum NavigationStudyError {
 }
 
 impl Pair {
-    /// A pair from records, converted to the general form and to a common body frame, which is returned, too.
-    /// The truth may be a calibration with its own σ.
+    /// A pair from records, converted to the general form and a common body frame, which is also returned. The truth
+    /// may be a calibration with its own σ.
     ///
     /// # Errors
     /// If the records cannot be compared.
@@ -170,7 +170,7 @@ impl PerSensor<Sensed> {
 }
 
 impl Mission {
-    /// Standing level at a site, heading North.
+    /// Stationary and level at a site, heading North.
     pub fn standing_level(site: &Site, intervals: u32) -> Self {
         Self {
             motion: Motion::Standing(Solution {
@@ -204,7 +204,7 @@ impl Mission {
         Ok(moments)
     }
 
-    /// The errors alone, by their nonlinear equations, which takes milliseconds for 40 h at rest.
+    /// Only the errors, from their nonlinear equations, in milliseconds for 40 h at rest.
     ///
     /// # Errors
     /// As for [`Self::navigate`].
@@ -262,7 +262,7 @@ impl Mission {
         self.exposure_from(Sensitivity::zeros(), truth)
     }
 
-    /// The same if the errors at the start depend on the parameters, too.
+    /// The same if the initial errors also depend on the parameters.
     ///
     /// # Errors
     /// As for [`Self::navigate`].

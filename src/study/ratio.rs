@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 const SAMPLES: usize = 2000;
 /// Probability outside the interval, half on each side.
 const OUTSIDE: f64 = 0.01;
-/// The bootstrap's own seed: its draws are independent of those of the runs.
+/// Seed of the bootstrap, whose draws are independent of those of the runs.
 const SEED: u64 = 0;
 
 /// A ratio of root mean squares, or of medians.

@@ -16,7 +16,9 @@ pub struct Shard {
 
 /// Invalid part of a job.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("expected two whole numbers i/M, i from 1 to M, such as 3/8 for the third part of eight")]
+#[error(
+    "expected two whole numbers i/M with i from 1 to M, such as 3/8 for the third of eight parts"
+)]
 pub struct ShardError;
 
 impl Shard {

@@ -1,10 +1,10 @@
 //! The paper's Table 1: errors of 40 h of navigation due to the two simplified installation forms (Zhao,
 //! Jiang, Li 2016, §3.2).
 //!
-//! For each sample, installation angles are drawn (six independent ones for each triad, rows of unit norm),
-//! and the triad is calibrated by the closed form from six positions without noise. Navigation at rest uses
-//! the remaining errors, level, with perfect alignment and height held, for gyros and accelerometers
-//! separately. The figure of a sample is the largest absolute error of the run.
+//! For each sample, installation angles are drawn (six independent ones for each triad, rows of unit norm), and the
+//! triad is calibrated by the closed form from six positions without noise. Navigation at rest uses the remaining
+//! errors, level, with perfect alignment and fixed height, for gyros and accelerometers separately. The figure of a
+//! sample is the largest absolute error of the run.
 //!
 //! Navigation uses the linear error model. This suffices because the errors are small: the neglected terms
 //! are products of two errors, at most a hundredth of the largest error in any row of the table (a test
@@ -31,7 +31,7 @@ pub use paper::{ByQuantity, Installation, Kind, QUANTITIES, Reading};
 pub use response::Moments;
 pub use verdict::{AGREEMENT, Verdict};
 
-/// Least number of samples for verdicts, so that only the paper's sampling error matters.
+/// Minimum number of samples for verdicts, so that only the sampling error of the paper matters.
 pub const POPULATION: usize = 4000;
 
 /// Number of times at which the errors of samples are stored.

@@ -1,5 +1,5 @@
-//! What a record holds, and what the methods could see of the instrument in it. Nothing is calibrated: all
-//! is by nominal scales and prior biases.
+//! Content of a recording, and the parameters that each method could observe. Nothing is calibrated: nominal scales and
+//! prior biases are used.
 
 mod advice;
 mod session;
@@ -16,35 +16,34 @@ use crate::run::motion::{self, LabelCheck, Rest, Turn};
 use crate::run::{Aiding, Run};
 use crate::units::DEGREE;
 
-/// Forms differ by what the data must say, not by what they can.
+/// Always in the general form, because forms differ only in their constraints.
 const FORM: InstallationForm = InstallationForm::General;
 
-/// What a record holds.
+/// Content of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Survey {
-    /// Where the instrument stands, in order.
+    /// The dwells, in order.
     pub rests: Vec<Rest>,
-    /// What it does from each of them to the next; empty in a record of sections, except those labelled as
-    /// turns.
+    /// The turns between them; in concatenated sections, only those labelled as turns.
     pub turns: Vec<Turn>,
-    /// Labelled sections against what was found.
+    /// Labelled sections compared with the data.
     pub labels: Vec<LabelCheck>,
-    /// What each method could see: what is to be expected, or why nothing is.
+    /// Predicted accuracy of each method, or the reason why it fails.
     pub methods: Vec<(Path, Result<Expected, String>)>,
-    /// A mounting that the record shows in place of the stated one.
+    /// A contradiction between the recording and run.toml.
     pub contradiction: Option<Contradiction>,
-    /// How long it stands in all, s.
+    /// Total duration of dwells, s.
     pub standing: f64,
     /// Length of the longest dwell, s.
     pub longest: f64,
-    /// Directions of up that are further apart than [`APART`].
+    /// Number of upward directions farther apart than [`APART`].
     pub directions: usize,
 }
 
-/// Directions nearer to each other than this, rad, count as one.
+/// Directions closer than this, rad, count as one.
 pub const APART: f64 = 15.0 * DEGREE;
 
-/// A way to a calibration.
+/// A calibration method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Path {
     /// `--method six-position`.
@@ -69,12 +68,12 @@ impl Path {
     }
 }
 
-/// σ to be expected, in the general installation form.
+/// Predicted σ, in the general installation form.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expected {
-    /// RMS σ of each group's estimated parameters, rad/s or m/s² normalised; `None` if all are fixed.
+    /// RMS σ of the estimated parameters of each group, rad/s or m/s² normalised; `None` if all are fixed.
     pub sigma: Vec<(Group, Option<f64>)>,
-    /// Parameters that stay within half of their prior σ, or that nothing but the prior says.
+    /// Parameters with σ above half of the prior, or determined only by the prior.
     pub unobserved: Vec<String>,
 }
 
@@ -114,7 +113,7 @@ impl Survey {
         }
     }
 
-    /// Of the six ways up, the rests in which each is: x up, x down, … z down.
+    /// Dwells in each of the six positions: x up, x down, … z down.
     pub fn ways_up(&self) -> [usize; 6] {
         let mut ways = [0; 6];
         for rest in self.rests.iter().filter(|rest| rest.up.is_upright()) {
@@ -124,7 +123,7 @@ impl Survey {
     }
 }
 
-/// How many directions of up differ.
+/// Number of distinct upward directions.
 fn directions(rests: &[Rest]) -> usize {
     let mut known: Vec<&Rest> = Vec::new();
     for rest in rests {
@@ -137,10 +136,9 @@ fn directions(rests: &[Rest]) -> usize {
 }
 
 impl Expected {
-    /// By a method.
+    /// Prediction for a method.
     ///
-    /// # Errors
-    /// [`CalibrationError`] if the method cannot calibrate by this run.
+    /// # Errors [`CalibrationError`] if the method cannot calibrate this run.
     pub fn of(run: &Run, path: Path) -> Result<Self, CalibrationError> {
         let aiding = match path {
             Path::SixPosition => {

@@ -43,7 +43,7 @@ pub struct Chain {
     joints: Vec<Joint>,
 }
 
-/// A moving joint with the fixed rotation behind it.
+/// A moving joint with the fixed rotation after it.
 #[derive(Debug, Clone, PartialEq)]
 struct Joint {
     axis: Vector3<f64>,
@@ -62,7 +62,7 @@ impl Chain {
         }
     }
 
-    /// A body that turns about an axis of its own.
+    /// A body that turns about one of its axes.
     pub fn about_body_axis(attitude: Matrix3<f64>, axis: Vector3<f64>, profile: Profile) -> Self {
         let mut chain = Self::still(attitude);
         chain.turn(axis, 0.0, profile, Default::default());

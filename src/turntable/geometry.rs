@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 use crate::attitude::exp;
 
-/// Axes whose errors are modelled, the outermost and those within.
+/// Number of axes with modelled errors, including the outermost.
 const AXES: usize = 3;
 /// Directions across an axis.
 const ACROSS: usize = 2;
@@ -25,13 +25,13 @@ pub type AxisAngles = [Option<(Vector3<f64>, f64)>; AXES];
 /// A kind of error of the axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum AxisError {
-    /// An axis within another is not at right angles to it: constant tilts in two directions across.
+    /// Non-orthogonality of an inner axis: constant tilts in two directions across it.
     Tilt,
-    /// An axis tilts with its own angle, once and twice a turn: for each axis, for cosine and sine of
-    /// the angle and of twice the angle, in two directions across.
+    /// Tilt of an axis that depends on its angle, once and twice per turn: for each axis, cosine and sine of the angle
+    /// and of twice the angle, in two directions across.
     Wobble,
-    /// An encoder reads wrongly with its own angle, once and twice a turn: for each axis, for cosine
-    /// and sine of the angle and of twice the angle.
+    /// Encoder error that depends on its angle, once and twice per turn: for each axis, cosine and sine of the angle
+    /// and of twice the angle.
     Encoder,
 }
 
@@ -39,7 +39,7 @@ impl AxisError {
     /// Every kind, in the order of their errors.
     pub const ALL: [Self; 3] = [Self::Tilt, Self::Wobble, Self::Encoder];
 
-    /// Indices among the errors of the axes of those on one axis, the outermost being number zero.
+    /// Indices of the errors of one axis (outermost is zero) among those of all axes.
     fn of_axis(self, axis: usize) -> Range<usize> {
         const WOBBLE: usize = ACROSS * (AXES - 1);
         const ENCODER: usize = WOBBLE + AXES * PHASES * ACROSS;
@@ -162,7 +162,7 @@ pub fn phases(angle: f64) -> [f64; PHASES] {
     [c, s, c2, s2]
 }
 
-/// The axes of a table at these angles, as far as their errors are modelled.
+/// The axes of a table at these angles, limited to those with modelled errors.
 pub fn axis_angles(axes: impl IntoIterator<Item = (Vector3<f64>, f64)>) -> AxisAngles {
     let mut axes = axes.into_iter();
     std::array::from_fn(|_| axes.next())

@@ -27,7 +27,7 @@ pub use table::{Axis, AxisImperfection, Imperfection, Table, TableAccuracy, Tabl
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TableError {
     /// A list of angles that does not fit the table.
-    #[error("{place}: {found} angles for a table of {expected} axes; give one angle per axis")]
+    #[error("{place}: {found} angles for a table with {expected} axes; give one angle per axis")]
     AxisCount {
         /// Place in the path.
         place: String,
@@ -56,7 +56,7 @@ pub enum TableError {
     },
     /// A rotation that cannot be completed in its time.
     #[error(
-        "step {step}: {angle_deg:.3}° in {duration} s needs more than its acceleration; allow {needed:.2} s or more"
+        "step {step}: {angle_deg:.3}° in {duration} s exceeds the acceleration of the axis; allow {needed:.2} s or more"
     )]
     Hurried {
         /// Step, counted from one.
@@ -70,7 +70,8 @@ pub enum TableError {
     },
     /// Axis errors on a path that does not state how the axes turn.
     #[error(
-        "the path turns about body axes, which does not say how the table's axes turn; take a table without non-orthogonality, wobble and encoder harmonics, or a path in table axes"
+        "the path turns about body axes, which does not define the table angles; use a table without \
+         non-orthogonality, wobble and encoder harmonics, or a path in table axes"
     )]
     AxesUnknown,
 }

@@ -7,7 +7,7 @@ use super::{AxesStep, Axis, BodyStep, Imperfection, Moves, Path, Profile, Table,
 use crate::attitude::exp;
 use crate::units::DEGREE;
 
-/// A stretch of the path in which the same joints move, or none.
+/// A stretch of the path in which the same joints (or none) move.
 #[derive(Debug, Clone, PartialEq)]
 struct Stretch {
     start: f64,

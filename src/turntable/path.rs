@@ -12,7 +12,7 @@ pub struct Path {
     pub moves: Moves,
 }
 
-/// Moves in the table's own axes or in the body's.
+/// Moves in table axes or in body axes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Moves {
     /// Turns of the table's axes.
@@ -31,7 +31,7 @@ pub enum Moves {
     },
 }
 
-/// All named axes turn at once, then the table stands.
+/// All named axes turn simultaneously, then the table is at rest.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AxesStep {
     /// Turn of each axis, outermost first, rad.
@@ -44,7 +44,7 @@ pub struct AxesStep {
     pub dwell: f64,
 }
 
-/// One rotation about a body axis, then the table stands.
+/// One rotation about a body axis, then the table is at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct BodyStep {
     /// The rotation.

@@ -14,8 +14,8 @@ pub struct Turned {
     pub acceleration: f64,
 }
 
-/// A turn whose rate rises and falls along raised cosines, with a constant stretch between them, so
-/// that the acceleration is continuous and everything is known in closed form.
+/// A turn whose rate rises and falls along raised cosines, with a constant stretch between them, so that the
+/// acceleration is continuous and all quantities have a closed form.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Profile {
     rate: f64,
@@ -63,7 +63,7 @@ impl Profile {
         2.0 * self.ramp + self.plateau
     }
 
-    /// The highest rate, rad/s, unsigned.
+    /// The maximum rate magnitude, rad/s.
     pub fn peak_rate(&self) -> f64 {
         self.rate.abs()
     }
@@ -73,7 +73,7 @@ impl Profile {
         [self.ramp, self.ramp + self.plateau, self.duration()]
     }
 
-    /// The state `time` seconds after the start; still before it and after the end.
+    /// The state `time` seconds after the start; at rest before the start and after the end.
     pub fn at(&self, time: f64) -> Turned {
         let Self {
             rate,

@@ -35,8 +35,7 @@ pub struct Table {
 /// 1σ of the errors of a table's log.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TableAccuracy {
-    /// 1σ per axis of the position error, constant while the table is at rest and new at every position,
-    /// rad.
+    /// 1σ per axis of the position error, constant in a dwell and independent between positions, rad.
     pub position_sigma: f64,
     /// 1σ per axis of the white error of each reading, rad.
     pub reading_sigma: f64,
@@ -47,8 +46,7 @@ pub struct TableAccuracy {
 /// 1σ of a table's errors, all in rad.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct TableErrors {
-    /// Position error per axis of the navigation frame: constant while the table stands, new at
-    /// every position.
+    /// Position error per axis of the navigation frame: constant in a dwell, independent between positions.
     pub position: f64,
     /// White error of each reading, per axis of the navigation frame.
     pub reading: f64,
@@ -56,9 +54,9 @@ pub struct TableErrors {
     pub level: f64,
     /// Error of the base in azimuth.
     pub north: f64,
-    /// Tilt of every axis but the outermost, per direction across it.
+    /// Tilt of every axis except the outermost, per direction across it.
     pub nonorthogonality: f64,
-    /// Amplitude of the tilt that every axis makes once per turn.
+    /// Amplitude of the tilt of every axis once per turn.
     pub wobble: f64,
     /// Amplitudes of the tilt of every axis with cosine and sine of its angle and of twice its angle, for each
     /// direction across it.
@@ -144,7 +142,7 @@ impl Imperfection {
         imperfection
     }
 
-    /// Whether any axis is tilted, wobbles, or has an encoder that reads wrongly.
+    /// Whether any axis has tilt, wobble or encoder error.
     pub fn moves_axes(&self) -> bool {
         self.axes
             .iter()

@@ -329,7 +329,10 @@ fn a_calibration_of_another_instrument_is_refused_with_the_reason() {
         .assert()
         .success();
     let said = String::from_utf8_lossy(&done.get_output().stderr);
-    assert!(said.contains("gyro scale factors are up to"), "{said}");
+    assert!(
+        said.contains("gyro scale factors differ by up to"),
+        "{said}"
+    );
     let mut reversed = calibration(units, scale);
     reversed.gyro.scale[2] *= -1.0;
     let message = of("sign.json", &reversed);

@@ -70,7 +70,7 @@ fn a_unit_that_was_edited_after_its_part_was_written_is_not_merged() {
     refused(
         "lot-part-edited",
         "merge l1 l2d -o out",
-        "not the one that was written with it",
+        "that does not belong to it",
     );
 }
 
@@ -121,7 +121,7 @@ fn rows_that_were_lost_in_a_turn_are_left_out_and_too_many_to_fill() {
     std::fs::write(&run, text.replace("../../../three-axis-counts", &table)).unwrap();
     let (status, _, message) = turncal(copy.path(), "apply calibration.json g/run.toml -o d.csv");
     assert!(
-        status == 0 && message.contains("300 that the log has lost"),
+        status == 0 && message.contains("300 rows missing in the log"),
         "{message}"
     );
     let rows = |name: &str| {
@@ -152,7 +152,10 @@ fn whole_numbers_beyond_two_to_the_53_keep_their_digits_and_text_that_is_left_ou
     let second = text.lines().nth(2).unwrap();
     assert!(second.starts_with("1152921504616846977,"), "{second}");
     let run = std::fs::read_to_string(copy.path().join("c/run.toml")).unwrap();
-    assert!(run.contains("`name` holds text and is left out"), "{run}");
+    assert!(
+        run.contains("`name` contains text and was ignored"),
+        "{run}"
+    );
 }
 
 #[test]

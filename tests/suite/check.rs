@@ -84,7 +84,7 @@ fn a_wrong_label_is_said_by_name() {
     let document = document(&place.path().join("run.toml"));
     let said = findings(&document).join("\n");
     assert!(
-        said.contains("Section `y_down` at 10.2 s has another axis up, 178°"),
+        said.contains("Section `y_down` at 10.2 s has a different axis up, 178°"),
         "{said}"
     );
     assert!(
@@ -179,7 +179,7 @@ fn every_fault_of_a_log_is_named() {
         samples["stuck"].as_u64() >= Some((0.9 / period) as u64),
         "{samples}"
     );
-    for kind in ["missing", "there twice", "saturated", "stuck"] {
+    for kind in ["missing", "duplicated", "saturated", "stuck"] {
         assert!(
             findings(&document)
                 .iter()

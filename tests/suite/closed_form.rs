@@ -414,7 +414,7 @@ fn labels_that_no_prior_allows_are_believed_and_the_mount_is_named() {
     assert!(
         words
             .iter()
-            .any(|text| text.contains("both triads turned alike")),
+            .any(|text| text.contains("both triads are rotated together")),
         "{words:?}"
     );
     let installation = closed_form.estimate.triads.accel.installation();

@@ -100,7 +100,7 @@ fn autopilot(
     assert!(
         notes
             .iter()
-            .any(|note| note.contains("ppm of scale") && note.contains("deg/s at 100 deg/s"))
+            .any(|note| note.contains("ppm in scale") && note.contains("deg/s at 100 deg/s"))
     );
 }
 
@@ -258,7 +258,7 @@ fn gazebo_makes_the_raw_output_but_for_what_its_file_states() {
     let (bias, sigma): ([f64; 6], [f64; 6]) = (bias.try_into().unwrap(), sigma.try_into().unwrap());
     let line = text
         .lines()
-        .find(|line| line.contains("divide the raw"))
+        .find(|line| line.contains("to convert the raw"))
         .unwrap();
     let lists = line.split('[').skip(1).filter_map(|l| l.split(']').next());
     let divisors: [f64; 6] = lists

@@ -257,7 +257,7 @@ pub fn comment(text: &str, begin: &str) -> Vec<f64> {
 
 /// What the comment says raw output is divided by, gyros first.
 pub fn divisors(text: &str) -> [Vector3<f64>; 2] {
-    halves(&comment(text, "divide the raw").try_into().unwrap())
+    halves(&comment(text, "to convert the raw").try_into().unwrap())
 }
 
 /// Kalibr's measurement model, from its file alone: angular rate and specific force along the body
@@ -550,7 +550,7 @@ fn what_a_format_does_not_hold_is_said_in_the_file_and_on_standard_error() {
         assert_eq!(said.lines().count(), lost.len(), "{said}");
         for (line, lost) in said.lines().zip(lost) {
             assert!(
-                line.starts_with("not held: ") && line.contains(lost),
+                line.starts_with("not included: ") && line.contains(lost),
                 "{line}"
             );
             assert!(file.contains(line), "{line}");

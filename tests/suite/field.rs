@@ -124,8 +124,8 @@ fn the_log_of_a_camera_has_its_scales_before_its_names() {
         has(
             &text,
             &[
-                "gyro_unit = \"count\"  # as the file says",
-                "accel_unit = \"count\"  # as the file says",
+                "gyro_unit = \"count\"  # stated in the file",
+                "accel_unit = \"count\"  # stated in the file",
                 "time_unit = \"ms\"  # as the file says",
                 "scale = 818.5115",
                 "scale = 208.838",
@@ -297,12 +297,12 @@ fn a_fraction_of_a_second_that_lost_its_zeros_is_read_as_a_number() {
         run.recording.imu.period
     );
     let said = run.recording.notes.join("\n");
-    assert!(said.contains("have lost the zeros before them"), "{said}");
+    assert!(said.contains("have lost their leading zeros"), "{said}");
     has(
         &draft(&log),
         &[
             "columns = { time = \"Time\", gyro = [\"GYRX\", ",
-            "continuous = true  # no gap in time",
+            "continuous = true  # no gaps",
         ],
     );
 }

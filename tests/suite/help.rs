@@ -153,9 +153,9 @@ fn wrong_usage_is_status_two_and_says_what_to_do() {
         "table-axes",
     ];
     for (arguments, says) in [
-        (&six[..], "leave --with out, or estimate it by --method ekf"),
-        (&velocity, "--aiding velocity does not observe the table"),
-        (&study, "leave one of them out"),
+        (&six[..], "omit --with, or use --method ekf"),
+        (&velocity, "--aiding velocity does not use the table"),
+        (&study, "omit one of them"),
         (&["calibrate", here], "this is a directory; give"),
         (
             &["export", "c.json", "--format", "c", "--run", &log],
@@ -184,7 +184,7 @@ fn wrong_usage_is_status_two_and_says_what_to_do() {
         ),
         (
             &["study", "experiment", "--hours", "0"],
-            "from a minute (0.0167) to 1000",
+            "from 0.0167 (one minute) to 1000",
         ),
         (&["noise", "-1", "deg/h"], "expected a number above zero"),
         (&["compare", "one.json"], "--truth"),

@@ -177,7 +177,7 @@ fn a_second_triad_is_said_and_a_missing_one_left_open() {
     let said = init(&[log.to_str().unwrap()]).success();
     let said = text(&said.get_output().stdout);
     assert!(
-        said.contains("# accel could be [\"acc2_x\", \"acc2_y\", \"acc2_z\"], too"),
+        said.contains("# accel could also be [\"acc2_x\", \"acc2_y\", \"acc2_z\"]"),
         "{said}"
     );
     assert!(said.contains("temperature = \"temp\""), "{said}");

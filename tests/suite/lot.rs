@@ -253,13 +253,13 @@ fn parts_of_a_lot_on_any_threads_and_in_any_order_are_the_whole() {
         same(&here.join(&merged), &here.join("whole"));
     }
     for (arguments, expected) in [
-        (&["merge", "2-1"][..], "no part with run u2, u4"),
+        (&["merge", "2-1"][..], "no part that contains run u2, u4"),
         (
             &["merge", "2-1", "2-2", "7-3"],
-            "run u3 that is in 2-1, too",
+            "run u3, which is also in 2-1",
         ),
         (&["merge", "2-1", "lot"], "lot/job.json"),
-        (&["merge", "2-1", "whole"], "run u1 that is in 2-1, too"),
+        (&["merge", "2-1", "whole"], "run u1, which is also in 2-1"),
     ] {
         let refused = turncal(here, arguments);
         assert_eq!(refused.status.code(), Some(1));
@@ -269,7 +269,7 @@ fn parts_of_a_lot_on_any_threads_and_in_any_order_are_the_whole() {
     assert!(turncal(here, &other).status.success());
     let refused = turncal(here, &["merge", "2-1", "other"]);
     assert!(
-        words(&refused).contains("another specification"),
+        words(&refused).contains("a different specification"),
         "{}",
         words(&refused)
     );

@@ -208,7 +208,7 @@ fn parts_of_a_study_on_any_threads_and_in_any_order_are_the_whole() {
 
     // A part that is there is not made again, one that was changed is refused.
     let again = [&study[..], &["--shard", "1/2", "-o", "accuracy-2-1"]].concat();
-    assert!(words(&turncal(here, &again)).contains("is there already"));
+    assert!(words(&turncal(here, &again)).contains("already exists"));
     let results = here.join("accuracy-2-1/runs.msgpack");
     let mut bytes = fs::read(&results).unwrap();
     let middle = bytes.len() / 2;

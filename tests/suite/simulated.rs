@@ -238,7 +238,7 @@ fn a_form_that_the_instrument_does_not_have_is_betrayed_by_its_innovations_not_g
     assert!(outcome.form_test.is_some_and(|test| test.rejects()));
     for sentence in [
         "The filter is inconsistent",
-        "The data reject the three-angle installation form",
+        "The three-angle installation form does not fit the data",
     ] {
         assert!(says(&outcome, sentence));
     }

@@ -10,12 +10,12 @@ use nalgebra::{Matrix3, Vector3};
 use crate::calibration::{ParameterMatrix, parameter};
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector};
 
-/// Step of the second differences; the forms' third derivatives are of order one at most.
+/// Step of the second differences; the third derivatives of the forms are at most of order one.
 const STEP: f64 = 1e-3;
 
-/// Mean squares of the second-order terms in the errors of each row's three parameters, for errors of this
-/// covariance, to which they are to be added (Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to
-/// Tracking and Navigation*, §10.3.2).
+/// Mean squares of the second-order terms in the errors of the three parameters of each row, for errors with this
+/// covariance, to which they are added (Bar-Shalom, Li, Kirubarajan, *Estimation with Applications to Tracking and
+/// Navigation*, §10.3.2).
 pub fn curvature(triads: &PerSensor<Triad>, covariance: &ParameterMatrix) -> ParameterMatrix {
     let mut added = ParameterMatrix::zeros();
     for sensor in Sensor::ALL {

@@ -2,8 +2,8 @@
 //!
 //! The covariance of a filter is homogeneous of degree one in the variances of all sources together: priors, noise of
 //! the instrument, errors of the table, noise of each observation. So the part of a source is its variance times the
-//! derivative by it, and the parts add up to the covariance (Euler). The part of the constants' prior is exact; the
-//! derivative by a noise is computed from the information of two reductions.
+//! derivative with respect to it, and the parts add up to the covariance (Euler). The part of the prior of the
+//! constants is exact; the derivative with respect to a noise is computed from the information of two reductions.
 
 pub mod curvature;
 
@@ -29,7 +29,7 @@ pub use source::BudgetSource;
 const COVERAGE: f64 = 0.954_499_736_103_642;
 /// The end of a 95 % interval, in σ.
 const END_OF_INTERVAL: f64 = 1.959_963_984_540_054;
-/// A part below this share of every variance is negligible.
+/// Parts below this share of every variance are negligible.
 const NOTHING: f64 = 1e-12;
 
 /// Covariance of an estimate by source.
@@ -55,7 +55,7 @@ pub struct BudgetPart {
 const STEP: f64 = 0.01;
 
 impl Budget {
-    /// The budget of an outcome's estimate.
+    /// The budget of the estimate of an outcome.
     ///
     /// # Errors
     /// [`CalibrationError`] if the problem is not the one of the outcome.
@@ -123,8 +123,8 @@ impl Budget {
         self.parts.iter().map(|part| part.covariance).sum()
     }
 
-    /// Degrees of freedom of the combined standard uncertainty of a parameter (Welch and Satterthwaite,
-    /// JCGM 100, G.4.1); infinite if those of all parts are.
+    /// Degrees of freedom of the combined standard uncertainty of a parameter (Welch and Satterthwaite, JCGM 100,
+    /// G.4.1); infinite if infinite for all parts.
     pub fn degrees_of_freedom(&self, parameter: usize) -> f64 {
         let of = |part: &BudgetPart| part.covariance[(parameter, parameter)];
         let combined: f64 = self.parts.iter().map(of).sum();
@@ -143,7 +143,7 @@ impl Budget {
 }
 
 impl Problem<'_> {
-    /// The noise sources of its reduction: those that it states, and those whose floor is never zero.
+    /// The noise sources of its reduction: stated sources and those with a nonzero floor.
     fn sources(&self) -> BTreeSet<BudgetSource> {
         let layout = Layout::new(&self.model, self.one_gravity());
         let noise = Source::ALL.into_iter();
@@ -168,9 +168,9 @@ impl Problem<'_> {
 }
 
 impl BudgetSource {
-    /// Degrees of freedom with which its variance is known: ½ (u/Δu)² (JCGM 100, G.4.2). Δu is taken from the
-    /// upper end of the interval of the estimated noise, because the lower end may be zero; of several
-    /// figures the least counts, but at least one.
+    /// Degrees of freedom with which its variance is known: ½ (u/Δu)² (JCGM 100, G.4.2). Δu is taken from the upper end
+    /// of the interval of the estimated noise, because the lower end may be zero; the smallest of several figures is
+    /// used, but at least one.
     fn degrees_of_freedom(self, outcome: &Outcome) -> f64 {
         if self == Self::DwellScatter {
             let parameters = outcome.estimate.estimated().count().max(1);

@@ -1,4 +1,4 @@
-//! A budget as stored in a calibration's file.
+//! A budget as stored in a calibration file.
 
 use serde::{Deserialize, Serialize};
 
@@ -25,7 +25,7 @@ pub struct BudgetPartRecord {
     pub source: String,
     /// Standard uncertainty of each parameter.
     pub u: Vec<f64>,
-    /// Degrees of freedom with which it is known; `None` if infinite.
+    /// Its degrees of freedom; `None` if infinite.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub degrees_of_freedom: Option<f64>,
 }
@@ -37,12 +37,12 @@ pub struct LeftOffRecord {
     pub term: String,
     /// 1σ of the change of each parameter if the term has its usual size; three digits.
     pub usual: Vec<f64>,
-    /// RMS of the change if the record's evidence of the term is used as well; three digits.
+    /// RMS of the change if the evidence in the recording is also used; three digits.
     pub shown: Vec<f64>,
 }
 
 impl Budget {
-    /// Converts to a record of these parameters, each with its factor to the file's unit.
+    /// Converts to a record of these parameters, each with its factor to the unit of the file.
     pub(in crate::calibration) fn record(
         &self,
         estimated: &[usize],

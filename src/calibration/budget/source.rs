@@ -21,10 +21,9 @@ pub enum BudgetSource {
     AttitudeAtRest,
     /// Turning at standstill, without a table.
     RotationAtRest,
-    /// Velocity at the first sample, and position in every dwell: the IMU's distance from the table's
-    /// centre.
+    /// Velocity at the first sample, and position in every dwell (distance of the IMU from the table centre).
     Place,
-    /// Position errors of the table, new at every position.
+    /// Position errors of the table, independent at each position.
     TablePosition,
     /// Readings of the table.
     TableReading,
@@ -32,7 +31,7 @@ pub enum BudgetSource {
     TableLevel,
     /// North of the table's base.
     TableNorth,
-    /// Axes of the table that are not at right angles.
+    /// Non-orthogonality of the table axes.
     TableSquareness,
     /// Wobble of its axes.
     TableWobble,
@@ -52,17 +51,17 @@ pub enum BudgetSource {
     Term(Term),
     /// Second-order effects of the installation form in poorly known angles.
     Curvature,
-    /// Headings that Earth rate does not determine.
+    /// Headings not determined by Earth rate.
     Headings,
     /// Scatter of the dwells beyond all noise.
     DwellScatter,
     /// Rounding of rates to steps wider than their noise.
     Rounding,
-    /// Sample period, if it is not determined by a clock.
+    /// Sample period, if not determined by a clock.
     Period,
     /// Error terms that the data show, but that are not estimated.
     ErrorTermsLeftOff,
-    /// Bias variation that may exist although the noise estimated from the record does not include it.
+    /// Possible bias variation that the estimated noise does not include.
     UnseenVariation,
 }
 
@@ -86,13 +85,13 @@ impl BudgetSource {
             Self::VelocityAtRest => "velocity at standstill",
             Self::AttitudeAtRest => "attitude at standstill",
             Self::RotationAtRest => "turning at standstill",
-            Self::Place => "place of the IMU",
+            Self::Place => "position of the IMU",
             Self::TablePosition => "table position",
             Self::TableReading => "table reading",
             Self::TableLevel => "table level",
             Self::TableNorth => "table north",
-            Self::TableSquareness => "squareness of the table's axes",
-            Self::TableWobble => "wobble of the table's axes",
+            Self::TableSquareness => "non-orthogonality of the table axes",
+            Self::TableWobble => "wobble of the table axes",
             Self::TableEncoder => "table encoders",
             Self::Gravity => "gravity",
             Self::InitialAttitude => "initial attitude",
@@ -100,13 +99,13 @@ impl BudgetSource {
             Self::Temperature => "prior of temperature coefficients",
             Self::Recording => "differences between recordings",
             Self::Term(term) => return format!("prior of {}", term.name()),
-            Self::Curvature => "second order of unknown angles",
+            Self::Curvature => "second-order effect of unknown angles",
             Self::Headings => "unknown heading",
             Self::DwellScatter => "scatter of dwells",
             Self::Rounding => "rounding of rates",
             Self::Period => "sample period",
-            Self::ErrorTermsLeftOff => "error terms that show and are left off",
-            Self::UnseenVariation => "biases that may vary unseen",
+            Self::ErrorTermsLeftOff => "significant error terms not estimated",
+            Self::UnseenVariation => "possible unseen bias variation",
         };
         name.to_owned()
     }

@@ -67,8 +67,8 @@ pub fn drift(
         .collect();
     let text = format!(
         "{} {parameters} appears to drift between {first:.1} s and {last:.1} s: {} (χ² falls by {fall:.0}; limit \
-         {limit:.0}). σ are valid only for parameters that do not change. Let the instrument warm up and keep its \
-         temperature constant, look for a step, or state the bias instability in [imu.noise].",
+         {limit:.0}). σ are valid only for constant parameters. Let the instrument warm up and keep its temperature \
+         constant, look for a step, or state the bias instability in [imu.noise].",
         triad_name(changing.sensor),
         each.join(", ")
     );

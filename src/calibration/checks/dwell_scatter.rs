@@ -39,8 +39,8 @@ impl DwellScatter {
         let Self { mean, limit, .. } = self;
         let text = format!(
             "The dwells disagree with one another by more than σ allow (scatter statistic {mean:.2}; limit \
-             {limit:.2}). turncal widened σ {}. This usually means an unmodelled error: look at the effects of \
-             error terms, and rerun with --with and the one that explains most.",
+             {limit:.2}). turncal widened σ {}. This usually means an unmodelled error. Find the error term that \
+             explains most in the report, and rerun with --with and that term.",
             widened_by(growth)
         );
         let figures = json!({ "mean": mean, "limit": limit, "growth": growth });

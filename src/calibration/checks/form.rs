@@ -35,7 +35,7 @@ impl FormTest {
             limit,
         } = self;
         let text = format!(
-            "The data reject the {} installation form: {angles} more angles, as the general form has them, are \
+            "The {} installation form does not fit the data: the {angles} additional angles of the general form are \
              needed (χ² falls by {gain:.0}; limit {limit:.1}). Rerun with --installation general.",
             form.name()
         );

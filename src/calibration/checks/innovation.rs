@@ -48,7 +48,7 @@ pub struct Innovation {
     pub accepted: bool,
     /// Number of its dwell.
     pub dwell: usize,
-    /// Whether it shows the errors of the move before its dwell, which it does not if rows are lost in between.
+    /// Whether it shows the errors of the move before its dwell; false if rows are missing in between.
     pub after_move: bool,
 }
 
@@ -89,7 +89,7 @@ impl Consistency {
 /// Mean normalised innovation squared.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Nis {
-    /// Mean per scalar observation; one if σ are correct. NaN without observations.
+    /// Mean per scalar observation; one if σ are correct, NaN without observations.
     pub mean: f64,
     /// Number of scalar observations.
     pub count: usize,
@@ -145,8 +145,8 @@ pub fn outliers(innovations: &[Innovation]) -> Option<Finding> {
     let most = dwells.rev().max_by_key(|of_dwell| of_dwell.len())?;
     let (rejected, dwell, time) = (rejected.len(), most[0].dwell + 1, most[0].time);
     let text = format!(
-        "{rejected} of {observations} observations were rejected as outliers, {} of them in dwell {dwell} from {time:.1} s \
-         on. Look there for a bump.",
+        "{rejected} of {observations} observations were rejected as outliers, {} of them in dwell {dwell}, which \
+         starts at {time:.1} s. Check that dwell for a bump.",
         most.len()
     );
     let figures = json!({

@@ -5,11 +5,11 @@ use serde_json::{Value, json};
 use crate::calibration::{Finding, FindingKind as Kind};
 use crate::run::motion::LabelCheck;
 
-/// The finding on sections whose labels the record contradicts, if any.
+/// The finding on sections whose labels the recording contradicts, if any.
 pub fn contradicted(contradicted: &[LabelCheck]) -> Option<Finding> {
     let each: Vec<String> = contradicted.iter().map(LabelCheck::to_string).collect();
     let text = format!(
-        "Labels and record disagree. Section {}.",
+        "Labels and recording disagree. Section {}.",
         each.join("; section ")
     );
     let figure = |check: &LabelCheck| {

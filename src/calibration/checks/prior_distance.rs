@@ -14,9 +14,9 @@ use crate::units::{DEGREE, PPM};
 
 /// Parameters farther from their prior than this many of its σ contradict it.
 const CONTRADICTS: f64 = 5.0;
-/// Part of the prior variance by which rounding changes unobserved parameters.
+/// Fraction of the prior variance by which rounding changes unobserved parameters.
 const ROUNDING: f64 = 1e-9;
-/// Two vectors are alike if they differ by less than this part of their common part.
+/// Two vectors are similar if they differ by less than this fraction of their common part.
 const ALIKE: f64 = 0.5;
 
 /// The finding on parameters of an estimate that are too far from their prior, if any.
@@ -35,7 +35,7 @@ pub fn far_from_prior(model: &Model, estimate: &Estimate) -> Option<Finding> {
     let (words, causes): (Vec<String>, Vec<Value>) =
         causes(&far, &estimate.triads).into_iter().unzip();
     let text = format!(
-        "More than {CONTRADICTS} σ of [imu.prior] away from it: {}. Likely cause: {}.",
+        "These parameters are more than {CONTRADICTS} σ from the prior in [imu.prior]: {}. Likely cause: {}.",
         each.join(", "),
         words.join("; ")
     );
@@ -49,7 +49,7 @@ pub fn far_from_prior(model: &Model, estimate: &Estimate) -> Option<Finding> {
     (!far.is_empty()).then(|| Finding::new(kind, text, figures))
 }
 
-/// Whether a parameter is a scale factor that no careless prior explains.
+/// Whether a parameter is a scale factor too far from its prior for a careless prior.
 fn is_another_scale(model: &Model, estimate: &Estimate, index: usize) -> bool {
     let (_, of_triad) = sensor_and_parameter(index);
     let factor = estimate.vector()[index] / model.prior_mean[index];
@@ -60,9 +60,9 @@ fn is_another_scale(model: &Model, estimate: &Estimate, index: usize) -> bool {
 /// The finding on parameters for which the data alone contradict the prior, if the estimate includes the prior. The
 /// test uses the covariance of the distance between estimate and a correct prior.
 ///
-/// A prior that is too tight holds the estimate, so that the distance itself shows nothing. With
-/// `P⁻¹ = S⁻¹ + V⁻¹` of prior and data, the distance of the estimate is `P V⁻¹` times that of the data, and its
-/// covariance for a correct prior is `P S⁻¹ P V⁻¹`: normalised, it equals the distance of data and prior over both σ.
+/// Too tight a prior constrains the estimate, so the distance alone is not informative. With `P⁻¹ = S⁻¹ + V⁻¹` of prior
+/// and data, the distance of the estimate is `P V⁻¹` times that of the data, and its covariance for a correct prior is
+/// `P S⁻¹ P V⁻¹`: normalised, it equals the distance of data and prior over both σ.
 pub fn far_by_data(
     model: &Model,
     estimate: &Estimate,
@@ -139,8 +139,7 @@ fn causes(far: &[usize], triads: &PerSensor<Triad>) -> Vec<Cause> {
     let biases = biases.map(|sensor| {
         let sensor = sensor.name();
         let words = format!(
-            "{sensor} bias or bias_sigma as stated does not fit the instrument; an offset of the register belongs in \
-             bias"
+            "the stated {sensor} bias or bias_sigma does not fit the instrument (a register offset belongs in bias)"
         );
         (words, json!({ "cause": "bias", "sensor": sensor }))
     });
@@ -158,8 +157,9 @@ fn of_scales(of: Sensor, scale: &Vector3<f64>, far: &[usize], count: usize) -> C
     let (off, sensor) = (scale.add_scalar(-1.0), of.name());
     if !reversed.is_empty() {
         let axes = reversed.join(", ");
-        let words =
-            format!("{sensor} {axes} reversed: give the column in columns of [imu] a minus");
+        let words = format!(
+            "{sensor} {axes} is reversed (put a minus before the column name in columns of [imu])"
+        );
         let figures = json!({ "cause": "reversed", "sensor": sensor, "axes": reversed });
         return (words, figures);
     }
@@ -170,12 +170,12 @@ fn of_scales(of: Sensor, scale: &Vector3<f64>, far: &[usize], count: usize) -> C
             Sensor::Accel => "gravity",
         };
         let words = format!(
-            "all three {sensor} scale factors off alike, by {off_ppm:+.0} ppm: {sensor}_unit, scale or {other}"
+            "all three {sensor} scale factors are off by {off_ppm:+.0} ppm (check {sensor}_unit, scale and {other})"
         );
         let figures = json!({ "cause": "unit", "sensor": sensor, "off_ppm": off_ppm });
         return (words, figures);
     }
-    let words = format!("{sensor} scale or scale_sigma_ppm as stated does not fit the instrument");
+    let words = format!("the stated {sensor} scale or scale_sigma_ppm does not fit the instrument");
     (words, json!({ "cause": "scale", "sensor": sensor }))
 }
 
@@ -197,8 +197,8 @@ fn of_installation(triads: &PerSensor<Triad>, far: PerSensor<bool>) -> Vec<Cause
     if far.gyro && far.accel && alike(&turn(Sensor::Gyro), &common) {
         let angle_deg = common.norm() / DEGREE;
         let words = format!(
-            "both triads turned alike, by {angle_deg:.3}°: the instrument's mount, the table's zero, level or north, \
-             or the labels"
+            "both triads are rotated together by {angle_deg:.3}° (check the instrument mount, the zero, level and \
+             north of the table, and the labels)"
         );
         return vec![(words, json!({ "cause": "mount", "angle_deg": angle_deg }))];
     }
@@ -206,15 +206,15 @@ fn of_installation(triads: &PerSensor<Triad>, far: PerSensor<bool>) -> Vec<Cause
         let (turn, sensor) = (turn(of).norm(), of.name());
         if half(of, 1.0).norm() >= ALIKE * turn {
             let words = format!(
-                "{sensor} axes not at right angles: positions or labels that are not as stated, or an \
-                 installation_sigma_arcsec too small"
+                "the {sensor} axes are not orthogonal (check the stated positions and labels; otherwise \
+                 installation_sigma_arcsec is too small)"
             );
             return (words, json!({ "cause": "skewed", "sensor": sensor }));
         }
         let angle_deg = turn / DEGREE;
         let words = format!(
-            "the {sensor} triad turned by {angle_deg:.3}°: its mount in the instrument, or a time offset if it is the \
-             gyros"
+            "the {sensor} triad is rotated by {angle_deg:.3}° (check its mount in the instrument, or for gyros a \
+             time offset)"
         );
         let figures = json!({ "cause": "turned", "sensor": sensor, "angle_deg": angle_deg });
         (words, figures)

@@ -17,10 +17,10 @@ use crate::navigation::{Navigator, State};
 use crate::recording::LabelledMotion;
 use crate::run::{Dwell, Run};
 
-/// What a calibration leaves of gravity and of turns.
+/// Residuals of gravity and turns after a calibration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
-    /// Residuals over the whole record.
+    /// Residuals over the whole recording.
     pub all: Measures,
     /// Cross-validation: residuals of a calibration without every other dwell, over these dwells and the turns that
     /// end in them; `None` if the other dwells do not give a calibration.
@@ -29,7 +29,7 @@ pub struct Quality {
     /// Residuals in each dwell.
     #[serde(skip)]
     pub dwells: Vec<DwellResidual>,
-    /// Residuals in the dwells that were held out, by the calibration without them.
+    /// Residuals in the excluded dwells, from the calibration without them.
     #[serde(skip)]
     pub held_out_dwells: Vec<DwellResidual>,
 }
@@ -41,8 +41,8 @@ pub struct DwellResidual {
     pub time: f64,
     /// Magnitude of the mean specific force minus gravity, m/s².
     pub gravity: f64,
-    /// Angle between gravity as the accelerometers see it and as the gyros carry it there from the dwell before, rad; none
-    /// in the first dwell of a stretch.
+    /// Angle between the gravity direction measured by the accelerometers and the one carried over from the previous
+    /// dwell by the gyros, rad; none in the first dwell of a stretch.
     pub direction: Option<f64>,
 }
 
@@ -93,7 +93,7 @@ pub struct Measures {
 /// Statistics of the deviations of one kind.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Spread {
-    /// Their number; if it is zero, so are the other figures.
+    /// Their number; if zero, the other figures are also zero.
     pub count: usize,
     /// Their root mean square.
     pub rms: f64,
@@ -200,7 +200,7 @@ fn labelled(run: &Run, Dwell { samples, .. }: &Dwell) -> bool {
     })
 }
 
-/// The table's attitude in the first dwell of a stretch or, without a table, a levelled attitude.
+/// The table attitude in the first dwell of a stretch or, without a table, a levelled attitude.
 fn first_attitude(
     stretch: &Stretch,
     triads: &PerSensor<Triad>,
@@ -217,7 +217,7 @@ fn first_attitude(
     Ok(level(&up.normalize()))
 }
 
-/// What a calibration leaves in the judged dwells and in the turns that end in them.
+/// Residuals in the evaluated dwells and in the turns that end in them.
 fn residuals(
     problem: &Problem,
     at: &Linearisation,
@@ -261,7 +261,7 @@ fn residuals(
     Ok(Residuals { dwells, turns })
 }
 
-/// Gyro angle minus labelled angle, rad, of labelled turns that end in judged dwells.
+/// Gyro angle minus labelled angle, rad, for labelled turns that end in evaluated dwells.
 fn labelled_turns(
     problem: &Problem,
     at: &Linearisation,

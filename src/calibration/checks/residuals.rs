@@ -137,12 +137,13 @@ impl Residuals {
         let times: Vec<String> = times.collect();
         let cause = match base {
             Some(base) => format!(
-                "A table base off level and north by {:.1}″ (1σ) explains all of it, and σ include that: state \
-                 level_sigma_arcsec and north_sigma_arcsec in [turntable].",
+                "A table base misaligned from level and north by {:.1}″ (1σ) explains it fully, and σ include this. \
+                 State level_sigma_arcsec and north_sigma_arcsec in [turntable].",
                 base / ARCSEC
             ),
-            None => "Look there for a bump, a wrong label or attitude. Check noise figures in [imu.noise], the level \
-                     and north of the table, the direction of gravity, and whether the sensor was really still."
+            None => "Look there for a bump, a wrong label or a wrong attitude. Check the noise figures in \
+                [imu.noise], the level and north of the table, the direction of gravity, and whether the sensor was \
+                really still."
                 .to_owned(),
         };
         let place = match times.len() {

@@ -18,8 +18,8 @@ const PULSES: f64 = 2.0;
 /// Findings on triads with a scatter at rest that does not agree with their noise. Calibrated inputs are used, because
 /// a wrong prior scale factor is not noise.
 ///
-/// A step lasts a tenth of a second, as in the filter: faster errors average out, and of slower ones only random
-/// walk, bias and vibration of the mount remain. The result changes nothing, because it does not distinguish
+/// A step lasts a tenth of a second, as in the filter: faster errors average out, and of slower ones only random walk,
+/// bias and vibration of the mount remain. The result does not change the calibration, because it does not distinguish
 /// between them.
 pub fn scatter_at_rest(problem: &Problem, calibrated: &PerSensor<Triad>) -> Vec<Finding> {
     let runs = problem.runs().enumerate();

@@ -19,7 +19,7 @@ use crate::imu::{Output, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::run::{Aiding, Run};
 use crate::units::DEGREE;
 
-/// Number of waves that are summed: the others add a thousandth.
+/// Number of summed waves; the others add a thousandth.
 const WAVES: u32 = 600;
 /// Least growth of σ that is reported.
 const SAID: f64 = 1.05;
@@ -107,8 +107,8 @@ fn of_triad(
     Some(equations.whole(&(&by_steps * by_steps.transpose())))
 }
 
-/// Steps of rates along body axes, rad/s or m/s²; zero if there are none, or if rows are integrals, which may carry the
-/// remainder.
+/// Resolution of rates along body axes, rad/s or m/s²; zero if not rounded, or if rows are integrals, which may carry
+/// the remainder.
 fn steps(run: &Run, sensor: Sensor) -> Vector3<f64> {
     let imu = &run.recording.imu;
     let Some(log) = imu.log.as_ref().filter(|log| log.output == Output::Rate) else {

@@ -1,4 +1,4 @@
-//! Results that may not be used: of iterations without convergence, or with residuals that no noise figure explains.
+//! Results that must not be used: without convergence, or with residuals that no noise figure explains.
 
 use serde_json::json;
 
@@ -12,7 +12,7 @@ const SO_WRONG: f64 = 1e-2;
 /// Limit of NIS, or of χ² over its degrees of freedom.
 ///
 /// 1σ of a stated noise figure is a factor of three, as everywhere in noise estimation. Its error exceeds the limit of
-/// NIS, its square, in one case of a hundred. Beyond that, samples and model do not belong together.
+/// NIS, its square, in one case of a hundred. Beyond that, the samples do not match the model.
 fn limit() -> f64 {
     let sigmas = chi_square_limit(1.0, 2.0 * SO_WRONG).sqrt();
     (2.0 * LOG_SIGMA * sigmas).exp()
@@ -26,7 +26,7 @@ pub fn not_converged(outcome: &Outcome) -> Option<Finding> {
         .last()
         .map_or(f64::NAN, |pass| pass.largest_step);
     let text = format!(
-        "Not converged: the last of {passes} passes still moved a parameter by {step:.2} σ. Use neither values nor \
+        "Not converged: the last of {passes} passes still moved a parameter by {step:.2} σ. Do not use the values or \
          σ. Check scale, units and axes in run.toml with turncal check."
     );
     let figures = json!({ "passes": passes, "largest_step_sigma": step });
@@ -61,7 +61,7 @@ fn rejected(name: &str, nis: f64, worst: f64) -> Option<Finding> {
     let text = format!(
         "Calibration rejected: {name} is {nis:.0}, far above anything a wrong noise figure could cause (limit \
          {limit:.0}). The largest residual is at {worst:.1} s: look there for lost, repeated or wrapped rows, a bump \
-         or another table position. If it is noise after all, rerun with --noise auto."
+         or a wrong table position. If it really is noise, rerun with --noise auto."
     );
     let figures = json!({ "nis": nis, "limit": limit, "worst": worst });
     (nis > limit).then(|| Finding::new(Kind::Unexplained, text, figures))

@@ -1,4 +1,4 @@
-//! Single events in a record.
+//! Single events in a recording.
 
 use crate::earth::ROTATION_RATE;
 use crate::imu::Sensor;

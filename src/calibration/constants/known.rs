@@ -9,7 +9,7 @@ use crate::calibration::{Posterior, Prior};
 #[derive(Debug, Clone)]
 pub struct Known {
     prior: Prior,
-    /// Constants that the prior leaves free, and those that it fixes at their mean.
+    /// Free constants, and constants fixed at their mean by the prior.
     open: Vec<usize>,
     fixed: Vec<usize>,
     /// Rows of the free constants, with their measured values: an upper triangle.

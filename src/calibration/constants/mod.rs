@@ -1,4 +1,4 @@
-//! The constants of a record, with their prior and posterior.
+//! The constants of a recording, with their prior and posterior.
 
 mod disturbance;
 mod known;

@@ -18,7 +18,7 @@ pub struct Posterior {
     pub covariance: DMatrix<f64>,
     /// Covariance of the parameters of both triads.
     pub parameter_covariance: ParameterMatrix,
-    /// Sum of squared normalised residuals, those of the prior included.
+    /// Sum of squared normalised residuals, including those of the prior.
     pub cost: f64,
     /// −2 ln of the likelihood, up to a constant.
     pub deviance: f64,
@@ -58,7 +58,7 @@ impl Posterior {
     }
 
     /// Addition to the covariance of another posterior if the prior of this one is correct: the mean square error of
-    /// the other estimate is this covariance plus the square of the difference of the estimates.
+    /// the other estimate is this covariance plus the squared difference of the estimates.
     pub fn added_to(&self, other: &Self) -> ParameterMatrix {
         let change = self.parameters - other.parameters;
         self.parameter_covariance - other.parameter_covariance + change * change.transpose()

@@ -19,7 +19,7 @@ pub struct Prior {
 }
 
 impl Prior {
-    /// The prior of these constants by a model, as errors of this point.
+    /// The prior of these constants in a model, as errors of this point.
     pub fn new(constants: &[Constant], model: &Model, at: &Linearisation) -> Self {
         let parameters = model.prior_mean - to_vector(&at.triads);
         let of = |constant: &Constant| match *constant {

@@ -23,24 +23,24 @@ pub struct Map {
     pub table: Linear,
 }
 
-/// The moving states, of this number, that are in `g`: nothing in a dwell depends on the position.
+/// The moving states in `g`, of this number; in a dwell, nothing depends on position.
 pub fn begins(moving: usize) -> Vec<usize> {
     let is_position = |place: &usize| (POSITION..POSITION + 3).contains(place);
     (0..moving).filter(|place| !is_position(place)).collect()
 }
 
 impl Filter {
-    /// The states that move in a dwell: navigation errors, the turn at rest, varying biases.
+    /// The states that move in a dwell: navigation errors, rotation at rest, varying biases.
     pub fn moving(&self) -> Vec<usize> {
         let varying = self.layout.varying_biases.iter().map(|of| of.0);
         self.moving_in_moves().into_iter().chain(varying).collect()
     }
 
-    /// `g`, of this size: what moves when it begins except the position; rates
-    /// and specific forces by which constants drive the errors of attitude and velocity.
+    /// `g`, of this size: the moving states at the start except position, and the rates and specific forces through
+    /// which constants drive the attitude and velocity errors.
     ///
-    /// Attitude errors are those from the attitude of the table, `φ − τ`, which its readings show: what the
-    /// Earth's rate and gravity make of τ is constant, too.
+    /// Attitude errors are relative to the table, `φ − τ`, as observed by its readings; the effect of Earth rate and
+    /// gravity on τ is also constant.
     pub fn map(&self, rest: &Rest, block: &Block, size: usize) -> Map {
         let mut given = self.none(size);
         let table = self.table_map(rest);

@@ -1,16 +1,17 @@
 //! Effect of constants on a filter.
 //!
-//! The filter is linear: with constants at q instead of zero its mean would be `x + U q`, and its
-//! innovations `ν − G q` with the same covariance. U is propagated; whitened rows `[G ν]` are kept. They give the same
-//! estimate and covariance of q, and the same effect of q on every state, as a filter with q among its states, for any
-//! prior and any subset of q (Friedland 1969, "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control
-//! 14(4)), without the cost of that filter.
+//! The filter is linear: with constants at q instead of zero, its mean would be `x + U q`, and its innovations `ν − G
+//! q` with the same covariance. U is propagated; whitened rows `[G ν]` are kept. They give the same estimate and
+//! covariance of q, and the same effect of q on every state, as a filter with q among its states, for any prior and any
+//! subset of q (Friedland 1969, "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control 14(4)),
+//! without the cost of that filter.
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::calibration::constants::triangle;
 
-/// Quantities that are linear in the errors, a row each: coefficients of states, and of constants that are not states.
+/// Quantities that are linear in the errors, one row each: coefficients of states, and of constants that are not
+/// states.
 #[derive(Debug)]
 pub struct Linear {
     pub states: DMatrix<f64>,
@@ -43,7 +44,7 @@ pub struct Columns {
     pub of_states: DMatrix<f64>,
     /// Whitened rows `[G ν]`, in sequence …
     rows: Vec<f64>,
-    /// … and the count of these numbers that were read already.
+    /// … and the number of values already read.
     looked_at: usize,
     /// Sum of squares of the observations, independent of constants and states.
     pub squares: f64,
@@ -81,7 +82,7 @@ impl Columns {
         }
     }
 
-    /// The rows that were not read before.
+    /// The rows not yet read.
     pub fn new_rows(&mut self) -> DMatrix<f64> {
         let rows = self.matrix(&self.rows[self.looked_at..]);
         self.looked_at = self.rows.len();

@@ -41,8 +41,8 @@ impl<const M: usize, const G: usize> DwellFilters for GainCache<M, G> {
     }
 }
 
-/// The implementation for this filter, by its moving states: navigation errors, then turn at rest or the biases of a
-/// triad, then two of these, then all.
+/// The implementation for this filter, by its moving states: navigation errors; plus rotation at rest or the biases of
+/// a triad; plus two of these; plus all.
 pub fn dwell_filters(filter: &Filter) -> Box<dyn DwellFilters> {
     let moving = filter.moving().len();
     let begins = begins(moving);
@@ -109,7 +109,7 @@ impl Filter {
         Taken::Whole
     }
 
-    /// Runs a filter of a part alone through the whole part.
+    /// Runs the separate filter of a part through the whole part.
     fn through<const M: usize, const G: usize>(
         &self,
         dwell: &mut DwellFilter<M, G>,

@@ -1,11 +1,11 @@
-//! A filter of a part of a dwell alone.
+//! A separate filter for a part of a dwell.
 //!
-//! At rest, the parameters act through three constant rates and three constant specific forces. Given these and
-//! the navigation errors at the start, together `g`, only noise remains: a small filter of navigation errors that
-//! are known at its start removes it from each observation. The residuals of the observations are linear in `g`
-//! and white, so together they are one measurement of `g`, and the errors at the end are linear in `g`, too.
-//! Nothing is lost: it is the filter of all states with its steps in another order (Friedland 1969, "Treatment of
-//! bias in recursive filtering", IEEE Trans. Automatic Control 14(4)).
+//! At rest, the parameters act through three constant rates and three constant specific forces. Given these and the
+//! navigation errors at the start (together `g`), only noise remains, which a small filter of navigation errors with
+//! known start whitens in each observation. The residuals of the observations are linear in `g` and white, so together
+//! they are one measurement of `g`; the errors at the end are also linear in `g`. No information is lost: it is the
+//! filter of all states with its steps in a different order (Friedland 1969, "Treatment of bias in recursive
+//! filtering", IEEE Trans. Automatic Control 14(4)).
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -29,13 +29,13 @@ pub struct Observed {
 /// `g`.
 pub struct DwellFilter<'a, const M: usize, const G: usize> {
     gains: &'a mut GainCache<M, G>,
-    /// Its current point in the course.
+    /// Its current point in the sequence.
     at: usize,
     /// Mean m.
     mean: [f64; M],
     /// Sum of rows of `g` times their measured values.
     vector: [f64; G],
-    /// Of the observations, given `g = 0`: sum of squares, and logarithm of the determinant of the covariance.
+    /// Sum of squares of the observations given `g = 0`, and logarithm of the determinant of their covariance.
     squares: f64,
     log_determinant: f64,
     /// Prior of `g`; `None` if innovations are not requested.

@@ -1,9 +1,9 @@
 //! Cache of covariances and gains of filters of parts of dwells: they do not depend on the data.
 //!
-//! Covariance and gain of a Kalman filter depend on the sequence of steps and observations, not on the observed
-//! values, and can be computed in advance (Gelb, *Applied Optimal Estimation*, §4.2). At rest, they do not depend on
-//! the attitude either, because gravity and Earth rate are constant in East-North-Up. So most dwells repeat the
-//! course of the one before.
+//! Covariance and gain of a Kalman filter depend on the sequence of steps and observations, not on the observed values,
+//! and can be computed in advance (Gelb, *Applied Optimal Estimation*, §4.2). At rest, they do not depend on the
+//! attitude either, because gravity and Earth rate are constant in East-North-Up. So most dwells repeat the sequence of
+//! the previous one.
 
 use nalgebra::Matrix3;
 
@@ -20,18 +20,18 @@ pub struct StepModel<const M: usize> {
     pub driven: Vec<(usize, usize, f64)>,
 }
 
-/// The course of a part of a dwell, reused as far as the next one repeats it.
+/// The sequence of a part of a dwell, reused as far as the next one repeats it.
 pub struct GainCache<const M: usize, const G: usize> {
     pub models: Vec<StepModel<M>>,
     pub course: Vec<Point<M, G>>,
 }
 
-/// A point of a course.
+/// What is known after an event of a sequence.
 pub struct Point<const M: usize, const G: usize> {
     /// The event that led to it.
     event: Event,
     pub known: Known<M, G>,
-    /// Gain of the observation, if one led to it.
+    /// Gain, if the event was an observation.
     pub gain: Option<Gain<M, G>>,
 }
 
@@ -40,7 +40,7 @@ enum Event {
     Begin,
     /// A step of this model.
     Step(usize),
-    /// Three navigation errors from a state on are observed, each with this variance.
+    /// Three navigation errors are observed, starting at this state, each with this variance.
     Observed(usize, f64),
 }
 
@@ -111,7 +111,7 @@ impl<const M: usize, const G: usize> GainCache<M, G> {
         from + 1
     }
 
-    /// The point after an observation of three navigation errors from a state on, each with this variance; `None`
+    /// The point after an observation of three navigation errors, starting at `state`, each with this variance; `None`
     /// if their covariance is not positive definite.
     pub fn observe(&mut self, from: usize, state: usize, variance: f64) -> Option<usize> {
         let event = Event::Observed(state, variance);

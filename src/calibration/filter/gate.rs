@@ -6,10 +6,10 @@ use crate::calibration::{Innovation, Observation};
 
 /// After this many consecutive rejections, the gate suspects the first accepted observation instead.
 const REOPEN: usize = 5;
-/// Number of rejected observations after a single accepted one that discredit the latter: it alone had a wide
-/// innovation covariance, and two consecutive outliers are rarer than one.
+/// Number of rejected observations that discredit a preceding single accepted one: only that one had a wide innovation
+/// covariance, and two consecutive outliers are rarer than one.
 const BEHIND_THE_FIRST: usize = 2;
-/// Most observations of a dwell that are dropped because they closed the gate.
+/// Maximum number of observations per dwell dropped because they closed the gate.
 const MOST_CLOSING: usize = 3;
 
 /// Rule for the acceptance of observations in a pass.
@@ -19,7 +19,7 @@ pub enum Gate<'a> {
     Open,
     /// Accept observations whose innovations are not outliers.
     Innovations,
-    /// Accept as in another pass, in the same order; accept all beyond its end.
+    /// Accept as in a given pass, in the same order; accept all beyond its end.
     As(&'a [bool]),
 }
 
@@ -46,7 +46,7 @@ pub struct Judge<'a> {
 /// State of the gate in a dwell.
 #[derive(Debug, Clone, Default)]
 struct Dwell {
-    /// Number of dwells that have begun.
+    /// Number of dwells started.
     begun: usize,
     after_move: bool,
     /// Number of its first innovation.
@@ -68,7 +68,7 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Starts a dwell, after a move or not.
+    /// Starts a dwell, whether or not after a move.
     pub fn begin(&mut self, after_move: bool) {
         self.dwell = Dwell {
             begun: self.dwell.begun + 1,

@@ -1,4 +1,4 @@
-//! The Kalman filter of the moving and redrawn states. The effect of constants is propagated as columns.
+//! The Kalman filter of the moving and reset states. The effect of constants is propagated as columns.
 
 mod at_rest;
 mod columns;
@@ -37,18 +37,18 @@ pub struct Filter {
     noise: PerSensor<ProcessNoise>,
     /// 1σ and correlation time of each varying bias, by its state.
     varying: Vec<(usize, f64, f64)>,
-    /// Effect of the recording's own mounting on the parameters, if it has one.
+    /// Effect of the mounting of the recording on the parameters, if any.
     turned: Option<Turned>,
     /// Effect of the constants.
     pub columns: Columns,
-    /// Number of dwells that have begun.
+    /// Number of dwells started.
     dwells: usize,
 }
 
 /// Gap before a stretch.
 #[derive(Debug)]
 pub enum Since<'a> {
-    /// A lost time in the same recording, s.
+    /// Missing time in the same recording, s.
     Lost(f64),
     /// A new recording: its deviation at the linearisation point, and the effect of its mounting.
     Anew(&'a Difference, Option<&'a Turned>),
@@ -79,10 +79,10 @@ impl Filter {
         }
     }
 
-    /// Starts a stretch: navigation errors and the table's position are redrawn. In another recording, so are the
-    /// variation of biases (first-order Gauss–Markov: Brown and Hwang, *Introduction to Random Signals*, 4th ed., §3.8)
-    /// and the states of the recording; in the same recording, the biases have varied meanwhile. `gravity` is its 1σ
-    /// at another site.
+    /// Starts a stretch: navigation errors and the table position are reset. In another recording, so are the bias
+    /// variations (first-order Gauss–Markov: Brown and Hwang, *Introduction to Random Signals*, 4th ed., §3.8) and the
+    /// states of the recording; in the same recording, the biases vary during the gap. `gravity` is its 1σ at another
+    /// site.
     pub fn begin(&mut self, start: &Start, since: Since, gravity: Option<f64>) {
         let initial = self.layout.initial_attitude;
         let (still, level) = (Vector3::zeros(), (&start.attitude, &start.attitude_sigma));
@@ -118,12 +118,12 @@ impl Filter {
         }
     }
 
-    /// Redraws three states, with these means and 1σ of their errors.
+    /// Resets three states, with these means and 1σ of their errors.
     fn redraw_three(&mut self, first: usize, (mean, sigma): (&Vector3<f64>, &Vector3<f64>)) {
         (0..3).for_each(|axis| self.redraw(first + axis, mean[axis], sigma[axis]));
     }
 
-    /// Redraws a state: its new error is independent of all others.
+    /// Resets a state: its new error is independent of all others.
     fn redraw(&mut self, state: usize, mean: f64, sigma: f64) {
         self.x[state] = mean;
         self.columns.of_states.column_mut(state).fill(0.0);
@@ -132,12 +132,12 @@ impl Filter {
         self.p[(state, state)] = sigma.powi(2) * self.weight_of(state);
     }
 
-    /// Variance factor of the source that draws a state.
+    /// Variance factor of the source of a reset state.
     fn weight_of(&self, state: usize) -> f64 {
         self.model.weight(self.layout.sources[state])
     }
 
-    /// Redraws the position error of the table after it has left its position.
+    /// Resets the position error of the table after it has left its position.
     pub fn redraw_table(&mut self) {
         if let Some(table) = self.layout.table_position {
             let sigma = self.model.position_sigma;
@@ -145,7 +145,7 @@ impl Filter {
         }
     }
 
-    /// Redraws the velocity after a move by hand, which gives no information on it.
+    /// Resets the velocity after a hand move, which gives no information about it.
     pub fn redraw_velocity(&mut self, sigma: f64) {
         (VELOCITY..VELOCITY + 3).for_each(|state| self.redraw(state, 0.0, sigma));
     }
@@ -167,7 +167,7 @@ impl Filter {
         self.dwells == dwell + 1
     }
 
-    /// From now on the body does not turn: any change of the computed attitude is an error.
+    /// Marks the body as not rotating: any change of the computed attitude is an error.
     pub fn begin_to_hold(&mut self) {
         if let Some(turn) = self.layout.turn_at_rest {
             (turn..turn + 3).for_each(|state| self.redraw(state, 0.0, 0.0));

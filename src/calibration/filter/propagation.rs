@@ -37,16 +37,16 @@ impl Filter {
         self.vary(block.duration);
     }
 
-    /// The states that a move drives: navigation errors and the turn at rest, if it is a state.
+    /// The states that a move drives: navigation errors and the rotation at rest, if it is a state.
     pub fn moving_in_moves(&self) -> Vec<usize> {
         let turn = self.layout.turn_at_rest;
         let turn = turn.into_iter().flat_map(|turn| turn..turn + 3);
         (0..NAVIGATION).chain(turn).collect()
     }
 
-    /// Only the rows of Φ of the states that move differ from identity. Of `Φ P Φᵀ + Q` only their rows and
-    /// columns change. `transition` holds these rows, a column for each of the first states; `added` what
-    /// constants add, a row each.
+    /// Only the rows of Φ of the moving states differ from identity, so only their rows and columns of `Φ P Φᵀ + Q`
+    /// change. `transition` contains these rows, with a column for each of the first states; `added` contains the
+    /// effect of constants, one row each.
     pub fn carry(
         &mut self,
         moving: &[usize],
@@ -85,8 +85,8 @@ impl Filter {
         noise
     }
 
-    /// Covariance that a block adds to two of the states that move, given what it adds to navigation errors and its
-    /// duration: the turn has the noise of the attitude, and its own.
+    /// Covariance that a block adds to two moving states, given its addition to the navigation errors and its duration:
+    /// the rotation has the noise of the attitude plus its own.
     pub fn noise_of_moving(
         &self,
         (of_navigation, duration): (&ErrorMatrix, f64),
@@ -189,7 +189,7 @@ impl Filter {
     }
 }
 
-/// The navigation error that a moving state follows: the turn at rest follows the attitude.
+/// The navigation error that a moving state follows: the rotation at rest follows the attitude.
 pub fn own(place: usize) -> usize {
     match place.checked_sub(NAVIGATION) {
         Some(axis) => ATTITUDE + axis,
@@ -197,7 +197,7 @@ pub fn own(place: usize) -> usize {
     }
 }
 
-/// Effect of a state `k`, with this column of effects on the navigation errors, on a moving state; for the turn at
+/// Effect of a state `k`, with this column of effects on the navigation errors, on a moving state; for the rotation at
 /// rest, the change of the attitude error.
 pub fn of_moving(column: &[f64; NAVIGATION], row: usize, k: usize) -> f64 {
     column[own(row)] - f64::from(row >= NAVIGATION && own(row) == k)

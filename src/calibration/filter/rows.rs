@@ -1,8 +1,8 @@
-//! Rows of a few numbers, as many as the compiler knows.
+//! Short rows of numbers with a length known at compile time.
 
 use nalgebra::Matrix3;
 
-/// Products that are summed side by side.
+/// Number of products summed in parallel.
 const LANES: usize = 4;
 
 /// `sum += weight row`

@@ -8,7 +8,7 @@ use crate::calibration::POSITION;
 use crate::navigation::State;
 
 impl Filter {
-    /// This number of quantities that do not depend on any error.
+    /// This number of quantities, independent of all errors.
     pub fn none(&self, rows: usize) -> Linear {
         Linear {
             states: DMatrix::zeros(rows, self.x.len()),
@@ -16,7 +16,7 @@ impl Filter {
         }
     }
 
-    /// Updates with the site's position, `z = δp`, with this variance per axis.
+    /// Updates with the site position, `z = δp`, with this variance per axis.
     pub fn update_position(&mut self, computed: &State, variance: f64) {
         let mut h = self.none(3);
         (0..3).for_each(|axis| h.states[(axis, POSITION + axis)] = 1.0);

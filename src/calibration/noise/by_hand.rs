@@ -1,4 +1,4 @@
-//! Additional noise of turning and holding by hand, from the equations of a calibration by gravity alone.
+//! Additional noise of turning and holding by hand, from the equations of a calibration with gravity alone.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -21,9 +21,9 @@ pub type Parts = [DVector<f64>; BY_HAND.len()];
 
 /// Additional noise that makes the errors more likely than the stated noise.
 ///
-/// It is found by maximum likelihood, with the parameters integrated out with their prior. Residuals would not show it
-/// if there are hardly more equations than parameters: then the parameters explain any noise, with values that are
-/// unlikely under the prior.
+/// It is found by maximum likelihood, with the parameters integrated out with their prior. With few more equations than
+/// parameters, residuals would not show it, because parameter values that are unlikely under the prior can explain any
+/// noise.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ByHand {
     found: Vec<Found>,
@@ -32,8 +32,8 @@ pub struct ByHand {
 }
 
 impl ByHand {
-    /// Adds source after source as long as the improvement is significant, from the errors of the equations before the
-    /// data and their covariance due to prior and stated noise.
+    /// Adds sources one by one while the improvement is significant, from the prior errors of the equations and their
+    /// covariance due to prior and stated noise.
     pub fn likeliest(
         errors: &DVector<f64>,
         covariance: &DMatrix<f64>,
@@ -55,7 +55,7 @@ impl ByHand {
         limit(0, 1, FALSE_ALARM / BY_HAND.len() as f64)
     }
 
-    /// Whether the data support no source.
+    /// Whether no source is supported by the data.
     pub fn is_none(&self) -> bool {
         self.found.is_empty()
     }
@@ -118,7 +118,7 @@ fn add(covariance: &mut DMatrix<f64>, parts: &DVector<f64>, variance: f64) {
     }
 }
 
-/// The likelihood of errors under a covariance, and its slope by a variance that has these parts in them.
+/// The likelihood of errors under a covariance, and its slope with respect to a variance with these parts.
 fn of_errors(
     errors: &DVector<f64>,
     covariance: DMatrix<f64>,

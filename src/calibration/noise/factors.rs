@@ -18,7 +18,7 @@ pub type Factors = [f64; SOURCES];
 pub struct Scale {
     /// Reference variance of each source in SI and radians; zero if the run cannot have it.
     reference: [f64; SOURCES],
-    /// Whether a nonzero figure is stated, for each source that the run can have.
+    /// Whether a nonzero figure is stated, for each possible source of the run.
     pub stated: [bool; SOURCES],
     /// The factors of the problem without estimation.
     pub initial: Factors,
@@ -66,7 +66,7 @@ impl Scale {
         }
     }
 
-    /// The stated factors, and the reference for figures that are not stated.
+    /// The stated factors, or the reference for unstated figures.
     pub fn broad(&self) -> Factors {
         let mut broad = self.initial;
         for k in self.present() {
@@ -77,7 +77,7 @@ impl Scale {
         broad
     }
 
-    /// The sources that the run can have.
+    /// Possible sources of the run.
     pub fn present(&self) -> Vec<usize> {
         (0..SOURCES).filter(|&k| self.reference[k] > 0.0).collect()
     }

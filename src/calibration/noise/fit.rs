@@ -14,7 +14,7 @@ use crate::calibration::{CalibrationError, Gate, Innovation, PassResult, Problem
 
 /// Prior 1σ of ln σ of a stated figure: a factor of three.
 pub const LOG_SIGMA: f64 = 1.098_612_288_668_109_8;
-/// False-alarm rate of the screening by scores. The score of a variance is as skewed as χ², so it does not decide;
+/// False-alarm rate of the screening by scores. The score of a variance is as skewed as χ², so it is only a screening,
 /// but it needs no fit.
 const SCREEN: f64 = 0.05;
 /// Probability of keeping an absent source.
@@ -27,7 +27,7 @@ const NOTHING: f64 = 1e-3;
 pub const SETTLED: f64 = 0.1;
 /// Longest step of ln σ.
 const LONGEST: f64 = 1.5;
-/// A step is given up if it does not lower the cost even at this fraction.
+/// A step is abandoned if it does not lower the cost at this fraction.
 const SHORTEST: f64 = 0.01;
 /// Most steps.
 const STEPS: usize = 40;
@@ -41,8 +41,8 @@ pub struct Likelihood<'a> {
     pub accepted: Vec<bool>,
 }
 
-/// A point with gradient and expected information of −½ of the deviance, by ln σ of a factor that is
-/// above zero, else by its variance over its reference.
+/// A point with gradient and expected information of −½ of the deviance, with respect to ln σ of a positive factor, or
+/// to the variance over its reference.
 pub struct Slope {
     pub here: PassResult,
     pub score: DVector<f64>,
@@ -210,7 +210,8 @@ impl Likelihood<'_> {
         })
     }
 
-    /// The factors of largest posterior density of these sources, the others held, and −2 ln of the likelihood there.
+    /// The factors of largest posterior density of these sources, with the others fixed, and −2 ln of the likelihood
+    /// there.
     ///
     /// A variance that is zero and would become negative is kept at zero until the others have converged; then each is
     /// tested again.
@@ -306,8 +307,8 @@ impl Likelihood<'_> {
     }
 }
 
-/// Derivatives by a factor from two passes, for each accepted scalar: of ln of its variance, and of its normalised
-/// innovation.
+/// Derivatives with respect to a factor from two passes, for each accepted scalar: of ln of its variance, and of its
+/// normalised innovation.
 fn differences(here: &PassResult, there: &PassResult) -> Vec<(f64, f64)> {
     let scalars = |of: &Innovation| [0, 1, 2].map(|k| (of.whitened[k], of.sigma[k]));
     let here = here.let_in().flat_map(scalars);

@@ -17,8 +17,8 @@ const ROUNDS: usize = 6;
 /// Number of observations of three components for the first noise estimate: of 900 numbers, half determine σ of
 /// a white noise to 3 %.
 const ENOUGH: usize = 300;
-/// Most steps of a dwell between these observations: with longer intervals, white noise of velocity
-/// and attitude could not be distinguished from random walk.
+/// Maximum number of dwell steps between these observations: with longer intervals, white noise of velocity and
+/// attitude could not be distinguished from random walk.
 const LONGEST: usize = 10;
 /// 95 % quantile of the normal distribution, one-sided, in σ.
 const ONE_SIDED: f64 = 1.645;

@@ -1,4 +1,4 @@
-//! Noise estimated from a record, for figures of `run.toml` that the data contradict.
+//! Noise estimated from a recording, for figures of `run.toml` that the data contradict.
 //!
 //! A few sources of noise, each with one σ, are estimated by maximum likelihood with the stated values as prior. The
 //! filter integrates out parameters, attitudes and table errors, so this is the restricted likelihood

@@ -9,11 +9,11 @@ use serde::{Deserialize, Serialize};
 pub enum NoisePolicy {
     /// Use the noise that run.toml and models state
     Stated,
-    /// Use the stated noise; estimate it from the record if the two disagree (p < 0.001)
+    /// Use the stated noise; estimate it from the recording if the two disagree (p < 0.001)
     #[default]
     #[cfg_attr(feature = "cli", value(alias = "estimate"))]
     Auto,
-    /// Estimate the noise from the record, with the stated noise as prior
+    /// Estimate the noise from the recording, with the stated noise as prior
     Learnt,
 }
 

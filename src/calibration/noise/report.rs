@@ -1,4 +1,4 @@
-//! Report on the noise of a record.
+//! Report on the noise of a recording.
 
 use std::fmt;
 
@@ -21,7 +21,7 @@ pub struct NoiseReport {
     /// The test of the stated noise; `None` if nothing was tested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub test: Option<NoiseTest>,
-    /// Every source that the record can have.
+    /// Every possible source of the recording.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sources: Vec<SourceFigures>,
 }
@@ -48,7 +48,7 @@ pub struct SourceFigures {
     pub name: String,
     /// Unit of the figures.
     pub unit: String,
-    /// The stated value, or the one seen in dwells before the filter; `None` if there is neither.
+    /// The stated value, or the one measured in dwells before the filter; `None` if neither exists.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stated: Option<f64>,
     /// The value used.
@@ -80,11 +80,11 @@ impl fmt::Display for NoiseReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if !self.learnt {
             return match &self.test {
-                Some(_) => f.write_str("Noise as stated: the data do not contradict it."),
-                None => f.write_str("Noise as stated."),
+                Some(_) => f.write_str("Stated noise was used; the data agree with it."),
+                None => f.write_str("Stated noise was used."),
             };
         }
-        f.write_str("Noise learnt from the record:")?;
+        f.write_str("Noise estimated from the recording:")?;
         for (number, figures) in self.sources.iter().filter(|s| s.counts()).enumerate() {
             f.write_str(if number == 0 { " " } else { "; " })?;
             write!(f, "{figures}")?;
@@ -136,7 +136,7 @@ impl fmt::Display for SourceFigures {
     }
 }
 
-/// A unit of noise as tables have it, such as °/√h.
+/// A noise unit as in tables, such as °/√h.
 fn symbol(unit: &str) -> String {
     let marks = [
         ("deg", "°"),

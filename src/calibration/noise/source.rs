@@ -1,4 +1,4 @@
-//! The sources of noise: a row for each, and the place of its σ in the model.
+//! The sources of noise, one row each, and the position of its σ in the model.
 
 use serde::{Deserialize, Serialize};
 
@@ -59,13 +59,13 @@ sources! {
         "imu.noise" GYRO.random_walk, part of White(Gyro);
     VelocityRandomWalk, Accel, "velocity random walk" in "ug/sqrt(Hz)" = MICRO_G_PER_SQRT_HZ,
         "imu.noise" ACCEL.random_walk, part of White(Accel);
-    GyroMotion, Gyro, "attitude noise of moves by rate" in "sqrt(s)" = 1.0,
+    GyroMotion, Gyro, "attitude noise in moves, by rate" in "sqrt(s)" = 1.0,
         "imu.noise" (GYRO.by_motion, 1.0), part of Moves(Gyro);
-    AccelMotion, Accel, "velocity noise of moves by acceleration" in "sqrt(s)" = 1.0,
+    AccelMotion, Accel, "velocity noise in moves, by acceleration" in "sqrt(s)" = 1.0,
         "imu.noise" (ACCEL.by_motion, 1.0), part of Moves(Accel);
-    GyroMoving, Gyro, "attitude noise of moves by time" in "deg/sqrt(s)" = DEGREE,
+    GyroMoving, Gyro, "attitude noise in moves, by time" in "deg/sqrt(s)" = DEGREE,
         "imu.noise" GYRO.by_duration, part of Moves(Gyro);
-    AccelMoving, Accel, "velocity noise of moves by time" in "mm/s/sqrt(s)" = 1e-3,
+    AccelMoving, Accel, "velocity noise in moves, by time" in "mm/s/sqrt(s)" = 1e-3,
         "imu.noise" ACCEL.by_duration, part of Moves(Accel);
     Velocity, Accel, "velocity at standstill" in "mm/s" = 1e-3,
         "standstill" ("velocity_sigma_m_s", 1.0), part of VelocityAtRest;

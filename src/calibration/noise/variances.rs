@@ -1,4 +1,4 @@
-//! Components of variance that make errors likeliest, one after the other as long as the gain is significant.
+//! Maximum-likelihood variance components, added one by one while the gain is significant.
 
 /// Longest step of ln of a variance.
 const LONGEST: f64 = 3.0;
@@ -10,26 +10,26 @@ const STEPS: usize = 40;
 /// One component.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Found {
-    /// Its number among all that are tried.
+    /// Its number among all candidates.
     pub place: usize,
     pub variance: f64,
     /// 1σ of the logarithm of the variance.
     pub spread: f64,
 }
 
-/// The likelihood of errors with some components, and how it changes with one of them.
+/// The likelihood of errors with some components, and its slope with respect to one of them.
 #[derive(Debug, Clone, Copy)]
 pub struct Slope {
     /// −2 ln of the likelihood, up to a constant.
     pub deviance: f64,
-    /// Gradient of ln of the likelihood by the variance of that one.
+    /// Gradient of ln of the likelihood with respect to that variance.
     pub score: f64,
     /// Its expected information.
     pub information: f64,
 }
 
-/// Adds component after component, of this number, while −2 ln of the likelihood falls by more than a limit; also returns
-/// by how much it falls in all. `slope` evaluates the likelihood of some components, with its slope by one.
+/// Adds components (out of this number) one by one while −2 ln of the likelihood decreases by more than a limit; also
+/// returns the total decrease. `slope` evaluates the likelihood of some components, with its slope with respect to one.
 pub fn likeliest(
     count: usize,
     limit: f64,
@@ -60,7 +60,7 @@ pub fn likeliest(
 /// The last one starts from zero.
 ///
 /// Source: Fisher scoring of the likelihood of components of variance, Patterson and Thompson 1971, Biometrika 58(3);
-/// of one after the other.
+/// applied to one after the other.
 fn fitted(found: &mut [Found], slope: &impl Fn(&[Found], usize) -> Option<Slope>) -> Option<f64> {
     for step in 0..STEPS {
         let mut settled = step > 0;

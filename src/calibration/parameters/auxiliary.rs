@@ -13,7 +13,7 @@ pub const AUXILIARY: usize = TABLE_GEOMETRY + TERM_PARAMETERS;
 /// A vector of them: table (see [`crate::turntable::TableGeometry`]), then terms (see [`Term`]).
 pub type AuxiliaryVector = SVector<f64, AUXILIARY>;
 
-/// Index among the auxiliary parameters of the first of the table's axes.
+/// Index of the first table axis among the auxiliary parameters.
 pub const OF_AXES: usize = TABLE_GEOMETRY - AXIS_ERRORS;
 
 /// Kind of an auxiliary parameter.
@@ -115,8 +115,8 @@ impl Auxiliary {
             .into()
     }
 
-    /// Whether second order and asymmetry of an accelerometer are both estimated, although hardly more than
-    /// their sum is observed.
+    /// Whether second order and asymmetry of an accelerometer are both estimated, although little more than their sum
+    /// is observed.
     pub fn even_terms_inseparable(&self) -> bool {
         let first = |term: Term| TABLE_GEOMETRY + term.parameters().start;
         let (second, asymmetry) = (first(Term::AccelSecondOrder), first(Term::AccelAsymmetry));

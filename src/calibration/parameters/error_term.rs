@@ -12,15 +12,14 @@ pub enum ErrorTerm {
     GaussMarkovBias,
     /// Level and north of the table's base.
     TableBase,
-    /// Errors of the table's axes: tilts of those within the outermost, wobble, encoders.
+    /// Errors of the table axes: tilts of all except the outermost, wobble, encoders.
     TableAxes(AxisError),
     /// A term of the instrument's error model.
     Instrument(Term),
 }
 
 impl ErrorTerm {
-    /// Every error term. Of two that explain a record equally well, the first in this order is
-    /// the more common.
+    /// Every error term. If two explain a recording equally well, the first in this order is more common.
     pub const ALL: [Self; 5 + Term::ALL.len()] = {
         let mut all = [Self::GaussMarkovBias; 5 + Term::ALL.len()];
         (all[1], all[2]) = (Self::TableBase, Self::TableAxes(AxisError::Tilt));

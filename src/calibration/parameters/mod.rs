@@ -19,7 +19,7 @@ pub type ParameterVector = SVector<f64, PARAMETERS>;
 /// A matrix of the parameters of both triads.
 pub type ParameterMatrix = SMatrix<f64, PARAMETERS, PARAMETERS>;
 
-/// Index of a triad's parameter among the parameters of both.
+/// Index of a parameter of a triad among the parameters of both.
 pub fn parameter(sensor: Sensor, of_triad: usize) -> usize {
     match sensor {
         Sensor::Gyro => of_triad,
@@ -27,7 +27,7 @@ pub fn parameter(sensor: Sensor, of_triad: usize) -> usize {
     }
 }
 
-/// The triad and the parameter of it at an index among the parameters of both.
+/// The triad and its parameter at an index among the parameters of both.
 pub fn sensor_and_parameter(index: usize) -> (Sensor, usize) {
     if index < PER_TRIAD {
         (Sensor::Gyro, index)
@@ -73,7 +73,7 @@ pub fn factor(nominal: &PerSensor<Nominal>, index: usize) -> f64 {
     nominal.get(sensor).factor(of_triad)
 }
 
-/// A parameter counts as observed if less than this part of its prior σ remains.
+/// A parameter counts as observed if less than this fraction of its prior σ remains.
 pub const OBSERVED_BELOW: f64 = 0.5;
 
 /// The same triads in the general form.

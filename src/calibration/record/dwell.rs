@@ -1,4 +1,4 @@
-//! A part of a dwell: its error models, steps, and what is observed of them.
+//! A part of a dwell: error models, steps and observations.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -11,28 +11,28 @@ use crate::calibration::{Observation, Problem, Stretch};
 use crate::navigation::{Block, Navigator, State};
 use crate::turntable::AxisResponse;
 
-/// Steps of a dwell that are taken in at once, of the length of its first: 10 s of them, in which a body that is
-/// held by hand keeps its attitude, too.
+/// Dwell steps processed at once, of the length of the first: 10 s, during which even a hand-held body keeps its
+/// attitude.
 const STEPS: usize = 100;
 
 /// A part of a dwell, modelled with one constant attitude.
 #[derive(Debug, Clone)]
 pub struct Rest {
-    /// Whether it is the dwell's first and its last.
+    /// Whether it is the first and the last part of the dwell.
     pub first: bool,
     pub last: bool,
-    /// Whether the body was elsewhere before.
+    /// Whether the body moved before it.
     pub new_position: bool,
-    /// State that was computed until it begins …
+    /// Computed state before its start …
     pub from: State,
-    /// … and the one where the pass linearises.
+    /// … and the linearisation state.
     pub begin: State,
-    /// How the table's attitude turns with errors of its axes, where their angles are known.
+    /// Rotation of the table attitude per axis error, if the angles are known.
     pub axes: Option<Arc<AxisResponse>>,
-    /// Error models of its steps; one for all that are alike.
+    /// Error models of its steps; equal steps share one.
     pub models: Vec<Block>,
     pub steps: Vec<Standing>,
-    /// What is observed, one step after the other.
+    /// Observations, step by step.
     pub seen: Vec<Seen>,
 }
 
@@ -41,26 +41,25 @@ pub struct Rest {
 pub struct Standing {
     /// When it ends, s.
     pub time: f64,
-    /// Which of the part's models is its own.
+    /// Index of its model in the part.
     pub model: usize,
-    /// By how much errors of attitude, velocity and position become more before it, since they are referred to
-    /// another computed state.
+    /// Change of the errors of attitude, velocity and position before it, because they refer to another computed state.
     pub referred: [Vector3<f64>; 3],
-    /// Which of the part's observations are of its end.
+    /// Indices of the observations at its end.
     pub seen: Range<usize>,
 }
 
-/// An observation of three components, alike in their variance.
+/// An observation of three components with equal variance.
 #[derive(Debug, Clone, Copy)]
 pub struct Seen {
     pub kind: Observation,
     /// Computed − observed, East-North-Up.
     pub residual: Vector3<f64>,
-    /// Of how many readings it is the mean.
+    /// Number of averaged readings.
     pub readings: usize,
 }
 
-/// How many of these steps, the first of which is in a dwell, make a part of it of at most this many samples.
+/// Number of these steps, the first of which is in a dwell, that form a part of at most this many samples.
 pub fn part_of(steps: &[Step], longest: usize) -> usize {
     let end = steps.first().map_or(0, |step| step.samples.start + longest);
     let belongs = |step: &&Step| {
@@ -71,14 +70,14 @@ pub fn part_of(steps: &[Step], longest: usize) -> usize {
     1 + others.take_while(belongs).count()
 }
 
-/// Samples that a part has at most of a dwell with this first step.
+/// Maximum number of samples of a part of a dwell with this first step.
 pub fn longest(first: &Step) -> usize {
     STEPS * first.samples.len()
 }
 
 impl Rest {
-    /// Navigates through these steps from where the navigator is. Each step begins at the same state of rest, and what
-    /// the step before led to is referred to it; `held` is the attitude that was computed when the body came to rest.
+    /// Navigates through these steps from the current state. Each step starts from the same state at rest, to which the
+    /// result of the previous step is referred; `held` is the attitude computed when the body came to rest.
     pub fn navigate(
         navigator: &mut Navigator,
         (problem, stretch): (&Problem, &Stretch),
@@ -170,8 +169,8 @@ impl Seen {
     }
 }
 
-/// The number of the model of a step of this many samples, some of which may be interpolated; `made` where no other step
-/// is like it: anew, or after one that differs by its interpolated samples alone.
+/// Index of the model of a step with this many samples, some of which may be interpolated. If no other step is equal,
+/// the model is made: anew, or from one that differs only in interpolated samples.
 fn model_of(
     models: &mut Vec<(usize, bool, Block)>,
     (length, bridged): (usize, bool),
@@ -186,15 +185,15 @@ fn model_of(
     })
 }
 
-/// The samples of steps that follow one another.
+/// The samples of successive steps.
 pub fn samples_of(steps: &[Step]) -> Range<usize> {
     let ends = steps.first().zip(steps.last());
     ends.map_or(0..0, |(first, last)| first.samples.start..last.samples.end)
 }
 
-/// Change of the errors of attitude, velocity and position when they are referred to another computed state of
-/// the same moment. It is of first order, as everything in a pass: the filter stays linear, and its result does
-/// not depend on the order of observations.
+/// Change of the errors of attitude, velocity and position when they are referred to another computed state of the same
+/// moment. It is of first order, like everything in a pass, so the filter stays linear and its result does not depend
+/// on the order of observations.
 pub fn between(from: &State, to: &State) -> [Vector3<f64>; 3] {
     [
         to_tilt_and_heading(&(from.attitude * to.attitude.transpose())),

@@ -46,8 +46,8 @@ pub struct WholeDwell {
 
 /// Length of a step, s: covariance is propagated and observations are taken at 10 Hz.
 const STEP: f64 = 0.1;
-/// Longest step of a packed record, in such steps, once a dwell has lasted as long: by then, observations are
-/// limited by random walk, not by their own noise.
+/// Longest step of a packed recording, in such steps, after a dwell of equal length: by then, observations are limited
+/// by random walk, not by their own noise.
 const STEPS_OF_PACKED: usize = 10;
 
 /// The steps from the start of the first dwell to the end of the last, without a gap; in dwells, `together`
@@ -112,8 +112,7 @@ pub fn steps(run: &Run, table: Option<&TableLog>, dwells: &[Dwell], together: us
 }
 
 impl AtRest {
-    /// Linearisation point while the table is at rest: the table's mean attitude, else the computed attitude,
-    /// levelled.
+    /// Linearisation point while the table is at rest: its mean attitude, otherwise the computed attitude, levelled.
     ///
     /// Both are within arc seconds of the truth in every pass, so the noise accumulated over a long
     /// record never leaves the linear range, and a tilt due to noise does not change the effect of a wrong
@@ -147,8 +146,8 @@ pub fn cut(range: Range<usize>, length: usize) -> impl Iterator<Item = Range<usi
     begins.map(move |begin| begin..(begin + length).min(end))
 }
 
-/// Cuts a range into parts of the first length, then into ever longer ones, each as long as all before it, up
-/// to the second; `together` parts are combined into one.
+/// Cuts a range into parts of the first length, then into increasing ones, each as long as all previous parts together,
+/// up to the second length; `together` parts are combined into one.
 fn growing(
     range: Range<usize>,
     (length, longest): (usize, usize),

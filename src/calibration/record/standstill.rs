@@ -15,8 +15,8 @@ pub const FLOOR: PerSensor<f64> = PerSensor {
 /// Least significant excess, in its standard errors.
 const SIGNIFICANT: f64 = 3.0;
 
-/// White 1σ, at standstill, of the integral of each triad's output, in excess of random walk and pulses: attitude
-/// in rad, velocity in m/s. As stated in the run, else estimated from its dwells.
+/// White 1σ, at standstill, of the integral of each triad's output, in excess of random walk and pulses: attitude in
+/// rad, velocity in m/s. Stated in the run, or otherwise estimated from its dwells.
 pub fn standstill_sigma(run: &Run, dwells: &[Dwell]) -> PerSensor<f64> {
     PerSensor::from_fn(|sensor| {
         let floor = *FLOOR.get(sensor);

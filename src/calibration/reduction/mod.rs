@@ -1,6 +1,6 @@
-//! Information of a record on the constants, at one linearisation point and with given noise.
+//! Information of a recording about the constants, at one linearisation point and with given noise.
 //!
-//! The Kalman filter has the moving and the redrawn states; constants are columns that it propagates (see
+//! The Kalman filter has the moving and the reset states; constants are columns that it propagates (see
 //! [`super::filter::columns`]). Each dwell gives whitened rows `[G ν]` with `ν = G c + noise of σ 1`: with a prior,
 //! they give the estimate of any subset of the constants, without another pass.
 
@@ -30,7 +30,7 @@ pub struct Reduction {
     pub log_determinant: f64,
     /// Initial attitude of each stretch.
     pub attitudes: Vec<Smoothed>,
-    /// States that belong to one recording only, for each recording; empty if there are none.
+    /// States that belong to a single recording, for each recording; empty if none.
     pub own: Vec<Smoothed>,
     /// Gravity at the last site, if there are several.
     pub gravity: Option<Smoothed>,
@@ -234,7 +234,7 @@ impl Smoothed {
         )
     }
 
-    /// Covariance with the constants, a row each.
+    /// Covariance with the constants, one row each.
     pub fn with_constants(&self, posterior: &Posterior) -> DMatrix<f64> {
         &posterior.covariance * self.by_constants.transpose()
     }

@@ -1,5 +1,5 @@
-//! Events of a record at one linearisation point: navigation runs once, the filter runs for every trial of noise or of
-//! a variance.
+//! Events of a recording at one linearisation point: navigation runs once, and the filter runs for every trial of noise
+//! or of a variance.
 
 use super::{Part, Smoothed, folded};
 use crate::calibration::filter::{DwellFilters, Filter, Gate, Judge, Since, Taken, dwell_filters};
@@ -23,7 +23,7 @@ pub struct Script<'a> {
     events: Vec<Vec<Event>>,
 }
 
-/// Quantities with which the noise of moves grows, over all moves.
+/// Quantities that scale the noise in moves, over all moves.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Moves {
     /// Duration, s.
@@ -59,7 +59,7 @@ impl<'a> Script<'a> {
         })
     }
 
-    /// Quantities with which the noise of moves grows.
+    /// Quantities that scale the noise in moves.
     pub fn moves(&self) -> Moves {
         let mut moves = Moves::default();
         for event in self.events.iter().flatten() {
@@ -75,7 +75,7 @@ impl<'a> Script<'a> {
         moves
     }
 
-    /// Information of the record on the constants, without innovations. `accepted` flags each observation of
+    /// Information of the recording about the constants, without innovations. `accepted` flags each observation of
     /// three components; those beyond its end are accepted.
     pub fn reduce(
         &self,
@@ -86,7 +86,7 @@ impl<'a> Script<'a> {
         self.follow(problem, &mut judge, Keeping::Parts)
     }
 
-    /// The same in one triangle, if no dwell is evaluated separately: memory does not grow with the record.
+    /// The same as one triangle, if no dwell is evaluated separately; memory does not grow with the recording.
     pub fn fold(
         &self,
         problem: &Problem,
@@ -97,7 +97,7 @@ impl<'a> Script<'a> {
         Ok(reduction.folded())
     }
 
-    /// Runs a filter through the record, with or without innovations.
+    /// Runs a filter over the recording, with or without innovations.
     pub fn follow(
         &self,
         problem: &Problem,
@@ -143,7 +143,7 @@ impl<'a> Script<'a> {
         })
     }
 
-    /// Starts a stretch after another: states of another recording or site are redrawn.
+    /// Starts a stretch after another: states of another recording or site are reset.
     fn begin(
         &self,
         filter: &mut Filter,
@@ -165,21 +165,21 @@ impl<'a> Script<'a> {
     }
 }
 
-/// Rows are folded when there are this many times as many as columns.
+/// Rows are reduced when they are this many times as many as columns.
 const FOLDED: usize = 4;
 
-/// What a filter keeps on its way.
+/// Data stored by a filter during a pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Keeping {
     /// The rows of each part of a dwell.
     Parts,
-    /// The same, and current information on the constants for innovations.
+    /// The same, plus current information about the constants for innovations.
     Innovations,
     /// One triangle.
     Folded,
 }
 
-/// A filter on its way through a record.
+/// A filter during a pass.
 struct Follower {
     filter: Filter,
     dwells: Box<dyn DwellFilters>,

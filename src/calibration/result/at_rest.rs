@@ -22,11 +22,11 @@ use crate::run::Run;
 
 /// Blocks that are left out in turn: every other one.
 const BLOCK: f64 = 100.0;
-/// Temperatures within this of each other are the same where heating and cooling are compared, K.
+/// Temperatures within this difference count as equal when heating and cooling are compared, K.
 const SAME: f64 = 2.0;
-/// Slower than this part of the largest rate a temperature neither rises nor falls.
+/// Below this fraction of the largest rate, a temperature counts as constant.
 const CHANGES: f64 = 0.1;
-/// Least seconds for each coefficient.
+/// Minimum number of seconds per coefficient.
 const SECONDS_EACH: usize = 10;
 
 /// Outputs at rest against temperature.
@@ -155,7 +155,7 @@ impl AtRest {
         }
     }
 
-    /// Findings on parameters that the record does not show.
+    /// Findings on parameters that the recording does not determine.
     pub fn findings(&self, estimate: &Estimate) -> Vec<Finding> {
         let names = |which: &dyn Fn(Sensor, bool) -> bool| -> Vec<String> {
             let is = |&index: &usize| {
@@ -166,7 +166,7 @@ impl AtRest {
             let of = (0..PARAMETERS).filter(is);
             of.filter_map(|index| parameter_name(form, index)).collect()
         };
-        let by = "an instrument that stands in one attitude";
+        let by = "an instrument at rest in one attitude";
         let hidden = names(&|sensor, is_bias| !is_bias || sensor == Sensor::Accel);
         let turned = names(&|_, is_bias| !is_bias);
         let findings = [not_observed(by, hidden), temperature_not_seen(turned)];
@@ -242,8 +242,8 @@ impl AxisAtRest {
         })
     }
 
-    /// Change of the output between the reference and a constant temperature in °C, and the 1σ of the
-    /// curve and of a second about the curve.
+    /// Change of the output from the reference to a constant temperature in °C, and the 1σ of the curve and of
+    /// one-second means about it.
     pub fn at(&self, range: &ThermalRange, temperature: f64) -> (f64, f64) {
         let row = row(range, &self.functions, temperature, 0.0);
         let variance = row.dot(&(&self.covariance * &row));
@@ -281,7 +281,7 @@ struct Curve<'a> {
 }
 
 impl<'a> Curve<'a> {
-    /// By least squares; `None` where the seconds do not determine it.
+    /// Least-squares fit; `None` if the data do not determine it.
     fn fit<'s>(
         range: &'a ThermalRange,
         functions: &'a [usize],
@@ -307,7 +307,7 @@ impl<'a> Curve<'a> {
         row(self.range, self.functions, temperature, rate).dot(&self.solution)
     }
 
-    /// Cooling minus heating where both passed the same temperature: of the residuals without its rate.
+    /// Cooling minus heating at temperatures passed in both directions, from the residuals without the rate term.
     fn hysteresis(&self, seconds: &[Second]) -> Vec<(f64, f64)> {
         let range = self.range;
         let limit = CHANGES * range.largest_rate;
@@ -329,7 +329,7 @@ impl<'a> Curve<'a> {
     }
 }
 
-/// RMS of every other block by a fit to the others.
+/// RMS of alternate blocks from a fit to the others.
 fn cross_validated(range: &ThermalRange, seconds: &[Second], functions: &[usize]) -> Option<f64> {
     let block = (BLOCK / TEMPERATURE_SPACING) as usize;
     let mut off = Vec::new();

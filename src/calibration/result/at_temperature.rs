@@ -13,7 +13,7 @@ use crate::calibration::{
 };
 use crate::imu::{Nominal, PerSensor, Sensor, ThermalModel, ThermalState};
 
-/// Of triads that stay in the file's quantity.
+/// Converts triads that stay in the quantity of the file.
 const ONE: PerSensor<Nominal> = PerSensor {
     gyro: Nominal(Vector3::new(1.0, 1.0, 1.0)),
     accel: Nominal(Vector3::new(1.0, 1.0, 1.0)),
@@ -24,11 +24,11 @@ const ONE: PerSensor<Nominal> = PerSensor {
 pub enum TemperatureError {
     /// The temperature is out of range.
     #[error(
-        "{found} °C, expected {lowest} to {highest} °C: outside that the polynomials of the {} are not known; \
-         calibrate at temperatures that reach there", .sensor.name()
+        "{found} °C is outside {lowest} to {highest} °C, where the polynomials of the {} are valid. Calibrate over a \
+         range that includes it", .sensor.name()
     )]
     Outside {
-        /// Which triad.
+        /// The triad.
         sensor: Sensor,
         /// The temperature.
         found: f64,
@@ -39,7 +39,7 @@ pub enum TemperatureError {
     },
     /// A coefficient of an unknown parameter, or of an invalid order.
     #[error(
-        "`{0}` in temperature.coefficients is not a parameter with a polynomial of order 1 to 5; correct the file"
+        "`{0}` in temperature.coefficients is not a parameter with a polynomial of order 1 to 5. Correct the file"
     )]
     Unknown(String),
 }
@@ -71,7 +71,7 @@ impl Calibration {
     /// The same for these values of the functions of temperature.
     ///
     /// # Errors
-    /// If coefficients are of no parameter.
+    /// If a coefficient belongs to no parameter.
     pub fn in_state(&self, state: &ThermalState) -> Result<Self, TemperatureError> {
         let Some(thermal) = self.thermal(&ONE)? else {
             return Ok(self.clone());
@@ -107,8 +107,8 @@ impl Calibration {
         })
     }
 
-    /// Covariance of its parameters, normalised by nominal scales: by its σ alone where it gives no correlations, zero
-    /// where it claims nothing. `None` where it is not of the parameters that it names.
+    /// Covariance of its parameters, normalised by nominal scales: from σ alone if correlations are missing, zero if
+    /// neither is stated. `None` if it does not match the named parameters.
     pub(crate) fn covariance_by(&self, nominal: &PerSensor<Nominal>) -> Option<ParameterMatrix> {
         let form = self.installation_form.unwrap_or_default();
         let factor = |index| factor(nominal, index);
@@ -139,10 +139,10 @@ impl Calibration {
         Some(covariance)
     }
 
-    /// How its parameters change with temperature, normalised by nominal scales; `None` if they do not.
+    /// Temperature dependence of its parameters, normalised by nominal scales; `None` if constant.
     ///
     /// # Errors
-    /// If coefficients are of no parameter.
+    /// If a coefficient belongs to no parameter.
     pub(crate) fn thermal(
         &self,
         nominal: &PerSensor<Nominal>,

@@ -22,9 +22,9 @@ pub struct Named<'a> {
 pub struct Comparison {
     /// The common frame: of the accelerometers if any record is in theirs.
     pub body_frame: BodyFrame,
-    /// The reference's scale factors in the file's quantity, by which all are normalised.
+    /// Scale factors of the reference in the quantity of the file, by which all are normalised.
     pub nominal: PerSensor<Nominal>,
-    /// The scale factors that the instrument should have, in the file's quantity, where a record states them.
+    /// Nominal scale factors of the instrument, in the quantity of the file, if a record states them.
     pub stated_nominal: Option<PerSensor<[f64; 3]>>,
     /// The truth, or the first calibration.
     pub reference: Canonical,
@@ -34,7 +34,7 @@ pub struct Comparison {
     pub parameters: Vec<usize>,
     /// Every calibration except the reference, in the given order.
     pub sides: Vec<Side>,
-    /// Scatter of all calibrations, from three on.
+    /// Scatter of all calibrations, if at least three.
     pub scatter: Option<Scatter>,
 }
 
@@ -45,15 +45,15 @@ impl Comparison {
         std::iter::once(&self.reference).chain(sides)
     }
 
-    /// The reference's scale factor in the file's quantity; `None` for other parameters.
+    /// Scale factor of the reference in the quantity of the file; `None` for other parameters.
     pub fn scale_factor(&self, parameter: usize) -> Option<f64> {
         let (sensor, of_triad) = sensor_and_parameter(parameter);
         (Triad::kind(of_triad) == ParameterKind::Scale)
             .then(|| self.nominal.get(sensor).factor(of_triad))
     }
 
-    /// The departure of the reference's scale factor from what it should be; none for other parameters, or where nothing
-    /// states that.
+    /// Deviation of the scale factor of the reference from nominal; none for other parameters, or if no nominal value
+    /// is stated.
     pub fn departure(&self, parameter: usize) -> Option<f64> {
         let (sensor, axis) = sensor_and_parameter(parameter);
         let nominal = self.stated_nominal.as_ref()?.get(sensor).get(axis)?;
@@ -153,7 +153,7 @@ pub fn compare(
     })
 }
 
-/// Records that state no unit are taken to have that of the others.
+/// Records without a unit are assumed to have that of the others.
 fn same_units(all: &[Named]) -> Result<(), ComparisonError> {
     for sensor in Sensor::ALL {
         let mut stated = all.iter().filter_map(|n| {

@@ -39,14 +39,13 @@ pub struct Calibrated {
     pub in_range: bool,
 }
 
-/// Scale factors of one instrument are within this factor of its nominal ones.
+/// Largest ratio between scale factors of an instrument and their nominal values.
 const SCALE_FACTOR: f64 = 2.0;
 
-/// Axes that span less than this of a cube do not span the space.
+/// Axes whose volume is below this fraction of a cube do not span the space.
 const SMALLEST_VOLUME: f64 = 1e-6;
 
-/// A term changes what it responds to itself by a hundredth at most, so three rounds leave a
-/// millionth of it.
+/// A term changes its own input by at most a hundredth, so three iterations leave a millionth.
 const ROUNDS: usize = 3;
 
 /// Errors in applying a calibration.
@@ -54,23 +53,23 @@ const ROUNDS: usize = 3;
 pub enum CorrectionError {
     /// The matrix has no inverse.
     #[error(
-        "the sensitivity matrix scale * installation of the {} has no inverse, for its axes lie in one \
-         plane; correct scale and installation in the calibration, or calibrate again", .0.name()
+        "the sensitivity matrix scale * installation of the {} has no inverse because its axes lie in one plane. \
+         Correct scale and installation in the calibration, or calibrate again", .0.name()
     )]
     Singular(Sensor),
     /// An unknown constant.
     #[error(
-        "`{0}` in terms is no parameter of a known term; calibrate again with this version, or remove \
-         the entry if it should have no effect"
+        "`{0}` in terms is not a parameter of a known error term. Calibrate again with this version, or remove the \
+         entry to ignore it"
     )]
     UnknownTerm(String),
     /// The unit differs from that of the run.
     #[error(
-        "the calibration is for {} output in `{calibration}`, the run's is in `{run}`; give the \
-         calibration of this instrument, or correct {}_unit in run.toml", .sensor.name(), .sensor.name()
+        "the calibration is for {} output in `{calibration}`, but the run uses `{run}`. Give the calibration of this \
+         instrument, or correct {}_unit in run.toml", .sensor.name(), .sensor.name()
     )]
     Unit {
-        /// Which triad.
+        /// The triad.
         sensor: Sensor,
         /// Unit of the calibration.
         calibration: String,
@@ -79,16 +78,16 @@ pub enum CorrectionError {
     },
     /// The scale differs from that of the run.
     #[error(
-        "{} {axis}: the calibration has {calibration:.6e} for one {}, the run's nominal scale is \
-         {run:.6e}; they must agree within a factor of two and in sign. Give the calibration of this \
+        "{} {axis}: the calibration has {calibration:.6e} per {}, but the nominal scale of the run is {run:.6e}. \
+         They must have the same sign and agree within a factor of two. Give the calibration of this \
          instrument, or correct scale in [imu.prior.{0}], output or body_axes in run.toml",
         .sensor.name(),
         match .sensor { Sensor::Gyro => "rad/s", Sensor::Accel => "m/s²" }
     )]
     Scale {
-        /// Which triad.
+        /// The triad.
         sensor: Sensor,
-        /// Which axis.
+        /// The axis.
         axis: char,
         /// Diagonal of `K C`, in the file's quantity per second.
         calibration: f64,
@@ -214,8 +213,8 @@ impl Correction {
         self.changing.is_some()
     }
 
-    /// The same at the temperature of a run at a time in s, and whether it holds there. Where the run has none, or a
-    /// triad would be singular there, it is that of the reference temperature.
+    /// The same at the temperature of a run at a time in s, and whether it is valid there. Without a temperature, or if
+    /// a triad would be singular, the reference temperature is used.
     fn at(&self, run: &Run, time: f64) -> (Self, bool) {
         let temperature = run.recording.imu.temperature.as_ref();
         let known = self

@@ -62,7 +62,7 @@ pub struct Calibration {
     pub gyro: TriadRecord,
     /// The accelerometers.
     pub accel: TriadRecord,
-    /// The file's quantity, such as `count`.
+    /// Quantity of the file, such as `count`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<PerSensor<String>>,
     /// 1σ of every value, zero if fixed.
@@ -186,7 +186,7 @@ pub struct NoiseRecord {
     pub run_toml: Option<String>,
 }
 
-/// A value of this kind, or none.
+/// A value of this kind, if any.
 fn if_known<'de, T: DeserializeOwned, D: Deserializer<'de>>(
     from: D,
 ) -> Result<Option<T>, D::Error> {
@@ -209,7 +209,7 @@ pub struct TermRecord {
 pub struct GravityRecord {
     /// Its magnitude.
     pub m_s2: f64,
-    /// 1σ, which the scale factors of all three accelerometers share.
+    /// 1σ, common to the scale factors of all three accelerometers.
     pub sigma_m_s2: f64,
 }
 
@@ -220,7 +220,7 @@ pub struct GravityRecord {
 pub enum Method {
     /// Extended Kalman filter over the whole run
     Ekf,
-    /// Closed form: from the table's positions, else from labelled sections, else from gravity
+    /// Closed form from table positions, otherwise from labelled sections, otherwise from gravity
     SixPosition,
 }
 
@@ -271,14 +271,13 @@ pub struct BlockRecord {
     pub block: String,
     /// Whether it was on; if not, it was tested with its usual σ.
     pub on: bool,
-    /// σ with the block over σ without it, of gyro K, E, D and accel K, E, D; `None` if there is
-    /// no σ.
+    /// σ with the term divided by σ without it, of gyro K, E, D and accel K, E, D; `None` if there is no σ.
     pub sigma_factors: [Option<f64>; 6],
     /// Decrease of the cost, −2 ln of likelihood and prior, with it.
     pub merit_gain: f64,
     /// Its limit at this term's share of the false-alarm rate.
     pub merit_gain_limit: f64,
-    /// Whether the gain exceeds its limit, so that the data support the block.
+    /// Whether the gain exceeds its limit, so that the data support the term.
     pub asked_for: bool,
     /// NIS of all observations without it …
     pub nis_without: f64,
@@ -297,8 +296,7 @@ pub struct TestVector {
 
 /// `calibration["gyro.bias.x"]`: a parameter by name, in the file's quantity, as [`Calibration::get`].
 ///
-/// # Panics
-/// As a map does, if there is no parameter of that name; `get` does not.
+/// # Panics Like a map, if there is no parameter with that name; `get` does not panic.
 impl Index<&str> for Calibration {
     type Output = f64;
 
@@ -375,8 +373,8 @@ impl TriadRecord {
         Matrix3::from_fn(|i, j| self.scale[i] * self.installation[i][j])
     }
 
-    /// The triad, normalised by nominal scales and split in a form. A record may hold any installation matrix, so
-    /// the split goes through `K C`, which all forms share.
+    /// The triad, normalised by nominal scales and split in a form. A record may contain any installation matrix, so
+    /// the split uses `K C`, which is common to all forms.
     pub fn triad(&self, nominal: &Nominal, form: InstallationForm) -> Triad {
         let sensitivity = self.normalised(nominal);
         let bias = Vector3::from(self.bias).component_div(&nominal.0);

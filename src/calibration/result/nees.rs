@@ -85,7 +85,7 @@ impl Directions {
             .collect()
     }
 
-    /// The inverse of the covariance; `None` where it has no inverse.
+    /// The inverse of the covariance; `None` if singular.
     pub fn information(&self) -> Option<DMatrix<f64>> {
         if self.eigenvalues.iter().any(|&v| v <= NO_DIRECTION) {
             return None;

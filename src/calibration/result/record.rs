@@ -94,7 +94,7 @@ impl Outcome {
 }
 
 impl Calibration {
-    /// With what each source adds to its uncertainty.
+    /// Adds the uncertainty budget.
     pub(in crate::calibration) fn take_budget(
         &mut self,
         run: &Run,

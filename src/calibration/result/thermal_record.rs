@@ -100,7 +100,7 @@ impl CoefficientRecord {
         })
     }
 
-    /// What it is of in a form; `None` where there is no such parameter or function.
+    /// Its parameter and function in a form; `None` if it does not exist.
     pub(super) fn coefficient(&self, form: InstallationForm) -> Option<Coefficient> {
         let function = match self.order {
             None => RATE,

@@ -14,7 +14,7 @@ use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
 /// Fewest recordings that distinguish a difference from a temperature dependence.
 const FEWEST: usize = 3;
-/// Least remaining part of the prior variance of a direction; below it, rounding dominates.
+/// Minimum remaining fraction of the prior variance of a direction; below it, rounding dominates.
 const LEAST_LEFT: f64 = 1e-12;
 /// The estimated σ of differences between recordings, if they differ by more than stated, and the finding on it.
 ///
@@ -54,7 +54,7 @@ pub fn learnt(model: &Model, alone: &[SeparateEstimate]) -> Option<(DayToDay, Fi
 struct RecordingEvidence {
     /// Values, each with an error of 1σ …
     values: DVector<f64>,
-    /// … of its own parameters, in prior σ: a row for each value …
+    /// … coefficients of the recording's parameters, in prior σ: one row per value …
     by_own: DMatrix<f64>,
     /// … and of the common parameters.
     by_common: DMatrix<f64>,
@@ -73,8 +73,8 @@ struct RecordingsEvidence {
 }
 
 impl RecordingEvidence {
-    /// Where `common` takes what all have in common to the parameters at the recording's temperature. `None` where
-    /// the recording says nothing beyond its prior.
+    /// `common` maps the common quantities to the parameters at the temperature of the recording. `None` if the
+    /// recording adds no information to its prior.
     fn new(
         (off, covariance): (&DVector<f64>, DMatrix<f64>),
         common: &DMatrix<f64>,
@@ -101,8 +101,8 @@ impl RecordingEvidence {
     }
 }
 
-/// Matrix from the common quantities of all recordings to the parameters of one, both in prior σ. Common are the
-/// parameters themselves and, of each, coefficients of the first `functions` functions of temperature.
+/// Matrix from the common quantities of all recordings to the parameters of one, both in prior σ. The common quantities
+/// are the parameters and, for each, coefficients of the first `functions` functions of temperature.
 fn common(
     model: &Model,
     indices: &[usize],
@@ -177,8 +177,8 @@ impl RecordingsEvidence {
         })
     }
 
-    /// The likelihood with variances of some groups in excess of the stated ones, and its slope by that of one; the
-    /// information leaves out what recordings have in common. `None` if rounding makes a matrix singular.
+    /// The likelihood with variances of some groups in excess of the stated ones, and its slope with respect to that of
+    /// one; the information excludes the common quantities. `None` if rounding makes a matrix singular.
     fn slope(&self, found: &[Found], group: usize) -> Option<Slope> {
         let mut own = self.stated.clone();
         for (i, &(group, prior)) in self.parameters.iter().enumerate() {

@@ -12,10 +12,10 @@ use crate::imu::{PerSensor, Triad};
 /// Effect of a rotation of the instrument on its mounting face: derivatives of the recording's parameters.
 #[derive(Debug, Clone)]
 pub struct Turned {
-    /// By the common parameters, a column each. The poorly determined mean of all mountings depends on well-determined
-    /// quantities, so the derivatives have to be as exact as the ratio of the two.
+    /// With respect to the common parameters, one column each. The poorly determined mean of all mountings depends on
+    /// well-determined quantities, so the accuracy of the derivatives must match the ratio of the two.
     pub by_parameters: ParameterMatrix,
-    /// By the rotation about each body axis.
+    /// With respect to the rotation about each body axis.
     pub by_mounting: SMatrix<f64, PARAMETERS, 3>,
 }
 
@@ -111,7 +111,7 @@ impl Difference {
         }
     }
 
-    /// Derivatives of the recording's parameters by the common ones and by its mounting.
+    /// Derivatives of the parameters of a recording with respect to the common ones and to its mounting.
     pub(in crate::calibration) fn response(&self, common: &PerSensor<Triad>) -> Turned {
         let before = to_vector(common) + self.parameters;
         let after = |mounting: &Vector3<f64>, parameters: &ParameterVector| {
@@ -127,7 +127,7 @@ impl Difference {
         }
     }
 
-    /// The mounting by which common triads come nearest to those of a recording.
+    /// The mounting that brings the common triads closest to those of a recording.
     pub(in crate::calibration) fn mounting_between(
         common: &PerSensor<Triad>,
         recording: &ParameterVector,

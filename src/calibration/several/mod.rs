@@ -29,7 +29,7 @@ pub use temperatures::TemperatureOptions;
 /// Common and individual properties of recordings of one instrument.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Together {
-    /// σ of their differences. Without a table, the body axes are those of the accelerometers, whatever the mounting.
+    /// σ of their differences. Without a table, the body axes are those of the accelerometers for any mounting.
     pub day_to_day: DayToDay,
     /// Temperature dependence of the parameters; `None` if there is none.
     pub temperature: Option<TemperatureOptions>,
@@ -96,7 +96,7 @@ impl<'a> Problem<'a> {
         self.stretches().iter().flat_map(of_stretch).collect()
     }
 
-    /// Whether anything in it differs between recordings or temperatures.
+    /// Whether any quantity differs between recordings or temperatures.
     pub(in crate::calibration) fn varies(&self) -> bool {
         self.model.thermal.is_some() || self.model.day_to_day.any()
     }

@@ -13,7 +13,7 @@ pub struct Selected {
     pub model: ThermalModel,
     /// The estimates under it.
     pub at: Linearisation,
-    /// The finding on temperature dependence that the recordings do not show.
+    /// The finding on unobserved temperature dependence.
     pub finding: Option<Finding>,
 }
 

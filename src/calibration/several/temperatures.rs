@@ -7,7 +7,7 @@ use crate::imu::{
 };
 use crate::recording::Temperature;
 
-/// Recordings within this many kelvin count as one temperature: the self-heating of a soaked instrument.
+/// Recordings within this many kelvin count as one temperature, because of the self-heating of a soaked instrument.
 const ONE_TEMPERATURE: f64 = 1.0;
 
 /// Prior 1σ of the change of a parameter over the range, in its prior σ: more than for an instrument of its
@@ -17,9 +17,9 @@ const CHANGE: f64 = 3.0;
 /// Options for the temperature dependence of parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TemperatureOptions {
-    /// Highest order of the polynomials that are tried, at most [`HIGHEST_ORDER`].
+    /// Highest polynomial order to try, at most [`HIGHEST_ORDER`].
     pub highest_order: usize,
-    /// Whether biases may depend on the rate of temperature, too.
+    /// Whether biases may also depend on the temperature rate.
     pub rate: bool,
     /// Reference temperature of the parameters, °C; `None` for the middle of the range.
     pub reference: Option<f64>,
@@ -35,7 +35,7 @@ impl Default for TemperatureOptions {
     }
 }
 
-/// The polynomials that the temperatures of a problem's dwells support; `None` if the instrument was at one.
+/// The polynomials supported by the dwell temperatures of a problem; `None` for a single temperature.
 pub fn model(
     problem: &Problem,
     options: TemperatureOptions,

@@ -22,7 +22,7 @@ pub struct Coefficient {
 }
 
 impl Coefficient {
-    /// The coefficients that a model has on.
+    /// The enabled coefficients of a model.
     pub(in crate::calibration) fn all(
         form: InstallationForm,
         model: Option<&ThermalModel>,
@@ -109,8 +109,8 @@ impl Thermal {
         (ParameterVector::from_fn(|i, _| change[i]), at)
     }
 
-    /// Number of temperature functions that are on for this parameter, zero if it does not change with temperature, and
-    /// whether its rate term is on.
+    /// Number of enabled temperature functions of this parameter (zero if it does not change with temperature), and
+    /// whether its rate term is enabled.
     pub fn order(&self, index: usize) -> (usize, bool) {
         let of = |c: &&Coefficient| c.index() == index;
         let functions = self.coefficients.iter().filter(of).map(|c| c.function + 1);

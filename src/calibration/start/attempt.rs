@@ -1,12 +1,12 @@
-//! A calibration from the coarse start.
+//! A calibration starting from the coarse start.
 
 use super::coarse::{CoarseStart, coarse_start};
 use crate::calibration::{
     CalibrationError, Gate, Iterated, NoisePolicy, Problem, Progress, Script, Solved, pass,
 };
 
-/// Iterates from the coarse start, with the stated noise or, if noise may be estimated, with the noise by hand that the
-/// start shows.
+/// Iterates from the coarse start, with the stated noise or, if noise may be estimated, with the hand noise found at
+/// the start.
 pub fn from_coarse_start<'a>(
     problem: &Problem<'a>,
     progress: Progress,
@@ -31,7 +31,7 @@ pub fn from_coarse_start<'a>(
     Ok(solved)
 }
 
-/// One pass at the start, which stays the estimate.
+/// One pass at the start, which remains the estimate.
 fn at_start<'a>(problem: &Problem<'a>, start: CoarseStart) -> Result<Solved<'a>, CalibrationError> {
     let script = Script::new(problem, &start.attitudes, &start.at)?;
     let iterated = Iterated {

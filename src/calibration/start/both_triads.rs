@@ -13,12 +13,12 @@ use crate::calibration::{
 use crate::imu::{PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
 
-/// A scale factor farther from zero than this many σ belongs to a working axis.
+/// An axis works if its scale factor is farther from zero than this many σ.
 const SENSES: f64 = 5.0;
 
-/// Both triads from positions, with the prior for parameters that these do not determine. If residuals exceed
-/// their limit, σ are widened until they do not, with a finding. The same is done if the positions alone contradict
-/// the prior, which would otherwise hide it.
+/// Both triads from positions, with the prior for parameters that these do not determine. If residuals exceed their
+/// limit, σ are widened until they do not, with a finding. The same applies if the positions alone contradict the
+/// prior, which would otherwise hide this.
 pub fn both_triads(
     observed: &PerSensor<Observed>,
     problem: &Problem,
@@ -63,7 +63,7 @@ fn set(
     of_triad.copy_from(part);
 }
 
-/// One triad by its positions as stated.
+/// One triad from its positions as stated.
 struct Stated<'a> {
     observed: &'a Observed,
     fit: Fit,
@@ -95,7 +95,7 @@ impl<'a> Stated<'a> {
         })
     }
 
-    /// Calibrates on a base with level and north as stated, or with this σ, rad; σ are widened if residuals exceed
+    /// Calibrates with the stated level and north of the base, or with this σ, rad; σ are widened if residuals exceed
     /// their limit.
     fn calibrated(
         &self,
@@ -146,10 +146,10 @@ fn base_off(residuals: &Residuals, observed: &Observed, triad: &Triad) -> Option
 
 /// Additional variance on every axis of these positions for which χ² of the residuals equals its expectation.
 ///
-/// It is added, not multiplied: residuals may all be of axes across the input, where a table's attitude
-/// makes stated σ large, and show nothing of the errors along the input, which determine the scale factors.
+/// It is added, not multiplied: all residuals may belong to axes perpendicular to the input, where the table attitude
+/// makes stated σ large, and do not show the errors along the input, which determine the scale factors.
 fn unexplained(observed: &Observed, triad: &Triad, places: &[usize]) -> f64 {
-    /// A factor of two a step, down to rounding.
+    /// A factor of two per step, down to rounding.
     const HALVINGS: i32 = 60;
     let errors = observed.known.iter().map(|known| &known.position);
     let errors = errors.map(|p| (p.output - triad.output(&p.input)).norm_squared());

@@ -1,6 +1,5 @@
-//! The closed form: static positions with known attitude (Zhao, Jiang, Li 2016, Eqs. 14 and 15; the
-//! second line of the printed Eq. 15 says `N_g` where the accelerometer is meant), and what takes its
-//! place without a table.
+//! The closed form: static positions with known attitude (Zhao, Jiang, Li 2016, Eqs. 14 and 15; the second line of the
+//! printed Eq. 15 says `N_g` where the accelerometer is meant), and its substitutes without a table.
 
 use super::both_triads::both_triads;
 use super::coarse::{Turned, calibrated, calibrated_as_held, dwells, judged};
@@ -34,7 +33,7 @@ pub enum Reference {
     Table,
     /// Labels of sections: an axis up, a turn about an axis by an angle.
     Labels,
-    /// Gravity alone: its magnitude at rest, its direction before and after each turn.
+    /// Only gravity: its magnitude at rest and its direction before and after each turn.
     Gravity,
 }
 
@@ -63,7 +62,7 @@ pub struct ClosedForm {
     pub standing_time: f64,
     /// The estimated noise; `None` if the stated noise is used.
     pub noise: Option<NoiseReport>,
-    /// Findings that a calibration engineer must know before using the figures.
+    /// Findings that a calibration engineer must know before using the results.
     pub findings: Vec<Finding>,
 }
 
@@ -76,9 +75,9 @@ impl ClosedForm {
 
 /// Calibrates both triads of a run without a filter.
 ///
-/// With a table's log, it uses the dwells: the paper's six positions of a triad (Earth rate or gravity along each
-/// body axis, in both directions) if there are such, else all dwells. Without a table it uses labelled sections;
-/// without those, every dwell and turn with gravity as the only reference. For exactly opposite positions, least
+/// With a table log, it uses the dwells: the six positions of the paper for a triad (Earth rate or gravity along each
+/// body axis, in both directions) if present, otherwise all dwells. Without a table, it uses labelled sections or,
+/// without labels, every dwell and turn with gravity as the only reference. For exactly opposite positions, least
 /// squares equals the half sums and half differences of the paper.
 ///
 /// # Errors
@@ -122,8 +121,7 @@ pub fn six_position_by(
     Ok(closed_form)
 }
 
-/// Adds the error of gravity, by which the accelerometers are calibrated: the same relative error in all three scale
-/// factors.
+/// Adds the gravity error, which causes the same relative error in all three accelerometer scale factors.
 fn share_gravity(estimate: &mut Estimate, site: &Site) {
     let part = (site.gravity_sigma / site.gravity).powi(2);
     let scale = estimate.triads.accel.scale;
@@ -132,7 +130,7 @@ fn share_gravity(estimate: &mut Estimate, site: &Site) {
     of_scale += scale * scale.transpose() * part;
 }
 
-/// The closed form from some dwells of the problem's first run with attitudes of a table, or parts of them.
+/// The closed form from dwells (or parts of dwells) of the first run of the problem, with table attitudes.
 ///
 /// # Errors
 /// As [`six_position`], and without a table.
@@ -169,7 +167,7 @@ pub fn six_position_of(
     })
 }
 
-/// The positions whose input lies along a body axis, if all six are there, else all.
+/// The positions with the input along a body axis, if all six exist, otherwise all.
 fn six_of(observed: &Observed) -> Vec<usize> {
     let along = |k: usize| -> Option<(usize, bool)> {
         let Position { input, .. } = observed.known[k].position;
@@ -270,7 +268,7 @@ fn by_gravity(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     })
 }
 
-/// Parameters that are hardly better known than before, if there are any.
+/// Parameters hardly better known than from the prior, if any.
 fn hidden(model: &Model, estimate: &Estimate, reference: Reference) -> Option<Finding> {
     let sigma = estimate.sigma();
     let hidden = |&i: &usize| {

@@ -1,4 +1,4 @@
-//! The coarse start: where the filter begins, not what it knows. The filter's prior stays its own.
+//! The coarse start: the linearisation point of the first pass. It does not change the prior of the filter.
 
 use nalgebra::Matrix3;
 
@@ -16,32 +16,31 @@ use crate::calibration::{
 use crate::earth::Site;
 use crate::imu::{ParameterKind, Sensor, TermVector};
 
-/// More equations, of a hundred dwells, leave no noise to parameters; their covariance is factorised whole, which takes
-/// the cube of their number.
+/// With more equations (a hundred dwells), parameters cannot absorb noise. The whole covariance is factorised, with a
+/// cost that grows with the cube of their number.
 const MOST_EQUATIONS: usize = 600;
-/// Largest number of points of linearisation at which noise is learnt.
+/// Maximum number of linearisation points at which noise is estimated.
 const NOISE_ROUNDS: usize = 6;
-/// A smaller step (1 ppm, 0.2″, and as much of rad/s or m/s²) ends an iteration.
+/// A smaller step (1 ppm, 0.2″, and the same number in rad/s or m/s²) ends an iteration.
 const SMALL: f64 = 1e-6;
-/// Attitudes, heading and gyros are found in turns, each from the others. Scale factors wrong by
-/// percents need four rounds …
+/// Attitudes, heading and gyros are estimated alternately. Scale factor errors of several percent need four rounds …
 const ROUNDS_OF_GYROS: usize = 4;
-/// … before the accelerometers may move, too.
+/// … before the accelerometers are also estimated.
 const ROUNDS: usize = 8;
 
-/// Where the filter begins.
+/// Starting point of the filter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoarseStart {
-    /// The first point of linearisation.
+    /// The first linearisation point.
     pub at: Linearisation,
-    /// What is known of the initial attitude of each stretch.
+    /// Prior of the initial attitude of each stretch.
     pub attitudes: Vec<AttitudePrior>,
-    /// What a hand adds to the noise that is stated, where that was called for.
+    /// Noise added by hand motion, if requested.
     pub(in crate::calibration) by_hand: Option<ByHand>,
 }
 
 impl CoarseStart {
-    /// A problem with the noise of turning and holding by hand that the start shows; `None` if it shows none.
+    /// A problem with the noise of turning and holding by hand found at the start; `None` if there is none.
     pub fn by_hand<'a>(&self, problem: &Problem<'a>) -> Option<Problem<'a>> {
         let by_hand = self.by_hand.as_ref()?;
         Some(problem.with_model(by_hand.model(problem)))
@@ -50,12 +49,11 @@ impl CoarseStart {
 
 /// Both triads and the initial attitudes by least squares over whole dwells and moves.
 ///
-/// With a table, its attitudes are known. Without, accelerometers follow from `|f| = g` over the
-/// dwells, gyros from the direction of gravity before and after each move, and gyro biases together
-/// with the heading from the rates at rest.
+/// With a table, its attitudes are known. Without one, the accelerometers follow from `|f| = g` in the dwells, the
+/// gyros from the gravity direction before and after each move, and gyro biases and heading from the rates at rest.
 ///
 /// # Errors
-/// [`CalibrationError`] if there is no dwell, or data and prior do not fit each other.
+/// [`CalibrationError`] if there is no dwell, or data and prior contradict each other.
 pub fn coarse_start(problem: &Problem) -> Result<CoarseStart, CalibrationError> {
     let dwells = dwells(problem)?;
     if let Some(attitudes) = attitudes_of_table(problem) {
@@ -86,7 +84,7 @@ pub fn coarse_start(problem: &Problem) -> Result<CoarseStart, CalibrationError> 
     })
 }
 
-/// What is known of the initial attitude of each stretch.
+/// Prior of the initial attitude of each stretch.
 pub fn initial_attitudes(problem: &Problem) -> Result<Vec<AttitudePrior>, CalibrationError> {
     match attitudes_of_table(problem) {
         Some(attitudes) => dwells(problem).map(|_| attitudes),
@@ -101,7 +99,7 @@ fn attitudes_of_table(problem: &Problem) -> Option<Vec<AttitudePrior>> {
         .collect()
 }
 
-/// The dwells of each stretch; an error where there is none.
+/// The dwells of each stretch; an error if there are none.
 pub fn dwells(problem: &Problem) -> Result<Vec<Vec<AtRest>>, CalibrationError> {
     let dwells = AtRest::all(problem);
     match dwells.iter().flatten().count() {
@@ -110,7 +108,7 @@ pub fn dwells(problem: &Problem) -> Result<Vec<Vec<AtRest>>, CalibrationError> {
     }
 }
 
-/// What its residuals show.
+/// Evaluation of its residuals.
 pub fn judged(turned: &Turned) -> Option<Judged> {
     let places = [
         (ParameterKind::Scale, [0, 1, 2]),
@@ -119,17 +117,17 @@ pub fn judged(turned: &Turned) -> Option<Judged> {
     Judged::new(&turned.equations, &Sensor::ALL, places)
 }
 
-/// Both triads and attitudes as gravity and the rates at rest show them.
+/// Both triads and attitudes from gravity and the rates at rest.
 pub struct Turned {
     /// The triads, and the attitude at the first sample of each stretch.
     pub at: Linearisation,
     /// 1σ of each heading, rad.
     heading_sigma: Vec<f64>,
-    /// What they are found from, made at them.
+    /// The equations from which they are estimated, linearised at them.
     pub equations: Equations,
 }
 
-/// Both triads and attitudes by gravity and Earth rate, first the accelerometers alone by its magnitude.
+/// Both triads and attitudes from gravity and Earth rate; first only the accelerometers, from the magnitude of gravity.
 pub fn calibrated(problem: &Problem, dwells: &[Vec<AtRest>]) -> Result<Turned, CalibrationError> {
     let model = &problem.model;
     let prior = from_vector(model.form, &model.prior_mean);
@@ -157,12 +155,11 @@ pub fn calibrated(problem: &Problem, dwells: &[Vec<AtRest>]) -> Result<Turned, C
     turned(problem, dwells, &mut at, &Sensor::ALL)
 }
 
-/// Attitudes, headings and gyro biases by these triads, and the equations there.
+/// Attitudes, headings and gyro biases for these triads, and the equations there.
 ///
-/// With the gyros the accelerometers are found, whose installation the magnitude of gravity alone shows badly where
-/// every dwell has an axis nearly up or down. Over a move between two dwells the gyros must carry the direction of
-/// gravity from where the accelerometers observed it before to where they observe it after; at rest they must sense
-/// Earth rate.
+/// The accelerometers are estimated together with the gyros, because the magnitude of gravity alone hardly determines
+/// their misalignments if every dwell has an axis nearly up or down. Over a move between two dwells, the gyros must
+/// carry the gravity direction observed before it to that observed after it; at rest they must sense Earth rate.
 fn turned(
     problem: &Problem,
     dwells: &[Vec<AtRest>],
@@ -203,7 +200,7 @@ fn turned(
     })
 }
 
-/// The same with what a hand adds to the noise that is stated, where the data show that and residuals cannot.
+/// The same with the noise added by hand motion, if the data show it although the residuals do not.
 pub fn calibrated_as_held(
     problem: &Problem,
     dwells: &[Vec<AtRest>],
@@ -229,7 +226,7 @@ pub fn calibrated_as_held(
     };
     // What equations are linearised at follows noise, and noise that.
     for _ in 0..NOISE_ROUNDS {
-        // What noise on trial leads nowhere with is not the noise of this record.
+        // What noise on trial leads nowhere with is not the noise of this recording.
         let Ok(turned) = with(&by_hand) else {
             return Ok((stated, None));
         };

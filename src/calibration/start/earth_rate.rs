@@ -1,4 +1,4 @@
-//! Rows by Earth rate without a table: what the gyros sense at rest, and which way is north.
+//! Equations from Earth rate without a table: gyro output at rest, and heading.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -12,17 +12,17 @@ use crate::calibration::{CalibrationError, Model, Source};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{PerSensor, Sensor, Triad};
 
-/// Bias of the gyros within Earth rate: their mean output at rest. From a prior that is off by so much that a move turns
-/// into another, no step leads back.
+/// Gyro bias, accurate to Earth rate: the mean output at rest. If the prior is so wrong that a move looks like a
+/// different one, no iteration can recover.
 pub fn gyro_bias_at_rest(dwells: &[Vec<AtRest>]) -> Vector3<f64> {
     let dwells = || dwells.iter().flatten();
     let outputs: Vector3<f64> = dwells().map(|dwell| dwell.mean.gyro.output).sum();
     outputs / dwells().count() as f64
 }
 
-/// Fits Earth rate, whose part along Up is known, and a constant along body axes: at rest
-/// `C ω = ω_ie + C b`. Attitudes that differ tell one from the other. Gives the headings of all stretches and b, rad/s.
-/// An error where a rate is no number.
+/// Fits Earth rate, whose Up component is known, and a constant along body axes: at rest `C ω = ω_ie + C b`. Different
+/// attitudes separate the two. Returns the headings of all stretches and b, rad/s, or an error if a rate is not a
+/// number.
 pub fn gyrocompass(
     model: &Model,
     stretches: &[Stretch],
@@ -79,7 +79,7 @@ pub fn gyrocompass(
     Ok((headings, found.fixed_rows::<3>(0).into_owned()))
 }
 
-/// Adds the rates in the dwells of a stretch, whose chain of attitudes is turned to its heading.
+/// Adds the rates in the dwells of a stretch, with its attitudes rotated to its heading.
 pub fn add_rates(
     equations: &mut Equations,
     model: &Model,

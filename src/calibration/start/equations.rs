@@ -1,7 +1,7 @@
-//! Linear equations for the errors of both triads about one point: least squares, its covariance, residuals.
+//! Linear equations for the errors of both triads about one point: least squares, covariance, residuals.
 //!
-//! A row is a residual, its partials by the unknowns, and the sources of its error. The unknowns are the parameters of
-//! a form, or the entries of `A = K C` and `D` of each triad ([`of_sensitivity`]).
+//! A row consists of a residual, its partial derivatives with respect to the unknowns, and its error sources. The
+//! unknowns are the parameters of a form, or the entries of `A = K C` and `D` of each triad ([`of_sensitivity`]).
 
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3, Vector4};
 
@@ -12,52 +12,52 @@ use crate::calibration::{
 };
 use crate::imu::{Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 
-/// Largest number of Gauss–Newton steps; scale factors wrong by percents need three.
+/// Maximum number of Gauss–Newton steps; scale factor errors of several percent need three.
 const STEPS: usize = 6;
 
-/// Partials of some rows by the unknowns of a triad.
+/// Partial derivatives of rows with respect to the unknowns of a triad.
 pub type OfTriad<const N: usize> = SMatrix<f64, N, PER_TRIAD>;
-/// The same by those of both.
+/// The same with respect to those of both.
 pub type Partials<const N: usize> = SMatrix<f64, N, PARAMETERS>;
 
-/// A span of time, with the mean noise of the triads over it.
+/// A time interval with the mean noise of the triads.
 #[derive(Debug, Clone)]
 pub struct Event {
     pub recording: usize,
-    /// Begin and end, s.
+    /// Start and end, s.
     pub times: [f64; 2],
     /// Variance of the mean per axis.
     pub variance: PerSensor<f64>,
-    /// The noise by which it is correlated with that of other events.
+    /// Noise common to other events.
     pub noise: PerSensor<Noise>,
 }
 
-/// An error vector that several rows have in common.
+/// An error vector common to several rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Common {
-    /// Mean noise of a triad over the event of this number.
+    /// Mean noise of a triad over the event with this number.
     Noise(Sensor, usize),
-    /// Of unit covariance, by number.
+    /// A vector with unit covariance, by number.
     Unit(usize),
 }
 
-/// Rows of what is observed in one event.
+/// Rows of the observations in one event.
 pub struct Rows<const N: usize> {
     pub event: usize,
     pub partials: Partials<N>,
     pub residual: SVector<f64, N>,
-    /// Variance by which each is weighted.
+    /// Variance for the weight of each.
     pub weighted: SVector<f64, N>,
-    /// Variance of the part of the error that no other row has.
+    /// Variance of the independent part of the error.
     pub own: SVector<f64, N>,
-    /// How the residuals follow errors that several rows have in common.
+    /// Response of the residuals to errors common to several rows.
     pub common: Vec<(Common, SMatrix<f64, N, 3>)>,
-    /// Variance by each of [`BY_HAND`] where that is one in SI and radians.
+    /// Variance due to each of [`BY_HAND`] for unit σ in SI and radians.
     pub by_hand: [f64; BY_HAND.len()],
 }
 
 impl<const N: usize> Rows<N> {
-    /// With errors of this variance that no other row has.
+    /// Adds independent errors of this variance.
     pub fn new(partials: Partials<N>, residual: SVector<f64, N>, variance: f64) -> Self {
         Self {
             event: 0,
@@ -71,29 +71,29 @@ impl<const N: usize> Rows<N> {
     }
 }
 
-/// Equations `residual = partials · δθ + error`, and what is known of δθ beforehand.
+/// Equations `residual = partials · δθ + error`, with the prior of δθ.
 pub struct Equations {
-    /// Which of the parameters of both triads are to be found.
+    /// The unknown parameters of both triads.
     pub unknown: Vec<usize>,
-    /// Their prior: mean over σ, and σ, infinite without one.
+    /// Their prior: mean divided by σ, and σ (infinite without a prior).
     mean: DVector<f64>,
     sigma: DVector<f64>,
     rows: Vec<Rows<1>>,
     pub events: Vec<Event>,
-    /// Whether rows are weighted by the inverse of their whole covariance, not each by its own variance.
+    /// Whether rows are weighted by the inverse of their full covariance instead of their variances.
     pub correlated: bool,
 }
 
-/// How the estimate follows …
+/// Gain of the estimate from …
 pub struct Gain {
-    /// … the prior's mean over its σ, …
+    /// … the prior mean divided by its σ, …
     of_prior: DMatrix<f64>,
     /// … and the scaled residuals.
     of_rows: DMatrix<f64>,
 }
 
 impl Equations {
-    /// By mean and σ of the prior of δθ; where that σ is zero, the parameter is not to be found.
+    /// From mean and σ of the prior of δθ; parameters with σ of zero are not estimated.
     pub fn new(mean: &ParameterVector, sigma: &ParameterVector) -> Self {
         let unknown: Vec<usize> = (0..PARAMETERS).filter(|&k| sigma[k] > 0.0).collect();
         let count = unknown.len();
@@ -107,7 +107,7 @@ impl Equations {
         }
     }
 
-    /// Of the parameters of some triads, about these values.
+    /// For the parameters of some triads, about these values.
     pub fn of_triads(model: &Model, at: &PerSensor<Triad>, sensors: &[Sensor]) -> Self {
         let of = |k| sensors.contains(&sensor_and_parameter(k).0);
         let sigma = |k: usize, _| if of(k) { model.prior_sigma[k] } else { 0.0 };
@@ -136,7 +136,7 @@ impl Equations {
         self.rows.len()
     }
 
-    /// Partials by the unknowns, and residuals, each row over the σ by which it is weighted.
+    /// Partial derivatives with respect to the unknowns, and residuals, each row divided by its weighting σ.
     pub fn scaled(&self) -> (DMatrix<f64>, DVector<f64>) {
         let (rows, unknown) = (&self.rows, &self.unknown);
         let sigma = |k: usize| rows[k].weighted.x.sqrt();
@@ -148,7 +148,7 @@ impl Equations {
         )
     }
 
-    /// The same with the unknowns over σ of their prior.
+    /// The same with the unknowns in units of their prior σ.
     pub fn in_sigmas(&self) -> (DMatrix<f64>, DVector<f64>) {
         let (design, residual) = self.scaled();
         (design * DMatrix::from_diagonal(&self.sigma), residual)
@@ -190,7 +190,7 @@ impl Equations {
         errors
     }
 
-    /// Least squares of rows and prior: x = R⁻¹ Qᵀ y, not by way of the squares of its equations.
+    /// Least squares of rows and prior: x = R⁻¹ Qᵀ y, without normal equations.
     pub fn gain(&self) -> Option<Gain> {
         let (design, _) = self.scaled();
         let (count, unknown) = design.shape();
@@ -217,12 +217,12 @@ impl Equations {
         })
     }
 
-    /// The unknowns by a gain.
+    /// The unknowns from a gain.
     pub fn found(&self, gain: &Gain) -> DVector<f64> {
         &gain.of_prior * &self.mean + &gain.of_rows * self.scaled().1
     }
 
-    /// The δθ of least squares; an error that names the triad where it is no number.
+    /// Least-squares δθ; if it is not a number, an error that names the triad.
     pub fn step(&self) -> Result<ParameterVector, CalibrationError> {
         let mut step = ParameterVector::zeros();
         let Some(&first) = self.unknown.first() else {
@@ -239,18 +239,18 @@ impl Equations {
         lost.map_or(Ok(step), |index| Err(singular(index)))
     }
 
-    /// Covariance of the unknowns by prior and errors.
+    /// Covariance of the unknowns due to prior and errors.
     pub fn covariance(&self, gain: &Gain) -> DMatrix<f64> {
         let of_errors = &gain.of_rows * self.errors() * gain.of_rows.transpose();
         &gain.of_prior * gain.of_prior.transpose() + of_errors
     }
 
-    /// Covariance of how far the data bring the unknowns from a prior that is right.
+    /// Covariance of the change of the unknowns from a correct prior by the data.
     pub fn covariance_of_distance(&self, gain: &Gain) -> DMatrix<f64> {
         &gain.of_rows * self.before_data().1 * gain.of_rows.transpose()
     }
 
-    /// A matrix of the unknowns among all parameters.
+    /// Expands a matrix of the unknowns to all parameters.
     pub fn whole(&self, of_unknowns: &DMatrix<f64>) -> ParameterMatrix {
         let place = |k: usize| self.unknown.iter().position(|&index| index == k);
         ParameterMatrix::from_fn(|i, j| match (place(i), place(j)) {
@@ -259,7 +259,7 @@ impl Equations {
         })
     }
 
-    /// How the estimate of the unknowns follows the first errors of unit covariance, three columns each.
+    /// Response of the estimate to the first unit-covariance errors, three columns each.
     pub fn by_units(&self, gain: &Gain, count: usize) -> DMatrix<f64> {
         let mut by_units = DMatrix::zeros(self.unknown.len(), 3 * count);
         for unit in 0..count {
@@ -271,7 +271,7 @@ impl Equations {
         by_units
     }
 
-    /// How the scaled rows follow an error of unit covariance.
+    /// Response of the scaled rows to a unit-covariance error.
     pub fn by_unit(&self, unit: usize) -> DMatrix<f64> {
         let mut by_unit = DMatrix::zeros(self.rows.len(), 3);
         for (row, mut place) in self.rows.iter().zip(by_unit.row_iter_mut()) {
@@ -284,14 +284,14 @@ impl Equations {
         by_unit
     }
 
-    /// Residuals of the scaled rows as they are before these data, and their covariance by prior and errors.
+    /// Residuals of the scaled rows before the fit, and their covariance due to prior and errors.
     pub fn before_data(&self) -> (DVector<f64>, DMatrix<f64>) {
         let (spread, residual) = self.in_sigmas();
         let covariance = &spread * spread.transpose() + self.errors();
         (residual - spread * &self.mean, covariance)
     }
 
-    /// How much of each of [`BY_HAND`] is in each of the scaled rows.
+    /// Contribution of each of [`BY_HAND`] to each of the scaled rows.
     pub fn by_hand(&self) -> Parts {
         std::array::from_fn(|source| {
             let part = |k: usize, _| self.rows[k].by_hand[source] / self.rows[k].weighted.x;
@@ -304,7 +304,7 @@ impl Equations {
         self.rows.iter().map(|row| (row.residual.x, row.weighted.x))
     }
 
-    /// The rows of each event that has any, by its number.
+    /// The rows of each event with rows, by its number.
     pub fn by_event(&self) -> Vec<(usize, Vec<usize>)> {
         let of = |event| (0..self.rows.len()).filter(move |&k| self.rows[k].event == event);
         let groups = (0..self.events.len()).map(|event| (event, Vec::from_iter(of(event))));
@@ -312,7 +312,7 @@ impl Equations {
     }
 }
 
-/// The partials of one triad among those of both.
+/// The partial derivatives of one triad among those of both.
 pub fn of<const N: usize>(sensor: Sensor, partials: &OfTriad<N>) -> Partials<N> {
     let mut whole = Partials::zeros();
     let mut place = whole.fixed_columns_mut::<PER_TRIAD>(parameter(sensor, 0));
@@ -320,17 +320,18 @@ pub fn of<const N: usize>(sensor: Sensor, partials: &OfTriad<N>) -> Partials<N> 
     whole
 }
 
-/// Partials of `A u + D` by `A` and `D`, row by row, for `[u; 1]`; for `[u; 0]` those of an output without its zero.
+/// Partial derivatives of `A u + D` with respect to `A` and `D`, row by row, for `[u; 1]`; for `[u; 0]`, of an output
+/// without bias.
 pub fn of_sensitivity(input: Vector4<f64>) -> OfTriad<3> {
     Matrix3::identity().kronecker(&input.transpose())
 }
 
-/// Partials of a triad's output by its parameters.
+/// Partial derivatives of the output of a triad with respect to its parameters.
 pub fn of_parameters(triad: &Triad, input: &Vector3<f64>) -> OfTriad<3> {
     OfTriad::from_columns(&triad.response().map(|response| response * input.push(1.0)))
 }
 
-/// Steps from a first point, each by equations made there, until no parameter changes by more than this.
+/// Iterates from a first point with new equations at each step, until no parameter changes by more than this.
 pub fn gauss_newton(
     from: PerSensor<Triad>,
     smallest: &ParameterVector,

@@ -1,4 +1,4 @@
-//! Rows by gravity without a table: its magnitude in every dwell, its direction before and after every move.
+//! Equations from gravity without a table: its magnitude in every dwell, and its direction before and after every move.
 
 use std::ops::Range;
 
@@ -15,16 +15,16 @@ use crate::imu::{Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::navigation::{Navigator, ProcessNoise, State};
 use crate::run::{Dwell, MeanOutput};
 
-/// Least σ of a row, rad or m/s: an instrument without noise is not better than that.
+/// Minimum σ of a row, rad or m/s, for an instrument without noise.
 pub const ROUNDING: f64 = 1e-9;
 
-/// Columns of the biases among a triad's parameters. Its mean noise enters as they do.
+/// Columns of the biases among the parameters of a triad. Its mean noise has the same effect.
 const BIAS: usize = PER_TRIAD - 3;
 
-/// A dwell by the mean outputs in it.
+/// A dwell with its mean outputs.
 #[derive(Debug, Clone)]
 pub struct AtRest {
-    /// Among the dwells of all stretches.
+    /// Number among the dwells of all stretches.
     pub number: usize,
     pub samples: Range<usize>,
     /// Begin and end, s.
@@ -59,14 +59,14 @@ impl AtRest {
         self.times[1] - self.times[0]
     }
 
-    /// The number of the event: of each dwell that follows that of the move before it.
+    /// Number of the event; each dwell follows the move before it.
     pub fn event(&self) -> usize {
         2 * self.number + 1
     }
 }
 
-/// Each dwell, and the move before it. The noise of that is that of the bias alone: each row has the random walk for
-/// itself.
+/// Each dwell, and the move before it. The noise of a move is only that of the bias, because the random walk of each
+/// row is independent.
 pub fn events(problem: &Problem, dwells: &[Vec<AtRest>]) -> Vec<Event> {
     let mut events = Vec::new();
     for (stretch, dwells) in problem.stretches().iter().zip(dwells) {
@@ -94,12 +94,12 @@ pub fn events(problem: &Problem, dwells: &[Vec<AtRest>]) -> Vec<Event> {
     events
 }
 
-/// Error of a triad's computed input, estimated − true, by the error of each of its parameters.
+/// Error of the computed input of a triad (estimated − true) per error of each of its parameters.
 pub fn input_errors(triad: &Triad, correction: &Matrix3<f64>, input: &Vector3<f64>) -> OfTriad<3> {
     correction * of_parameters(triad, input)
 }
 
-/// How some rows follow the mean noise of a triad over an event: as they do its biases.
+/// Response of rows to the mean noise of a triad over an event, equal to that to its biases.
 pub fn of_noise<const N: usize>(
     sensor: Sensor,
     event: usize,
@@ -115,7 +115,7 @@ struct Force {
     size: f64,
     /// Up along body axes.
     up: Vector3<f64>,
-    /// The force's error by the error of each accelerometer parameter.
+    /// Error of the force per error of each accelerometer parameter.
     error: OfTriad<3>,
 }
 
@@ -171,19 +171,19 @@ pub fn add_magnitude(
 pub struct Heading {
     /// Number of the stretch.
     pub stretch: usize,
-    /// Turn about Up that brings the attitudes to East-North-Up, rad.
+    /// Rotation about Up that aligns the attitudes with East-North-Up, rad.
     pub turn: Matrix3<f64>,
-    /// 1σ of its angle, rad; above one nothing is known of it.
+    /// 1σ of its angle, rad; above one, it is unknown.
     pub sigma: f64,
 }
 
 impl Heading {
-    /// Its σ as it is used, rad.
+    /// The σ used, rad.
     pub fn known(&self) -> f64 {
         self.sigma.clamp(1e-3, 1.0)
     }
 
-    /// How some rows follow its error, by their change with an angle of one.
+    /// Response of rows to its error, from their change per radian.
     pub fn error<const N: usize>(
         &self,
         by_angle: &SVector<f64, N>,
@@ -194,7 +194,7 @@ impl Heading {
     }
 }
 
-/// Attitudes of the dwells of a stretch, each carried to the next by the gyros and levelled there.
+/// Attitudes of the dwells of a stretch, carried from one to the next by the gyros and levelled there.
 pub struct Chain {
     pub attitudes: Vec<Matrix3<f64>>,
     moves: Vec<Move>,
@@ -204,24 +204,24 @@ pub struct Chain {
 struct Move {
     /// s
     duration: f64,
-    /// The tilt that the gyros are wrong by after it, `C_computed = (I − [φ×]) C_true`, …
+    /// Tilt error of the gyros after it, `C_computed = (I − [φ×]) C_true`, …
     tilt: Vector3<f64>,
-    /// … by the error of each gyro parameter, …
+    /// … per error of each gyro parameter, …
     of_gyro: OfTriad<3>,
-    /// … and by that of each accelerometer parameter, which make Up before …
+    /// … and per error of each accelerometer parameter, which determine Up before …
     of_before: OfTriad<3>,
     /// … and after it.
     of_after: OfTriad<3>,
-    /// Variance of each of its two components by noise and interpolation of the gyros, …
+    /// Variance of each of its two components due to noise and interpolation of the gyros, …
     walk: f64,
-    /// … by each of [`BY_HAND`] where that is one, …
+    /// … due to each of [`BY_HAND`] for unit σ, …
     by_hand: [f64; BY_HAND.len()],
-    /// … and by the first and the noise of Up.
+    /// … and due to the first and the noise of Up.
     variance: f64,
 }
 
 impl Chain {
-    /// From an attitude in the first dwell, which is levelled.
+    /// Starts from an attitude in the first dwell, which is levelled.
     ///
     /// Source: Tedaldi, Pretto, Menegatti 2014, "A robust and easy to implement method for IMU calibration
     /// without external equipments", ICRA, §IV.
@@ -245,8 +245,8 @@ impl Chain {
         Ok(Self { attitudes, moves })
     }
 
-    /// Adds what the moves between the dwells show once the chain is turned to its heading: the gyros carry Up from
-    /// where it was before to where it is after.
+    /// Adds the moves between the dwells after rotation of the chain to its heading: the gyros carry Up from before the
+    /// move to after it.
     pub fn add(
         &self,
         equations: &mut Equations,

@@ -1,4 +1,4 @@
-//! What residuals of equations show: events that do not fit, and parameters that change in time.
+//! Evaluation of the residuals of equations: events that do not fit, and parameters that drift.
 
 use super::equations::Equations;
 use crate::calibration::checks::drift::{Changing, drift};
@@ -6,20 +6,20 @@ use crate::calibration::checks::residuals::{Residuals, Worst};
 use crate::calibration::{Finding, parameter};
 use crate::imu::{ParameterKind, Sensor};
 
-/// Residuals without what any values of the unknowns explain, and the events that fit the others least.
+/// Residuals without the part explained by the unknowns, and the worst-fitting events.
 pub struct Judged {
     pub residuals: Residuals,
     pub worst: Worst,
-    /// Begin and end of the worst events, s.
+    /// Start and end of the worst events, s.
     times: Vec<[f64; 2]>,
     drift: Option<Finding>,
 }
 
-/// Where the unknowns of the three axes are among those of a triad, by kind.
+/// Indices of the unknowns of the three axes among those of a triad, by kind.
 pub type Places = [(ParameterKind, [usize; 3]); 2];
 
 impl Judged {
-    /// `None` where the errors of the equations have no covariance.
+    /// `None` if the errors of the equations have no covariance.
     pub fn new(equations: &Equations, sensors: &[Sensor], places: Places) -> Option<Self> {
         let (design, residual) = equations.scaled();
         let residuals = Residuals::new(&design, &residual, &equations.errors())?;
@@ -59,12 +59,12 @@ impl Judged {
         })
     }
 
-    /// A drift of biases or scale factors that the residuals follow.
+    /// A drift of biases or scale factors visible in the residuals.
     pub fn drift(&self) -> Option<Finding> {
         self.drift.clone()
     }
 
-    /// That residuals are beyond chance, by which σ grow by this factor.
+    /// The finding on residuals beyond chance, with the growth factor of σ.
     pub fn large(&self, of: &'static str, growth: f64, base: Option<f64>) -> Finding {
         let worst = (self.times.clone(), self.worst.without);
         self.residuals.large(of, growth, worst, base)

@@ -1,7 +1,6 @@
-//! Rows by labels: the instrument is put with each axis up and down and turned about each by hand.
+//! Equations from labels: the instrument is placed by hand with each axis up and down and turned about each axis.
 //!
-//! Which way is north is not known, but it is the same way in all sections with one heading, and a turn carries it
-//! along.
+//! North is unknown, but common to all sections with the same heading, and turns carry it along.
 //!
 //! Source: Ferraris, Grimaldi, Parvis 1995, "Procedure for effortless in-field calibration of
 //! three-axial rate gyro and accelerometers", *Sensors and Materials* 7(5), without the gyros'
@@ -19,10 +18,10 @@ use crate::recording::LabelledMotion;
 use crate::run::motion::{LabelCheck, Rest, checks};
 use crate::run::{Dwell, MeanOutput, Run};
 
-/// Turns are followed in steps this long, s: within one a hand turns by a few degrees.
+/// Step of the integration of turns, s; within one step, a hand turns by a few degrees.
 const STEP: f64 = 0.02;
 
-/// A labelled section as far as it is used.
+/// The used part of a labelled section.
 #[derive(Debug, Clone)]
 pub struct Section {
     pub samples: Range<usize>,
@@ -56,7 +55,7 @@ impl Section {
     }
 }
 
-/// The sections that are used, and the labels of others.
+/// The used sections, and the labels of the others.
 #[derive(Default)]
 pub struct Used {
     pub sections: Vec<Section>,
@@ -89,7 +88,7 @@ impl Used {
     }
 }
 
-/// Mean outputs of both triads for the inputs that labels state.
+/// Mean outputs of both triads for the labelled inputs.
 pub fn observed(run: &Run, rests: &[Rest], sections: &[Section]) -> PerSensor<Observed> {
     PerSensor::from_fn(|sensor| Observed {
         sensor,
@@ -102,7 +101,7 @@ pub fn observed(run: &Run, rests: &[Rest], sections: &[Section]) -> PerSensor<Ob
     })
 }
 
-/// Of the gyros in all sections. The inputs share what tilts take off them, the ends of the turns, and Earth's rate.
+/// Gyro positions from all sections. The inputs share the reduction by tilts, the ends of the turns, and Earth rate.
 fn of_gyros(run: &Run, rests: &[Rest], sections: &[Section]) -> Vec<Known> {
     let sigma = run.segment_sigma;
     let level = run.site.earth_rate_n().y;
@@ -161,8 +160,8 @@ fn of_gyros(run: &Run, rests: &[Rest], sections: &[Section]) -> Vec<Known> {
     known.collect()
 }
 
-/// Of the accelerometers where the instrument stands. Of each position, what it is tilted by counts, too, for misaligned
-/// axes bring that to the one that is up. Not so of turns: tilts of their own make what is found of misalignment there.
+/// Accelerometer positions from static sections. The tilt of each position also counts, because misaligned axes project
+/// it onto the upward axis. This does not apply to turns, where independent tilts dominate the misalignment estimate.
 fn of_accelerometers(run: &Run, sections: &[Section]) -> Vec<Known> {
     let sigma = run.segment_sigma;
     let stands = sections.iter().filter_map(|section| match section.motion {
@@ -182,8 +181,8 @@ fn of_accelerometers(run: &Run, sections: &[Section]) -> Vec<Known> {
     known.collect()
 }
 
-/// Gravity along an axis. It is weighted as if nothing were known of how it falls on the other two axes:
-/// so the bias of each comes from its own two positions, as in half sums. What falls there is of [`by_tilts`].
+/// Gravity along an axis. It is weighted as if its components along the other two axes were unknown, so the bias of
+/// each axis comes from its own two positions, as in half sums. Those components come from [`by_tilts`].
 fn force_by_hand(
     sigma: f64,
     force: Vector3<f64>,
@@ -197,11 +196,11 @@ fn force_by_hand(
     }
 }
 
-/// An input along or about an axis that is within a degree or so of where it should be, and this noise.
+/// An input along or about an axis that is misplaced by about a degree, with this noise.
 ///
-/// To first order that turns the input into the other two axes. Along the axis it takes off the second
-/// order: half the sum of two squared angles. That is the square of σ in the mean, the same for all
-/// positions ([`shortened`]), and scatters by as much.
+/// To first order, the misplacement rotates the input into the other two axes. Along the axis it reduces the input to
+/// second order, by half the sum of two squared angles. The mean of this is σ², the same for all positions
+/// ([`shortened`]), with an equal scatter.
 fn set_by_hand(
     sigma: f64,
     input: Vector3<f64>,
@@ -217,47 +216,47 @@ fn set_by_hand(
     }
 }
 
-/// Variance of what a tilt takes off an input.
+/// Variance of the reduction of an input by a tilt.
 fn along(sigma: f64, input: &Vector3<f64>) -> Vector3<f64> {
     input.map(|component| (component * sigma.powi(2)).powi(2))
 }
 
-/// The square of what a small turn about any axis makes of each component of an input: the magnitude of the other two
-/// components.
+/// Squared effect of a small rotation about any axis on each component of an input: the squared magnitude of the other
+/// two components.
 fn across(input: &Vector3<f64>) -> Vector3<f64> {
     input.map(|component| input.norm_squared() - component.powi(2))
 }
 
-/// What tilts of this σ take off an input in the mean.
+/// Mean reduction of an input by tilts of this σ.
 fn shortened(position: &Position, sigma: f64) -> Matrix3<f64> {
     let mut shortened = Matrix3::zeros();
     shortened.set_column(0, &(position.input * -sigma.powi(2)));
     shortened
 }
 
-/// The same, and the tilts about each axis of the position of this number.
+/// The same, with the tilts about each axis of the position with this number.
 fn by_tilts(position: &Position, sigma: f64, number: usize) -> [(usize, Matrix3<f64>); 2] {
     let tilts = skew(position.input) * sigma;
     [(1, shortened(position, sigma)), (2 + number, tilts)]
 }
 
-/// Earth's rate along body axes where a section begins.
+/// Earth rate along body axes at the start of a section.
 #[derive(Debug, Clone, Copy)]
 struct Direction {
-    /// The same for all sections that share it.
+    /// The part common to all sections.
     number: usize,
     known: Vector3<f64>,
-    /// One σ of what is not.
+    /// 1σ of the rest.
     spread: Matrix3<f64>,
 }
 
-/// The rest in which this sample is.
+/// The dwell of this sample.
 fn rest_at(rests: &[Rest], sample: usize) -> Option<usize> {
     let is_in = |rest: &Rest| rest.dwell.samples.contains(&sample);
     rests.iter().position(is_in)
 }
 
-/// Earth's rate at the begin of each section. A turn that begins in a labelled rest begins with that rest's.
+/// Earth rate at the start of each section. A turn that starts in a labelled dwell uses that of the dwell.
 fn directions(run: &Run, rests: &[Rest], sections: &[Section]) -> Vec<Direction> {
     let rate = run.site.earth_rate_n();
     let mut next = 0;
@@ -301,8 +300,8 @@ fn directions(run: &Run, rests: &[Rest], sections: &[Section]) -> Vec<Direction>
     sections.iter().map(direction).collect()
 }
 
-/// Whether two sections with this axis up have one heading: what is level of Earth's rate is likelier to be
-/// the same in both than to have two directions.
+/// Whether two sections with this axis up have the same heading: a common horizontal Earth rate is more likely than two
+/// directions.
 fn share_heading(
     one: &Section,
     other: &Section,
@@ -323,7 +322,7 @@ fn share_heading(
     off / same + 2.0 * same.ln() <= off / apart + 2.0 * apart.ln()
 }
 
-/// Mean over a section of the rotation to its body axes from those at its begin, by nominal scales.
+/// Mean over a section of the rotation from its initial to its current body axes, with nominal scales.
 fn mean_turned_back(run: &Run, section: &Section) -> Matrix3<f64> {
     let imu = &run.recording.imu;
     let zero = run.instrument.prior.gyro.bias * imu.period;

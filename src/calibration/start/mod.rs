@@ -1,6 +1,6 @@
-//! Where the iterations begin: closed form, coarse start and the mounting of the instrument.
+//! Start of the iterations: closed form, coarse start and axis order.
 //!
-//! One set of equations ([`equations`]) with four kinds of rows: by a table, by labels, by gravity, by Earth rate.
+//! One set of equations ([`equations`]) with four kinds of rows: from a table, labels, gravity and Earth rate.
 
 pub mod attempt;
 mod both_triads;

@@ -12,16 +12,16 @@ use crate::imu::{
     InstallationForm, Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector,
 };
 
-/// Least eigenvalue of the correlations of a row's unknowns.
+/// Minimum eigenvalue of the correlations of the unknowns of a row.
 const SMALLEST_EIGENVALUE: f64 = 1e-4;
-/// A smaller step ends the iteration, over σ of the prior.
+/// A smaller step, in units of prior σ, ends the iteration.
 const SMALL: f64 = 1e-6;
-/// σ over the largest input of an output for which no noise is stated.
+/// σ of an output without stated noise, divided by the largest input.
 const NOISELESS: f64 = 1e-9;
 /// Number of the error of a table's base: of 1 rad about East, North and Up.
 pub const BASE: usize = 0;
 
-/// The mean output of a triad under an input that is known from elsewhere: at a position, or over a turn.
+/// The mean output of a triad under a known input, at a position or over a turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Position {
     /// Mean input along body axes, rad/s or m/s².
@@ -30,17 +30,17 @@ pub struct Position {
     pub output: Vector3<f64>,
     /// Variance of each output axis, (rad/s)² or (m/s²)².
     pub variance: Vector3<f64>,
-    /// The same, by which it is weighted: the variance itself unless that would trust it too much.
+    /// Variance for its weight: the variance itself, unless that would give it too much weight.
     pub weighted: Vector3<f64>,
 }
 
-/// A position, and the errors that its input has in common with others.
+/// A position, and the errors that its input shares with others.
 #[derive(Debug, Clone)]
 pub struct Known {
     pub position: Position,
     /// Begin and end, s.
     pub times: [f64; 2],
-    /// How the input changes with errors of unit covariance, by number, and with that of the [`BASE`].
+    /// Response of the input to unit-covariance errors, by number, and to that of the [`BASE`].
     pub errors: Vec<(usize, Matrix3<f64>)>,
 }
 
@@ -54,17 +54,17 @@ pub struct Observed {
     pub known: Vec<Known>,
 }
 
-/// One triad as its positions show it.
+/// One triad estimated from its positions.
 #[derive(Clone)]
 pub struct Fit {
     pub triad: Triad,
     pub covariance: SMatrix<f64, PER_TRIAD, PER_TRIAD>,
-    /// How it follows the errors that its inputs have in common, three columns each.
+    /// Response to the common errors of its inputs, three columns each.
     pub by_errors: DMatrix<f64>,
 }
 
 impl Observed {
-    /// The same with this more variance on every axis of these positions, as of a bias that is new at each.
+    /// The same with additional variance on every axis of these positions, as from an independent bias at each.
     pub fn widened(&self, variance: f64, places: &[usize]) -> Self {
         let mut wider = self.clone();
         for &place in places {
@@ -75,7 +75,7 @@ impl Observed {
         wider
     }
 
-    /// The same on a table's base that is known to this σ, rad.
+    /// The same with a table base known to this σ, rad.
     pub fn on_base(&self, sigma: f64) -> Self {
         Self {
             base_sigma: self.base_sigma.map(|_| Vector3::repeat(sigma)),
@@ -139,7 +139,7 @@ impl Observed {
         equations
     }
 
-    /// Equations of `A` and `D`, of which nothing is known beforehand.
+    /// Equations of `A` and `D` without a prior.
     fn of_sensitivity(&self, at: (Matrix3<f64>, Vector3<f64>)) -> Equations {
         let mut sigma = ParameterVector::zeros();
         let mut of_triad = sigma.fixed_rows_mut::<PER_TRIAD>(parameter(self.sensor, 0));
@@ -162,14 +162,14 @@ impl Observed {
         self.of_sensitivity((triad.sensitivity(), triad.bias))
     }
 
-    /// What positions leave of any triad, their inputs' errors taken through this one.
+    /// Residuals of positions after the best-fit triad, with the input errors propagated through this one.
     pub fn residuals(&self, triad: &Triad) -> Option<Residuals> {
         let equations = self.about(triad);
         let (design, residual) = equations.scaled();
         Residuals::new(&design, &residual, &equations.errors())
     }
 
-    /// One triad from positions; with what is known beforehand where they do not know every parameter better.
+    /// One triad from positions, with the prior if the positions do not determine every parameter better.
     pub fn fitted(&self, model: &Model) -> Result<Fit, CalibrationError> {
         let first = parameter(self.sensor, 0);
         let sigma = model.prior_sigma.fixed_rows::<PER_TRIAD>(first);
@@ -197,8 +197,8 @@ impl Observed {
         Ok(self.fit(*triads.get(sensor), &equations, &gain, &by_unknowns))
     }
 
-    /// One triad from positions alone: least squares for `A = K C` and `D` row by row, then the form's split. `None`
-    /// if fewer than four positions, or positions that leave a row undetermined.
+    /// One triad from positions alone: least squares for `A = K C` and `D` row by row, then the split of the form.
+    /// `None` if fewer than four positions, or positions that leave a row undetermined.
     pub fn determined(&self, form: InstallationForm) -> Option<Fit> {
         let mut rows = TriadVector::from_column_slice(Matrix4x3::identity().as_slice());
         let mut equations = self.of_sensitivity(sensitivity_and_bias(&rows));
@@ -224,7 +224,7 @@ impl Observed {
         Some(self.fit(triad, &equations, &gain?, &by_rows))
     }
 
-    /// A triad whose parameters follow the unknowns of equations so, and these the residuals by a gain.
+    /// A triad from a gain, given the derivatives of its parameters with respect to the unknowns.
     fn fit(
         &self,
         triad: Triad,
@@ -243,7 +243,7 @@ impl Observed {
     }
 }
 
-/// `A` and `D` of their entries row by row.
+/// `A` and `D` from their entries row by row.
 fn sensitivity_and_bias(rows: &TriadVector) -> (Matrix3<f64>, Vector3<f64>) {
     let rows = Matrix4x3::from_column_slice(rows.as_slice()).transpose();
     (
@@ -252,8 +252,8 @@ fn sensitivity_and_bias(rows: &TriadVector) -> (Matrix3<f64>, Vector3<f64>) {
     )
 }
 
-/// Whether positions leave a row undetermined: in a plane they leave an eigenvalue of nothing but rounding
-/// and table error, whatever the weights.
+/// Whether positions leave a row undetermined: positions in a plane leave an eigenvalue due only to rounding and table
+/// error, for any weights.
 fn in_a_plane(equations: &Equations) -> bool {
     let (mut design, _) = equations.scaled();
     let norms: Vec<f64> = design
@@ -264,9 +264,9 @@ fn in_a_plane(equations: &Equations) -> bool {
     norms.contains(&0.0) || correlations.symmetric_eigenvalues().min() < SMALLEST_EIGENVALUE
 }
 
-/// One triad from positions that have nothing in common: least squares for `A = K C` and `D` row by row, then the
-/// form's split. `None` if fewer than four positions or positions that leave a row undetermined.
-/// Gives the triad and the covariance of its parameters.
+/// One triad from positions without common errors: least squares for `A = K C` and `D` row by row, then the split of
+/// the form. `None` if fewer than four positions or positions that leave a row undetermined. Gives the triad and the
+/// covariance of its parameters.
 pub fn six_position_triad(
     positions: &[Position],
     form: InstallationForm,

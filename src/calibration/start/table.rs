@@ -1,4 +1,4 @@
-//! Rows by the attitudes of a table.
+//! Equations from the attitudes of a table.
 
 use std::ops::Range;
 
@@ -17,7 +17,7 @@ use crate::navigation::{Block, Navigator, State};
 use crate::run::{Dwell, MeanOutput};
 use crate::turntable::axis_response;
 
-/// What a triad senses of a site at rest, along East, North and Up.
+/// Input of a triad at rest at a site, along East, North and Up.
 pub fn sensed(site: &Site, sensor: Sensor) -> Vector3<f64> {
     match sensor {
         Sensor::Gyro => site.earth_rate_n(),
@@ -25,11 +25,11 @@ pub fn sensed(site: &Site, sensor: Sensor) -> Vector3<f64> {
     }
 }
 
-/// Mean outputs in some dwells of the problem's first run under the inputs that the table's attitudes make; `None`
-/// without a table.
+/// Mean outputs in some dwells of the first run of the problem, with inputs from the table attitudes; `None` without a
+/// table.
 ///
-/// An attitude that is wrong by `C_true = (I + [e×]) C_read` gives the input an error of `C_readᵀ [u_n×] e`: of the
-/// base, of the axes, of the position that the table took up, of its readings there.
+/// An attitude error `C_true = (I + [e×]) C_read` causes an input error of `C_readᵀ [u_n×] e`, from base, axes,
+/// position and readings.
 pub fn positions(problem: &Problem, dwells: &[Dwell], sensor: Sensor) -> Option<Observed> {
     let (run, model) = (problem.run(), &problem.model);
     let axes = &model.geometry.axes;
@@ -73,8 +73,8 @@ pub fn positions(problem: &Problem, dwells: &[Dwell], sensor: Sensor) -> Option<
     })
 }
 
-/// Equations of both triads: over each dwell the velocity must stay zero and the attitude must stay; over each move
-/// between two dwells the gyros must turn by what the table says.
+/// Equations of both triads: in each dwell, velocity must stay zero and attitude constant; over each move between two
+/// dwells, the gyros must measure the rotation of the table.
 pub fn carried(
     problem: &Problem,
     triads: &PerSensor<Triad>,
@@ -91,7 +91,7 @@ pub fn carried(
     Ok(equations)
 }
 
-/// Adds a dwell, and the move to it from the dwell before.
+/// Adds a dwell and the move before it.
 fn add_carried(
     equations: &mut Equations,
     problem: &Problem,

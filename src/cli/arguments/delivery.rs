@@ -1,4 +1,4 @@
-//! Where output goes, alike in every command.
+//! Output options, identical in every command.
 
 use std::path::{Path, PathBuf};
 
@@ -8,29 +8,28 @@ use turncal::report::{self, Document};
 
 use crate::cli::terminal::show;
 
-/// The option that all commands that write share.
+/// Overwrite option of all commands that write files.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub struct Overwrite {
-    /// Replace the output directory if it exists and holds only what turncal wrote
+    /// Replace the output directory if it exists and contains only turncal output
     #[arg(long)]
     pub force: bool,
 }
 
 impl Overwrite {
-    /// Begins an output directory; none of `inputs` may lie in it.
+    /// Creates an output directory; none of `inputs` may be inside it.
     pub fn directory(self, target: &Path, inputs: &[&Path]) -> Result<WholeDirectory, FileError> {
         WholeDirectory::create(target, self.force, inputs)
     }
 }
 
-/// Where the figures of a command go: as a report into a directory, and as JSON or text to standard
-/// output.
+/// Output of the results: as a report into a directory, and as JSON or text on standard output.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Delivery {
     /// Directory for a report
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Print the figures as one JSON document and nothing else
+    /// Print the results as one JSON document and nothing else
     #[arg(long)]
     json: bool,
     #[command(flatten)]
@@ -38,12 +37,12 @@ pub struct Delivery {
 }
 
 impl Delivery {
-    /// The directory, if one is asked for.
+    /// Requested directory.
     pub fn output(&self) -> Option<&Path> {
         self.output.as_deref()
     }
 
-    /// Whether JSON is asked for.
+    /// Whether JSON is requested.
     pub fn json(&self) -> bool {
         self.json
     }
@@ -53,8 +52,7 @@ impl Delivery {
         self.overwrite.force
     }
 
-    /// Begins the directory, if one is asked for, so that long work is not done in vain; none of
-    /// `inputs` may lie in it.
+    /// Creates the requested directory before any long computation; none of `inputs` may be inside it.
     pub fn begin(&self, inputs: &[&Path]) -> Result<Begun<'_>, FileError> {
         let target = self.output.as_deref();
         let begun = target.map(|target| {
@@ -68,14 +66,14 @@ impl Delivery {
     }
 }
 
-/// A delivery whose directory has been begun.
+/// Delivery with its directory created.
 pub struct Begun<'a> {
     directory: Option<(&'a Path, WholeDirectory)>,
     json: bool,
 }
 
 impl Begun<'_> {
-    /// Writes files into the directory, and shows nothing.
+    /// Writes files into the directory without printing.
     pub fn fill(self, write: impl FnOnce(&Path) -> Result<(), FileError>) -> Result<(), FileError> {
         if let Some((_, whole)) = self.directory {
             write(&whole.path())?;
@@ -84,7 +82,7 @@ impl Begun<'_> {
         Ok(())
     }
 
-    /// Writes and prints a document as it is asked for.
+    /// Writes and prints a document as requested.
     pub fn deliver(self, document: &Document) -> anyhow::Result<()> {
         let mut page = None;
         if let Some((target, whole)) = self.directory {
@@ -100,7 +98,7 @@ impl Begun<'_> {
     }
 }
 
-/// Refuses an output file that is one of the inputs: not even force replaces those.
+/// Refuses an output file that is one of the inputs, even with `--force`.
 pub fn keep<'a>(
     output: &Path,
     inputs: impl IntoIterator<Item = &'a PathBuf>,
@@ -111,8 +109,8 @@ pub fn keep<'a>(
     let is_target = |input: &PathBuf| input.canonicalize().is_ok_and(|input| input == target);
     if inputs.into_iter().any(is_target) {
         bail!(
-            "{}: found an input of this command, expected a name that is free. Choose another name; \
-             replacing this file would delete what the output is made from.",
+            "{}: found an input of this command, expected an unused name. Choose another name, because replacing \
+             this file would delete the input.",
             output.display()
         );
     }

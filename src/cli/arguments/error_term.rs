@@ -27,42 +27,39 @@ fn help(term: ErrorTerm) -> &'static str {
     match term {
         ErrorTerm::GaussMarkovBias => "Gauss–Markov biases",
         ErrorTerm::TableBase => "Level and north of the table",
-        ErrorTerm::TableAxes(AxisError::Tilt) => "Non-orthogonality of the table's axes",
+        ErrorTerm::TableAxes(AxisError::Tilt) => "Non-orthogonality of the table axes",
         ErrorTerm::TableAxes(AxisError::Wobble) => {
-            "Wobble of the table's axes, once and twice a turn"
+            "Wobble of the table axes, once and twice per turn"
         }
         ErrorTerm::TableAxes(AxisError::Encoder) => {
-            "Errors of the table's encoders, once and twice a turn"
+            "Errors of the table encoders, once and twice per turn"
         }
         ErrorTerm::Instrument(term) => term.entry().help,
     }
 }
 
-/// Ends the program, with its status for wrong usage, if this is an error of the table and the table is
-/// not observed.
+/// Exits with the status for wrong usage if this is a table error and the table is not observed.
 pub fn needs_table(term: ErrorTerm, aiding: Option<Aiding>) {
     let of_table = matches!(term, ErrorTerm::TableBase | ErrorTerm::TableAxes(_));
     if of_table && aiding == Some(Aiding::Velocity) {
         let message = format!(
-            "--aiding velocity does not observe the table, so {} makes no difference; leave one of them \
-             out\n",
+            "--aiding velocity does not use the table, so {} has no effect; omit one of them\n",
             term.name()
         );
         clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
     }
 }
 
-/// Switches an error term on in a problem.
+/// Switches on an error term in a problem.
 pub fn switch_on(term: ErrorTerm, problem: &mut Problem) -> anyhow::Result<()> {
     if !problem.model.can_have(term) {
         bail!(
-            "{}: --with {} needs {}; leave it out, or add that to the run",
+            "{}: --with {} needs {}. Omit it, or add this to the run",
             problem.run().recording.name,
             term.name(),
             match problem.model.aiding {
-                Aiding::Table =>
-                    "the angles of the table's axes in the table's log, not a quaternion",
-                Aiding::Velocity => "the table's log",
+                Aiding::Table => "the axis angles in the table log, not a quaternion",
+                Aiding::Velocity => "the table log",
             }
         );
     }

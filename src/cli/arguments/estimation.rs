@@ -1,4 +1,4 @@
-//! How a run is estimated, alike for one run and for a lot.
+//! Estimation options of a run, identical for a single run and a lot.
 
 use anyhow::Context;
 use clap::error::ErrorKind;
@@ -11,7 +11,7 @@ use turncal::run::{Aiding, Run};
 
 use super::error_term::{error_term, needs_table, switch_on};
 
-/// Arguments that say how.
+/// Estimation options.
 #[derive(Debug, Clone, Serialize, clap::Args)]
 pub struct Estimation {
     /// Estimation method
@@ -20,10 +20,10 @@ pub struct Estimation {
     /// Form of the installation matrix
     #[arg(long, value_enum, default_value_t)]
     installation: InstallationForm,
-    /// Observations of the filter [default: table if the run has its log, else velocity]
+    /// Observations used by the filter [default: table if the run has a table log, otherwise velocity]
     #[arg(long, value_enum)]
     aiding: Option<Aiding>,
-    /// Error terms to estimate, in addition to those that the run switches on [default: those that the data support]
+    /// Error terms to estimate, in addition to those switched on in run.toml [default: those supported by the data]
     #[arg(long, value_name = "TERM", value_parser = error_term(), value_delimiter = ',')]
     #[serde(serialize_with = "names")]
     with: Vec<ErrorTerm>,
@@ -33,12 +33,12 @@ pub struct Estimation {
 }
 
 impl Estimation {
-    /// Ends the program where arguments exclude each other.
+    /// Exits if arguments exclude each other.
     pub fn check(&self) {
         if let (Method::SixPosition, Some(term)) = (self.method, self.with.first()) {
             let message = format!(
-                "--with {}: --method six-position estimates scale factors, installation and biases only; \
-                 leave --with out, or estimate it by --method ekf\n",
+                "--with {}: --method six-position estimates only scale factors, misalignments and biases; omit \
+                 --with, or use --method ekf\n",
                 term.name()
             );
             clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
@@ -48,7 +48,7 @@ impl Estimation {
         }
     }
 
-    /// The problem that a run poses.
+    /// Calibration problem of a run.
     pub fn problem<'a>(&self, run: &'a Run, path: &std::path::Path) -> anyhow::Result<Problem<'a>> {
         if self.aiding == Some(Aiding::Table) && run.recording.table.is_none() {
             return Err(CalibrationError::NoTable).with_context(|| path.display().to_string());
@@ -60,7 +60,7 @@ impl Estimation {
         Ok(problem)
     }
 
-    /// The problem that recordings of one instrument pose together.
+    /// Joint calibration problem of several recordings of one instrument.
     pub fn together<'a>(
         &self,
         runs: &[&'a Run],
@@ -68,8 +68,8 @@ impl Estimation {
     ) -> anyhow::Result<Problem<'a>> {
         if matches!(self.method, Method::SixPosition) {
             anyhow::bail!(
-                "--method six-position: the closed form is of one recording at one temperature; leave it out, or \
-                 calibrate each run by itself"
+                "--method six-position handles only one recording at one temperature; omit it, or calibrate each run \
+                 separately"
             );
         }
         let mut problem = Problem::together(runs, &self.options(), together)?;
@@ -89,7 +89,7 @@ impl Estimation {
     }
 }
 
-/// Error terms by the names of the command line.
+/// Error terms by their command-line names.
 fn names<S: Serializer>(terms: &[ErrorTerm], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_seq(terms.iter().map(|term| term.name()))
 }

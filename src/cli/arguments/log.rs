@@ -1,4 +1,4 @@
-//! A run.toml or a log where a run is asked for.
+//! A run.toml or a log as the argument of a command.
 
 use std::path::{Path, PathBuf};
 
@@ -10,11 +10,11 @@ use turncal::report::terminal::printable;
 
 use super::{latitude, positive};
 
-/// What is stated of a log that has no run.toml.
+/// Statements about a log without a run.toml.
 #[derive(Debug, Clone, PartialEq, Default, clap::Args)]
-#[command(next_help_heading = "Of a log without run.toml")]
+#[command(next_help_heading = "For a log without run.toml")]
 pub struct OfLog {
-    /// File with the rows of the accelerometers, if the log has those of the gyros only
+    /// File with the accelerometer rows, if the log contains only the gyros
     #[arg(long, value_name = "ACCEL.csv", conflicts_with = "stream")]
     accel_file: Option<PathBuf>,
     /// Rows per second
@@ -29,18 +29,17 @@ pub struct OfLog {
     /// Gravity at the site, m/s²
     #[arg(long, value_name = "M/S2", value_parser = positive)]
     gravity: Option<f64>,
-    /// Unit of the gyros: rad/s, deg/s, deg/h, or what one count is, such as '1/131 deg/s'; of increments rad, deg,
-    /// arcsec
+    /// Unit of the gyros: rad/s, deg/s, deg/h, or the size of one count, such as '1/131 deg/s'; for increments rad,
+    /// deg, arcsec
     #[arg(long, value_name = "UNIT", value_parser = |text: &str| StatedUnit::parse(Sensor::Gyro, text))]
     gyro_unit: Option<StatedUnit>,
-    /// Unit of the accelerometers: m/s^2, g, or what one count is, such as '1/16384 g'; of increments m/s, g*s
+    /// Unit of the accelerometers: m/s^2, g, or the size of one count, such as '1/16384 g'; for increments m/s, g*s
     #[arg(long, value_name = "UNIT", value_parser = |text: &str| StatedUnit::parse(Sensor::Accel, text))]
     accel_unit: Option<StatedUnit>,
-    /// Sensor whose data sheet gives noise and tolerances: a name that turncal list shows, such as bmi088, or a TOML
-    /// file
+    /// Sensor whose data sheet gives noise and tolerances: a name from turncal list, such as bmi088, or a TOML file
     #[arg(long, value_name = "NAME")]
     sensor: Option<String>,
-    /// Noise figures and, without --rate, rows per second, from Kalibr's imu.yaml
+    /// Kalibr imu.yaml with noise figures and (without --rate) rows per second
     #[arg(long, value_name = "YAML")]
     noise_file: Option<PathBuf>,
     /// Stream of the instrument [default: the one with the most samples]
@@ -49,7 +48,7 @@ pub struct OfLog {
 }
 
 impl OfLog {
-    /// The name of the stream, and what is stated.
+    /// Stream name and statements.
     pub fn stated(&self) -> anyhow::Result<(Option<&str>, Stated)> {
         let kalibr = self.noise_file.as_deref();
         let kalibr = kalibr.map(KalibrImu::read).transpose()?;
@@ -76,7 +75,7 @@ impl OfLog {
         Ok((self.stream.as_deref(), stated))
     }
 
-    /// Reads a run, or a log with what is stated of it; what was found in a log is shown.
+    /// Reads a run, or a log with the given statements; shows the fields found in a log.
     pub fn open(&self, path: &Path) -> anyhow::Result<Opened> {
         self.open_with(path, |found| show_found(path, found))
     }
@@ -88,7 +87,7 @@ impl OfLog {
     }
 }
 
-/// Shows on standard error what was found in a log.
+/// Shows the fields found in a log on standard error.
 pub fn show_found(path: &Path, found: &[Found]) {
     tell!("Found in {}:", printable(&path.display().to_string()));
     for of in found {
@@ -98,18 +97,18 @@ pub fn show_found(path: &Path, found: &[Found]) {
     }
 }
 
-/// The path of a run.toml, where a log would say too little.
+/// Path of a run.toml, for commands that do not accept a log.
 pub fn run_file(text: &str) -> Result<PathBuf, String> {
     let path = run_or_log(text)?;
     match path.is_file() && path.extension().is_none_or(|end| end != "toml") {
         true => Err(format!(
-            "this is a log, expected the run.toml that describes it; turncal init {text} drafts one"
+            "found a log, expected the run.toml that describes it. Draft one with turncal init {text}"
         )),
         false => Ok(path),
     }
 }
 
-/// The path of a run.toml or a log, or `-`; if a run's directory is given instead, the error names the file in it.
+/// Path of a run.toml or a log, or `-`; for a run directory, the error names the file in it.
 pub fn run_or_log(text: &str) -> Result<PathBuf, String> {
     let path = Path::new(text);
     let inside = path.join("run.toml");

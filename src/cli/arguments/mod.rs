@@ -1,4 +1,4 @@
-//! What commands have in common: their inputs, how they estimate, where results go.
+//! Options common to several commands: inputs, estimation, output.
 
 mod delivery;
 mod error_term;

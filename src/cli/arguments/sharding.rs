@@ -9,10 +9,10 @@ use turncal::study::{Shard, Study};
 use super::{Delivery, shard};
 use crate::cli::terminal::Runs;
 
-/// The part of a study that is to be made.
+/// Part of a study to compute.
 #[derive(Debug, Clone, Copy, clap::Args)]
 pub struct Sharding {
-    /// Make part i of M of the runs into DIR, for turncal merge
+    /// Compute part i of M of the runs and write it to DIR for turncal merge
     #[arg(long, value_name = "i/M", value_parser = shard, requires = "output", conflicts_with = "json", help_heading = "Advanced")]
     shard: Option<Shard>,
 }
@@ -33,7 +33,7 @@ impl Sharding {
         let job = Job::new(job, serde_json::to_value(study)?, runs);
         let part = Part::new(job, Some(shard));
         if !delivery.force() && part_is_there(target, &part) {
-            tell!("part {shard} is there already");
+            tell!("part {shard} already exists");
             return Ok(true);
         }
         let begun = delivery.begin(inputs)?;

@@ -1,4 +1,4 @@
-//! What arguments must be, said in the field's words.
+//! Value ranges of arguments.
 
 use std::path::Path;
 use std::time::Duration;
@@ -41,10 +41,10 @@ pub fn latitude(text: &str) -> Result<f64, String> {
     number(text, -90.0, 90.0)
 }
 
-/// Hours of a navigation.
+/// Navigation time, h.
 pub fn hours(text: &str) -> Result<f64, String> {
     between(text, INTERVAL / HOUR, 1000.0)
-        .ok_or_else(|| "expected a number of hours, from a minute (0.0167) to 1000".to_owned())
+        .ok_or_else(|| "expected a number of hours from 0.0167 (one minute) to 1000".to_owned())
 }
 
 /// Seed of all random numbers.
@@ -53,7 +53,7 @@ pub fn seed(text: &str) -> Result<u64, String> {
         .map_err(|_| format!("expected a whole number from 0 to {}", u64::MAX))
 }
 
-/// How many runs, instruments or samples a study has: a scatter needs two.
+/// Number of runs, instruments or samples of a study; a scatter needs two.
 pub fn at_least_two(text: &str) -> Result<u64, String> {
     const MOST: u64 = 1_000_000;
     match text.parse() {
@@ -62,7 +62,7 @@ pub fn at_least_two(text: &str) -> Result<u64, String> {
     }
 }
 
-/// A calibration as it is at a temperature in °C; without one as it stands.
+/// A calibration at a temperature in °C, or unchanged without one.
 pub fn at_temperature(path: &Path, temperature: Option<f64>) -> anyhow::Result<Calibration> {
     let record = Calibration::read(path)?;
     match temperature {

@@ -1,4 +1,4 @@
-//! A run's calibration with all that is said of it, alike for one run and for a lot.
+//! Calibration of a run with its checks, the same for a single run and a lot.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -25,14 +25,14 @@ pub struct Truth {
     terms: BTreeMap<String, TermRecord>,
 }
 
-/// A calibration with what was said of it.
+/// A calibration with its checks.
 pub struct Calibrated {
     pub calibration: Calibration,
     assessment: Assessment,
 }
 
 impl Calibrated {
-    /// Judges a solution and says what it is worth.
+    /// Checks a solution.
     pub fn new(problem: &Problem, solution: &mut Solution) -> anyhow::Result<Self> {
         let assessment = solution.assess(problem)?;
         Ok(Self {
@@ -41,7 +41,7 @@ impl Calibrated {
         })
     }
 
-    /// With the files that a run.toml or campaign.toml names.
+    /// Adds the files that a run.toml or campaign.toml names.
     pub fn of_files(mut self, path: &Path, run: &Run) -> Self {
         stamp(&mut self.calibration, path);
         let is_log = path.extension().is_none_or(|end| end != "toml");
@@ -52,7 +52,7 @@ impl Calibrated {
         self
     }
 
-    /// The report on it.
+    /// Its report.
     pub fn document(
         &self,
         (problem, name): (&Problem, &str),
@@ -102,7 +102,7 @@ impl Calibrated {
     }
 }
 
-/// What was to be expected of a record alone; of several nothing is predicted.
+/// Predicted accuracy of a single recording; none for several recordings.
 fn predicted(problem: &Problem, solution: &Solution) -> Option<Expected> {
     let path = match (solution.closed_form(), problem.model.aiding) {
         (Some(_), _) => return None,
@@ -115,7 +115,7 @@ fn predicted(problem: &Problem, solution: &Solution) -> Option<Expected> {
         .flatten()
 }
 
-/// Says in a calibration of which files it was made.
+/// Records the input files in a calibration.
 pub fn stamp(calibration: &mut Calibration, path: &Path) {
     if let Some(provenance) = &mut calibration.provenance {
         provenance.inputs.clear();
@@ -131,7 +131,7 @@ fn add(calibration: &mut Calibration, path: &Path) {
     }
 }
 
-/// What a closed form was made of, in a few words.
+/// Short description of the data used by a closed form.
 pub fn note(closed_form: &ClosedForm) -> String {
     let PerSensor { gyro, accel } = closed_form.positions;
     let turns = closed_form.turns;
@@ -141,7 +141,7 @@ pub fn note(closed_form: &ClosedForm) -> String {
         }
         Reference::Labels => format!("{accel} labelled positions and {turns} labelled turns"),
         Reference::Gravity => {
-            format!("gravity in {accel} dwells and its direction over {turns} turns")
+            format!("gravity in {accel} dwells and its direction change over {turns} turns")
         }
     };
     let minutes = closed_form.standing_time / 60.0;
@@ -149,7 +149,8 @@ pub fn note(closed_form: &ClosedForm) -> String {
     format!("{from}, {minutes:.digits$} min at rest")
 }
 
-/// Navigates standing level at the run's site by the calibration of each method, for as long as suits them.
+/// Simulates stationary, level navigation at the site of the run with the calibration of each method, for a duration
+/// suited to both.
 pub fn navigate(
     run: &Run,
     methods: &[(&'static str, &Estimate)],
@@ -164,7 +165,7 @@ pub fn navigate(
     all.collect()
 }
 
-/// Begin and end of each dwell, s.
+/// Start and end of each dwell, s.
 pub fn dwell_times(problem: &Problem) -> Vec<Range<f64>> {
     let imu = &problem.run().recording.imu;
     let dwells = problem.dwells();
@@ -180,14 +181,14 @@ pub fn write_report(document: &Document, directory: &Path) -> anyhow::Result<()>
     Ok(turncal::report::write(document, directory)?)
 }
 
-/// A truth in the general form, which can hold any.
+/// A truth, converted to the general form, which can represent any other.
 pub fn read_truth(path: &Path, run: &Run, body_frame: BodyFrame) -> anyhow::Result<Truth> {
     let record = Calibration::read(path)?;
     if let Some(unit) = &record.unit
         && *unit != run.instrument.unit
     {
         bail!(
-            "{}: units are {} and {}, those of the run {} and {}; give the truth of this run",
+            "{}: units are {} and {}, but those of the run are {} and {}. Give the truth of this run",
             path.display(),
             unit.gyro,
             unit.accel,

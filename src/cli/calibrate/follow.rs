@@ -9,8 +9,8 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::Context;
 use turncal::lot::Specification;
-use turncal::report::terminal::printable;
-use turncal::report::{session, wrapped};
+use turncal::report::session;
+use turncal::report::terminal::{printable, wrapped};
 use turncal::run::Run;
 use turncal::survey::{Advisor, Status};
 

@@ -21,10 +21,10 @@ use super::calibrated::{Calibrated, write_report};
 use crate::cli::arguments::{Estimation, OfLog};
 use crate::cli::terminal::{Runs, piece_by_piece, show};
 
-/// Written where no directory is named.
+/// Default output directory.
 pub const DIRECTORY: &str = "lot-calibration";
 
-/// What is asked of a lot.
+/// Request for a lot.
 pub struct Request<'a> {
     pub runs: &'a [PathBuf],
     pub of_log: &'a OfLog,
@@ -84,14 +84,14 @@ impl Request<'_> {
         let inputs: Vec<&Path> = self.runs.iter().map(PathBuf::as_path).collect();
         let waiting = || {
             let name = printable(&target.display().to_string());
-            tell!("note: another turncal works in {name}; waiting until it is done");
+            tell!("note: another turncal process is using {name}; waiting for it to finish");
         };
         Ok(LotDirectory::open(
             target, part, self.force, &inputs, &waiting,
         )?)
     }
 
-    /// A unit as it is kept, else calibrated.
+    /// A stored unit, or else a newly calibrated one.
     fn unit(
         &self,
         run: &Path,
@@ -114,7 +114,7 @@ impl Request<'_> {
         Ok(unit)
     }
 
-    /// The unit with its report; a failure is its result, too.
+    /// The unit with its report; a failure is also a result.
     fn calibrate(&self, path: &Path, name: &str) -> (Unit, Option<Document>) {
         let calibrated = self.calibrated(path);
         let unit = |meta, calibrated| Unit {
@@ -158,7 +158,7 @@ impl Request<'_> {
 
 type Meta = BTreeMap<String, String>;
 
-/// Writes and prints what is said of a lot; one with units that were not calibrated is a failure.
+/// Writes and prints the report of a lot; fails if a unit was not calibrated.
 pub fn deliver(
     lot: &Lot,
     directory: Option<(&LotDirectory, &Path)>,
@@ -178,7 +178,7 @@ pub fn deliver(
     let failed: Vec<&str> = lot.failures().map(|(unit, _)| unit.name.as_str()).collect();
     if !failed.is_empty() {
         bail!(
-            "{} of {} units were not calibrated: {}; the reasons are in the warnings",
+            "{} of {} units were not calibrated: {} (see the warnings for reasons)",
             failed.len(),
             lot.rows.len(),
             failed.join(", ")
@@ -190,13 +190,13 @@ pub fn deliver(
     }
 }
 
-/// All is done, but units do not meet their specification.
+/// The lot was calibrated, but units do not meet their specification.
 #[derive(Debug, thiserror::Error)]
 #[error("the specification is not met: {0}")]
 pub struct NotMet(pub String);
 
-/// A name for each unit: of its run's directory, or of its file where that is not called run.toml, with as many
-/// directories above as it takes to tell all apart.
+/// A name for each unit: its run directory, or its file if that is not called run.toml, with as many parent directories
+/// as needed to make names unique.
 fn unit_names(runs: &[PathBuf]) -> anyhow::Result<Vec<String>> {
     let full: Vec<PathBuf> = runs
         .iter()
@@ -221,7 +221,7 @@ fn unit_names(runs: &[PathBuf]) -> anyhow::Result<Vec<String>> {
     }
     let twice = (0..full.len()).find(|&k| full[..k].contains(&full[k]));
     let twice = twice.map_or_else(String::new, |k| runs[k].display().to_string());
-    bail!("{twice}: found this run twice, expected each unit once; leave one out")
+    bail!("{twice}: found this run twice, expected each unit once. Remove one")
 }
 
 #[cfg(test)]

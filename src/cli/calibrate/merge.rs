@@ -1,4 +1,4 @@
-//! `turncal merge`: parts of a job as one result.
+//! `turncal merge`: merges the parts of a job.
 
 use std::path::{Path, PathBuf};
 
@@ -17,8 +17,8 @@ use crate::cli::arguments::Delivery;
 
 /// Merges the parts of a sharded job; the result is identical to a single run
 ///
-/// Parts are directories written with --shard, of a lot or of a study. Their order, number and machines do not
-/// matter; missing or duplicate runs, and parts of another job, are refused.
+/// Parts are directories of a lot or a study, written with --shard. Their order, number and machines do not matter;
+/// missing or duplicate runs and parts of a different job are refused.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:
   turncal study accuracy --runs 500 --shard 1/2 -o part-1
@@ -56,7 +56,7 @@ impl Merge {
         let study: S = serde_json::from_value(parts.job.options.clone()).with_context(|| {
             let first = self.parts.first().map_or(Path::new(""), PathBuf::as_path);
             format!(
-                "{}: job.json does not state a study; make the parts again",
+                "{}: job.json does not describe a study. Make the parts again",
                 first.display()
             )
         })?;
@@ -69,7 +69,7 @@ impl Merge {
         let part = Part::new(parts.job.clone(), None);
         let waiting = || {
             let name = printable(&target.unwrap_or(Path::new("")).display().to_string());
-            tell!("note: another turncal works in {name}; waiting until it is done");
+            tell!("note: another turncal process is using {name}; waiting for it to finish");
         };
         let open =
             |target| LotDirectory::open(target, &part, self.delivery.force(), inputs, &waiting);

@@ -35,9 +35,9 @@ const HIGHEST_ORDER_AT_REST: usize = 5;
 /// Heading of the options of a log that is still being written.
 const FOLLOWING: &str = "Of a log that is being written";
 
-/// Estimates scale factors, installation and biases of a run
+/// Estimates scale factors, misalignments and biases from a run
 ///
-/// Writes DIR/calibration.json and DIR/report/ and prints a summary. The command fails if the filter does not
+/// Writes DIR/calibration.json and DIR/report/, and prints a summary. The command fails if the filter does not
 /// converge.
 ///
 /// With --temperature, parameters depend on the temperature column; for an instrument at rest in one attitude, only
@@ -65,28 +65,28 @@ const FOLLOWING: &str = "Of a log that is being written";
   turncal calibrate --follow imu.csv --specification mems-by-hand
   turncal calibrate lot/*/run.toml --shard 3/8 -o part-3")]
 pub struct Calibrate {
-    /// The run's run.toml, or a log, or - for rows of text on standard input; several are the units of a lot; a
-    /// campaign.toml names recordings of one instrument
+    /// A run.toml, a log, or - for text on standard input; several are units of a lot; a campaign.toml lists recordings
+    /// of one instrument
     #[arg(required = true, value_name = "RUN.toml|LOG", value_parser = run_or_log)]
     runs: Vec<PathBuf>,
     #[command(flatten)]
     of_log: OfLog,
-    /// Directory to write [default: NAME-calibration, NAME-calibration-six-position for that method,
-    /// lot-calibration for a lot; nothing with --json]
+    /// Output directory [default: NAME-calibration, NAME-calibration-six-position for that method, lot-calibration for
+    /// a lot; none with --json]
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     #[command(flatten)]
     estimation: Estimation,
-    /// Let parameters depend on the temperature column of the run; campaigns do so if temperature is known
+    /// Let parameters depend on the temperature column of the run (the default for campaigns with known temperature)
     #[arg(long, conflicts_with_all = ["specification", "shard"])]
     temperature: bool,
-    /// True calibration: the estimator does not use it; summary and report show the errors against it
+    /// True calibration, not used by the estimator; summary and report show the errors relative to it
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
-    /// Limits for the units of a lot: a specification.toml
+    /// Limits for the units of a lot (a specification.toml)
     #[arg(long, value_name = "FILE", conflicts_with = "truth")]
     specification: Option<PathBuf>,
-    /// Calibrate part i of M of a lot, to be merged with the others
+    /// Calibrate part i of M of a lot, for turncal merge
     #[arg(long, value_name = "i/M", value_parser = shard, requires = "output", conflicts_with_all = ["json", "truth"], help_heading = "Advanced")]
     shard: Option<Shard>,
     /// Follow a growing log, - or a serial device: show what its rows give so far and what to do next, and calibrate
@@ -147,8 +147,8 @@ impl Calibrate {
 
     fn lot(&self) -> anyhow::Result<()> {
         if self.truth.is_some() {
-            let message = "--truth is that of one run; compare units of a lot with their truths by turncal \
-                           compare\n";
+            let message = "--truth applies to one run; to compare units of a lot with their truths, use turncal \
+                compare\n";
             clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
         }
         let directory = Some(Path::new(lot::DIRECTORY)).filter(|_| !self.json);
@@ -192,7 +192,7 @@ impl Calibrate {
         )
     }
 
-    /// Outputs of an instrument that stands against its temperature.
+    /// Output of a stationary instrument against its temperature.
     fn at_rest(&self, at_rest: &AtRest, opened: &Opened, path: &Path) -> anyhow::Result<()> {
         let run = &opened.run;
         let calibration = at_rest.record(run);
@@ -225,13 +225,13 @@ impl Calibrate {
         self.solved(&problem, &campaign.name, (path, None), activity)
     }
 
-    /// The directory to write, if any; by default of this name.
+    /// Output directory, if any, with this default name.
     fn target(&self, default: impl FnOnce() -> String) -> Option<PathBuf> {
         let default = || (!self.json).then(|| PathBuf::from(default()));
         self.output.clone().or_else(default)
     }
 
-    /// Solves a problem, writes and shows what came of it.
+    /// Solves a problem, then writes and shows the result.
     fn solved(
         &self,
         problem: &Problem,
@@ -282,10 +282,10 @@ impl Calibrate {
             _ => print(&calibration.to_json(Path::new("standard output"))?)?,
         }
         if !solution.converged() {
-            bail!("{name}: not converged; values and σ may not be used, see the findings");
+            bail!("{name}: not converged; do not use the values or σ, see the findings");
         }
         if !solution.is_usable() {
-            bail!("{name}: values may not be used, see the findings");
+            bail!("{name}: do not use the values, see the findings");
         }
         Ok(())
     }
@@ -300,7 +300,7 @@ fn read_by(opened: Option<&Opened>, target: Option<&Path>, path: &Path) -> PathB
     }
 }
 
-/// What was written, and what to do with it.
+/// Files written, and the next command.
 fn files(target: Option<&Path>, run: &Path, document: &Document) -> Facts {
     let mut facts = Facts::default();
     let shown = |path: PathBuf| path.display().to_string();
@@ -333,7 +333,7 @@ fn say(recording: &Recording) {
     }
 }
 
-/// Solves a problem, the passes being shown.
+/// Solves a problem and shows the passes.
 pub fn solve(problem: &Problem, method: Method, activity: &Activity) -> anyhow::Result<Solution> {
     let name = &problem.run().recording.name;
     activity.next(format!("calibrating {name}"));

@@ -9,26 +9,25 @@ use turncal::report::allan;
 use crate::cli::arguments::{Delivery, OfLog, run_or_log};
 use crate::cli::terminal::Activity;
 
-/// Allan deviation of a stationary record, and the noise figures that it shows
+/// Computes the Allan deviation of a stationary recording and its noise figures
 ///
-/// Overlapping Allan deviation of every axis with its confidence; random walk, bias instability, rate random
-/// walk, quantisation and ramps as far as they are detected, with their σ, and upper limits of the others; a
-/// table [imu.noise] for run.toml. Takes the whole record if it is stationary, else its longest static
-/// interval.
+/// Shows the overlapping Allan deviation of every axis with its confidence interval; random walk, bias instability,
+/// rate random walk, quantisation and ramp with σ if detected, otherwise with an upper limit; and a table [imu.noise]
+/// for run.toml. Uses the whole recording if it is stationary, otherwise its longest static interval.
 #[derive(Debug, clap::Args)]
-#[command(mut_arg("output", |output| output.help("Directory for a page and figures")))]
+#[command(mut_arg("output", |output| output.help("Directory for the report and figures")))]
 #[command(after_help = "Examples:
   turncal allan imu.csv
   turncal allan run.toml
   turncal allan run.toml --segment z_up -o noise
   turncal allan run.toml --json")]
 pub struct Allan {
-    /// The run's run.toml, or a log, or - for rows of text on standard input
+    /// A run.toml, a log, or - for text on standard input
     #[arg(value_name = "RUN.toml|LOG", value_parser = run_or_log)]
     run: PathBuf,
     #[command(flatten)]
     of_log: OfLog,
-    /// Take the segment of this label; the longest, if there are several
+    /// Use the segment with this label (the longest if there are several)
     #[arg(long, value_name = "LABEL")]
     segment: Option<String>,
     #[command(flatten)]

@@ -8,21 +8,20 @@ use turncal::survey::Survey;
 use crate::cli::arguments::{Delivery, OfLog, run_or_log};
 use crate::cli::terminal::Activity;
 
-/// Describes the content of a run, and the parameters that each method could observe
+/// Describes a run and the parameters that each method could observe
 ///
-/// Reads everything and calibrates nothing. Shows rate, jitter, faults and steps of the log; dwells with the axis
-/// that points up; turns with axis and angle; labelled sections compared with both; the expected σ of each method
-/// and the parameters that it would not observe; changes to make. Problems that it finds do not change the exit
-/// status.
+/// Does not calibrate. Shows rate, jitter, faults and resolution of the log; dwells with their upward axis; turns with
+/// axis and angle; labelled sections compared with both; the predicted σ of each method and the parameters that it
+/// would not observe; recommended changes. Problems that it finds do not change the exit status.
 #[derive(Debug, clap::Args)]
-#[command(mut_arg("output", |output| output.help("Directory for a page and a figure of the record")))]
+#[command(mut_arg("output", |output| output.help("Directory for the report and a figure of the recording")))]
 #[command(after_help = "Examples:
   turncal check imu.csv
   turncal check run.toml
   turncal check run.toml -o check
   turncal check run.toml --json")]
 pub struct Check {
-    /// The run's run.toml, or a log, or - for rows of text on standard input
+    /// A run.toml, a log, or - for text on standard input
     #[arg(value_name = "RUN.toml|LOG", value_parser = run_or_log)]
     run: PathBuf,
     #[command(flatten)]
@@ -36,7 +35,7 @@ impl Check {
         let activity = Activity::new("reading");
         let run = self.of_log.open(&self.run)?.run;
         let begun = self.delivery.begin(&[&self.run])?;
-        activity.next("looking at the run");
+        activity.next("checking the run");
         let survey = Survey::of(&run);
         drop(activity);
         begun.deliver(&check::document(&run, &survey))?;

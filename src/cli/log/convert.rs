@@ -7,17 +7,17 @@ use turncal::formats::draft::Draft;
 use crate::cli::arguments::{OfLog, Overwrite};
 use crate::cli::terminal::Activity;
 
-/// Writes the log of another program as a plain run directory
+/// Converts the log of another program to a plain run directory
 ///
-/// The instrument's streams become CSV files with every column and all digits, with a draft of run.toml as
-/// written by `turncal init`. Reads MCAP, ROS bags, PX4 ULog, ArduPilot DataFlash, MATLAB and NumPy files;
-/// calibrate and check also read them directly.
+/// The streams of the instrument become CSV files with every column and all digits, plus a draft of run.toml as written
+/// by `turncal init`. Reads MCAP, ROS bags, PX4 ULog, ArduPilot DataFlash, MATLAB and NumPy files; calibrate and check
+/// also read them directly.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal convert flight.ulg -o my-run
   turncal convert drive.mcap --stream /imu/data -o my-run")]
 pub struct Convert {
-    /// The log; its format is identified by its content
+    /// Log file, whose format is identified by content
     log: PathBuf,
     /// Directory to write
     #[arg(short, long, value_name = "DIR")]

@@ -10,9 +10,9 @@ use crate::cli::terminal::{Activity, print};
 
 /// Writes a draft of run.toml for a log without one
 ///
-/// Finds the columns by names or values, the unit of time, the units of the sensors from gravity at rest and from
-/// its rotation with the gyros, and the white noise at rest; each guess is given with its reason. Fields that only
-/// a person knows are marked TODO.
+/// Identifies the columns by name or value, the time unit, the sensor units (from gravity at rest and its rotation with
+/// the gyros), and the white noise at rest, and gives a reason for each guess. Fields that the log cannot show are
+/// marked TODO.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal init imu.csv
@@ -20,8 +20,8 @@ use crate::cli::terminal::{Activity, print};
   turncal init flight.ulg
   turncal init Gyroscope.csv Accelerometer.csv")]
 pub struct Init {
-    /// Rows of numbers below a line of names, or without one: `.csv`, `.txt`, `.tsv`, `.dat` or `.log`, also
-    /// with `.gz`; or MCAP, a ROS bag, PX4 ULog, ArduPilot DataFlash, MAT, NPY or NPZ, whose streams are listed
+    /// Rows of numbers with or without a line of names (`.csv`, `.txt`, `.tsv`, `.dat` or `.log`, also `.gz`); or MCAP,
+    /// a ROS bag, PX4 ULog, ArduPilot DataFlash, MAT, NPY or NPZ, whose streams are listed
     #[arg(value_name = "IMU.csv")]
     log: PathBuf,
     /// The same as --accel-file
@@ -69,7 +69,7 @@ impl Init {
         Ok(())
     }
 
-    /// A log's name as the new file, which stands beside the log unless told otherwise, says it.
+    /// Name of a log in the new file, which is next to the log by default.
     fn name(&self, log: &Path) -> String {
         let directory = |path: &Path| {
             let parent = path.parent().filter(|parent| *parent != Path::new(""));

@@ -1,4 +1,4 @@
-//! Commands that look at a log.
+//! Commands that analyse a log.
 
 pub mod allan;
 pub mod check;

@@ -16,16 +16,15 @@ use turncal::units::PPM;
 use crate::cli::arguments::{OfLog, keep, run_or_log};
 use crate::cli::terminal::{Activity, stream};
 
-/// A scale factor that deviates by more than this many σ of the run is hardly one of its instrument.
+/// A scale factor that differs by more than this many prior σ probably belongs to another instrument.
 const SUSPECT_SIGMAS: f64 = 10.0;
 
-/// Turns a run's raw samples into angular rate and specific force
+/// Converts the raw samples of a run to angular rate and specific force
 ///
-/// Writes one row per sample: start and end in s, angular rate in rad/s and specific force in m/s², both
-/// averaged over the sample, along right, front and up of the calibration's body frame. Error terms of the
-/// calibration are corrected, too, and temperature dependence by the run's temperature; the correction of the
-/// time offset neglects Earth rate. The file is itself a record for a run.toml: output = "rate",
-/// time_stamp = "end".
+/// Writes one row per sample: start and end in s, angular rate in rad/s and specific force in m/s², both averaged over
+/// the sample, along right, front and up in the body frame of the calibration. Error terms of the calibration are also
+/// corrected, as is temperature dependence if the run has a temperature; the correction of the time offset neglects
+/// Earth rate. The output can itself be the log of a run.toml: output = "rate", time_stamp = "end".
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal apply result/calibration.json run.toml -o calibrated.csv.gz
@@ -34,7 +33,7 @@ pub struct Apply {
     /// The calibration
     #[arg(value_name = "CALIBRATION.json")]
     calibration: PathBuf,
-    /// The run's run.toml, or a log, or - for rows of text on standard input
+    /// A run.toml, a log, or - for text on standard input
     #[arg(value_name = "RUN.toml|LOG", value_parser = run_or_log)]
     run: PathBuf,
     #[command(flatten)]
@@ -42,7 +41,7 @@ pub struct Apply {
     /// File to write, `.csv` or `.csv.gz` [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Interpolate lost rows and write them with 1 in a column `filled`, except in gaps too long for calibrate to
+    /// Interpolate missing rows and mark them with 1 in a column `filled`, except in gaps too long for calibrate to
     /// bridge
     #[arg(long)]
     fill: bool,
@@ -57,8 +56,7 @@ impl Apply {
             let name = output.to_string_lossy();
             if !(name.ends_with(".csv") || name.ends_with(".csv.gz")) {
                 let message = format!(
-                    "-o {name}: the rows are CSV; give a name that ends in .csv, or in .csv.gz to \
-                     compress them\n"
+                    "-o {name}: the output is CSV; give a name that ends in .csv, or in .csv.gz for compression\n"
                 );
                 clap::Error::raw(ErrorKind::ValueValidation, message).exit();
             }
@@ -71,7 +69,7 @@ impl Apply {
         let lost: usize = run.recording.imu.lost().iter().map(Range::len).sum();
         if let Some(missing) = run.recording.imu.missing().next().filter(|_| self.fill) {
             bail!(
-                "{}: {} rows are missing from {:.3} s on, too many to fill. Leave --fill out, or cut the log there",
+                "{}: {} rows are missing from {:.3} s on, too many to fill. Omit --fill, or split the log there",
                 self.run.display(),
                 missing.len(),
                 run.recording.imu.time(missing.start)
@@ -95,9 +93,10 @@ impl Apply {
             run.recording.imu.period,
             match (lost, self.fill) {
                 (0, _) => String::new(),
-                (lost, true) => format!(", {lost} of them lost in the log and interpolated"),
+                (lost, true) =>
+                    format!(", of which {lost} were missing in the log and interpolated"),
                 (lost, false) => format!(
-                    ", {lost} that the log has lost are left out (--fill interpolates them)"
+                    "; {lost} rows missing in the log were skipped (--fill interpolates them)"
                 ),
             },
             record.body_frame.words()
@@ -115,8 +114,9 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
         notes.push("the calibration did not converge".to_owned());
     }
     if record.unit.is_none() {
-        notes
-            .push("the calibration names no units; they are taken for those of the run".to_owned());
+        notes.push(
+            "the calibration states no units, so turncal assumed those of the run".to_owned(),
+        );
     }
     for sensor in Sensor::ALL {
         let scale = correction.sensitivity.get(sensor).diagonal();
@@ -128,8 +128,8 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
             .component_div(&run.instrument.prior.get(sensor).scale_sigma);
         if sigmas.max() > SUSPECT_SIGMAS {
             notes.push(format!(
-                "{} scale factors are up to {:.0} ppm off the run's nominal ones, {:.0} times the 1σ in \
-                 [imu.prior.{0}]: is this the calibration of this instrument?",
+                "{} scale factors differ by up to {:.0} ppm from the nominal values of the run, {:.0} times the 1σ \
+                 in [imu.prior.{0}]. Check that this calibration belongs to this instrument",
                 sensor.name(),
                 off.amax() / PPM,
                 sigmas.max()
@@ -140,24 +140,24 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
         notes.extend(of_temperature(thermal, run));
     }
     if correction.has(Term::TimeOffset) {
-        notes.push("the time offset of the accelerometers neglects Earth rate".to_owned());
+        notes
+            .push("the correction of the accelerometer time offset neglects Earth rate".to_owned());
     }
     if correction.has(Term::SizeEffect) && !run.recording.imu.continuous {
         notes.push(
-            "the record is not continuous, so the size effect is corrected without its part by \
-             angular acceleration"
+            "the recording is not continuous, so the size effect is corrected without its angular-acceleration part"
                 .to_owned(),
         );
     }
     notes
 }
 
-/// Where the run's temperature is unknown, or beyond that of the calibration.
+/// Notes if the temperature of the run is unknown or outside the range of the calibration.
 fn of_temperature(thermal: &ThermalRecord, run: &Run) -> Vec<String> {
     let Some(temperature) = &run.recording.imu.temperature else {
         return vec![format!(
-            "the run has no temperature, the calibration changes with it: all rows are corrected as at {} °C and \
-             have 0 in in_range",
+            "the calibration depends on temperature, but the run has none: all rows are corrected for {} °C and have \
+             0 in in_range",
             thermal.range.gyro.reference
         )];
     };
@@ -167,8 +167,8 @@ fn of_temperature(thermal: &ThermalRecord, run: &Run) -> Vec<String> {
             || highest > range.highest + TEMPERATURE_TOLERANCE;
         is_beyond.then(|| {
             format!(
-                "{}: the run is at {lowest:.1} to {highest:.1} °C, the calibration holds for {:.1} to \
-                 {:.1} °C; rows beyond have 0 in in_range",
+                "{}: the run covers {lowest:.1} to {highest:.1} °C, but the calibration is valid for {:.1} to {:.1} \
+                 °C; rows outside have 0 in in_range",
                 sensor.name(),
                 range.lowest,
                 range.highest

@@ -13,14 +13,14 @@ use crate::cli::NotMet;
 use crate::cli::arguments::Overwrite;
 use crate::cli::terminal::print;
 
-/// Writes a calibration certificate as PDF/A-3, with a Digital Calibration Certificate in it
+/// Writes a calibration certificate as PDF/A-3 with an embedded Digital Calibration Certificate
 ///
 /// DIR/certificate.pdf contains the fields that ISO/IEC 17025 requires of a certificate, from calibration.json and
-/// lab.toml. dcc.xml (PTB's DCC 3.3.0, with D-SI units and the covariance matrix) and calibration.json are embedded
-/// in it and written to DIR, too. Missing required fields are named. All dates are those of lab.toml: the same files
-/// give the same bytes. It claims no accreditation.
+/// lab.toml. dcc.xml (PTB DCC 3.3.0, with D-SI units and the covariance matrix) and calibration.json are embedded in it
+/// and also written to DIR. Missing required fields are named. All dates come from lab.toml, so the same files give the
+/// same bytes. The certificate claims no accreditation.
 ///
-/// A draft of lab.toml: turncal certificate --draft
+/// For a draft of lab.toml, run turncal certificate --draft
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal certificate --draft > lab.toml
@@ -32,19 +32,19 @@ pub struct Certificate {
     /// The calibration
     #[arg(value_name = "CALIBRATION.json", required_unless_present = "draft")]
     calibration: Option<PathBuf>,
-    /// The laboratory's statements
+    /// Laboratory data
     #[arg(long, value_name = "lab.toml", required_unless_present = "draft")]
     laboratory: Option<PathBuf>,
-    /// Limits for the parameters, applied by the decision rule of lab.toml
+    /// Limits for the parameters, applied with the decision rule in lab.toml
     #[arg(long, value_name = "specification.toml")]
     specification: Option<PathBuf>,
-    /// The calibration with which the item was received
+    /// Earlier calibration, valid when the item was received
     #[arg(long, value_name = "EARLIER.json")]
     as_found: Option<PathBuf>,
     /// Directory to write
     #[arg(short, long, value_name = "DIR", default_value = "certificate")]
     output: PathBuf,
-    /// Print a lab.toml to be completed, and nothing else
+    /// Print a lab.toml to complete, and nothing else
     #[arg(long, exclusive = true)]
     draft: bool,
     #[command(flatten)]
@@ -105,7 +105,7 @@ impl Certificate {
         let overall = content.conformity.as_ref().and_then(Conformity::overall);
         match overall {
             Some(Decision::Fail | Decision::ConditionalFail) => {
-                let limits = "the certificate names the limits".to_owned();
+                let limits = "the certificate lists the limits".to_owned();
                 Err(NotMet(limits).into())
             }
             _ => Ok(()),

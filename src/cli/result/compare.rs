@@ -11,19 +11,19 @@ use crate::cli::terminal::short_names;
 
 /// Compares calibrations, parameter by parameter, with their σ
 ///
-/// All are first converted to the general installation form and to one body frame. Without a truth, the
-/// first is the reference. For three or more, mean, scatter and χ² of the scatter with the stated σ
-/// are shown, too.
+/// All calibrations are first converted to the general installation form and one body frame. Without a truth, the first
+/// is the reference. For three or more, the mean, scatter and χ² of the scatter relative to the stated σ are also
+/// shown.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  turncal compare monday.json friday.json --truth truth.json")]
 pub struct Compare {
-    /// Calibrations, two or more; one is enough with --truth
+    /// Two or more calibrations (one is enough with --truth)
     #[arg(required = true, value_name = "CALIBRATION.json")]
     calibrations: Vec<PathBuf>,
-    /// The true values, if they are known
+    /// True values, if known
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
-    /// Compare them at this temperature, °C [default: each at its own reference]
+    /// Temperature of the comparison, °C [default: reference temperature of each calibration]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     temperature_degc: Option<f64>,
     #[command(flatten)]
@@ -33,8 +33,7 @@ pub struct Compare {
 impl Compare {
     pub fn run(&self) -> anyhow::Result<()> {
         if self.calibrations.len() == 1 && self.truth.is_none() {
-            let message = "one calibration can be compared with a truth only: give --truth, or a second \
-                       calibration\n";
+            let message = "one calibration can be compared only with a truth; give --truth or a second calibration\n";
             clap::Error::raw(ErrorKind::TooFewValues, message).exit();
         }
         let paths: Vec<&Path> = self

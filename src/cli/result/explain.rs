@@ -7,7 +7,7 @@ use turncal::report::{Document, Facts};
 
 use crate::cli::terminal::show;
 
-/// Explains a finding: its meaning, its cause and the remedy
+/// Explains a finding: meaning, cause and remedy
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal explain W07

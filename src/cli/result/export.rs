@@ -12,9 +12,9 @@ use crate::cli::terminal::print;
 
 /// Exports a calibration for other programs (Kalibr, PX4, ROS, C, …)
 ///
-/// Formats with inputs in rad/s and m/s² state the divisor of the raw output: the nominal scale of its unit
-/// or, for counts, that of --run, else the calibrated scale factors rounded to three digits. Parts of the
-/// calibration that a format cannot hold are named in the file and on standard error.
+/// Formats with inputs in rad/s and m/s² state the divisor of the raw output: the nominal scale of its unit or, for
+/// counts, that of --run, otherwise the calibrated scale factors rounded to three digits. Parts of the calibration that
+/// a format cannot represent are named in the file and on standard error.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal export result/calibration.json --format c -o imu.h
@@ -28,10 +28,11 @@ pub struct Export {
     /// Format to write
     #[arg(long, value_enum)]
     format: export::Format,
-    /// A run of the same instrument, for noise figures, sample rate and nominal scales
+    /// Run of the same instrument, for noise figures, sample rate and nominal scales
     #[arg(long, value_name = "RUN.toml", value_parser = run_file)]
     run: Option<PathBuf>,
-    /// Calibration temperature, °C [default: its reference; c, px4 and ardupilot contain the temperature dependence]
+    /// Calibration temperature, °C [default: reference temperature; c, px4 and ardupilot contain the temperature
+    /// dependence]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     temperature_degc: Option<f64>,
     /// File to write [default: standard output]
@@ -58,7 +59,7 @@ impl Export {
             None => print(text)?,
         }
         for note in exported.notes {
-            tell!("not held: {note}");
+            tell!("not included: {note}");
         }
         Ok(())
     }

@@ -18,14 +18,14 @@ use crate::cli::arguments::{Delivery, at_temperature, hours, latitude, number};
 use crate::cli::terminal::{Activity, short_names};
 
 const HOUR: f64 = 3600.0;
-/// Pitch beyond which roll and heading cannot be told apart, degrees.
+/// Largest pitch at which roll and heading are distinguishable, degrees.
 const LARGEST_PITCH: f64 = 89.0;
 
 /// Shows the navigation error due to the errors of a calibration
 ///
-/// Navigates with the instrument of --truth, corrected by the calibration, from perfect alignment and with the
-/// height held to the true height: at rest, or along a trajectory. Shows the errors of attitude, velocity and
-/// position, and their σ predicted from the calibration's covariance.
+/// Navigates with the instrument of --truth, corrected by the calibration, from perfect alignment and with the height
+/// fixed to the true height, at rest or along a trajectory. Shows the errors of attitude, velocity and position, and
+/// their σ predicted from the covariance of the calibration.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for navigation.csv, figures and a page")))]
 #[command(after_help = "Examples:
@@ -44,7 +44,7 @@ pub struct Navigate {
     /// The true parameters of the instrument: a truth.json or another calibration
     #[arg(long, value_name = "FILE")]
     truth: PathBuf,
-    /// Latitude in degrees, north positive [default: the trajectory's, else the calibration's]
+    /// Latitude in degrees, north positive [default: from the trajectory, otherwise from the calibration]
     #[arg(
         long,
         alias = "latitude",
@@ -53,7 +53,7 @@ pub struct Navigate {
         value_parser = latitude
     )]
     latitude_deg: Option<f64>,
-    /// Height above the ellipsoid in metres [default: 0, or the trajectory's, which moves with it]
+    /// Height above the ellipsoid in metres [default: 0, or that of the trajectory, which shifts with it]
     #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = height)]
     height_m: Option<f64>,
     /// Attitude at rest, in degrees
@@ -66,13 +66,13 @@ pub struct Navigate {
         value_parser = attitude
     )]
     attitude_deg: Attitude,
-    /// Triad with calibration errors
+    /// Triads with calibration errors
     #[arg(long, value_enum, default_value_t = Errors::Both)]
     errors: Errors,
-    /// Duration in hours, to the minute, up to 1000
+    /// Duration in hours (whole minutes, up to 1000)
     #[arg(long, default_value_t = 40.0, allow_negative_numbers = true, value_parser = hours)]
     hours: f64,
-    /// Move instead of resting: a TOML file or an embedded name (flight, vehicle)
+    /// Trajectory to follow instead of rest: a TOML file or an embedded name (flight, vehicle)
     #[arg(long, value_name = "FILE.toml")]
     trajectory: Option<String>,
     /// Warm up from one temperature to another during navigation, °C
@@ -81,7 +81,7 @@ pub struct Navigate {
     /// Time constant of warming up, h
     #[arg(long, value_name = "H", default_value_t = 1.0, value_parser = time_constant)]
     warming_time_constant_h: f64,
-    /// Temperature, °C [default: each calibration at its own reference]
+    /// Temperature, °C [default: reference temperature of each calibration]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     temperature_degc: Option<f64>,
     #[command(flatten)]

@@ -16,12 +16,12 @@ use crate::cli::arguments::{Delivery, Sharding, at_least_two, error_term, needs_
 
 /// Tests the accuracy of the filter and the consistency of its σ
 ///
-/// Simulates many runs, each with a different instrument, different noise and different table errors, and
-/// calibrates each by the filter and, on the paper's static positions, by the closed form. Shows the RMS
-/// error of each group, and of the position after 40 h of navigation, compared with the Cramér–Rao bound
-/// and with the closed form, and the consistency of the filter's σ (NEES, NIS, position errors within
-/// their predicted σ). For a campaign it shows parameters at the reference temperature, coefficients and
-/// selected orders. A run on which the filter fails is counted, not dropped.
+/// Simulates many runs, each with a different instrument, different noise and different table errors, and calibrates
+/// each with the filter and, on the static positions of the paper, with the closed form. Shows the RMS error of each
+/// group, and of the position after 40 h of navigation, compared with the Cramér–Rao bound and with the closed form,
+/// and the consistency of the filter σ (NEES, NIS, position errors within their predicted σ). For a campaign, it shows
+/// parameters at the reference temperature, coefficients and selected orders. Runs in which the filter fails are
+/// included.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal study accuracy --runs 500
@@ -35,35 +35,34 @@ pub struct Accuracy {
     /// Scenario or campaign: a TOML file or an embedded name
     #[arg(default_value = "demo")]
     scenario: String,
-    /// Another path for it: a TOML file or an embedded name
+    /// Different path: a TOML file or an embedded name
     #[arg(long, value_name = "PATH")]
     path: Option<String>,
-    /// Observations of the filter
+    /// Observations used by the filter
     #[arg(long, value_enum, default_value_t = Aiding::Table)]
     aiding: Aiding,
     /// Installation form of the filter
     #[arg(long, value_enum, default_value_t)]
     installation: InstallationForm,
-    /// Installation of the simulated instruments: a TOML file or an embedded name [default: the
-    /// scenario's]
+    /// Installation of the simulated instruments: a TOML file or an embedded name [default: from the scenario]
     #[arg(long, value_name = "MODEL")]
     truth_installation: Option<String>,
     /// Error terms to simulate and to estimate, in addition to those of the scenario
     #[arg(long, value_name = "TERM", value_parser = error_term(), value_delimiter = ',')]
     with: Vec<ErrorTerm>,
-    /// Error terms to simulate and not to estimate
+    /// Error terms to simulate but not to estimate
     #[arg(long, value_name = "TERM", value_parser = error_term(), value_delimiter = ',')]
     unmodelled: Vec<ErrorTerm>,
     /// Noise used by the filter; the noise stated in a scenario is correct
     #[arg(long, value_enum, default_value_t = NoisePolicy::Stated)]
     noise: NoisePolicy,
-    /// In a campaign, do not let biases depend on the rate of temperature
+    /// In a campaign, do not let biases depend on the temperature rate
     #[arg(long)]
     without_rate: bool,
     /// Number of runs
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = at_least_two)]
     runs: u64,
-    /// Seed of all random numbers [default: the scenario's]
+    /// Seed of all random numbers [default: from the scenario]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
     #[command(flatten)]

@@ -15,13 +15,12 @@ use crate::cli::arguments::{Delivery, Sharding, at_least_two, hours, seed};
 const HOUR: f64 = 3600.0;
 const SCENARIO: &str = "experiment";
 
-/// Simulates the paper's turntable experiment: navigation accuracy after each calibration
+/// Simulates the turntable experiment of the paper: navigation accuracy after each calibration
 ///
-/// Simulates many instruments on a table with position errors, with noise and Gauss–Markov biases.
-/// Calibrates each by the closed form on the paper's static positions and by the filter, in a sixth of
-/// that time and in the same time, in all installation forms, and navigates with the remaining
-/// errors: at rest, aligned by the calibrated instrument itself or perfectly, and moving. Shows the position error of
-/// every method, and the parameters that cause it.
+/// Simulates many instruments on a table with position errors, with noise and Gauss–Markov biases. Calibrates each with
+/// the closed form on the static positions of the paper and with the filter (in a sixth of that time and in the same
+/// time), in all installation forms. Navigates with the remaining errors: at rest, with self-alignment or perfect
+/// alignment, and moving. Shows the position error of every method, and the parameters that cause it.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal study experiment
@@ -31,13 +30,13 @@ pub struct Experiment {
     /// Number of instruments
     #[arg(long, value_name = "N", default_value_t = 50, value_parser = at_least_two)]
     samples: u64,
-    /// Seed of all random numbers [default: the scenario's]
+    /// Seed of all random numbers [default: from the scenario]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
     /// Trajectory of the moving instrument: a TOML file or an embedded name
     #[arg(long, value_name = "TRAJECTORY", default_value = "flight")]
     trajectory: String,
-    /// Hours of navigation, to the minute, up to 1000
+    /// Navigation time in hours (whole minutes, up to 1000)
     #[arg(long, default_value_t = 40.0, value_parser = hours)]
     hours: f64,
     #[command(flatten)]

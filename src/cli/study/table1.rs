@@ -8,14 +8,13 @@ use turncal::units::DEGREE;
 use crate::cli::arguments::{Delivery, at_least_two, hours, latitude, seed};
 use crate::cli::terminal::Activity;
 
-/// Reproduces the paper's Table 1: navigation errors due to a simplified installation form
+/// Reproduces Table 1 of the paper: navigation errors due to a simplified installation form
 ///
-/// Draws installation angles as in the paper, calibrates gyros and accelerometers by the closed form in the
-/// six-angle and the three-angle form, without noise, and navigates with the remaining errors. Shows the
-/// largest errors next to the paper's figures, under every reading of its text, and states which of these
-/// figures a correct program gives.
+/// Draws installation angles as in the paper, calibrates gyros and accelerometers with the closed form in the six-angle
+/// and the three-angle form, without noise, and navigates with the remaining errors. Shows the largest errors next to
+/// the figures in the paper, for every reading of its text, and states which figures a correct program reproduces.
 #[derive(Debug, clap::Args)]
-#[command(mut_arg("output", |output| output.help("Directory for a report with the paper's Figures 2 to 9")))]
+#[command(mut_arg("output", |output| output.help("Directory for a report with Figures 2 to 9 of the paper")))]
 #[command(after_help = "Examples:
   turncal study table1 -o table1
   turncal study table1 --samples 4000 --json
@@ -27,10 +26,10 @@ pub struct Table1 {
     /// Seed of all random numbers
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = seed)]
     seed: u64,
-    /// Length of a run in hours, a minute to 1000
+    /// Duration of a run in hours (one minute to 1000 h)
     #[arg(long, default_value_t = paper::HOURS, value_parser = hours)]
     hours: f64,
-    /// Geodetic latitude in degrees; the paper states none, its figures imply 45.78
+    /// Geodetic latitude in degrees; the paper states none, but its figures imply 45.78
     #[arg(long, default_value_t = paper::LATITUDE_DEG, value_name = "L", allow_negative_numbers = true, value_parser = latitude)]
     latitude_deg: f64,
     #[command(flatten)]

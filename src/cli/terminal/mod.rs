@@ -7,7 +7,7 @@ mod signals;
 mod threads;
 
 pub use names::short_names;
-pub use output::{print, show, show_brief, stream};
+pub use output::{columns, print, show, show_brief, stream};
 pub use progress::{Activity, Runs};
 pub use signals::{end_gently, is_ended, leave_nothing_behind};
 pub use threads::{piece_by_piece, with_threads};

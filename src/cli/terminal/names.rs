@@ -1,9 +1,9 @@
-//! What files are called in tables and messages.
+//! Names of files in tables and messages.
 
 use std::ffi::OsStr;
 use std::path::Path;
 
-/// File stems; where they are equal, the name of the directory; where that is, too, the whole path.
+/// File stems; if equal, directory names; if those are also equal, whole paths.
 pub fn short_names(paths: &[&Path]) -> Vec<String> {
     let shown = |name: &OsStr| name.to_string_lossy().into_owned();
     let stem = |path: &Path| path.file_stem().map(shown);

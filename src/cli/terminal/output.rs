@@ -5,7 +5,7 @@ use std::io::{self, BufWriter, IsTerminal, Write};
 use turncal::calibration::Word;
 use turncal::report::{self, Document, terminal};
 
-/// Prints a document as text as wide as the terminal, or as JSON.
+/// Prints a document as text in the width of the terminal, or as JSON.
 pub fn show(document: &Document, json: bool) -> anyhow::Result<()> {
     let text = match json {
         true => report::json(document),
@@ -14,7 +14,7 @@ pub fn show(document: &Document, json: bool) -> anyhow::Result<()> {
     print(text.as_bytes())
 }
 
-/// Prints what one screen has room for of a document.
+/// Prints the one-screen form of a document.
 pub fn show_brief(document: &Document) -> anyhow::Result<()> {
     let text = terminal::brief(document, columns().map(usize::from));
     let is_plain = !io::stdout().is_terminal() || std::env::var_os("NO_COLOR").is_some();
@@ -26,7 +26,7 @@ pub fn show_brief(document: &Document) -> anyhow::Result<()> {
     print(text.as_bytes())
 }
 
-/// A verdict as a terminal shows it in its colour.
+/// A verdict in its terminal colour.
 fn in_colour(word: Word) -> String {
     let colour = match word {
         Word::Good | Word::Pass => 32,
@@ -36,18 +36,18 @@ fn in_colour(word: Word) -> String {
     format!("\u{1b}[1;{colour}m{word}\u{1b}[0m")
 }
 
-/// How wide standard output is: that of its terminal, else what COLUMNS says, else without limit.
-fn columns() -> Option<u16> {
+/// Width of standard output: from its terminal, else COLUMNS, else unlimited.
+pub fn columns() -> Option<u16> {
     let terminal = terminal_size::terminal_size_of(io::stdout()).map(|(width, _)| width.0);
     terminal.or_else(|| std::env::var("COLUMNS").ok()?.parse().ok())
 }
 
-/// Writes to standard output. A reader that has seen enough, such as `head`, is no failure.
+/// Writes to standard output. A closed pipe, as with `head`, is not a failure.
 pub fn print(bytes: &[u8]) -> anyhow::Result<()> {
     stream(|stdout| stdout.write_all(bytes))
 }
 
-/// The same for what is too long to be held.
+/// The same for output too large for memory.
 pub fn stream(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> anyhow::Result<()> {
     let mut stdout = BufWriter::new(io::stdout().lock());
     match write(&mut stdout).and_then(|()| stdout.flush()) {

@@ -1,4 +1,4 @@
-//! Progress on a terminal; nothing where standard error is a file or a pipe.
+//! Progress on a terminal; none if standard error is a file or a pipe.
 
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::thread;
@@ -8,15 +8,15 @@ use indicatif::{ProgressBar, ProgressStyle};
 use turncal::calibration::Pass;
 use turncal::report::terminal::printable;
 
-/// What is being done, with the time it has taken.
+/// Current activity with its elapsed time.
 pub struct Activity {
     bar: ProgressBar,
-    /// Goes to end the thread that moves the time on.
+    /// Dropping it ends the thread that updates the time.
     ticking: Option<Sender<()>>,
 }
 
 impl Activity {
-    /// Begins to show an activity.
+    /// Shows an activity.
     pub fn new(message: impl Into<String>) -> Self {
         let bar = ProgressBar::new_spinner().with_message(printable(&message.into()));
         if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed:>4}") {
@@ -26,12 +26,12 @@ impl Activity {
         Self { bar, ticking }
     }
 
-    /// Says what comes next.
+    /// Shows the next activity.
     pub fn next(&self, message: impl Into<String>) {
         self.bar.set_message(printable(&message.into()));
     }
 
-    /// Tells of a pass of the filter.
+    /// Shows a pass of the filter.
     pub fn pass(&self, pass: &Pass) {
         let step = pass.largest_step;
         self.next(format!("iteration done, largest step {step:.2} σ"));
@@ -45,8 +45,8 @@ impl Drop for Activity {
     }
 }
 
-/// Moves the time on until the sender goes. Indicatif's own ticker panics where no thread can be started;
-/// here the time stands still until the next message.
+/// Updates the time until the sender is dropped. The ticker of indicatif panics if no thread can be started; here the
+/// time is not updated until the next message.
 fn tick(bar: &ProgressBar) -> Option<Sender<()>> {
     let (ticking, end) = mpsc::channel();
     let bar = bar.clone();
@@ -58,11 +58,11 @@ fn tick(bar: &ProgressBar) -> Option<Sender<()>> {
     thread::Builder::new().spawn(ticker).ok().map(|_| ticking)
 }
 
-/// How many of a known number of runs are done.
+/// Number of finished runs out of a known total.
 pub struct Runs(ProgressBar);
 
 impl Runs {
-    /// Begins to show that none is.
+    /// Shows that none is finished.
     pub fn new(runs: u64) -> Self {
         let bar = ProgressBar::new(runs);
         let template = "{wide_bar} {pos} of {len} runs, {eta} to go";
@@ -72,7 +72,7 @@ impl Runs {
         Self(bar)
     }
 
-    /// One more is done.
+    /// Adds a finished run.
     pub fn one_done(&self) {
         self.0.inc(1);
     }

@@ -1,4 +1,4 @@
-//! What happens when the command is interrupted.
+//! Handling of interrupts.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -17,8 +17,8 @@ pub fn is_ended() -> bool {
     ENDED.load(Ordering::SeqCst)
 }
 
-/// Makes Ctrl-C, a request to end and a lost terminal end the command without leaving anything
-/// unfinished behind; shells report them as status 130, 143 and 129.
+/// Ends the command without incomplete output on Ctrl-C, a termination request or a lost terminal; shells report status
+/// 130, 143 and 129.
 #[cfg(unix)]
 pub fn leave_nothing_behind() {
     use std::process;
@@ -61,8 +61,8 @@ pub fn leave_nothing_behind() {
     }
 }
 
-/// Whether the process was begun with a signal ignored, as `nohup` does; that stays so. Where the
-/// system does not tell, none is.
+/// Whether the process was started with a signal ignored, as by `nohup`; it then stays ignored. False if the system
+/// does not provide this.
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -71,6 +71,6 @@ fn is_ignored(signal: i32) -> bool {
     mask.is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
-/// Elsewhere the next run clears up.
+/// On other systems, the next run cleans up.
 #[cfg(not(unix))]
 pub fn leave_nothing_behind() {}

@@ -1,4 +1,4 @@
-//! On how many threads a command works.
+//! Number of threads of a command.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -6,8 +6,8 @@ use std::thread;
 
 use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
 
-/// Does `work` on one thread a processor or as many as RAYON_NUM_THREADS says, and on this one alone
-/// where the system does not let them be started.
+/// Runs `work` on one thread per processor, or as many as RAYON_NUM_THREADS states, or only on this one if the system
+/// refuses more.
 pub fn with_threads<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, ThreadPoolBuildError> {
     match ThreadPoolBuilder::new().build() {
         Ok(pool) if pool.current_num_threads() > 1 => return Ok(pool.install(work)),
@@ -15,7 +15,7 @@ pub fn with_threads<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, Threa
         // other thread, and where it cannot have them asks anew at each allocation.
         Ok(_) => {}
         Err(_) => {
-            tell!("note: the system does not let threads be started; working on one alone");
+            tell!("note: the system does not allow more threads; using one thread");
         }
     }
     let alone = ThreadPoolBuilder::new().num_threads(1).use_current_thread();
@@ -23,8 +23,8 @@ pub fn with_threads<T: Send>(work: impl FnOnce() -> T + Send) -> Result<T, Threa
     Ok(work())
 }
 
-/// Does `count` pieces of work, one at a time on each thread: no more than one per thread is in memory, and the first
-/// are done early. Results are in order.
+/// Computes `count` pieces of work, one at a time per thread, so that at most one per thread is in memory. Results are
+/// in order.
 pub fn piece_by_piece<T: Send>(count: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let next = AtomicUsize::new(0);
     let results: Mutex<Vec<(usize, T)>> = Mutex::new(Vec::with_capacity(count));

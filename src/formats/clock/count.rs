@@ -1,46 +1,45 @@
-//! The sample of each row, by stamps that jitter, come late or in bursts, and lack rows.
+//! Sample number of each row, from stamps with jitter, delays, bursts and missing rows.
 
 use std::collections::VecDeque;
 
 use crate::statistics::median;
 
-/// Rows behind a late one that show it: no burst is longer, and over so few a rough period is good enough.
+/// Rows after a late one that reveal it: no burst is longer, and an approximate period suffices over so few rows.
 pub const REACH: usize = 128;
-/// Part of a stamp's difference by which the phase of the clock follows it: little, so that jitter
-/// averages out …
+/// Fraction of the difference of a stamp by which the clock phase follows it, small enough to average jitter …
 const PHASE: f64 = 0.02;
-/// … and its period, which makes the loop well damped.
+/// … and fraction for the period, for a well-damped loop.
 const PERIOD: f64 = 0.5 * PHASE * PHASE;
-/// Stamps that give the first phase.
+/// Number of stamps for the initial phase.
 const FIRST: usize = 50;
-/// Distances of stamps that differ by less are the same despite rounding, in samples.
+/// Stamp differences that differ by less count as equal, because of rounding, in samples.
 const ALIKE: f64 = 1e-6;
-/// Rows that tell whether some are missing before them.
+/// Number of rows that decide whether rows are missing before them.
 const WITNESSES: usize = 32;
 
-/// By what samples are counted.
+/// Method of counting samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Counting {
     ByStamps,
     ByRows,
 }
 
-/// Counts samples by steps from row to row, with a clock that follows the stamps slowly.
+/// Counts samples by the time steps between rows, with a clock that slowly follows the stamps.
 #[derive(Debug, Clone)]
 pub struct Counter {
     counting: Counting,
-    /// Whether the period stays as it is.
+    /// Whether the period is fixed.
     fixed: bool,
     pub number: usize,
     pub period: f64,
     pub due: f64,
-    /// How much nearer to later stamps rows have to be if others are missing, in samples: the logarithm of the rows
-    /// among which one is named, by the scale of their jitter, which half of the steps are off by.
+    /// Required reduction of the distance to later stamps if rows are missing, in samples: logarithm of the number of
+    /// candidate rows times the jitter scale (median deviation of the steps).
     price: f64,
 }
 
 impl Counter {
-    /// At the first of these times.
+    /// Starts at the first of these times.
     pub fn new(times: &[f64], period: f64, fixed: bool, counting: Counting) -> Self {
         let off = |pair: &[f64]| ((pair[1] - pair[0]) / period - 1.0).abs();
         let mut off: Vec<f64> = times.windows(2).map(off).collect();
@@ -54,8 +53,7 @@ impl Counter {
         }
     }
 
-    /// The number of the sample of the first of these times, those of rows that follow one another; it may be beyond
-    /// any.
+    /// Sample number of the first of these times of consecutive rows; it may be beyond all others.
     pub fn next(&mut self, times: &[f64]) -> f64 {
         let step = match self.counting {
             Counting::ByStamps => 1.0 + self.missing(times),
@@ -72,9 +70,9 @@ impl Counter {
         next
     }
 
-    /// Samples before the first of these times that have no row: the number that puts most rows at their times.
+    /// Missing samples before the first of these times: the number that matches most rows with their times.
     ///
-    /// Rows off by more than a sample do not say by how much; of a Laplacian jitter the remaining distances are the
+    /// Rows off by more than a sample count only as such; for Laplacian jitter, the remaining distances give the
     /// likelihood.
     fn missing(&self, times: &[f64]) -> f64 {
         let rows = times.iter().take(WITNESSES).zip(1..);
@@ -105,8 +103,7 @@ impl Counter {
     }
 }
 
-/// From the first stamp to its due time by the circular mean of the first stamps' phases, which gaps
-/// do not disturb.
+/// Offset from the first stamp to its due time, from the circular mean of the first phases, which gaps do not affect.
 fn phase(times: &[f64], period: f64) -> f64 {
     let turn = std::f64::consts::TAU / period;
     let (sin, cos) = times
@@ -117,10 +114,10 @@ fn phase(times: &[f64], period: f64) -> f64 {
     f64::atan2(sin, cos) / turn
 }
 
-/// Times of rows, those that came late at the latest time that the rows behind them allow.
+/// Row times, with late rows at the latest time allowed by the following rows.
 ///
-/// A row was sampled before those behind it, a period for each. A stamp that says otherwise by more than a period,
-/// which jitter and rounding do not, is the logger's: it was busy, or passed on a burst.
+/// A row was sampled before the following ones, by one period each. A stamp that contradicts this by more than a
+/// period, beyond jitter and rounding, is due to a busy logger or a burst.
 pub fn punctual(stamps: &[(f64, u64)], period: f64) -> Vec<f64> {
     let mut times: Vec<f64> = stamps.iter().map(|&(time, _)| time).collect();
     // Against a clock without gaps; rows behind, each earlier than all between it and this one.
@@ -147,13 +144,13 @@ pub fn punctual(stamps: &[(f64, u64)], period: f64) -> Vec<f64> {
     times
 }
 
-/// Rows over which steps are compared: more hide jitter, fewer are seldom without a gap. Twice as many, as often as
-/// needed, where rows come in bursts.
+/// Number of rows over which steps are compared: more average jitter, fewer are more often without a gap. Doubled as
+/// often as needed for bursts.
 const SPAN: usize = 8;
-/// Spans without a gap are within this of their median, in samples.
+/// Spans without a gap differ from their median by less, in samples.
 const NO_GAP: f64 = 0.8;
 
-/// Mean step where no row is missing. It is free of the rounding that a single printed step keeps.
+/// Mean step without missing rows, free of the rounding of single printed steps.
 pub fn mean_step(stamps: &[(f64, u64)]) -> f64 {
     let rows = stamps.len() - 1;
     // Rows that are missing make this longer, never shorter.

@@ -1,4 +1,4 @@
-//! The line that all stamps of a log share: the uniform clock of its samples.
+//! The common line of all stamps of a log: the uniform clock of its samples.
 
 use std::path::{Path, PathBuf};
 
@@ -7,94 +7,94 @@ use super::wander::{Knots, Wander};
 use crate::formats::error::{FileError, Place};
 use crate::recording::nanoseconds;
 
-/// The uniform clock of stamps that do not go back.
+/// The uniform clock of non-decreasing stamps.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Uniform {
     /// Due time of the first sample, s.
     pub first: f64,
     /// s
     pub period: f64,
-    /// The number of each row's sample; the first is 0. Empty if they were given out one by one.
+    /// Sample number of each row, from 0. Empty if they were delivered one by one.
     pub numbers: Vec<usize>,
-    /// Stamps against due times, s; where samples wander, against their own times.
+    /// Stamps relative to due times, s; for drifting samples, relative to their own times.
     pub jitter_rms: f64,
     pub jitter_max: f64,
-    /// The period over the one that was given minus one, where stamps contradict that.
+    /// Period divided by the given one, minus one, if the stamps contradict it.
     pub off_given: Option<f64>,
-    /// The times of samples, where they are off the due times by more than half a sample.
+    /// Sample times, if they deviate from the due times by more than half a sample.
     pub wander: Option<Wander>,
 }
 
-/// σ that one flawless record in ten thousand exceeds.
+/// σ limit that one flawless recording in ten thousand exceeds.
 const BY_CHANCE: f64 = 3.89;
-/// A first stamp this near its due time is it, and stamps jitter by no less, s.
+/// A first stamp this close to its due time equals it, and jitter is at least this, s.
 const EXACT: f64 = 1e-9;
 
 impl Uniform {
-    /// Finds the number of each sample, and the clock that all stamps share. A given period is that of the clock
-    /// unless the stamps contradict it. There must be at least two stamps.
+    /// Finds the number of each sample and the common clock of all stamps. A given period is used unless the stamps
+    /// contradict it. At least two stamps are required.
     pub fn new(file: &Path, stamps: &[(f64, u64)], given: Option<f64>) -> Result<Self, FileError> {
         let (line, numbers) = Line::new(file, stamps, given)?;
         let clock = line.finish()?;
         Ok(Self { numbers, ..clock })
     }
 
-    /// Time of a sample after the first is due, s; it need not be a whole one.
+    /// Time of a sample after the due time of the first, s; may be fractional.
     pub fn time(&self, number: f64) -> f64 {
         let time = self.wander.as_ref().map(|wander| wander.time(number));
         time.unwrap_or(number) * self.period
     }
 
-    /// The sample of a time after the first is due, s.
+    /// Sample number at a time after the due time of the first, s.
     pub fn number(&self, time: f64) -> f64 {
         let time = time / self.period;
         let number = self.wander.as_ref().map(|wander| wander.number(time));
         number.unwrap_or(time)
     }
 
-    /// What stamps do that no uniform clock does, in a sentence.
+    /// Deviation of the stamps from a uniform clock, in a sentence.
     pub fn uneven(&self) -> Option<String> {
         let ms = |time: f64| format!("{:.3} ms", 1e3 * time);
         let sample = ms(self.period);
         if let Some(wander) = &self.wander {
             return Some(format!(
-                "By their stamps samples wander by up to {} against an even clock of {sample} a sample: they are \
-                 integrated over its samples.",
+                "The time stamps drift by up to {} from a uniform clock of {sample} per sample. turncal resampled \
+                    the data to that clock by integration.",
                 ms(wander.largest() * self.period),
             ));
         }
         (self.jitter_max > self.period).then(|| {
             format!(
-                "Time stamps are early or late by up to {}, and a sample lasts {sample}. turncal took an even clock \
-                 through all of them.",
+                "Time stamps jitter by up to {}, more than the sample period of {sample}. turncal fitted a uniform \
+                    clock to them.",
                 ms(self.jitter_max),
             )
         })
     }
 }
 
-/// Follows stamps as they come, and gives at the end the clock that they shared.
+/// Follows stamps one by one and finally returns their common clock.
 #[derive(Debug, Clone)]
 pub struct Line {
     file: PathBuf,
     given: Option<f64>,
     counter: Counter,
-    /// Stamps are referred to the first of them and to a clock of about their period.
+    /// Stamps are relative to the first one and to a clock of about their period.
     origin: f64,
     about: f64,
-    /// That of the first stamps, s.
+    /// Period of the first stamps, s.
     period: f64,
     last: f64,
-    /// Stamps as they stand …
+    /// Unchanged stamps …
     stamps: Sums,
-    /// … and rows that came late at the time that rows behind them allow.
+    /// … and late rows at the time allowed by the following rows.
     placed: Sums,
     knots: Knots,
-    /// The stamps that may be farthest below a line, and above.
+    /// Stamps that may be farthest below and above a line.
     hulls: [Vec<[f64; 2]>; 2],
 }
 
-/// Sums over stamps: n is the number of the sample, x how far it is off, s.
+/// Sums over stamps: n is the sample number, x its deviation, s.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
     count: f64,
@@ -125,7 +125,7 @@ impl Sums {
 }
 
 impl Line {
-    /// Takes up the clock of the first stamps, and gives the numbers of their samples.
+    /// Starts with the clock of the first stamps and returns their sample numbers.
     pub fn new(
         file: &Path,
         stamps: &[(f64, u64)],
@@ -138,8 +138,8 @@ impl Line {
             return Err(FileError::new(
                 file,
                 Place::Line(stamps[0].1),
-                format_args!("steps of {} s from row to row", nanoseconds(found)),
-                format_args!("sample_period_s = {period} as in run.toml"),
+                format_args!("a time step of {} s between rows", nanoseconds(found)),
+                format_args!("{period} s (sample_period_s in run.toml)"),
                 "Correct sample_period_s, time_unit or the time column.",
             ));
         }
@@ -166,9 +166,8 @@ impl Line {
         clock(given.unwrap_or(found), given.is_some()).map(|(line, _)| line)
     }
 
-    /// The count that makes stamps likeliest, rows missing by the stamps or none at all. Each place where rows are
-    /// missing has to make stamps likelier by as much as it takes to name it among all rows (minimum description
-    /// length). Err is the row behind a gap that is too long.
+    /// The most likely count: rows missing according to the stamps, or none. Each gap must raise the likelihood by the
+    /// cost of naming its place among all rows (minimum description length). `Err` is the row after too long a gap.
     fn likeliest(
         stamps: &[(f64, u64)],
         about: f64,
@@ -206,7 +205,7 @@ impl Line {
         Ok(by_stamps)
     }
 
-    /// Counts stamps by a clock of this period; Err is the row after a gap longer than all rows together.
+    /// Counts stamps with a clock of this period; `Err` is the row after a gap longer than all rows together.
     fn through(
         stamps: &[(f64, u64)],
         about: f64,
@@ -239,8 +238,7 @@ impl Line {
         Ok((line, numbers))
     }
 
-    /// The numbers of the samples of the next `count` rows; the stamps of the rows behind them tell whether one is
-    /// late.
+    /// Sample numbers of the next `count` rows; the stamps of the following rows show whether one is late.
     pub fn numbers(
         &mut self,
         stamps: &[(f64, u64)],
@@ -259,7 +257,7 @@ impl Line {
         .collect()
     }
 
-    /// About how long a sample is, s.
+    /// Approximate sample period, s.
     pub fn period(&self) -> f64 {
         self.period
     }
@@ -283,7 +281,7 @@ impl Line {
         }
     }
 
-    /// The clock that all stamps shared.
+    /// The common clock of all stamps.
     pub fn finish(mut self) -> Result<Uniform, FileError> {
         self.knots = self.knots.finish();
         let free = self.fit(self.free_period());
@@ -299,8 +297,8 @@ impl Line {
         self.fit(given)
     }
 
-    /// Whether stamps drift from a clock of another period, over all of them, by more than jitter makes
-    /// a line through them drift, if they are independent, and by more than any of them jitters, if not.
+    /// Whether stamps drift from a clock of a different period by more than jitter explains, both for independent
+    /// jitter and compared with the largest jitter.
     fn contradicts(&self, free: &Uniform, period: f64) -> bool {
         let drift = (free.period - period).abs() * self.counter.number as f64;
         let sigma = free.jitter_rms * (12.0 / self.stamps.count).sqrt();
@@ -355,8 +353,8 @@ fn gap(file: &Path, before: f64, (time, line): (f64, u64)) -> FileError {
         file,
         Place::Line(line),
         format_args!("a gap in time from {before} s to {time} s"),
-        "fewer rows missing than there are",
-        "Correct the clock, or split the record there.",
+        "fewer missing rows than recorded rows",
+        "Correct the clock, or split the recording there.",
     )
 }
 
@@ -364,9 +362,9 @@ fn not_forward(file: &Path, line: u64) -> FileError {
     FileError::new(
         file,
         Place::Line(line),
-        "times that do not go on from here",
-        "times that increase from row to row",
-        "Correct the time column or leave out the rows, or name another time column in run.toml.",
+        "times that stop increasing here",
+        "times that increase with every row",
+        "Correct the time column, remove these rows, or name another time column in run.toml.",
     )
 }
 

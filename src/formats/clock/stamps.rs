@@ -1,4 +1,4 @@
-//! The stamps of a log's rows as they come: rows that come late, counters that wrap, clocks that are set, pauses.
+//! Stamps of the rows of a log in order of arrival: late rows, wrapping counters, clock settings, pauses.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use crate::recording::nanoseconds;
 use crate::statistics::median;
 
 impl Clock<'_> {
-    /// Begins to read a file.
+    /// Starts reading a file.
     pub fn start(&self, csv: &mut LogRows) -> Result<Stamps, FileError> {
         Ok(Stamps {
             column: self.column.map(|name| csv.column(name)).transpose()?,
@@ -37,20 +37,20 @@ impl Clock<'_> {
     }
 }
 
-/// Where a row belongs by its stamp: the number of kept rows that it is behind.
+/// Position of a row by its stamp: number of kept rows before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stamp {
     /// It is taken.
     New(usize),
-    /// The row before has it, too.
+    /// The same stamp as the previous row.
     Again(usize),
 }
 
-/// Where nothing was recorded for so long that the rest of it is left out.
+/// A pause so long that its remainder is omitted.
 struct Pause {
-    /// Time of the row behind it, the pauses being short, s.
+    /// Time of the row after it, with shortened pauses, s.
     until: f64,
-    /// By how much these are too short up to here, s.
+    /// Total shortening up to here, s.
     left_out: f64,
     line: u64,
 }
@@ -60,44 +60,44 @@ pub struct Stamps {
     column: Option<usize>,
     nanoseconds: Option<usize>,
     unit: TimeUnit,
-    /// s from row to row, if it is stated; always of counts
+    /// Sample period, s, if stated; always for counts.
     period: Option<f64>,
     breaks: Breaks,
-    /// The time of the row before by its own numbers, s, as all that follows.
+    /// Time of the previous row as logged, s, like the following fields.
     time: Option<f64>,
     first: Option<f64>,
     /// The longest step forward.
     longest: f64,
-    /// In all, in steps longer than BREAK.
+    /// Total of steps longer than BREAK.
     without_rows: f64,
-    /// By how much a row is later than its numbers: counters wrap, clocks are set, pauses are cut short.
+    /// Difference between row time and logged number, due to wraps, clock settings and shortened pauses.
     ahead: f64,
     /// The size of a counter that wrapped.
     wraps_at: Option<f64>,
-    /// Pauses that are cut short.
+    /// Shortened pauses.
     pauses: Vec<Pause>,
-    /// Where the clock was set, in some sentences each.
+    /// Clock settings, a few sentences each.
     set: Vec<String>,
-    /// Number of rows before the last such place.
+    /// Number of rows before the last clock setting.
     set_before: Option<usize>,
-    /// Rows that were put before others, and the line of the first.
+    /// Reordered rows, and the line of the first.
     out_of_order: (usize, u64),
-    /// Rows since the latest one that come behind it.
+    /// Rows since the latest one that belong before it.
     behind: usize,
-    /// Whether rows of one time may have different values.
+    /// Whether rows with equal times may have different values.
     bursts: bool,
-    /// Rows that follow one another at one time.
+    /// Consecutive rows with equal times.
     standing: usize,
-    /// Rows that have another's time but not its values, and the line of the first.
+    /// Rows with the time but not the values of another, and the line of the first.
     at_once: (usize, u64),
-    /// Time in s and line of each row taken and not let go …
+    /// Time in s and line of each row kept …
     pub of_rows: Vec<(f64, u64)>,
-    /// … and how many were before them.
+    /// … and number of rows before them.
     let_go: usize,
 }
 
 impl Stamps {
-    /// The same where no two rows may have one time.
+    /// The same if times must be unique.
     pub fn without_bursts(self) -> Self {
         Self {
             bursts: false,
@@ -105,7 +105,7 @@ impl Stamps {
         }
     }
 
-    /// Takes the row unless it is one of those at its time again, of which `is_same` compares the values.
+    /// Accepts the row unless it duplicates a row at its time; `is_same` compares the values.
     pub fn take(
         &mut self,
         csv: &LogRows,
@@ -121,9 +121,9 @@ impl Stamps {
         self.standing += 1;
         if self.standing > MOST_AT_ONCE {
             return Err(csv.error_here(
-                format_args!("the same time in more than {MOST_AT_ONCE} rows"),
-                "times that increase",
-                "Name another time column, or leave it out and give sample_period_s.",
+                format_args!("the same time in more than {MOST_AT_ONCE} consecutive rows"),
+                "increasing times",
+                "Name another time column, or omit it and set sample_period_s.",
             ));
         }
         if is_same(place - 1) {
@@ -131,9 +131,9 @@ impl Stamps {
         }
         if !self.bursts {
             return Err(csv.error_here(
-                "the time of the row before again, a duplicate with other values",
+                "the same time as in the previous row, but other values",
                 "a later time",
-                "Remove the wrong one of both rows, or print times with more digits.",
+                "Remove the wrong row of the two, or log the time with more digits.",
             ));
         }
         if self.is_set_to(place, csv)? {
@@ -145,7 +145,7 @@ impl Stamps {
         Ok(Stamp::New(place))
     }
 
-    /// Looks at the stamp of the row, and takes it if it is new.
+    /// Examines the stamp of the row and accepts it if new.
     fn look(&mut self, csv: &LogRows) -> Result<Stamp, FileError> {
         let end = self.of_rows.len();
         let Some(column) = self.column else {
@@ -159,10 +159,7 @@ impl Stamps {
         }
         let time = self.time_of(csv, column)?;
         if time + self.usual_step() == time {
-            return Err(csv.not(
-                column,
-                "a time, not a number so large that the next row would have the same",
-            ));
+            return Err(csv.not(column, "a time small enough to resolve one sample period"));
         }
         if let Some(before) = self.time {
             let step = time - before;
@@ -193,7 +190,7 @@ impl Stamps {
         Ok(Stamp::New(end))
     }
 
-    /// Refuses the first two steps if they are as long as is stated in another unit than that of `run.toml`.
+    /// Refuses the first two steps if they match the stated period only in a different unit.
     fn is_in_unit(&self, csv: &LogRows, step: f64) -> Result<(), FileError> {
         let (TimeUnit::PerSecond(own), Some(period)) = (self.unit, self.period) else {
             return Ok(());
@@ -213,17 +210,14 @@ impl Stamps {
         match TimeUnit::WORDS.iter().find(fits) {
             None => Ok(()),
             Some((unit, _)) => Err(csv.error_here(
-                format_args!(
-                    "times that go on by {} from row to row",
-                    nanoseconds(step * own)
-                ),
-                format_args!("{period} s, as sample_period_s says"),
-                format!("Give time_unit = \"{unit}\", or correct sample_period_s."),
+                format_args!("a time step of {} between rows", nanoseconds(step * own)),
+                format_args!("{period} s (sample_period_s in run.toml)"),
+                format!("Set time_unit = \"{unit}\", or correct sample_period_s."),
             )),
         }
     }
 
-    /// The time of a row by its own numbers, s.
+    /// Logged time of a row, s.
     fn time_of(&self, csv: &LogRows, column: usize) -> Result<f64, FileError> {
         let number = csv.number(column)?;
         let nanoseconds = self.nanoseconds.map(|column| csv.number(column));
@@ -242,8 +236,8 @@ impl Stamps {
         self.of_rows.push((time + self.ahead, line));
     }
 
-    /// Puts a row that comes late in its place, if there is one of the last: where a row is missing, or at the time of
-    /// another. Those of a clock that was set back find theirs taken.
+    /// Inserts a late row at its position among the last rows: where a row is missing, or at the time of another. After
+    /// a clock was set back, these positions are occupied.
     fn late(&mut self, time: f64, line: u64) -> Option<Stamp> {
         let last = self.of_rows.len().saturating_sub(REACH);
         let place = last + self.of_rows[last..].partition_point(|(other, _)| *other <= time);
@@ -261,8 +255,8 @@ impl Stamps {
         Some(Stamp::New(place))
     }
 
-    /// Whether a row is missing before this place: whether the step there is nearer to two than to one of the usual ones
-    /// of the last rows, of which half are no longer.
+    /// Whether a row is missing before this position: whether the step is closer to two than to one median step of the
+    /// last rows.
     fn misses_a_row(&self, place: usize) -> bool {
         let step = |rows: &[(f64, u64)]| rows[1].0 - rows[0].0;
         let last = &self.of_rows[self.of_rows.len().saturating_sub(REACH)..];
@@ -276,13 +270,13 @@ impl Stamps {
         self.period.unwrap_or(1.0)
     }
 
-    /// The step that is stated, or else the longest so far; before any, a second.
+    /// The stated step, otherwise the longest so far, initially one second.
     fn usual_step(&self) -> f64 {
         let longest = Some(self.longest).filter(|longest| *longest > 0.0);
         self.period.or(longest).unwrap_or(1.0)
     }
 
-    /// Whether a counter of a known size wrapped at a step back, which is then made good.
+    /// Whether a counter of known size wrapped at a backward step, which is then corrected.
     fn wraps(&mut self, step: f64) -> bool {
         let size = match self.unit {
             TimeUnit::Count => wrap(step, COUNTERS.map(|size| size * self.period()), |size| {
@@ -295,7 +289,7 @@ impl Stamps {
         size.is_some()
     }
 
-    /// Whether with this step forward nothing was recorded for longer than something was.
+    /// Whether, with this forward step, pauses are longer than the recorded time.
     fn is_pause(&self, step: f64) -> bool {
         let rows = self.let_go + self.of_rows.len();
         let lasted = self.time.zip(self.first);
@@ -304,13 +298,13 @@ impl Stamps {
         pauses && step + 2.0 * self.without_rows > lasted
     }
 
-    /// Takes what follows this step for a little later.
+    /// Shifts the following rows to slightly later.
     fn cut(&mut self, step: f64) {
         self.ahead += BREAK - step;
         self.without_rows += BREAK;
     }
 
-    /// Cuts a pause short: samples of nothing would take room.
+    /// Shortens a pause, to save memory.
     fn pause(&mut self, csv: &LogRows, time: f64, step: f64) {
         self.cut(step);
         let before = self.pauses.last().map_or(0.0, |pause| pause.left_out);
@@ -321,7 +315,7 @@ impl Stamps {
         });
     }
 
-    /// The time at which samples are that were given this one, the pauses being short.
+    /// Sample time for this logged time, with shortened pauses.
     pub fn told(&self, time: f64) -> f64 {
         // Samples begin about where their stamps are.
         let behind = |pause: &Pause| pause.until - 0.5 * BREAK <= time;
@@ -330,7 +324,7 @@ impl Stamps {
         time + pause.map_or(0.0, |pause| pause.left_out)
     }
 
-    /// Takes what follows for a part of its own, a little later.
+    /// Treats the following rows as a separate part, slightly later.
     fn is_set(&mut self, csv: &LogRows, before: f64, step: f64) -> Result<(), FileError> {
         // Where rows come behind later ones, or it happens again and again, a time that steps back is of no clock.
         let row = self.let_go + self.of_rows.len();
@@ -341,8 +335,8 @@ impl Stamps {
         self.set_before = Some(row);
         self.cut(step);
         self.set.push(format!(
-            "line {}: time goes from {} to {}: the clock was set, and nobody knows how long nothing was \
-             recorded. What follows is a stretch of its own; its times are taken {} s later.",
+            "line {}: the time jumps from {} to {} because the clock was set, so the length of the gap is unknown. \
+                turncal treats the rest as a separate stretch and shifts its times by {} s.",
             csv.line(),
             self.words(before),
             self.words(before + step),
@@ -354,9 +348,9 @@ impl Stamps {
     fn goes_back(&self, csv: &LogRows, before: f64, step: f64) -> FileError {
         let (from, to) = (self.words(before), self.words(before + step));
         csv.error_here(
-            format_args!("time going back from {from} to {to}"),
-            "times that increase",
-            "Put the rows in order, name another time column, or split the file where the clock was set.",
+            format_args!("a time that steps back from {from} to {to}"),
+            "increasing times",
+            "Sort the rows, name another time column, or split the file where the clock was set.",
         )
     }
 
@@ -367,8 +361,8 @@ impl Stamps {
         }
     }
 
-    /// Whether the row at the time of another, many rows back and none missing there, is the first one of a clock that
-    /// was set; it is then taken.
+    /// Whether a row with the time of a much earlier row, where none is missing, is the first after a clock setting; it
+    /// is then accepted.
     fn is_set_to(&mut self, place: usize, csv: &LogRows) -> Result<bool, FileError> {
         if place == self.of_rows.len() || self.misses_a_row(place) {
             return Ok(false);
@@ -384,14 +378,14 @@ impl Stamps {
         Ok(true)
     }
 
-    /// Lets go of the first rows' stamps.
+    /// Releases the stamps of the first rows.
     pub fn let_go(&mut self, rows: usize) {
         self.of_rows.drain(..rows);
         self.of_rows.shrink_to(2 * self.of_rows.len());
         self.let_go += rows;
     }
 
-    /// What was made of numbers that step back, and what that leaves open where this number of samples lack their rows.
+    /// Notes on times that step back, and on the resulting ambiguity if this number of samples lack their rows.
     pub fn notes(&self, file: &Path, missing: usize) -> Vec<String> {
         let file = file.display();
         let set = self.set.iter();
@@ -399,8 +393,8 @@ impl Stamps {
         let ends = self.pauses.first().zip(self.pauses.last());
         notes.extend(ends.map(|(first, last)| {
             format!(
-                "{file}: nothing was recorded in {} pause(s), the first before line {}, for longer in all than \
-                 something was. {BREAK} s of each counts as missing rows, {} s more do not.",
+                "{file}: recording paused {} time(s), first before line {}, for longer in total than it ran. turncal \
+                    counts {BREAK} s of each pause as missing rows and ignores the other {} s.",
                 self.pauses.len(),
                 first.line,
                 nanoseconds(last.left_out)
@@ -409,26 +403,26 @@ impl Stamps {
         let (same, line) = self.at_once;
         notes.extend((same > 0).then(|| {
             format!(
-                "{same} row(s) of {file} have the time of the row before and other values, the first in line {line}: \
-                 each counts as a sample."
+                "{same} row(s) of {file} repeat the previous time with other values, the first in line {line}. Each \
+                    counts as a sample."
             )
         }));
         let (late, line) = self.out_of_order;
         notes.extend((late > 0).then(|| {
             format!(
-                "{late} row(s) of {file} come behind later ones, the first in line {line}: they are put in their place."
+                "{late} row(s) of {file} are out of order, the first in line {line}. turncal sorted them by time."
             )
         }));
         notes.extend(self.wraps_at.and_then(|size| match self.unit {
             TimeUnit::PerSecond(_) => Some(format!(
-                "{file}: the time wraps every {} s and is taken to go on.",
+                "{file}: the time counter wraps every {} s. turncal unwrapped it.",
                 nanoseconds(size)
             )),
             TimeUnit::Count => (missing > 0).then(|| {
                 format!(
-                    "Rows are missing, and the counter wraps every {} samples, {} s: as many more may be missing \
-                     at each place, or several times as many, and all after it be as much too early. Give a time that \
-                     does not wrap, or split the record there.",
+                    "Rows are missing, and the counter wraps every {} samples ({} s). Each gap may be longer by one \
+                        or more of these periods, and all later times too early by as much. Use a time that does not \
+                        wrap, or split the recording at the gaps.",
                     (size / self.period()).round(),
                     nanoseconds(size)
                 )
@@ -438,7 +432,7 @@ impl Stamps {
     }
 }
 
-/// Counts a row of its kind; the line of the first is kept.
+/// Counts a row of this kind and keeps the line of the first.
 fn count((count, first): &mut (usize, u64), line: u64) {
     *count += 1;
     if *count == 1 {
@@ -446,15 +440,14 @@ fn count((count, first): &mut (usize, u64), line: u64) {
     }
 }
 
-/// At one time, a minute and more of any rows are no burst: the time stands still.
+/// More rows with the same time than a burst can have, a minute or more: the time has stopped.
 const MOST_AT_ONCE: usize = 1 << 16;
-/// How long nothing is taken to have been recorded where nobody knows, and the rest of a long pause, s: more than
-/// is ever interpolated.
+/// Assumed gap if the true one is unknown, and the length of a shortened pause, s; longer than any interpolation.
 const BREAK: f64 = 1.0;
 
 /// Sizes of counters of samples.
 const COUNTERS: [f64; 4] = [256.0, 65_536.0, 16_777_216.0, 4_294_967_296.0];
-/// The seconds after which clocks start over: registers of milliseconds and microseconds, a day, a week of satellites.
+/// Periods after which clocks restart, s: millisecond and microsecond registers, a day, a satellite week.
 const CLOCKS: [f64; 7] = [
     65.536,
     16.777_216,
@@ -465,7 +458,7 @@ const CLOCKS: [f64; 7] = [
     604_800.0,
 ];
 
-/// The first of these sizes of a counter that makes its step back one forward that is no longer than usual.
+/// The first counter size that turns the backward step into a forward step of usual length.
 fn wrap<const N: usize>(step: f64, sizes: [f64; N], longest: impl Fn(f64) -> f64) -> Option<f64> {
     let forward = |size: &f64| step + size > 0.0 && step + size <= longest(*size);
     sizes.into_iter().find(forward)

@@ -1,14 +1,13 @@
-//! How far a clock of samples wanders from a uniform one.
+//! Drift of a sample clock relative to a uniform one.
 
 use crate::statistics::median;
 
-/// Rows that share a knot: many against jitter, few against what an oscillator's rate changes by.
+/// Rows per knot: many compared with jitter, few compared with changes of the oscillator rate.
 const ROWS: usize = 64;
-/// Stamps nearer than this part of a sample to their due times need no other clock.
+/// Stamps closer than this fraction of a sample to their due times need no drifting clock.
 const WITHIN: f64 = 0.5;
 
-/// Rows of about one time: the mean of their numbers, the median of how far their stamps are off, s, and the line of
-/// the one in the middle.
+/// Neighbouring rows: mean number, median stamp deviation, s, and line of the middle row.
 #[derive(Debug, Clone, Copy)]
 struct Knot {
     number: f64,
@@ -16,10 +15,10 @@ struct Knot {
     line: u64,
 }
 
-/// Stamps as they come, against a clock that they are referred to.
+/// Stamps in order, relative to a reference clock.
 #[derive(Debug, Clone, Default)]
 pub struct Knots {
-    /// Number, how far it is off, and line.
+    /// Number, deviation and line.
     rows: Vec<(usize, f64, u64)>,
     knots: Vec<Knot>,
     count: usize,
@@ -35,7 +34,7 @@ impl Knots {
         }
     }
 
-    /// With the rows that are left, if they are enough to tell a wander from jitter.
+    /// Includes the remaining rows, if they suffice to separate drift from jitter.
     pub fn finish(mut self) -> Self {
         if 2 * self.rows.len() >= ROWS || self.knots.is_empty() {
             self.tie();
@@ -60,15 +59,14 @@ impl Knots {
         }
     }
 
-    /// RMS and largest of how far stamps are off their knots, s.
+    /// RMS and largest deviation of stamps from their knots, s.
     pub fn jitter(&self) -> (f64, f64) {
         let mean = self.squares / self.count.max(1) as f64;
         (mean.sqrt(), self.largest)
     }
 
-    /// From a clock of this period whose first sample is due later than that of the one that stamps are referred to, and
-    /// whose period is longer; `None` if stamps are near enough to that one. Err is the line where times do not
-    /// increase.
+    /// Drift relative to a clock of this period, with an offset and a period difference to the reference clock; `None`
+    /// if the stamps are close enough to it. `Err` is the line where times do not increase.
     pub fn wander(&self, later: f64, longer: f64, period: f64) -> Result<Option<Wander>, u64> {
         let knots = self.knots.iter().map(|knot| {
             let off = (knot.off - later - knot.number * longer) / period;
@@ -84,15 +82,15 @@ impl Knots {
     }
 }
 
-/// The samples of a clock that wanders on the axis of time of a uniform one, both counted in samples.
+/// Samples of a drifting clock on the time axis of a uniform one, both in samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Wander {
-    /// Number, and how much later it is than its number says; between them straight lines.
+    /// Number and delay, with linear interpolation.
     knots: Vec<(f64, f64)>,
 }
 
 impl Wander {
-    /// When a sample is, which need not be a whole one.
+    /// Time of a sample, which may be fractional.
     pub fn time(&self, number: f64) -> f64 {
         let behind = self.knots.partition_point(|&(knot, _)| knot <= number);
         self.between(behind, |(knot, off)| (knot, knot + off), number)
@@ -106,20 +104,20 @@ impl Wander {
         self.between(behind, |(knot, off)| (knot + off, knot), time)
     }
 
-    /// The knot from which on the clock does not go forward any more.
+    /// The first knot after which the clock no longer increases.
     fn stops(&self) -> Option<usize> {
         let time = |(number, off): (f64, f64)| number + off;
         let forward = |pair: &[(f64, f64)]| time(pair[1]) > time(pair[0]);
         self.knots.windows(2).position(|pair| !forward(pair))
     }
 
-    /// The most by which a sample is off, in samples.
+    /// Largest deviation of a sample, in samples.
     pub fn largest(&self) -> f64 {
         let offs = self.knots.iter().map(|(_, off)| off.abs());
         offs.fold(0.0, f64::max)
     }
 
-    /// On the line through the knots before and behind, as seen along either axis.
+    /// Interpolates between the adjacent knots, along either axis.
     fn between(&self, behind: usize, seen: impl Fn((f64, f64)) -> (f64, f64), at: f64) -> f64 {
         let behind = behind.clamp(1, self.knots.len() - 1);
         let (x, y) = seen(self.knots[behind - 1]);

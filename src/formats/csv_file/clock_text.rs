@@ -1,13 +1,13 @@
-//! Times as text: a date and a time of day, a time of day alone, or seconds whose fraction lost its zeros.
+//! Times as text: a date and time of day, a time of day, or seconds with a fraction that lost its leading zeros.
 
-/// How the texts of a column are read as times.
+/// Conversion of the texts of a column to times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ClockText {
-    /// Digits of the fractions where these are whole numbers without the zeros before them.
+    /// Digits of fractions written without leading zeros.
     unpadded: Option<usize>,
 }
 
-/// Days from 1970 to a day of the Gregorian calendar; months begin with March, so that leap days come last.
+/// Days from 1970 to a Gregorian date; months start with March, so that leap days are last.
 fn days(year: i64, month: i64, day: i64) -> i64 {
     let (year, month) = match month {
         3.. => (year, month - 3),
@@ -87,7 +87,7 @@ fn parts(text: &str) -> Option<(f64, &str)> {
 }
 
 impl ClockText {
-    /// Of a column of which these are the texts in the first rows; `None` if plain numbers serve.
+    /// For a column with these texts in the first rows; `None` if they are plain numbers.
     pub fn of(texts: &[&str]) -> Option<Self> {
         let parts: Vec<_> = texts.iter().filter_map(|text| parts(text)).collect();
         if parts.is_empty() || 2 * parts.len() < texts.len() {
@@ -117,7 +117,7 @@ impl ClockText {
         }
     }
 
-    /// The time that a text says, s.
+    /// Time of a text, s.
     pub fn seconds(self, text: &str) -> Option<f64> {
         parts(text).map(|(whole, fraction)| self.seconds_of(whole, fraction))
     }
@@ -128,12 +128,12 @@ impl ClockText {
         whole + count / 10f64.powi(i32::try_from(digits).unwrap_or(0))
     }
 
-    /// What is made of its texts that they do not say, if anything.
+    /// Remark on assumptions about its texts, if any.
     pub fn remark(self, name: &str) -> Option<String> {
         let digits = self.unpadded?;
         Some(format!(
-            "The fractions of a second in `{name}` have lost the zeros before them: they are read as whole numbers of \
-             10^-{digits} s."
+            "Fractions of a second in `{name}` have lost their leading zeros. turncal read them as whole multiples \
+                of 10^-{digits} s."
         ))
     }
 }

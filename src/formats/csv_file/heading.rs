@@ -1,4 +1,4 @@
-//! What the first lines of a text say of the others: a preamble, lines of names and units, rows, which tags may tell apart.
+//! Structure of a text from its first lines: preamble, lines of names and units, and rows, possibly tagged.
 
 use std::collections::BTreeMap;
 
@@ -6,49 +6,49 @@ use super::clock_text::ClockText;
 use super::lines::{Line, Stop};
 use super::row::{MOST_COLUMNS, Malformed, Row};
 
-/// Rows at the end of the first lines that show what rows are.
+/// Number of rows at the end of the first lines that define the row format.
 const ROWS: usize = 64;
-/// Fewer columns cannot hold a time and both triads.
+/// Minimum number of columns for a time and both triads.
 const BOTH_TRIADS: usize = 7;
-/// More kinds of rows than this are no kinds.
+/// Maximum number of kinds of rows.
 const MOST_TAGS: usize = 64;
 /// The unit of a column of times as text.
 const CLOCK: &str = "h:m:s";
-/// Where cameras' logs (`.gcsv`) say the unit of columns: the key, what their names begin with, the unit.
+/// Unit keys in camera logs (`.gcsv`): key, prefix of column names, unit.
 const SCALES: [(&str, char, &str); 3] = [
     ("tscale", 't', "s"),
     ("gscale", 'g', "rad/s"),
     ("ascale", 'a', "g"),
 ];
 
-/// What a text holds.
+/// Content of a text.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Heading {
     pub delimiter: Delimiter,
-    /// Names of the columns: `1`, `2`, … where the file gives none.
+    /// Column names: `1`, `2`, … if the file has none.
     pub names: Vec<String>,
-    /// Their line; of the first row where there are none.
+    /// Their line; that of the first row if there are no names.
     pub line: u64,
-    /// Units of the columns, where the file says them.
+    /// Column units, if stated.
     pub units: Option<Vec<String>>,
-    /// Columns that are read as times of a clock.
+    /// Columns read as clock times.
     pub clocks: Vec<Option<ClockText>>,
     /// Rate of the rows, Hz.
     pub rate: Option<f64>,
-    /// What the file says of its values that is not followed, or is read otherwise.
+    /// Statements of the file that are ignored or interpreted.
     pub remarks: Vec<String>,
-    /// First lines that are no rows.
+    /// Number of first lines that are not rows.
     pub above: usize,
 }
 
-/// Rows of several kinds, by the word or number in one of their columns.
+/// Rows of several kinds, identified by the word or number in one column.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Tags {
     pub column: usize,
     pub names: Vec<String>,
 }
 
-/// The first lines of a text, taken apart.
+/// The parsed first lines of a text.
 pub struct Looks(Vec<Look>);
 
 struct Look {
@@ -75,7 +75,7 @@ impl Look {
         }
     }
 
-    /// The fields if there are as many, be it by the delimiter of others; an empty one behind the last is none.
+    /// The fields if their number matches, with any delimiter; an empty one after the last is ignored.
     fn fields(&self, delimiter: Delimiter, count: usize) -> Option<Vec<String>> {
         let fits = |mut fields: Vec<String>| {
             if fields.len() == count + 1 {
@@ -99,7 +99,7 @@ impl Look {
             .or_else(own)
     }
 
-    /// As many words, of names or units.
+    /// The same number of words, for names or units.
     fn words(&self, delimiter: Delimiter, count: usize) -> Option<Vec<String>> {
         let fields = self.fields(delimiter, count)?;
         let filled = fields.iter().filter(|field| !field.is_empty()).count();
@@ -128,7 +128,7 @@ struct Shape {
 }
 
 impl Shape {
-    /// Of the last of some rows, for names may be among the first; a last column that is always empty has to have a name.
+    /// From the last rows, because names may be among the first; a last column that is always empty must have a name.
     fn of(rows: &[&Look], all: &[Look]) -> Option<Self> {
         let rows = &rows[rows.len() - ROWS.min(rows.len().div_ceil(2))..];
         let mut shapes = BTreeMap::new();
@@ -160,7 +160,7 @@ impl Shape {
         Some(Self { delimiter, numbers })
     }
 
-    /// The fields of a line that has numbers where rows have them, and as many columns.
+    /// The fields of a line with numbers in the same columns as rows, and the same number of columns.
     fn row(&self, look: &Look) -> Option<Vec<String>> {
         let fields = look
             .fields(self.delimiter, self.numbers.len())
@@ -174,7 +174,7 @@ impl Shape {
     }
 }
 
-/// Names and units, and the lines from the first on that they take.
+/// Names and units, and the number of lines that they occupy.
 struct Named {
     names: Vec<String>,
     units: Option<Vec<String>>,
@@ -187,7 +187,7 @@ impl Looks {
         Self(lines.map(Look::of).collect())
     }
 
-    /// Of all rows, or of those with one of some tags. None of a file without any.
+    /// Heading of all rows, or of those with a tag. None for a file without rows.
     pub fn heading(&self, tag: Option<(&Tags, &str)>) -> Result<Option<Heading>, Stop> {
         let is_of_tag =
             |look: &&Look| tag.is_none_or(|(tags, tag)| look.field(tags.column) == Some(tag));
@@ -232,7 +232,8 @@ impl Looks {
             .filter_map(|(clock, name)| clock.as_ref()?.remark(name))
             .collect();
         remarks.extend(value(&says, "orientation").map(|letters| {
-            format!("The orientation {letters} that the file states is not applied: columns are taken as they stand.")
+            format!("turncal did not apply the orientation {letters} that the file states; the columns were used \
+                unchanged.")
         }));
         Ok(Some(Heading {
             delimiter: shape.delimiter,
@@ -246,7 +247,7 @@ impl Looks {
         }))
     }
 
-    /// What names the columns, and where it stands, above this row.
+    /// The line of column names above this row, and its position.
     fn named(
         &self,
         shape: &Shape,
@@ -285,8 +286,8 @@ impl Looks {
         })
     }
 
-    /// The same where no line has as many words as rows have columns: numbers, unless what stands above the rows is no
-    /// preamble, but names or a row that do not fit them.
+    /// The same if no line has as many words as rows have columns: numbers, unless the lines above are mismatched names
+    /// or a mismatched row rather than a preamble.
     fn unnamed(&self, shape: &Shape, first: usize, is_tagged: bool) -> Result<Named, Stop> {
         let Self(looks) = self;
         let columns = shape.numbers.len();
@@ -318,8 +319,8 @@ impl Looks {
         })
     }
 
-    /// What tells rows of several kinds apart: words, or small numbers before a time, of rows that are of several widths
-    /// or too narrow to hold both triads.
+    /// Tags of rows of several kinds: words, or small numbers before a time, in rows with different widths or too few
+    /// columns for both triads.
     pub fn tags(&self) -> Option<Tags> {
         let rows = || {
             self.0
@@ -358,7 +359,7 @@ impl Looks {
     }
 }
 
-/// Whether a column behind the first goes forward in all rows.
+/// Whether a column after the first increases in all rows.
 fn goes_on(rows: &[&Vec<String>]) -> bool {
     (1..rows[0].len()).any(|column| {
         let number =
@@ -368,7 +369,7 @@ fn goes_on(rows: &[&Vec<String>]) -> bool {
     })
 }
 
-/// The value that a line of a preamble gives to a key.
+/// Value of a key in a preamble line.
 fn value<'a>(says: &[&'a str], key: &str) -> Option<&'a str> {
     says.iter().find_map(|line| {
         let (found, value) = line.split_once([',', ';', '=', ':', '\t'])?;
@@ -399,7 +400,7 @@ fn units_with(
     (is_said || has_some).then_some(all)
 }
 
-/// The names in some lines, from the first on as many as it takes to tell the columns apart, and the units in the next.
+/// The names in as many lines as needed to distinguish the columns, and the units in the next.
 fn names_and_units(levels: &[Vec<String>], is_comment: bool) -> (Vec<String>, Option<Vec<String>>) {
     let levels = match levels {
         // Other comments may have as many words.
@@ -424,7 +425,7 @@ fn names_and_units(levels: &[Vec<String>], is_comment: bool) -> (Vec<String>, Op
     (levels[0].clone(), levels.get(1).cloned())
 }
 
-/// Whether each names one column: units of two columns are often one word.
+/// Whether each names one column; units of two columns are often equal.
 fn are_distinct(names: &[String]) -> bool {
     let mut sorted: Vec<&str> = names.iter().map(String::as_str).collect();
     sorted.retain(|name| !name.is_empty());
@@ -466,17 +467,17 @@ fn is_number(field: &str) -> bool {
     !field.ends_with(',') && field.replacen(',', ".", 1).parse::<f64>().is_ok()
 }
 
-/// What parts a row's fields.
+/// Field separator of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Delimiter {
-    /// This byte, each time.
+    /// This byte.
     Byte(u8),
-    /// Spaces and tabs, however many.
+    /// Any number of spaces and tabs.
     Blanks,
 }
 
 impl Delimiter {
-    /// The one in a first row.
+    /// The separator in a first row.
     fn of_row(row: &str) -> Self {
         let blanks = Self::Blanks.fields(row).unwrap_or_default();
         if blanks.len() > 1 && blanks.iter().all(|field| is_number(field)) {
@@ -506,7 +507,7 @@ impl Delimiter {
         )
     }
 
-    /// The byte that parts fields in the lines given out.
+    /// Separator byte in the returned lines.
     pub fn byte(self) -> u8 {
         match self {
             Self::Byte(byte) => byte,
@@ -519,7 +520,7 @@ impl Delimiter {
         self.byte() != b','
     }
 
-    /// Leaves one delimiter between two fields, and one behind a word that a colon parts from numbers.
+    /// Leaves one delimiter between two fields, and one after a word followed by a colon and numbers.
     pub fn tidy(self, line: &mut Vec<u8>) {
         if self == Self::Blanks {
             collapse_blanks(line);
@@ -551,7 +552,7 @@ impl Delimiter {
     }
 }
 
-/// Runs of blanks outside quotes become one space, those at the ends nothing.
+/// Replaces runs of blanks outside quotes by one space and trims the ends.
 fn collapse_blanks(line: &mut Vec<u8>) {
     let (mut quoted, mut kept, mut pending) = (false, 0, false);
     for at in 0..line.len() {

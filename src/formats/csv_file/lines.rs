@@ -1,5 +1,5 @@
-//! Lines of a text as programs write them, in UTF-8 or UTF-16, ended by any of the usual marks. What a file may make its
-//! reader hold is limited here, for all callers alike.
+//! Lines of a text in UTF-8 or UTF-16 with any usual line ending. The memory used per file is limited here for all
+//! callers.
 
 use std::collections::VecDeque;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read};
@@ -30,23 +30,23 @@ impl Line {
         marks.iter().find_map(|mark| text.strip_prefix(*mark))
     }
 
-    /// Whether there is more in it than delimiters.
+    /// Whether it contains more than delimiters.
     fn has_content(&self) -> bool {
         let empty = |byte: &u8| byte.is_ascii_whitespace() || matches!(byte, b',' | b';');
         !self.text.iter().all(empty)
     }
 }
 
-/// Why lines cannot be read on.
+/// Reason why reading stopped.
 #[derive(Debug)]
 pub enum Stop {
-    /// The system or the decompression says so.
+    /// Error of the system or of decompression.
     System(io::Error),
-    /// From this line on no row ends within [`LONGEST`].
+    /// From this line on, no row ends within [`LONGEST`].
     Endless { line: u64 },
-    /// This line has no fields.
+    /// This line cannot be split into fields.
     Malformed { line: u64, what: Malformed },
-    /// The bytes are no text.
+    /// The bytes are not text.
     Binary,
 }
 
@@ -56,15 +56,15 @@ impl From<io::Error> for Stop {
     }
 }
 
-/// The lines of a file, the first of them looked at before their turn.
+/// The lines of a file, with a look-ahead at the first ones.
 pub struct Lines {
     source: Box<dyn BufRead>,
-    /// What ends a line.
+    /// Line ending.
     end: u8,
     ahead: VecDeque<Line>,
-    /// What comes behind those.
+    /// The remaining input.
     stop: Option<Stop>,
-    /// Number of the last line that was read, and of the last row given out.
+    /// Number of the last line read, and of the last row returned.
     number: u64,
     row: u64,
     line: Line,
@@ -125,13 +125,13 @@ impl Lines {
         self.ahead.iter()
     }
 
-    /// Passes over this many lines of the first ones.
+    /// Skips this many of the first lines.
     pub fn skip(&mut self, lines: usize) {
         let passed = self.ahead.drain(..lines).next_back();
         self.row = passed.map_or(0, |line| line.number);
     }
 
-    /// Goes to the next line that is no comment; false at the end of the file.
+    /// Advances to the next line that is not a comment; false at the end of the file.
     pub fn advance(&mut self) -> Result<bool, Stop> {
         let mut left = LONGEST;
         loop {
@@ -160,12 +160,12 @@ impl Lines {
         &mut self.line
     }
 
-    /// Whether something ends the line, so that it is all there.
+    /// Whether the line has an ending, so that it is complete.
     pub fn is_ended(&self) -> bool {
         self.line.is_ended
     }
 
-    /// Takes the next line that is not empty, within `left` bytes; false at the end of the file.
+    /// Reads the next non-empty line, within `left` bytes; false at the end of the file.
     fn take(&mut self, left: &mut u64) -> Result<bool, Stop> {
         loop {
             let line = &mut self.line;
@@ -195,7 +195,7 @@ impl Lines {
     }
 }
 
-/// UTF-16 as UTF-8; pairs of surrogates, which no number and no name here has, are lost.
+/// Converts UTF-16 to UTF-8; surrogate pairs, which occur in no number or name here, are lost.
 struct Utf16 {
     source: Box<dyn BufRead>,
     unit: fn([u8; 2]) -> u16,

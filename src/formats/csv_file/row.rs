@@ -2,15 +2,15 @@
 
 use csv_core::{ReadRecordResult, Reader, ReaderBuilder, Terminator};
 
-/// As many columns as a spreadsheet has.
+/// Maximum number of columns, as in a spreadsheet.
 pub const MOST_COLUMNS: usize = 16_384;
-/// No number and no name is longer, bytes.
+/// Maximum length of a number or name, bytes.
 pub const LONGEST_FIELD: usize = 1 << 16;
 
-/// Why a line is no row.
+/// Reason why a line is not a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Malformed {
-    /// A field begins with a quote that nothing in its line closes.
+    /// A field starts with a quote that is not closed in its line.
     Quote,
     /// More columns than [`MOST_COLUMNS`].
     Columns,
@@ -18,17 +18,17 @@ pub enum Malformed {
     Field,
 }
 
-/// The fields of a line, which may stand in quotes; no field goes beyond its line.
+/// The fields of a line, possibly quoted; no field extends beyond its line.
 pub struct Row {
     parser: Reader,
     text: Vec<u8>,
-    /// End of each field in the text, and room for more.
+    /// End of each field in the text, with spare capacity.
     ends: Vec<usize>,
     count: usize,
 }
 
 impl Row {
-    /// No fields yet, to be parted by this byte.
+    /// No fields yet, with this separator.
     pub fn new(delimiter: u8) -> Self {
         Self {
             parser: ReaderBuilder::new()
@@ -41,7 +41,7 @@ impl Row {
         }
     }
 
-    /// Takes the fields of a line, which comes without its end.
+    /// Splits a line without its ending into fields.
     pub fn split(&mut self, line: &[u8]) -> Result<(), Malformed> {
         self.parser.reset();
         self.count = 0;
@@ -77,7 +77,7 @@ impl Row {
         }
     }
 
-    /// How many fields there are.
+    /// Number of fields.
     pub fn len(&self) -> usize {
         self.count
     }

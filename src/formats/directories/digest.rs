@@ -1,4 +1,4 @@
-//! What tells one input from another: SHA-256 of bytes and of files.
+//! SHA-256 of bytes and files, to identify inputs.
 
 use std::ffi::OsStr;
 use std::fs::File;
@@ -39,10 +39,10 @@ fn digest_of_file(path: &Path) -> io::Result<String> {
     }
 }
 
-/// The files of a run, as its run.toml names them, each with its digest, or with what the system says
-/// where it cannot be read. The run.toml comes first; the others are those that it names.
+/// The files of a run, as named in its run.toml, each with its digest or, if unreadable, the system error. The run.toml
+/// comes first.
 ///
-/// Of a campaign its file, then those of each recording, in the order of their paths.
+/// For a campaign: its file, then those of each recording, in the order of their paths.
 pub fn input_digests(run: &Path) -> Vec<(String, String)> {
     let file = table_of(run);
     let recordings = file.get("recording").and_then(Value::as_array);
@@ -71,7 +71,7 @@ fn table_of(path: &Path) -> Table {
     text.parse().unwrap_or_default()
 }
 
-/// The digest of a file, or what the system says where it cannot be read.
+/// The digest of a file, or the system error if it cannot be read.
 fn digest_or_error(path: &Path) -> String {
     digest_of_file(path).unwrap_or_else(|error| error.kind().to_string())
 }

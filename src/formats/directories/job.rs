@@ -1,5 +1,5 @@
-//! `job.json`: which job a directory holds, or which part of it, so that parts of one job are told from parts of
-//! another and a job begun is known again.
+//! `job.json`: identifies the job (or part of a job) in a directory, to distinguish parts of different jobs and to
+//! resume a job.
 
 use std::path::Path;
 
@@ -21,25 +21,25 @@ const FORMAT: &str = "turncal-job/1";
 pub struct Job {
     /// Always [`FORMAT`].
     format: String,
-    /// What kind.
+    /// Its kind.
     pub job: JobKind,
     /// The program's version.
     pub version: String,
-    /// The kind of processor and its features, by which sums are rounded.
+    /// Processor type and features, which affect rounding.
     pub processor: Vec<String>,
-    /// All that decides what a run gives.
+    /// All options that determine the result of a run.
     pub options: Value,
-    /// How many runs there are in all.
+    /// Total number of runs.
     pub runs: u64,
     /// Names of the runs of a lot.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub names: Vec<String>,
-    /// What results are held against; does not change what a run gives.
+    /// Specification for the results; does not change the result of a run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub specification: Option<crate::lot::Specification>,
 }
 
-/// What kind of job.
+/// Kind of job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum JobKind {
@@ -51,7 +51,7 @@ pub enum JobKind {
     StudyExperiment,
 }
 
-/// A job, or a part of it, as its directory says.
+/// A job or part, as recorded in its directory.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Part {
     /// The job.
@@ -59,10 +59,10 @@ pub struct Part {
     pub job: Job,
     /// SHA-256 of the job.
     pub digest: String,
-    /// Which part; `None` if it is all.
+    /// The part; `None` for the whole job.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<Shard>,
-    /// Numbers of the runs in it, from zero; none if it is all.
+    /// Numbers of its runs, from zero; empty for the whole job.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub holds: Vec<u64>,
     /// SHA-256 of the file of results in the same directory.
@@ -85,12 +85,12 @@ impl Job {
         }
     }
 
-    /// SHA-256 of what decides what a run gives.
+    /// SHA-256 of all options that determine the result of a run.
     pub fn key(&self) -> String {
         digest_of(&(&self.version, &self.processor, self.job, &self.options))
     }
 
-    /// How two jobs differ in what decides what a run gives, in words; `None` if they do not.
+    /// Difference between two jobs that affects results, in words; `None` if there is none.
     pub fn difference(&self, other: &Self) -> Option<String> {
         let words = |of: &Self| match of.job {
             JobKind::Lot => "`calibrate` of a lot",
@@ -137,7 +137,7 @@ fn of_values(name: &str, a: &Value, b: &Value) -> String {
 }
 
 impl Part {
-    /// All of a job, or the part of it that holds these runs.
+    /// The whole job, or the part with these runs.
     pub fn new(job: Job, shard: Option<Shard>) -> Self {
         Self {
             digest: digest_of(&job),
@@ -159,15 +159,20 @@ impl Part {
     /// Reads the `job.json` of a directory.
     pub fn read(directory: &Path) -> Result<Self, FileError> {
         let path = directory.join(JOB_FILE);
-        let advice = "Give a directory that turncal wrote for a lot, or with --shard.";
+        let advice = "Give a directory that turncal wrote for a lot or with --shard.";
         let part: Self = small_file::json(&path, "a job", FORMAT, advice)?;
         let is_whole = match part.shard {
             Some(shard) => part.holds == shard.runs(part.job.runs),
             None => true,
         };
         if part.digest != digest_of(&part.job) || !is_whole {
-            let found = "a job that its digest or its runs do not fit";
-            return Err(FileError::of(&path, found, "it as it was written", advice));
+            let found = "a job whose digest or run list does not match";
+            return Err(FileError::of(
+                &path,
+                found,
+                "the job as turncal wrote it",
+                advice,
+            ));
         }
         Ok(part)
     }
@@ -179,7 +184,7 @@ impl Part {
     }
 }
 
-/// Architecture, system and the features by which numerical code is chosen while it runs.
+/// Architecture, system and the features that select numerical code at run time.
 fn processor() -> Vec<String> {
     let mut all = vec![
         std::env::consts::ARCH.to_owned(),

@@ -1,5 +1,5 @@
-//! The directory of a lot, which grows unit by unit: `job.json`, `units/NAME/` each whole or not there at all,
-//! and the summary of all units last. If the same job is started again, it continues where it stopped.
+//! The directory of a lot, which grows unit by unit: `job.json`, complete directories `units/NAME/`, and finally the
+//! summary of all units. If the same job is started again, it continues where it stopped.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
@@ -19,13 +19,13 @@ use crate::noise::RestNoise;
 
 /// The directory of the units in that of the lot.
 const UNITS: &str = "units";
-/// What is known of a unit beside its calibration.
+/// Data of a unit in addition to its calibration.
 const UNIT_FILE: &str = "unit.json";
 const CALIBRATION_FILE: &str = "calibration.json";
 /// The version of the format of [`UNIT_FILE`].
 const FORMAT: &str = "turncal-unit/1";
 
-/// A lot's directory, in which no other process works as long as this lives.
+/// A lot directory, locked against other processes during its lifetime.
 pub struct LotDirectory {
     root: PathBuf,
     /// The lock file; `None` if the file system has no locks.
@@ -37,7 +37,7 @@ pub struct LotDirectory {
 struct UnitRecord {
     format: String,
     name: String,
-    /// SHA-256 of what decides the result: job, options, files.
+    /// SHA-256 of the inputs that determine the result: job, options, files.
     key: String,
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     meta: BTreeMap<String, String>,
@@ -45,14 +45,14 @@ struct UnitRecord {
     nominal: Option<PerSensor<[f64; 3]>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     noise_at_rest: Option<RestNoise>,
-    /// SHA-256 of its calibration's file.
+    /// SHA-256 of its calibration file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     calibration_sha256: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     failure: Option<String>,
 }
 
-/// What decides the result of a unit: the job without its list of units, and the unit's files.
+/// Inputs that determine the result of a unit: the job without its list of units, and the files of the unit.
 pub fn unit_key(job: &str, run: &Path) -> String {
     digest_of(&(job, input_digests(run)))
 }
@@ -63,12 +63,12 @@ pub fn read_part_unit(part: &Path, name: &str) -> Result<Unit, FileError> {
 }
 
 impl LotDirectory {
-    /// Creates a lot's directory, or continues one that the same job has begun; `waiting` is called if another
-    /// process has to finish first. With `force` the lot restarts from the beginning.
+    /// Creates a lot directory, or continues one started by the same job; `waiting` is called if another process must
+    /// finish first. With `force` the lot restarts from the beginning.
     ///
     /// # Errors
-    /// [`FileError`] if it holds another job, another part of this one, units that are not of this lot, or
-    /// anything that turncal did not write where that would have to go.
+    /// [`FileError`] if it holds another job, another part of this one, units that do not belong to this lot, or files
+    /// not written by turncal in places that would be overwritten.
     pub fn open(
         target: &Path,
         part: &Part,
@@ -106,16 +106,15 @@ impl LotDirectory {
         })
     }
 
-    /// The unit as it was calibrated before, if nothing that decides its result has changed since.
+    /// The previously calibrated unit, if its inputs are unchanged.
     pub fn kept(&self, name: &str, key: &str) -> Option<Unit> {
         let unit = read_unit(&self.root.join(UNITS).join(name), Some(key));
         Some(unit.ok()?.0)
     }
 
-    /// Puts a unit in its place; `write` puts further files into its directory.
+    /// Stores a unit; `write` adds further files to its directory.
     ///
-    /// # Errors
-    /// What `write` says, or [`FileError`] if the unit cannot be written.
+    /// # Errors The error of `write`, or [`FileError`] if the unit cannot be written.
     pub fn put<E: From<FileError>>(
         &self,
         unit: &Unit,
@@ -138,13 +137,14 @@ impl LotDirectory {
         }
         let target = self.root.join(UNITS).join(name);
         let whole = WholeDirectory::create(&target, true, &[])?;
-        copy_all(&from, &whole.path())
-            .map_err(|error| FileError::io(&from, "copy the unit", &error, "Make room."))?;
+        copy_all(&from, &whole.path()).map_err(|error| {
+            FileError::io(&from, "copy the unit", &error, "Free some disk space.")
+        })?;
         whole.commit()?;
         Ok(unit)
     }
 
-    /// Puts what is said of all units in place; files of an earlier time that are not among these go.
+    /// Stores the summary of all units; removes outdated files.
     pub fn finish(&self, files: &[(String, String)]) -> Result<(), FileError> {
         clear_abandoned(&self.root.join(UNITS));
         let below = below_units();
@@ -175,7 +175,7 @@ fn lock(units: &Path, waiting: &dyn Fn()) -> Option<File> {
     }
 }
 
-/// Refuses a directory that was begun for something else.
+/// Refuses a directory started for a different job.
 fn check_same(target: &Path, found: &Part, expected: &Part) -> Result<(), FileError> {
     let difference = found.job.difference(&expected.job).or_else(|| {
         let words = |part: &Part| {
@@ -190,14 +190,14 @@ fn check_same(target: &Path, found: &Part, expected: &Part) -> Result<(), FileEr
     difference.map_or(Ok(()), |difference| {
         Err(FileError::of(
             target,
-            format_args!("a lot begun with other options: {difference}"),
-            "the job that was begun here, to continue it",
-            "Give the same options, choose another directory, or add --force to restart.",
+            format_args!("a lot started with other options ({difference})"),
+            "the options of the job started here",
+            "Use the same options, choose another directory, or add --force to restart.",
         ))
     })
 }
 
-/// Refuses a directory with units that the lot does not have.
+/// Refuses a directory with units that are not in the lot.
 fn check_units(units: &Path, part: &Part) -> Result<(), FileError> {
     let held: Vec<&str> = part
         .held()
@@ -214,9 +214,9 @@ fn check_units(units: &Path, part: &Part) -> Result<(), FileError> {
     others.first().map_or(Ok(()), |other| {
         Err(FileError::of(
             units,
-            format_args!("unit `{other}`, which is not among the runs given"),
-            "units of this lot only",
-            "Give its run.toml, too, choose another directory, or add --force to restart.",
+            format_args!("unit `{other}`, which is not among the given runs"),
+            "only units of this lot",
+            "Also give its run.toml, choose another directory, or add --force to restart.",
         ))
     })
 }
@@ -227,16 +227,16 @@ fn read_unit(directory: &Path, key: Option<&str>) -> Result<(Unit, String), File
     let record: UnitRecord =
         small_file::json(&path, "a unit", FORMAT, "Calibrate the unit again.")?;
     let wrong = |found: &str| {
-        let (expected, advice) = ("the unit as it was written", "Calibrate it again.");
+        let (expected, advice) = ("the unit as turncal wrote it", "Calibrate it again.");
         Err(FileError::of(directory, found, expected, advice))
     };
     if key.is_some_and(|key| record.key != key) {
-        return wrong("another key");
+        return wrong("a different key");
     }
     let path = directory.join(CALIBRATION_FILE);
     let digest = fs::read(&path).ok().map(|bytes| digest_of_bytes(&bytes));
     if record.failure.is_none() && record.calibration_sha256 != digest {
-        return wrong("a calibration.json that is not the one that was written with it");
+        return wrong("a calibration.json that does not belong to it");
     }
     let calibrated = match (record.failure, record.nominal) {
         (Some(failure), _) => Err(failure),

@@ -1,4 +1,4 @@
-//! Directories of results: whole or not there at all, of a lot, of a job and its parts.
+//! Result directories: complete or absent; of a lot; of a job and its parts.
 
 mod digest;
 mod job;

@@ -1,4 +1,4 @@
-//! Parts of a job: written by one machine each, put together by one.
+//! Parts of a job: written by one machine each, and merged by one.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,9 +10,9 @@ use super::digest::digest_of_bytes;
 use super::job::{JOB_FILE, Job, Part};
 use crate::formats::error::{FileError, list};
 
-/// Results of the runs of a study, as MessagePack: numbers come back to the bit.
+/// Results of the runs of a study as MessagePack, which preserves every bit of a number.
 const RESULTS: &str = "runs.msgpack";
-/// As many missing runs are named.
+/// Maximum number of missing runs named.
 const NAMED: usize = 5;
 
 /// Writes a part of a study into an existing directory.
@@ -23,7 +23,7 @@ pub fn write_part<T: Serialize>(directory: &Path, part: Part, runs: &[T]) -> Res
     };
     let results = rmp_serde::to_vec(runs).map_err(|error| {
         let path = directory.join(RESULTS);
-        let expected = "results that can be written";
+        let expected = "writable results";
         FileError::of(&path, error, expected, "Nothing was written.")
     })?;
     let part = Part {
@@ -34,7 +34,7 @@ pub fn write_part<T: Serialize>(directory: &Path, part: Part, runs: &[T]) -> Res
     write(JOB_FILE, &part.to_json())
 }
 
-/// Whether a directory holds this part of a study, whole.
+/// Whether a directory contains this part of a study completely.
 pub fn part_is_there(directory: &Path, part: &Part) -> bool {
     let Ok(found) = Part::read(directory) else {
         return false;
@@ -55,16 +55,15 @@ pub fn part_is_there(directory: &Path, part: &Part) -> bool {
 pub struct Parts {
     /// The job.
     pub job: Job,
-    /// Directory of each with what it says of itself.
+    /// Directory of each part with its job record.
     parts: Vec<(PathBuf, Part)>,
 }
 
 impl Parts {
-    /// Reads what directories say of themselves.
+    /// Reads the job records of directories.
     ///
-    /// # Errors
-    /// [`FileError`] if one is no part, if they are parts of different jobs, or if a run is in none or in two of
-    /// them.
+    /// # Errors [`FileError`] if one is not a part, if they are parts of different jobs, or if a run is in none or in
+    /// two of them.
     pub fn read(directories: &[PathBuf]) -> Result<Self, FileError> {
         let read = |directory: &PathBuf| Ok((directory.clone(), Part::read(directory)?));
         let parts = directories
@@ -73,7 +72,7 @@ impl Parts {
             .collect::<Result<Vec<_>, FileError>>()?;
         let Some((first, reference)) = parts.first() else {
             let (found, expected) = ("no part", "all parts of a job");
-            let advice = "Name the directories that --shard wrote.";
+            let advice = "Give the directories that --shard wrote.";
             return Err(FileError::of(Path::new("."), found, expected, advice));
         };
         for (directory, part) in &parts[1..] {
@@ -81,11 +80,12 @@ impl Parts {
                 return Err(FileError::of(
                     directory,
                     format_args!(
-                        "a part of another job than {}: {difference}",
+                        "a part of a different job than {} ({difference})",
                         first.display()
                     ),
-                    "parts of one job",
-                    "Merge parts that were made by one version with the same arguments on processors of one kind.",
+                    "parts of the same job",
+                    "Merge only parts made by the same version, with the same arguments, on processors of the same \
+                        type.",
                 ));
             }
         }
@@ -97,7 +97,7 @@ impl Parts {
         Ok(parts)
     }
 
-    /// Every run in one part.
+    /// Checks that every run is in exactly one part.
     fn check_all_there(&self) -> Result<(), FileError> {
         let mut held = self.held();
         held.sort();
@@ -106,12 +106,12 @@ impl Parts {
             return Err(FileError::of(
                 directory,
                 format_args!(
-                    "run {} that is in {}, too",
+                    "run {}, which is also in {}",
                     self.name(*run),
                     other.display()
                 ),
-                "every run in one part",
-                "Leave one of the two out.",
+                "each run in one part only",
+                "Leave out one of the two.",
             ));
         }
         let is_there = |run: &u64| held.binary_search_by_key(run, |(run, _)| *run).is_ok();
@@ -129,7 +129,7 @@ impl Parts {
         let given = list(given.iter().map(String::as_str));
         Err(FileError::of(
             &first.0,
-            format_args!("no part with run {words}"),
+            format_args!("no part that contains run {words}"),
             format_args!("all {} runs; the parts given are {given}", self.job.runs),
             "Add the missing parts.",
         ))
@@ -145,7 +145,7 @@ impl Parts {
         .collect()
     }
 
-    /// A run as messages call it: by its number, of a lot by its unit.
+    /// Name of a run in messages: its number, or its unit in a lot.
     fn name(&self, run: u64) -> String {
         let name = usize::try_from(run).ok();
         let name = name.and_then(|run| self.job.names.get(run));
@@ -155,7 +155,7 @@ impl Parts {
     /// The results of all runs of a study, in the order of their numbers.
     ///
     /// # Errors
-    /// [`FileError`] if results are not as they were written.
+    /// [`FileError`] if the results were modified.
     pub fn results<T: DeserializeOwned>(&self) -> Result<Vec<T>, FileError> {
         let mut all: Vec<(u64, T)> = Vec::new();
         for (directory, part) in &self.parts {
@@ -164,11 +164,11 @@ impl Parts {
             let bytes = fs::read(&path)
                 .map_err(|error| FileError::io(&path, "read the part", &error, advice))?;
             let wrong = |found: String| {
-                let expected = "the results as they were written";
+                let expected = "the results as turncal wrote them";
                 FileError::of(&path, found, expected, advice)
             };
             if part.results.as_deref() != Some(digest_of_bytes(&bytes).as_str()) {
-                return Err(wrong("results that their digest does not fit".to_owned()));
+                return Err(wrong("results that do not match their digest".to_owned()));
             }
             let runs: Vec<T> =
                 rmp_serde::from_slice(&bytes).map_err(|error| wrong(error.to_string()))?;
@@ -194,15 +194,15 @@ impl Parts {
     }
 }
 
-/// How jobs differ in anything.
+/// Any difference between jobs.
 fn difference(a: &Job, b: &Job) -> Option<String> {
     a.difference(b).or_else(|| {
         if a.runs != b.runs {
             return Some(format!("{} and {} runs", a.runs, b.runs));
         }
         if a.names != b.names {
-            return Some("other units, or in another order".to_owned());
+            return Some("different units or a different order".to_owned());
         }
-        (a.specification != b.specification).then(|| "another specification".to_owned())
+        (a.specification != b.specification).then(|| "a different specification".to_owned())
     })
 }

@@ -1,7 +1,7 @@
-//! Output that appears whole or not at all: written beside its place, then renamed into it.
+//! Output that is complete or absent: written next to its target, then renamed.
 //!
-//! A process that ends on a signal takes away what it has not finished ([`abandon_unfinished`]); what a
-//! process that was killed left beside its output goes when the next output is begun there.
+//! A process that ends on a signal removes unfinished output ([`abandon_unfinished`]); leftovers of a killed process
+//! are removed when the next output is started there.
 
 mod manifest;
 mod stage;
@@ -20,30 +20,30 @@ pub use stage::abandon_unfinished;
 fn taken(target: &Path) -> FileError {
     FileError::of(
         target,
-        "something of this name already",
-        "a name that is free",
-        "Choose another name, or give --force to replace it.",
+        "an existing file or directory of this name",
+        "an unused name",
+        "Choose another name, or add --force to replace it.",
     )
 }
 
-/// The system does not let anything be written where `target` is to be.
+/// Error: the system does not allow writing at `target`.
 fn unwritable(target: &Path, doing: &str, error: &io::Error) -> FileError {
     let advice = "Choose a directory that can be written.";
     FileError::io(target, doing, error, advice)
 }
 
-/// A directory in the making. Dropped without [`Self::commit`] it leaves nothing behind.
+/// A directory under construction. Dropped without [`Self::commit`], it leaves nothing behind.
 pub struct WholeDirectory {
     stage: Stage,
     force: bool,
 }
 
 impl WholeDirectory {
-    /// Begins a directory that will appear at `target`.
+    /// Starts a directory that will appear at `target`.
     ///
-    /// An existing directory is replaced only with `force`, and only while it holds nothing but what was
-    /// written by a [`WholeDirectory`]; a file never, and never a directory that holds one of `inputs` or
-    /// the current directory: replacing it would delete them.
+    /// An existing directory is replaced only with `force`, and only if it contains nothing but files written by a
+    /// [`WholeDirectory`]. Files, and directories that contain one of `inputs` or the current directory, are never
+    /// replaced.
     pub fn create(target: &Path, force: bool, inputs: &[&Path]) -> Result<Self, FileError> {
         if let Ok(existing) = fs::symlink_metadata(target) {
             if !force {
@@ -54,7 +54,7 @@ impl WholeDirectory {
                 let what = if is_link { "link" } else { "file" };
                 let found = format_args!("a {what} of this name");
                 let advice = format_args!("Choose another name or remove the {what}.");
-                let expected = "a directory or nothing";
+                let expected = "a directory or an unused name";
                 return Err(FileError::of(target, found, expected, advice));
             }
             let inside = |path: &&Path| match (path.canonicalize(), target.canonicalize()) {
@@ -70,7 +70,7 @@ impl WholeDirectory {
                 };
                 return Err(FileError::of(
                     target,
-                    format_args!("{name} in this directory"),
+                    format_args!("{name} in it"),
                     "a directory that can be replaced",
                     "Choose another name; replacing this one would delete files that are still needed.",
                 ));
@@ -83,12 +83,12 @@ impl WholeDirectory {
         Ok(Self { stage, force })
     }
 
-    /// Where to write until then.
+    /// Temporary location.
     pub fn path(&self) -> PathBuf {
         self.stage.new_path()
     }
 
-    /// Puts the directory in its place, with a list of its entries in the file `.turncal`.
+    /// Moves the directory into place, with a list of its entries in the file `.turncal`.
     pub fn commit(self) -> Result<(), FileError> {
         let list = manifest::of_all(&self.path())
             .map_err(|error| unwritable(self.stage.target(), "put the output in place", &error))?;
@@ -113,8 +113,8 @@ impl WholeDirectory {
     }
 }
 
-/// Writes the list of a directory that grows, in which nothing but these names is turncal's; what is in a name
-/// that ends in `/` has a list of its own. Files that only the previous list names are deleted.
+/// Writes the list of a growing directory, in which only these names belong to turncal; entries that end in `/` have
+/// their own list. Files named only in the previous list are deleted.
 pub fn list_anew(directory: &Path, names: &[&str]) -> Result<(), FileError> {
     for old in manifest::listed_files(directory) {
         let still = |name: &&str| old.file_name() == Some(name.as_ref());
@@ -127,36 +127,35 @@ pub fn list_anew(directory: &Path, names: &[&str]) -> Result<(), FileError> {
     write_whole(&directory.join(manifest::FILE), list.as_bytes(), true)
 }
 
-/// Removes what a killed process left unfinished in a directory.
+/// Removes unfinished output of a killed process from a directory.
 pub fn clear_abandoned(directory: &Path) {
     stage::remove_abandoned(directory);
 }
 
-/// Refuses a directory that holds anything beside what was written by a [`WholeDirectory`].
+/// Refuses a directory with anything not written by a [`WholeDirectory`].
 fn only_output(directory: &Path) -> Result<(), FileError> {
     let foreign = manifest::foreign(directory)
-        .map_err(|error| unwritable(directory, "look into the directory", &error))?;
+        .map_err(|error| unwritable(directory, "list the directory", &error))?;
     foreign.map_or(Ok(()), |foreign| {
         Err(FileError::of(
             directory,
             format_args!(
-                "`{}` in it, which no list of what turncal wrote there (`{}`) names",
+                "`{}` in it, which turncal's list of its own files (`{}`) does not name",
                 foreign.display(),
                 manifest::FILE,
             ),
-            "a directory that holds only what turncal wrote",
-            "Move it elsewhere or choose another name; replacing the directory would delete it.",
+            "a directory with only files that turncal wrote",
+            "Move it elsewhere or choose another name, because replacing the directory would delete it.",
         ))
     })
 }
 
-/// Writes a file whole or not at all; an existing one is replaced only with `force`, a directory
-/// never.
+/// Writes a complete file or none; an existing file is replaced only with `force`, a directory never.
 pub fn write_whole(path: &Path, bytes: &[u8], force: bool) -> Result<(), FileError> {
     write_whole_with(path, force, |mut file| file.write_all(bytes))
 }
 
-/// The same for what is too long to be held: `write` gets the file that will appear.
+/// The same for output too large for memory: `write` receives the temporary file.
 pub fn write_whole_with(
     path: &Path,
     force: bool,
@@ -168,7 +167,7 @@ pub fn write_whole_with(
             return Err(FileError::of(
                 path,
                 "a directory of this name",
-                "a file or nothing",
+                "a file or an unused name",
                 "Choose another name.",
             ));
         }

@@ -1,4 +1,4 @@
-//! Which columns hold what.
+//! Assignment of columns.
 
 use nalgebra::Vector3;
 
@@ -8,40 +8,40 @@ use crate::formats::Sheet;
 use crate::imu::{PerSensor, Sensor};
 use crate::statistics::median;
 
-/// Columns by their place in the file.
+/// Columns by index in the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Columns {
     pub names: Vec<String>,
     pub time: Option<usize>,
-    /// Nanoseconds beside a time in whole seconds.
+    /// Nanoseconds in addition to a time in whole seconds.
     pub nanoseconds: Option<usize>,
     pub triads: PerSensor<Option<[usize; 3]>>,
-    /// Others that might be meant.
+    /// Other candidates.
     pub others: PerSensor<Vec<[usize; 3]>>,
-    /// Whether the triads were identified by their values, for their names say nothing.
+    /// Whether the triads were identified by value, because their names are not informative.
     pub by_size: bool,
     pub temperature: Option<usize>,
     /// Four columns of norm one.
     pub quaternion: Option<[usize; 4]>,
 }
 
-/// Part of the rows that must be numbers.
+/// Fraction of rows that must be numeric.
 const NUMBERS: f64 = 0.5;
-/// Sensors fail in fewer rows; where one of both says nothing in more, the other has another rate.
+/// Sensor failures affect fewer rows; if one triad is empty in more, the rates differ.
 const LACKING: f64 = 0.1;
-/// So many instruments may share a log.
+/// Maximum number of instruments in a log.
 const MOST_INSTANCES: usize = 8;
-/// Part of the steps of a time that go forward, and of one that is named so, which may stay for many rows.
+/// Fraction of increasing steps of a time column, and of a column named as time, which may repeat.
 const FORWARD: f64 = 0.9;
 const SELDOM_FORWARD: f64 = 0.01;
-/// Accelerometers keep gravity's magnitude within this part in half of the rows …
+/// Accelerometers have the magnitude of gravity within this fraction in half of the rows …
 const EVEN: f64 = 0.05;
-/// … and what departs from its median by more in them is none.
+/// … and a column that deviates more from its median is not an accelerometer.
 const UNEVEN: f64 = 0.2;
-/// Gyros that turn say more than this many times what they say in half of the rows.
+/// Gyros in a turn exceed their median by more than this factor.
 const LIVELY: f64 = 3.0;
 
-/// Of both triads, row by row.
+/// Samples of both triads, row by row.
 type Samples = PerSensor<Vec<Vector3<f64>>>;
 
 impl Columns {
@@ -100,7 +100,7 @@ impl Columns {
         }
     }
 
-    /// The times of all rows, in the column's unit.
+    /// The times of all rows, in the unit of the column.
     pub fn stamps(&self, sheet: &Sheet) -> Option<Vec<f64>> {
         let times = &sheet.columns[self.time?];
         Some(match self.nanoseconds {
@@ -109,7 +109,7 @@ impl Columns {
         })
     }
 
-    /// The rows in which the triads are numbers, and their samples: zeros of a triad that is not there.
+    /// Rows with numeric triads, and their samples; zeros for a missing triad.
     pub fn samples(&self, sheet: &Sheet) -> Option<(Vec<usize>, Samples)> {
         let at = |sensor: Sensor, row: usize| match self.triads.get(sensor) {
             Some(columns) => Vector3::from(columns.map(|k| sheet.columns[k][row])),
@@ -133,7 +133,7 @@ impl Columns {
     }
 }
 
-/// The name of a column, or its number where others are called so, too, or it has none.
+/// The name of a column, or its number if the name is missing or not unique.
 fn distinct(names: &[String], column: usize) -> String {
     let like = names.iter().filter(|name| **name == names[column]);
     match names[column].is_empty() || like.count() > 1 {
@@ -142,13 +142,13 @@ fn distinct(names: &[String], column: usize) -> String {
     }
 }
 
-/// The columns whose names say that they are of this sensor.
+/// Columns that belong to this sensor by name.
 pub fn named(sheet: &Sheet, sensor: Sensor) -> Vec<usize> {
     let is = |k: &usize| Name::of(&sheet.names[*k]).sensor() == Some(sensor);
     (0..sheet.names.len()).filter(is).collect()
 }
 
-/// Whether gyros and accelerometers have rows of their own, as their names tell.
+/// Whether gyros and accelerometers have separate rows, by their names.
 pub fn have_rows_of_their_own(sheet: &Sheet) -> bool {
     let places = PerSensor::from_fn(|sensor| named(sheet, sensor));
     let (mut both, mut one) = (0, 0);
@@ -206,7 +206,7 @@ fn split_time(sheet: &Sheet, names: &[Name]) -> Option<[usize; 2]> {
     Some([pair, pair + 1])
 }
 
-/// The column that tells rows of several instruments apart, with what it says of the first.
+/// The column that distinguishes several instruments, with its value for the first.
 pub fn instance(sheet: &Sheet) -> Option<(usize, f64)> {
     let tells = |k: &usize| {
         let mut known: Vec<f64> = Vec::new();
@@ -224,7 +224,7 @@ pub fn instance(sheet: &Sheet) -> Option<(usize, f64)> {
     Some((column, *sheet.columns[column].first()?))
 }
 
-/// The parts of the steps between values that go forward and back.
+/// Fractions of increasing and decreasing steps.
 fn forward(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (mut steps, mut forward, mut back) = (0.0, 0.0, 0.0);
     let mut last = f64::NAN;
@@ -237,7 +237,7 @@ fn forward(values: impl Iterator<Item = f64>) -> (f64, f64) {
     (forward / f64::max(steps, 1.0), back / f64::max(steps, 1.0))
 }
 
-/// The column most like a time by its name, else the first that goes forward.
+/// The column with the most time-like name, otherwise the first increasing one.
 fn time(sheet: &Sheet, names: &[Name], forward: impl Fn(usize) -> (f64, f64)) -> Option<usize> {
     let goes_on = |k: &usize| match forward(*k) {
         (forward, _) if forward >= FORWARD => true,
@@ -267,7 +267,7 @@ fn by_name(names: &[Name], sheet: &Sheet, sensor: Sensor) -> Vec<[usize; 3]> {
     )
 }
 
-/// Three columns each whose names differ by the axis alone.
+/// Groups of three columns whose names differ only in the axis.
 pub fn by_stem(names: &[Name], candidates: &[usize]) -> Vec<[usize; 3]> {
     let mut triads = Vec::new();
     for &first in candidates {
@@ -289,7 +289,7 @@ pub fn by_stem(names: &[Name], candidates: &[usize]) -> Vec<[usize; 3]> {
     triads
 }
 
-/// The triads that names do not show, by gravity, which keeps the magnitude of the accelerometers', and by turns.
+/// Triads identified by value instead of name: accelerometers by the constant magnitude of gravity, gyros by turns.
 fn by_numbers(
     sheet: &Sheet,
     names: &[Name],
@@ -346,8 +346,7 @@ fn by_numbers(
     }
 }
 
-/// Median departure of a triad's magnitude from its median, and its largest in all but a hundredth of the rows, over
-/// the median.
+/// Median deviation of the magnitude of a triad from its median, and its 99 % quantile, divided by the median.
 fn magnitude(sheet: &Sheet, triad: &[usize; 3]) -> (f64, f64) {
     let at = |row: usize| Vector3::from(triad.map(|k| sheet.columns[k][row]));
     let samples = (0..sheet.rows()).map(at);
@@ -365,7 +364,7 @@ fn magnitude(sheet: &Sheet, triad: &[usize; 3]) -> (f64, f64) {
     (off / middle, sizes[hundredth] / middle)
 }
 
-/// Four columns side by side with names that begin alike or say nothing, whose squares add up to one in every row.
+/// Four adjacent columns with similar or uninformative names whose squares add up to one in every row.
 fn quaternion(sheet: &Sheet, time: Option<usize>) -> Option<[usize; 4]> {
     let begin = |k: usize| {
         let name = &sheet.names[k];

@@ -9,13 +9,13 @@ use super::streams::{Streams, Written};
 use crate::formats::source::Source;
 use crate::formats::{FileError, write_rows};
 
-/// Of gyros, and of accelerometers in the same stream.
+/// File of the gyros, and of accelerometers in the same stream.
 const GYRO_FILE: &str = "imu.csv.gz";
 const ACCEL_FILE: &str = "accelerometers.csv.gz";
 
 impl Draft {
-    /// Writes the streams that hold the instrument as rows of text, with this draft for them, into a directory
-    /// that is there; a damaged log only if what is whole of it is to be used.
+    /// Writes the streams of the instrument as text, with this draft for them, into an existing directory; a damaged
+    /// log only if its intact part is to be used.
     ///
     /// # Errors
     /// [`FileError`] if the log is text already, is damaged, or cannot be read or written.
@@ -23,9 +23,14 @@ impl Draft {
         let of_text = |streams: &Streams| streams.written.is_some();
         let streams = self.streams.as_mut().filter(|streams| !of_text(streams));
         let Some(streams) = streams else {
-            let advice = "`turncal init` drafts a run.toml for it as it is.";
-            let expected = "a log of another program";
-            return Err(FileError::of(log, "rows of text", expected, advice));
+            let advice = "`turncal init` can draft a run.toml for it without conversion.";
+            let expected = "a log of another program, which needs no conversion";
+            return Err(FileError::of(
+                log,
+                "a text file with rows",
+                expected,
+                advice,
+            ));
         };
         let source = |stream| Source {
             stream: Some(stream),

@@ -1,4 +1,4 @@
-//! Scales as data sheets state them, and as a record shows them.
+//! Scales from data sheets and from a recording.
 
 use nalgebra::Vector3;
 
@@ -10,22 +10,22 @@ use crate::formats::unit_scale;
 use crate::imu::{Output, Sensor};
 use crate::units::{DEGREE, STANDARD_GRAVITY};
 
-/// Counts for a degree a second that data sheets state …
+/// Data-sheet values for counts per degree per second …
 const PER_DEGREE: [f64; 17] = [
     131.0, 65.5, 32.8, 16.4, 262.144, 14.375, 114.29, 57.14, 28.57, 14.29, 160.0, 100.0, 80.0,
     50.0, 40.0, 20.0, 10.0,
 ];
-/// … and for one g, beside powers of two.
+/// … and per g, in addition to powers of two.
 const PER_G: [f64; 11] = [
     256_000.0, 128_000.0, 64_000.0, 4000.0, 2000.0, 1250.0, 1200.0, 1000.0, 800.0, 500.0, 250.0,
 ];
 
-/// Counts for one of `run.toml`'s units, with the reason.
+/// Counts per unit of `run.toml`, with the reason.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scale {
     /// The file's quantity per second for one rad/s or m/s².
     pub value: Vector3<f64>,
-    /// What it may be off by, relative, as far as the record shows.
+    /// Its relative uncertainty from the recording.
     pub off: f64,
     /// Whether the file names the unit.
     pub is_named: bool,
@@ -33,14 +33,14 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Of a unit that is named and is another number of one of `run.toml`'s.
+    /// For a named unit that is a multiple of one in `run.toml`.
     pub fn of_unit(sensor: Sensor, unit: Unit) -> Option<Self> {
         let of_one = unit_scale(sensor, unit.word).filter(|_| unit.times != 1.0)?;
         Some(Self {
             value: Vector3::repeat(of_one / unit.times),
             off: 0.0,
             is_named: true,
-            why: format!("one is {} {}", short(unit.times), unit.word),
+            why: format!("1 unit of the file is {} {}", short(unit.times), unit.word),
         })
     }
 
@@ -49,40 +49,44 @@ impl Scale {
         let Axes { scale, sigma, .. } = gravity.axes;
         let is_sure = sigma < TOLERANCE;
         let mut by = match gravity.rests {
-            1 => " at rest".to_owned(),
-            rests => format!(" ± {} % by gravity at {rests} rests", percent(sigma)),
+            1 => " in one dwell".to_owned(),
+            rests => format!(
+                " ± {} %, from gravity in {rests} \
+                dwells",
+                percent(sigma)
+            ),
         };
         if !is_sure {
-            by += ", if its zero offset is zero: gravity lies in too few directions to verify that";
+            by += ", if the zero offset is zero, which too few directions of gravity can verify";
         }
         let often = likely_for_g((scale * per_second).mean());
         let often = if is_sure { String::new() } else { often + ": " };
         // Zeros that are not known leave room for any figure.
         let others = if is_sure { &PER_G[..] } else { &[] };
         let sheet = |figure: f64| [&[2f64.powf(figure.log2().round())], others].concat();
-        let one = ("one g", STANDARD_GRAVITY);
+        let one = ("g", STANDARD_GRAVITY);
         Self::measured(&gravity.axes, per_second, one, sheet, [&by, &often])
     }
 
-    /// Of the gyros' axes by what they turn, of rows of this length in s or, of increments, one; over this many moves, or of one
-    /// scale from step to step.
+    /// Scale of the gyro axes from their rotation, for rows of this length in s (one for increments), over this many
+    /// moves or, with a common scale, from step to step.
     pub fn of_turns(axes: &Axes, moves: Option<usize>, row: f64, output: Output) -> Self {
         let by = match moves {
             Some(moves) => {
                 let sigma = percent(axes.sigma);
-                format!(" ± {sigma} % by the turns of gravity over {moves} moves")
+                format!(" ± {sigma} %, from the change of gravity direction in {moves} moves")
             }
-            None => " by the turns of gravity".to_owned(),
+            None => " , from the change of gravity direction".to_owned(),
         };
         // Pulses are made as each instrument makes them.
         let sheet = |_| match output {
             Output::Rate => PER_DEGREE.to_vec(),
             Output::Pulse | Output::Increment => Vec::new(),
         };
-        Self::measured(axes, row * DEGREE, ("1 deg/s", DEGREE), sheet, [&by, ""])
+        Self::measured(axes, row * DEGREE, ("deg/s", DEGREE), sheet, [&by, ""])
     }
 
-    /// The figures of data sheets where they are as near as sheets allow, else those of the record.
+    /// Data-sheet values if close enough, otherwise measured values.
     fn measured(
         axes: &Axes,
         times: f64,
@@ -108,8 +112,13 @@ impl Scale {
             },
             is_named: false,
             why: match is_stated {
-                true => format!("{} counts for {of}; {measured}{by}", axes.words(&stated)),
-                false => format!("for {of} {measured}{by}; {often}the data sheet knows better"),
+                true => format!(
+                    "{} counts per {of}; measured {measured}{by}",
+                    axes.words(&stated)
+                ),
+                false => {
+                    format!("{measured} counts per {of}{by}; {often}prefer the data-sheet value")
+                }
             },
             value: value.zip_map(&axes.scale, f64::copysign) / one,
         }
@@ -117,7 +126,7 @@ impl Scale {
 }
 
 impl Axes {
-    /// One figure where all axes have the same.
+    /// One figure if all axes are equal.
     fn words(&self, figures: &Vector3<f64>) -> String {
         let [x, y, z] = <[f64; 3]>::from(*figures);
         match self.by_axis {
@@ -131,15 +140,18 @@ fn percent(part: f64) -> f64 {
     format!("{:.1e}", 100.0 * part).parse().unwrap_or(part)
 }
 
-/// What a data sheet states nearest to a measured figure, if it is as near as sheets allow.
+/// The data-sheet value nearest to a measured figure, if within tolerance.
 fn nearest(sheet: &[f64], measured: f64) -> Option<f64> {
     let off = |stated: &f64| (stated / measured - 1.0).abs();
     let nearest = sheet.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
     nearest.copied().filter(|stated| off(stated) < TOLERANCE)
 }
 
-/// What registers often say for one g that say this with a zero that is not known.
+/// Typical counts per g for a register with this output and an unknown zero.
 pub fn likely_for_g(per_g: f64) -> String {
     let power = 2f64.powf(per_g.log2().floor());
-    format!("often {power} or {} counts for one g", 2.0 * power)
+    format!(
+        "typical values are {power} and {} counts per g",
+        2.0 * power
+    )
 }

@@ -1,16 +1,16 @@
-//! What a log shows, and how sure that is.
+//! Fields detected in a log, with their certainty.
 
 use super::motion::Motion;
 use super::units::short;
 use super::{AXES_OF_PROGRAM, Draft, NO_COLUMNS};
 use crate::imu::Sensor;
 
-/// How sure something is.
+/// Certainty of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Certainty {
-    /// The log states it and the motion agrees, or the motion alone shows it, or the user states it.
+    /// Stated in the log and confirmed by motion, determined by motion alone, or stated by the user.
     Certain,
-    /// The log states it, or it is usual; the motion does not show it.
+    /// Stated in the log or typical, but not confirmed by motion.
     Guess,
     /// Neither.
     Unknown,
@@ -27,21 +27,21 @@ impl Certainty {
     }
 }
 
-/// One thing that was found in a log.
+/// A detected field.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
-    /// Of what, such as `gyros`.
+    /// Name, such as `gyros`.
     pub what: &'static str,
-    /// What was found.
+    /// Its value.
     pub value: String,
-    /// How sure it is.
+    /// Its certainty.
     pub certainty: Certainty,
-    /// Why.
+    /// The reason.
     pub why: String,
 }
 
 impl Draft {
-    /// What was found, in the order in which it is shown.
+    /// Detected fields, in display order.
     pub fn found(&self) -> Vec<Found> {
         vec![
             self.time_found(),
@@ -52,7 +52,7 @@ impl Draft {
         ]
     }
 
-    /// The first thing that stands between the draft and a run: what the log has, what is needed, what to do.
+    /// The first open field that prevents a run: evidence in the log, requirement, remedy.
     pub(in crate::formats) fn open_question(&self) -> Option<[String; 3]> {
         let (field, why) = self.page("log").open.into_iter().next()?;
         let is_zero = |motion: &Motion| motion.gravity == 0.0;
@@ -61,25 +61,25 @@ impl Draft {
         let (expected, advice) = match &*field {
             "gyro_unit" if !has_accels => (
                 "gyros of a known unit, and accelerometers",
-                "Give both files to `turncal init GYROS ACCELS -o run.toml`. For the Allan figures of gyros alone, state \
-                 --gyro-unit.",
+                "Give both files: `turncal init GYROS ACCELS -o run.toml`. For an Allan analysis of the gyros alone, \
+                 set --gyro-unit.",
             ),
-            "gyro_unit" => ("the unit of the gyros", "State it with --gyro-unit."),
+            "gyro_unit" => ("the unit of the gyros", "Set it with --gyro-unit."),
             "accel_unit" => (
                 "the unit of the accelerometers",
-                "State it with --accel-unit.",
+                "Set it with --accel-unit.",
             ),
             "scale" => (
-                "what one count is",
-                "State it by the data sheet, such as --gyro-unit '1/131 deg/s' or --accel-unit '1/16384 g'.",
+                "the size of one count",
+                "Take it from the data sheet and set it, e.g. --gyro-unit '1/131 deg/s' or --accel-unit '1/16384 g'.",
             ),
-            "sample_period_s" => ("the rate of the rows", "State it with --rate."),
+            "sample_period_s" => ("the sample rate", "Set it with --rate."),
             _ => (
-                "what run.toml needs",
-                "Write a draft by `turncal init LOG -o run.toml` and complete it.",
+                "all fields that run.toml needs",
+                "Write a draft with `turncal init LOG -o run.toml` and complete it.",
             ),
         };
-        let found = format!("nothing that shows `{field}` ({why})");
+        let found = format!("no evidence for `{field}` ({why})");
         Some([found, expected.to_owned(), advice.to_owned()])
     }
 
@@ -97,7 +97,7 @@ impl Draft {
                 clock.certainty,
             ),
             (None, Some(rate)) => (hertz(rate), clock.certainty),
-            (_, None) => ("period of the rows".to_owned(), Certainty::Unknown),
+            (_, None) => ("sample period".to_owned(), Certainty::Unknown),
         };
         Found::new("time", value, certainty, &clock.why)
     }
@@ -120,7 +120,7 @@ impl Draft {
         }
         let mut why = unit.why.clone();
         if let Some(down) = self.down.filter(|_| sensor == Sensor::Accel) {
-            why += &format!("; at the beginning {}", self.down_words(down));
+            why += &format!("; at the start {}", self.down_words(down));
         }
         Found::new(what, value, certainty, why)
     }
@@ -129,7 +129,7 @@ impl Draft {
         let of_streams = self.streams.as_ref().and_then(|streams| streams.axes);
         let (value, certainty, why) = match of_streams {
             Some(axes) => (axes, Certainty::Certain, AXES_OF_PROGRAM),
-            None => ("x right, y front, z up", Certainty::Guess, "please check"),
+            None => ("x right, y front, z up", Certainty::Guess, "check this"),
         };
         Found::new("axes", value, certainty, why)
     }
@@ -144,7 +144,7 @@ impl Draft {
             return Found::new("place", place.join(", "), Certainty::Certain, "as stated");
         }
         let gravity = "gravity 9.806 ± 0.015 m/s²";
-        let why = "state --latitude and --height for smaller σ";
+        let why = "set --latitude and --height for smaller σ";
         Found::new("place", gravity, Certainty::Unknown, why)
     }
 }

@@ -1,5 +1,4 @@
-//! A draft of `run.toml` for a log that has none: what its names and numbers show, each with the reason, and
-//! what only a person knows left open.
+//! A draft of `run.toml` for a log without one: detected fields with reasons, and open fields for the user.
 
 mod columns;
 mod convert;
@@ -33,55 +32,55 @@ use streams::Streams;
 use time::Clock;
 use units::Quantities;
 
-/// Fewer rows than a run may have show nothing.
+/// Minimum number of rows of a run.
 const FEWEST_ROWS: usize = 100;
-/// Fewer samples at rest show no noise.
+/// Minimum number of samples at rest for a noise estimate.
 const FEWEST_AT_REST: usize = 64;
 
-const NO_COLUMNS: &str = "no names or numbers showed them";
-const AXES_OF_PROGRAM: &str = "as the program that wrote the log has them";
+const NO_COLUMNS: &str = "not recognized by name or values";
+const AXES_OF_PROGRAM: &str = "axis convention of the program that wrote the log";
 
-/// What a log shows of the instrument and its record.
+/// Information in a log about the instrument and its recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draft {
-    /// Of a log of streams, and what they hold.
+    /// For a log of streams, their content.
     streams: Option<Streams>,
-    /// The column that tells several instruments apart, with the number of the one that is taken.
+    /// The column that distinguishes several instruments, with the number of the selected one.
     instance: Option<(usize, f64)>,
     columns: Columns,
     clock: Clock,
     quantities: Quantities,
-    /// What a register is made to say at zero, a row …
+    /// Nominal zero output of a register per row …
     offset: PerSensor<f64>,
-    /// … and what the record shows of it, of counts.
+    /// … and its estimate from the recording, for counts.
     registers: Option<Registers>,
-    /// Why the columns cannot be taken as they are.
+    /// Reasons why the columns cannot be used unchanged.
     blocked: Vec<String>,
-    /// White noise in the file's quantity per second and root of one, where something is at rest.
+    /// White noise in the quantity of the file per second, per √Hz, if the log has dwells.
     random_walk: PerSensor<Option<f64>>,
-    /// How rows move, above what their registers are made to say at zero.
+    /// Motion in the rows, relative to the nominal register zero.
     motion: Option<Motion>,
-    /// The column of the accelerometers that shows gravity with a minus at first.
+    /// The accelerometer column with negative gravity at the start.
     down: Option<usize>,
-    /// The rows that were looked at where the log has more.
+    /// Number of rows examined, if the log has more.
     only: Option<usize>,
-    /// What its user states.
+    /// Statements of the user.
     stated: Stated,
 }
 
 impl Draft {
-    /// Looks at a file of rows.
+    /// Examines a file of rows.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read or has hardly any rows.
+    /// [`FileError`] if it cannot be read or has too few rows.
     pub fn of_file(path: &Path) -> Result<Self, FileError> {
         Self::of_stream(path, None, &Stated::default())
     }
 
-    /// The same of one stream of a log of several, and with what is stated of it.
+    /// The same for one stream of a log, with statements about it.
     ///
     /// # Errors
-    /// [`FileError`] if it cannot be read or has hardly any rows.
+    /// [`FileError`] if it cannot be read or has too few rows.
     pub fn of_stream(
         path: &Path,
         stream: Option<&str>,
@@ -102,7 +101,7 @@ impl Draft {
         Ok(Self::of_sheet(sheet, None, stated))
     }
 
-    /// Looks at two files of rows, of gyros and of accelerometers. `accel_name` is the name of the latter in the draft.
+    /// Examines two files of rows, of gyros and of accelerometers. `accel_name` is the name of the latter in the draft.
     ///
     /// # Errors
     /// [`FileError`] if one cannot be read, has hardly any rows or lacks its triad or its time.
@@ -155,14 +154,14 @@ impl Draft {
             draft.columns.names.clone_from(&streams.names);
             if let Some(time) = &streams.time {
                 draft.clock.unit.clone_from(&time.gyro.1);
-                "as the file says".clone_into(&mut draft.clock.why);
+                "stated in the file".clone_into(&mut draft.clock.why);
                 draft.clock.certainty = Certainty::Certain;
             }
         }
         draft
     }
 
-    /// Takes in what rows show of units, registers and noise.
+    /// Detects units, registers and noise.
     fn take_rows(&mut self, mut rows: Rows, sheet: &Sheet) {
         let mut motion = rows.motion();
         self.quantities = Quantities::find(sheet, &self.columns, &self.clock, rows.whole, &motion);
@@ -177,7 +176,7 @@ impl Draft {
         self.motion = Some(motion);
     }
 
-    /// Takes in what rows show of the registers that they were read from, and says how they move then.
+    /// Detects the registers behind the rows, and returns the motion without their zero.
     fn look_behind(&mut self, rows: &mut Rows, motion: &Motion, sheet: &Sheet) -> Motion {
         let found = Registers::find(rows, motion);
         let is_count = PerSensor::from_fn(|sensor| self.quantities.is_count(sensor));
@@ -197,7 +196,7 @@ impl Draft {
         motion
     }
 
-    /// The triads that the log has; both where nothing shows any.
+    /// The triads in the log; both if none was identified.
     fn present(&self) -> impl Iterator<Item = Sensor> {
         let triads = &self.columns.triads;
         let none = triads.gyro.is_none() && triads.accel.is_none();
@@ -206,8 +205,7 @@ impl Draft {
     }
 }
 
-/// Angle in rad of one unit of the gyros in one row, as gravity's direction turns; negative where the triads have opposite
-/// signs.
+/// Angle in rad per gyro unit in one row, from the rotation of gravity; negative if the triads have opposite signs.
 pub(super) fn turned_angle(triads: PerSensor<Vec<Vector3<f64>>>, period: f64) -> Option<f64> {
     let rows = Rows::new(triads, Vec::new(), period);
     let motion = rows.motion();
@@ -216,7 +214,7 @@ pub(super) fn turned_angle(triads: PerSensor<Vec<Vector3<f64>>>, period: f64) ->
         .or_else(|| Registers::find(&rows, &motion).turns?.angle())
 }
 
-/// Keeps the rows of one of several instruments, and says by which column and number.
+/// Keeps the rows of one of several instruments, and returns the column and number.
 fn retain_instance(sheet: &mut Sheet) -> Option<(usize, f64)> {
     let (column, number) = columns::instance(sheet)?;
     sheet.retain(|of, row| of.columns[column][row] == number);
@@ -240,7 +238,7 @@ fn retain_samples(sheet: &mut Sheet, columns: &Columns) {
     });
 }
 
-/// White noise of both triads in the longest rest, as `turncal allan` finds it.
+/// White noise of both triads in the longest dwell, as from `turncal allan`.
 fn white_noise(
     rows: &Rows,
     motion: &Motion,

@@ -1,5 +1,4 @@
-//! What raw samples of unknown unit show of the motion: where they rest, how large gravity is, and by gravity's
-//! direction how far the gyros turn.
+//! Motion from raw samples of unknown unit: dwells, magnitude of gravity, and gyro rotation from the gravity direction.
 
 use std::ops::Range;
 
@@ -10,50 +9,49 @@ use crate::imu::PerSensor;
 use crate::statistics::{FALSE_ALARM, SIGMA_OF_MEDIAN, median, median_of_axes, student_limit};
 use crate::units::DEGREE;
 
-/// Length of the windows whose means are compared, s.
+/// Length of the compared windows, s.
 pub const WINDOW: f64 = 0.25;
 /// Windows at rest differ by less than this many σ of their noise …
 const SIGMAS: f64 = 6.0;
-/// … and this part of gravity or of the fastest turn.
+/// … and this fraction of gravity or of the fastest turn.
 const PART: f64 = 1e-3;
 /// Samples on either side of a cut …
 const BESIDE: usize = 8;
-/// … between which gravity's direction changes by this much at once, rad …
+/// … between which the gravity direction jumps by this much, rad …
 const CUT: f64 = 30.0 * DEGREE;
-/// … though it stays within this on each side.
+/// … but varies by less on each side.
 const STEADY: f64 = 5.0 * DEGREE;
-/// Length of the steps over which gravity's direction is followed, s.
+/// Step of the integration of the gravity direction, s.
 pub const FOLLOWED: f64 = 0.08;
-/// Specific force within this part of gravity shows its direction.
+/// Specific force within this fraction of gravity gives its direction.
 const NEAR_GRAVITY: f64 = 0.1;
-/// Changes of direction below this tell nothing, rad.
+/// Smaller changes of direction are not used, rad.
 const ENOUGH: f64 = 20.0 * DEGREE;
-/// How well gravity's direction must follow the gyros.
+/// Required agreement between gravity direction and gyros.
 const CORRELATION: f64 = 0.98;
-/// What data sheets allow a scale.
+/// Scale tolerance of data sheets.
 pub const TOLERANCE: f64 = 0.03;
-/// Samples that are added up to tell pulses, whose fractions are carried, from readings.
+/// Number of samples summed to distinguish pulses, which carry fractions, from readings.
 const SUM: usize = 16;
 
-/// What the samples show.
+/// Motion detected in the samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Motion {
     /// The longest stretch at rest.
     pub longest_rest: Range<usize>,
-    /// Specific force at rest, the file's quantity a row.
+    /// Specific force at rest, in the quantity of the file per row.
     pub gravity: f64,
     /// Gyros at rest.
     pub rest: Vector3<f64>,
-    /// Whether gravity's direction changes.
+    /// Whether the gravity direction changes.
     pub is_turned: bool,
-    /// Angle in rad of one unit of the gyros in one row, where turns show it; negative where the triads have
-    /// opposite signs.
+    /// Angle in rad per gyro unit in one row, if determined by turns; negative if the triads have opposite signs.
     pub angle: Option<f64>,
     /// A first guess of its size.
     pub size: f64,
-    /// Samples before which gravity's direction jumps: sections laid end to end.
+    /// Samples before which the gravity direction jumps, as in concatenated sections.
     pub cuts: Vec<usize>,
-    /// Variance of sums of samples at rest over that of as many independent ones, least of the axes.
+    /// Variance of sums of samples at rest, relative to independent samples; smallest axis.
     pub sum_variance: Option<f64>,
 }
 
@@ -65,7 +63,7 @@ pub fn means(samples: &[Vector3<f64>], length: usize) -> Vec<Vector3<f64>> {
     samples.chunks_exact(length).map(mean).collect()
 }
 
-/// 1σ of the noise of means of windows, from how they differ from one to the next.
+/// 1σ noise of window means, from successive differences.
 fn noise(means: &[Vector3<f64>]) -> f64 {
     let differences = means.windows(2).map(|pair| pair[1] - pair[0]);
     let mut changes: Vec<f64> = differences
@@ -75,7 +73,7 @@ fn noise(means: &[Vector3<f64>]) -> f64 {
 }
 
 impl Motion {
-    /// Of samples before some of which, `breaks`, others are missing.
+    /// From samples; others are missing before those in `breaks`.
     pub fn find(samples: &PerSensor<Vec<Vector3<f64>>>, breaks: &[usize], period: f64) -> Self {
         let length = ((WINDOW / period).round() as usize).clamp(1, samples.gyro.len().div_ceil(8));
         let gyro = means(&samples.gyro, length);
@@ -135,7 +133,7 @@ fn is_near(force: &Vector3<f64>, gravity: f64) -> bool {
     (force.norm() / gravity - 1.0).abs() < NEAR_GRAVITY
 }
 
-/// Whether gravity's direction changes by enough to tell something.
+/// Whether the gravity direction changes enough to be used.
 fn is_turned(forces: &[Vector3<f64>], gravity: f64) -> bool {
     let mut shown = forces.iter().filter(|force| is_near(force, gravity));
     let first = shown.next();
@@ -147,14 +145,14 @@ pub fn is_whole(samples: &[Vector3<f64>]) -> bool {
     values.all(|value| value.fract() == 0.0)
 }
 
-/// How far one unit of the gyros in one row turns, rad, as gravity's direction follows them from step to step.
+/// Rotation per gyro unit in one row, rad, from the gravity direction step by step.
 struct Followed {
     angle: Option<f64>,
     size: f64,
 }
 
 impl Followed {
-    /// By least squares of `ḟ = f × ω`, wherever |f| is that of gravity.
+    /// By least squares of `ḟ = f × ω`, wherever |f| equals gravity.
     fn new(
         samples: &PerSensor<Vec<Vector3<f64>>>,
         breaks: &[usize],
@@ -207,7 +205,7 @@ fn is_broken(breaks: &[usize], samples: &Range<usize>) -> bool {
     breaks.get(after).is_some_and(|&next| next < samples.end)
 }
 
-/// Places where gravity's direction jumps, though no sample is missing there and the gyros do not turn it.
+/// Places where the gravity direction jumps without missing samples or gyro rotation.
 fn cuts(samples: &PerSensor<Vec<Vector3<f64>>>, breaks: &[usize]) -> Vec<usize> {
     let accel = &samples.accel;
     let (mut cuts, mut next) = (Vec::new(), 2 * BESIDE);
@@ -228,8 +226,8 @@ fn cuts(samples: &PerSensor<Vec<Vector3<f64>>>, breaks: &[usize]) -> Vec<usize> 
     cuts
 }
 
-/// Whether gyros turn about an axis in the middle half of these samples, as chance hardly makes them say with their
-/// scatter in the others: in a log of few rows a second a turn takes no longer than a cut, but gyros show it.
+/// Whether gyros turn about an axis in the middle half of these samples, significantly relative to their scatter in the
+/// others: at low rates a turn can be as short as a cut, but the gyros show it.
 fn turn_about(axis: &Vector3<f64>, gyro: &[Vector3<f64>]) -> bool {
     let rates: Vec<f64> = gyro.iter().map(|rate| rate.dot(axis)).collect();
     let (before, others) = rates.split_at(BESIDE);
@@ -242,7 +240,7 @@ fn turn_about(axis: &Vector3<f64>, gyro: &[Vector3<f64>]) -> bool {
     change.abs() > student_limit(degrees, 0.5 * FALSE_ALARM) * sigma
 }
 
-/// Variance of sums of samples at rest over that of as many independent ones, least of the axes.
+/// Variance of sums of samples at rest, relative to independent samples; smallest axis.
 fn sum_variance(samples: &PerSensor<Vec<Vector3<f64>>>, settled: &[Range<usize>]) -> Option<f64> {
     let ratio = |triad: &[Vector3<f64>], axis: usize| {
         let (mut of_sums, mut of_one) = (0.0, 0.0);

@@ -1,9 +1,9 @@
-//! What the name of a column says: a quantity, an axis, a unit.
+//! Quantity, axis and unit from the name of a column.
 
 use crate::formats::quantity::{Of, spelled};
 use crate::imu::Sensor;
 
-/// A unit as `run.toml` writes it, and how many of it one of a file's is.
+/// A unit of `run.toml`, and the size of the file unit in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
     pub word: &'static str,
@@ -11,7 +11,7 @@ pub struct Unit {
     pub of: Of,
 }
 
-/// What is within the names of a triad's columns, and what are whole names of such.
+/// Parts of names of triad columns, and whole names.
 #[rustfmt::skip]
 const TRIADS: [(Sensor, &[&str], &[&str]); 2] = [
     (
@@ -26,22 +26,22 @@ const TRIADS: [(Sensor, &[&str], &[&str]); 2] = [
         &["a", "f", "fb", "sf", "dv", "force", "gf"],
     ),
 ];
-/// What is within the names of other columns.
+/// Parts of names of other columns.
 #[rustfmt::skip]
 const OTHERS: [&str; 9] =
     ["mag", "compass", "quat", "euler", "cov", "std", "bias", "orientation", "useracc"];
 
-/// A name taken apart.
+/// A parsed name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Name {
     /// Letters and digits in lower case, without axis and unit.
     pub stem: String,
-    /// What stands for the axis.
+    /// The axis part.
     pub axis: Option<char>,
     pub unit: Option<Unit>,
 }
 
-/// The body axes of the program whose columns have such names; `None` if it is not known.
+/// Body axes of the program that uses such column names; `None` if unknown.
 pub fn axes_of_program(columns: &[String]) -> Option<&'static str> {
     let has = |name: &str| columns.iter().any(|column| column == name);
     // PX4's sensor_combined and ArduPilot's IMU: front, right, down.
@@ -50,7 +50,7 @@ pub fn axes_of_program(columns: &[String]) -> Option<&'static str> {
     is_autopilot.then_some("frd")
 }
 
-/// The unit that a text names, of which a number before it says how many.
+/// The unit in a text, with an optional preceding factor.
 pub fn unit(text: &str) -> Option<Unit> {
     let text = text.trim_matches(['[', ']', ' ']);
     let text = text.strip_suffix("/LSB").unwrap_or(text);
@@ -66,7 +66,7 @@ pub fn unit(text: &str) -> Option<Unit> {
     (times > 0.0 && times.is_finite()).then_some(Unit { word, times, of })
 }
 
-/// The words of a name in lower case: what blanks, marks or capitals part.
+/// The words of a name in lower case, separated by blanks, marks or capitals.
 fn words(name: &str) -> Vec<String> {
     let letters: Vec<char> = name.chars().collect();
     let mut words = vec![String::new()];
@@ -87,7 +87,7 @@ fn words(name: &str) -> Vec<String> {
 }
 
 impl Name {
-    /// Of a column whose unit may stand in a row of its own.
+    /// For a column whose unit may be in a separate row.
     pub fn of_column(name: &str, unit_below: &str) -> Self {
         let mut of = Self::of(name);
         of.unit = of.unit.or_else(|| unit(unit_below));
@@ -156,7 +156,7 @@ impl Name {
         })
     }
 
-    /// Whether it is neither a gyro's nor an accelerometer's, by its name.
+    /// Whether its name belongs to neither gyro nor accelerometer.
     pub fn is_of_another_sensor(&self) -> bool {
         let is_magnetic = self
             .unit
@@ -164,7 +164,7 @@ impl Name {
         is_magnetic || OTHERS.iter().any(|other| self.stem.contains(other))
     }
 
-    /// How much like a column of time it is, more is more.
+    /// Similarity to a time column; larger is more similar.
     pub fn is_time(&self) -> u8 {
         let whole = self.whole();
         let has = |parts: &[&str]| parts.iter().any(|part| whole.contains(part));
@@ -197,14 +197,14 @@ impl Name {
         self.unit.is_some_and(|unit| unit.of == Of::Time)
     }
 
-    /// Whether this column holds one part of a time that is split over two: whole seconds, or their fraction.
+    /// Whether this column contains one part of a time split into two columns: whole seconds or fraction.
     pub fn is_part_of_time(&self, word: &str) -> bool {
         self.unit
             .or_else(|| unit(&self.whole()))
             .is_some_and(|unit| unit.word == word)
     }
 
-    /// Whether it tells several instruments apart.
+    /// Whether it distinguishes several instruments.
     pub fn is_instance(&self) -> bool {
         let names = [
             "i", "id", "instance", "imu", "imuid", "device", "deviceid", "sensorid",
@@ -212,7 +212,7 @@ impl Name {
         names.contains(&&*self.whole())
     }
 
-    /// Ticks in s, where a maker's name for a time says what they are.
+    /// Tick in s, if the name defines it.
     pub fn tick(&self) -> Option<f64> {
         // Xsens, MT Low-Level Communication Protocol: 10 kHz.
         (self.whole() == "sampletimefine").then_some(1e-4)

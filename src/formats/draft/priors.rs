@@ -1,5 +1,4 @@
-//! What is known before calibration: scale and bias as the record shows them, the rest as is usual in the class
-//! of its noise.
+//! Prior: scale and bias from the recording, the rest typical for the class of its noise.
 
 use nalgebra::Vector3;
 
@@ -11,10 +10,10 @@ use crate::formats::schema::page::Page;
 use crate::imu::Sensor;
 use crate::units::{ARCSEC, DEG_PER_SQRT_H, DEGREE, MICRO_G_PER_SQRT_HZ, PPM};
 
-/// Knowledge before calibration that is usual in a class of instruments, 1σ.
+/// Typical prior of a class of instruments, 1σ.
 struct Class {
     name: &'static str,
-    /// White noise of the gyros below which an instrument is of this class, rad/√s.
+    /// Gyro white noise below which an instrument belongs to this class, rad/√s.
     angle_random_walk: f64,
     /// The same of the accelerometers, (m/s)/√s.
     velocity_random_walk: f64,
@@ -50,7 +49,7 @@ const CLASSES: [Class; 3] = [
 ];
 
 impl Draft {
-    /// By the noise of the gyros, else that of the accelerometers.
+    /// From the gyro noise, otherwise the accelerometer noise.
     fn class(&self) -> &'static Class {
         let walk = |sensor| self.white_noise(sensor);
         let is_of = |class: &&Class| match (walk(Sensor::Gyro), walk(Sensor::Accel)) {
@@ -71,11 +70,11 @@ impl Draft {
         let from = stated.map_or_else(
             || {
                 format!(
-                    "typical of {} instrument: check against the data sheet",
+                    "typical for {} instrument; check against the data sheet",
                     class.name
                 )
             },
-            |of| format!("of {} by its data sheet", of.of),
+            |of| format!("from the data sheet of {}", of.of),
         );
         let remark = format!("{from}; N = scale * installation * u + bias");
         page.table(&format!("imu.prior.{}", sensor.name()), &remark);
@@ -94,13 +93,16 @@ impl Draft {
 
     fn open_scale(&self, sensor: Sensor) -> String {
         let plain = sensor.pick(
-            "counts for one rad/s by the data sheet: 57.29578 times those for 1 deg/s, often 131, 65.5, 32.8, 16.4",
-            "counts for one m/s² by the data sheet: those for one g over 9.80665",
+            "counts per rad/s from the data sheet: 57.29578 times the counts per deg/s, which are often 131, 65.5, \
+             32.8 or 16.4",
+            "counts per m/s² from the data sheet: counts per g divided by 9.80665",
         );
         let why = match &self.registers {
-            Some(found) if !found.has_rests => "; nothing is at rest, so nothing shows it",
-            Some(_) if sensor == Sensor::Accel => "; gravity at rest does not show it",
-            Some(_) => "; gravity's directions at rest do not show it",
+            Some(found) if !found.has_rests => "; the log has no dwells to estimate it from",
+            Some(_) if sensor == Sensor::Accel => {
+                "; it could not be estimated from gravity in the dwells"
+            }
+            Some(_) => "; it could not be estimated from the change of gravity direction",
             None => "",
         };
         let likely = self.quantities.units.get(sensor).likely.as_ref();
@@ -124,7 +126,7 @@ impl Draft {
             None => {
                 if offset != 0.0 {
                     let bias = three(&Vector3::repeat(offset * per_second));
-                    page.line("bias", bias, "what an unsigned register says at zero");
+                    page.line("bias", bias, "output of an unsigned register at zero input");
                 }
                 let rest = self.rest().filter(|_| sensor == Sensor::Gyro);
                 rest.map_or(0.0, |rest| rest.amax())
@@ -136,20 +138,20 @@ impl Draft {
                 "bias_sigma",
                 format_args!("{sigma:?}"),
                 match per_second {
-                    1.0 => "in the file's unit",
-                    _ => "in the file's unit, per second",
+                    1.0 => "in the unit of the file",
+                    _ => "in the unit of the file, per second",
                 },
             );
         }
     }
 
-    /// Output of the gyros at rest, the file's quantity a row.
+    /// Gyro output at rest, in the quantity of the file per row.
     fn rest(&self) -> Option<Vector3<f64>> {
         self.motion.as_ref().map(|motion| motion.rest)
     }
 
-    /// What the record shows a register to say at zero, with its σ, where it is none that its class has: in the
-    /// file's quantity a row.
+    /// Register zero estimated from the recording, with its σ, if it is not typical for the class; in the quantity of
+    /// the file per row.
     fn own_zero(
         &self,
         sensor: Sensor,
@@ -162,18 +164,18 @@ impl Draft {
         match sensor {
             Sensor::Accel => {
                 let gravity = registers.gravity.as_ref()?;
-                let why = "where gravity at rest is centred";
+                let why = "centre of the gravity vectors in the dwells";
                 Some((gravity.own_zero?, gravity.zero_sigma, why))
             }
             Sensor::Gyro => {
                 let rest = self.rest().filter(|_| registers.has_rests)?;
-                (rest.amax() > BEYOND * usual?).then_some((rest, 0.0, "what it says at rest"))
+                (rest.amax() > BEYOND * usual?).then_some((rest, 0.0, "mean output at rest"))
             }
         }
     }
 }
 
-/// One number for three that are the same.
+/// One number for three equal ones.
 fn three(values: &Vector3<f64>) -> String {
     let [x, y, z] = <[f64; 3]>::from(*values).map(seven);
     if x == y && y == z {

@@ -1,5 +1,5 @@
-//! Rows of an instrument of which hardly anything is known, as a run: its dwells, the likelihood of its axes and its closed
-//! form, which are those of any run, show zero, scale, signs and order of axes.
+//! Rows of an almost unknown instrument as a run: dwells, axis likelihood and closed form, as for any run, give zero,
+//! scale, signs and axis order.
 
 use nalgebra::{SMatrix, SVector, Vector3};
 
@@ -16,70 +16,70 @@ use crate::run::{Aiding, Dwell, Run};
 use crate::statistics::{FALSE_ALARM, chi_square_limit, median, median_of_axes};
 use crate::units::{DEGREE, STANDARD_GRAVITY};
 
-/// Place of the biases among the parameters of a triad.
+/// Index of the biases among the parameters of a triad.
 const BIAS: usize = PARAMETERS - 3;
-/// Length of the rows of the run, s, where those of the log are shorter.
+/// Row period of the run, s, if that of the log is shorter.
 const ROW: f64 = 0.02;
-/// A run needs longer rests than a hand makes: all is taken to happen this many times slower, on which nothing else depends.
+/// A run needs longer dwells than a hand makes, so time is stretched by this factor, which has no other effect.
 const SLOWED: f64 = 2.0;
-/// 1σ of a scale that is as good as unknown, relative …
+/// Relative 1σ of an unknown scale …
 const ANY_SCALE: f64 = 0.5;
-/// … and of axes of one chip, rad.
+/// … and 1σ of the axes of one chip, rad.
 const ASKEW: f64 = 2.0 * DEGREE;
-/// Zero of a register that is made to say nothing at zero, 1σ, m/s² …
+/// 1σ of the zero of a register with nominal zero, m/s² …
 const ABOUT_ZERO: f64 = 1.0;
-/// … and of gyros, rad/s: their output at rest shows it.
+/// … and for gyros, rad/s, from their output at rest.
 const ANY_RATE: f64 = 10.0;
-/// Relative accuracy of gravity at rest: raw outputs are not linear, and drift.
+/// Relative accuracy of gravity at rest, given nonlinearity and drift of raw output.
 const PART: f64 = 1e-3;
-/// How long an output wanders one way, s.
+/// Correlation time of output drift, s.
 const WANDERS: f64 = 1.0;
-/// Output of one chip is straight to this part, 1σ, as data sheets of such chips state (MPU-6050, section 6.1: 0.2 %): a
-/// scale found at large rates is none at small ones.
+/// 1σ nonlinearity of a chip from data sheets (MPU-6050, section 6.1: 0.2 %): a scale found at large rates differs at
+/// small ones.
 const LINEAR: f64 = 2e-3;
-/// A first guess of how far gyros turn may be wrong by this factor, for a hand shakes more than it turns …
+/// The first guess of the gyro rotation may be wrong by this factor, because a hand shakes more than it turns …
 const SEARCHED: f64 = 8.0;
-/// … each that is tried is this many times the one before …
+/// … successive trials differ by this factor …
 const STEP: f64 = 1.1;
-/// … and those within this factor are the same.
+/// … and those within this factor are equal.
 const SAME: f64 = 1.25;
 /// Other axes and scales are this many times less likely.
 const TOLD_APART: f64 = 1e3;
 
-/// How the axes of a triad follow rotation or gravity.
+/// Response of the axes of a triad to rotation or gravity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axes {
-    /// The file's quantity a row for one rad a row, negative where it turns the other way, or for one g.
+    /// Quantity of the file per row for one rad per row (negative if reversed) or for one g.
     pub scale: Vector3<f64>,
-    /// Of what is common to them, relative.
+    /// Relative σ of the common part.
     pub sigma: f64,
-    /// Whether they differ by more than those of one chip.
+    /// Whether they differ by more than the axes of one chip.
     pub by_axis: bool,
 }
 
-/// What gravity at rest shows of accelerometers.
+/// Accelerometer parameters from gravity at rest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gravity {
-    /// What the axes say at zero, the file's quantity a row, where it is not what they are made to say.
+    /// Zero of the axes, in the quantity of the file per row, if it is not the nominal one.
     pub own_zero: Option<Vector3<f64>>,
     /// Its largest σ.
     pub zero_sigma: f64,
     pub axes: Axes,
-    /// Rests it was found from.
+    /// Number of dwells used.
     pub rests: usize,
 }
 
-/// How the gyros' columns lie to the accelerometers'.
+/// Relation of gyro columns to accelerometer columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Turns {
-    /// Of each axis of the accelerometers the column that turns about it.
+    /// For each accelerometer axis, the gyro column about it.
     pub columns: [usize; 3],
     pub axes: Axes,
     pub moves: usize,
 }
 
 impl Turns {
-    /// Angle in rad of a unit in a row, if all axes turn one way.
+    /// Angle in rad per unit in one row, if all axes have the same sign.
     pub fn angle(&self) -> Option<f64> {
         let scale = self.axes.scale;
         let size = scale.abs().map(f64::ln).mean().exp().recip();
@@ -87,30 +87,30 @@ impl Turns {
         (self.columns == [0, 1, 2] && sign.min() == sign.max()).then_some(size * sign.x)
     }
 
-    /// Whether the columns are in the order of the accelerometers' and turn as theirs do.
+    /// Whether the columns have the order and signs of the accelerometers.
     pub fn agree(&self) -> bool {
         self.columns == [0, 1, 2] && self.axes.scale.min() > 0.0
     }
 }
 
-/// What is taken for the instrument.
+/// Assumed instrument.
 #[derive(Debug, Clone)]
 struct Guess {
-    /// rad/s and m/s² of one of the file's quantity a row.
+    /// rad/s and m/s² per quantity of the file per row.
     unit: PerSensor<f64>,
-    /// What accelerometers say at zero.
+    /// Accelerometer zero.
     zero: Vector3<f64>,
-    /// How the gyros' columns make its axes.
+    /// Assignment of gyro columns to its axes.
     order: AxisOrder,
 }
 
-/// Rows of both triads, and what does not follow from the row before.
+/// Rows of both triads, and breaks between them.
 #[derive(Clone)]
 pub struct RawRun {
     rows: PerSensor<Vec<Vector3<f64>>>,
-    /// By its clock, s.
+    /// Row period by its clock, s.
     period: f64,
-    /// Of the log's own rows.
+    /// Row period of the log.
     period_of_log: f64,
     is_whole: PerSensor<bool>,
     breaks: Vec<usize>,
@@ -118,7 +118,7 @@ pub struct RawRun {
 }
 
 impl RawRun {
-    /// Of the rows of a log some of which, `breaks`, do not follow from the one before.
+    /// From the rows of a log, with `breaks` before some of them.
     pub fn new(of_log: &Rows, breaks: &[usize], motion: &Motion) -> Self {
         let length = ((ROW / of_log.period).round() as usize).max(1);
         let period = SLOWED * of_log.period;
@@ -144,7 +144,7 @@ impl RawRun {
         }
     }
 
-    /// The same where gyros have a zero of their own in each stretch.
+    /// The same with a separate gyro zero in each stretch.
     pub fn of_sections(mut self) -> Self {
         for stretch in stretches(self.rows.gyro.len(), &self.breaks, self.period) {
             let rows = &mut self.rows.gyro[stretch.samples];
@@ -154,7 +154,7 @@ impl RawRun {
         self
     }
 
-    /// The run if the instrument is this one, and if moves are unknown where it breaks.
+    /// The run with this instrument, with unknown moves at breaks.
     fn run(&self, guess: &Guess, breaks: &[usize]) -> Option<Run> {
         let gyro = |row: &Vector3<f64>| guess.order.apply(row) * (guess.unit.gyro * self.period);
         let accel = |row: &Vector3<f64>| (row - guess.zero) * (guess.unit.accel * self.period);
@@ -191,7 +191,7 @@ impl RawRun {
         Some(Run::new(recording, Instrument::new(prior, noise), site))
     }
 
-    /// The run as it is guessed, and where it rests: gravity lies one way there.
+    /// The guessed run, with its dwells, where the gravity direction is constant.
     fn at_rest(&self) -> Option<(Run, Vec<Dwell>)> {
         let run = self.run(&self.guess, &self.breaks)?;
         let mut dwells = run.dwells(Aiding::Velocity);
@@ -203,12 +203,12 @@ impl RawRun {
         Some((run, dwells))
     }
 
-    /// How often it rests.
+    /// Number of dwells.
     pub fn rests(&self) -> usize {
         self.at_rest().map_or(0, |(_, dwells)| dwells.len())
     }
 
-    /// What gravity shows of the accelerometers, which are then guessed so.
+    /// Accelerometer parameters from gravity, which become the guess.
     pub fn gravity(&mut self) -> Option<Gravity> {
         let (_, dwells) = self.at_rest()?;
         let rows = &self.rows.accel;
@@ -250,7 +250,7 @@ impl RawRun {
         })
     }
 
-    /// How the gyros turn gravity from dwell to dwell; `None` if this does not single out one axis order and scale.
+    /// Gyro axes and scale from the rotation of gravity between dwells; `None` if not unique.
     pub fn turns(&mut self) -> Option<Turns> {
         let (run, dwells) = self.at_rest()?;
         let options = Options::default().noise(NoisePolicy::Stated);
@@ -293,7 +293,7 @@ impl RawRun {
 }
 
 impl Axes {
-    /// Of a triad whose guessed scale was this, and of which this part is not straight.
+    /// For a triad with this guessed scale and this nonlinearity.
     fn of(estimate: &Estimate, sensor: Sensor, guessed: f64, linear: f64) -> Self {
         let found = estimate.triads.get(sensor).scale;
         let sigma = estimate.sigma();
@@ -322,7 +322,7 @@ fn calibrated(run: &Run) -> Option<Estimate> {
     Some(closed_form.estimate)
 }
 
-/// Stretches of samples between breaks, each of which costs a sample.
+/// Sample ranges between breaks; each break costs a sample.
 fn stretches(count: usize, breaks: &[usize], period: f64) -> Vec<Stretch> {
     let lost = |&row: &usize| Fault {
         kind: FaultKind::Missing,
@@ -336,7 +336,7 @@ fn stretches(count: usize, breaks: &[usize], period: f64) -> Vec<Stretch> {
     stretches_between(count, 0.0, period, &lost)
 }
 
-/// Centre of the sphere on which points lie, by `|a|² = 2 b·a + c`, with its largest σ; `None` if they lie in a plane.
+/// Centre of the sphere through the points, from `|a|² = 2 b·a + c`, with its largest σ; `None` if they lie in a plane.
 fn centre(points: &[Vector3<f64>]) -> Option<(Vector3<f64>, f64)> {
     let middle = mean(points);
     let (mut information, mut right) = (SMatrix::<f64, 4, 4>::zeros(), SVector::<f64, 4>::zeros());

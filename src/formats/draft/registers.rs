@@ -1,4 +1,4 @@
-//! What rows show of the registers that they were read from: zero, range, and what they must not be taken for.
+//! Registers behind the rows: zero, range, and unusable encodings.
 
 use nalgebra::Vector3;
 
@@ -11,10 +11,10 @@ use crate::imu::{PerSensor, Sensor};
 /// Codes of a register of 16 bits.
 const CODES: f64 = 65_536.0;
 
-/// Rows of both triads above what registers are made to say at zero.
+/// Rows of both triads minus the nominal register zero.
 pub struct Rows {
     pub triads: PerSensor<Vec<Vector3<f64>>>,
-    /// Those that come after a gap.
+    /// Rows after a gap.
     pub breaks: Vec<usize>,
     /// s
     pub period: f64,
@@ -22,7 +22,7 @@ pub struct Rows {
     pub whole: PerSensor<bool>,
     /// Whether signed numbers of 16 bits were written as unsigned ones.
     wrapped: PerSensor<bool>,
-    /// What registers are made to say at zero.
+    /// Nominal register zero.
     pub offset: PerSensor<f64>,
 }
 
@@ -52,7 +52,7 @@ impl Rows {
         Motion::find(&self.triads, &self.breaks, self.period)
     }
 
-    /// The axis along which specific force points backwards, and hardly any other way, in the first rows.
+    /// The axis with mostly negative specific force in the first rows.
     pub fn points_down(&self) -> Option<usize> {
         let accel = &self.triads.accel;
         let rows = ((WINDOW / self.period).round() as usize).clamp(1, accel.len().max(1));
@@ -60,15 +60,15 @@ impl Rows {
         (0..3).find(|&axis| force[axis] < -0.9 * force.norm())
     }
 
-    /// Why columns of counts cannot be taken as they are.
+    /// Reasons why count columns cannot be used unchanged.
     pub fn unfit(&self) -> Vec<String> {
         let wrapped = Sensor::ALL
             .into_iter()
             .filter(|&sensor| *self.wrapped.get(sensor));
         let why = |sensor: Sensor| {
             format!(
-                "signed numbers of 16 bits are written as unsigned ones in those of {}: take 65536 from what is 32768 \
-                 or more, and draft again",
+                "the columns of {} contain signed 16-bit values written as unsigned: subtract 65536 from values of \
+                 32768 and above, then run init again",
                 sensor.name()
             )
         };
@@ -76,7 +76,7 @@ impl Rows {
     }
 }
 
-/// What counts show.
+/// Registers detected from counts.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Registers {
     pub has_rests: bool,
@@ -85,7 +85,7 @@ pub struct Registers {
 }
 
 impl Registers {
-    /// Of rows with what they show of their motion.
+    /// From rows and their detected motion.
     pub fn find(rows: &Rows, motion: &Motion) -> Self {
         let found = |mut raw: RawRun| {
             let (has_rests, gravity) = (raw.rests() > 0, raw.gravity());
@@ -104,8 +104,7 @@ impl Registers {
         found(RawRun::new(rows, &breaks, motion).of_sections())
     }
 
-    /// Takes the zero from the samples where it is the register's own, and puts the gyros' columns into the
-    /// order of the accelerometers'.
+    /// Subtracts the nominal register zero and reorders the gyro columns to match the accelerometers.
     pub fn apply(
         &self,
         samples: &mut PerSensor<Vec<Vector3<f64>>>,
@@ -127,8 +126,8 @@ impl Registers {
     }
 }
 
-/// Whether signed numbers of 16 bits were written as unsigned ones, which are taken for what they were: small negative
-/// ones are then just below 65536, and the record is smoother with them below zero.
+/// Whether signed 16-bit numbers were written as unsigned, which is corrected: small negative numbers then appear just
+/// below 65536, and the signal is smoother with them below zero.
 fn unwrap(samples: &mut [Vector3<f64>]) -> bool {
     let mut values = samples.iter().flat_map(|sample| sample.iter());
     if !is_whole(samples) || !values.all(|value| (0.0..CODES).contains(value)) {

@@ -1,4 +1,4 @@
-//! Which streams of a log, or which files of rows, hold the instrument.
+//! Selection of the streams or files of the instrument.
 
 use std::path::{Path, PathBuf};
 
@@ -18,37 +18,37 @@ use crate::formats::streams::{self, Column, Found, Stream};
 use crate::formats::{FileError, Sheet};
 use crate::imu::{Output, PerSensor, Sensor};
 
-/// The streams that hold gyros and accelerometers.
+/// The gyro and accelerometer streams.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Streams {
-    /// What the log holds, a line a stream.
+    /// Content of the log, one line per stream.
     listed: Vec<String>,
-    /// The stream of the gyros, and of the accelerometers if that is another.
+    /// The gyro stream, and the accelerometer stream if separate.
     pub gyro: String,
     pub accel: Option<String>,
-    /// The time of both where there are two, and its unit.
+    /// Time columns and units, if there are two streams.
     pub time: Option<PerSensor<(String, String)>>,
-    /// The columns that are looked at, as the log names them.
+    /// Column names in the log.
     pub names: Vec<String>,
     remarks: Vec<String>,
-    /// The body axes that programs of this kind have.
+    /// Body axes of the program.
     pub axes: Option<&'static str>,
-    /// Where and why the file is damaged.
+    /// Place and reason of damage.
     damage: Option<String>,
     /// The file of the accelerometers, where both triads are rows of text.
     pub written: Option<Written>,
 }
 
-/// What rows of text a log was written as.
+/// Text files written from a log.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Written {
     pub accel: Option<String>,
 }
 
-/// More columns of a stream are not listed.
+/// Maximum number of columns listed per stream.
 const MOST_SHOWN: usize = 12;
 
-/// A text of one line, whatever is in it.
+/// A text reduced to one line.
 fn one_line(text: &str) -> String {
     text.replace(char::is_control, " ")
 }
@@ -59,12 +59,12 @@ struct Member {
     is_stream: bool,
     found: Found,
     triads: PerSensor<Option<[usize; 3]>>,
-    /// The column of time, and the word for its unit if that is known.
+    /// The time column, with its unit if known.
     time: Option<(String, String)>,
 }
 
 impl Streams {
-    /// Looks at a log; `None` if it is a text whose rows are one stream.
+    /// Examines a log; `None` for a text with a single stream.
     pub fn of_file(file: &Path, wanted: Option<&str>) -> Result<Option<(Self, Sheet)>, FileError> {
         let (members, damage) = match streams::open(file)? {
             Some(log) => {
@@ -81,7 +81,7 @@ impl Streams {
         }
         let Some((gyro, accel)) = chosen(&members, wanted) else {
             let advice = "Record the file again.";
-            let expected = "streams of samples";
+            let expected = "at least one stream of samples";
             return Err(FileError::of(file, "no samples", expected, advice));
         };
         let salvage = damage.is_some();
@@ -99,8 +99,8 @@ impl Streams {
         Ok(Some((streams, sheet)))
     }
 
-    /// Looks at the files of both triads, as phones and `ulog2csv` write them, which may be one with rows of either; the
-    /// accelerometers' is called so in the draft if it is another.
+    /// Examines the files of both triads, as written by phones and `ulog2csv`, possibly one file with separate rows; a
+    /// separate accelerometer file has this name in the draft.
     pub fn of_two_files(
         gyro: &Path,
         accel: &Path,
@@ -119,7 +119,7 @@ impl Streams {
         Ok((streams, sheet))
     }
 
-    /// Both triads of two members on one clock, as columns whose names say what they are.
+    /// Both triads on one clock, as columns with descriptive names.
     fn of_pair(pair: &PerSensor<&Member>, salvage: bool) -> Result<(Self, Sheet), FileError> {
         let sources = PerSensor::from_fn(|sensor| pair.get(sensor).source(salvage));
         let triads = PerSensor::try_from_fn(|sensor| pair.get(sensor).triad(sensor))?;
@@ -175,7 +175,7 @@ impl Streams {
         }
     }
 
-    /// What the log holds, and the keys that name what is taken of it.
+    /// Content of the log, and the keys for the selected streams.
     pub fn write(&self, page: &mut Page) {
         if self.written.is_none() {
             self.listed.iter().for_each(|line| page.remark(line));
@@ -190,12 +190,13 @@ impl Streams {
             };
             let (time, unit) = (quoted(time), word_or_number(unit));
             let keys = format!("{{ {place}time = {time}, time_unit = {unit} }}");
-            let why = "accelerometers have a clock of their own; --with time-offset finds how far they are apart";
+            let why =
+                "accelerometers use their own clock; --with time-offset estimates the difference";
             page.line("accel_from", keys, why);
         }
         self.remarks.iter().for_each(|remark| page.remark(remark));
         if let Some(damage) = self.damage.as_ref().filter(|_| self.written.is_none()) {
-            let why = format_args!("remove the # to use the intact part. {damage}");
+            let why = format_args!("uncomment to use the intact part. {damage}");
             page.open("salvage = true", why);
         }
     }
@@ -227,7 +228,7 @@ impl Member {
         }
     }
 
-    /// The rows of a file in which a sensor has a value.
+    /// The rows of a file with values of a sensor.
     fn of_rows(file: &Path, sensor: Sensor) -> Result<Self, FileError> {
         let mut sheet = Sheet::read(file, FEWEST_ROWS)?;
         let of_sensor = columns::named(&sheet, sensor);
@@ -271,10 +272,7 @@ impl Member {
 
     /// The names of a triad's columns.
     fn triad(&self, sensor: Sensor) -> Result<[&str; 3], FileError> {
-        let expected = sensor.pick(
-            "three columns of the gyros",
-            "three columns of the accelerometers",
-        );
+        let expected = sensor.pick("three gyro columns", "three accelerometer columns");
         let triad = self
             .triads
             .get(sensor)
@@ -282,9 +280,9 @@ impl Member {
         Ok(triad.map(|k| &*self.found.stream.columns[k].name))
     }
 
-    /// The column of time and its unit, by its steps where the log does not say it.
+    /// The time column and its unit, from its steps if not stated.
     fn time_by(&self, source: &Source) -> Result<(String, String), FileError> {
-        let missing = || self.missing("a column of time");
+        let missing = || self.missing("a time column");
         let (name, mut unit) = self.time.clone().ok_or_else(missing)?;
         if unit.is_empty() {
             let sheet = Sheet::of(source.open()?, FEWEST_ROWS)?;
@@ -296,7 +294,7 @@ impl Member {
     }
 }
 
-/// What a log holds, a line a stream.
+/// Content of a log, one line per stream.
 fn listed(members: &[Member]) -> Vec<String> {
     let mut others = Vec::new();
     let mut lines = Vec::new();
@@ -321,13 +319,12 @@ fn listed(members: &[Member]) -> Vec<String> {
         lines.push(format!("{name}: {samples} samples of {shown}{more}"));
     }
     if !others.is_empty() {
-        lines.push(format!("and samples of other kinds: {}", others.join(", ")));
+        lines.push(format!("other streams: {}", others.join(", ")));
     }
     lines
 }
 
-/// The stream of the gyros, and of the accelerometers if that is another; where no stream that is meant has them,
-/// the longest.
+/// The gyro stream, and the accelerometer stream if separate; otherwise the longest stream.
 fn chosen(members: &[Member], wanted: Option<&str>) -> Option<(usize, Option<usize>)> {
     let samples = |k: Option<usize>| k.map_or(0, |k| members[k].found.samples);
     let is_meant = |k: usize| match wanted {
@@ -359,7 +356,7 @@ fn chosen(members: &[Member], wanted: Option<&str>) -> Option<(usize, Option<usi
     }
 }
 
-/// The names of a stream's columns, with the stream's before them where they do not say what they are.
+/// Column names of a stream, prefixed with the stream name if not descriptive.
 fn names(found: &Found) -> Vec<String> {
     let bare = found
         .stream

@@ -139,7 +139,7 @@ fn unsigned_registers_have_their_zero_in_the_middle_and_a_data_sheets_scale() {
             "time_unit = \"count\"",
             "# sample_period_s =  # TODO",
             "bias = 32768.0",
-            "scale = 417.6758  # 4096 counts for one g",
+            "scale = 417.6758  # 4096 counts per g",
         ],
     );
 }
@@ -188,7 +188,7 @@ fn registers_without_names_and_time_are_told_by_their_numbers() {
         &text,
         &[
             "columns = { gyro = [\"4\", \"5\", \"6\"], accel = [\"1\", \"2\", \"3\"] }",
-            "# TODO: no column goes forward like a time",
+            "# TODO: no column increases like a time",
         ],
     );
 }
@@ -326,7 +326,7 @@ fn a_rate_in_a_comment_decides_what_a_time_without_a_unit_is() {
     has(
         &text,
         &[
-            "sample_period_s = 0.01  # 100 Hz, as the file says",
+            "sample_period_s = 0.01  # 100 Hz, stated in the file",
             "gyro_unit = \"rad/s\"",
             "columns = { gyro = ",
         ],
@@ -357,7 +357,7 @@ fn rows_of_a_second_instrument_and_rows_without_samples_are_passed_over() {
         &[
             "instance = { column = \"I\", number = 0 }",
             "# sample_period_s = 0.01 ",
-            "continuous = true  # no gap in time",
+            "continuous = true  # no gaps",
         ],
     );
     let text = draft("time_s,type,wx,wy,wz,fx,fy,fz,pressure\n", |k, v| {
@@ -370,10 +370,7 @@ fn rows_of_a_second_instrument_and_rows_without_samples_are_passed_over() {
     });
     has(
         &text,
-        &[
-            "# sample_period_s = 0.01 ",
-            "continuous = true  # no gap in time",
-        ],
+        &["# sample_period_s = 0.01 ", "continuous = true  # no gaps"],
     );
 }
 
@@ -414,7 +411,7 @@ fn a_counter_that_other_packets_share_is_no_time_and_a_compass_no_gyro() {
     has(
         &text,
         &[
-            "# a counter shared with other packets is not a time: the period of the rows is found from the turns",
+            "# a counter shared with other packets is not a time; the sample period is estimated from the turns",
             "columns = { gyro = [\"%float(RawGyroX)\", \"%float(RawGyroY)\", \"%float(RawGyroZ)\"], \
              accel = [\"%float(RawAccelX)\", ",
         ],

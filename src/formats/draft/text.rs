@@ -1,4 +1,4 @@
-//! The draft as TOML: its lines, each with the reason, and what they leave open.
+//! The draft as TOML: lines with reasons, and open fields.
 
 use super::name::axes_of_program;
 use super::units::short;
@@ -9,8 +9,8 @@ use crate::formats::schema::page::Page;
 use crate::imu::{Noise, NoiseKeys, Output, Sensor};
 
 impl Draft {
-    /// The draft as a `run.toml` in which the log is named so. Lines with `TODO` must be completed before it
-    /// can be read; the others are guesses, each with its reason.
+    /// The draft as a `run.toml` with this name for the log. Lines with `TODO` must be completed before it can be read;
+    /// the others are guesses, each with its reason.
     pub fn to_toml(&self, file: &str) -> String {
         self.page(file).text
     }
@@ -21,8 +21,7 @@ impl Draft {
             None => "the log alone".to_owned(),
         };
         let remark = format!(
-            "Made from {of_it}. Check what is guessed and complete what is open; `turncal check` then says what the run \
-             holds."
+            "Draft made from {of_it}. Check the guesses and complete the open fields, then run `turncal check`."
         );
         let mut page = Page::of(FORMAT, &remark);
         self.site(&mut page);
@@ -36,7 +35,7 @@ impl Draft {
         self.body_axes(&mut page);
         if let Some((column, number)) = self.instance {
             let of = format!("{{ column = {}, number = {number} }}", self.name(column));
-            let why = "rows of several instruments: those of the first";
+            let why = "the log contains several instruments; this selects the first";
             page.line("instance", of, why);
         }
         self.columns(&mut page);
@@ -51,20 +50,20 @@ impl Draft {
     fn site(&self, page: &mut Page) {
         page.table(
             "site",
-            "the site of the instrument; fields that are not stated get a wide σ",
+            "location of the instrument; missing fields get a wide σ",
         );
         let stated = &self.stated;
         for (key, value, why) in [
             (
                 "latitude_deg",
                 stated.latitude_deg,
-                "north positive; to 0.1° it is good enough",
+                "north positive; 0.1° is accurate enough",
             ),
             ("height_m", stated.height_m, "above the ellipsoid"),
             (
                 "gravity_m_s2",
                 stated.gravity_m_s2,
-                "if it was measured; else normal gravity is taken",
+                "if measured; otherwise normal gravity is used",
             ),
         ] {
             match value {
@@ -83,15 +82,15 @@ impl Draft {
             match unit.word {
                 Some(word) => page.line(&key, quoted(word), &unit.why),
                 None => {
-                    let why = format!("{}; the data sheet or the logger says", unit.why);
+                    let why = format!("{}; see the data sheet or the logger", unit.why);
                     page.open(&format!("{key} ="), why);
                 }
             }
         }
         if found.opposed {
             page.remark(
-                "Gravity turns against the gyros: one triad has the opposite sign. Reverse its columns or give it a \
-                 negative scale.",
+                "Gravity rotates opposite to the gyro output, so one triad has the wrong sign. Negate its columns or \
+                 give it a negative scale.",
             );
         }
     }
@@ -104,31 +103,35 @@ impl Draft {
         let rate = clock.period.map_or(0.0, |period| short(period.recip()));
         match clock.period.map(seven) {
             Some(period) if clock.is_stated => {
-                page.line("sample_period_s", period, format_args!("{rate} Hz, as the file says"));
+                page.line(
+                    "sample_period_s",
+                    period,
+                    format_args!("{rate} Hz, stated in the file"),
+                );
             }
             Some(period) => page.remark(format_args!(
-                "sample_period_s = {period}  # {rate} Hz, found from the times when this is left out"
+                "sample_period_s = {period}  # {rate} Hz; estimated from the time column if omitted"
             )),
             None if self.rows_show_period() => {}
             None => {
-                let why = "s from row to row, which a counter does not tell";
+                let why = "seconds between rows, which a counter does not give";
                 page.open("sample_period_s =", why);
             }
         }
-        let why = "guessed: a row covers the time up to its stamp; else \"start\" or \"middle\"";
+        let why = "guess: a row covers the interval that ends at its time stamp; otherwise \"start\" or \"middle\"";
         page.line("time_stamp", quoted("end"), why);
         let cuts = self.motion.as_ref().map_or(0, |motion| motion.cuts.len());
         let why = match (cuts, clock.gaps.len(), clock.repeated) {
-            (0, 0, 0) => "no gap in time".to_owned(),
+            (0, 0, 0) => "no gaps".to_owned(),
             (0, 0, repeated) => {
                 format!(
-                    "no gap in time, but it stays or goes back in {}",
+                    "no gaps, but time repeats or steps back in {}",
                     places(repeated)
                 )
             }
-            (0, gaps, _) => format!("but rows are missing in {}", places(gaps)),
+            (0, gaps, _) => format!("rows are missing in {}", places(gaps)),
             (cuts, ..) => format!(
-                "gravity changes its direction at once in {}: sections laid end to end; if not, true",
+                "gravity direction jumps in {}, as in concatenated sections; otherwise set true",
                 places(cuts)
             ),
         };
@@ -148,10 +151,10 @@ impl Draft {
             page.line("body_axes", quoted(axes), AXES_OF_PROGRAM);
             return;
         }
-        let mut why = "guessed: x right, y front, z up; else \"frd\" or \"flu\"".to_owned();
+        let mut why = "guess: x right, y front, z up; otherwise \"frd\" or \"flu\"".to_owned();
         if let Some(axes) = axes_of_program(&self.columns.names) {
             why +=
-                &format!("; columns are called so by PX4 or ArduPilot, whose axes are \"{axes}\"");
+                &format!("; the column names are those of PX4 or ArduPilot, which use \"{axes}\"");
         }
         page.line("body_axes", quoted("rfu"), why);
     }
@@ -192,7 +195,7 @@ impl Draft {
             match known {
                 None => page.open("", format_args!("{name} = {why}")),
                 Some(_) => page.remark(format_args!(
-                    "{name} = {why}, and without them `turncal allan` alone takes the log"
+                    "{name} = {why}; without them only `turncal allan` can use the log"
                 )),
             }
         }
@@ -206,13 +209,13 @@ impl Draft {
         }
     }
 
-    /// Which other columns could be a triad, and whether only numbers told the triads.
+    /// Remarks on alternative triad columns and on identification by value.
     fn doubts_of_triads(&self, page: &mut Page) {
         let columns = &self.columns;
         for sensor in Sensor::ALL {
             for other in columns.others.get(sensor) {
                 let names = self.names(other);
-                page.remark(format_args!("{} could be [{names}], too", sensor.name()));
+                page.remark(format_args!("{} could also be [{names}]", sensor.name()));
             }
         }
         if columns.by_size && columns.triads.gyro.is_some() {
@@ -223,39 +226,40 @@ impl Draft {
         if let Some((down, accel)) = self.down.zip(columns.triads.accel) {
             let reversed = accel.map(|k| quoted(&format!("-{}", columns.names[k])));
             page.remark(format_args!(
-                "At the beginning {}. If the sensor lay that side up, write accel = [{}].",
+                "At the start {}. If that axis pointed up, write accel = [{}].",
                 self.down_words(down),
                 reversed.join(", ")
             ));
         }
     }
 
-    /// What stands for a column of time.
+    /// Substitute for a time column.
     fn without_time(&self, page: &mut Page) {
         let why = &self.clock.why;
         if self.clock.is_stated {
-            page.remark(format_args!("{why}: rows follow one another."));
+            page.remark(format_args!("{why}; rows are taken as consecutive."));
         } else if self.rows_show_period() {
             page.remark(format_args!(
-                "{why}: the period of the rows is found from the turns, unless sample_period_s states it."
+                "{why}; the sample period is estimated from the turns unless sample_period_s is set."
             ));
         } else {
             page.open(
                 "",
-                format_args!("{why}: name one that is, or give sample_period_s."),
+                format_args!("{why}; name a time column or set sample_period_s."),
             );
         }
     }
 
-    /// That an axis points down, or the accelerometers have the sign of gravity.
+    /// Remark that an axis points down or that the accelerometers output gravity.
     pub(super) fn down_words(&self, down: usize) -> String {
         format!(
-            "{} is negative: it points down, or the accelerometers give gravity instead of specific force, as iOS does",
+            "{} is negative: the axis points down, or the accelerometers output gravity instead of specific force, \
+             as iOS does",
             self.columns.names[down]
         )
     }
 
-    /// Where gyros do not turn as the accelerometers' columns lie.
+    /// Remark on gyro columns that do not match the accelerometer axes.
     fn turned_axes(&self, page: &mut Page) {
         let turns = self
             .registers
@@ -270,17 +274,17 @@ impl Draft {
             format!("{sign}{}", self.columns.names[triad[k]])
         });
         page.remark(format_args!(
-            "By gravity's directions over {} moves the gyros that turn about the accelerometers' axes are {x}, {y} and \
-             {z}:",
+            "From the gravity directions in {} moves, the gyros about the accelerometer axes x, y and z are {x}, {y} \
+             and {z}.",
             turns.moves
         ));
-        page.remark("hence the order of their columns and the signs of their scale.");
+        page.remark("The gyro column order and scale signs follow from this.");
     }
 
     fn noise_table(&self, page: &mut Page) {
         page.table(
             "imu.noise",
-            "white noise; turncal estimates it from the record unless it is stated",
+            "white noise; turncal estimates it from the recording unless it is stated",
         );
         for sensor in self.present() {
             if let Some(noise) = &self.stated.noise {
@@ -290,10 +294,10 @@ impl Draft {
             let (key, unit) = NoiseKeys::of(sensor).random_walk;
             match self.white_noise(sensor) {
                 Some(walk) => page.remark(format_args!(
-                    "{key} = {:?}  # at rest in this log; a data sheet or turncal allan knows better",
+                    "{key} = {:?}  # measured at rest in this log; prefer a data sheet or turncal allan",
                     short(walk / unit)
                 )),
-                None => page.optional(key, "the data sheet's figure"),
+                None => page.optional(key, "value from the data sheet"),
             }
         }
     }
@@ -311,12 +315,14 @@ impl Draft {
         page.text.push('\n');
         match &self.columns.quaternion {
             Some(four) => page.remark(format_args!(
-                "{} are a quaternion. If it is a turntable's, body right-front-up to East-North-Up in the order w, x, y, \
-                 z, give it as [turntable] from the same file; what the instrument itself makes of its attitude is none.",
+                "{} form a quaternion. If it comes from a turntable (body right-front-up to East-North-Up, order w, \
+                 x, y, z), add a [turntable] that reads this file. Do not use an attitude computed by the instrument \
+                 itself.",
                 self.names(four)
             )),
             None => page.remark(
-                "With a turntable's log: [turntable] with file, columns, position_sigma_arcsec and reading_sigma_arcsec.",
+                "If you have a turntable log, add [turntable] with file, columns, position_sigma_arcsec and \
+                 reading_sigma_arcsec.",
             ),
         }
     }
@@ -330,7 +336,7 @@ fn stated_noise(page: &mut Page, sensor: Sensor, noise: &Noise) {
     if let Some(bias) = noise.gauss_markov {
         let (key, unit) = keys.gauss_markov;
         line(key, bias.sigma / unit, "as stated");
-        let why = "as stated; chosen for a random walk, which has none";
+        let why = "chosen here, because a random walk has no correlation time";
         line(keys.correlation_time, bias.correlation_time, why);
     }
 }
@@ -347,7 +353,7 @@ pub fn seven(value: f64) -> f64 {
     format!("{value:.6e}").parse().unwrap_or(value)
 }
 
-/// A word in quotes, or a number as it is.
+/// A word in quotes, or a number unchanged.
 pub fn word_or_number(text: &str) -> String {
     match text.parse::<f64>() {
         Ok(_) => text.to_owned(),

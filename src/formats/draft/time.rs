@@ -11,26 +11,26 @@ use crate::formats::clock::Uniform;
 use crate::formats::quantity::units_of_time;
 use crate::statistics::median;
 
-/// No unit of three orders is right at two of these periods, s: 5 kHz to 5 Hz.
+/// Plausible sample periods, s (5 kHz to 5 Hz): units that differ by 1000 cannot both be plausible.
 pub const PERIODS: std::ops::Range<f64> = 2e-4..0.2;
-/// Steps within this factor are those of a stated rate.
+/// Steps within this factor match a stated rate.
 const STATED: f64 = 1.2;
 
-/// What the column of time shows.
+/// Clock detected in the time column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Clock {
     /// The word or number for `time_unit`.
     pub unit: String,
-    /// Why it is that, and how sure.
+    /// Reason and certainty.
     pub why: String,
     pub certainty: Certainty,
-    /// Time from row to row in s, if something tells it.
+    /// Sample period in s, if known.
     pub period: Option<f64>,
-    /// Whether that is what the file states, which its times do not tell.
+    /// Whether the period is stated in the file rather than derived from times.
     pub is_stated: bool,
     /// Steps longer than the usual one.
     pub gaps: Vec<Gap>,
-    /// Steps that do not go forward.
+    /// Steps that do not increase.
     pub repeated: usize,
 }
 
@@ -39,7 +39,7 @@ impl Clock {
     pub fn find(sheet: &Sheet, columns: &mut Columns) -> Self {
         let stated = sheet.rate.map(f64::recip);
         let Some((column, stamps)) = columns.time.zip(columns.stamps(sheet)) else {
-            return Self::without(stated, "no column goes forward like a time");
+            return Self::without(stated, "no column increases like a time");
         };
         let steps = Steps::of(&stamps);
         let name = Name::of_column(&sheet.names[column], &sheet.units[column]);
@@ -58,9 +58,9 @@ impl Clock {
         let (second, why) = if columns.nanoseconds.is_some() {
             (Some(1.0), "seconds and nanoseconds".to_owned())
         } else if named.is_some() {
-            (named, "as the file says".to_owned())
+            (named, "stated in the file".to_owned())
         } else if (steps.is_count || name.is_counter()) && name.is_time() < 2 {
-            (None, "steps of one: a counter of samples".to_owned())
+            (None, "steps of one, as in a sample counter".to_owned())
         } else if let Some(period) = known {
             let is_near = |second: &f64| (steps.mean * second / period).ln().abs() < STATED.ln();
             // Ticks of a clock of its own.
@@ -120,11 +120,11 @@ pub struct Gap {
     missing: f64,
 }
 
-/// How times go on, as they do where rows are read.
+/// Steps of the times, as interpreted by the reader.
 struct Steps {
-    /// From sample to sample, rows that are missing counted.
+    /// Mean step per sample, with missing rows counted.
     mean: f64,
-    /// Whether they are whole numbers, most of them one.
+    /// Whether steps are whole numbers, mostly one.
     is_count: bool,
     gaps: Vec<Gap>,
     repeated: usize,

@@ -1,4 +1,4 @@
-//! What a row holds, and in which units: each that `run.toml` has is held against gravity at rest or its turns.
+//! Quantity and units of a row: each unit of `run.toml` is compared with gravity at rest or its rotation.
 
 use nalgebra::Vector3;
 
@@ -15,7 +15,8 @@ use crate::formats::{Sheet, unit_scale};
 use crate::imu::{Output, PerSensor, Sensor};
 use crate::units::STANDARD_GRAVITY;
 
-/// Gravity at rest tells units that differ by more than this factor, for raw sensors are off by tenths; and so do turns.
+/// Gravity at rest and turns distinguish units that differ by more than this factor, because raw sensors may be off by
+/// tenths.
 const TOLD_APART: PerSensor<f64> = PerSensor {
     gyro: 1.3,
     accel: 1.25,
@@ -23,17 +24,17 @@ const TOLD_APART: PerSensor<f64> = PerSensor {
 /// Sums of pulses vary less than sums of readings by more than this factor.
 const PULSE_SUMS: f64 = 0.5;
 
-/// What is known of the unit of a triad.
+/// Unit of a triad, as far as known.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Unit {
-    /// The word for `run.toml`, if it is known.
+    /// Its name in `run.toml`, if known.
     pub word: Option<&'static str>,
     pub why: String,
-    /// Whether motion shows it, or the user states it.
+    /// Whether it is confirmed by motion or stated by the user.
     pub is_shown: bool,
-    /// For counts, where something shows it …
+    /// Scale of counts, if determined …
     pub scale: Option<Scale>,
-    /// … and what is likely where nothing does.
+    /// … and typical values otherwise.
     pub likely: Option<String>,
 }
 
@@ -46,17 +47,17 @@ impl Unit {
     }
 }
 
-/// What rows hold.
+/// Quantity of the rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantities {
     pub output: Output,
     pub output_why: String,
     pub units: PerSensor<Unit>,
-    /// Whether gyros and accelerometers turn opposite ways.
+    /// Whether gyros and accelerometers have opposite signs.
     pub opposed: bool,
 }
 
-/// A unit that rows may have.
+/// A possible unit of the rows.
 struct Hypothesis {
     word: &'static str,
     output: Output,
@@ -94,48 +95,56 @@ impl Hypothesis {
         self.factor.is_some() && !self.fits()
     }
 
-    /// What motion says of it.
+    /// Evidence from motion.
     fn evidence(&self, sensor: Sensor, motion: &Motion) -> String {
         match (sensor, self.factor) {
             (_, None) => String::new(),
             (Sensor::Accel, _) if self.fits() => format!("{} at rest", short(motion.gravity)),
             (Sensor::Accel, Some(factor)) => {
-                format!("at rest it is {} times gravity", short(factor))
+                format!("magnitude at rest is {} times gravity", short(factor))
             }
-            (Sensor::Gyro, _) if self.fits() => "gravity turns as far".to_owned(),
-            (Sensor::Gyro, Some(factor)) => format!("gravity turns {} times as far", short(factor)),
+            (Sensor::Gyro, _) if self.fits() => {
+                "integrated gyro angles match the change of gravity \
+                direction"
+                    .to_owned()
+            }
+            (Sensor::Gyro, Some(factor)) => format!(
+                "gravity direction changes by {} times the integrated gyro \
+                angle",
+                short(factor)
+            ),
         }
     }
 
-    /// Why rows have it that the file names.
+    /// Reason for the unit named in the file.
     fn why_named(&self, sensor: Sensor, motion: &Motion) -> String {
         let link = match self.factor {
             None => "",
             Some(_) if self.fits() => "; ",
             Some(_) => ", but ",
         };
-        format!("as the file says{link}{}", self.evidence(sensor, motion))
+        format!("stated in the file{link}{}", self.evidence(sensor, motion))
     }
 }
 
 /// The rows of a triad.
 struct Rows<'a> {
     motion: &'a Motion,
-    /// s, not a number where nothing tells it.
+    /// Period in s; NaN if unknown.
     period: f64,
-    /// The unit that the file names.
+    /// Unit named in the file.
     named: Option<name::Unit>,
     /// Whether they are whole numbers.
     whole: bool,
 }
 
 impl Quantities {
-    /// Where too few rows hold numbers to show anything.
+    /// If there are too few numeric rows.
     pub fn unknown() -> Self {
         Self {
             output: Output::Rate,
-            output_why: "as most logs have it".to_owned(),
-            units: PerSensor::from_fn(|_| Unit::open("too few rows hold numbers to show it")),
+            output_why: "as in most logs".to_owned(),
+            units: PerSensor::from_fn(|_| Unit::open("too few numeric rows to tell")),
             opposed: false,
         }
     }
@@ -188,14 +197,14 @@ impl Quantities {
         let evidence = shown.map_or(String::new(), |of| of.evidence(sensor, rows.motion));
         let (chosen, why) = match (by_name, shown) {
             (Some(name), Some(shown)) if name.is_contradicted() => {
-                let why = format!("{evidence}, although the file says {}", name.word);
+                let why = format!("{evidence}, although the file states {}", name.word);
                 (shown, why)
             }
             (Some(name), _) if !name.is_contradicted() || sensor == Sensor::Accel => {
                 (name, name.why_named(sensor, rows.motion))
             }
             (None, Some(shown)) if !rows.whole && (named.is_none() || sensor == Sensor::Gyro) => {
-                let others = by_motion.map(|of| format!("; it may as well be {}", of.word));
+                let others = by_motion.map(|of| format!("; could also be {}", of.word));
                 (shown, evidence + &others.collect::<String>())
             }
             _ => {
@@ -215,16 +224,20 @@ impl Quantities {
         }
     }
 
-    /// Takes what rows hold by the accelerometers.
+    /// Sets the row quantity from the accelerometers.
     fn hold(&mut self, output: Output, rows: &Rows) {
         self.output = output;
         self.output_why = match output {
             Output::Pulse => {
-                "whole numbers whose sums vary less than they would if fractions were not carried over"
-                    .to_owned()
+                "integer counts that carry their remainder, as pulse outputs do".to_owned()
             }
-            Output::Increment => format!("gravity times {} s a row", short(rows.period)),
-            Output::Rate => "specific force at rest is g itself, not g times the sample period".to_owned(),
+            Output::Increment => format!(
+                "specific force at rest is g times {} s per row",
+                short(rows.period)
+            ),
+            Output::Rate => {
+                "specific force at rest is g itself, not g times the sample period".to_owned()
+            }
         };
     }
 
@@ -241,7 +254,7 @@ impl Quantities {
             word: Some("count"),
             why: why_count(
                 rows,
-                &format!("no known unit makes {} at rest", short(gravity)),
+                &format!("no known unit gives {} at rest", short(gravity)),
             ),
             likely: per_g.is_finite().then(|| likely_for_g(per_g)),
             ..Unit::default()
@@ -261,18 +274,21 @@ impl Quantities {
             // Without a clock each unit needs a period of its own.
             Some(angle) if !row.is_finite() && is_bare => {
                 let Some((word, period)) = usual_period(all, angle) else {
-                    return Unit::open("with no time from row to row turns do not show it");
+                    return Unit::open("cannot be estimated from turns without time stamps");
                 };
                 let rate = short(period.recip());
                 return Unit {
                     word: Some(word),
-                    ..Unit::open(&format!("gravity turns as far at about {rate} Hz"))
+                    ..Unit::open(&format!(
+                        "integrated gyro angles match the change of gravity direction at about \
+                        {rate} Hz"
+                    ))
                 };
             }
             None if is_bare && self.output != Output::Pulse => {
                 return Unit::open(match rows.motion.is_turned {
-                    true => "gravity turns too seldom or too roughly to show it",
-                    false => "gravity does not turn, so nothing shows it",
+                    true => "too few usable turns of gravity to estimate it",
+                    false => "gravity direction does not change, so it cannot be estimated",
                 });
             }
             _ => {}
@@ -283,7 +299,7 @@ impl Quantities {
                 name.word,
                 name.why_named(Sensor::Gyro, rows.motion)
             ),
-            None => why_count(rows, "no known unit fits the turns of gravity"),
+            None => why_count(rows, "no known unit fits the change of gravity direction"),
         };
         // Rows add up to the angle.
         let measured = angle.map(|angle| row / angle);
@@ -303,7 +319,7 @@ impl Quantities {
         }
     }
 
-    /// Takes the units that the user states.
+    /// Applies the units stated by the user.
     pub fn state(&mut self, stated: &Stated) {
         let of_triads = [
             (Sensor::Gyro, stated.gyro_unit),
@@ -312,7 +328,7 @@ impl Quantities {
         for (sensor, StatedUnit(of)) in of_triads.into_iter().filter_map(|(k, of)| Some((k, of?))) {
             if let Of::Rows(_, output) = of.of {
                 self.output = output;
-                "as the stated unit is of it".clone_into(&mut self.output_why);
+                "follows from the stated unit".clone_into(&mut self.output_why);
             }
             let unit = self.units.get_mut(sensor);
             let found = unit.scale.take().filter(|_| of.word == "count");
@@ -332,7 +348,7 @@ impl Quantities {
         self.units.get(sensor).word == Some("count")
     }
 
-    /// Takes in what the record shows of the registers behind its counts.
+    /// Applies the registers detected behind the counts.
     pub fn of_registers(&mut self, found: &Registers, period: Option<f64>) {
         let period = period.unwrap_or(f64::NAN);
         let (per_second, row) = (self.per_second(period), self.row(period));
@@ -349,7 +365,7 @@ impl Quantities {
         if gyro.word.is_none_or(|word| word == "count") && is_open(gyro) {
             if gyro.word.is_none() {
                 gyro.word = Some("count");
-                gyro.why = "no known unit fits the turns of gravity".to_owned();
+                gyro.why = "no known unit fits the change of gravity direction".to_owned();
             }
             gyro.scale = Some(Scale::of_turns(
                 &turns.axes,
@@ -369,7 +385,7 @@ impl Quantities {
         }
     }
 
-    /// What a row of gyros is summed over to make an angle.
+    /// Factor from a gyro row to its integral.
     fn row(&self, period: f64) -> f64 {
         period * self.per_second(period)
     }
@@ -382,7 +398,7 @@ impl Quantities {
     }
 }
 
-/// A unit of which the file states how many of `run.toml`'s one is, unless motion contradicts it.
+/// A unit that the file states as a multiple of one in `run.toml`, unless motion contradicts it.
 fn scaled(sensor: Sensor, rows: &Rows) -> Option<Unit> {
     let unit = rows.named?;
     let scale = Scale::of_unit(sensor, unit)?;
@@ -390,26 +406,26 @@ fn scaled(sensor: Sensor, rows: &Rows) -> Option<Unit> {
     let of_it = Hypothesis::new(sensor, (unit.word, per_si), Output::Rate, rows);
     (of_it.factor.is_none() || of_it.fits()).then(|| Unit {
         word: Some("count"),
-        why: "as the file says".to_owned(),
+        why: "stated in the file".to_owned(),
         is_shown: true,
         scale: Some(scale),
         likely: None,
     })
 }
 
-/// Why a triad is taken to hold counts.
+/// Reason for treating a triad as counts.
 fn why_count(rows: &Rows, unfit: &str) -> String {
     match rows.named {
         _ if rows.whole => "whole numbers".to_owned(),
         Some(unit) => format!(
-            "{} has no word of its own here: a count with a scale",
+            "{} is not a built-in unit, so it is a count with a scale",
             unit.word
         ),
         None => unfit.to_owned(),
     }
 }
 
-/// The only unit with which rows that turn by this angle come at a usual period, and the period.
+/// The only unit that gives a usual period for rows with this rotation, and the period.
 fn usual_period(all: &[Hypothesis], angle: f64) -> Option<(&'static str, f64)> {
     let periods = all.iter().map(|of| (of.word, of.per_si * angle));
     let mut usual = periods.filter(|(_, period)| PERIODS.contains(period));

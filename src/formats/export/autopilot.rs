@@ -1,7 +1,7 @@
 //! Parameters of PX4, ArduPilot, Betaflight and INAV: offsets, and scales of accelerometers.
 //!
-//! PX4 and ArduPilot make `(n − offset) ⊙ scale` of accelerometers and `n − offset` of gyros, in sensor axes, and turn
-//! these to body axes (`SENS_BOARD_ROT`, `AHRS_ORIENTATION`) behind that. INAV and Betaflight do the same in whole counts.
+//! PX4 and ArduPilot compute `(n − offset) ⊙ scale` for accelerometers and `n − offset` for gyros, in sensor axes, and
+//! then rotate to body axes (`SENS_BOARD_ROT`, `AHRS_ORIENTATION`). INAV and Betaflight do the same in whole counts.
 //!
 //! Source: PX4-Autopilot, `src/lib/sensor_calibration` and `src/modules/temperature_compensation`; ArduPilot,
 //! `AP_InertialSensor_Backend.cpp`, `_rotate_and_correct_accel`, and `AP_InertialSensor_tempcal.cpp`, `correct_sensor`;
@@ -17,20 +17,20 @@ use crate::imu::{AXES, PerSensor, Sensor};
 use crate::units::{DEGREE, STANDARD_GRAVITY};
 
 const UPPER: [&str; 3] = ["X", "Y", "Z"];
-const UNCORRECTED: &str = "scale of gyros, and any misalignment";
-/// Orders of temperature that PX4 and ArduPilot have.
+const UNCORRECTED: &str = "gyro scale factors and all misalignments";
+/// Polynomial orders in temperature supported by PX4 and ArduPilot.
 const ORDERS: usize = 3;
-/// Temperature from which ArduPilot counts, °C, and the factor of its coefficients.
+/// Reference temperature of ArduPilot, °C, and the factor of its coefficients.
 const ARDUPILOT_REFERENCE: f64 = 35.0;
 const ARDUPILOT_FACTOR: f64 = 1e6;
-/// Counts for one g of a 16-bit sensor of ±16 g, to which Betaflight and INAV set those that they know …
+/// Counts per g of a 16-bit sensor with ±16 g, the setting of Betaflight and INAV …
 const COUNTS_PER_G: f64 = 2048.0;
-/// … and for one rad/s of one of ±2000 °/s.
+/// … and per rad/s with ±2000 °/s.
 const COUNTS_PER_RAD_S: f64 = 16.4 / DEGREE;
-/// What autopilots leave off of a change with temperature.
-const OF_TEMPERATURE: &str = "change of scale factors and installation with temperature, of biases with its rate and \
-    of orders above three; biases are those of the sensor's own temperature";
-/// One in INAV's gains.
+/// Temperature dependence that autopilots cannot represent.
+const OF_TEMPERATURE: &str = "change of scale factors and misalignments with temperature, change of biases with \
+    temperature rate, and orders above three; biases refer to the temperature of the sensor";
+/// Unit gain in INAV.
 const INAV_ONE: f64 = 4096.0;
 
 /// Offsets of both triads, and scales of the accelerometers, as far as numbers of 32 bits hold them.
@@ -49,7 +49,7 @@ fn held(axes: &Axes) -> PerSensor<Held> {
     })
 }
 
-/// Parameters by the names that a program has for offset and scale of an axis.
+/// Parameters with the names of a program for offset and scale of an axis.
 fn parameters(
     file: &mut Document,
     held: &PerSensor<Held>,
@@ -92,8 +92,8 @@ fn px4_line(name: &str, value: f32) -> String {
 pub fn px4(source: &Source) -> Exported {
     let axes = Axes::front_right_down(source);
     let held = held(&axes);
-    let id = "which device it is: PX4 takes the parameters whose CAL_ACC0_ID and CAL_GYRO0_ID are the device's; where \
-              the instrument is another than number 0, rename them";
+    let id = "device identity: PX4 uses the parameters whose CAL_ACC0_ID and CAL_GYRO0_ID match the device; rename \
+        them for an instrument other than number 0";
     let reads = ("#", "PX4 reads rad/s and m/s^2");
     let mut file = Document::correcting(source, &axes, reads, &held, &[UNCORRECTED, id]);
     let kind = |sensor: Sensor| sensor.pick("GYRO", "ACC");
@@ -123,15 +123,15 @@ pub fn px4(source: &Source) -> Exported {
     file.finish().without(OF_TEMPERATURE)
 }
 
-/// ArduPilot's temperature: `n − p(T) + p(T_cal)` before the offsets are taken off, with
-/// `p(T) = (c₁ d + c₂ d² + c₃ d³) 10⁻⁶`, d = T − 35 °C.
+/// ArduPilot's temperature: `n − p(T) + p(T_cal)` before the offsets are subtracted, with `p(T) = (c₁ d + c₂ d² + c₃
+/// d³) 10⁻⁶`, d = T − 35 °C.
 pub fn ardupilot(source: &Source) -> Exported {
     let axes = Axes::front_right_down(source);
     let held = held(&axes);
     let notes = [
         UNCORRECTED,
-        "which instance it is: the second has INS_ACC2OFFS_X and so on",
-        "lasting gyro offsets: ArduPilot determines them again at every start, unless INS_GYR_CAL is 0",
+        "instance number: the second instance uses INS_ACC2OFFS_X and so on",
+        "permanent gyro offsets: ArduPilot re-estimates them at every start unless INS_GYR_CAL is 0",
     ];
     let reads = ("#", "ArduPilot reads rad/s and m/s^2");
     let mut file = Document::correcting(source, &axes, reads, &held, &notes);
@@ -172,11 +172,11 @@ fn counts(v: &Vector3<f64>, per_unit: f64) -> Vector3<f64> {
 
 fn of_counts(what: &str, counts: f64, unit: &str) -> String {
     format!(
-        "counts are of {what} with {counts:.0} for one {unit}; at another number n, times n / {counts:.0}"
+        "counts are for {what} with {counts:.0} counts per {unit}; for n counts per {unit}, multiply by n / {counts:.0}"
     )
 }
 
-/// Betaflight takes `acc_calibration` from the counts of each axis and zeroes the gyros at every start.
+/// Betaflight subtracts `acc_calibration` from the counts of each axis and zeroes the gyros at every start.
 pub fn betaflight(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let per_unit = COUNTS_PER_G / STANDARD_GRAVITY;
@@ -185,8 +185,8 @@ pub fn betaflight(source: &Source) -> Exported {
         gyro: Held::offset(Vector3::zeros()),
         accel: Held::offset(zero / per_unit),
     };
-    let notes = ["anything of the gyros, which it zeroes at every start"];
-    let reads = ("#", "lines for its command line,");
+    let notes = ["all gyro parameters, because it zeroes the gyros at every start"];
+    let reads = ("#", "commands for its command line,");
     let mut file = Document::correcting(source, &axes, reads, &held, &notes);
     file.comment(&of_counts("an accelerometer", COUNTS_PER_G, "g"));
     let [x, y, z] = [zero.x, zero.y, zero.z].map(|count| count as i64);
@@ -194,8 +194,8 @@ pub fn betaflight(source: &Source) -> Exported {
     file.finish()
 }
 
-/// INAV makes `(counts − acczero) accgain / 4096` of accelerometers; zeros of gyros are used where it does not find them
-/// itself.
+/// INAV computes `(counts − acczero) accgain / 4096` for accelerometers; gyro zeros are used if it does not estimate
+/// them.
 pub fn inav(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let PerSensor { gyro, accel } = &axes.triads;
@@ -210,7 +210,7 @@ pub fn inav(source: &Source) -> Exported {
             offset: zero / per_unit,
         },
     };
-    let reads = ("#", "lines for its command line,");
+    let reads = ("#", "commands for its command line,");
     let mut file = Document::correcting(source, &axes, reads, &held, &[UNCORRECTED]);
     file.comment(&of_counts("an accelerometer", COUNTS_PER_G, "g"));
     file.comment(&of_counts("gyros", COUNTS_PER_RAD_S, "rad/s"));

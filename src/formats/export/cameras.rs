@@ -15,7 +15,7 @@ fn held(axes: &Axes) -> PerSensor<Held> {
     PerSensor::from_fn(|sensor| Held::all(axes.triads.get(sensor)))
 }
 
-/// A table with its head: version, kind, size, and checksum of what follows.
+/// A table with its header: version, kind, size, and checksum of the content.
 fn table([major, minor]: [u8; 2], kind: u16, content: &[u8]) -> Vec<u8> {
     let mut sum = flate2::Crc::new();
     sum.update(content);
@@ -30,13 +30,13 @@ fn table([major, minor]: [u8; 2], kind: u16, content: &[u8]) -> Vec<u8> {
 
 /// The 520 bytes of the memory of the motion module, as `rs-imu-calibration` writes them.
 ///
-/// librealsense makes `matrix n − bias`, its matrices column by column. Bytes without a use are 0xff.
+/// librealsense computes `matrix n − bias`, with matrices column by column. Unused bytes are 0xff.
 pub fn realsense(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let held = held(&axes);
     let notes = [
-        "rotation and translation to the depth sensor, which stay those of the drawing",
-        "the serial number behind the table, which is left empty",
+        "rotation and translation to the depth sensor, which keep their design values",
+        "the serial number after the table, which stays empty",
     ];
     let document = Document::correcting(source, &axes, ("#", "in memory"), &held, &notes);
     let mut imu = vec![0xff; 37 * 4 + 96];

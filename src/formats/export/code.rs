@@ -16,7 +16,7 @@ pub fn c(source: &Source) -> Exported {
     for sensor in Sensor::ALL {
         let (name, unit, input) = (sensor.name(), source.unit(sensor), Source::input(sensor));
         file.comment(&format!(
-            "{input} along each axis for one {unit} of each output"
+            "{input} along each axis per {unit} of each output"
         ));
         let matrix = rows(source.correction.matrix.get(sensor)).map(|row| format!("    {{{row}}}"));
         let matrix = matrix.join(",\n");
@@ -58,7 +58,7 @@ static inline void turncal_calibrate(const double raw[6], double calibrated[6])
 }
 ";
 
-/// Numbers to the last bit.
+/// Numbers with full precision.
 fn numbers<'a>(values: impl IntoIterator<Item = &'a f64>) -> String {
     let values: Vec<String> = values.into_iter().map(|v| format!("{v:e}")).collect();
     values.join(", ")
@@ -73,7 +73,7 @@ fn rows(matrix: &Matrix3<f64>) -> [String; 3] {
 pub fn octave(source: &Source) -> Exported {
     let mut file = Document::of_code(source, "%");
     file.comment("");
-    file.comment("save as turncal_calibrate.m; a row of raw is N, a row of u is u:");
+    file.comment("save as turncal_calibrate.m; each row of raw is N, each row of u is u:");
     file.comment("gyros x y z, accelerometers x y z");
     file.line("function u = turncal_calibrate(raw)");
     for sensor in Sensor::ALL {
@@ -95,7 +95,7 @@ const OCTAVE: &str = "  if size(raw, 2) ~= 6
        bsxfun(@minus, raw(:, 4:6), accel_bias) * accel_correction.'];
 end";
 
-/// A function for C that calibrates at a temperature.
+/// A C function that calibrates at a temperature.
 fn at_temperature(source: &Source, file: &mut Document) {
     let Some(thermal) = &source.record.temperature else {
         return;
@@ -120,7 +120,7 @@ fn at_temperature(source: &Source, file: &mut Document) {
             text + "}"
         };
         file.comment(&format!(
-            "{name}: value at {} degC and coefficients of powers of T - {} from the first on; valid from {} to {} degC",
+            "{name}: value at {} degC, then coefficients of powers 1 to 5 of T - {}; valid from {} to {} degC",
             range.reference, range.reference, range.lowest, range.highest
         ));
         file.line(&format!(
@@ -146,7 +146,7 @@ fn at_temperature(source: &Source, file: &mut Document) {
             entries.collect::<Vec<_>>().join(",\n    ")
         ));
     }
-    file.comment("the same at a temperature in degC that does not change; include <math.h> before");
+    file.comment("the same at a constant temperature in degC; include <math.h> first");
     file.line(AT_TEMPERATURE);
 }
 

@@ -1,16 +1,16 @@
-//! A file of an export in the making: comments, what it does not hold, numbers.
+//! An export file under construction: comments, omissions, numbers.
 
 use super::Exported;
 use super::source::{Axes, Held, Remainder, Source};
 use crate::imu::{PerSensor, Sensor, Term};
 
-/// What nearly every format lacks.
+/// Omission of nearly every format.
 pub const SIGMA: &str = "sigma and covariance of the parameters; they are in calibration.json";
 
 pub const TEST_VECTORS: &str =
     "test vectors, raw -> calibrated, gyros x y z, accelerometers x y z:";
 
-/// A file in the making.
+/// A file under construction.
 pub struct Document {
     mark: &'static str,
     text: String,
@@ -18,8 +18,8 @@ pub struct Document {
 }
 
 impl Document {
-    /// Begins with the lines that all formats share. `notes` name everything that this format cannot hold, except error
-    /// terms: those for which `held` is false are added here.
+    /// Starts with the lines common to all formats. `notes` names everything that this format cannot represent, except
+    /// error terms: those for which `held` is false are added here.
     pub fn holding(
         source: &Source,
         mark: &'static str,
@@ -34,7 +34,7 @@ impl Document {
         document
     }
 
-    /// The same of a format in which error terms have no place.
+    /// The same for a format without error terms.
     pub fn new(
         source: &Source,
         mark: &'static str,
@@ -49,13 +49,13 @@ impl Document {
             document.comment(&line);
         }
         for note in document.notes.clone() {
-            document.comment(&format!("not held: {note}"));
+            document.comment(&format!("not included: {note}"));
         }
         document
     }
 
-    /// Begins a file for a program that makes `matrix (n − offset)` of both triads' output, says what that leaves, and
-    /// what else it does not hold.
+    /// Starts a file for a program that computes `matrix (n − offset)` for both triads, and states the residual error
+    /// and other omissions.
     pub fn correcting(
         source: &Source,
         axes: &Axes,
@@ -73,7 +73,7 @@ impl Document {
         document
     }
 
-    /// Begins a file of code: it corrects K, E and D, and has terms and test vectors in comments.
+    /// Starts a code file: it corrects K, E and D, and lists terms and test vectors in comments.
     pub fn of_code(source: &Source, mark: &'static str) -> Self {
         let mut document = Self::holding(source, mark, [SIGMA], |_| false);
         let vectors = source.test_vectors();
@@ -85,7 +85,7 @@ impl Document {
         document
     }
 
-    /// A comment of one line, whatever is in it: names and warnings come from files.
+    /// A one-line comment for any text, because names and warnings come from files.
     pub fn comment(&mut self, line: &str) {
         let breaks = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
         let line = line.replace(breaks, " ");
@@ -112,7 +112,7 @@ impl Document {
         self.text.insert_str(0, &format!("{line}\n"));
     }
 
-    /// Puts all so far between these, which only end a comment together.
+    /// Encloses the text so far in these comment delimiters.
     pub fn enclose(&mut self, open: &str, close: &str) {
         self.text = format!("{open}\n{}{close}\n", self.text.replace("--", "- -"));
     }
@@ -125,7 +125,7 @@ impl Document {
     }
 }
 
-/// A number that YAML 1.1 takes for one: with a point, and a sign in its exponent.
+/// A number in YAML 1.1 syntax, with a decimal point and a signed exponent.
 pub fn yaml_number(value: f64) -> String {
     let text = format!("{:e}", value + 0.0);
     let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));

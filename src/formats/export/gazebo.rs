@@ -1,8 +1,8 @@
 //! The noise of an IMU in Gazebo (SDFormat).
 //!
 //! A sample is the true value plus white noise of `stddev`, plus a bias drawn from `bias_mean` ± `bias_stddev` with
-//! either sign, plus a walk pulled back with `dynamic_bias_correlation_time`, whose standard deviation in the long
-//! run is `dynamic_bias_stddev √(τ/2)`.
+//! either sign, plus a correlated walk with `dynamic_bias_correlation_time`, whose stationary standard deviation is
+//! `dynamic_bias_stddev √(τ/2)`.
 //!
 //! Source: gz-sensors, `GaussianNoiseModel.cc`; SDFormat 1.6 and later, `noise.sdf`.
 
@@ -15,7 +15,7 @@ pub fn write(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let held = PerSensor::from_fn(|sensor| Held::offset(axes.triads.get(sensor).bias));
     let notes = [
-        "the sign of the bias: Gazebo draws it at random for each axis, so half of them have the opposite sign",
+        "the sign of the bias: Gazebo draws it at random for each axis, so half of the axes get the opposite sign",
     ];
     let reads = ("", "Gazebo writes rad/s and m/s^2, here");
     let mut file = Document::correcting(source, &axes, reads, &held, &notes);

@@ -1,7 +1,7 @@
-//! iKalibr's IMU intrinsics.
+//! IMU intrinsics for iKalibr.
 //!
 //! From true to measured: `f_m = MAP_a f + BIAS_a`, `ω_m = MAP_g (SO3_AtoG ω) + BIAS_g`, both maps upper triangular
-//! with the coefficients (00, 11, 22, 01, 02, 12). The body is that of the accelerometers' map.
+//! with the coefficients (00, 11, 22, 01, 02, 12). The body frame is that of the accelerometer map.
 //!
 //! Source: iKalibr, `include/sensor/imu_intrinsic.hpp` and `config/imu-intri.yaml`.
 
@@ -21,7 +21,7 @@ pub fn write(source: &Source) -> Exported {
     let turn = crate::attitude::log(&own).norm() / ARCSEC;
     let notes = [
         format!(
-            "the body frame: its own is {turn:.1} arcsec from that of the calibration, by the rotation below"
+            "the body frame: its frame differs from that of the calibration by {turn:.1} arcsec (the rotation below)"
         ),
         SIGMA.to_owned(),
     ];

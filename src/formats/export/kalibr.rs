@@ -1,9 +1,8 @@
-//! Kalibr's IMU intrinsics, model `scale-misalignment`, and those of OpenVINS.
+//! IMU intrinsics for Kalibr, model `scale-misalignment`, and for OpenVINS.
 //!
-//! From true to measured, in rad/s and m/s²: `a = M_a C_i_b f + b_a`,
-//! `ω = M_g C_gyro_i C_i_b ω_b + A C_gyro_i C_i_b f + b_g`, with both `M` lower triangular and both
-//! `C` rotations. `C_i_b`, in `T_i_b`, takes the body frame of the calibration to the axes of the
-//! accelerometers, so nothing of K and E is lost.
+//! From true to measured, in rad/s and m/s²: `a = M_a C_i_b f + b_a`, `ω = M_g C_gyro_i C_i_b ω_b + A C_gyro_i C_i_b f
+//! + b_g`, with both `M` lower triangular and both `C` rotations. `C_i_b`, in `T_i_b`, rotates the body frame of the
+//! calibration into the accelerometer axes, so K and E are represented completely.
 //!
 //! Source: Rehder et al., "Extending kalibr: calibrating the extrinsics of multiple IMUs and of
 //! individual axes", ICRA 2016; the keys are those of Kalibr's IMU chain files.
@@ -17,9 +16,9 @@ use crate::calibration::result::frame::accelerometer_frame;
 use crate::imu::{PerSensor, Sensor, Term};
 use crate::units::ARCSEC;
 
-/// What Kalibr and OpenVINS find themselves.
+/// Quantities that Kalibr and OpenVINS estimate themselves.
 const BIASES: &str =
-    "biases, which it finds itself, so no error is left of them; they are in a comment";
+    "biases, which it estimates itself, so they leave no error; a comment lists them";
 
 fn begin(source: &Source) -> Document {
     Document::holding(source, "#", [BIASES, SIGMA], |term| {
@@ -54,8 +53,8 @@ pub fn write(source: &Source) -> Exported {
     file.comment("measured = M C_gyro_i C_i_b w + A C_gyro_i C_i_b f + bias");
     let turned = crate::attitude::log(&imu_b).norm() / ARCSEC;
     file.comment(&format!(
-        "T_i_b takes the body frame above to the axes of the accelerometers, {turned:.1} arcsec \
-         away; what takes it for the identity gets u along those"
+        "T_i_b rotates the body frame above into the accelerometer axes, {turned:.1} arcsec away; a program that \
+         assumes the identity gets u along those axes"
     ));
     biases(&mut file, &axes);
     file.line("imu0:\n  model: scale-misalignment\n  T_i_b:");
@@ -72,13 +71,13 @@ pub fn write(source: &Source) -> Exported {
     file.finish()
 }
 
-/// Above the diagonal there is only rounding.
+/// Tolerance for rounding above the diagonal.
 fn lower(mut matrix: Matrix3<f64>) -> Matrix3<f64> {
     matrix.fill_upper_triangle(0.0, 1);
     matrix
 }
 
-/// A matrix row by row below its name, which is indented.
+/// A matrix row by row below its indented name.
 fn matrix(file: &mut Document, name: &str, matrix: &Matrix3<f64>) {
     let indent = " ".repeat(name.len() - name.trim_start().len());
     file.line(&format!("{name}:"));
@@ -129,7 +128,7 @@ pub fn open_vins_rpng(source: &Source) -> Exported {
     open_vins(source, "rpng", upper)
 }
 
-/// OpenVINS' IMU intrinsics, in its models `kalibr` and `rpng`.
+/// IMU intrinsics for OpenVINS, models `kalibr` and `rpng`.
 ///
 /// From measured to true, in rad/s and m/s²: `a = R_IMUtoACCᵀ Ta⁻¹ (a_m − b_a)`,
 /// `ω = R_IMUtoGYROᵀ Tw⁻¹ (ω_m − Tg a − b_g)`, with `Ta`, `Tw` lower triangular (`kalibr`) or upper (`rpng`): only

@@ -1,7 +1,7 @@
-//! The part of a KF-GINS configuration that is about the IMU.
+//! IMU section of a KF-GINS configuration.
 //!
-//! Along front, right, down, from true to measured: `n = (1 + s) u + b` axis by axis, with b in °/h
-//! and mGal, s in ppm. It is taken out as `u = (n − b) / (1 + s)`.
+//! Along front, right, down, from true to measured: `n = (1 + s) u + b` axis by axis, with b in °/h and mGal, s in ppm.
+//! It is corrected as `u = (n − b) / (1 + s)`.
 //!
 //! Source: the KF-GINS configuration file and its IMU compensation (GIEngine, i2Nav, Wuhan
 //! University).
@@ -32,8 +32,8 @@ pub fn write(source: &Source) -> Exported {
         format!("{:.1} arcsec ({:.1} ppm)", tilt / ARCSEC, tilt / PPM)
     };
     let lost = format!(
-        "misalignment: up to {} of the gyros, {} of the accelerometers stay in the data; where that \
-         is too much give KF-GINS what `turncal apply` writes, and zero bias and scale",
+        "misalignment: up to {} (gyros) and {} (accelerometers) remain in the data; if that is too much, give \
+         KF-GINS the output of `turncal apply` with zero bias and scale",
         largest(Sensor::Gyro),
         largest(Sensor::Accel)
     );
@@ -42,7 +42,7 @@ pub fn write(source: &Source) -> Exported {
         "sigma of misalignment, and covariance; they are in calibration.json".to_owned(),
     ];
     let mut file = Document::holding(source, "#", notes, |_| false);
-    axes.introduce(&mut file, "KF-GINS reads rad and m/s a sample,");
+    axes.introduce(&mut file, "KF-GINS reads rad and m/s per sample,");
     for sensor in Sensor::ALL {
         let rows = misalignment.get(sensor).row_iter();
         for (axis, row) in ["front", "right", "down"].iter().zip(rows) {
@@ -73,9 +73,7 @@ pub fn write(source: &Source) -> Exported {
 }
 
 fn sigma(file: &mut Document, source: &Source, axes: &Axes) {
-    file.comment(
-        "1 sigma of the calibration; biases that change from switch-on to switch-on need more",
-    );
+    file.comment("1 sigma of the calibration; increase it if biases change at switch-on");
     for (key, sensor, is_bias, unit, name) in [
         ("initbgstd", Sensor::Gyro, true, DEG_PER_H, "deg/h"),
         ("initbastd", Sensor::Accel, true, MILLIGAL, "mGal"),
@@ -90,7 +88,7 @@ fn sigma(file: &mut Document, source: &Source, axes: &Axes) {
         match sigma.filter(|sigma| sigma.iter().all(|&s| s > 0.0)) {
             Some(sigma) => file.line(&format!("{key}: {}  # {name}", yaml_list(&sigma))),
             None => file.comment(&format!(
-                "{key}: the calibration states no sigma of all three"
+                "{key}: the calibration does not state sigma for all three axes"
             )),
         }
     }
@@ -120,7 +118,7 @@ fn noise(file: &mut Document, source: &Source) {
             None => format!("#  {name}: [ , , ]  # {unit}: {missing}"),
         });
     }
-    file.line("#  gsstd: [ , , ]  # ppm: 1σ by which scale factors vary, from the data sheet");
+    file.line("#  gsstd: [ , , ]  # ppm: 1σ of scale-factor variation, from the data sheet");
     file.line("#  asstd: [ , , ]  # ppm: the same");
     let times = Sensor::ALL
         .iter()
@@ -128,7 +126,7 @@ fn noise(file: &mut Document, source: &Source) {
     let shortest = times.map(|bias| bias.correlation_time).reduce(f64::min);
     file.line(&match shortest {
         Some(time) => format!(
-            "  corrtime: {}  # h, one for all; the shorter of gyros and accelerometers",
+            "  corrtime: {}  # h, one value for all; the shorter of gyros and accelerometers",
             yaml_number(time / HOUR)
         ),
         None => format!("#  corrtime:   # h: {missing}"),

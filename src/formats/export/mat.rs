@@ -19,7 +19,7 @@ const MATRIX: u32 = 14;
 const STRUCT: u32 = 2;
 const CHAR: u32 = 4;
 const NUMBERS: u32 = 6;
-/// Longest name of a field, with its end.
+/// Longest field name, with its terminator.
 const NAME: usize = 32;
 
 pub fn write(source: &Source) -> Exported {
@@ -75,7 +75,7 @@ fn element(kind: u32, content: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// An array's begin: class, size and name.
+/// Start of an array: class, size and name.
 fn array(class: u32, name: &str, rows: usize, columns: usize, rest: &[u8]) -> Vec<u8> {
     let flags: Vec<u8> = [class, 0].into_iter().flat_map(u32::to_le_bytes).collect();
     let size: Vec<u8> = [rows, columns]

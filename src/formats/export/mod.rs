@@ -1,6 +1,6 @@
-//! What other programs read: calibrated samples, and calibrations in their own formats.
+//! Exports for other programs: calibrated samples and calibrations.
 //!
-//! Every format says in comments what `N` and `u` are, and names what it cannot hold.
+//! Every format defines `N` and `u` in comments and names its omissions.
 
 mod autopilot;
 mod cameras;
@@ -29,10 +29,10 @@ use source::Source;
 pub struct Format {
     /// Its name on the command line.
     pub name: &'static str,
-    /// What reads it.
+    /// Programs that read it.
     pub about: &'static str,
     write: fn(&Source) -> Exported,
-    /// Whether it has a change with temperature, or says what it leaves of it.
+    /// Whether it represents temperature dependence, or states its omission.
     holds_temperature: bool,
 }
 
@@ -48,28 +48,28 @@ const fn row(name: &'static str, about: &'static str, write: fn(&Source) -> Expo
 /// Every format.
 #[rustfmt::skip]
 static FORMATS: [Format; 20] = [
-    row("kalibr", "IMU intrinsics of Kalibr, model scale-misalignment", kalibr::write),
-    row("kf-gins", "The part of a KF-GINS configuration that is about the IMU", kf_gins::write),
+    row("kalibr", "IMU intrinsics for Kalibr, model scale-misalignment", kalibr::write),
+    row("kf-gins", "IMU section of a KF-GINS configuration", kf_gins::write),
     row("c", "A C99 header with constants and a function", code::c).with_temperature(),
-    row("octave", "A function file of Octave or MATLAB", code::octave),
-    row("text", "Every value with its name, σ and unit", text::write),
-    row("px4", "Parameters of PX4: CAL_GYRO0, CAL_ACC0", autopilot::px4).with_temperature(),
-    row("ardupilot", "Parameters of ArduPilot: INS_GYROFFS, INS_ACCOFFS, INS_ACCSCAL", autopilot::ardupilot)
+    row("octave", "An Octave or MATLAB function file", code::octave),
+    row("text", "All values with name, σ and unit", text::write),
+    row("px4", "PX4 parameters: CAL_GYRO0, CAL_ACC0", autopilot::px4).with_temperature(),
+    row("ardupilot", "ArduPilot parameters: INS_GYROFFS, INS_ACCOFFS, INS_ACCSCAL", autopilot::ardupilot)
         .with_temperature(),
-    row("open-vins-kalibr", "IMU intrinsics of OpenVINS, model kalibr", kalibr::open_vins_kalibr),
-    row("open-vins-rpng", "IMU intrinsics of OpenVINS, model rpng", kalibr::open_vins_rpng),
-    row("ikalibr", "IMU intrinsics of iKalibr", ikalibr::write),
-    row("imu-calib", "The accelerometers' calibration of the ROS package imu_calib", ros::imu_calib),
-    row("ros-covariance", "Covariances of ROS sensor_msgs/Imu; needs --run", ros::covariance),
-    row("dlio", "IMU intrinsics of DLIO (direct LiDAR-inertial odometry)", ros::dlio),
-    row("gazebo", "Noise of an IMU in Gazebo", gazebo::write),
-    row("mat", "A structure for MATLAB, a MAT file", mat::write),
-    row("betaflight", "Zeros of accelerometers for Betaflight", autopilot::betaflight),
+    row("open-vins-kalibr", "IMU intrinsics for OpenVINS, model kalibr", kalibr::open_vins_kalibr),
+    row("open-vins-rpng", "IMU intrinsics for OpenVINS, model rpng", kalibr::open_vins_rpng),
+    row("ikalibr", "IMU intrinsics for iKalibr", ikalibr::write),
+    row("imu-calib", "Accelerometer calibration for the ROS package imu_calib", ros::imu_calib),
+    row("ros-covariance", "Covariances for ROS sensor_msgs/Imu; needs --run", ros::covariance),
+    row("dlio", "IMU intrinsics for DLIO (direct LiDAR-inertial odometry)", ros::dlio),
+    row("gazebo", "IMU noise for Gazebo", gazebo::write),
+    row("mat", "A MATLAB structure (MAT file)", mat::write),
+    row("betaflight", "Accelerometer zeros for Betaflight", autopilot::betaflight),
     row("inav", "Zeros and gains for INAV", autopilot::inav),
-    row("realsense", "Memory of the IMU of a RealSense D400 camera, as rs-imu-calibration writes it",
+    row("realsense", "IMU calibration table of a RealSense D400 camera, as written by rs-imu-calibration",
         cameras::realsense),
-    row("depthai", "IMU calibration of a DepthAI (OAK) camera, JSON", cameras::depthai),
-    row("slimevr", "Calibration of a SlimeVR tracker", slimevr::write),
+    row("depthai", "IMU calibration for a DepthAI (OAK) camera, JSON", cameras::depthai),
+    row("slimevr", "Calibration for a SlimeVR tracker", slimevr::write),
 ];
 
 impl Format {
@@ -78,7 +78,7 @@ impl Format {
         &FORMATS
     }
 
-    /// The format of this name.
+    /// The format with this name.
     pub fn named(name: &str) -> Option<&'static Self> {
         FORMATS.iter().find(|format| format.name == name)
     }
@@ -107,23 +107,23 @@ impl clap::ValueEnum for Format {
 pub struct Exported {
     /// The file.
     pub bytes: Vec<u8>,
-    /// What the format does not hold, a sentence each. The file says it, too.
+    /// Omissions of the format, one sentence each, which are also in the file.
     pub notes: Vec<String>,
 }
 
 impl Exported {
-    /// The same where something more is not held.
+    /// The same with further omissions.
     fn without(mut self, note: impl Into<String>) -> Self {
         self.notes.push(note.into());
         self
     }
 }
 
-/// Writes a calibration in a format. A run of the same instrument gives noise figures, sample rate and
-/// the nominal scales that counts are to be divided by, for formats that want rad/s and m/s².
+/// Writes a calibration in a format. A run of the same instrument gives noise figures, sample rate and the nominal
+/// scales by which counts are divided, for formats in rad/s and m/s².
 ///
 /// # Errors
-/// If the calibration has no inverse or an unknown term, or is not one of the run's instrument.
+/// If the calibration has no inverse or an unknown term, or does not belong to the instrument of the run.
 pub fn write(
     record: &Calibration,
     format: &Format,
@@ -132,8 +132,8 @@ pub fn write(
     let exported = (format.write)(&Source::new(record, run)?);
     Ok(match &record.temperature {
         Some(thermal) if !format.holds_temperature => exported.without(format!(
-            "change with temperature; this is the calibration at {} °C, another temperature is written with \
-             --temperature-degc",
+            "change with temperature; this is the calibration at {} °C (use --temperature-degc for another \
+             temperature)",
             thermal.range.gyro.reference
         )),
         _ => exported,

@@ -8,15 +8,15 @@ use super::document::{Document, yaml_list};
 use super::source::{Axes, Held, Source};
 use crate::imu::{PerSensor, Sensor};
 
-/// Row-major about x, y, z: the variance of a sample, density² × rate.
+/// Row-major about x, y, z: variance per sample, density² × rate.
 pub fn covariance(source: &Source) -> Exported {
     let notes = [
-        "scale, misalignment and bias; publish what `turncal apply` writes, whose errors they are not",
-        "wander of biases, which is not white; `turncal allan` finds it",
+        "scale, misalignment and bias; publish the output of `turncal apply`, which has these errors removed",
+        "bias drift, which is not white; measure it with `turncal allan`",
     ];
     let mut file = Document::new(source, "#", notes);
     file.comment("");
-    file.comment("variance of a sample: density^2 times rate, (rad/s)^2 and (m/s^2)^2");
+    file.comment("variance per sample: density^2 times rate, (rad/s)^2 and (m/s^2)^2");
     for (key, sensor) in [
         ("angular_velocity_covariance", Sensor::Gyro),
         ("linear_acceleration_covariance", Sensor::Accel),
@@ -35,7 +35,7 @@ pub fn covariance(source: &Source) -> Exported {
     file.finish()
 }
 
-/// All of the accelerometers, and the offset of the gyros.
+/// All accelerometer parameters, and gyro offsets.
 fn held(axes: &Axes) -> PerSensor<Held> {
     PerSensor {
         gyro: Held::offset(axes.triads.gyro.bias),
@@ -43,13 +43,12 @@ fn held(axes: &Axes) -> PerSensor<Held> {
     }
 }
 
-/// `SM n − bias` of the accelerometers, so the bias is in corrected units.
+/// `SM n − bias` for the accelerometers, so the bias is in corrected units.
 pub fn imu_calib(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let held = held(&axes);
     let notes = [
-        "biases of the gyros: imu_calib takes their mean at its start, and with it the rate of the Earth, up to \
-                  15.041 deg/h",
+        "gyro biases: imu_calib averages the gyros at its start, which includes Earth rate of up to 15.041 deg/h",
     ];
     let reads = ("#", "imu_calib reads rad/s and m/s^2, here");
     let mut file = Document::correcting(source, &axes, reads, &held, &notes);
@@ -59,12 +58,12 @@ pub fn imu_calib(source: &Source) -> Exported {
     file.finish()
 }
 
-/// `sm n − bias` of the accelerometers and `n − bias` of the gyros, along the axes of `baselink`.
+/// `sm n − bias` for the accelerometers and `n − bias` for the gyros, along the axes of `baselink`.
 pub fn dlio(source: &Source) -> Exported {
     let axes = Axes::log(source);
     let held = held(&axes);
     let notes = [
-        "gyro scale and misalignment; the rotation from the log's axes to baselink, which DLIO applies first",
+        "gyro scale and misalignment; rotation from the log axes to baselink, which DLIO applies first",
     ];
     let reads = ("#", "DLIO reads rad/s and m/s^2, here");
     let mut file = Document::correcting(source, &axes, reads, &held, &notes);

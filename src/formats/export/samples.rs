@@ -8,15 +8,15 @@ use crate::formats::{FileError, write_rows, write_whole_with};
 use crate::recording::nanoseconds;
 use crate::run::Run;
 
-/// Begin and end of a sample, angular rate and specific force along right, front and up.
+/// Start and end of a sample, angular rate and specific force along right, front and up.
 pub const HEADER: &str = "start_s,end_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,\
                           accel_y_m_s2,accel_z_m_s2";
 
-/// Writes a row a row of the log, [`HEADER`] first, of a calibration that changes with temperature `in_range` after it:
-/// whether it holds at the temperature of the row. A row holds means over its sample, so it is itself a record of
+/// Writes one row per log row, with [`HEADER`] first; for a temperature-dependent calibration, `in_range` states
+/// whether it is valid at the temperature of the row. A row contains means over its sample, so the output is a log with
 /// `output = "rate"` in `rad/s` and `m/s^2`.
 ///
-/// With `fill` samples that the log has lost are written too, interpolated, and a last column `filled` is 1 there.
+/// With `fill`, missing samples are also written, interpolated, with 1 in a last column `filled`.
 pub fn sample_rows(
     file: &mut dyn Write,
     correction: &Correction,
@@ -50,8 +50,7 @@ pub fn sample_rows(
     Ok(())
 }
 
-/// The same into a file, whole or not at all, compressed if its name ends in `.gz`; an existing file is
-/// replaced only with `force`.
+/// The same into a complete file, compressed if its name ends in `.gz`; an existing file is replaced only with `force`.
 pub fn write_samples(
     path: &Path,
     correction: &Correction,

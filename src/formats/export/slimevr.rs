@@ -1,7 +1,7 @@
 //! SlimeVR's calibration of a tracker, as the fields of its `SoftFusionSensorConfig`.
 //!
-//! It makes `A_Ainv (counts − A_B)` of accelerometers and `G_Sens ⊙ (counts − G_off)` of gyros, then scales both by the
-//! sensor's nominal sensitivity.
+//! It computes `A_Ainv (counts − A_B)` for accelerometers and `G_Sens ⊙ (counts − G_off)` for gyros, then scales both
+//! by the nominal sensitivity of the sensor.
 //!
 //! Source: SlimeVR-Tracker-ESP, `src/configuration/SensorConfig.h` and `src/sensors/softfusion`.
 
@@ -23,14 +23,12 @@ pub fn write(source: &Source) -> Exported {
         accel: Held::all(accel),
     };
     let notes = [
-        "misalignment of gyros",
-        "sample rates and magnetometer, which stay as the tracker found them",
+        "gyro misalignment",
+        "sample rates and magnetometer, which keep the values found by the tracker",
     ];
     let reads = ("//", "SlimeVR reads counts, here");
     let mut file = Document::correcting(source, &axes, reads, &held, &notes);
-    file.comment(
-        "offsets are in the log's unit, which has to be counts of the tracker's own driver",
-    );
+    file.comment("offsets are in the unit of the log, which must be counts of the tracker driver");
     let list = |v: &Vector3<f64>| {
         let [x, y, z] = [v.x, v.y, v.z].map(|value| value as f32);
         format!("{{{x:?}f, {y:?}f, {z:?}f}}")

@@ -1,4 +1,4 @@
-//! What every format is written from, and how it is put into words.
+//! Common input of all formats, and its description.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -19,7 +19,7 @@ pub struct Source<'a> {
 
 /// A triad in rad/s or m/s²: `n = A u + b`, with `n = N / nominal`, along right, front, up.
 pub struct Normalised {
-    /// What the file's quantity per second is divided by, axis by axis.
+    /// Divisor of the quantity of the file per second, axis by axis.
     pub nominal: Vector3<f64>,
     pub sensitivity: Matrix3<f64>,
     pub bias: Vector3<f64>,
@@ -38,8 +38,8 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// The unit of `N`. A count is one of a rate or, per second, of an increment: the record does not
-    /// tell them apart.
+    /// The unit of `N`. A count is that of a rate or, per second, of an increment; the record does not distinguish
+    /// them.
     pub fn unit(&self, sensor: Sensor) -> String {
         match self.row_unit(sensor) {
             None => "an unnamed unit".to_owned(),
@@ -57,7 +57,7 @@ impl<'a> Source<'a> {
         sensor.pick("rad/s", "m/s^2")
     }
 
-    /// Whose calibration this is, what `N` and `u` are.
+    /// Instrument of the calibration, and definitions of `N` and `u`.
     pub fn about(&self) -> Vec<String> {
         let record = self.record;
         let mut lines = vec![format!(
@@ -68,7 +68,7 @@ impl<'a> Source<'a> {
             (Some(Method::Ekf), Some(Aiding::Table)) => {
                 "Kalman filter, standstill and table attitude"
             }
-            (Some(Method::Ekf), _) => "Kalman filter, standstill alone",
+            (Some(Method::Ekf), _) => "Kalman filter, standstill only",
             (Some(Method::SixPosition), _) => "closed form from static positions",
             (None, _) => "not stated",
         };
@@ -87,8 +87,8 @@ impl<'a> Source<'a> {
             String::new(),
             EQUATION.to_owned(),
             format!(
-                "N: raw output per second, gyros in {}, accelerometers in {}; rows of pulses or \
-                 increments are divided by the sample period, rows of rates stand as they are",
+                "N: raw output per second, gyros in {}, accelerometers in {}; divide pulses or increments by the \
+                 sample period and use rates unchanged",
                 self.unit(Sensor::Gyro),
                 self.unit(Sensor::Accel)
             ),
@@ -96,34 +96,34 @@ impl<'a> Source<'a> {
                 "u: angular rate in rad/s, specific force in m/s^2, along: {}",
                 record.body_frame.words()
             ),
-            "axes of N and u: right, front, up; a log along front, right, down is (y, x, -z) of \
-             this, along front, left, up (y, -x, z)"
+            "axes of N and u: right, front, up; (y, x, -z) converts a log along front, right, down and (y, -x, z) \
+             one along front, left, up"
                 .to_owned(),
         ]);
         lines
     }
 
-    /// σ of a triad's parameters.
+    /// σ of the parameters of a triad.
     pub fn sigma(&self, sensor: Sensor) -> Option<&TriadRecord> {
         let sigma = self.record.sigma.as_ref();
         sigma.map(|sigma| sigma.get(sensor))
     }
 
-    /// The noise that the run states.
+    /// Stated noise of the run.
     pub fn noise(&self, sensor: Sensor) -> Option<&Noise> {
         self.run.map(|run| run.instrument.noise.get(sensor))
     }
 
-    /// Its bias that varies.
+    /// Its bias variation.
     pub fn varying(&self, sensor: Sensor) -> Option<GaussMarkov> {
         self.noise(sensor)?.gauss_markov
     }
 
-    /// Why a figure of noise is missing.
+    /// Reason for a missing noise figure.
     pub fn no_noise(&self) -> &'static str {
         match self.run {
-            Some(_) => "[imu.noise] of the run does not state it",
-            None => "`turncal allan` finds it; or export with --run RUN.toml",
+            Some(_) => "[imu.noise] in run.toml does not state it",
+            None => "measure it with `turncal allan` or export with --run RUN.toml",
         }
     }
 
@@ -149,7 +149,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Parameters of error terms, a line each, in SI.
+    /// Parameters of error terms, one line each, in SI.
     pub fn term_lines(&self, has: impl Fn(Term) -> bool) -> Vec<String> {
         let line = |k: usize| {
             let term = Term::of(k).filter(|&term| has(term))?;
@@ -163,7 +163,7 @@ impl<'a> Source<'a> {
         self.correction.terms().filter_map(line).collect()
     }
 
-    /// That error terms are not held, if there are any.
+    /// Note on omitted error terms, if any.
     pub fn terms_note(&self, held: impl Fn(Term) -> bool) -> Option<String> {
         let names: Vec<&str> = Term::ALL
             .into_iter()
@@ -172,13 +172,13 @@ impl<'a> Source<'a> {
             .collect();
         (!names.is_empty()).then(|| {
             format!(
-                "error terms are not corrected by it ({}); `turncal apply` corrects them",
+                "this format does not correct error terms ({}); `turncal apply` does",
                 names.join(", ")
             )
         })
     }
 
-    /// Raw outputs and what they become, a line each.
+    /// Raw outputs with calibrated values, one line each.
     pub fn test_vectors(&self) -> Vec<String> {
         let numbers = |values: &[f64; 6]| values.map(|v| format!("{v:e}")).join(", ");
         let vectors = self.record.test_vectors.iter();
@@ -191,14 +191,14 @@ impl<'a> Source<'a> {
 /// Both triads along other axes than right, front, up.
 pub struct Axes {
     pub triads: PerSensor<Normalised>,
-    /// What of specific force the gyros add to their rate.
+    /// Gyro output per specific force.
     pub g_sensitivity: Matrix3<f64>,
     /// From these axes to right, front, up.
     order: AxisOrder,
 }
 
 impl Axes {
-    /// Along front, right, down, as autopilots have it.
+    /// Along front, right, down, as for autopilots.
     pub fn front_right_down(source: &Source) -> Self {
         Self::new(source, AxisOrder::FRONT_RIGHT_DOWN)
     }
@@ -208,7 +208,7 @@ impl Axes {
         Self::new(source, AxisOrder::IDENTITY)
     }
 
-    /// Along the axes of the run's log, else right, front, up.
+    /// Along the axes of the log of the run, otherwise right, front, up.
     pub fn log(source: &Source) -> Self {
         let log = source.run.and_then(|run| run.recording.imu.log.as_ref());
         Self::new(
@@ -250,25 +250,24 @@ impl Axes {
         }
     }
 
-    /// The axis right, front or up that lies along one of these.
+    /// The axis (right, front or up) along one of these.
     pub fn axis_of_record(&self, axis: usize) -> usize {
         let of = self.order.source.iter().position(|&source| source == axis);
         of.unwrap_or(axis)
     }
 
-    /// Says along which axes what follows is, `what` being what a reader does there, and what raw output is divided
-    /// by before.
+    /// States the axes and direction (`what`) of the following values, and the divisor of raw output.
     pub fn introduce(&self, file: &mut Document, what: &str) {
         file.comment("");
         file.comment(&format!("{what} along {};", self.words()));
         let [gyro, accel] = Sensor::ALL.map(|sensor| yaml_list(&self.triads.get(sensor).nominal));
         file.comment(&format!(
-            "divide the raw output for that: gyros by {gyro}, accelerometers by {accel}"
+            "to convert the raw output, divide gyros by {gyro} and accelerometers by {accel}"
         ));
     }
 }
 
-/// What a program makes of the output n of a triad: `matrix (n − offset)`.
+/// Correction of the output n of a triad by a program: `matrix (n − offset)`.
 pub struct Held {
     pub matrix: Matrix3<f64>,
     pub offset: Vector3<f64>,
@@ -283,7 +282,7 @@ impl Held {
         }
     }
 
-    /// All of a triad: a calibration that can be exported has an inverse.
+    /// The complete correction of a triad; an exportable calibration has an inverse.
     pub fn all(triad: &Normalised) -> Self {
         let inverse = triad.sensitivity.try_inverse();
         Self {
@@ -298,7 +297,8 @@ impl Held {
     }
 }
 
-/// What a reader that makes `matrix (n − offset)` of a triad's output leaves of its input u: `errors u + constant`.
+/// Residual error, as a function of the input u, of a program that computes `matrix (n − offset)`: `errors u +
+/// constant`.
 pub struct Remainder {
     sensor: Sensor,
     errors: Matrix3<f64>,
@@ -315,7 +315,7 @@ impl Remainder {
         }
     }
 
-    /// Whether it is not more than rounding.
+    /// Whether it is only rounding.
     pub fn is_none(&self) -> bool {
         self.errors.amax() < 1e-12 && self.constant.amax() < 1e-12
     }
@@ -325,7 +325,7 @@ impl Remainder {
         self.errors.singular_values().max()
     }
 
-    /// How much that is, in a sentence.
+    /// Its size, in a sentence.
     pub fn words(&self) -> String {
         let scale = self.errors.diagonal().amax();
         let mut across = self.errors;
@@ -340,14 +340,14 @@ impl Remainder {
             format!("{:.3} mg", 1e3 * self.constant.amax() / STANDARD_GRAVITY),
         );
         format!(
-            "{name}: the residual error is up to {:.1} ppm of scale and {:.1} arcsec of misalignment, together \
-             {example} in any direction, and {bias} of bias",
+            "{name}: the residual error is up to {:.1} ppm in scale and {:.1} arcsec in misalignment ({example} in \
+             any direction combined), and {bias} in bias",
             scale / PPM,
             across.amax() / ARCSEC
         )
     }
 
-    /// All figures, a line an axis: parts of u, and the constant in rad/s or m/s².
+    /// All figures, one line per axis: fractions of u, and the constant in rad/s or m/s².
     pub fn lines(&self, file: &mut Document) {
         for (axis, name) in ["x", "y", "z"].iter().enumerate() {
             let row: Vector3<f64> = self.errors.row(axis).transpose();

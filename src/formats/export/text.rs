@@ -1,4 +1,4 @@
-//! Every value with its name, σ and unit, for people.
+//! Every value with its name, σ and unit, as text.
 
 use nalgebra::Vector3;
 
@@ -77,7 +77,7 @@ fn triad(file: &mut Document, source: &Source, sensor: Sensor) {
     }
 }
 
-/// A σ of zero is that of a value that was not estimated.
+/// A σ of zero means that the value was not estimated.
 fn row(file: &mut Document, name: &str, value: f64, sigma: Option<f64>, unit: &str) {
     let sigma = match sigma {
         None => String::new(),

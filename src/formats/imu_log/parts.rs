@@ -1,4 +1,4 @@
-//! The samples of rows, a part of them at a time: all at once of a short log, packed part by part of a long one.
+//! Samples of rows, in parts: a short log at once, a long one packed part by part.
 
 use std::ops::Range;
 
@@ -16,12 +16,12 @@ use crate::recording::{
     stretches_between,
 };
 
-/// How many rows are held.
+/// Limits for the number of rows in memory.
 #[derive(Debug, Clone, Copy)]
 pub struct Sizes {
-    /// From this many on a log is packed: until then they take 50 MB at most.
+    /// Longer logs are packed; up to this length they take at most 50 MB.
     pub long: usize,
-    /// Rows that are looked at for faults at once, as though they were a record.
+    /// Number of rows searched for faults at once.
     pub part: usize,
 }
 
@@ -34,26 +34,25 @@ impl Default for Sizes {
     }
 }
 
-/// Rows on either side of a part that are looked at with it: more than what is bridged, and what tells of it, reach
-/// over.
+/// Additional rows searched on either side of a part; more than the reach of a bridge and its evidence.
 const BESIDE: usize = 1 << 13;
 
-/// What a log has come to so far.
+/// Samples of a log so far.
 pub struct Parts<'a> {
     log: &'a ImuLog<'a>,
     layout: Layout,
-    /// Rows of a part; `None` if all rows are one.
+    /// Rows per part; `None` for a single part.
     size: Option<usize>,
     clock: Line,
-    /// The sample of each row that is held.
+    /// Sample number of each row in memory.
     numbers: Vec<usize>,
-    /// Rows held that were taken.
+    /// Rows in memory that were processed.
     taken: usize,
-    /// The first sample that was not.
+    /// The first unprocessed sample.
     next: usize,
     facts: Option<[ColumnFacts; 6]>,
     series: PerSensor<SeriesWriter>,
-    /// Where it is known that samples wander.
+    /// Known drift of the samples.
     even: Option<(Wander, PerSensor<Even>)>,
     faults: Vec<Fault>,
     bridges: Vec<Bridge>,
@@ -61,7 +60,7 @@ pub struct Parts<'a> {
 }
 
 impl<'a> Parts<'a> {
-    /// Begins with the first rows of a log, or all of them. How the samples of a log in parts wander may be known.
+    /// Starts with the first rows of a log, or all of them. For a log in parts, the drift of the samples may be known.
     pub fn new(
         log: &'a ImuLog<'a>,
         layout: Layout,
@@ -106,17 +105,17 @@ impl<'a> Parts<'a> {
         })
     }
 
-    /// The rows that have to be held for the next part.
+    /// The rows needed for the next part.
     fn end(&self) -> Option<usize> {
         self.size.map(|size| self.taken + size + 2 * BESIDE)
     }
 
-    /// Whether enough rows are held to take some.
+    /// Whether enough rows are in memory to process some.
     pub fn is_full(&self, held: &Held) -> bool {
         self.end().is_some_and(|end| held.len() >= end + REACH)
     }
 
-    /// Takes rows that are held, all of them at the end of the file, and lets go of what no later row asks for.
+    /// Processes rows in memory (all at the end of the file) and releases those no longer needed.
     pub fn take(
         &mut self,
         held: &mut Held,
@@ -138,7 +137,7 @@ impl<'a> Parts<'a> {
         Ok(())
     }
 
-    /// Takes rows up to about this one, to which faults are looked for.
+    /// Processes rows up to about this one, the limit of the fault search.
     fn part(&mut self, held: &mut Held, stamps: &mut Stamps, end: usize) {
         let is_last = end == held.len();
         let first = self.numbers[0];
@@ -181,7 +180,7 @@ impl<'a> Parts<'a> {
         self.let_go(held, stamps);
     }
 
-    /// Rows to be looked at for faults.
+    /// Rows for the fault search.
     fn rows<'b>(
         &self,
         held: &Held,
@@ -218,7 +217,7 @@ impl<'a> Parts<'a> {
         });
     }
 
-    /// Keeps what was found of these samples; repaired columns begin with sample `first`.
+    /// Stores the faults of these samples; repaired columns start at sample `first`.
     fn keep(&mut self, repaired: Repaired, first: usize, samples: Range<usize>, is_last: bool) {
         let Repaired {
             columns,
@@ -252,7 +251,7 @@ impl<'a> Parts<'a> {
         }
     }
 
-    /// One that lasts from the part before into the one that begins here is one.
+    /// Merges faults that continue from the previous part.
     fn keep_fault(&mut self, fault: Fault, begin: usize) {
         let is_whole = matches!(fault.kind, FaultKind::Duplicate | FaultKind::Missing);
         let is_rest = fault.samples.start == begin && !is_whole;
@@ -278,12 +277,12 @@ impl<'a> Parts<'a> {
         self.taken -= rows;
     }
 
-    /// Whether rows were packed as they came.
+    /// Whether rows were packed while reading.
     pub fn are_packed(&self) -> bool {
         self.size.is_some()
     }
 
-    /// The clock that all rows shared.
+    /// The common clock of all rows.
     pub fn clock(&self) -> Result<Uniform, FileError> {
         self.clock.clone().finish()
     }
@@ -293,8 +292,7 @@ impl<'a> Parts<'a> {
         self.next - self.rows
     }
 
-    /// What the log is, all of its rows being taken; `integral_error` is that of its accelerometers, in their quantity
-    /// times s.
+    /// The samples of the complete log; `integral_error` is that of its accelerometers, in their quantity times s.
     pub fn finish(
         mut self,
         clock: Uniform,
@@ -358,8 +356,8 @@ impl<'a> Parts<'a> {
         }
     }
 
-    /// Puts faults and bridges, in order, where samples are that were put on an even clock; RMS errors of the integrals
-    /// of these, in the columns' quantity times samples.
+    /// Moves faults and bridges, in order, to the positions of samples resampled to a uniform clock; with RMS errors of
+    /// the integrals, in the quantity of the columns times samples.
     fn onto_the_even_clock(&mut self) -> PerSensor<[f64; 3]> {
         let mut error = PerSensor::default();
         if let Some((wander, even)) = &self.even {
@@ -380,8 +378,8 @@ impl<'a> Parts<'a> {
     }
 }
 
-/// The pulse whose rounding has this RMS error on each axis: an error of integrals between edges is as bounded as
-/// that, and as independent of how long it is summed over.
+/// Pulse whose rounding has this RMS error on each axis: like rounding, the error of integrals between edges is bounded
+/// and does not grow with time.
 fn pulse_of(error: [f64; 3]) -> f64 {
     12f64.sqrt() * Vector3::from(error).norm() / 3f64.sqrt()
 }

@@ -1,4 +1,4 @@
-//! The rows of a file: those that are samples, in order of time, all of them held or packed as they come.
+//! The sample rows of a file in order of time, all in memory or packed while reading.
 
 use super::parts::{Parts, Sizes};
 use super::{ImuLog, Layout};
@@ -8,10 +8,10 @@ use crate::formats::rows::LogRows;
 use crate::formats::temperature::Temperatures;
 use crate::imu::Output;
 
-/// Fewer samples than this are no record of a turntable: not one dwell can be told from a turn.
+/// Minimum number of samples; with fewer, dwells and turns cannot be distinguished.
 const FEWEST_SAMPLES: usize = 100;
 
-/// Rows that are held, without duplicates.
+/// Rows in memory, without duplicates.
 #[derive(Default)]
 pub struct Held {
     pub columns: [Vec<f64>; 6],
@@ -40,7 +40,7 @@ impl Held {
         }
     }
 
-    /// Lets go of the first rows.
+    /// Releases the first rows.
     pub fn let_go(&mut self, rows: usize) {
         for column in &mut self.columns {
             column.drain(..rows);
@@ -51,12 +51,12 @@ impl Held {
     }
 }
 
-/// A file as far as it is read.
+/// A partly read file.
 pub struct Reading<'a> {
     log: &'a ImuLog<'a>,
-    /// Of the values of a sample in a row.
+    /// Column indices of a sample in a row.
     places: [Option<usize>; 6],
-    /// The column that tells instruments apart, and what it says of this one.
+    /// The column that distinguishes instruments, and its value for the selected one.
     instance: Option<(usize, f64)>,
     pub stamps: Stamps,
     pub temperature: Option<Temperatures>,
@@ -93,7 +93,7 @@ impl<'a> Reading<'a> {
         })
     }
 
-    /// Takes the row if it is a sample.
+    /// Stores the row if it is a sample.
     fn take(&mut self, csv: &LogRows) -> Result<(), FileError> {
         if let Some((place, number)) = self.instance
             && csv.number(place)? != number
@@ -138,18 +138,18 @@ impl<'a> Reading<'a> {
         Ok(())
     }
 
-    /// What was made of rows that are no samples, a sentence each.
+    /// Remarks on rows that are not samples, one sentence each.
     pub fn notes(&self) -> impl Iterator<Item = String> {
         let file = self.log.source.file.display();
         let blank = (self.blank > 0).then(|| {
             format!(
-                "{} row(s) of {file} have nothing in the columns of both triads and are passed over.",
+                "{} row(s) of {file} are empty in the columns of both triads. turncal skipped them.",
                 self.blank
             )
         });
         let lacking = (self.lacking > 0).then(|| {
             format!(
-                "{} row(s) of {file} lack a value of the gyros or accelerometers and count as missing.",
+                "{} row(s) of {file} lack a gyro or accelerometer value and count as missing.",
                 self.lacking
             )
         });
@@ -160,8 +160,8 @@ impl<'a> Reading<'a> {
         let (found, advice) = match self.lacking {
             0 => (String::new(), "Record a run with dwells and turns."),
             lacking => (
-                format!(" and {lacking} rows that lack a value of the gyros or accelerometers"),
-                "If they are in rows of their own, `turncal init` drafts a run.toml that says so.",
+                format!(" and {lacking} rows that lack a gyro or accelerometer value"),
+                "If gyros and accelerometers are in separate rows, `turncal init` drafts a run.toml for that layout.",
             ),
         };
         csv.error(
@@ -173,7 +173,7 @@ impl<'a> Reading<'a> {
 }
 
 impl<'a> Reading<'a> {
-    /// Reads all rows; how the samples of a long log wander may be known.
+    /// Reads all rows; the drift of the samples of a long log may be known.
     pub fn all(
         &mut self,
         csv: &mut LogRows,
@@ -211,7 +211,7 @@ impl<'a> Reading<'a> {
 }
 
 impl ImuLog<'_> {
-    /// A number of a row as it stands.
+    /// A number in a row, unchanged.
     fn value(&self, csv: &LogRows, column: usize) -> Result<f64, FileError> {
         let value = csv.number(column)?;
         if self.output == Output::Pulse && value.fract() != 0.0 {

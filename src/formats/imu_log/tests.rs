@@ -167,7 +167,7 @@ fn samples_of_a_clock_that_wanders_are_those_of_an_even_one() {
         log.output = Output::Rate;
         let mut notes = Vec::new();
         let imu = log.read_by(sizes, &mut notes).unwrap();
-        assert!(notes[0].contains("wander by up to 3"), "{notes:?}");
+        assert!(notes[0].contains("drift by up to 3"), "{notes:?}");
         imu
     };
     let parts = Sizes {
@@ -276,7 +276,7 @@ fn a_clock_that_wraps_goes_on_and_one_that_was_set_begins_a_stretch() {
     let (imu, notes) = read(&set_back, 1e3, Breaks::Settings).unwrap();
     let samples: Vec<_> = imu.stretches.iter().map(|s| s.samples.clone()).collect();
     assert_eq!(samples, [0..7000, 7099..10_099]);
-    let said = "imu.csv, line 7002: time goes from 69.99 s to 5 s: the clock was set";
+    let said = "imu.csv, line 7002: the time jumps from 69.99 s to 5 s because the clock was set";
     assert!(notes.contains(said), "{notes}");
     // However little it was set back by, in whole samples or not: rows that come late find a place.
     for back in [50, 55, 503, 1000] {
@@ -284,7 +284,7 @@ fn a_clock_that_wraps_goes_on_and_one_that_was_set_begins_a_stretch() {
         let (imu, notes) = read(&a_little, 1e3, Breaks::Settings).unwrap();
         assert_eq!(imu.stretches.len(), 2, "{back}: {notes}");
         assert!(
-            notes.contains("line 7002: time goes from 69.99 s to"),
+            notes.contains("line 7002: the time jumps from 69.99 s to"),
             "{notes}"
         );
     }
@@ -317,8 +317,8 @@ fn a_clock_that_wraps_goes_on_and_one_that_was_set_begins_a_stretch() {
     // If the unit is missing, the error names it.
     let in_microseconds = |k: usize| 10_000 * k as u64;
     let refused = read(&in_microseconds, 1.0, Breaks::Settings).unwrap_err();
-    let said = "line 4: found times that go on by 10000 from row to row, expected 0.01 s, as sample_period_s says. Give \
-                time_unit = \"us\"";
+    let said = "line 4: found a time step of 10000 between rows, expected 0.01 s (sample_period_s in run.toml). Set \
+        time_unit = \"us\"";
     assert!(refused.to_string().contains(said), "{refused}");
     // Milliseconds of a second are no time.
     let of_second = |k: usize| 10 * (k % 100) as u64;
@@ -327,7 +327,7 @@ fn a_clock_that_wraps_goes_on_and_one_that_was_set_begins_a_stretch() {
     let refused = read(&set_back, 1e3, Breaks::Pauses)
         .unwrap_err()
         .to_string();
-    assert!(refused.contains("line 7002: found time going back from 69.99 s to 5 s"));
+    assert!(refused.contains("line 7002: found a time that steps back from 69.99 s to 5 s"));
 }
 
 #[test]

@@ -1,21 +1,21 @@
-//! Samples of a stream integrated over other intervals than its own: between any times, or over the samples of an even
-//! clock where its own wanders.
+//! Samples of a stream integrated over other intervals: between any times, or over the samples of a uniform clock if
+//! its own drifts.
 
 use std::ops::Range;
 
 use crate::formats::clock::Wander;
 use crate::imu::Output;
 
-/// The product of the distances from the middle of two edges to the four of the cubic.
+/// Product of the distances from the midpoint of two edges to the four nodes of the cubic.
 const MIDWAY: f64 = 0.5625;
 
-/// Edges nearer than this, in samples, are the same.
+/// Edges closer than this, in samples, are equal.
 const SAME: f64 = 1e-6;
 
-/// Samples without a gap, whose integrals are counted in values times samples.
+/// Samples without a gap, with integrals in values times samples.
 #[derive(Default)]
 pub struct Course {
-    /// Where they begin, in samples.
+    /// Their start, in samples.
     pub begin: f64,
     pub sums: [Vec<f64>; 3],
 }
@@ -29,8 +29,8 @@ impl Course {
         self.begin + self.len() as f64
     }
 
-    /// The integrals between two places, and how much of the error midway between edges they have, squared; none if
-    /// the places are not within, or not in this order.
+    /// Integrals between two positions, and their squared fraction of the midway error; `None` if the positions are
+    /// outside or not in order.
     pub fn between(&self, begin: f64, end: f64) -> Option<([f64; 3], f64)> {
         let place = |place: f64| {
             let place = place - self.begin;
@@ -57,17 +57,17 @@ impl Course {
         Some((sums, weight * weight))
     }
 
-    /// The edge at or before a place.
+    /// The edge at or before a position.
     fn edge(&self, place: f64) -> usize {
         (place as usize).min(self.len())
     }
 
     /// Mean square error of the integral midway between two edges.
     ///
-    /// Every second edge is left out and interpolated from its neighbours, and every fourth one from those two
-    /// away. White noise alone, which the filter knows of, makes the square of what is missed grow as the distance
-    /// of edges; a signal that the cubic does not follow as its eighth power. So both are told apart, and the
-    /// signal's part at the distance that there is, is 2⁻⁸ of that at twice as much.
+    /// Every second edge is omitted and interpolated from its neighbours, and every fourth one from those two away. The
+    /// squared error due to white noise, which the filter models, grows linearly with edge distance, and that of a
+    /// signal not followed by the cubic with its eighth power. This separates the two, and the signal part at the
+    /// actual distance is 2⁻⁸ of that at twice the distance.
     pub fn edge_error(&self) -> [f64; 3] {
         self.sums.each_ref().map(|sums| {
             let missed = |apart: usize| {
@@ -91,7 +91,8 @@ impl Course {
     }
 }
 
-/// The integral from an edge to a place so much of a sample behind it, by the cubic through four edges about it.
+/// Integral from an edge to a position this fraction of a sample after it, from the cubic through the four surrounding
+/// edges.
 fn beyond(sums: &[f64], edge: usize, part: f64) -> f64 {
     if part == 0.0 {
         return 0.0;
@@ -112,13 +113,13 @@ fn beyond(sums: &[f64], edge: usize, part: f64) -> f64 {
     cubic(from + part) - cubic(from)
 }
 
-/// Samples over other intervals than those of their stream, and the error that this leaves.
+/// Samples over intervals other than those of their stream, with the resulting error.
 pub struct Resampled {
     output: Output,
-    /// Of the errors at the edges of all samples, squared.
+    /// Sum of squared errors at the edges of all samples.
     weights: f64,
     count: f64,
-    /// Mean square errors midway between edges, each times the samples that show it.
+    /// Mean square errors midway between edges, weighted by the number of samples.
     squares: [f64; 3],
     samples: f64,
 }
@@ -134,7 +135,7 @@ impl Resampled {
         }
     }
 
-    /// What a row would hold of the interval between two places; `None` if the course does not have it.
+    /// Row value for the interval between two positions; `None` if outside the data.
     pub fn sample(&mut self, course: &Course, begin: f64, end: f64) -> Option<[f64; 3]> {
         let (sums, weight) = course.between(begin, end)?;
         self.weights += weight;
@@ -163,12 +164,12 @@ impl Resampled {
     }
 }
 
-/// Samples that the cubic reaches beyond the one it ends in.
+/// Number of samples that the cubic extends beyond the last one.
 const AHEAD: f64 = 2.0;
-/// Samples that it reaches back.
+/// Number of samples that it extends backwards.
 const BACK: usize = 2;
 
-/// The even samples of a triad, given out as those that wander come in.
+/// Uniform samples of a triad, produced as drifting samples arrive.
 pub struct Even {
     wander: Wander,
     lag: f64,
@@ -178,13 +179,13 @@ pub struct Even {
     resampled: Resampled,
 }
 
-/// The edges of samples that wander among even samples, which begin with the first whole one; stamps come `lag` of a
-/// sample after its begin.
+/// Edges of drifting samples relative to uniform samples, which start with the first whole one; stamps are `lag`
+/// samples after the start of a sample.
 pub fn place(wander: &Wander, lag: f64, edge: usize) -> f64 {
     wander.time(edge as f64 - lag) + lag
 }
 
-/// The even samples that these reach into, counted from the first.
+/// Number of uniform samples that these cover, from the first.
 pub fn reached(wander: &Wander, lag: f64, samples: &Range<usize>) -> Range<usize> {
     let first = place(wander, lag, 0).ceil();
     let of = |edge| place(wander, lag, edge) - first;
@@ -208,8 +209,7 @@ impl Even {
         }
     }
 
-    /// Gives out the samples that those which came in hold, all of them at the end, and lets go of what no later one
-    /// asks for.
+    /// Returns the samples covered by the input (all at the end) and releases data no longer needed.
     pub fn give(&mut self, at_end: bool, mut take: impl FnMut([f64; 3])) {
         let until = self.held.end() - if at_end { 0.0 } else { AHEAD };
         let edge = |time: f64| self.wander.number(time - self.lag) + self.lag;

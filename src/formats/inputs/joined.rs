@@ -1,9 +1,8 @@
-//! Two streams, each with its own clock, as rows of one.
+//! Two streams with separate clocks, combined into rows of one.
 //!
-//! Gyros stand as they are. Accelerometers are integrated over each sample of the gyros: the integral is known at
-//! the edges of their own samples, and between those follows the cubic through four of them. What is passed on
-//! from sample to sample is exact, so errors do not add up; there remains the error of the integral at an edge,
-//! which the record itself tells (see [`Course::edge_error`]).
+//! Gyros are unchanged. Accelerometers are integrated over each gyro sample: their integral is known at the edges of
+//! their samples and interpolated by a cubic through four of them. The sum over samples is exact, so errors do not
+//! accumulate; the remaining error of the integral at an edge is estimated from the data (see [`Course::edge_error`]).
 
 use std::path::{Path, PathBuf};
 
@@ -14,32 +13,32 @@ use crate::formats::error::{FileError, Place};
 use crate::formats::rows::Rows;
 use crate::imu::{Output, PerSensor};
 
-/// The column of time, in s.
+/// The time column, in s.
 pub const TIME: &str = "time";
 
-/// One of the streams, as `run.toml` describes it.
+/// One of the streams, as described in `run.toml`.
 pub struct Part<'a> {
     pub source: &'a Source<'a>,
     pub clock: Clock<'a>,
     pub columns: [&'a str; 3],
-    /// Columns that are passed on as they are.
+    /// Columns passed on unchanged.
     pub further: &'a [&'a str],
 }
 
-/// Both streams at one row of the gyros' clock.
+/// Both streams at one row of the gyro clock.
 pub struct Joined {
     file: PathBuf,
     header: Vec<String>,
     units: Vec<String>,
     remarks: Vec<String>,
-    /// Time, gyros, accelerometers, further columns of the gyros' stream.
+    /// Time, gyros, accelerometers, further columns of the gyro stream.
     rows: Vec<Vec<f64>>,
     error: [f64; 3],
-    /// Rows given out, with this one.
+    /// Number of rows returned, including this one.
     at: usize,
 }
 
-/// The columns of both triads by names that tell them apart.
+/// Column names of both triads, made unique.
 pub fn distinct(triads: &PerSensor<[&str; 3]>) -> PerSensor<[String; 3]> {
     let bare = |name: &str| name.strip_prefix('-').unwrap_or(name).to_owned();
     let clash = |name: &str| triads.gyro.iter().any(|other| bare(other) == bare(name));
@@ -53,7 +52,7 @@ pub fn distinct(triads: &PerSensor<[&str; 3]>) -> PerSensor<[String; 3]> {
 }
 
 impl Joined {
-    /// Reads both streams, whose stamps come `lag` of a sample after its begin.
+    /// Reads both streams, with stamps `lag` samples after the start of a sample.
     pub fn read(parts: &PerSensor<Part>, output: Output, lag: f64) -> Result<Self, FileError> {
         let gyro = Track::read(&parts.gyro)?;
         let accel = Track::read(&parts.accel)?;
@@ -181,13 +180,13 @@ fn apart(file: &Path, gyro: &Track, accel: &Track) -> FileError {
     };
     FileError::of(
         file,
-        format_args!("accelerometers from {}", of(accel)),
-        format_args!("times that overlap the gyros', {}", of(gyro)),
-        "Bring both streams to one clock, or correct time_unit.",
+        format_args!("an accelerometer stream from {}", of(accel)),
+        format_args!("times that overlap the gyro stream ({})", of(gyro)),
+        "Convert both streams to the same clock, or correct time_unit.",
     )
 }
 
-/// What both streams have to say, each remark once, and that they are two.
+/// Remarks of both streams, each once, and a note about two streams.
 fn remarks_of_both(gyro: Track, accel: Track) -> Vec<String> {
     let mut remarks = gyro.remarks;
     remarks.extend(
@@ -200,8 +199,9 @@ fn remarks_of_both(gyro: Track, accel: Track) -> Vec<String> {
     let uneven = accel.clock.uneven();
     remarks.extend(uneven.map(|said| format!("Accelerometers: {said}")));
     remarks.push(format!(
-        "Gyros every {} s and accelerometers every {} s are two streams: accelerometers are integrated over the \
-         gyros' samples. If their clocks may be apart, estimate by how much: --with time-offset.",
+        "Gyros (every {} s) and accelerometers (every {} s) are separate streams, so turncal integrated the \
+         accelerometers over the gyro samples. If their clocks may differ, estimate the offset with --with \
+         time-offset.",
         rounded(gyro.clock.period),
         rounded(accel.clock.period)
     ));
@@ -257,12 +257,12 @@ impl Track {
         if stamps.of_rows.len() < 2 {
             return Err(rows.error(
                 format_args!("{} samples", stamps.of_rows.len()),
-                "a stream of samples",
-                "Name another stream, or record it again.",
+                "at least 2",
+                "Name another stream, or repeat the recording.",
             ));
         }
         let mut remarks = rows.remarks().to_vec();
-        remarks.extend(rows.cut_off("It is left out"));
+        remarks.extend(rows.cut_off("turncal ignored it"));
         remarks.extend(stamps.notes(rows.file(), 0));
         let clock = Uniform::new(&part.source.file, &stamps.of_rows, part.clock.period)
             .map_err(|error| rows.placed(error))?;
@@ -275,7 +275,7 @@ impl Track {
         })
     }
 
-    /// Samples that follow one another, by their numbers.
+    /// Consecutive samples, by number.
     fn courses(&self) -> Vec<Course> {
         let numbers = &self.clock.numbers;
         let mut courses: Vec<Course> = Vec::new();

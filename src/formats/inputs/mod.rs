@@ -1,4 +1,4 @@
-//! The files that a `run.toml` names: where their rows come from, and what is read from them.
+//! The files named in a `run.toml`: their sources and contents.
 
 pub mod course;
 pub mod joined;

@@ -10,8 +10,8 @@ use crate::imu::AxisOrder;
 use crate::recording::{ImuSamples, LabelledMotion, Segment};
 use crate::units::DEGREE;
 
-/// Reads the sections of a run with these samples, which are stamped `lag` samples after they begin; what
-/// the file leaves open goes to `notes`.
+/// Reads the sections of a run with these samples, with stamps `lag` samples after their start; `notes` receives
+/// remarks about the file.
 pub fn read(
     file: &Path,
     imu: &ImuSamples,
@@ -40,16 +40,16 @@ pub fn read(
             Err(csv.error_here(found, expected, "Correct or remove the row."))
         };
         if end <= start {
-            return wrong("a segment", "an end after the start".to_owned());
+            return wrong("a segment", "an end later than the start".to_owned());
         }
         let (first, last) = record;
         if start < first - slack || end > last + slack {
-            let expected = format!("times inside the IMU record, {first} s to {last} s");
+            let expected = format!("times within the IMU log ({first} s to {last} s)");
             return wrong("a segment", expected);
         }
         if row(start) == row(end) {
             let expected = format!(
-                "a segment several samples long (sample period {} s)",
+                "a segment of several samples (sample period {} s)",
                 imu.period
             );
             return wrong("no sample", expected);
@@ -65,13 +65,13 @@ pub fn read(
     }
     // A label that lacks letters is none, which is said elsewhere.
     notes.extend(
-        csv.cut_off("It is used")
+        csv.cut_off("turncal used it")
             .filter(|_| label_column + 1 != csv.header().len()),
     );
     Ok(segments)
 }
 
-/// What a label says, its axes being those of the file.
+/// Motion stated by a label, in the axes of the file.
 fn motion_of(label: &str, axes: AxisOrder) -> Option<LabelledMotion> {
     let axis = |name: &str| {
         let index = ["x", "y", "z"].into_iter().position(|axis| axis == name)?;

@@ -1,4 +1,4 @@
-//! Where rows come from, as `run.toml` says it.
+//! Sources of rows, as described in `run.toml`.
 
 use std::path::{Path, PathBuf};
 
@@ -10,18 +10,18 @@ use crate::formats::schema::instrument::Fields;
 use crate::formats::schema::{Positive, TimeColumn};
 use crate::formats::streams::{self, StreamRows};
 
-/// Where rows come from.
+/// Source of rows.
 #[derive(Debug, Clone)]
 pub struct Source<'a> {
     pub file: PathBuf,
-    /// Of a file of several streams the one that is meant.
+    /// The selected stream, if the file has several.
     pub stream: Option<&'a str>,
-    /// Whether what is whole of a damaged file is used.
+    /// Whether the intact part of a damaged file is used.
     pub salvage: bool,
 }
 
 impl Source<'_> {
-    /// A file of which nothing is known.
+    /// A file without further settings.
     pub fn of_file(file: &Path) -> Self {
         Self {
             file: file.to_owned(),
@@ -30,7 +30,7 @@ impl Source<'_> {
         }
     }
 
-    /// Opens it by its content.
+    /// Opens it according to its content.
     pub fn open(&self) -> Result<LogRows, FileError> {
         let Some(log) = streams::open(&self.file)? else {
             return CsvFile::open(&self.file, self.stream).map(LogRows::new);
@@ -41,7 +41,7 @@ impl Source<'_> {
 }
 
 impl<'a> Fields<'a> {
-    /// What a table says of its file.
+    /// Source described by a TOML table.
     pub fn source(
         &self,
         file: &str,
@@ -55,7 +55,7 @@ impl<'a> Fields<'a> {
         }
     }
 
-    /// The clock that a table says of its rows.
+    /// Clock described by a TOML table.
     pub fn clock(
         &self,
         table: &str,
@@ -64,7 +64,7 @@ impl<'a> Fields<'a> {
     ) -> Result<Clock<'a>, FileError> {
         if unit == Some(TimeUnit::Count) && period.is_none() {
             let path = format!("{table}.sample_period_s");
-            return Err(self.document.missing(&path, "what a count lasts"));
+            return Err(self.document.missing(&path, "the duration of one count"));
         }
         let seconds = TimeUnit::PerSecond(1.0);
         let (column, nanoseconds) = match column {
@@ -76,7 +76,7 @@ impl<'a> Fields<'a> {
         };
         if nanoseconds.is_some() && unit.is_some_and(|unit| unit != seconds) {
             let path = format!("{table}.time_unit");
-            let advice = "Choose it, or leave it out.";
+            let advice = "Set it to `s`, or remove it.";
             return Err(self.document.wrong(&path, "`s`", advice));
         }
         Ok(Clock {
@@ -88,7 +88,7 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// Where the accelerometers are, if not in the rows of the gyros, and their clock.
+    /// Source of the accelerometers, if not in the gyro rows, and their clock.
     pub fn accel_from(
         &self,
         gyro: &Source<'a>,
@@ -115,7 +115,7 @@ impl<'a> Fields<'a> {
             Some(_) => Ok(Some((source, clock))),
             None => Err(self.document.missing(
                 "imu.accel_from.time",
-                "the column of its time, for two streams need both",
+                "the time column of the accelerometers, because separate streams both need one",
             )),
         }
     }

@@ -1,4 +1,4 @@
-//! The turntable's log: readings of the attitude of its mounting face.
+//! The turntable log: attitude readings of its mounting face.
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
@@ -13,28 +13,27 @@ use crate::recording::{ImuSamples, TableLog};
 use crate::turntable::{AxisAngles, AxisError, TableAccuracy, TableGeometry, axis_angles};
 use crate::units::{ARCSEC, DEGREE};
 
-/// Four components printed to four decimals meet it. What is off by more is no quaternion.
+/// Tolerance of the norm, met by four components with four decimals; larger deviations are not quaternions.
 const NORM_TOLERANCE: f64 = 1e-4;
 
-/// What axes are called by which a table turns when all its angles are zero.
+/// Names of the rotation axes when all angles are zero.
 pub const LETTERS: [(&str, Vector3<f64>); 3] = [
     ("x", Vector3::new(1.0, 0.0, 0.0)),
     ("y", Vector3::new(0.0, 1.0, 0.0)),
     ("z", Vector3::new(0.0, 0.0, 1.0)),
 ];
-/// How a row gives `C_b_n`, and where the table's axes stand.
+/// Columns for `C_b_n` and the axis angles.
 pub struct AttitudeColumns<'a> {
-    /// Those of a quaternion `[w, x, y, z]`, body right-front-up to East-North-Up, if there is one; then those of angles in
+    /// Columns of a quaternion `[w, x, y, z]`, body right-front-up to East-North-Up, if any, followed by angles in
     /// degrees, outermost first.
     names: Vec<&'a str>,
-    /// The axes of the angles. Without a quaternion the attitude is `C_b_n = R(axis₁, outer) R(axis₂, middle) R(axis₃,
+    /// The axes of the angles. Without a quaternion, the attitude is `C_b_n = R(axis₁, outer) R(axis₂, middle) R(axis₃,
     /// inner)`.
     axes: Vec<Vector3<f64>>,
 }
 
 impl AttitudeColumns<'_> {
-    /// The attitude that a row says, its columns being at these places, and the angles of the axes; `None` if there is
-    /// only a quaternion.
+    /// Attitude in a row, with columns at these indices, and axis angles; `None` if there is only a quaternion.
     fn reading(
         &self,
         csv: &LogRows,
@@ -58,9 +57,9 @@ impl AttitudeColumns<'_> {
         let norm = quaternion.norm();
         if (norm - 1.0).abs() > NORM_TOLERANCE {
             return Err(csv.error_here(
-                format_args!("a quaternion of norm {norm:.6}"),
-                format_args!("1 within {NORM_TOLERANCE}"),
-                "Correct the row, or the order of columns in run.toml: w, x, y, z.",
+                format_args!("a quaternion with norm {norm:.6}"),
+                format_args!("norm 1 within {NORM_TOLERANCE}"),
+                "Correct the row or the column order in run.toml (w, x, y, z).",
             ));
         }
         let angles = Some(angles).filter(|angles| !angles.is_empty());
@@ -70,7 +69,7 @@ impl AttitudeColumns<'_> {
 }
 
 impl<'a> Fields<'a> {
-    /// What `[turntable]` says, if it is there.
+    /// Settings in `[turntable]`, if present.
     pub fn table_log(&mut self) -> Result<Option<TableLogFile<'a>>, FileError> {
         let Some(fields) = &self.run.turntable else {
             return Ok(None);
@@ -78,7 +77,7 @@ impl<'a> Fields<'a> {
         let stated = (fields.time_unit, fields.sample_period_s);
         let attitude = self.attitude(fields)?;
         if fields.time_sigma_ms.is_some() {
-            let note = "turntable.time_sigma_ms is read but has no effect yet.";
+            let note = "turntable.time_sigma_ms currently has no effect.";
             self.notes.push(note.to_owned());
         }
         Ok(Some(TableLogFile {
@@ -106,7 +105,7 @@ impl<'a> Fields<'a> {
                 let count = letters.len();
                 return wrong(
                     "turntable.columns.angles",
-                    &format!("an angle for each of {count} axes, outermost first"),
+                    &format!("one angle column for each of the {count} axes, outermost first"),
                     "Complete `angles` or `axes`.",
                 );
             }
@@ -128,12 +127,12 @@ impl<'a> Fields<'a> {
             (None, Some(_)) => {
                 return wrong(
                     path,
-                    "it beside the columns of `angles`",
-                    "Name the columns of the angles, or remove the axes.",
+                    "axes together with columns of `angles`",
+                    "Name the angle columns, or remove the axes.",
                 );
             }
             (None, None) if columns.quaternion.is_none() => {
-                let meaning = "the columns of a quaternion or of `angles`";
+                let meaning = "columns of a quaternion or of `angles`";
                 return missing("turntable.columns.quaternion", meaning);
             }
             (None, None) => Vec::new(),
@@ -144,7 +143,7 @@ impl<'a> Fields<'a> {
         Ok(AttitudeColumns { names, axes })
     }
 
-    /// What is stated of the errors of a table with this number of angles.
+    /// Stated errors of a table with this number of angles.
     fn geometry(&self, fields: &TurntableFile, angles: usize) -> Result<TableGeometry, FileError> {
         let sigma = |stated: Option<Angle>| stated.map_or(0.0, |sigma| sigma.0 * ARCSEC);
         let mut axes = TableGeometry::default().axes;
@@ -153,8 +152,8 @@ impl<'a> Fields<'a> {
             if stated.is_some() && angles == 0 {
                 return Err(self.document.wrong(
                     &format!("turntable.{key}"),
-                    "it with `angles` only, for a quaternion does not tell the axes apart",
-                    "Remove it, or give the angles of the table's axes, alone or with the quaternion.",
+                    "`angles` in the table log, because a quaternion does not separate the axes",
+                    "Remove it, or add the angles of the table axes, with or without the quaternion.",
                 ));
             }
             axes += kind.of_table(angles, sigma(stated));
@@ -167,7 +166,7 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// What `run.toml` says of the file.
+/// Log settings in `run.toml`.
 pub struct TableLogFile<'a> {
     pub source: Source<'a>,
     pub clock: Clock<'a>,
@@ -176,7 +175,7 @@ pub struct TableLogFile<'a> {
 }
 
 impl TableLogFile<'_> {
-    /// Reads the log of a run with these samples; what the file leaves open goes to `notes`.
+    /// Reads the log of a run with these samples; `notes` receives remarks about the file.
     pub fn read(&self, imu: &ImuSamples, notes: &mut Vec<String>) -> Result<TableLog, FileError> {
         let mut csv = self.source.open()?;
         let mut stamps = self.clock.start(&mut csv)?.without_bursts();
@@ -186,7 +185,7 @@ impl TableLogFile<'_> {
         let mut axes = Vec::new();
         while csv.advance()? && !csv.may_be_cut() {
             let (reading, angles) = self.attitude.reading(&csv, &places)?;
-            // A row twice says nothing new.
+            // A repeated row adds no information.
             if let Stamp::New(place) = stamps.take(&csv, |other| attitude[other] == reading)? {
                 attitude.insert(place, reading);
                 if let Some(angles) = angles {
@@ -194,7 +193,7 @@ impl TableLogFile<'_> {
                 }
             }
         }
-        notes.extend(csv.cut_off("It is left out"));
+        notes.extend(csv.cut_off("turncal ignored it"));
         notes.extend(stamps.notes(csv.file(), 0));
         attitude.shrink_to_fit();
         axes.shrink_to_fit();
@@ -203,9 +202,9 @@ impl TableLogFile<'_> {
             [first, .., last] => (*first, *last),
             _ => {
                 return Err(csv.error(
-                    "a single reading or none",
+                    "fewer than 2 readings",
                     "at least 2",
-                    "Log the table over the whole run, or remove [turntable].",
+                    "Log the table during the whole run, or remove [turntable].",
                 ));
             }
         };
@@ -213,8 +212,8 @@ impl TableLogFile<'_> {
         if last < start || first > end {
             return Err(csv.error(
                 format_args!("readings from {first} s to {last} s"),
-                format_args!("times that overlap the IMU record, {start} s to {end} s"),
-                "Bring both files to one clock.",
+                format_args!("times that overlap the IMU log ({start} s to {end} s)"),
+                "Convert both files to the same clock.",
             ));
         }
         Ok(TableLog {

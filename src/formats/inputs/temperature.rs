@@ -6,22 +6,22 @@ use crate::formats::schema::{OneOrThree, TemperatureColumn};
 use crate::imu::PerSensor;
 use crate::recording::{TEMPERATURE_SPACING, Temperature, TemperatureFacts};
 
-/// Beyond this, °C, no instrument is calibrated: the column is in another unit, or no temperature.
+/// Values beyond this limit, °C, mean that the column has another unit or is not a temperature.
 const LARGEST: f64 = 100.0;
-/// More spans of [`TEMPERATURE_SPACING`] than this are no recording: a year.
+/// Maximum number of spans of [`TEMPERATURE_SPACING`]: one year.
 const MOST_SPANS: f64 = 366.0 * 86_400.0;
 
-/// What a column's numbers are.
+/// Unit of a temperature column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TemperatureUnit {
-    /// K for one of them.
+    /// K per unit.
     kelvin: f64,
-    /// 0 °C in them.
+    /// 0 °C in this unit.
     zero: f64,
 }
 
 impl TemperatureUnit {
-    /// The words for it in `run.toml`.
+    /// Its names in `run.toml`.
     pub const WORDS: [(&'static str, Self); 3] = [
         ("degC", Self::new(1.0, 0.0)),
         ("K", Self::new(1.0, 273.15)),
@@ -37,7 +37,7 @@ impl TemperatureUnit {
     }
 }
 
-/// What `run.toml` says of them.
+/// Settings in `run.toml`.
 pub struct TemperatureColumns<'a> {
     names: Vec<&'a str>,
     of: PerSensor<[usize; 3]>,
@@ -45,7 +45,7 @@ pub struct TemperatureColumns<'a> {
 }
 
 impl<'a> TemperatureColumns<'a> {
-    /// A column of both triads, or one or three of each.
+    /// One column for both triads, or one or three for each.
     pub fn of_fields(column: &'a TemperatureColumn, unit: TemperatureUnit) -> Self {
         let mut all = Self {
             names: Vec::new(),
@@ -81,7 +81,7 @@ impl<'a> TemperatureColumns<'a> {
         &self.names
     }
 
-    /// The column of the first axis, as it is named.
+    /// Name of the column of the first axis.
     pub fn first(&self) -> &'a str {
         self.names[0]
     }
@@ -104,7 +104,7 @@ impl<'a> TemperatureColumns<'a> {
     }
 }
 
-/// Temperatures as a file is read.
+/// Temperatures collected while reading a file.
 pub struct Temperatures {
     channels: Vec<Channel>,
     of: PerSensor<[usize; 3]>,
@@ -119,24 +119,24 @@ struct Channel {
     name: String,
     /// Sum and number of values in each span.
     spans: Vec<(f64, u32)>,
-    /// Of all values, the sum in place of the mean.
+    /// Statistics of all values, with the sum instead of the mean.
     facts: Option<TemperatureFacts>,
     /// Rows without a number, and the line of the first.
     missing: (usize, u64),
-    /// The first value that is no temperature, as it stands, and its line.
+    /// The first invalid value, unchanged, and its line.
     beyond: Option<(f64, u64)>,
 }
 
-/// What was read of them.
+/// Result of reading.
 pub struct Read {
     pub temperature: Option<Temperature>,
     pub facts: Option<TemperatureFacts>,
-    /// What is wrong with them, a sentence each.
+    /// Remarks on faults, one sentence each.
     pub notes: Vec<String>,
 }
 
 impl Temperatures {
-    /// Takes a row with this stamp, s.
+    /// Processes a row with this stamp, s.
     pub fn take(&mut self, csv: &LogRows, time: f64) {
         let first = *self.first.get_or_insert(time);
         let span = (time - first) / TEMPERATURE_SPACING;
@@ -148,7 +148,7 @@ impl Temperatures {
         }
     }
 
-    /// What was read, of a file whose stamps are so much later than its first sample's begin, s.
+    /// The result, for stamps delayed by this time relative to the start of the first sample, s.
     pub fn read(self, file: &str) -> Read {
         let facts = self.channels.first().and_then(|channel| {
             let count: f64 = channel.spans.iter().map(|of| f64::from(of.1)).sum();
@@ -213,22 +213,22 @@ impl Channel {
             let (name, largest) = (&self.name, LARGEST);
             notes.push(format!(
                 "{file}, line {line}, column {name}: found {value}, expected a temperature within ±{largest} °C. \
-                 The column is not used; if it is in kelvin or fahrenheit, say temperature_unit = \"K\" or \"degF\" \
-                 in [imu]."
+                 turncal ignored the column. If it is in kelvin or fahrenheit, set temperature_unit = \"K\" or \
+                 \"degF\" in [imu]."
             ));
         }
         let (missing, line) = self.missing;
         if missing > 0 {
             let name = &self.name;
             notes.push(format!(
-                "{file}, column {name}: {missing} row(s) hold no temperature, the first in line {line}. It is \
-                 interpolated there."
+                "{file}, column {name}: {missing} row(s) contain no temperature, the first in line {line}. turncal \
+                 interpolated it."
             ));
         }
         notes
     }
 
-    /// Means of the spans, those without a value on the straight line between their neighbours.
+    /// Means of the spans, with linear interpolation for spans without a value.
     fn filled(self) -> Vec<f64> {
         let known: Vec<(usize, f64)> = self
             .spans

@@ -1,6 +1,6 @@
-//! `calibration.json` and `truth.json`: read with every value that cannot be refused, written whole.
+//! `calibration.json` and `truth.json`: validated on reading, written completely.
 //!
-//! A calibration that was reached here is written whatever its size, because its findings say what it is worth.
+//! An estimated calibration is written with any values, because its findings describe its quality.
 
 use std::collections::HashSet;
 use std::ops::RangeInclusive;
@@ -16,25 +16,24 @@ use crate::imu::{AXES, PARAMETERS, PerSensor, Sensor, Term, ThermalRange, Triad}
 use crate::shown::excerpt;
 use crate::units::{DEGREE, STANDARD_GRAVITY};
 
-/// An entry of an installation matrix beyond this is of an axis across the one that it is named for.
+/// A larger entry of an installation matrix belongs to an axis perpendicular to its name.
 const INSTALLATION: f64 = 100.0;
-/// A bias, in rad/s or m/s², beyond the range of any instrument: registers that read half their range at zero
-/// included.
+/// Bias limit, in rad/s or m/s², beyond the range of any instrument, including registers with zero at mid-range.
 const BIAS: f64 = 1e6;
-/// Scale factors, in the file's quantity for one rad/s or m/s².
+/// Scale factors, in the quantity of the file per rad/s or m/s².
 const SCALES: RangeInclusive<f64> = 1e-12..=1e15;
 /// Gravity anywhere near the surface of the Earth, m/s².
 const GRAVITY: RangeInclusive<f64> = 9.7..=9.9;
-/// Errors of a table's base and axes are small angles, rad.
+/// Maximum error of table base and axes, which are small angles, rad.
 const TABLE: f64 = 180.0 * DEGREE;
-/// Digits that another program may have rounded a correlation to.
+/// Rounding tolerance of correlations written by other programs.
 const ROUNDING: f64 = 1e-6;
 
-/// What is wrong: what was found, and what was expected.
+/// An error: content found and content expected.
 type Wrong = (String, String);
 type Checked = Result<(), Wrong>;
 
-/// Refuses what does not hold.
+/// Refuses a violated condition.
 macro_rules! expect {
     ($holds:expr, $expected:expr, $($found:tt)+) => {
         let holds: bool = $holds;
@@ -57,8 +56,7 @@ impl Calibration {
                 file: path.to_owned(),
                 place: Place::Character { line, column },
                 message: format!(
-                    "not a calibration in the format {FORMAT}: {what}. Correct the file or write it \
-                     again."
+                    "not a calibration in the format {FORMAT}: {what}. Correct the file or write it again with turncal."
                 ),
             }
         })?;
@@ -69,15 +67,15 @@ impl Calibration {
         Ok(record)
     }
 
-    /// The record as the bytes of its file, `path` being named in errors.
+    /// The record as file bytes; `path` is used in error messages.
     pub fn to_json(&self, path: &Path) -> Result<Vec<u8>, FileError> {
-        let expected = "values that JSON can hold".to_owned();
+        let expected = "values that JSON can represent".to_owned();
         let written = || small_file::pretty(self).map_err(|error| (error.to_string(), expected));
         let bytes = self.check().and_then(|()| written());
         bytes.map_err(|wrong| refused(path, &wrong))
     }
 
-    /// Writes the record whole or not at all; an existing file only with `force`.
+    /// Writes the complete record or nothing; an existing file is replaced only with `force`.
     pub fn write(&self, path: &Path, force: bool) -> Result<(), FileError> {
         write_whole(path, &self.to_json(path)?, force)
     }
@@ -94,12 +92,12 @@ impl Calibration {
             expect!(
                 triad.values().all(f64::is_finite),
                 "finite numbers",
-                "a value in {name} that is not finite"
+                "a non-finite value in {name}"
             );
             expect!(
                 !triad.scale.contains(&0.0),
-                "three scale factors, none of them zero",
-                "{name}.scale with a zero"
+                "three non-zero scale factors",
+                "a zero in {name}.scale"
             );
         }
         let of_triads =
@@ -108,7 +106,7 @@ impl Calibration {
             for value in sigma.values() {
                 expect!(
                     value.is_finite() && value >= 0.0,
-                    "finite numbers that are zero or above",
+                    "finite numbers of at least zero",
                     "{value} in sigma.{name}"
                 );
             }
@@ -128,11 +126,11 @@ impl Calibration {
             for name in names {
                 let expected = || {
                     let known = known.iter().map(String::as_str);
-                    let advice = suggestion(name, known, "this form does not have it");
+                    let advice = suggestion(name, known, "not a parameter of this form");
                     format!("names of parameters of the {} form ({advice})", form.name())
                 };
                 expect!(known.contains(name), expected(), "`{name}` in {field}");
-                expect!(seen.insert(name), "every parameter once", "`{name}` twice");
+                expect!(seen.insert(name), "each parameter once", "`{name}` twice");
             }
         }
         Ok(())
@@ -142,22 +140,22 @@ impl Calibration {
         let size = self.parameters.len();
         expect!(
             self.covariance.len() == size,
-            format!("{size}, one for each entry of parameters"),
+            format!("{size} rows, one per entry of parameters"),
             "{} row(s) in covariance",
             self.covariance.len()
         );
         for (i, row) in self.covariance.iter().enumerate() {
             expect!(
                 row.len() == size,
-                format!("{size}, for covariance is square"),
+                format!("{size} values, because the covariance is square"),
                 "{} value(s) in row {} of covariance",
                 row.len(),
                 i + 1
             );
             expect!(
                 row.iter().all(|value| value.is_finite()) && row[i] >= 0.0,
-                "finite numbers, none below zero on the diagonal",
-                "a value in row {} of covariance that cannot be",
+                "finite numbers, with none below zero on the diagonal",
+                "an impossible value in row {} of covariance",
                 i + 1
             );
         }
@@ -178,7 +176,7 @@ impl Calibration {
             let all = [lowest, highest, reference, rate];
             expect!(
                 all.iter().all(|v| v.is_finite()) && lowest <= highest && rate >= 0.0,
-                "a finite range, its lower end first, and a rate that is not negative",
+                "a finite range with its lower end first and a rate of at least zero",
                 "temperature.range.{} from {lowest} to {highest} °C",
                 sensor.name()
             );
@@ -189,23 +187,23 @@ impl Calibration {
         expect!(
             coefficients.chain(rows().flatten()).all(|v| v.is_finite()),
             "finite numbers",
-            "a number in temperature that is not finite"
+            "a non-finite number in temperature"
         );
         let covered = thermal.covariance.is_empty()
             || (thermal.covariance.len() == n && thermal.cross.len() == self.parameters.len());
         expect!(
             covered && rows().all(|row| row.len() == n),
             "one row of covariance per coefficient and one row of cross per parameter",
-            "temperature.covariance or .cross of another size"
+            "temperature.covariance or .cross of the wrong size"
         );
         let none = PerSensor::default();
         let anywhere = thermal.range.state(&none, &none);
-        let expected = || "names of parameters and orders from 1 to 5".to_owned();
+        let expected = || "parameter names and orders from 1 to 5".to_owned();
         let at = self.in_state(&anywhere);
         at.map_or_else(|found| Err((found.to_string(), expected())), |_| Ok(()))
     }
 
-    /// Refuses values beyond what an instrument has.
+    /// Refuses values impossible for an instrument.
     fn check_sizes(&self) -> Checked {
         let mut sizes: Vec<(String, f64, RangeInclusive<f64>)> = Vec::new();
         let about_zero = |largest: f64| -largest..=largest;
@@ -252,7 +250,11 @@ impl Calibration {
             };
             expect!(
                 possible.contains(&value),
-                format!("{} to {} in SI", words(least), words(most)),
+                format!(
+                    "a value from {} to {} in SI units",
+                    words(least),
+                    words(most)
+                ),
                 "{name} = {}",
                 words(value)
             );
@@ -260,8 +262,7 @@ impl Calibration {
         Ok(())
     }
 
-    /// Refuses what is no covariance: not symmetric, or with a combination of parameters of negative
-    /// variance.
+    /// Refuses an invalid covariance: not symmetric, or not positive semidefinite.
     fn check_correlations(&self) -> Checked {
         let size = self.parameters.len();
         if size == 0 {
@@ -275,8 +276,8 @@ impl Calibration {
             let scale = sigma[i] * sigma[j];
             expect!(
                 (value - mirrored).abs() <= ROUNDING * scale,
-                "the same twice, for covariance is symmetric",
-                "the covariance {both} twice, {value:e} and {mirrored:e}"
+                "equal values, because the covariance is symmetric",
+                "two covariances {both}, {value:e} and {mirrored:e}"
             );
             expect!(
                 value.abs() <= (1.0 + ROUNDING) * scale,
@@ -293,15 +294,15 @@ impl Calibration {
         expect!(
             least >= -ROUNDING * size as f64,
             "a positive semidefinite matrix",
-            "a covariance by which a combination of parameters has a negative variance (smallest eigenvalue of the \
-             correlations {least:.3})"
+            "a covariance that gives a combination of parameters a negative variance (smallest eigenvalue of the \
+             correlation matrix {least:.3})"
         );
         Ok(())
     }
 }
 
 fn refused(path: &Path, (found, expected): &Wrong) -> FileError {
-    let advice = "Correct the file, or write the calibration again.";
+    let advice = "Correct the file or write it again with turncal.";
     FileError::of(path, found, expected, advice)
 }
 

@@ -1,4 +1,4 @@
-//! `campaign.toml`: recordings of one instrument that are calibrated together.
+//! `campaign.toml`: recordings of one instrument that are calibrated jointly.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -18,21 +18,21 @@ use crate::units::ARCSEC;
 
 /// The version of the format.
 const FORMAT: &str = "turncal-campaign/1";
-/// Recordings of one instrument with what they have in common.
+/// Recordings of one instrument with their common settings.
 #[derive(Debug, Clone)]
 pub struct Campaign {
-    /// The name of its directory, or of the file.
+    /// Name of its directory or file.
     pub name: String,
-    /// In the order of their names, whatever that of the file.
+    /// In order of name, independent of the order in the file.
     pub runs: Vec<Run>,
-    /// What they have in common.
+    /// Common settings.
     pub together: Together,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CampaignFile {
-    /// Groups of parameters that each recording has for itself.
+    /// Parameter groups that are independent in each recording.
     #[serde(default)]
     own: Vec<String>,
     temperature: Option<TemperatureFile>,
@@ -49,7 +49,7 @@ struct RecordingFile {
     temperature_degc: Option<Celsius>,
 }
 
-/// Whether parameters follow temperature, and how.
+/// Temperature dependence of parameters.
 #[derive(Clone, Copy, Deserialize)]
 #[serde(
     untagged,
@@ -66,7 +66,7 @@ enum TemperatureFile {
 }
 
 impl Campaign {
-    /// Whether a file says that it is one.
+    /// Whether a file is a campaign.
     pub fn is_at(path: &Path) -> bool {
         let text = small_file::text(path, "", "").unwrap_or_default();
         let table = Document::of(path, &text).parse().ok();
@@ -79,8 +79,7 @@ impl Campaign {
 
     /// Reads a campaign and its recordings, whose paths are relative to it.
     ///
-    /// # Errors
-    /// [`FileError`] if it or a recording cannot be read, or a value cannot be.
+    /// # Errors [`FileError`] if it or a recording cannot be read, or a value is invalid.
     pub fn read(path: &Path) -> Result<Self, FileError> {
         let text = small_file::text(path, "the campaign", "Give the path of a campaign.toml.")?;
         let document = Document::of(path, &text);
@@ -95,7 +94,7 @@ impl Campaign {
             .for_each(|one| one.run = directory.join(&one.run));
         named.sort_by(|a, b| a.run.cmp(&b.run));
         if let Some(pair) = named.windows(2).find(|pair| pair[0].run == pair[1].run) {
-            let advice = "Name every recording once.";
+            let advice = "List each recording once.";
             let found = format_args!("{} twice", pair[0].run.display());
             return Err(FileError::of(path, found, "each recording once", advice));
         }
@@ -133,7 +132,7 @@ impl Campaign {
     }
 }
 
-/// The `campaign.toml` of recordings with these paths, relative to it, that differ from day to day by this 1σ.
+/// The `campaign.toml` for recordings with these relative paths and this 1σ between recordings.
 pub fn campaign_text(paths: &[String], day_to_day: &DayToDay) -> String {
     let mut page = Page::of(FORMAT, "");
     for path in paths {
@@ -157,7 +156,7 @@ pub fn campaign_text(paths: &[String], day_to_day: &DayToDay) -> String {
     page.text
 }
 
-/// How parameters follow temperature; `None` if they do not.
+/// Temperature dependence of parameters; `None` if constant.
 fn temperature(
     document: Document,
     stated: TemperatureFile,
@@ -198,7 +197,7 @@ fn own_name(group: Group) -> String {
     format!("{}.{kind}", group.sensor().name())
 }
 
-/// 1σ by which recordings differ, from a table `[day_to_day]`.
+/// 1σ between recordings, from a table `[day_to_day]`.
 pub fn day_to_day(
     document: Document,
     stated: &BTreeMap<String, NonNegative>,
@@ -217,7 +216,7 @@ pub fn day_to_day(
     Ok(differ)
 }
 
-/// What differs as much as instruments do has nothing in common.
+/// Makes groups independent by a 1σ as large as between instruments.
 fn own_parameters(
     document: Document,
     own: &[String],
@@ -230,8 +229,8 @@ fn own_parameters(
             let known: Vec<String> = Group::all().map(own_name).collect();
             return Err(document.wrong(
                 "own",
-                format_args!("names among {}", known.join(", ")),
-                "Name groups of parameters that each recording has for itself.",
+                format_args!("names from the list {}", known.join(", ")),
+                "Name parameter groups that differ freely between recordings.",
             ));
         };
         for i in group.parameters(form) {

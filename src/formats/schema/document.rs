@@ -1,4 +1,4 @@
-//! A TOML document whose errors name line, column, field, what was found and what to do.
+//! A TOML document whose errors name line, column, field, content found and remedy.
 
 use std::fmt::Display;
 use std::ops::Range;
@@ -10,41 +10,44 @@ use toml::de::{DeTable, DeValue, Deserializer};
 
 use crate::formats::error::{FileError, Place, list, suggestion};
 
-/// What fields hold that must be there.
+/// Meanings of required fields.
 const MEANINGS: [(&str, &str); 19] = [
-    ("accel", "the names of three columns, or of one"),
-    ("accel_unit", "the unit of a row"),
+    ("accel", "the names of three columns or of one"),
+    ("accel_unit", "the unit of the values"),
     ("column", "the column that identifies the instrument"),
-    ("columns", "the names of the columns"),
+    ("columns", "the column names"),
     ("file", "a file name"),
-    ("format", "the format of this file"),
-    ("gyro", "the names of three columns, or of one"),
-    ("gyro_unit", "the unit of a row"),
+    ("format", "the format name of this file"),
+    ("gyro", "the names of three columns or of one"),
+    ("gyro_unit", "the unit of the values"),
     (
         "imu",
-        "a table of the instrument: its file and the content of the file",
+        "a table that describes the log file of the instrument",
     ),
     (
         "number",
-        "the value of the column for the instrument to use",
+        "the value in that column for the instrument to use",
     ),
-    ("output", "the quantity of a row: pulse, increment or rate"),
-    ("position_sigma_arcsec", "a 1σ in seconds of arc"),
-    ("reading_sigma_arcsec", "a 1σ in seconds of arc"),
+    ("output", "the quantity in a row: pulse, increment or rate"),
+    ("position_sigma_arcsec", "a 1σ value in arcseconds"),
+    ("reading_sigma_arcsec", "a 1σ value in arcseconds"),
     (
         "recording",
-        "a [[recording]] for each run, with run = \"its run.toml\"",
+        "one [[recording]] per run, with run = \"its run.toml\"",
     ),
     ("run", "the path of a run.toml"),
-    ("sigma", "1σ of each of its parameters"),
-    ("time", "the name of a column"),
-    ("time_stamp", "which moment of a sample its time names"),
+    ("sigma", "the 1σ of each of its parameters"),
+    ("time", "a column name"),
+    (
+        "time_stamp",
+        "the moment within a sample that its time stamp marks",
+    ),
     ("uncertainty", "the expanded uncertainty, k = 2"),
 ];
-/// What serde expects, in words for users.
+/// Expectations of serde, in words for users.
 const KINDS: [(&str, &str); 4] = [
     ("f64", "a finite number"),
-    ("a string", "a text in quotes"),
+    ("a string", "text in quotes"),
     ("a boolean", "true or false"),
     ("a map", "a table"),
 ];
@@ -62,12 +65,12 @@ impl<'a> Document<'a> {
         Self { file, text }
     }
 
-    /// The fields of a document of this format, which is not among them.
+    /// The fields of a document of this format, without the format field.
     pub fn of_format(self, format: &str) -> Result<Spanned<DeTable<'a>>, FileError> {
         let mut table = self.parse()?;
         match table.get_mut().remove("format") {
             Some(said) if said.get_ref().as_str() == Some(format) => Ok(table),
-            Some(_) => Err(self.wrong("format", format_args!("`{format}`"), "Choose it.")),
+            Some(_) => Err(self.wrong("format", format_args!("`{format}`"), "Set this format.")),
             None => Err(self.missing("format", "")),
         }
     }
@@ -75,17 +78,17 @@ impl<'a> Document<'a> {
     /// All fields.
     pub fn parse(self) -> Result<Spanned<DeTable<'a>>, FileError> {
         DeTable::parse(self.text).map_err(|error| {
-            let found = format_args!("TOML that cannot be read ({})", error.message());
+            let found = format_args!("invalid TOML ({})", error.message());
             self.error(error.span(), found, "a TOML document", "Correct this line.")
         })
     }
 
-    /// Fields as a type has them.
+    /// Fields converted to a type.
     pub fn fill<T: Deserialize<'a>>(self, table: Spanned<DeTable<'a>>) -> Result<T, FileError> {
         T::deserialize(Deserializer::from(table)).map_err(|error| self.refused(&error))
     }
 
-    /// A number or a date as the text that stands in the file; so are those of a table.
+    /// A number or a date (also in tables) as written in the file.
     pub fn as_written(self, value: &mut Spanned<DeValue<'a>>) {
         let span = value.span();
         match value.get_mut() {
@@ -98,20 +101,20 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// What stands for a value in the file, its first line.
+    /// The text of a value in the file, first line only.
     pub fn written(self, span: Range<usize>) -> &'a str {
         let text = self.text.get(span).and_then(|text| text.lines().next());
         text.unwrap_or("a value")
     }
 
-    /// The error of a field, `table.name`, that is there.
+    /// The error for an existing field, `table.name`.
     pub fn wrong(self, path: &str, expected: impl Display, advice: impl Display) -> FileError {
         let span = self.span_of(path);
         let source = span.clone().map_or("nothing", |span| self.written(span));
         self.error(span, format_args!("{path} = {source}"), expected, advice)
     }
 
-    /// The error of a field, `table.name`, that is not there; `meaning` says what it holds.
+    /// The error for a missing field, `table.name`; `meaning` describes its content.
     pub fn missing(self, path: &str, meaning: &str) -> FileError {
         let (table, name) = path.rsplit_once('.').unwrap_or(("", path));
         let tables = std::iter::successors(Some(table), |of| Some(of.rsplit_once('.')?.0));
@@ -184,7 +187,7 @@ impl<'a> Document<'a> {
         Some(value.span())
     }
 
-    /// What serde says, in the words of this program.
+    /// Converts an error of serde.
     fn refused(self, error: &toml::de::Error) -> FileError {
         let (message, span) = (error.message(), error.span());
         let told = error.to_string();

@@ -1,4 +1,4 @@
-//! The instrument as `run.toml` describes it: its record, noise, unit, nominal scale and prior.
+//! The instrument as described in `run.toml`: log, noise, unit, nominal scale and prior.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ use crate::imu::{
 };
 use crate::units::{ARCSEC, DEGREE, PPM};
 
-/// 1σ of the scale factors, misalignments and biases of a sensor of which nothing is stated: usual of consumer MEMS.
+/// Default 1σ of scale factors, misalignments and biases, typical of consumer MEMS.
 pub const USUAL_SCALE: f64 = 50_000.0 * PPM;
 pub const USUAL_INSTALLATION: f64 = 2.0 * DEGREE;
 /// rad/s and m/s².
@@ -25,16 +25,16 @@ pub const USUAL_BIAS: PerSensor<f64> = PerSensor {
     gyro: 2.0 * DEGREE,
     accel: 1.0,
 };
-/// The period of rows of which none is known, until their motion shows it, s.
+/// Assumed sample period until estimated from motion, s.
 pub const USUAL_PERIOD: f64 = 0.01;
-/// 1σ of a scale factor of which nothing is known, of the scale factor.
+/// Maximum relative 1σ of a scale factor.
 const WIDEST_SCALE: f64 = 10.0;
-/// 1σ of a bias beyond the range of any instrument, rad/s or m/s².
+/// Maximum 1σ of a bias, beyond the range of any instrument, rad/s or m/s².
 const WIDEST_BIAS: f64 = 1e6;
-/// Beyond any error of an angle, ″.
+/// Maximum angle error, ″.
 const HALF_TURN: f64 = 648_000.0;
 
-/// What a `run.toml` says, as it is read; remarks on what is assumed or without effect go to `notes`.
+/// Content of a `run.toml` while reading; `notes` receives remarks on assumptions and fields without effect.
 pub struct Fields<'a> {
     pub document: Document<'a>,
     pub run: &'a RunFile,
@@ -42,11 +42,11 @@ pub struct Fields<'a> {
     pub notes: Vec<String>,
 }
 
-/// What `[imu]` and the tables below it say.
+/// Content of `[imu]` and its subtables.
 pub struct InstrumentFields<'a> {
     pub log: ImuLog<'a>,
     pub known: Instrument,
-    /// Whether neither run.toml nor a time column tells how long a row lasts.
+    /// Whether the sample period is stated neither in run.toml nor by a time column.
     pub without_period: bool,
 }
 
@@ -60,7 +60,7 @@ impl<'a> Fields<'a> {
         let accel_from = self.accel_from(&source, of_gyro)?;
         if let (Some(of), Some(_)) = (&imu.instance, &accel_from) {
             let meaning = format!(
-                "one instrument without `{}`, as accel_from needs",
+                "a stream of one instrument without `{}`, which accel_from requires",
                 of.column
             );
             return Err(self.document.missing("imu.stream", &meaning));
@@ -99,14 +99,14 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// The usual period where none is stated; how long a row lasts can only be found of rates that stand alone.
+    /// The default period if none is stated; the period can only be estimated for rates without other logs.
     fn with_usual_period(&self, clock: &mut Clock) -> Result<bool, FileError> {
         if clock.column.is_some() || clock.period.is_some() {
             return Ok(false);
         }
         if self.run.imu.output != Output::Rate || self.run.turntable.is_some() {
-            let meaning = "the name of a column; pulses, increments and runs with a [turntable] require either it or \
-                           sample_period_s";
+            let meaning = "a column name (pulses, increments and runs with a [turntable] need either this or \
+                sample_period_s)";
             return Err(self.document.missing("imu.columns.time", meaning));
         }
         clock.period = Some(USUAL_PERIOD);
@@ -136,7 +136,7 @@ impl<'a> Fields<'a> {
         })
     }
 
-    /// Noise of a triad at rest and in moves; zero where it is not stated.
+    /// Noise of a triad at rest and in moves; zero if not stated.
     fn noise(&self, sensor: Sensor) -> Result<(Noise, MotionNoise), FileError> {
         let keys = NoiseKeys::of(sensor);
         let get = |name: &str| self.run.imu.noise.get(name).map(|value| value.0);
@@ -184,14 +184,17 @@ impl<'a> Fields<'a> {
         if is_there(sensor) {
             let unit = imu.of(sensor).unit.map(str::to_owned);
             let path = format!("imu.{name}_unit");
-            let missing = || self.document.missing(&path, "the unit of the file");
+            let missing = || {
+                self.document
+                    .missing(&path, "the unit of the values in the file")
+            };
             return unit.ok_or_else(missing);
         }
         if imu.accel_from.is_some() || !Sensor::ALL.into_iter().any(is_there) {
             let path = format!("imu.columns.{name}");
             return Err(self.document.missing(&path, "the names of three columns"));
         }
-        let note = format!("The log has no columns of {name}: they are taken to be zero.");
+        let note = format!("The log has no {name} columns. turncal assumed zero output.");
         self.notes.push(note);
         Ok("count".to_owned())
     }
@@ -220,23 +223,24 @@ impl<'a> Fields<'a> {
         match (of.prior.scale.map(OneOrThree::vector), of_unit) {
             (None, Some(of_unit)) => Ok(Vector3::repeat(of_unit)),
             (None, None) => {
-                let meaning =
-                    "counts per second for one rad/s or m/s², for a count has no size of its own";
+                let meaning = "the counts per second for 1 rad/s or 1 m/s², because the size of a count varies by instrument";
                 Err(document.missing(&path, meaning))
             }
-            (Some(scale), _) if scale.iter().any(|&s| s == 0.0) => {
-                Err(document.wrong(&path, "no zeros", "Give the data sheet's scale factor."))
-            }
+            (Some(scale), _) if scale.iter().any(|&s| s == 0.0) => Err(document.wrong(
+                &path,
+                "non-zero values",
+                "Set the scale factor from the data sheet.",
+            )),
             (Some(scale), Some(of_unit)) if !is_near(&scale, of_unit) => Err(document.wrong(
                 &path,
-                format_args!("about {of_unit}, which is 1 rad/s or 1 m/s² in this unit"),
-                "Correct the scale or the unit, or leave the scale out.",
+                format_args!("about {of_unit} (1 rad/s or 1 m/s² in this unit)"),
+                "Correct the scale or the unit, or remove the scale.",
             )),
             (Some(scale), _) => Ok(scale),
         }
     }
 
-    /// The prior of a triad of this nominal scale, along right-front-up; what is not stated is wide.
+    /// The prior of a triad with this nominal scale, along right-front-up; wide defaults if not stated.
     fn prior(&mut self, sensor: Sensor, nominal: Vector3<f64>) -> Result<Prior, FileError> {
         let (of, axes) = (
             self.run.imu.of(sensor),
@@ -249,7 +253,7 @@ impl<'a> Fields<'a> {
             assumed.extend(stated.is_none().then_some(words));
             if !stated.iter().flatten().all(|&s| s > 0.0 && s <= most) {
                 let path = format!("imu.prior.{}.{key}", sensor.name());
-                let expected = format_args!("numbers above zero, at most {most}");
+                let expected = format_args!("numbers above zero and at most {most}");
                 return Err(self.document.wrong(&path, expected, "Correct this value."));
             }
             Ok(stated.unwrap_or(usual))
@@ -277,7 +281,7 @@ impl<'a> Fields<'a> {
         )?;
         if !assumed.is_empty() && of.columns.is_some() {
             self.notes.push(format!(
-                "run.toml does not state everything in [imu.prior.{}]. turncal assumed (1σ): {}.",
+                "[imu.prior.{}] in run.toml is incomplete. turncal assumed (1σ): {}.",
                 sensor.name(),
                 assumed.join(", ")
             ));
@@ -292,7 +296,7 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// 1σ of the parameters of the terms that a table of them switches on, in SI; zero for the others.
+/// 1σ of the parameters of enabled error terms, in SI; zero for the others.
 pub fn term_sigma(
     document: Document,
     table: &str,
@@ -308,7 +312,7 @@ pub fn term_sigma(
         let most = (term.entry().largest / unit).round();
         if stated.0 > most {
             let path = format!("{table}.{}.sigma", term.name());
-            let expected = format_args!("a number above zero, at most {most}");
+            let expected = format_args!("a number above zero and at most {most}");
             return Err(document.wrong(&path, expected, "Correct this value."));
         }
         for parameter in term.parameters() {

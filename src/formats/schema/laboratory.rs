@@ -1,4 +1,4 @@
-//! `lab.toml`: what a laboratory states in a calibration certificate.
+//! `lab.toml`: laboratory data for a calibration certificate.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use crate::formats::small_file;
 /// The version of the format.
 const FORMAT: &str = "turncal-laboratory/1";
 
-/// Tables and fields that ISO/IEC 17025 asks for in every certificate.
+/// Tables and fields required in every certificate by ISO/IEC 17025.
 const REQUIRED: [(&str, &[&str]); 8] = [
     ("laboratory", &["name", "street", "city", "country"]),
     ("customer", &["name", "street", "city", "country"]),
@@ -29,16 +29,12 @@ const REQUIRED: [(&str, &[&str]); 8] = [
 ];
 
 impl Laboratory {
-    /// Reads and checks a lab.toml. `meta` holds what the run said of the item, by which `[item]` is completed.
+    /// Reads and checks a lab.toml. `meta` contains metadata of the run, which complete `[item]`.
     ///
     /// # Errors
-    /// [`FileError`] that names every required field that is missing, or the first that cannot be right.
+    /// [`FileError`] that names every required field that is missing, or the first invalid one.
     pub fn read(path: &Path, meta: impl Fn(&str) -> Option<String>) -> Result<Self, FileError> {
-        let text = small_file::text(
-            path,
-            "what the laboratory states",
-            "Give the path of a lab.toml.",
-        )?;
+        let text = small_file::text(path, "the laboratory data", "Give the path of a lab.toml.")?;
         let document = Document::of(path, &text);
         let of_item = [("model", meta("instrument")), ("serial", meta("serial"))];
         let mut table = document.of_format(FORMAT)?;
@@ -68,15 +64,15 @@ impl Laboratory {
                 of.value.is_finite() && of.uncertainty.is_finite() && of.uncertainty >= 0.0
             };
             if !of.as_ref().is_none_or(is_sound) {
-                let expected = "a finite value, and an uncertainty that is zero or above";
+                let expected = "a finite value and an uncertainty of at least zero";
                 let path = format!("conditions.{name}");
                 return Err(document.wrong(&path, expected, "Correct this value."));
             }
         }
         let days = &file.certificate;
         if days.end < days.begin || days.issued < days.end {
-            let expected = "begin, end and issued in this order";
-            return Err(document.wrong("certificate.end", expected, "Correct these days."));
+            let expected = "begin, end and issued in chronological order";
+            return Err(document.wrong("certificate.end", expected, "Correct these dates."));
         }
         for (of, contact) in [("laboratory", &file.contact), ("customer", &file.customer)] {
             let country = &contact.country;
@@ -117,12 +113,12 @@ fn check_complete(
     Err(FileError::of(
         path,
         format_args!("{fields} missing"),
-        format_args!("what ISO/IEC 17025, 7.8.2 and 7.8.4, ask for: {missing}"),
-        "Add what is missing; `turncal certificate --draft` shows what it holds.",
+        format_args!("the fields required by ISO/IEC 17025, 7.8.2 and 7.8.4: {missing}"),
+        "Add them; `turncal certificate --draft` shows an example.",
     ))
 }
 
-/// Texts are not empty, and white space in them is put in order, as a page and XML want it.
+/// Refuses empty texts and normalises white space for page and XML.
 fn say_something(
     document: Document,
     path: &str,
@@ -138,7 +134,7 @@ fn say_something(
         DeValue::String(text) => {
             let words: Vec<&str> = text.split_whitespace().collect();
             if words.is_empty() {
-                let expected = "a text that is not empty";
+                let expected = "non-empty text";
                 return Err(document.wrong(path, expected, "Complete this value."));
             }
             *text = words.join(" ").into();
@@ -191,13 +187,13 @@ mod tests {
             (
                 "issued = 2026-03-06",
                 "issued = 2026-01-06",
-                "in this order",
+                "in chronological order",
             ),
             ("country = \"DE\"", "country = \"Germany\"", "ISO 3166-1"),
             ("rule = \"guard-band\"", "rule = \"guard\"", "guard-band"),
             ("name = \"Example", "nam = \"Example", "unknown field"),
             ("\"T-17\", ", "", "serial number"),
-            ("uncertainty = 0.5", "uncertainty = -0.5", "zero or above"),
+            ("uncertainty = 0.5", "uncertainty = -0.5", "at least zero"),
         ] {
             let text = LAB.replacen(from, to, 1);
             assert_ne!(text, LAB, "{from}");

@@ -1,5 +1,5 @@
-//! What users write and turncal writes for them: fields of TOML and JSON files as serde structs, and errors that name
-//! line, column and field.
+//! Files written by users and for users: fields of TOML and JSON files as serde structs, with errors that name line,
+//! column and field.
 
 mod calibration_file;
 mod campaign;

@@ -1,10 +1,10 @@
-//! A TOML document that turncal writes, line by line, each field with a remark for its reader.
+//! A TOML document written line by line, with a remark for each field.
 
 use std::fmt::Display;
 
 use toml::Value;
 
-/// The lines so far, and what a person must complete in them.
+/// The lines so far, and the open fields.
 #[derive(Debug)]
 pub struct Page {
     pub text: String,
@@ -13,7 +13,7 @@ pub struct Page {
 }
 
 impl Page {
-    /// A document of this format below a remark.
+    /// A document of this format, with an initial remark.
     pub fn of(format: &str, remark: &str) -> Self {
         let (text, open) = (String::new(), Vec::new());
         let mut page = Self { text, open };
@@ -24,7 +24,7 @@ impl Page {
         page
     }
 
-    /// The header of a table below a remark.
+    /// A table header after a remark.
     pub fn table(&mut self, name: &str, remark: &str) {
         self.text.push('\n');
         if !remark.is_empty() {
@@ -44,7 +44,7 @@ impl Page {
         }
     }
 
-    /// A field whose value is TOML already.
+    /// A field whose value is TOML.
     pub fn plain(&mut self, key: &str, value: impl Display) {
         self.text += &format!("{key} = {value}\n");
     }
@@ -54,12 +54,12 @@ impl Page {
         self.text += &format!("{key} = {value}  # {why}\n");
     }
 
-    /// A field that may be left out.
+    /// An optional field.
     pub fn optional(&mut self, key: &str, why: &str) {
         self.remark(format_args!("{key} =  # {why}"));
     }
 
-    /// A field, as far as it is known, that must be completed.
+    /// A partly known field that must be completed.
     pub fn open(&mut self, field: &str, why: impl Display) {
         let gap = if field.is_empty() { "" } else { "  # " };
         self.remark(format_args!("{field}{gap}TODO: {why}"));

@@ -1,4 +1,4 @@
-//! `run.toml` and the files that it names, as one [`Run`].
+//! `run.toml` and the files that it names, read as one [`Run`].
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -24,14 +24,14 @@ use crate::units::{ARCSEC, DEGREE, MILLIGAL, PPM};
 impl Run {
     /// Reads `run.toml` and the files that it names, relative to itself.
     ///
-    /// Everything is checked: every field is known, every number finite and possible, time uniform,
-    /// the files overlap. Samples, nominal scales and priors come back along right-front-up
-    /// whatever `body_axes` says. What is not stated of place, noise, period and prior is wide, with a note that says so.
+    /// Everything is checked: known fields, finite and possible numbers, uniform time, overlapping files. Samples,
+    /// nominal scales and priors are returned along right-front-up for any `body_axes`. Unstated site, noise, period
+    /// and prior get wide defaults, with a note.
     pub fn read(path: &Path) -> Result<Self, FileError> {
         Self::of_text(path, &text_of(path)?, Some(path))
     }
 
-    /// The same of the text of a `run.toml` that stands, or would stand, beside this file, and was read from `source`.
+    /// The same from the text of a `run.toml` located (or assumed) next to this file and read from `source`.
     pub fn of_text(path: &Path, text: &str, source: Option<&Path>) -> Result<Self, FileError> {
         let document = Document::of(path, text);
         let file = run_file(document)?;
@@ -84,10 +84,9 @@ impl Run {
         Ok(run)
     }
 
-    /// `[meta]` of a `run.toml` alone, for a run whose logs cannot be read.
+    /// Only `[meta]` of a `run.toml`, for a run with unreadable logs.
     ///
-    /// # Errors
-    /// [`FileError`] if not even that can be read.
+    /// # Errors [`FileError`] if it cannot be read.
     pub fn read_meta(path: &Path) -> Result<BTreeMap<String, String>, FileError> {
         let text = text_of(path)?;
         let document = Document::of(path, &text);
@@ -101,7 +100,7 @@ impl Run {
     }
 }
 
-/// Refuses a `run.toml` that [`Run::read`] would refuse, whatever is in the files that it names.
+/// Refuses a `run.toml` that [`Run::read`] would refuse for any content of the named files.
 pub fn check(document: Document) -> Result<(), FileError> {
     let run = run_file(document)?;
     let mut fields = Fields {
@@ -120,7 +119,7 @@ fn run_file(document: Document) -> Result<RunFile, FileError> {
     fill(document, document.of_format(FORMAT)?)
 }
 
-/// The same with numbers and dates of `[meta]` as they are written.
+/// The same with numbers and dates of `[meta]` as written.
 fn fill<'a, T: Deserialize<'a>>(
     document: Document<'a>,
     mut table: Spanned<DeTable<'a>>,
@@ -137,7 +136,7 @@ fn fill<'a, T: Deserialize<'a>>(
     document.fill(table)
 }
 
-/// The file of the accelerometers, if it is another than that of the gyros.
+/// The accelerometer file, if different from the gyro file.
 fn other_file(log: &ImuLog) -> Option<PathBuf> {
     let (source, _) = log.accel_from.as_ref()?;
     (source.file != log.source.file).then(|| source.file.clone())
@@ -148,7 +147,7 @@ fn text_of(path: &Path) -> Result<String, FileError> {
 }
 
 impl InstrumentFields<'_> {
-    /// The samples of the record, and what they show against what is stated.
+    /// The samples of the log, checked against the statements.
     fn samples(&self, notes: &mut Vec<String>) -> Result<ImuSamples, FileError> {
         let mut imu = self.log.read(notes)?;
         if self.without_period {
@@ -159,7 +158,7 @@ impl InstrumentFields<'_> {
         Ok(imu)
     }
 
-    /// What is known of the instrument, white noise that is not stated being what the record shows.
+    /// The instrument, with unstated white noise estimated from the log.
     fn with_noise(&self, imu: &ImuSamples, notes: &mut Vec<String>) -> Instrument {
         let mut known = self.known.clone();
         let mut found = Vec::new();
@@ -173,16 +172,15 @@ impl InstrumentFields<'_> {
         }
         if !found.is_empty() {
             notes.push(format!(
-                "You stated no white noise. turncal starts with that of the quieter part of the record ({}) and \
-                 estimates the noise from there. State the data sheet's figures in [imu.noise] if you know them.",
+                "You stated no white noise. turncal starts from the noise of the quieter part of the recording ({}) \
+                 and estimates it from there. If you know the data-sheet values, state them in [imu.noise].",
                 found.join(", ")
             ));
         }
         known
     }
 
-    /// Rates of which nothing tells how long a row lasts, with the period at which they turn the instrument as
-    /// gravity's direction turns.
+    /// Rates without a known period, with the period for which their rotation matches that of gravity.
     fn with_found_period(
         &self,
         imu: ImuSamples,
@@ -193,8 +191,8 @@ impl InstrumentFields<'_> {
         let Some(period) = angle.filter(|&period| period > 0.0) else {
             return Err(FileError::of(
                 &self.log.source.file,
-                "rows without a time, whose turns do not show how long a row lasts",
-                "a time column, or sample_period_s in run.toml",
+                "rows without time stamps, with turns too poor to estimate the sample period",
+                "a time column or sample_period_s in run.toml",
                 "Add sample_period_s to [imu].",
             ));
         };
@@ -202,16 +200,16 @@ impl InstrumentFields<'_> {
         let sigma = self.known.prior.gyro.scale_sigma.norm() / 3.0;
         let percent = 100.0 * sigma;
         notes.push(format!(
-            "run.toml does not state sample_period_s, and the log has no time. turncal found {period:.4} s ± \
-             {percent:.1} % from the turns, which widens the σ of the gyro scale factors as much."
+            "run.toml does not state sample_period_s, and the log has no time column. turncal estimated {period:.4} \
+             s ± {percent:.1} % from the turns, which widens the σ of the gyro scale factors by the same amount."
         ));
         Ok(imu.with_period(period, sigma))
     }
 
-    /// What it means that stamps were taken and not `sample_period_s`.
+    /// Effect of using stamps instead of `sample_period_s`.
     ///
-    /// Rates are integrated over the period to angles, increments of velocity divided by it to specific force: a scale
-    /// changes by as much as the period.
+    /// Rates are integrated over the period to angles, and velocity increments are divided by it, so a scale factor
+    /// changes in proportion to the period.
     fn clock_note(&self, imu: &ImuSamples) -> Option<String> {
         let off = imu.log.as_ref()?.off_stated_period?;
         let (sensor, triad) = match self.log.output {
@@ -225,18 +223,18 @@ impl InstrumentFields<'_> {
         let judged = match off.abs() <= prior {
             true => format!("within its prior σ of {sigma:.2} ppm."),
             false => format!(
-                "beyond its prior σ of {sigma:.2} ppm: if the instrument's clock is right and the stamps are not, leave \
-                 the time column out."
+                "beyond its prior σ of {sigma:.2} ppm. If the instrument clock is right and the time stamps are \
+                 wrong, omit the time column."
             ),
         };
         Some(format!(
-            "Stamps come every {period} s, {ppm:.2} ppm {way} than sample_period_s says; stamps are taken, and the scale \
-             of the {triad} is by as much another, {judged}"
+            "The time stamps are {period} s apart, {ppm:.2} ppm {way} than sample_period_s. turncal used the time \
+             stamps, which changes the scale factor of the {triad} by the same amount, {judged}"
         ))
     }
 }
 
-/// The name of the directory of a `run.toml`, else the file's own without its endings.
+/// The directory name of a `run.toml`, otherwise the file name without extensions.
 pub fn name(path: &Path) -> String {
     let mut full = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     if full.extension().is_some_and(|of| of == "gz") {
@@ -252,9 +250,9 @@ pub fn name(path: &Path) -> String {
     )
 }
 
-/// 1σ of a height that is not stated, m.
+/// 1σ of an unstated height, m.
 const USUAL_HEIGHT: f64 = 500.0;
-/// How much gravity falls with height, (m/s²)/m.
+/// Decrease of gravity with height, (m/s²)/m.
 const FREE_AIR: f64 = 0.3086 * MILLIGAL;
 
 impl Fields<'_> {
@@ -262,7 +260,7 @@ impl Fields<'_> {
         let file = &self.run.site;
         if file.latitude_deg.is_none() && self.run.turntable.is_some() {
             let meaning =
-                "a latitude, north positive: with a [turntable], Earth rate must be known";
+                "the latitude (north positive), because a [turntable] run needs a known Earth rate";
             return Err(self.document.missing("site.latitude_deg", meaning));
         }
         let longitude = file.longitude_deg.map_or(0.0, |degrees| degrees.0 * DEGREE);
@@ -289,7 +287,7 @@ impl Fields<'_> {
     }
 }
 
-/// What it costs that latitude, height or gravity are not stated.
+/// Effect of unstated latitude, height or gravity.
 fn place_note(site: &Site, has_gravity: bool, has_height: bool) -> Option<String> {
     let has_gravity = has_gravity || (site.is_known && has_height);
     let (missing, fields) = match (site.is_known, has_height) {
@@ -317,11 +315,11 @@ fn place_note(site: &Site, has_gravity: bool, has_height: bool) -> Option<String
     }
     let costs = costs.join("; it ");
     (!costs.is_empty()).then(|| {
-        format!("You stated no {missing}. turncal {costs}. State {fields} in [site]{or_gravity}.")
+        format!("You stated no {missing}. turncal {costs}. Set {fields} in [site]{or_gravity}.")
     })
 }
 
-/// 1σ of a gravity that is stated without one, m/s²: of its last digit, and no less than a milligal.
+/// 1σ of a gravity stated without σ, m/s²: from its last digit, at least one milligal.
 fn stated_gravity_sigma(written: &str) -> f64 {
     let digits = written
         .split_once('.')

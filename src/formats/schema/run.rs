@@ -1,4 +1,4 @@
-//! The fields of `run.toml`: what is read and what is written.
+//! The fields of `run.toml`.
 
 use std::collections::BTreeMap;
 
@@ -119,7 +119,7 @@ pub struct ImuFile {
     pub terms: BTreeMap<String, TermFile>,
 }
 
-/// What `[imu]` says of a triad.
+/// Settings of a triad in `[imu]`.
 pub struct TriadFields<'a> {
     pub columns: Option<&'a Names<3>>,
     pub unit: Option<&'a str>,
@@ -140,7 +140,7 @@ impl ImuFile {
     }
 }
 
-/// What it does not say is as in `[imu]`.
+/// Defaults are those of `[imu]`.
 #[derive(Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -159,7 +159,7 @@ pub struct AccelFromFile {
     pub sample_period_s: Option<Positive>,
 }
 
-/// The column that tells instruments apart, and what it says of the one that is meant.
+/// The column that distinguishes instruments, and its value for the selected one.
 #[derive(Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -188,7 +188,7 @@ pub struct ImuColumns {
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(
     untagged,
-    expecting = "the name of a column, or those of seconds and nanoseconds"
+    expecting = "a column name, or the names of the seconds and nanoseconds columns"
 )]
 pub enum TimeColumn {
     One(String),
@@ -200,7 +200,7 @@ pub enum TimeColumn {
 #[serde(
     untagged,
     deny_unknown_fields,
-    expecting = "the name of a column, or `gyro` and `accel` with the name of a column or three each"
+    expecting = "a column name, or `gyro` and `accel` with one or three column names each"
 )]
 pub enum TemperatureColumn {
     One(String),
@@ -297,7 +297,7 @@ pub struct TurntableFile {
     pub time_sigma_ms: Option<Positive>,
 }
 
-/// Keys of errors of the axes, in the order of [`crate::turntable::AxisError::ALL`].
+/// Keys of axis errors, in the order of [`crate::turntable::AxisError::ALL`].
 pub const AXIS_ERRORS: [&str; 3] = [
     "nonorthogonality_sigma_arcsec",
     "wobble_sigma_arcsec",
@@ -305,7 +305,7 @@ pub const AXIS_ERRORS: [&str; 3] = [
 ];
 
 impl TurntableFile {
-    /// 1σ of errors of the axes, in the same order.
+    /// 1σ of axis errors, in the same order.
     pub fn axis_errors(&self) -> [Option<Angle>; 3] {
         [
             self.nonorthogonality_sigma_arcsec,
@@ -340,7 +340,7 @@ pub struct SegmentsFile {
     pub position_sigma_deg: Option<Positive>,
 }
 
-/// The JSON schema of `run.toml`, for editors that complete and check it.
+/// The JSON schema of `run.toml`, for completion and checks in editors.
 #[cfg(feature = "cli")]
 pub fn json_schema() -> serde_json::Value {
     let mut schema = schemars::schema_for!(RunFile);

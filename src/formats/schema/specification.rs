@@ -1,4 +1,4 @@
-//! `specification.toml`: within which limits units of a type must be.
+//! `specification.toml`: limits for units of a type.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -14,7 +14,7 @@ use crate::lot::{Limit, Specification};
 
 /// The version of the format.
 const FORMAT: &str = "turncal-specification/1";
-/// Unless the file says otherwise.
+/// Default confidence.
 const CONFIDENCE: f64 = 0.95;
 
 #[derive(Deserialize)]
@@ -55,7 +55,7 @@ impl Specification {
         let file: SpecificationFile = document.fill(document.of_format(FORMAT)?)?;
         let confidence = file.confidence.unwrap_or(CONFIDENCE);
         if !(0.5..1.0).contains(&confidence) {
-            let expected = "a number from 0.5 to below 1";
+            let expected = "a number of at least 0.5 and below 1";
             return Err(document.wrong("confidence", expected, "Correct this value."));
         }
         let mut limits = Vec::new();
@@ -78,7 +78,7 @@ impl Specification {
     }
 }
 
-/// The key of a group in its sensor's table, and its unit in SI.
+/// The key of a group in the table of its sensor, and its unit in SI.
 fn key(group: Group) -> (String, f64) {
     let (key, unit) = DayToDay::key(group);
     (key[group.sensor().name().len() + 1..].to_owned(), unit)
@@ -135,7 +135,7 @@ fn limits_of(
     match limits.is_empty() {
         true => Err(document.missing(
             &format!("{path}.within"),
-            "the largest distance from nominal that is allowed, or one axis by its name",
+            "the largest allowed deviation from nominal, or a limit for a named axis",
         )),
         false => Ok(limits),
     }
@@ -179,7 +179,10 @@ mod tests {
         for (text, expected) in [
             ("[gyro]\nscale = 500\n", "scale_ppm"),
             ("[gyro]\nscale_ppm = -5\n", "above zero"),
-            ("[accel]\nbias_ug = { nominal = 3.0 }\n", "largest distance"),
+            (
+                "[accel]\nbias_ug = { nominal = 3.0 }\n",
+                "largest allowed deviation",
+            ),
             (
                 "[gyro]\nscale_ppm = { within = 3, w = 1 }\n",
                 "unknown field `w`",

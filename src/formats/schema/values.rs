@@ -1,4 +1,4 @@
-//! Values that are checked where they are read, so that the error names their line.
+//! Values checked while reading, so that errors name their line.
 
 use nalgebra::Vector3;
 use serde::Deserialize;
@@ -10,12 +10,12 @@ use crate::formats::imu_log::TimeStamp;
 use crate::formats::inputs::temperature::TemperatureUnit;
 use crate::imu::AxisOrder;
 
-/// Squares and quotients of such numbers are still numbers.
+/// Squares and quotients of such numbers are finite.
 fn with_size(value: f64) -> Result<f64, &'static str> {
     match value {
         _ if !value.is_finite() => Err("a finite number"),
         _ if value == 0.0 || (1e-30..=1e30).contains(&value.abs()) => Ok(value),
-        _ => Err("a number whose magnitude is from 1e-30 to 1e30"),
+        _ => Err("a number with a magnitude from 1e-30 to 1e30"),
     }
 }
 
@@ -49,24 +49,24 @@ checked!(
     Positive, "a number above zero", |v| v > 0.0;
     /// Zero or above.
     #[derive(Default)]
-    NonNegative, "zero or a number above it", |v| v >= 0.0;
-    /// 1σ of an angle, ″: beyond half a turn no error of an angle is.
-    Angle, "a number above zero, at most 648000", |v| v > 0.0 && v <= 648_000.0;
+    NonNegative, "a number of at least zero", |v| v >= 0.0;
+    /// 1σ of an angle, ″, at most half a turn.
+    Angle, "a number above zero and at most 648000", |v| v > 0.0 && v <= 648_000.0;
     /// °
     Latitude, "a latitude from -90 to 90", |v| v.abs() <= 90.0;
     /// °
     Longitude, "a longitude from -180 to 360", |v| (-180.0..=360.0).contains(&v);
-    /// From the shore of the Dead Sea to above any laboratory, m.
+    /// Height from the shore of the Dead Sea to above any laboratory, m.
     Height, "a height from -500 to 9000", |v| (-500.0..=9000.0).contains(&v);
     /// m/s²
     Gravity, "a number from 9.7 to 9.9", |v| (9.7..=9.9).contains(&v);
     /// 1σ of gravity, mGal.
     Milligals, "a number from 0 to 100000", |v| (0.0..=1e5).contains(&v);
-    /// A temperature that an instrument may have, °C.
+    /// A plausible instrument temperature, °C.
     Celsius, "a number from -100 to 100", |v| v.abs() <= 100.0;
 );
 
-/// A value of each axis, or one for all three.
+/// One value per axis, or one for all three.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(untagged, expecting = "three numbers, or one for all axes")]
@@ -84,7 +84,7 @@ impl OneOrThree {
     }
 }
 
-/// So many names of columns.
+/// This number of column names.
 #[derive(Clone, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(try_from = "Vec<String>")]
@@ -96,13 +96,13 @@ impl<const N: usize> TryFrom<Vec<String>> for Names<N> {
 
     fn try_from(names: Vec<String>) -> Result<Self, Self::Error> {
         names.try_into().map(Self).map_err(|_| match N {
-            4 => "four columns, in the order w, x, y, z",
+            4 => "four columns in the order w, x, y, z",
             _ => "three texts in quotes",
         })
     }
 }
 
-/// Types that a table of words stands for.
+/// Types defined by a table of names.
 macro_rules! by_words {
     ($($name:ident),+) => {$(
         impl<'de> Deserialize<'de> for $name {
@@ -126,9 +126,9 @@ macro_rules! by_words {
 
 by_words!(AxisOrder, TemperatureUnit, TimeStamp);
 
-/// A word, or what a tick of a clock of its own lasts, s.
+/// A name, or the duration of a clock tick, s.
 #[derive(Deserialize)]
-#[serde(untagged, expecting = "a unit of time, or what a tick lasts in s")]
+#[serde(untagged, expecting = "a unit of time, or the duration of a tick in s")]
 enum TimeUnitFile {
     Tick(Positive),
     Word(String),

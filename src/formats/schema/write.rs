@@ -21,15 +21,13 @@ use crate::run::Run;
 use crate::turntable::AxisError;
 use crate::units::{ARCSEC, DEGREE, MILLIGAL, PPM};
 
-/// Columns of the angles of a table's axes, outermost first.
+/// Columns of the table axis angles, outermost first.
 const ANGLES: [&str; 3] = ["outer", "middle", "inner"];
 
-/// Writes a run into a directory that is there: `run.toml`, `imu.csv.gz`, `table.csv.gz`,
-/// `segments.csv`, `truth.json`.
+/// Writes a run into an existing directory: `run.toml`, `imu.csv.gz`, `table.csv.gz`, `segments.csv`, `truth.json`.
 ///
-/// [`Run::read`] returns the same run, except for rounding in the last digit, its name (which is the
-/// directory's) and its notes. The same run gives the same bytes. `run.instrument.unit` must be a unit of this
-/// `output`.
+/// [`Run::read`] returns the same run, except for rounding in the last digit, its name (that of the directory) and its
+/// notes. The same run gives the same bytes. `run.instrument.unit` must be a unit of this `output`.
 pub fn write_run(
     directory: &Path,
     run: &Run,
@@ -175,12 +173,12 @@ fn segment_rows(file: &mut dyn Write, segments: &[Segment]) -> io::Result<()> {
     csv.flush()
 }
 
-/// A number to fifteen digits: all that a conversion of units leaves true.
+/// A number to fifteen digits, the accuracy of a unit conversion.
 fn short(value: f64) -> f64 {
     format!("{value:.14e}").parse().unwrap_or(value)
 }
 
-/// A value in a file's unit; `None` if it is not above zero.
+/// A value in the unit of the file; `None` if it is not above zero.
 fn above_zero(value: f64, unit: f64) -> Option<f64> {
     Some(short(value / unit)).filter(|&value| value > 0.0)
 }
@@ -188,7 +186,7 @@ fn above_zero(value: f64, unit: f64) -> Option<f64> {
 fn configuration_text(run: &Run, output: Output) -> String {
     let mut page = Page::of(FORMAT, "");
     let site = &run.site;
-    page.table("site", "the place of the turntable");
+    page.table("site", "location of the turntable");
     let known = |value: f64| Some(value).filter(|_| site.is_known);
     page.known("latitude_deg", known(short(site.latitude / DEGREE)));
     page.known("longitude_deg", known(short(site.longitude / DEGREE)));
@@ -196,16 +194,13 @@ fn configuration_text(run: &Run, output: Output) -> String {
     page.field("gravity_m_s2", site.gravity);
     page.field("gravity_sigma_mgal", short(site.gravity_sigma / MILLIGAL));
     if !run.recording.meta.is_empty() {
-        page.table("meta", "carried into calibration and report");
+        page.table("meta", "copied into calibration and report");
     }
     for (key, value) in &run.recording.meta {
         page.field(key, value.as_str());
     }
     imu(&mut page, run, output);
-    page.table(
-        "standstill",
-        "how still the IMU is while the table is at rest",
-    );
+    page.table("standstill", "motion of the IMU while the table is at rest");
     let of = &run.standstill;
     let attitude = of.sigma.gyro.map(|sigma| short(sigma / ARCSEC));
     page.known("velocity_sigma_m_s", of.sigma.accel);
@@ -216,7 +211,7 @@ fn configuration_text(run: &Run, output: Output) -> String {
         turntable(&mut page, run);
     }
     if !run.recording.segments.is_empty() {
-        page.table("segments", "labelled sections of the record, in s");
+        page.table("segments", "labelled sections of the recording, in s");
         page.field("file", "segments.csv");
         page.field("position_sigma_deg", short(run.segment_sigma / DEGREE));
     }
@@ -225,7 +220,7 @@ fn configuration_text(run: &Run, output: Output) -> String {
 
 fn imu(page: &mut Page, run: &Run, output: Output) {
     let (imu, instrument) = (&run.recording.imu, &run.instrument);
-    page.table("imu", "the instrument's samples, along body right-front-up");
+    page.table("imu", "instrument samples along body right-front-up");
     page.field("file", "imu.csv.gz");
     page.field("output", output_word(output));
     page.field("gyro_unit", instrument.unit.gyro.as_str());
@@ -253,7 +248,8 @@ fn imu(page: &mut Page, run: &Run, output: Output) {
         let (by_duration, unit) = keys.by_duration;
         page.known(by_duration, above_zero(moves.by_duration, unit));
     }
-    let known = "known before calibration: N = scale * installation * u + bias, N the file's quantity per second";
+    let known = "known before calibration: N = scale * installation * u + bias, with N in the file's quantity per \
+        second";
     for (sensor, remark) in [(Sensor::Gyro, known), (Sensor::Accel, "")] {
         let prior = instrument.prior.get(sensor);
         let nominal = instrument.nominal.get(sensor).0;
@@ -283,8 +279,8 @@ fn turntable(page: &mut Page, run: &Run) {
     let (table, geometry) = (&run.table, &run.table.geometry);
     page.table(
         "turntable",
-        "attitude of the table's mounting face, body right-front-up to East-North-Up; position errors are constant while \
-         the table stands and new at every position, reading errors are white",
+        "attitude of the table's mounting face, body right-front-up to East-North-Up; position errors are constant \
+         in a dwell and independent between dwells, reading errors are white",
     );
     let sigma = |sigma: f64| above_zero(sigma, ARCSEC);
     page.field("file", "table.csv.gz");

@@ -1,4 +1,4 @@
-//! Arrays of a file, put together to streams and read row by row.
+//! Arrays of a file, combined into streams and read row by row.
 //!
 //! Arrays of the same number of rows are one stream; an array of several columns gives `name[0]`, `name[1]`, …
 
@@ -8,11 +8,11 @@ use std::rc::Rc;
 use super::bytes::{Broken, Kind};
 use super::{Column, Log, Stream};
 
-/// What has more columns or more bytes in a row is a picture or a matrix, but no samples.
+/// Limits per row; arrays with more columns or bytes are pictures or matrices rather than samples.
 const MOST_COLUMNS: usize = 256;
 const LONGEST_ROW: usize = 1 << 16;
 
-/// The bytes of an array from one of them on.
+/// The bytes of an array from an offset on.
 pub type Open = Box<dyn Fn(u64) -> io::Result<Box<dyn Read>>>;
 
 /// An array of items of the same size.
@@ -24,7 +24,7 @@ pub struct Array {
     pub size: usize,
     pub fields: Vec<Field>,
     pub open: Open,
-    /// Where it begins in the file.
+    /// Its offset in the file.
     pub offset: u64,
 }
 
@@ -39,7 +39,7 @@ pub struct Field {
 }
 
 impl Array {
-    /// Items, where they can be counted.
+    /// Number of items, if countable.
     fn items(&self) -> Option<usize> {
         let mut sizes = self.shape.iter();
         sizes.try_fold(1usize, |all, &size| all.checked_mul(size))
@@ -53,12 +53,12 @@ impl Array {
         }
         Err(Broken::new(
             self.offset,
-            format_args!("{bytes} bytes of the array `{name}`"),
-            format_args!("items of {} bytes by its shape {:?}", self.size, self.shape),
+            format_args!("{bytes} bytes in the array `{name}`"),
+            format_args!("items of {} bytes in the shape {:?}", self.size, self.shape),
         ))
     }
 
-    /// Its columns, by how they are read: the longest dimension, of equal ones the first, counts rows.
+    /// Its columns with their layout: the longest dimension (the first of equal ones) gives the rows.
     fn cursors(self) -> Vec<Cursor> {
         let rows = self.shape.iter().copied().max().unwrap_or(1);
         let columns = self
@@ -136,15 +136,15 @@ impl Array {
     }
 }
 
-/// Columns that are read together, row by row.
+/// Columns read together, row by row.
 struct Cursor {
     open: Rc<Open>,
     source: Option<Box<dyn Read>>,
     /// Bytes before the first row.
     begin: u64,
-    /// The bytes of the last row that was read …
+    /// The bytes of the last row read …
     row: Vec<u8>,
-    /// … from row to row …
+    /// … between rows …
     stride: u64,
     rows: usize,
     /// … and the row after it.
@@ -177,7 +177,7 @@ impl Cursor {
         Ok(())
     }
 
-    /// From the begin of a number of the last row on.
+    /// Bytes from the start of a number of the last row.
     fn bytes(&self, cell: &Field) -> &[u8] {
         self.row.get(cell.place..).unwrap_or_default()
     }
@@ -198,7 +198,7 @@ impl Cursor {
         Broken::new(
             self.offset,
             format_args!("`{name}`: {error}"),
-            format_args!("{} rows of an array", self.rows),
+            format_args!("an array of {} rows", self.rows),
         )
     }
 }
@@ -237,7 +237,7 @@ impl Arrays {
         }
     }
 
-    /// The streams with something to be known of each of them.
+    /// Adds remarks to all streams.
     pub fn with_remarks(mut self, remarks: &[String]) -> Self {
         for stream in &mut self.streams {
             stream.remarks.extend_from_slice(remarks);

@@ -1,15 +1,15 @@
-//! Bytes of a file, each of which knows where it is.
+//! Bytes of a file with their offsets.
 
 use std::io::{self, Read, Seek, SeekFrom};
 
-/// What a log's bytes come from.
+/// Source of the bytes of a log.
 pub trait Source: Read + Seek + Send {}
 impl<T: Read + Seek + Send> Source for T {}
 
-/// Why a file cannot be read on, and where.
+/// Why and where reading of a file stopped.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Broken {
-    /// Bytes from the begin of the file.
+    /// Offset from the start of the file, in bytes.
     pub offset: u64,
     pub found: String,
     pub expected: String,
@@ -25,7 +25,7 @@ impl Broken {
     }
 }
 
-/// A file read from its begin on.
+/// A file read from its start.
 pub struct Input {
     source: Box<dyn Source>,
     offset: u64,
@@ -43,13 +43,13 @@ impl Input {
         })
     }
 
-    /// The file itself, at any place.
+    /// The underlying file.
     #[cfg_attr(not(any(feature = "hdf5", feature = "npy")), allow(dead_code))]
     pub fn into_source(self) -> Box<dyn Source> {
         self.source
     }
 
-    /// Bytes read or passed over so far.
+    /// Bytes read or skipped so far.
     pub fn offset(&self) -> u64 {
         self.offset
     }
@@ -65,12 +65,12 @@ impl Input {
         if count > self.left() {
             let found = match self.left() {
                 0 => "the end of the file".to_owned(),
-                left => format!("{left} bytes to the end of the file"),
+                left => format!("only {left} bytes before the end of the file"),
             };
             return Err(Broken::new(
                 self.offset,
                 found,
-                format_args!("{count} bytes of {what}"),
+                format_args!("{count} bytes for {what}"),
             ));
         }
         let read = (&mut self.source).take(count).read_to_end(into);
@@ -79,12 +79,16 @@ impl Input {
                 self.offset += count;
                 Ok(())
             }
-            Ok(_) => Err(Broken::new(self.offset, "a file that became shorter", what)),
+            Ok(_) => Err(Broken::new(
+                self.offset,
+                "a file that became shorter while being read",
+                what,
+            )),
             Err(error) => Err(Broken::new(self.offset, error, what)),
         }
     }
 
-    /// Goes to another place.
+    /// Moves to another offset.
     pub fn go_to(&mut self, offset: u64) -> Result<(), Broken> {
         if offset > self.length {
             let found = format!("a reference to byte {offset}");
@@ -92,7 +96,7 @@ impl Input {
             return Err(Broken::new(self.offset, found, expected));
         }
         let sought = self.source.seek(SeekFrom::Start(offset));
-        sought.map_err(|error| Broken::new(offset, error, "a place in the file"))?;
+        sought.map_err(|error| Broken::new(offset, error, "a readable position in the file"))?;
         self.offset = offset;
         Ok(())
     }
@@ -100,8 +104,8 @@ impl Input {
     /// Skips `count` bytes.
     pub fn skip(&mut self, count: u64, what: &str) -> Result<(), Broken> {
         if count > self.left() {
-            let found = format!("{} bytes to the end of the file", self.left());
-            let expected = format!("{count} bytes of {what}");
+            let found = format!("only {} bytes before the end of the file", self.left());
+            let expected = format!("{count} bytes for {what}");
             return Err(Broken::new(self.offset, found, expected));
         }
         self.go_to(self.offset + count)
@@ -113,9 +117,9 @@ impl Input {
 pub struct Slice<'a> {
     bytes: &'a [u8],
     at: usize,
-    /// Where the first of them is in the file …
+    /// Offset of the first byte in the file …
     base: u64,
-    /// … or all of them, where they were packed.
+    /// … or of the packed data that contained them.
     is_packed: bool,
     pub big_endian: bool,
 }
@@ -131,7 +135,7 @@ impl<'a> Slice<'a> {
         }
     }
 
-    /// Bytes that were packed into something at this place of the file.
+    /// Bytes unpacked from data at this offset of the file.
     pub fn packed(bytes: &'a [u8], place: u64) -> Self {
         Self {
             is_packed: true,
@@ -139,12 +143,12 @@ impl<'a> Slice<'a> {
         }
     }
 
-    /// The same bytes, whole numbers in them in this order.
+    /// The same bytes with this byte order.
     pub fn in_order(self, big_endian: bool) -> Self {
         Self { big_endian, ..self }
     }
 
-    /// Some of these bytes, which are at this place.
+    /// A part of these bytes, at this offset.
     pub fn of(&self, bytes: &'a [u8], place: u64) -> Self {
         Self {
             bytes,
@@ -154,7 +158,7 @@ impl<'a> Slice<'a> {
         }
     }
 
-    /// Where the next byte is in the file.
+    /// Offset of the next byte in the file.
     pub fn offset(&self) -> u64 {
         match self.is_packed {
             true => self.base,
@@ -177,8 +181,8 @@ impl<'a> Slice<'a> {
         let bytes = bytes.ok_or_else(|| {
             Broken::new(
                 self.offset(),
-                format_args!("only {} bytes left in the record", self.left()),
-                format_args!("{count} bytes of {what}"),
+                format_args!("only {} bytes left in this part of the file", self.left()),
+                format_args!("{count} bytes for {what}"),
             )
         })?;
         self.at += count;
@@ -195,25 +199,25 @@ impl<'a> Slice<'a> {
         })
     }
 
-    /// The length of what follows.
+    /// A length field.
     pub fn length(&mut self, size: usize, what: &str) -> Result<usize, Broken> {
         let length = self.whole(size, what)?;
         usize::try_from(length).map_err(|_| Broken::new(self.offset(), length, what))
     }
 
-    /// What follows its own length of this many bytes.
+    /// Content preceded by a length field of this many bytes.
     pub fn measured(&mut self, size: usize, what: &str) -> Result<&'a [u8], Broken> {
         let length = self.length(size, "a length")?;
         self.take(length, what)
     }
 
-    /// The same of a text.
+    /// The same for a text.
     pub fn measured_text(&mut self, size: usize, what: &str) -> Result<String, Broken> {
         let length = self.length(size, "a length")?;
         self.text(length, what)
     }
 
-    /// A text of this length; what is no UTF-8 in it is replaced.
+    /// A text of this length; invalid UTF-8 is replaced.
     pub fn text(&mut self, count: usize, what: &str) -> Result<String, Broken> {
         let bytes = self.take(count, what)?;
         let end = bytes.iter().position(|&byte| byte == 0);
@@ -252,7 +256,7 @@ impl Kind {
         })
     }
 
-    /// By the name in C and ROS, such as `uint16_t` and `float32`.
+    /// Kind from its name in C or ROS, such as `uint16_t` and `float32`.
     pub fn named(name: &str) -> Option<Self> {
         match name {
             "bool" => return Some(Self::U8),
@@ -288,7 +292,7 @@ impl Kind {
         })
     }
 
-    /// The whole number in the first bytes, with all digits; `None` if it is none.
+    /// The whole number in the first bytes, exact; `None` for other kinds.
     pub fn whole(self, bytes: &[u8], big_endian: bool) -> Option<i128> {
         let bits = self.bits(bytes, big_endian)?;
         Some(match self {

@@ -1,7 +1,7 @@
-//! The calibration that an autopilot has already applied to its values, taken out again.
+//! Removal of a calibration already applied by an autopilot.
 //!
-//! Both PX4 and ArduPilot make `(raw − offset) ⊙ scale` of accelerometers and `raw − offset` of gyros, and turn the
-//! axes behind that.
+//! Both PX4 and ArduPilot compute `(raw − offset) ⊙ scale` for accelerometers and `raw − offset` for gyros, and then
+//! rotate the axes.
 //!
 //! Source: PX4-Autopilot, `src/lib/sensor_calibration` and `src/modules/sensors/vehicle_imu`; ArduPilot,
 //! `AP_InertialSensor_Backend::_rotate_and_correct_accel` and `_rotate_and_correct_gyro`.
@@ -9,18 +9,18 @@
 use super::Column;
 use crate::imu::{PerSensor, Sensor};
 
-/// What was applied to a triad.
+/// Correction applied to a triad.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Applied {
     /// The parameters, in words.
     pub name: String,
     pub offset: [f64; 3],
     pub scale: [f64; 3],
-    /// Whether axes were turned after it, which mixes them, or more was taken out.
+    /// Whether axes were then rotated (which mixes them) or further corrections were applied.
     pub is_more: bool,
 }
 
-/// Columns of corrected values, of the time in µs that they were summed over, and of the device's number.
+/// Columns of corrected values, of their integration time in µs, and of the device number.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Corrected {
     pub values: [usize; 3],
@@ -43,30 +43,30 @@ impl Corrected {
     }
 }
 
-/// What was applied while parameters had changed so often, and to which device.
+/// Correction applied at this parameter revision, and the device.
 struct Known {
     changes: u64,
     device: Option<f64>,
     applied: Option<Applied>,
 }
 
-/// What was done to samples of a triad, in the same words for all of them.
+/// Treatment of samples of a triad with a common description.
 struct Done {
     applied: Option<Applied>,
     /// Number of the first such sample, from one.
     first: u64,
-    /// Whether numbers have changed behind the same words.
+    /// Whether values changed with the same description.
     varies: bool,
 }
 
-/// What is taken out of the samples of a stream.
+/// Corrections to remove from the samples of a stream.
 pub struct Undo {
     /// Who applied it.
     pub program: &'static str,
     pub corrected: PerSensor<Option<Corrected>>,
     samples: u64,
     done: PerSensor<Vec<Done>>,
-    /// What was applied, as long as parameters and device stay.
+    /// Applied correction, while parameters and device are unchanged.
     found: PerSensor<Option<Known>>,
 }
 
@@ -81,8 +81,8 @@ impl Undo {
         }
     }
 
-    /// Makes of a sample what the sensor gave; `changes` counts those of parameters so far. Whether there is more to
-    /// say than before.
+    /// Restores the raw sensor output of a sample; `changes` is the number of parameter changes so far. Returns whether
+    /// there are new remarks.
     pub fn undo(
         &mut self,
         row: &mut [f64],
@@ -120,7 +120,7 @@ impl Undo {
         is_news
     }
 
-    /// What was undone, a sentence for each triad and each thing that was done to it.
+    /// Removed corrections, one sentence per triad and correction.
     pub fn remarks(&self) -> Vec<String> {
         let of_triad = |&sensor: &Sensor| {
             let done = self.done.get(sensor);
@@ -128,7 +128,10 @@ impl Undo {
                 let words = words(self.program, sensor, of);
                 match done.len() {
                     1 => words,
-                    _ => format!("Part of the samples, from number {}: {words}", of.first),
+                    _ => format!(
+                        "From sample {} on, for part of the samples: {words}",
+                        of.first
+                    ),
                 }
             })
         };
@@ -136,7 +139,7 @@ impl Undo {
     }
 }
 
-/// Notes what is done to a sample; whether that has no words yet.
+/// Records the treatment of a sample; returns whether it is new.
 fn note(done: &mut Vec<Done>, applied: Option<&Applied>, sample: u64) -> bool {
     let kind = |of: Option<&Applied>| of.map(|of| (of.name.clone(), of.is_more));
     let same = done
@@ -167,12 +170,12 @@ fn words(program: &str, sensor: Sensor, done: &Done) -> String {
     };
     match &done.applied {
         Some(of) if of.is_more => format!(
-            "{program} corrected its {triad} by {}{varies} and did more to them, turned axes or compensated \
-             temperature: this is not undone, so the calibration is that of corrected data.",
+            "{program} corrected its {triad} by {}{varies} and also rotated axes or compensated temperature. turncal \
+                cannot undo this, so the calibration applies to the corrected data.",
             of.name
         ),
         Some(of) => format!(
-            "{program} corrected its {triad} by {}{varies}: this is undone.",
+            "{program} corrected its {triad} by {}{varies}. turncal undid this correction.",
             of.name
         ),
         None => format!(

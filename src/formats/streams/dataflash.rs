@@ -1,7 +1,7 @@
-//! ArduPilot's DataFlash logs.
+//! ArduPilot DataFlash logs.
 //!
-//! Messages begin with the bytes A3 95 and their type; those of type 128 (`FMT`) say what the others hold. What
-//! `IMU`, `ACC` and `GYR` hold is corrected by the parameters `INS_…`, which `PARM` messages give.
+//! Messages start with the bytes A3 95 and their type; type 128 (`FMT`) defines the content of the others. `IMU`, `ACC`
+//! and `GYR` are corrected with the parameters `INS_…` in `PARM` messages.
 //!
 //! Source: ArduPilot, `libraries/AP_Logger/LogStructure.h`.
 
@@ -14,7 +14,7 @@ use crate::imu::{PerSensor, Sensor};
 
 const BEGIN: [u8; 2] = [0xa3, 0x95];
 const FMT: u8 = 0x80;
-/// The column that tells instances apart.
+/// The column that distinguishes instances.
 const INSTANCE: &str = "I";
 
 pub fn open(input: Input) -> Result<Box<dyn Log>, Broken> {
@@ -41,7 +41,7 @@ struct DataFlash {
     input: Input,
     formats: BTreeMap<u8, Format>,
     parameters: BTreeMap<String, f64>,
-    /// How often one of them was set.
+    /// Number of parameter changes.
     changes: u64,
     streams: Vec<Stream>,
     /// By type and instance.
@@ -57,9 +57,9 @@ struct Format {
     name: String,
     length: u64,
     columns: Vec<Column>,
-    /// Place, kind and factor of each number.
+    /// Offset, kind and factor of each number.
     places: Vec<(usize, Kind, f64)>,
-    /// Place of the instance.
+    /// Offset of the instance.
     instance: Option<usize>,
 }
 
@@ -118,19 +118,19 @@ impl Format {
             return Err(Broken::new(
                 offset,
                 format_args!("{name} of {length} bytes"),
-                format_args!("{place}, as its fields `{types}` take"),
+                format_args!("{place} bytes for its fields `{types}`"),
             ));
         }
         Ok(format)
     }
 
-    /// Whether it may be an instrument's.
+    /// Whether it may belong to an instrument.
     fn is_inertial(&self) -> bool {
         let stem = self.name.trim_end_matches(|c: char| c.is_ascii_digit());
         ["IMU", "ACC", "GYR"].contains(&stem)
     }
 
-    /// What of it is corrected.
+    /// Its corrections.
     fn undo(&self) -> Undo {
         let corrected = PerSensor::from_fn(|sensor| {
             let names = sensor.pick(["GyrX", "GyrY", "GyrZ"], ["AccX", "AccY", "AccZ"]);
@@ -160,8 +160,7 @@ impl Log for DataFlash {
             if self.input.left() == 0 {
                 return Ok(None);
             }
-            self.input
-                .take(3, &mut self.message, "a message's begin and type")?;
+            self.input.take(3, &mut self.message, "a message header")?;
             let Some(&[first, second, kind]) = self.message.first_chunk() else {
                 return Ok(None);
             };
@@ -169,7 +168,7 @@ impl Log for DataFlash {
                 return Err(Broken::new(
                     self.offset,
                     format_args!("the bytes {first:02x} {second:02x}"),
-                    "a3 95, with which a message begins",
+                    "the bytes a3 95 that start a message",
                 ));
             }
             let Some(format) = self.formats.get(&kind) else {
@@ -225,12 +224,12 @@ impl Log for DataFlash {
 impl DataFlash {
     fn format(&mut self) -> Result<(), Broken> {
         let mut content = Slice::new(&self.message, self.offset);
-        content.take(3, "a message's begin")?;
+        content.take(3, "a message header")?;
         let kind = content.whole(1, "a type")? as u8;
         let length = content.whole(1, "a length")?;
         let name = content.text(4, "a name")?;
-        let types = content.text(16, "the types of fields")?;
-        let labels = content.text(64, "the names of fields")?;
+        let types = content.text(16, "field types")?;
+        let labels = content.text(64, "field names")?;
         if kind != FMT {
             let format = Format::of(self.offset, &name, length, &types, &labels)?;
             self.formats.insert(kind, format);
@@ -244,8 +243,8 @@ impl DataFlash {
         let name_at = if length < 3 + 8 + 16 + 4 { 3 } else { 11 };
         let mut content = Slice::new(&self.message, self.offset);
         content.take(name_at, "a time")?;
-        let name = content.text(16, "a parameter's name")?;
-        let value = Kind::F32.number(content.take(4, "a parameter's value")?, false);
+        let name = content.text(16, "a parameter name")?;
+        let value = Kind::F32.number(content.take(4, "a parameter value")?, false);
         self.parameters.insert(name, value.unwrap_or(f64::NAN));
         self.changes += 1;
         Ok(())
@@ -286,7 +285,7 @@ impl DataFlash {
     }
 }
 
-/// What ArduPilot's parameters of an instance, from 0, say.
+/// Corrections from the ArduPilot parameters of an instance, from 0.
 fn applied(parameters: &BTreeMap<String, f64>, sensor: Sensor, instance: u8) -> Option<Applied> {
     let kind = sensor.pick("GYR", "ACC");
     // A damaged log may have an instance 255.

@@ -1,6 +1,6 @@
-//! HDF5 files, and MAT files of version 7.3 (`save -v7.3`), which are HDF5 behind a header of 512 bytes.
+//! HDF5 files, and MAT files of version 7.3 (`save -v7.3`), which are HDF5 after a header of 512 bytes.
 //!
-//! The crate `hdf5-pure` reads the format; its datasets become arrays here, called by their paths.
+//! The crate `hdf5-pure` reads the format; its datasets become arrays named by path.
 //!
 //! Source: The HDF Group, "HDF5 File Format Specification Version 4.0".
 
@@ -16,14 +16,14 @@ use super::arrays::{Array, Arrays, Field, Open};
 use super::bytes::{Broken, Input, Kind};
 use crate::room;
 
-/// Groups within groups, and groups of a file: a group may contain itself.
+/// Limits of group depth and number, because a group may contain itself.
 const DEEPEST: usize = 8;
 const MOST_GROUPS: usize = 1024;
 /// Numbers of an array within an item.
 const MOST_NUMBERS: usize = 64;
-/// Bytes of what is read at a time, where rows and chunks are shorter.
+/// Bytes read at once, if rows and chunks are shorter.
 const AT_ONCE: u64 = 1 << 16;
-/// Nothing deflated is shorter by more.
+/// Maximum compression ratio of deflate.
 const DEFLATE: u64 = 1040;
 
 pub fn open(input: Input) -> Result<Box<dyn Log>, Broken> {
@@ -33,7 +33,7 @@ pub fn open(input: Input) -> Result<Box<dyn Log>, Broken> {
     let file = file.map_err(broken)?;
     let end = file.superblock().eof_address;
     if end > length {
-        let expected = format!("{end} bytes of an HDF5 file");
+        let expected = format!("an HDF5 file of {end} bytes");
         return Err(Broken::new(length, "the end of the file", expected));
     }
     // Fields of MATLAB's structures are called as in a MAT file of version 5.
@@ -51,18 +51,18 @@ pub fn open(input: Input) -> Result<Box<dyn Log>, Broken> {
 fn broken(error: Error) -> Broken {
     let found = match error {
         // The crate's own words advise its callers.
-        Error::FileMarkedInUse { .. } => "a file that its writer has not closed".to_owned(),
+        Error::FileMarkedInUse { .. } => "a file that was not closed by its writer".to_owned(),
         Error::Format(FormatError::OffsetOverflow {
             offset: u64::MAX, ..
-        }) => "an address that is not defined, as that of a soft link".to_owned(),
+        }) => "an undefined address, such as that of a soft link".to_owned(),
         error => error.to_string(),
     };
-    Broken::new(0, found, "an HDF5 file of version 1.14 or before")
+    Broken::new(0, found, "an HDF5 file of version 1.14 or earlier")
 }
 
-/// The groups of a file, one after the other.
+/// Traversal of the groups of a file.
 struct Walk {
-    /// Between the names of a group and of what is in it.
+    /// Separator between the names of a group and its members.
     between: &'static str,
     /// Bytes of the file.
     file: u64,
@@ -75,7 +75,7 @@ impl Walk {
         self.groups += 1;
         if self.groups > MOST_GROUPS {
             let found = format_args!("more than {MOST_GROUPS} groups");
-            return Err(Broken::new(0, found, "a file of one recording"));
+            return Err(Broken::new(0, found, "a file with one recording"));
         }
         let begin = match path {
             "" => String::new(),
@@ -95,7 +95,7 @@ impl Walk {
     }
 }
 
-/// A dataset as an array; `None` if it holds no numbers.
+/// A dataset as an array; `None` if not numeric.
 fn array(name: String, dataset: Dataset, file: u64) -> Result<Option<Array>, Broken> {
     let of_it = |error| {
         let Broken { found, .. } = broken(error);
@@ -114,8 +114,8 @@ fn array(name: String, dataset: Dataset, file: u64) -> Result<Option<Array>, Bro
     let row = inner.try_fold(size, |all, &size| all.checked_mul(size));
     let all = row.and_then(|row| row.checked_mul(shape.first().copied().unwrap_or(1)));
     let (Some(row), Some(all)) = (row, all) else {
-        let found = format_args!("`{name}` of the shape {shape:?}");
-        return Err(Broken::new(0, found, "a shape that can be counted"));
+        let found = format_args!("`{name}` with the shape {shape:?}");
+        return Err(Broken::new(0, found, "a shape with fewer items"));
     };
     let stored = Stored {
         dataset,
@@ -144,7 +144,7 @@ fn is_no_number_to_matlab(dataset: &Dataset) -> bool {
     class == Some("char") || attributes.contains_key("MATLAB_empty")
 }
 
-/// Adds the numbers of an item that begins at this place.
+/// Adds the numbers of an item that starts at this offset.
 fn numbers(name: &str, item: &Datatype, place: usize, into: &mut Vec<Field>) {
     match item {
         Datatype::Enumeration { base_type, .. } => numbers(name, base_type, place, into),
@@ -215,18 +215,18 @@ struct Stored {
 }
 
 impl Stored {
-    /// The bytes from this one on.
+    /// The bytes from this offset on.
     fn open(&self, skip: u64) -> io::Result<Box<dyn Read>> {
         let possible = self.possible()?;
         if self.all > possible {
-            let found = format!("the file holds at most {possible} of {} bytes", self.all);
+            let found = format!("the file contains at most {possible} of {} bytes", self.all);
             return Err(io::Error::other(found));
         }
         let row = self.row.max(1);
         let at_once = self.rows_at_once()?;
         let needed = at_once.saturating_mul(row).min(self.all);
         if !room::is_there((needed as usize).saturating_mul(2)) {
-            let found = format!("{needed} bytes to read at once do not fit into memory");
+            let found = format!("{needed} bytes must be read at once and do not fit into memory");
             return Err(io::Error::other(found));
         }
         let mut rows = Rows {
@@ -239,7 +239,7 @@ impl Stored {
         Ok(Box::new(rows))
     }
 
-    /// One long row, or short ones of whole chunks: to read a part of a chunk unpacks all of it.
+    /// One long row, or short ones in whole chunks, because reading a part of a chunk unpacks all of it.
     fn rows_at_once(&self) -> io::Result<u64> {
         let row = self.row.max(1);
         if row >= AT_ONCE {
@@ -252,7 +252,7 @@ impl Stored {
         Ok(chunk.saturating_mul(chunks).min(self.all / row + 1))
     }
 
-    /// The most bytes that the file can give, because the crate allocates what damaged sizes state.
+    /// Maximum number of bytes in the file, because the crate allocates sizes stated by damaged files.
     fn possible(&self) -> io::Result<u64> {
         let layout = self.dataset.layout().map_err(io::Error::other)?;
         Ok(match layout {

@@ -1,4 +1,4 @@
-//! MATLAB's MAT files of version 5 (`save -v6`, `-v7`).
+//! MATLAB MAT files of version 5 (`save -v6`, `-v7`).
 //!
 //! Source: MathWorks, "MAT-File Format", 2023: a header of 128 bytes, then elements of a type, a size and content,
 //! padded to eight bytes.
@@ -32,8 +32,8 @@ pub fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
         _ => {
             return Err(Broken::new(
                 126,
-                format_args!("the mark {mark:02x?}"),
-                "`IM` or `MI`, the order of bytes",
+                format_args!("the byte-order mark {mark:02x?}"),
+                "`IM` or `MI`",
             ));
         }
     };
@@ -44,14 +44,14 @@ pub fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
     if version != 0x0100 {
         return Err(Broken::new(
             124,
-            format_args!("a MAT file of version {version:04x} that begins like one of version 5"),
-            "0100: save it with -v7",
+            format_args!("MAT version {version:04x} in a version-5 header"),
+            "version 0100 (save it with -v7)",
         ));
     }
     let mut arrays = Vec::new();
     while input.left() > 0 {
         let offset = input.offset();
-        input.take(8, &mut bytes, "an element's type and size")?;
+        input.take(8, &mut bytes, "the type and size of an element")?;
         let mut tag = Slice::new(&bytes, offset).in_order(big_endian);
         let (kind, size) = (tag.whole(4, "a type")?, tag.whole(4, "a size")?);
         input.take(size, &mut bytes, "an element")?;
@@ -69,7 +69,7 @@ pub fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
     Ok(Box::new(Arrays::new(arrays)))
 }
 
-/// The content of the element in a compressed one; nothing if it is no array.
+/// The content of a compressed element; empty if it is not an array.
 fn unpack(packed: &[u8], offset: u64, big_endian: bool) -> Result<Vec<u8>, Broken> {
     let broken = |error: std::io::Error| Broken::new(offset, error, "a zlib-compressed element");
     let mut decoder = ZlibDecoder::new(packed);
@@ -84,8 +84,11 @@ fn unpack(packed: &[u8], offset: u64, big_endian: bool) -> Result<Vec<u8>, Broke
     if !is_possible || !room::is_there(size as usize * 2) {
         return Err(Broken::new(
             offset,
-            format_args!("an array of {size} bytes in {} packed ones", packed.len()),
-            "one that fits into memory",
+            format_args!(
+                "an array of {size} bytes compressed to {} bytes",
+                packed.len()
+            ),
+            "an array that fits into memory",
         ));
     }
     let mut unpacked = Vec::new();
@@ -98,7 +101,7 @@ fn unpack(packed: &[u8], offset: u64, big_endian: bool) -> Result<Vec<u8>, Broke
         return Err(Broken::new(
             offset,
             found,
-            format_args!("{size} bytes of an array"),
+            format_args!("{size} bytes for the array"),
         ));
     }
     Ok(unpacked)
@@ -130,8 +133,8 @@ impl<'a> Element<'a> {
                 .clamp(size, slice.left().max(size)),
         };
         let bytes = slice.take(whole, what)?.get(..size).ok_or_else(|| {
-            let found = format_args!("a short element of {size} bytes");
-            Broken::new(offset, found, "at most 4")
+            let found = format_args!("a small data element of {size} bytes");
+            Broken::new(offset, found, "at most 4 bytes")
         })?;
         Ok(Self {
             kind,
@@ -204,7 +207,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(text).into_owned()
 }
 
-/// Adds the columns of an array, those of the fields of a structure by their names.
+/// Adds the columns of an array; fields of a structure are named after it.
 fn matrix(
     mut slice: Slice,
     name: &str,
@@ -214,13 +217,13 @@ fn matrix(
     if slice.left() == 0 {
         return Ok(());
     }
-    let flags = Element::next(&mut slice, "an array's kind")?;
+    let flags = Element::next(&mut slice, "the type of an array")?;
     let class = flags.number(Kind::U32, 0).unwrap_or(0.0) as u32 as u8;
-    let dimensions = Element::next(&mut slice, "an array's size")?;
+    let dimensions = Element::next(&mut slice, "the size of an array")?;
     let shape: Vec<usize> = (0..dimensions.bytes.len() / 4)
         .map(|k| dimensions.count(k))
         .collect();
-    let own = text(Element::next(&mut slice, "an array's name")?.bytes);
+    let own = text(Element::next(&mut slice, "the name of an array")?.bytes);
     let name = match (name.is_empty(), own.is_empty()) {
         (true, _) => own,
         (false, true) => name.to_owned(),
@@ -247,10 +250,14 @@ fn structure(
     depth: usize,
     arrays: &mut Vec<Array>,
 ) -> Result<(), Broken> {
-    let length = Element::next(slice, "the length of names")?.count(0);
-    let names = Element::next(slice, "names of fields")?;
+    let length = Element::next(slice, "the length of field names")?.count(0);
+    let names = Element::next(slice, "field names")?;
     if length == 0 {
-        return Err(Broken::new(names.offset, "names of 0 bytes", "some"));
+        return Err(Broken::new(
+            names.offset,
+            "field names of 0 bytes",
+            "at least 1 byte",
+        ));
     }
     for field in names.bytes.chunks(length) {
         let element = Element::next(slice, "a field")?;

@@ -1,7 +1,7 @@
 //! MCAP: messages of ROS 1 and 2, Protocol Buffers and JSON whose schemas are in the file.
 //!
-//! Source: mcap.dev, "MCAP Format Specification": magic bytes, then records of an opcode, a length of eight bytes
-//! and content; chunks hold records, packed.
+//! Source: mcap.dev, "MCAP Format Specification": magic bytes, then records with an opcode, an eight-byte length and
+//! content; chunks contain compressed records.
 
 use std::collections::BTreeMap;
 
@@ -41,11 +41,11 @@ struct Schema {
 struct Mcap {
     input: Input,
     schemas: BTreeMap<u16, Schema>,
-    /// Records of the chunk that is read, and how far it is.
+    /// Records of the current chunk, and the position in it.
     chunk: Vec<u8>,
     at: usize,
     record: Vec<u8>,
-    /// Where the record, or the chunk that it is in, is.
+    /// Offset of the record or of its chunk.
     offset: u64,
     is_ended: bool,
 }
@@ -78,17 +78,21 @@ impl Messages for Mcap {
 }
 
 impl Mcap {
-    /// Takes the next record, from the chunk if one is open; its opcode, or none at the end of the data.
+    /// Reads the next record, from the chunk if one is open; returns its opcode, or `None` at the end of the data.
     fn next_record(&mut self) -> Result<Option<u8>, Broken> {
         if self.at < self.chunk.len() {
             let mut chunk = Slice::packed(&self.chunk[self.at..], self.offset);
-            let kind = chunk.whole(1, "a record's kind")? as u8;
-            let content = chunk.measured(8, "a record of a chunk")?;
+            let kind = chunk.whole(1, "the type of a record")? as u8;
+            let content = chunk.measured(8, "a record in a chunk")?;
             self.record.clear();
             self.record.extend_from_slice(content);
             self.at += chunk.position();
             if kind == CHUNK {
-                return Err(Broken::new(self.offset, "a chunk in a chunk", "messages"));
+                return Err(Broken::new(
+                    self.offset,
+                    "a chunk inside a chunk",
+                    "messages",
+                ));
             }
             return Ok(Some(kind));
         }
@@ -97,10 +101,10 @@ impl Mcap {
         }
         self.offset = self.input.offset();
         self.input
-            .take(9, &mut self.record, "a record's kind and length")?;
+            .take(9, &mut self.record, "the type and length of a record")?;
         let mut head = Slice::new(&self.record, self.offset);
-        let kind = head.whole(1, "a record's kind")? as u8;
-        let length = head.whole(8, "a record's length")?;
+        let kind = head.whole(1, "the type of a record")? as u8;
+        let length = head.whole(8, "the length of a record")?;
         if matches!(kind, SCHEMA | CHANNEL | MESSAGE | CHUNK) {
             self.input.take(length, &mut self.record, "a record")?;
         } else if (1..=DATA_END).contains(&kind) || kind >= 0x80 {
@@ -108,8 +112,8 @@ impl Mcap {
         } else {
             return Err(Broken::new(
                 self.offset,
-                format_args!("a record of kind {kind}"),
-                "one of MCAP's kinds",
+                format_args!("a record of type {kind}"),
+                "a record type of MCAP",
             ));
         }
         Ok(Some(kind))
@@ -120,7 +124,7 @@ impl Mcap {
         record.take(16, "the times of a chunk")?;
         let size = record.whole(8, "the size of a chunk")?;
         let sum = record.whole(4, "the checksum of a chunk")? as u32;
-        let method = record.measured_text(4, "how a chunk is packed")?;
+        let method = record.measured_text(4, "the compression of a chunk")?;
         let packed = record.measured(8, "a chunk")?;
         self.chunk = unpack(&method, packed, size, self.offset)?;
         self.at = 0;
@@ -132,7 +136,7 @@ impl Mcap {
             return Err(Broken::new(
                 self.offset,
                 format_args!("a chunk with the checksum {:08x}", found.sum()),
-                format_args!("{sum:08x}, as it was written"),
+                format_args!("{sum:08x}"),
             ));
         }
         Ok(())
@@ -140,9 +144,9 @@ impl Mcap {
 
     fn schema(&mut self) -> Result<(), Broken> {
         let mut record = Slice::packed(&self.record, self.offset);
-        let number = record.whole(2, "a schema's number")? as u16;
-        let name = record.measured_text(4, "a schema's name")?;
-        let encoding = record.measured_text(4, "a schema's encoding")?;
+        let number = record.whole(2, "a schema number")? as u16;
+        let name = record.measured_text(4, "a schema name")?;
+        let encoding = record.measured_text(4, "a schema encoding")?;
         let data = record.measured(4, "a schema")?.to_vec();
         let schema = Schema {
             name,
@@ -155,15 +159,15 @@ impl Mcap {
 
     fn channel(&self, topics: &mut Topics) -> Result<(), Broken> {
         let mut record = Slice::packed(&self.record, self.offset);
-        let number = record.whole(2, "a channel's number")? as u16;
-        let schema = record.whole(2, "a schema's number")? as u16;
+        let number = record.whole(2, "a channel number")? as u16;
+        let schema = record.whole(2, "a schema number")? as u16;
         let topic = record.measured_text(4, "a topic")?;
-        let encoding = record.measured_text(4, "an encoding of messages")?;
+        let encoding = record.measured_text(4, "a message encoding")?;
         let reader = || match self.schemas.get(&schema) {
             Some(schema) => reader(&encoding, schema),
             None if encoding == "json" => Reader::Json(Vec::new()),
             None => Reader::Unknown(format!(
-                "messages of encoding `{encoding}` without a schema are not read"
+                "turncal cannot read messages of encoding `{encoding}` without a schema"
             )),
         };
         topics.add(number.into(), &topic, reader);
@@ -173,8 +177,8 @@ impl Mcap {
     /// Channel and time of a message.
     fn message(&self) -> Result<(u32, u64), Broken> {
         let mut record = Slice::packed(&self.record, self.offset);
-        let channel = record.whole(2, "a channel's number")? as u16;
-        record.take(4, "a message's number")?;
+        let channel = record.whole(2, "a channel number")? as u16;
+        record.take(4, "a message number")?;
         let time = record.whole(8, "a time")?;
         record.take(8, "a time")?;
         Ok((channel.into(), time))
@@ -189,10 +193,10 @@ fn reader(encoding: &str, schema: &Schema) -> Reader {
         ("json", _) => Reader::Json(Vec::new()),
         ("protobuf", "protobuf") => match protobuf::Message::parse(&schema.name, &schema.data) {
             Some(message) => Reader::Protobuf(message),
-            None => Reader::Unknown("its descriptor cannot be read".to_owned()),
+            None => Reader::Unknown("its descriptor is invalid".to_owned()),
         },
         (encoding, schema) => Reader::Unknown(format!(
-            "messages of encoding `{encoding}` with a schema of `{schema}` are not read"
+            "turncal cannot read messages of encoding `{encoding}` with a schema of `{schema}`"
         )),
     }
 }

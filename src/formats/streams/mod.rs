@@ -1,6 +1,6 @@
-//! Logs as other programs write them: a file gives streams of samples.
+//! Logs of other programs: a file provides streams of samples.
 //!
-//! A format is identified by the file's first bytes, never by its name. Each is a feature of the crate.
+//! A format is identified by the first bytes of the file, never by its name. Each format is a feature of the crate.
 
 #[cfg(any(feature = "hdf5", feature = "mat", feature = "npy"))]
 mod arrays;
@@ -43,7 +43,7 @@ pub(super) use rows::{Found, StreamRows, survey};
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Column {
     pub name: String,
-    /// As `run.toml` writes it, empty where the file does not say it.
+    /// In the spelling of `run.toml`; empty if not stated.
     pub unit: &'static str,
 }
 
@@ -60,39 +60,39 @@ impl Column {
 /// Samples of one kind from one source.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Stream {
-    /// As `run.toml` names it.
+    /// Its name in `run.toml`.
     pub name: String,
-    /// Empty until its first sample where only that shows them.
+    /// Empty until its first sample, if only that defines them.
     pub columns: Vec<Column>,
-    /// What was done to its values or must be known of them, a sentence each.
+    /// Remarks on its values, one sentence each.
     pub remarks: Vec<String>,
-    /// Whether it may be an instrument's, as far as the format tells.
+    /// Whether it may belong to an instrument, according to the format.
     pub is_inertial: bool,
-    /// The word for its body axes, where the format has a convention.
+    /// Name of its body axes, if the format has a convention.
     pub axes: Option<&'static str>,
 }
 
-/// A file that gives streams of samples, read from its begin to its end.
+/// A file that provides streams of samples, read sequentially.
 pub trait Log {
     /// The streams found up to here.
     fn streams(&self) -> &[Stream];
 
-    /// Goes to the next sample of any stream, and says of which; `None` at the end of the file.
+    /// Advances to the next sample of any stream and returns the stream; `None` at the end of the file.
     fn advance(&mut self) -> Result<Option<usize>, Broken>;
 
-    /// The values of the sample, one for each column of its stream; NaN where there is no number.
+    /// The values of the sample, one for each column of its stream; NaN for missing numbers.
     fn values(&mut self, row: &mut Vec<f64>) -> Result<(), Broken>;
 
-    /// The whole number in a column of the sample whose values were asked for, where it has more digits than they.
+    /// The exact whole number in a column of the current sample, if it has more digits than its value.
     fn whole(&self, _column: usize) -> Option<i128> {
         None
     }
 
-    /// Where the sample is in the file, bytes.
+    /// Offset of the sample in the file, bytes.
     fn offset(&self) -> u64;
 }
 
-/// A format of logs, with the feature that reads it and what its files begin with.
+/// A log format, with its feature and the first bytes of its files.
 struct Format {
     name: &'static str,
     feature: &'static str,
@@ -102,7 +102,7 @@ struct Format {
 
 type Open = fn(Input) -> Result<Box<dyn Log>, Broken>;
 
-/// A row a format: feature, reader, name, and what its files begin with.
+/// One row per format: feature, reader, name, and first bytes.
 macro_rules! formats {
     ($($feature:literal $open:path, $name:literal, $begins:expr;)*) => {
         [$(Format {
@@ -121,7 +121,8 @@ static FORMATS: [Format; 9] = formats! {
     "ulog" ulog::open, "a PX4 ULog file", [b"ULog\x01\x12\x35"];
     "dataflash" dataflash::open, "an ArduPilot DataFlash log", [b"\xa3\x95\x80"];
     "mat" mat::open, "a MAT file", [b"MATLAB 5.0 MAT-file"];
-    "hdf5" hdf5::open, "an HDF5 file, as MAT files of version 7.3 are", [b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3 MAT-file"];
+    "hdf5" hdf5::open, "an HDF5 file (MAT files of version 7.3 included)", [b"\x89HDF\r\n\x1a\n", b"MATLAB 7.3 \
+        MAT-file"];
     "mcap" mcap::open, "an MCAP file", [b"\x89MCAP0\r\n"];
     "rosbag" rosbag::open, "a ROS 1 bag", [b"#ROSBAG V2.0\n"];
     "rosbag" rosbag2::open, "a ROS 2 bag", [b"SQLite format 3\0"];
@@ -129,21 +130,21 @@ static FORMATS: [Format; 9] = formats! {
     "npy" npy::open_archive, "a ZIP archive of NumPy arrays", [b"PK\x03\x04"];
 };
 
-/// What files begin with that turncal does not read, what they are, and what to do.
+/// Unsupported files: first bytes, name and remedy.
 const CLOSED: [(&[u8], &str, &str); 2] = [
     (
         b"PAR1",
         "a Parquet file",
-        "Save it as CSV, in Python by pandas.read_parquet(file).to_csv('imu.csv', index=False).",
+        "Save it as CSV, in Python with pandas.read_parquet(file).to_csv('imu.csv', index=False).",
     ),
     (
         b"\xd0\xcf\x11\xe0",
-        "a workbook of Excel",
+        "an Excel workbook",
         "Save the sheet as CSV.",
     ),
 ];
 
-/// Opens a log by its content; `None` if it is no such log, but perhaps rows of text.
+/// Opens a log according to its content; `None` if it is not such a log, but perhaps text.
 pub fn open(path: &Path) -> Result<Option<Box<dyn Log>>, FileError> {
     let refused = |error: std::io::Error| {
         FileError::io(
@@ -165,7 +166,7 @@ pub fn open(path: &Path) -> Result<Option<Box<dyn Log>>, FileError> {
         .map_err(refused)?;
     let closed = CLOSED.iter().find(|(bytes, ..)| begin.starts_with(bytes));
     if let Some((_, found, advice)) = closed {
-        let expected = "rows of text, or a log of a program that turncal knows";
+        let expected = "a text log or a supported binary log";
         return Err(FileError::new(path, Place::File, found, expected, advice));
     }
     let Some(format) = FORMATS.iter().find(|format| format.is_of(&begin)) else {
@@ -175,7 +176,7 @@ pub fn open(path: &Path) -> Result<Option<Box<dyn Log>>, FileError> {
         return Err(FileError::new(
             path,
             Place::File,
-            format_args!("{}, which this build does not read", format.name),
+            format_args!("{}, which this build cannot read", format.name),
             format_args!("a build with the feature `{}`", format.feature),
             "Build turncal with its default features, or convert the file to CSV.",
         ));
@@ -196,7 +197,7 @@ impl Format {
 }
 
 impl Broken {
-    /// As the error of a file.
+    /// Converts to a file error.
     fn of(&self, file: &Path, advice: &str) -> FileError {
         // Zero where the format does not tell the place.
         let place = match self.offset {

@@ -1,4 +1,4 @@
-//! NumPy's arrays, single (`.npy`) and in an archive (`.npz`).
+//! NumPy arrays, single (`.npy`) and in an archive (`.npz`).
 //!
 //! Arrays of the same number of rows are one stream; an array of several columns gives `name[0]`, `name[1]`, …
 //!
@@ -20,9 +20,9 @@ use super::arrays::{Array, Arrays, Open};
 use super::bytes::{Broken, Input, Source};
 use header::Header;
 
-/// A header is a few names.
+/// Maximum header length.
 const LONGEST_HEADER: u64 = 1 << 20;
-/// What is read at a time, of each column that lies by itself.
+/// Bytes read at once per separate column.
 const AT_ONCE: usize = 1 << 14;
 
 pub fn open_array(input: Input) -> Result<Box<dyn Log>, Broken> {
@@ -63,7 +63,7 @@ pub fn open_archive(input: Input) -> Result<Box<dyn Log>, Broken> {
         });
     }
     if members.is_empty() {
-        let expected = "arrays `NAME.npy`; save the sheet of a workbook as CSV";
+        let expected = "arrays `NAME.npy` (save the sheet of a workbook as CSV)";
         return Err(Broken::new(0, "a ZIP archive without arrays", expected));
     }
     let file: File = Rc::new(RefCell::new(archive.into_inner()));
@@ -76,7 +76,7 @@ pub fn open_archive(input: Input) -> Result<Box<dyn Log>, Broken> {
     Ok(Box::new(Arrays::new(arrays).with_remarks(&remarks)))
 }
 
-/// A file that several read at their own places.
+/// A file shared by several readers at different offsets.
 type File = Rc<RefCell<Box<dyn Source>>>;
 
 struct At {
@@ -94,15 +94,15 @@ impl Read for At {
     }
 }
 
-/// A file of an array, by itself or in an archive.
+/// An array file, single or in an archive.
 #[derive(Clone)]
 struct Member {
     name: String,
-    /// Where its bytes are in the file, how many and how many unpacked.
+    /// Offset, packed size and unpacked size of its bytes.
     begin: u64,
     packed: u64,
     size: u64,
-    /// What their check sum has to be.
+    /// Expected checksum.
     sum: Option<u32>,
     offset: u64,
     is_deflated: bool,
@@ -126,7 +126,7 @@ impl Member {
         }
     }
 
-    /// The array, and what of it is left out.
+    /// The array, and its omitted parts.
     fn array(self, file: &File) -> Result<(Array, Option<String>), Broken> {
         let header = Header::read(&mut self.open(file), &self.name, self.offset)?;
         let left_out = header.left_out();
@@ -149,7 +149,7 @@ impl Member {
     }
 }
 
-/// Bytes whose check sum is looked at where they end.
+/// Bytes whose checksum is verified at the end.
 struct Checked {
     bytes: CrcReader<Box<dyn Read>>,
     sum: u32,
@@ -159,7 +159,7 @@ impl Read for Checked {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
         let count = self.bytes.read(into)?;
         if count == 0 && !into.is_empty() && self.bytes.crc().sum() != self.sum {
-            let what = "its check sum is not that of the archive";
+            let what = "its checksum differs from that in the archive";
             return Err(io::Error::new(io::ErrorKind::InvalidData, what));
         }
         Ok(count)

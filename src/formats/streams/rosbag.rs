@@ -1,7 +1,7 @@
 //! ROS 1 bags, version 2.0.
 //!
-//! Source: wiki.ros.org/Bags/Format/2.0: a line of the version, then records of a head (fields `name=value`) and
-//! data; chunks hold connections and messages, packed.
+//! Source: wiki.ros.org/Bags/Format/2.0: a version line, then records with a header (fields `name=value`) and data;
+//! chunks contain compressed connections and messages.
 
 use super::Log;
 use super::bytes::{Broken, Input, Slice};
@@ -29,12 +29,12 @@ pub fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
 
 struct Bag {
     input: Input,
-    /// Records of the chunk that is read, and how far it is.
+    /// Records of the current chunk, and the position in it.
     chunk: Vec<u8>,
     at: usize,
     head: Vec<u8>,
     data: Vec<u8>,
-    /// Where the record, or the chunk that it is in, is.
+    /// Offset of the record or of its chunk.
     offset: u64,
 }
 
@@ -63,7 +63,7 @@ impl Messages for Bag {
                     return Err(Broken::new(
                         self.offset,
                         "a record without `op`",
-                        "its kind",
+                        "its record type",
                     ));
                 }
             }
@@ -81,17 +81,21 @@ impl Messages for Bag {
 }
 
 impl Bag {
-    /// Takes the next record, from the chunk if one is open; false at the end.
+    /// Reads the next record, from the chunk if one is open; false at the end.
     fn next_record(&mut self) -> Result<bool, Broken> {
         if self.at < self.chunk.len() {
             let mut chunk = Slice::packed(&self.chunk[self.at..], self.offset);
             for part in [&mut self.head, &mut self.data] {
                 part.clear();
-                part.extend_from_slice(chunk.measured(4, "a record of a chunk")?);
+                part.extend_from_slice(chunk.measured(4, "a record in a chunk")?);
             }
             self.at += chunk.position();
             if Head::of(&self.head, self.offset)?.field("op") == Some(&[CHUNK]) {
-                return Err(Broken::new(self.offset, "a chunk in a chunk", "messages"));
+                return Err(Broken::new(
+                    self.offset,
+                    "a chunk inside a chunk",
+                    "messages",
+                ));
             }
             return Ok(true);
         }
@@ -124,7 +128,7 @@ impl Bag {
     }
 }
 
-/// Fields by their names.
+/// Fields by name.
 struct Head<'a> {
     fields: Vec<(&'a [u8], &'a [u8])>,
     offset: u64,
@@ -159,7 +163,7 @@ impl<'a> Head<'a> {
             Broken::new(
                 self.offset,
                 format_args!("no `{name}` of {size} bytes"),
-                "it",
+                "this field",
             )
         })?;
         Slice::new(field, self.offset).whole(size, name)

@@ -9,7 +9,7 @@ use super::bytes::{Broken, Input};
 use super::messages::{MessageLog, Messages, Reader, Topics, ros::Encoding};
 use super::sqlite::{Database, Row, Table};
 
-/// The definition of `sensor_msgs/msg/Imu`, which earlier bags lack.
+/// Definition of `sensor_msgs/msg/Imu`, missing in earlier bags.
 const IMU: &str = "std_msgs/Header header
 geometry_msgs/Quaternion orientation
 float64[9] orientation_covariance
@@ -52,7 +52,7 @@ pub fn open(input: Input) -> Result<Box<dyn Log>, Broken> {
             }
         }
     }
-    let missing = |name| Broken::new(0, format!("no table `{name}`"), "a bag of ROS 2");
+    let missing = |name| Broken::new(0, format!("no table `{name}`"), "a ROS 2 bag");
     let mut topics = Topics::default();
     let mut table = database.table("topics")?.ok_or_else(|| missing("topics"))?;
     while let Some(row) = database.next(&mut table)? {
@@ -63,7 +63,7 @@ pub fn open(input: Input) -> Result<Box<dyn Log>, Broken> {
         let reader = || match definitions.get(&kind).filter(|_| encoding == "cdr") {
             Some(definition) => Reader::of_ros(&kind, definition, Encoding::Cdr),
             None => Reader::Unknown(format!(
-                "messages `{kind}` of encoding `{encoding}` are not read, because the bag does not define them"
+                "turncal cannot read messages `{kind}` of encoding `{encoding}` because the bag does not define them"
             )),
         };
         let number = row.get("id").whole().unwrap_or(0) as u32;

@@ -16,24 +16,24 @@ pub struct StreamRows {
     name: String,
     names: Vec<String>,
     units: Vec<String>,
-    /// Whether what is whole before a damage is used.
+    /// Whether the intact part before damage is used.
     salvage: bool,
     damage: Option<Broken>,
     row: Vec<f64>,
-    /// Samples of the stream so far, with this one.
+    /// Number of samples of the stream so far, including this one.
     samples: u64,
-    /// Whether the row is the first and was not given out yet.
+    /// Whether the row is the first and has not been returned yet.
     is_ahead: bool,
 }
 
-/// A stream with what a look over the whole file shows of it.
+/// A stream with its statistics from the whole file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
     pub stream: Stream,
     pub samples: u64,
 }
 
-/// All streams of a log that have samples, and the error of the place where it is damaged.
+/// All streams of a log with samples, and the error at the first damage.
 pub fn survey(file: &Path, mut log: Box<dyn Log>) -> (Vec<Found>, Option<FileError>) {
     let mut samples: Vec<u64> = Vec::new();
     let mut row = Vec::new();
@@ -66,7 +66,7 @@ const CUT_OFF: &str = "Copy or record the file again, or set `salvage = true` to
                        before this point.";
 
 impl StreamRows {
-    /// Opens a stream, which must have a sample; without a name the only one.
+    /// Opens a stream, which must have a sample; without a name, the only one.
     pub fn open(
         file: &Path,
         mut log: Box<dyn Log>,
@@ -155,7 +155,7 @@ impl Rows for StreamRows {
         &self.log.streams()[self.stream].remarks
     }
 
-    /// False also at a damage where what is before it is to be used.
+    /// Also false at damage if the part before it is to be used.
     fn advance(&mut self, _used: &[usize]) -> Result<bool, FileError> {
         if self.is_ahead {
             self.is_ahead = false;
@@ -182,7 +182,7 @@ impl Rows for StreamRows {
             expected,
         } = self.damage.as_ref()?;
         Some(format!(
-            "{}, byte {offset}: found {found}, expected {expected}; the {} samples of `{}` before it are used.",
+            "{}, byte {offset}: found {found}, expected {expected}. turncal used the {} samples of `{}` before it.",
             self.file.display(),
             self.samples,
             self.name
@@ -226,15 +226,18 @@ impl Rows for StreamRows {
     }
 }
 
-/// A log of which no stream with samples can be meant.
+/// Error for a log without a matching stream with samples.
 fn no_stream(file: &Path, log: &dyn Log, with_samples: &[usize], name: Option<&str>) -> FileError {
     let names = || with_samples.iter().map(|&k| &*log.streams()[k].name);
     let (found, expected) = match name {
-        _ if with_samples.is_empty() => ("no samples".to_owned(), "streams of samples".to_owned()),
+        _ if with_samples.is_empty() => (
+            "no samples".to_owned(),
+            "at least one stream of samples".to_owned(),
+        ),
         name => (
             format!("the streams {}", list(names())),
             name.map_or_else(
-                || "one stream, or `stream` in run.toml".to_owned(),
+                || "one stream or `stream` in run.toml".to_owned(),
                 |name| format!("a stream `{name}` with samples"),
             ),
         ),
@@ -247,7 +250,7 @@ fn no_stream(file: &Path, log: &dyn Log, with_samples: &[usize], name: Option<&s
     FileError::new(file, Place::File, found, expected, advice)
 }
 
-/// Whether this is the stream's name, which may leave out that it is the first instance.
+/// Whether this is the name of the stream; the index of the first instance may be omitted.
 fn is_called(stream: &str, name: &str) -> bool {
     stream == name || stream.strip_suffix("[0]") == Some(name)
 }
@@ -256,8 +259,8 @@ fn changed(file: &Path) -> FileError {
     FileError::new(
         file,
         Place::File,
-        "another file than a moment ago",
-        "a file that stays as it is",
-        "Wait until it is written, and try again.",
+        "a file that changed while it was read",
+        "an unchanged file",
+        "Wait until it is complete, then try again.",
     )
 }

@@ -7,11 +7,11 @@ use super::bytes::{Broken, Input, Slice};
 const HEADER: usize = 100;
 const INTERIOR: u64 = 5;
 const LEAF: u64 = 13;
-/// Pages within pages: a tree of 2³² pages is less deep.
+/// Maximum depth of pages; a tree of 2³² pages is less deep.
 const DEEPEST: usize = 32;
 
 pub enum Value {
-    /// Or a number that is not whole, which is in none of the columns that are read.
+    /// Null, or a real number, which does not occur in the columns read.
     Null,
     Whole(i64),
     Bytes(Vec<u8>),
@@ -37,12 +37,12 @@ impl Value {
     }
 }
 
-/// Values by the names of the table's columns.
+/// Values by column name.
 #[derive(Default)]
 pub struct Row {
     columns: Vec<String>,
     values: Vec<Value>,
-    /// Where it is in the file.
+    /// Its offset in the file.
     pub offset: u64,
 }
 
@@ -55,18 +55,18 @@ impl Row {
     }
 }
 
-/// A place in a table.
+/// A position in a table.
 pub struct Table {
     columns: Vec<String>,
-    /// Pages on the way to it, each with the next of its cells.
+    /// Pages from the root, each with its next cell.
     pages: Vec<(Page, usize)>,
-    /// Pages that may still be read: a damaged tree may turn back on itself.
+    /// Remaining number of pages to read, because a damaged tree may contain a loop.
     left: u64,
 }
 
 struct Page {
     bytes: Vec<u8>,
-    /// Where it is in the file, and its own header in it.
+    /// Its offset in the file, and the offset of its header.
     offset: u64,
     begin: usize,
     is_leaf: bool,
@@ -76,7 +76,7 @@ struct Page {
 pub struct Database {
     input: Input,
     page: usize,
-    /// Bytes of a page that are used.
+    /// Usable bytes of a page.
     usable: usize,
     length: u64,
 }
@@ -87,14 +87,14 @@ impl Database {
         let mut bytes = Vec::new();
         input.take(HEADER as u64, &mut bytes, "the header")?;
         let mut header = big_endian(&bytes[16..], 16);
-        let page = match header.whole(2, "the size of a page")? {
+        let page = match header.whole(2, "the page size")? {
             1 => 1 << 16,
             size => size as usize,
         };
         header.take(2, "versions")?;
         let usable = page.saturating_sub(header.whole(1, "reserved bytes")? as usize);
         if !page.is_power_of_two() || usable < 480 {
-            let found = format_args!("pages of {page} bytes, {usable} of them in use");
+            let found = format_args!("pages of {page} bytes with {usable} usable bytes");
             return Err(Broken::new(16, found, "pages of 512 to 65536 bytes"));
         }
         Ok(Self {
@@ -105,7 +105,7 @@ impl Database {
         })
     }
 
-    /// The begin of a table; `None` if there is no table of this name.
+    /// The start of a table; `None` if no table has this name.
     pub fn table(&mut self, name: &str) -> Result<Option<Table>, Broken> {
         let columns = ["type", "name", "tbl_name", "rootpage", "sql"];
         let mut schema = self.begin(1, columns.map(str::to_owned).to_vec())?;
@@ -130,7 +130,7 @@ impl Database {
     fn read(&mut self, number: u64) -> Result<Page, Broken> {
         let place = number.checked_sub(1);
         let offset = place.and_then(|place| place.checked_mul(self.page as u64));
-        let wrong = |found| Broken::new(self.input.offset(), found, "a page of a table");
+        let wrong = |found| Broken::new(self.input.offset(), found, "a table page");
         let offset = offset.filter(|&offset| offset < self.length);
         let offset = offset.ok_or_else(|| wrong(format!("page {number}")))?;
         let mut bytes = Vec::new();
@@ -138,14 +138,14 @@ impl Database {
         self.input.take(self.page as u64, &mut bytes, "a page")?;
         let begin = if number == 1 { HEADER } else { 0 };
         let mut header = big_endian(&bytes[begin..], offset);
-        let kind = header.whole(1, "the kind of a page")?;
-        header.take(2, "a free block")?;
-        let cells = header.whole(2, "a count of cells")? as usize;
+        let kind = header.whole(1, "the page type")?;
+        header.take(2, "a free-block pointer")?;
+        let cells = header.whole(2, "the number of cells")? as usize;
         if kind != LEAF && kind != INTERIOR {
             return Err(Broken::new(
                 offset,
-                format!("a page of kind {kind}"),
-                "a page of a table",
+                format!("a page of type {kind}"),
+                "a table page",
             ));
         }
         Ok(Page {
@@ -181,16 +181,16 @@ impl Database {
                 continue;
             }
             let child = match cell < page.cells {
-                true => page.cell(cell)?.whole(4, "a page's number")?,
+                true => page.cell(cell)?.whole(4, "a page number")?,
                 // Behind all cells.
                 false => {
                     let mut header = big_endian(&page.bytes[page.begin + 8..], page.offset);
-                    header.whole(4, "a page's number")?
+                    header.whole(4, "a page number")?
                 }
             };
             if table.pages.len() > DEEPEST || table.left == 0 {
                 let offset = self.input.offset();
-                return Err(Broken::new(offset, "pages without end", "a tree of pages"));
+                return Err(Broken::new(offset, "a loop of pages", "a tree of pages"));
             }
             table.left -= 1;
             let page = self.read(child)?;
@@ -198,7 +198,7 @@ impl Database {
         }
     }
 
-    /// Number and content of a row, the end of which may be on further pages.
+    /// Number and content of a row, which may continue on overflow pages.
     fn payload(&mut self, cell: &mut Slice) -> Result<(i64, Vec<u8>), Broken> {
         let offset = cell.offset();
         let size = varint(cell)?;
@@ -207,7 +207,7 @@ impl Database {
             return Err(Broken::new(
                 offset,
                 format!("a row of {size} bytes"),
-                "one within the file",
+                "a row within the file",
             ));
         }
         let (size, usable) = (size as usize, self.usable);
@@ -222,16 +222,17 @@ impl Database {
         if local == size {
             return Ok((id, payload));
         }
-        let mut next = cell.whole(4, "an overflow page's number")?;
+        let mut next = cell.whole(4, "an overflow page number")?;
         let mut bytes = Vec::new();
         while payload.len() < size {
             let place = next.checked_sub(1).map(|place| place * self.page as u64);
-            let place = place.ok_or_else(|| Broken::new(offset, "a row cut off", "all of it"))?;
+            let place =
+                place.ok_or_else(|| Broken::new(offset, "a truncated row", "a complete row"))?;
             self.input.go_to(place)?;
             self.input
                 .take(usable as u64, &mut bytes, "an overflow page")?;
             let mut page = big_endian(&bytes, place);
-            next = page.whole(4, "an overflow page's number")?;
+            next = page.whole(4, "an overflow page number")?;
             let part = (size - payload.len()).min(page.left());
             payload.extend(page.take(part, "an overflow page")?);
         }
@@ -243,10 +244,10 @@ impl Page {
     fn cell(&self, number: usize) -> Result<Slice<'_>, Broken> {
         let pointers = self.begin + if self.is_leaf { 8 } else { 12 };
         let pointer = self.bytes.get(pointers + 2 * number..).unwrap_or_default();
-        let place = big_endian(pointer, self.offset).whole(2, "a cell's place")? as usize;
+        let place = big_endian(pointer, self.offset).whole(2, "a cell pointer")? as usize;
         let cell = self.bytes.get(place..).ok_or_else(|| {
             let found = format!("a cell at byte {place} of a page");
-            Broken::new(self.offset, found, "one within it")
+            Broken::new(self.offset, found, "a position within the page")
         })?;
         Ok(big_endian(cell, self.offset + place as u64))
     }
@@ -256,7 +257,7 @@ fn big_endian(bytes: &[u8], offset: u64) -> Slice<'_> {
     Slice::new(bytes, offset).in_order(true)
 }
 
-/// Seven bits a byte, the first ones first; the ninth byte has eight.
+/// A variable-length integer: seven bits per byte, most significant first; the ninth byte has eight.
 fn varint(slice: &mut Slice) -> Result<u64, Broken> {
     let mut value = 0;
     for byte in 0..9 {
@@ -272,12 +273,12 @@ fn varint(slice: &mut Slice) -> Result<u64, Broken> {
     Ok(value)
 }
 
-/// The values of a row, its number standing in for one that is left out.
+/// The values of a row; its number replaces an omitted one.
 fn record(payload: &[u8], id: i64, offset: u64) -> Result<Vec<Value>, Broken> {
     let mut values = Slice::packed(payload, offset).in_order(true);
     let head = varint(&mut values)? as usize;
     let begin = values.position();
-    let types = values.take(head.saturating_sub(begin), "the types of a row")?;
+    let types = values.take(head.saturating_sub(begin), "the column types of a row")?;
     let mut types = Slice::packed(types, offset);
     let mut row = Vec::new();
     while types.left() > 0 {
@@ -303,7 +304,7 @@ fn record(payload: &[u8], id: i64, offset: u64) -> Result<Vec<Value>, Broken> {
     Ok(row)
 }
 
-/// The names of a table's columns by the statement that made it.
+/// Column names of a table, from its CREATE statement.
 fn columns_of(sql: &str) -> Vec<String> {
     let (_, columns) = sql.split_once('(').unwrap_or_default();
     let names = columns

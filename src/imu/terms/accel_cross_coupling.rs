@@ -9,7 +9,7 @@ pub const ENTRY: TermEntry = TermEntry {
     name: "accel-cross-coupling",
     title: "accel cross coupling",
     help: "Accelerometers: products of specific force along two axes",
-    adds: "q times the product of these two of f along its axis to f",
+    adds: "adds q times the product of these two components of f to f, along its axis",
     // Accelerometer, then the components that are multiplied.
     parameters: (
         "accel.cross_coupling",

@@ -8,7 +8,7 @@ pub const ENTRY: TermEntry = TermEntry {
     name: "accel-second-order",
     title: "accel second order",
     help: "Accelerometers: square of specific force",
-    adds: "q f^2 along its axis to f",
+    adds: "adds q f^2 to f, along its axis",
     sensor: Sensor::Accel,
     unit: ("µg/g²", MICRO_G / (STANDARD_GRAVITY * STANDARD_GRAVITY)),
     si_unit: "s^2/m",

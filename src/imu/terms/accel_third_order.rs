@@ -8,7 +8,7 @@ pub const ENTRY: TermEntry = TermEntry {
     name: "accel-third-order",
     title: "accel third order",
     help: "Accelerometers: third power of specific force",
-    adds: "q f^3 along its axis to f",
+    adds: "adds q f^3 to f, along its axis",
     sensor: Sensor::Accel,
     unit: (
         "µg/g³",

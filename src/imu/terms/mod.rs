@@ -1,8 +1,8 @@
-//! Error terms of an instrument, in addition to `K`, `E` and `D`: each adds `t(q)` to the input of a triad,
-//! `N = K C (u + t(q)) + D`, with parameters `q` of its own.
+//! Error terms of an instrument, in addition to `K`, `E` and `D`: each adds `t(q)` to the input of a triad, `N = K C (u
+//! + t(q)) + D`, with its own parameters `q`.
 //!
-//! A term is a [`TermEntry`] in a file of its own and a line of the registry below. Options, files,
-//! simulation, estimation, budget, report and exports read the entry.
+//! A term is a [`TermEntry`] in a separate file and a line of the registry below. Options, files, simulation,
+//! estimation, budget, report and exports read the entry.
 //!
 //! Source: IEEE Std 1293-2018, §5.3 (accelerometers: second and third order, cross coupling,
 //! asymmetry); IEEE Std 952-2020, §5 (gyros: acceleration sensitivity, asymmetry and nonlinearity of the
@@ -62,7 +62,7 @@ registry! {
     AccelAsymmetry: asymmetry::ACCEL,
     /// Accelerometers x and y are displaced from z by lever arms in m along body axes.
     SizeEffect: size_effect::ENTRY,
-    /// Accelerometer samples refer to a time q later than the gyros', in s.
+    /// Accelerometer samples refer to a time q later than gyro samples, in s.
     TimeOffset: time_offset::ENTRY,
     /// Gyros add `Q f`, Q row by row, in rad/s per m/s².
     GSensitivity: g_sensitivity::ENTRY,

@@ -1,4 +1,4 @@
-//! Size effect: accelerometers x and y are displaced from z by lever arms r_x and r_y and also sense row i of
+//! Size effect: accelerometers x and y are displaced from z by lever arms r_x and r_y and therefore also sense row i of
 //! `([ω̇×] + [ω×]²) r_i`. A lever arm common to all three is not observable from dwells.
 
 use super::entry::{Columns, REFERENCE_RATE, Sensed, TermEntry, set_rows};
@@ -8,7 +8,7 @@ use crate::units::STANDARD_GRAVITY;
 pub const ENTRY: TermEntry = TermEntry {
     name: "size-effect",
     title: "accel lever arm",
-    help: "Accelerometers: lever arms between the three",
+    help: "Accelerometers: lever arms between the three sensors",
     adds: "its row of ([w' x] + [w x]^2) r to f, r the lever arm",
     sensor: Sensor::Accel,
     unit: ("mm", 1e-3),

@@ -1,5 +1,5 @@
-//! Accelerometer samples refer to a time q later than the gyros', in s: if the body keeps its
-//! position and turns by θ in that time, they are `exp(−[θ×]) f`, or `f − q (ω − ω_ie) × f` to first order.
+//! Accelerometer samples refer to a time q later than gyro samples, in s: if the body stays in place and rotates by θ
+//! in that time, they are `exp(−[θ×]) f`, or `f − q (ω − ω_ie) × f` to first order.
 
 use nalgebra::Vector3;
 
@@ -10,7 +10,7 @@ use crate::imu::Sensor;
 pub const ENTRY: TermEntry = TermEntry {
     name: "time-offset",
     title: "accel time offset",
-    help: "Accelerometers: delay of their samples behind the gyros'",
+    help: "Accelerometers: delay of their samples relative to the gyros",
     adds: "-q w x f to f, accelerometers sampled later",
     sensor: Sensor::Accel,
     unit: ("ms", 1e-3),

@@ -1,4 +1,4 @@
-//! A segment that has its place in time, and what moves in it.
+//! A segment placed in time, with its motion.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -11,7 +11,7 @@ use crate::units::STANDARD_GRAVITY;
 const SPEED: usize = 0;
 const HEIGHT: usize = 2;
 
-/// A segment that has its place in time; speed, heading and height in this order.
+/// A segment placed in time; speed, heading and height, in this order.
 #[derive(Debug, Clone, Copy)]
 pub struct Leg {
     start: f64,
@@ -26,7 +26,7 @@ pub struct Leg {
 pub struct Kinematics([Turned; 3]);
 
 impl Leg {
-    /// A leg of no length that ends at a start.
+    /// An empty leg that ends at a start.
     pub fn before(start: &Start) -> Self {
         Self {
             start: 0.0,
@@ -126,7 +126,7 @@ impl Kinematics {
         changes == [0.0; 4] && height.acceleration == 0.0
     }
 
-    /// The true state at this latitude and longitude, and what is sensed in it.
+    /// The true state at this latitude and longitude, with the sensed input.
     pub fn instant(&self, place: Vector2<f64>, banks: bool) -> Instant {
         let Self([speed, heading, height]) = self;
         let [(pitch, pitch_rate), (roll, roll_rate)] = self.pitch_and_roll(banks);

@@ -1,4 +1,4 @@
-//! A journey in steps as long as what is smooth allows.
+//! Motion along a trajectory in steps as long as smoothness permits.
 
 use std::convert::Infallible;
 
@@ -17,7 +17,7 @@ const LARGEST_TURN: f64 = 0.1;
 /// The least number of steps between two breaks where motion is not steady.
 const LEAST: u32 = 8;
 
-/// A step in which everything is smooth.
+/// A step of smooth motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stride {
     /// Its length, s.
@@ -29,7 +29,7 @@ pub struct Stride {
 }
 
 impl Stride {
-    /// Number of steps for a time in s in which something turns at a rate in rad/s.
+    /// Number of steps for a time in s with a rotation rate in rad/s.
     pub fn count(duration: f64, rate: f64) -> u32 {
         (duration * (rate / LARGEST_TURN).max(1.0 / LONGEST))
             .ceil()
@@ -37,7 +37,7 @@ impl Stride {
     }
 }
 
-/// A journey along a trajectory in steps that end at its breaks and follow what happens between them.
+/// Motion along a trajectory in steps that end at its breaks and resolve the motion between them.
 #[derive(Debug, Clone)]
 pub struct Strides<'a> {
     trajectory: &'a Trajectory,
@@ -49,7 +49,7 @@ pub struct Strides<'a> {
 }
 
 impl Trajectory {
-    /// Goes through it in steps as long as its motion allows.
+    /// Follows a trajectory in steps as long as its motion permits.
     pub fn strides(&self) -> Strides<'_> {
         let leg = Leg::before(&self.start);
         let place = Vector2::new(self.start.latitude, self.start.longitude);
@@ -64,12 +64,12 @@ impl Trajectory {
 }
 
 impl Strides<'_> {
-    /// The true state now and what is sensed in it.
+    /// The current true state and sensed input.
     pub fn here(&self) -> &Instant {
         &self.here
     }
 
-    /// Goes to the leg of this time.
+    /// Advances to the leg at this time.
     fn enter(&mut self) {
         let segments = &self.trajectory.segments;
         while self.leg.end() <= self.time {
@@ -82,8 +82,8 @@ impl Strides<'_> {
         self.leg.at(time).instant(place, self.trajectory.banks)
     }
 
-    /// Continues until a time in s since the start and hands over every stride. What is computed on the way turns
-    /// at `beside` rad/s relative to the body.
+    /// Continues until a time in s since the start and passes on every stride. The computed solution rotates at
+    /// `beside` rad/s relative to the body.
     ///
     /// # Errors
     /// The first that is returned for a stride.
@@ -113,7 +113,7 @@ impl Strides<'_> {
         let Ok(()) = self.go(until, 0.0, |_| Ok::<_, Infallible>(()));
     }
 
-    /// Steps to a time before which nothing breaks.
+    /// Steps to a time without a break before it.
     fn steps(&self, to: f64, beside: f64) -> u32 {
         let duration = to - self.time;
         let middle = self.time + 0.5 * duration;

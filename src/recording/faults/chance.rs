@@ -1,11 +1,11 @@
-//! Significance limits for faults: how improbable samples must be in a faultless record.
+//! Significance limits for faults: required improbability of samples in a faultless recording.
 
 use statrs::distribution::{ContinuousCDF, Normal};
 
-/// Number of faultless records per false alarm of one kind of fault.
+/// Number of faultless recordings per false alarm of one kind of fault.
 const RECORDS: f64 = 1e4;
 
-/// The limit of one kind of fault in a record, with Bonferroni's correction over all samples of its six axes.
+/// The limit of one kind of fault in a recording, with Bonferroni's correction over all samples of its six axes.
 #[derive(Debug, Clone, Copy)]
 pub struct Limit {
     /// −ln of the probability that a faultless sample exceeds the limit.
@@ -15,7 +15,7 @@ pub struct Limit {
 }
 
 impl Limit {
-    /// The limit for a record with this number of rows.
+    /// The limit for a recording with this number of rows.
     pub fn of_rows(rows: usize) -> Self {
         let probability = (6.0 * rows.max(1) as f64 * RECORDS).recip();
         Self {
@@ -58,7 +58,7 @@ impl Limit {
 
 /// Fractions of samples beyond the two quantiles from which the tail is extrapolated.
 const TAIL: [f64; 2] = [5e-2, 5e-3];
-/// Fraction of the values of a faultless record beyond the first returned quantile.
+/// Fraction of the values of a faultless recording beyond the first returned quantile.
 const FEW: f64 = 1e-3;
 
 /// σ beyond which a normal variate lies with this probability, two-sided.

@@ -1,5 +1,4 @@
-//! Values that no instrument at rest or on a turntable can give, as from a failed transfer or a counter
-//! below zero.
+//! Values impossible for an instrument at rest or on a turntable, as from a failed transfer or a counter underflow.
 
 use std::ops::Range;
 
@@ -47,7 +46,7 @@ pub fn impossible(rows: &Rows) -> Vec<Found> {
     all
 }
 
-/// Columns in which each impossible value is replaced by the value before it.
+/// Columns with each impossible value replaced by the previous value.
 pub fn without(columns: &[Vec<f64>; 6], impossible: &[Found]) -> [Vec<f64>; 6] {
     let mut without = columns.clone();
     for found in impossible {

@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use fill::Fill;
 
-/// Most samples used from either side.
+/// Maximum number of samples used on either side.
 const MOST: usize = 64;
 /// Polynomials tried: degree, and samples used from either side. Each next one must agree with the
 /// best so far at the hole itself, because the stretches on which it is tested are farther away.
@@ -25,7 +25,7 @@ const CANDIDATES: [(usize, usize); 12] = [
     (3, 32),
     (1, MOST),
 ];
-/// The same for a hole at the start or end of the record.
+/// The same for a hole at the start or end of the recording.
 const ONE_SIDED: [(usize, usize); 4] = [(0, 1), (0, 4), (0, 16), (0, MOST)];
 /// A hole and its neighbours may span this many times their own length, other holes included.
 const REACH: usize = 4;
@@ -36,7 +36,7 @@ const AGREE: f64 = 3.0;
 pub struct Hole<'a> {
     sound: &'a [bool],
     samples: Range<usize>,
-    /// The nearest sound samples before and after, outwards.
+    /// The nearest good samples before and after, outwards.
     sides: [Vec<usize>; 2],
     candidates: &'static [(usize, usize)],
     /// The first possible candidate, and the straight line through most samples.
@@ -74,7 +74,7 @@ impl<'a> Hole<'a> {
     ///
     /// `rounding` is the mean square of this error that rounding to whole steps can cause. If errors are that small,
     /// selecting the best fill depends on the individual steps next to the hole: among pulses that are mostly zero, a
-    /// fill that meets no pulse seems free of error, but is biased by whole pulses. The widest fill is then used
+    /// fill without any pulse seems free of error, but is biased by whole pulses. The widest fill is then used
     /// regardless of the values: it is linear in them, and therefore unbiased.
     pub fn fill(&self, axis: &mut [f64], rounding: f64) -> Option<f64> {
         let best = self.within(axis, rounding).or_else(|| self.best(axis));
@@ -173,7 +173,7 @@ impl<'a> Hole<'a> {
     }
 }
 
-/// The nearest sound samples, outwards.
+/// The nearest good samples, outwards.
 fn neighbours(sound: &[bool], outwards: impl Iterator<Item = usize>, hole: usize) -> Vec<usize> {
     outwards
         .take(REACH * (MOST + hole))
@@ -182,7 +182,7 @@ fn neighbours(sound: &[bool], outwards: impl Iterator<Item = usize>, hole: usize
         .collect()
 }
 
-/// A tested way to fill a hole.
+/// A tested fill of a hole.
 struct Trial<'a> {
     fill: &'a Fill,
     sum: f64,

@@ -22,7 +22,7 @@ pub use repair::{Repaired, Rows};
 pub use slower::Slower;
 use spikes::spikes;
 
-/// Samples of a record that do not show the instrument's input.
+/// Samples of a recording that do not show the instrument's input.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fault {
     /// The kind of fault.
@@ -43,13 +43,13 @@ pub struct Fault {
 pub enum FaultKind {
     /// Rows that are missing from the file.
     Missing,
-    /// A copy of the row before, time stamp included.
+    /// A copy of the previous row, including its time stamp.
     Duplicate,
     /// Values at the end of the axis' range; the true value may lie beyond.
     Saturated,
     /// A repeated value, although the axis' noise or motion continues.
     Stuck,
-    /// A single sample that fits neither the samples before nor those after it.
+    /// A single sample that fits neither the previous nor the following samples.
     Spike,
     /// A row of zeros, although gravity is not zero.
     Zero,
@@ -163,8 +163,7 @@ impl Found {
     }
 }
 
-/// Looks for saturated and stuck values and spikes in the columns of gyro x, y, z and accelerometer
-/// x, y, z.
+/// Searches for saturated and stuck values and spikes in the columns of gyro x, y, z and accelerometer x, y, z.
 fn find(
     columns: &[Vec<f64>; 6],
     facts: &[ColumnFacts; 6],

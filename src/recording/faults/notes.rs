@@ -19,12 +19,12 @@ pub fn notes(imu: &ImuSamples) -> Vec<String> {
         let what = imu.what(kind, faults.iter().copied(), count);
         let unbridged = faults.iter().filter(|fault| !fault.bridged).count();
         let done = if kind == FaultKind::Duplicate {
-            "dropped.".to_owned()
+            "turncal dropped the duplicates.".to_owned()
         } else if unbridged == 0 {
-            "bridged by interpolation, whose error is in the σ.".to_owned()
+            "turncal interpolated there, and σ include the interpolation error.".to_owned()
         } else {
             format!(
-                "too long to be bridged at {unbridged} of {} places, where attitude and velocity restart.",
+                "{unbridged} of {} places are too long to bridge, so attitude and velocity restart there.",
                 faults.len()
             )
         };
@@ -51,18 +51,17 @@ impl ImuSamples {
         let [from, to] = [part.samples.start, part.samples.end].map(|k| self.time(k));
         let [usual, step] = [1, part.step].map(|samples| 1e3 * self.period * samples as f64);
         let done = match part.places - part.bridged {
-            0 => {
-                "the samples between are interpolated, with the error of that in the σ.".to_owned()
-            }
+            0 => "turncal interpolated the samples between, and σ include the interpolation error."
+                .to_owned(),
             unbridged => format!(
-                "the samples between are interpolated, but at {unbridged} of {} places attitude and velocity restart, \
-                 and dwells and moves are lost. Split the log where its rate changes, and calibrate its parts together \
-                 as a campaign.",
+                "turncal interpolated the samples between, but attitude and velocity restart at {unbridged} of {} \
+                 places, which loses dwells and moves. Split the log where its rate changes, and calibrate the parts \
+                 together as a campaign.",
                 part.places
             ),
         };
         format!(
-            "From line {}, {from:.2} s, to {to:.2} s rows come every {step:.3} ms, elsewhere every {usual:.3} ms: {done}",
+            "From line {} ({from:.2} s) to {to:.2} s the row interval is {step:.3} ms instead of {usual:.3} ms: {done}",
             part.line
         )
     }
@@ -77,11 +76,13 @@ impl ImuSamples {
         let are = if count == 1 { "is" } else { "are" };
         let plural = if count == 1 { "" } else { "s" };
         let said = match kind {
-            FaultKind::Duplicate => "there twice",
+            FaultKind::Duplicate => "duplicated",
             FaultKind::Spike if count == 1 => "a spike",
             FaultKind::Spike => "spikes",
-            FaultKind::Zero => "zero in all columns, as no accelerometers are under gravity",
-            FaultKind::Beyond => "beyond what any instrument measures, by the nominal scale",
+            FaultKind::Zero => {
+                "zero in all columns, which is impossible for accelerometers under gravity"
+            }
+            FaultKind::Beyond => "beyond the range of any instrument at the nominal scale",
             FaultKind::Missing | FaultKind::Saturated | FaultKind::Stuck => kind.name(),
         };
         let mut columns: Vec<&str> = Vec::new();

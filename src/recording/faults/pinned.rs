@@ -19,13 +19,13 @@ pub use ends::saturated;
 
 /// Rows in which noise is measured at one level.
 const BLOCK: usize = 64;
-/// Part of the blocks that may be quieter than noise at rest: axes stuck for long.
+/// Fraction of blocks that may be quieter than noise at rest, for axes stuck for a long time.
 const STUCK_PART: f64 = 0.1;
 /// Number of rows whose sum is nearly free of rounding.
 const SUM: usize = 4;
 /// Number of rows next to a run whose mean is taken.
 const NEXT: usize = 4 * SUM;
-/// Parts of the record in which repeats of repeats are counted.
+/// Parts of the recording in which repeats of repeats are counted.
 const PARTS: usize = 32;
 /// Rows on either side of a run that show how a motion continues.
 const CLOSE: usize = 16;
@@ -40,7 +40,7 @@ pub struct Axis<'a> {
     step: f64,
     /// Whether values are whole pulses, the remainder being carried into the next.
     pulses: bool,
-    /// Runs of rows equal to the row before them.
+    /// Runs of rows equal to the previous row.
     runs: Vec<Range<usize>>,
     /// Variance of the noise at rest, steps², from rows that are not at an extreme: an axis clipped over a whole dwell
     /// shows no noise there.
@@ -76,8 +76,7 @@ impl<'a> Axis<'a> {
         }
     }
 
-    /// Rows that repeat the row before them for longer than a working axis does, without the first of the
-    /// equal values.
+    /// Rows that repeat the previous row for longer than a working axis does, without the first of the equal values.
     pub fn stuck(&self, limit: Limit) -> Vec<Range<usize>> {
         if self.step <= 0.0 {
             return Vec::new();
@@ -144,7 +143,7 @@ impl<'a> Axis<'a> {
     }
 
     /// The same for the quieter side of these rows, because a motion may start or end on the other; zero at the start
-    /// and the end of the record.
+    /// and the end of the recording.
     fn unrest_beside(&self, rows: &Range<usize>) -> f64 {
         let Some(before) = rows.start.checked_sub(CLOSE) else {
             return 0.0;
@@ -317,7 +316,7 @@ fn repeats_at_best(variance: f64) -> f64 {
     erf((8.0 * variance).sqrt().recip())
 }
 
-/// Fraction of repeats that are repeated again, in the parts of the record with most of them; the longest run
+/// Fraction of repeats that are repeated again, in the parts of the recording with most of them; the longest run
 /// of each part is excluded, because the axis may be stuck there.
 fn repeats_of_repeats(values: &[f64]) -> f64 {
     let part = values.len().div_ceil(PARTS).max(BLOCK);

@@ -68,7 +68,7 @@ fn sensor(column: usize) -> Sensor {
 }
 
 impl Rows<'_> {
-    /// Looks for faults and bridges them.
+    /// Finds faults and bridges them.
     pub fn repair(mut self) -> Repaired {
         let mut faults = self.faults(&self.found());
         let mut columns = std::mem::take(&mut self.columns).map(|rows| placed(rows, &self.numbers));
@@ -156,7 +156,7 @@ impl Rows<'_> {
     }
 
     /// Variance of the rounding of a sum of samples: within one step for the whole sum if the remainder is carried,
-    /// else within one step for each sample.
+    /// otherwise within one step per sample.
     fn rounding(&self, column: usize, samples: usize) -> f64 {
         let step = self.facts[column].step.unwrap_or(0.0);
         step * step * if self.pulses { 1.0 } else { samples as f64 }

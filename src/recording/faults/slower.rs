@@ -1,4 +1,4 @@
-//! Parts of a record with a lower rate of rows: the same number of rows is missing at each place.
+//! Parts of a recording with a lower rate of rows: the same number of rows is missing at each place.
 
 use std::f64::consts::LN_2;
 use std::ops::Range;
@@ -7,7 +7,7 @@ use super::chance::Limit;
 use super::{Fault, FaultKind};
 use crate::recording::ImuSamples;
 
-/// A part of a record with a lower rate of rows.
+/// A part of a recording with a lower rate of rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Slower {
     /// From the first sample without a row to the last.
@@ -91,8 +91,8 @@ mod tests {
         let said = notes(&imu);
         assert!(
             said[0].starts_with(
-                "From line 2001, 20.01 s, to 39.98 s rows come every 30.000 ms, elsewhere every 10.000 ms: the samples \
-                 between are interpolated, but at 499 of 666 places"
+                "From line 2001 (20.01 s) to 39.98 s the row interval is 30.000 ms instead of 10.000 ms: turncal \
+                 interpolated the samples between, but attitude and velocity restart at 499 of 666 places"
             ),
             "{said:?}"
         );

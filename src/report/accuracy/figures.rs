@@ -28,9 +28,8 @@ pub fn figures(accuracy: &Accuracy) -> Vec<Plot> {
 fn ratio(accuracy: &Accuracy) -> Plot {
     let panel = ratios(accuracy, "RMS error / RMS bound", &[("", |f| f.ratio)]);
     Plot::new("ratio.svg", "Error over bound", (1, 400), [panel]).caption(
-        "RMS error of the EKF over the Cramér–Rao bound, of each group of parameters and of the position after 40 \
-         h; bars: its 99 % interval. A bar that crosses the line at 1 says that nothing shows the filter to be \
-         worse than the best there can be.",
+        "RMS error of the EKF divided by the Cramér–Rao bound, for each parameter group and for the position after \
+         40 h; bars: 99 % interval. A bar that crosses the line at 1 is consistent with an optimal filter.",
     )
 }
 
@@ -97,10 +96,10 @@ const REACH: f64 = 5.0;
 const BINS: usize = 24;
 /// Points of a curve.
 const CURVE: usize = 301;
-/// The least half width of the axes of positions, in σ.
+/// Minimum half range of the position axes, in σ.
 const POSITION_REACH: f64 = 4.0;
 
-/// Normalised errors of each group over the density that the claimed σ promise.
+/// Normalised errors of each group, with the density implied by the stated σ.
 pub fn errors(accuracy: &Accuracy) -> Plot {
     let panels = Group::all().map(|group| {
         let values = normalised(accuracy, group);
@@ -123,12 +122,12 @@ pub fn errors(accuracy: &Accuracy) -> Plot {
             .noted(notes)
     });
     Plot::new("errors.svg", "Errors over claimed σ", (3, 300), panels).caption(
-        "Density of every parameter's error over the σ that the filter claims for it, all runs. Line: the standard \
+        "Density of parameter errors divided by the filter's σ, all runs. Line: standard normal density, which \
          normal density, which it follows if the σ are true; RMS is then 1.",
     )
 }
 
-/// Errors over σ of the parameters of a group that have a σ.
+/// Errors divided by σ for the parameters of a group that have a σ.
 fn normalised(accuracy: &Accuracy, group: Group) -> Vec<f64> {
     accuracy
         .filtered()
@@ -168,8 +167,8 @@ pub fn nees(accuracy: &Accuracy) -> Plot {
     let one = accuracy.anees.map_or((1.0, 1.0), |a| a.interval_of_one);
     let outside = all().filter(|nees| !(one.0..=one.1).contains(nees)).count();
     let mut caption = format!(
-        "Squared error over the claimed covariance, correlations included, one dot for each run; 1 on average if \
-         the σ are true. Shaded: 95 % interval of one run; {} of {} runs lie outside.",
+        "Squared error normalised by the stated covariance (with correlations), one dot per run; the mean is 1 if \
+         the σ are correct. Shaded: 95 % interval of one run; {} of {} runs lie outside.",
         count(outside),
         count(all().count())
     );
@@ -206,7 +205,7 @@ pub fn nees(accuracy: &Accuracy) -> Plot {
     Plot::new("nees.svg", "NEES of every run", (1, 420), [panel]).caption(caption)
 }
 
-/// Position errors after each mission over the σ that were predicted of them.
+/// Position errors after each mission, divided by their predicted σ.
 pub fn positions(accuracy: &Accuracy) -> Plot {
     let clouds: Vec<Vec<Point>> = accuracy
         .navigation
@@ -221,10 +220,10 @@ pub fn positions(accuracy: &Accuracy) -> Plot {
     let panels = accuracy.navigation.iter().zip(clouds);
     let panels = panels.map(|(of, cloud)| of_mission(of, cloud, reach));
     Plot::new("position.svg", "Position errors over predicted σ", (2, 570), panels).caption(
-        "Horizontal position error of the EKF after 40 h over the σ predicted from its covariance, one dot for \
-         each run, the same axes for all. Across: east over its σ; up: what north differs from that which east \
-         lets expect, over the σ of that. So the ellipses of all runs are circles: solid 1σ, dashed 2.45σ. Where \
-         the axes end far beyond ±4 the σ are too small, and the circles a speck in the middle.",
+        "Horizontal position error of the EKF after 40 h, divided by the σ predicted from its covariance; one dot \
+         per run, same axes for all. Horizontal axis: east error; vertical axis: north error given the east error. \
+         The error ellipses of all runs thus become circles: solid 1σ, dashed 2.45σ. If the axes extend far beyond \
+         ±4, the σ are too small and the circles shrink to a dot.",
     )
 }
 

@@ -16,7 +16,7 @@ use crate::study::accuracy::{Containment, Journey, Region};
 use crate::study::navigation::{FORTY_HOURS, INTERVAL};
 use crate::study::{Accuracy, Figures};
 
-/// Everything that is said of the study.
+/// The complete report of the study.
 pub fn document(accuracy: &Accuracy) -> Document {
     let mut document = Document::new(format!(
         "Accuracy of the filter over {} simulated runs of {}",
@@ -37,7 +37,7 @@ pub fn document(accuracy: &Accuracy) -> Document {
     document
 }
 
-/// Reasons of failure that are shown.
+/// Number of reasons for failure shown.
 const REASONS: usize = 3;
 
 pub(super) fn facts(accuracy: &Accuracy) -> Facts {
@@ -77,7 +77,7 @@ pub(super) fn facts(accuracy: &Accuracy) -> Facts {
     facts
 }
 
-/// Which error terms the filter had, and which it should have had.
+/// The error terms that were estimated, and those that were simulated only.
 fn terms(accuracy: &Accuracy) -> String {
     let (scenario, unmodelled) = (&accuracy.study.scenario, &accuracy.study.unmodelled);
     let there = ErrorTerm::ALL.into_iter().filter(|&b| scenario.has(b));
@@ -116,7 +116,7 @@ fn table_time(accuracy: &Accuracy) -> String {
     let baseline = &accuracy.baseline;
     let cut = match baseline.equal_time() {
         Some(time) => format!(", also cut to {}", minutes(time)),
-        None => "; its positions cannot be had in the time of the EKF".to_owned(),
+        None => "; its positions do not fit into the time of the EKF".to_owned(),
     };
     let (filter, closed) = (minutes(accuracy.table_time), minutes(baseline.table_time));
     let path = &baseline.scenario.path_name;
@@ -187,7 +187,7 @@ fn nis(nis: &Nis) -> Option<Value> {
     })
 }
 
-/// One for each mission, or why it cannot be navigated from the scenario's site.
+/// One per mission, or the reason why it cannot be navigated from the site of the scenario.
 fn navigation(accuracy: &Accuracy) -> Value {
     let mission = |journey| {
         json!({
@@ -216,7 +216,7 @@ fn navigation(accuracy: &Accuracy) -> Value {
     navigated.chain(others).collect()
 }
 
-/// How many runs have their position error within a region that their predicted covariance marks out.
+/// Number of runs whose position error is within a region given by the predicted covariance.
 fn containment(of: &Containment) -> Value {
     let (region, sigmas) = match of.region {
         Region::East => ("east", 1.0),

@@ -1,4 +1,4 @@
-//! The tables, alike for terminal and page.
+//! The tables, the same for terminal and page.
 
 use crate::calibration::{ErrorTerm, Nis};
 use crate::imu::Sensor;
@@ -9,7 +9,7 @@ use crate::study::{Accuracy, Figures, Ratio};
 
 const AGAINST_BOUND: &str = "| unit | RMS error | RMS σ | RMS bound | error/bound | 99 % interval";
 
-/// What ought to be one, with the digits that the width of its interval leaves meaning to.
+/// A quantity with expected value one, with the digits that are significant given its interval.
 pub fn mean(mean: f64, (low, high): (f64, f64)) -> String {
     if mean < 10.0 {
         value(mean, 0.5 * (high - low))
@@ -18,7 +18,7 @@ pub fn mean(mean: f64, (low, high): (f64, f64)) -> String {
     }
 }
 
-/// A factor that ought to be one.
+/// A factor with expected value one.
 pub fn factor(factor: f64) -> String {
     mean(factor, (0.99, 1.01))
 }
@@ -33,7 +33,7 @@ fn ratio_cells(of: Option<&Ratio>) -> [String; 2] {
     cells.unwrap_or([NONE; 2].map(str::to_owned))
 }
 
-/// A row for each, a section for each triad and for navigation.
+/// One row each, with a section per triad and one for navigation.
 fn sections(
     accuracy: &Accuracy,
     cells: impl Fn(&Compared) -> Vec<String>,
@@ -57,9 +57,9 @@ pub fn bound(accuracy: &Accuracy) -> Table {
     let cells = |of: &Compared| against_bound(of.figures, of.unit_value);
     Table::new("EKF against the Cramér–Rao bound", columns(AGAINST_BOUND))
         .sections(sections(accuracy, cells))
-        .note("RMS over all runs and the parameters of a group; σ: as stated by the filter.")
-        .note("Position: horizontal, after 40 h from perfect alignment; flight: the trajectory of that name.")
-        .note("Bound: Bayesian, from a pass linearised at the truth. Interval: bootstrap over runs.")
+        .note("RMS over all runs and the parameters of a group; σ: stated by the filter.")
+        .note("Position: horizontal, after 40 h from perfect alignment; flight: on the trajectory `flight`.")
+        .note("Bound: Bayesian Cramér–Rao bound from a pass linearised at the truth. Interval: bootstrap over runs.")
 }
 
 /// Auxiliary parameters, term by term.
@@ -103,7 +103,7 @@ pub fn gain(accuracy: &Accuracy) -> Table {
     };
     Table::new("EKF against the closed form, RMS error", columns)
         .sections(sections(accuracy, cells))
-        .note("Gain: error of the closed form over error of the EKF, above 1 where the EKF is better.")
+        .note("Gain: error of the closed form divided by error of the EKF; above 1, the EKF is better.")
 }
 
 pub fn consistency(accuracy: &Accuracy) -> Table {
@@ -127,8 +127,9 @@ pub fn consistency(accuracy: &Accuracy) -> Table {
 "| mean | 95 % interval | 99.8 % interval | numbers | lag-one correlation | 99 % if white",
 ))
         .section(nees.into_iter().chain(nis))
-        .note("NEES/n: squared errors over the claimed covariance; NIS: squared innovations over theirs.")
-        .note("Both are one if σ are true; the intervals are χ².")
+        .note("NEES/n: squared errors normalised by the stated covariance; NIS: squared innovations normalised by \
+            theirs.")
+        .note("Both are 1 if σ are correct; intervals from χ².")
 }
 
 fn nis_row(name: &str, nis: &Nis) -> Vec<String> {
@@ -144,7 +145,7 @@ fn nis_row(name: &str, nis: &Nis) -> Vec<String> {
     ]
 }
 
-/// How often an error lies in a region, and how often it should.
+/// Actual and expected fraction of errors in a region.
 pub fn held(of: &Containment) -> String {
     let found = percent(of.within as f64 / of.runs as f64);
     let claimed = percent(of.region.probability());
@@ -167,16 +168,19 @@ pub fn containment(accuracy: &Accuracy) -> Table {
             ]
         })
     });
-    Table::new("Position error after 40 h within its predicted σ", columns("| runs | within | claimed | 99 % interval | as claimed"))
-        .sections(sections)
-        .note("σ and ellipses: predicted from the covariance that the filter claims, by the linear error model.")
-        .note("Interval: binomial, of the share of the runs if the covariance is true.")
+    Table::new(
+        "Position error after 40 h within its predicted σ",
+        columns("| runs | within | claimed | 99 % interval | as claimed"),
+    )
+    .sections(sections)
+    .note("σ and ellipses: predicted from the filter covariance with the linear error model.")
+    .note("Interval: binomial, for the share of runs if the covariance is correct.")
 }
 
 /// 99 % of a normal distribution lie within this many σ.
 const SIGMAS_99: f64 = 2.576;
 
-/// Something whose error is compared, with how it is shown.
+/// A compared error, with its presentation.
 pub struct Compared<'a> {
     pub(super) title: String,
     /// The triad; `None` for a position.
@@ -224,7 +228,7 @@ fn region_name(region: Region) -> String {
     }
 }
 
-/// What the lag-one correlation of white innovations stays within in 99 of 100 studies.
+/// 99 % limit of the lag-one correlation of white innovations.
 pub fn white_within(nis: &Nis) -> f64 {
     SIGMAS_99 / (nis.count as f64).sqrt()
 }

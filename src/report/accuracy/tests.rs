@@ -152,12 +152,14 @@ fn a_group_in_which_the_closed_form_is_better_is_named() {
 #[test]
 fn a_form_that_cannot_hold_the_truth_is_charged_with_what_it_costs() {
     let mut accuracy = small();
-    assert!(!doubts(&accuracy).contains("cannot hold"));
+    assert!(!doubts(&accuracy).contains("cannot represent"));
     accuracy.study.form = InstallationForm::ThreeAngle;
-    assert!(doubts(&accuracy).contains("three-angle form cannot hold the truth, which is general"));
+    assert!(
+        doubts(&accuracy).contains("three-angle form cannot represent the truth, which is general")
+    );
     assert_eq!(json(&accuracy)["form_holds_truth"], false);
     accuracy.study.scenario.installation.form = InstallationForm::ThreeAngle;
-    assert!(!doubts(&accuracy).contains("cannot hold"));
+    assert!(!doubts(&accuracy).contains("cannot represent"));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! What the figures say, in sentences.
+//! Conclusions from the figures, in sentences.
 
 use std::cmp::Ordering;
 
@@ -9,9 +9,9 @@ use crate::imu::Output;
 use crate::report::prelude::*;
 use crate::study::{Accuracy, Figures, Ratio};
 
-/// Fewer runs than this make a rough interval.
+/// With fewer runs than this, intervals are approximate.
 const FEW: usize = 30;
-/// NIS that whole pulses leave a filter, whose noise is taken for Gaussian.
+/// Range of NIS due to pulses, which the filter treats as Gaussian noise.
 const PULSES: std::ops::RangeInclusive<f64> = 0.9..=1.1;
 
 /// Every sentence, the most important first.
@@ -30,7 +30,8 @@ pub fn say(document: &mut Document, accuracy: &Accuracy) {
         let not_held: Vec<String> = not_held.map(tables::held).collect();
         sentences.extend((!not_held.is_empty()).then(|| {
             warn(format!(
-                "After 40 h, {}, the position error does not lie within its predicted σ as often as claimed: {}.",
+                "After 40 h, {}, the position error is within its predicted σ less or more often than it should be: \
+                 {}.",
                 journey_name(of.journey),
                 not_held.join(", ")
             ))
@@ -49,7 +50,7 @@ pub fn say(document: &mut Document, accuracy: &Accuracy) {
     let runs = accuracy.trials.len();
     sentences.extend((runs < FEW).then(|| {
         warn(format!(
-            "{runs} runs are few: the intervals of the ratios are rough below {FEW}."
+            "The intervals of the ratios are approximate because {runs} runs are fewer than {FEW}."
         ))
     }));
     for (good, text) in sentences {
@@ -65,13 +66,13 @@ fn convergence(accuracy: &Accuracy) -> (bool, String) {
     let without = accuracy.trials.iter().filter(|t| t.filtered.is_none());
     let (failed, without) = (count(failed), count(without.count()));
     let text = format!(
-        "{failed} of {runs} runs failed. {without} of them gave no estimate at all and are not in any RMS; \
-         the others are."
+        "{failed} of {runs} runs failed. The {without} of them without an estimate are excluded from every RMS; the \
+         others are included."
     );
     (false, text)
 }
 
-/// Where a number lies from its interval.
+/// Position of a number relative to its interval.
 fn side(of: f64, (low, high): (f64, f64)) -> (Ordering, &'static str) {
     match of {
         of if of < low => (Ordering::Less, "below"),
@@ -80,7 +81,7 @@ fn side(of: f64, (low, high): (f64, f64)) -> (Ordering, &'static str) {
     }
 }
 
-/// What has a ratio on a chosen side of 1, named with it.
+/// Names of the items with a ratio on the chosen side of 1.
 fn named(
     accuracy: &Accuracy,
     of: impl Fn(&Figures) -> Option<Ratio>,
@@ -100,8 +101,8 @@ fn against_bound(accuracy: &Accuracy) -> (bool, String) {
     let (form, truth) = accuracy.forms();
     if !form.holds(truth) {
         let text = format!(
-            "The {} form cannot hold the truth, which is {}. The bound is that of the general form; against \
-             it the wrong form costs a factor of: {}.",
+            "The {} form cannot represent the truth, which is {}. Relative to the bound of the general form, the \
+             errors are larger by a factor of: {}.",
             form.name(),
             truth.name(),
             named(accuracy, of, |_| true)
@@ -110,20 +111,20 @@ fn against_bound(accuracy: &Accuracy) -> (bool, String) {
     }
     let outside = named(accuracy, of, Ordering::is_ne);
     if outside.is_empty() {
-        let text = "RMS error over bound is 1 within its 99 % interval everywhere: nothing shows the filter to \
-                    be worse than the best there can be.";
+        let text = "The ratio of RMS error to bound is 1 within its 99 % interval for every group, so the filter is \
+            consistent with the optimum.";
         return (true, text.to_owned());
     }
     let text = format!(
-        "RMS error over bound is not 1 within its 99 % interval: {outside}. By chance one interval in a \
-         hundred misses."
+        "The ratio of RMS error to bound differs from 1 beyond its 99 % interval: {outside}. One interval in a \
+         hundred does so by chance."
     );
     (false, text)
 }
 
 fn nees(accuracy: &Accuracy) -> (bool, String) {
     let Some(of) = accuracy.anees else {
-        let text = "No run gave an estimate: nothing can be said of its σ.";
+        let text = "No run gave an estimate, so σ cannot be validated.";
         return (false, text.to_owned());
     };
     let mean = tables::mean(of.mean, of.interval_95);
@@ -131,15 +132,15 @@ fn nees(accuracy: &Accuracy) -> (bool, String) {
     let is_inside = side(of.mean, of.interval_95).0.is_eq();
     let text = match side(of.mean, of.interval_998) {
         _ if is_inside => format!(
-            "ANEES {mean} lies within its 95 % interval {inner}: the claimed σ are true, correlations included."
+            "ANEES {mean} is within its 95 % interval {inner}, so the stated covariance is correct, including \
+             correlations."
         ),
         (Ordering::Equal, _) => format!(
-            "ANEES {mean} lies outside its 95 % interval {inner}, as in one study of twenty, but within that \
-             of 99.8 %, {outer}."
+            "ANEES {mean} is outside its 95 % interval {inner}, which happens in one study of twenty, but within its \
+             99.8 % interval {outer}."
         ),
         (_, side) => format!(
-            "ANEES {mean} lies {side} its 99.8 % interval {outer}: the claimed σ are too {}; errors are {} times \
-             them.",
+            "ANEES {mean} is {side} its 99.8 % interval {outer}: the stated σ are too {} (errors are {} times σ).",
             if of.mean > 1.0 { "small" } else { "large" },
             tables::factor(of.mean.sqrt())
         ),
@@ -147,13 +148,13 @@ fn nees(accuracy: &Accuracy) -> (bool, String) {
     (side(of.mean, of.interval_998).0.is_eq(), text)
 }
 
-/// What innovations are that are not as large or not as white as they should be.
+/// Sentences on innovations of the wrong size or whiteness.
 fn innovations(accuracy: &Accuracy, name: &str, nis: &Nis) -> Vec<(bool, String)> {
     let mut sentences = Vec::new();
     if let (Ordering::Less | Ordering::Greater, side) = side(nis.mean, nis.interval) {
         let mut text = format!(
-            "NIS of {name} {} lies {side} its 99.8 % interval {}: innovations are {} times as large as the filter \
-             takes them to be.",
+            "NIS of {name} ({}) is {side} its 99.8 % interval {}: the innovations are {} times as large as the \
+             filter predicts.",
             tables::mean(nis.mean, nis.interval),
             interval(nis.interval),
             tables::factor(nis.mean.sqrt())
@@ -161,14 +162,15 @@ fn innovations(accuracy: &Accuracy, name: &str, nis: &Nis) -> Vec<(bool, String)
         let is_pulse = accuracy.study.scenario.output == Output::Pulse;
         let pulses = is_pulse && PULSES.contains(&nis.mean);
         if pulses {
-            text += " Whole pulses are not Gaussian noise: 0.9 to 1.1 is expected of them.";
+            text +=
+                " This is normal for pulses (0.9 to 1.1), because their rounding is not Gaussian.";
         }
         sentences.push((pulses, text));
     }
     let within = white_within(nis);
     if nis.lag_one.abs() > within {
         let text = format!(
-            "Lag-one correlation of the innovations of {name} {} lies outside ±{} (99 %): they are not white.",
+            "The innovations of {name} are not white: their lag-one correlation {} is outside ±{} (99 %).",
             value(nis.lag_one, within),
             value(within, within)
         );
@@ -183,13 +185,13 @@ fn form(accuracy: &Accuracy) -> Option<(bool, String)> {
     };
     let (form, truth) = accuracy.forms();
     let mut text = format!(
-        "The data reject the {} form against the general one in {} of {} runs.",
+        "The {} form is rejected in favour of the general form in {} of {} runs.",
         form.name(),
         count(rejections),
         count(tested)
     );
     if form.holds(truth) {
-        text += " It is the right one; one run in a thousand rejects it by chance.";
+        text += " It is the correct form; one run in a thousand rejects it by chance.";
     }
     // Three σ of a Poisson number beyond what chance gives.
     let by_chance = 1e-3 * tested as f64;
@@ -208,9 +210,8 @@ fn gain(accuracy: &Accuracy) -> Vec<(bool, String)> {
             Ordering::Equal => "does not differ significantly from",
             Ordering::Less => "is less accurate than",
         };
-        let text = format!(
-            "In {filter} the EKF {judged} the closed form in {closed}; the gain is: {named}."
-        );
+        let text =
+            format!("In {filter} the EKF {judged} the closed form in {closed} (gain: {named}).");
         (!named.is_empty()).then_some((side.is_ge(), text))
     });
     sentences.collect()

@@ -1,4 +1,4 @@
-//! The analysis by name. Deviations are in deg/h and µg, intervals of 95 %.
+//! The analysis as named values. Deviations are in deg/h and µg; intervals are 95 %.
 
 use crate::formats::NoiseKeys;
 use crate::imu::Sensor;
@@ -93,14 +93,14 @@ fn axis(axis: &AxisNoise, sensor: Sensor) -> Value {
 /// A field of `[imu.noise]`: key, value, and a comment or nothing.
 type Field = (&'static str, f64, String);
 
-/// `[imu.noise]` with all that was found, ready to be pasted.
+/// `[imu.noise]` with all detected processes, ready to paste.
 pub fn noise_table(analysis: &NoiseAnalysis) -> String {
     let mut text = "[imu.noise]\n".to_owned();
     for &sensor in &analysis.sensors {
         let fields = of_triad(analysis, sensor);
         if fields.is_empty() {
             let name = sensor.name();
-            text += &format!("# {name}: nothing was found; state the data sheet's figure\n");
+            text += &format!("# {name}: not found; use the data-sheet value\n");
         }
         for (key, value, comment) in fields {
             let mark = if comment.is_empty() { "" } else { "  # " };
@@ -110,7 +110,7 @@ pub fn noise_table(analysis: &NoiseAnalysis) -> String {
     text
 }
 
-/// The same fields to all digits.
+/// The same fields with all digits.
 pub fn fields(analysis: &NoiseAnalysis) -> Map<String, Value> {
     let fields = Sensor::ALL.map(|sensor| of_triad(analysis, sensor));
     let fields = fields.into_iter().flatten();
@@ -124,8 +124,8 @@ fn of_triad(analysis: &NoiseAnalysis, sensor: Sensor) -> Vec<Field> {
     };
     let walk = quantity(Process::RandomWalk, sensor);
     let comment = match figures.random_walk_is_limit {
-        true => "a limit: its slope was not found",
-        false => "root of the mean square of the axes",
+        true => "upper limit; its slope was not detected",
+        false => "RMS of the axes",
     };
     let of_walk = figures.noise.random_walk / walk.value;
     let mut fields = vec![(walk.key, of_walk, comment.to_owned())];
@@ -141,14 +141,14 @@ fn of_triad(analysis: &NoiseAnalysis, sensor: Sensor) -> Vec<Field> {
     let comment = format!("1σ of a Gauss–Markov process{stands_for}");
     fields.push((key, of.sigma / unit, comment));
     let open = match figures.correlation_is_open {
-        true => "as long as the record can show; σ grows with its root",
+        true => "longest that the recording can show; σ grows with its square root",
         false => "",
     };
     fields.push((time_key, of.correlation_time, open.to_owned()));
     fields
 }
 
-/// What the process stands for, if it was not found as such.
+/// The process that it represents, if not detected as such.
 fn in_place_of(analysis: &NoiseAnalysis, sensor: Sensor) -> String {
     let found = analysis.triads.get(sensor).mean.found();
     let stands_for = [Process::BiasInstability, Process::RateRandomWalk].into_iter();
@@ -162,7 +162,7 @@ fn in_place_of(analysis: &NoiseAnalysis, sensor: Sensor) -> String {
     match stands_for.is_empty() {
         true => String::new(),
         false => format!(
-            " fitted to the same deviations in the place of {}",
+            " fitted to the same deviations instead of {}",
             stands_for.join(" and ")
         ),
     }

@@ -1,13 +1,13 @@
-//! Allan deviation against cluster time, a panel for each axis.
+//! Allan deviation against cluster time, one panel per axis.
 
 use super::quantity::{deviation_unit, quantity};
 use crate::imu::{AXES, Sensor};
 use crate::noise::{AxisNoise, Found, NoiseAnalysis, Process};
 use crate::report::prelude::*;
 
-/// A process is drawn where it makes at least this part of the variance.
+/// A process is drawn where it contributes at least this fraction of the variance.
 const SEEN: f64 = 0.02;
-/// Points in a decade of a drawn line.
+/// Points per decade of a drawn line.
 const POINTS: f64 = 24.0;
 
 pub fn figure(analysis: &NoiseAnalysis, sensor: Sensor) -> Plot {
@@ -21,10 +21,10 @@ pub fn figure(analysis: &NoiseAnalysis, sensor: Sensor) -> Plot {
     let panels = triad.axes.iter().zip(AXES);
     let panels = panels.map(|(axis, letter)| panel(axis, letter, sensor, ends));
     Plot::new(&file, &heading, (3, 440), panels).caption(
-        "Overlapping Allan deviation against cluster time, both logarithmic, the same axes for all three. Dots: as \
-         measured, with the 95 % interval as a band; black: the sum of what was found; dashed: each process \
-         found, with its slope and coefficient. Where no dashed line is, no slope was found. Upright line: 1 s, \
-         where random walk is read off; ring: the lowest deviation.",
+        "Overlapping Allan deviation against cluster time, both logarithmic, the same axes for all three. Dots with \
+         band: measured values with their 95 % interval; black: sum of the detected processes; dashed: each detected \
+         process, with its slope and coefficient. Vertical line: 1 s, where random walk is read; ring: lowest \
+         deviation.",
     )
 }
 

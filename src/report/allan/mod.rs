@@ -1,4 +1,4 @@
-//! The report of an instrument's noise: Allan deviations, what they show, and the figures for a run.
+//! Report on the noise of an instrument: Allan deviations, detected processes, and values for run.toml.
 
 mod data;
 mod figure;
@@ -9,7 +9,7 @@ mod words;
 use crate::noise::NoiseAnalysis;
 use crate::report::prelude::*;
 
-/// Everything that is said of the noise of a run of this name.
+/// The complete report on the noise of a run with this name.
 pub fn document(run: &str, analysis: &NoiseAnalysis) -> Document {
     let NoiseAnalysis {
         stretch, period, ..

@@ -8,7 +8,7 @@ use crate::units::{
 
 const SQRT_HOUR: f64 = 60.0;
 
-/// How the strength of a process is shown.
+/// Presentation of the strength of a process.
 pub struct Quantity {
     /// Such as `angle random walk N`.
     pub name: &'static str,
@@ -21,13 +21,13 @@ pub struct Quantity {
 }
 
 impl Quantity {
-    /// The letter that the standards have for it.
+    /// Its letter in the standards.
     pub fn letter(&self) -> &'static str {
         self.name.rsplit(' ').next().unwrap_or_default()
     }
 }
 
-/// Of a process in one triad.
+/// Quantity of a process in one triad.
 #[rustfmt::skip]
 pub fn quantity(process: Process, sensor: Sensor) -> Quantity {
     use Process::*;

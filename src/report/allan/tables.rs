@@ -6,7 +6,7 @@ use crate::imu::{AXES, Sensor};
 use crate::noise::{AxisNoise, Found, NoiseAnalysis, Process, TriadNoise, of_kind};
 use crate::report::prelude::*;
 
-/// What was found in a triad: a row for each process, a column for each axis and one for their mean.
+/// Results for a triad: one row per process, one column per axis and one for their mean.
 pub fn coefficients(analysis: &NoiseAnalysis, sensor: Sensor) -> Table {
     let triad = analysis.triads.get(sensor);
     let columns: Vec<&AxisNoise> = triad.axes.iter().chain([&triad.mean]).collect();
@@ -59,7 +59,7 @@ pub fn coefficients(analysis: &NoiseAnalysis, sensor: Sensor) -> Table {
         .chain(axes)
         .chain(["triad".to_owned()]);
     let table = Table::new(capital(triad_name(sensor)), headings).section(rows).note(
-        "± 1σ. <: its slope is not detected; 95 % upper limit. triad: the mean of the three variances.",
+        "± 1σ. <: slope not detected, 95 % upper limit. triad: from the mean of the three variances.",
     );
     match of_a_pulse(*analysis.pulse.get(sensor), sensor) {
         Some(note) => table.note(note),
@@ -67,12 +67,12 @@ pub fn coefficients(analysis: &NoiseAnalysis, sensor: Sensor) -> Table {
     }
 }
 
-/// What the quantisation by pulses makes.
+/// Quantisation due to pulses.
 fn of_a_pulse(pulse: f64, sensor: Sensor) -> Option<String> {
     let of = quantity(Process::Quantisation, sensor);
     (pulse > 0.0).then(|| {
         format!(
-            "One pulse makes Q = {} {}, where noise is more than a pulse.",
+            "One pulse corresponds to Q = {} {} if the noise exceeds a pulse.",
             three_digits(pulse / 12f64.sqrt() / of.value),
             of.unit
         )
@@ -128,7 +128,7 @@ pub fn deviations(analysis: &NoiseAnalysis) -> Table {
     let mut table = Table::new("Overlapping Allan deviation", columns)
         .section(taus.map(row))
         .note(format!(
-            "Degrees of freedom: the fewest of the six. {}",
+            "Degrees of freedom: the smallest of the six. {}",
             words::INTERVALS
         ));
     table.optional = vec![7];

@@ -1,45 +1,43 @@
-//! What has to be said of an analysis.
+//! Sentences about an analysis.
 
 use super::quantity::quantity;
 use crate::imu::{AXES, Sensor};
 use crate::noise::{Hidden, Identified, NoiseAnalysis, Process, TriadNoise, of_kind};
 use crate::report::prelude::*;
 
-/// Random walks of the axes of a triad that differ by more than this factor are not alike.
+/// Random walks of the axes of a triad count as different beyond this ratio.
 const UNLIKE: f64 = 1.5;
-/// Departures of the variance from all models that are not worth a word.
+/// Deviations of the variance from all models below this fraction are not reported.
 const SMALL: f64 = 0.02;
 
-pub const INTERVALS: &str = "A deviation s with ν degrees of freedom lies with 95 % probability \
-    between s √(ν/χ²₀.₉₇₅) and s √(ν/χ²₀.₀₂₅) (NIST SP 1065, 5.3).";
+pub const INTERVALS: &str = "The 95 % interval of a deviation s with ν degrees of freedom is s √(ν/χ²₀.₉₇₅) to s \
+    √(ν/χ²₀.₀₂₅) (NIST SP 1065, 5.3).";
 
-/// What is left out at the short end, in a sentence.
+/// Excluded short cluster times, in a sentence.
 fn left_out(of: &Identified, taus: &[f64]) -> Option<String> {
     let from = taus.get(of.first).filter(|_| of.first > 0)?;
     Some(format!(
-        "no process describes its deviations below {}: pulses coarser than the noise, or the bandwidth of the \
-         sensor. Coefficients are of the longer cluster times.",
+        "no process fits its deviations below {}, because of pulses coarser than the noise or the sensor bandwidth. \
+         The coefficients use the longer cluster times.",
         duration(*from)
     ))
 }
 
-pub const METHOD: &str = "Overlapping Allan variance of the rate (NIST SP 1065, 5.2.4) at two \
-    cluster times in an octave. Coefficients: generalised least squares of the variances as a sum of \
-    processes (IEEE Std 952, annex C; El-Sheimy, Hou, Niu 2008), none of them negative, weighted by the \
-    covariance that the points have under those very processes, from their generalised \
-    autocovariances (Greenhall, Riley 2003), which also gives the equivalent degrees of freedom. Of all \
-    combinations the most likely one is taken, where each process must raise twice the logarithm of the \
-    likelihood by 9 (3σ), and a correlation time by 4 more. Short cluster \
-    times at which no combination describes the deviations, where pulses coarser than the noise or the bandwidth of \
-    the sensor show, are left out. Bias instability B is the coefficient of flicker noise, whose floor is 0.664 B.";
+pub const METHOD: &str = "Overlapping Allan variance of the rate (NIST SP 1065, 5.2.4) at two cluster times per \
+    octave. Coefficients: non-negative generalised least-squares fit of the variances as a sum of processes (IEEE \
+    Std 952, annex C; El-Sheimy, Hou, Niu 2008). The weights are the covariance of the points under these processes, \
+    from their generalised autocovariances (Greenhall, Riley 2003), which also give the equivalent degrees of \
+    freedom. turncal selects the most likely combination; each process must raise twice the log-likelihood by 9 \
+    (3σ), and a correlation time by 4 more. Short cluster times that no combination fits (pulses coarser than the \
+    noise, or sensor bandwidth) are excluded. Bias instability B is the coefficient of flicker noise, whose floor is \
+    0.664 B.";
 
-/// What forbids to trust the figures, or to use them without thought.
+/// Warnings about the figures.
 pub fn warnings(analysis: &NoiseAnalysis) -> Vec<String> {
     let mut warnings = Vec::new();
     if !analysis.stretch.stands {
         warnings.push(format!(
-            "The instrument is not stationary all through {}: these are figures of its motion and its noise \
-             together.",
+            "The instrument is not stationary throughout {}, so the figures include motion as well as noise.",
             analysis.stretch.name
         ));
     }
@@ -49,15 +47,14 @@ pub fn warnings(analysis: &NoiseAnalysis) -> Vec<String> {
         for (axis, letter) in triad.axes.iter().zip(AXES) {
             match &axis.identified {
                 None if axis.is_constant => warnings.push(format!(
-                    "{name} {letter}: its samples vary by rounding only, so its noise is not observed."
+                    "{name} {letter}: its samples vary only by rounding, so its noise cannot be determined."
                 )),
                 None => warnings.push(format!(
-                    "{name} {letter}: no process describes its deviations."
+                    "{name} {letter}: no process fits its deviations."
                 )),
                 Some(of) if of.misfit > SMALL => warnings.push(format!(
-                    "{name} {letter}: its deviations depart from every sum of processes by {} %, as \
-                     vibration, filters, steps of temperature, or pulses coarser than the noise make \
-                     them; σ allow for that.",
+                    "{name} {letter}: its deviations differ from every sum of processes by {} %, which σ include. \
+                     Possible causes are vibration, filters, temperature steps, or pulses coarser than the noise.",
                     // Of a deviation, half as much as of a variance.
                     sigma(50.0 * of.misfit)
                 )),
@@ -68,8 +65,8 @@ pub fn warnings(analysis: &NoiseAnalysis) -> Vec<String> {
             }
             if axis.knocks > 0 {
                 warnings.push(format!(
-                    "{name} {letter}: {} jump(s) from sample to sample of more than 8σ: knocks or faulty \
-                     samples, which raise deviations. Choose a quieter stretch with --segment.",
+                    "{name} {letter}: {} jump(s) of more than 8σ between samples (knocks or faulty samples) raise \
+                     the deviations. Choose a quieter segment with --segment.",
                     count(axis.knocks)
                 ));
             }
@@ -84,8 +81,8 @@ fn ramp(triad: &TriadNoise, sensor: Sensor) -> Option<String> {
     let of = quantity(Process::RateRamp, sensor);
     let found = of_kind(triad.mean.found(), Process::RateRamp)?;
     Some(format!(
-        "{}: a ramp of {} {} is no noise, and [imu.noise] has no place for it: let the instrument warm up \
-         and hold its temperature.",
+        "{}: the output drifts by {} {}. This is not noise and does not go into [imu.noise]. Let the instrument warm \
+         up and keep its temperature constant.",
         sensor.name(),
         three_digits(found.strength / of.value),
         of.unit
@@ -103,8 +100,7 @@ fn unlike(triad: &TriadNoise, sensor: Sensor) -> Option<String> {
     let most = walks.iter().copied().fold(0.0, f64::max);
     (most > UNLIKE * least).then(|| {
         format!(
-            "{}: the axes are not alike ({} from {} to {} {}); a run states one figure for all three, the \
-             root of their mean square.",
+            "{}: the axes differ ({} from {} to {} {}). run.toml takes one value for all three, their RMS.",
             sensor.name(),
             of.name,
             three_digits(least),
@@ -114,7 +110,7 @@ fn unlike(triad: &TriadNoise, sensor: Sensor) -> Option<String> {
     })
 }
 
-/// Of each slope that a triad does not show: what it is below, and how it could be seen.
+/// For each undetected slope of a triad: its upper limit, and how to measure it.
 pub fn advice(analysis: &NoiseAnalysis) -> Vec<String> {
     let mut sentences = Vec::new();
     for &sensor in &analysis.sensors {
@@ -125,25 +121,23 @@ pub fn advice(analysis: &NoiseAnalysis) -> Vec<String> {
             let longer = |factor: f64| duration(factor * analysis.duration());
             let how = match process {
                 Process::Quantisation => {
-                    "shows at short cluster times: a higher sample rate would show it, a longer record \
-                     would not"
+                    "a higher sample rate would show it, a longer recording would not"
                         .to_owned()
                 }
                 Process::BiasInstability if found(Process::RateRandomWalk) => {
-                    "lies hidden between random walk and rate random walk: a longer record would not \
-                     show it"
+                    "random walk and rate random walk hide it, so a longer recording would not show it"
                         .to_owned()
                 }
                 Process::BiasInstability | Process::RateRandomWalk if found(Process::RateRamp) => {
-                    "lies hidden under the ramp: record after it has warmed up, at an even temperature"
+                    "the ramp hides it, so record after warm-up at constant temperature"
                         .to_owned()
                 }
                 Process::RateRandomWalk => format!(
-                    "half of that would show in a record twice as long, {}",
+                    "a recording twice as long ({}) would show half of that",
                     longer(2.0)
                 ),
                 _ => format!(
-                    "half of that would show in a record four times as long, {}",
+                    "a recording four times as long ({}) would show half of that",
                     longer(4.0)
                 ),
             };

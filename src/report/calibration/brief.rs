@@ -1,4 +1,4 @@
-//! What one screen has room for: accuracy and where it comes from, the independent check, what the calibration is worth.
+//! One-screen summary: accuracy and its main source, cross-validation, navigation error.
 
 use super::super::navigation;
 use super::report::Report;
@@ -6,7 +6,7 @@ use super::{budget, tables};
 use crate::calibration::{Estimate, ParameterVector};
 use crate::report::prelude::*;
 
-/// Adds what one screen has room for.
+/// Adds the one-screen summary.
 pub fn add(document: &mut Document, report: &Report) {
     let Some(estimate) = report.estimate() else {
         return;
@@ -15,7 +15,7 @@ pub fn add(document: &mut Document, report: &Report) {
     let mut facts = Facts::default();
     for (name, value) in [
         ("weakest", weakest(report)),
-        ("left out of the fit", tables::cross_validation(report)),
+        ("excluded from fit", tables::cross_validation(report)),
         ("navigation", navigation(report)),
         ("not covered", budget::unseen(report, estimate)),
     ] {
@@ -26,7 +26,7 @@ pub fn add(document: &mut Document, report: &Report) {
     document.brief.push(facts.into());
 }
 
-/// RMS σ and error of each group, beside what was to be expected and what makes most of it.
+/// RMS σ and error of each group, with the predicted σ and the largest source.
 fn accuracy(report: &Report, estimate: &Estimate) -> Table {
     let both = match report.methods()[..] {
         [(_, closed), (_, _)] => Some(closed),
@@ -66,7 +66,7 @@ fn accuracy(report: &Report, estimate: &Estimate) -> Table {
     table
 }
 
-/// The parameter of which the data left most of what was uncertain before.
+/// The parameter with the smallest reduction of its prior σ.
 fn weakest(report: &Report) -> Option<String> {
     let (estimate, outcome) = (report.estimate()?, report.outcome?);
     let (sigma_of, prior) = (estimate.sigma(), &outcome.prior_sigma);

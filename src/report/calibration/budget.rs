@@ -1,4 +1,4 @@
-//! Where the uncertainty comes from: tables and stacked bars.
+//! Sources of the uncertainty: tables and stacked bars.
 
 use super::super::terms::title;
 use super::report::Report;
@@ -7,16 +7,16 @@ use crate::earth::ROTATION_RATE;
 use crate::imu::Sensor;
 use crate::report::prelude::*;
 
-/// So many sources have a colour of their own; the others share one.
+/// Number of sources with separate colours; the others share one.
 const SHOWN: usize = 5;
-/// A latitude is usually stated to this, rad.
+/// Usual resolution of a stated latitude, rad.
 const LATITUDE: f64 = 1e-3 * DEGREE;
-/// So many error terms are named that a record would not show.
+/// Maximum number of unobservable error terms that are named.
 const NAMED_TERMS: usize = 3;
-/// A source is named where it adds at least this part of a variance.
+/// A source is named if it contributes at least this fraction of a variance.
 const NAMED: f64 = 1e-3;
 
-/// RMS of a group's standard uncertainties by source, and together.
+/// RMS of the standard uncertainties of a group, by source and combined.
 pub fn table(budget: &Budget, estimate: &Estimate) -> Table {
     let row = |name: &str, u: ParameterVector, freedom: &str| {
         let mut row = vec![name.to_owned()];
@@ -49,17 +49,17 @@ pub fn table(budget: &Budget, estimate: &Estimate) -> Table {
             coverage,
         ])
         .note(
-            "Standard uncertainty that each source adds, RMS over the parameters of a group; squares add to the \
-             variances of the estimate (JCGM 100). Sources below a thousandth of every variance are left out \
-             here; calibration.json has them all, parameter by parameter.",
+            "Standard uncertainty contributed by each source, RMS over the parameters of a group; squares add up to \
+             the variance of the estimate (JCGM 100). Sources below a thousandth of every variance are not shown; \
+             calibration.json lists all of them per parameter.",
         )
         .note(
-            "ν: degrees of freedom with which the size of a source is known, infinite where it is stated. k from \
-             Student's t with the effective degrees of freedom, the largest of the group.",
+            "ν: degrees of freedom of each source, infinite if stated. k: from Student's t with the effective \
+             degrees of freedom, largest of the group.",
         )
 }
 
-/// The sources that add anything worth naming, the largest first.
+/// The relevant sources, the largest first.
 fn shown<'a>(budget: &'a Budget, estimate: &Estimate) -> Vec<&'a BudgetPart> {
     let shares = |part| estimate.estimated().map(move |i| share(part, estimate, i));
     let parts = budget.parts.iter();
@@ -75,7 +75,7 @@ fn share(part: &BudgetPart, estimate: &Estimate, index: usize) -> f64 {
     part.covariance[(index, index)] / estimate.covariance[(index, index)]
 }
 
-/// The source of most of the variances of a group, with its share.
+/// The largest source of the variance of a group, with its share.
 pub fn largest(budget: &Budget, group: &[usize]) -> Option<String> {
     let sum = |part: &BudgetPart| group.iter().map(|&i| part.covariance[(i, i)]).sum::<f64>();
     let all: f64 = budget.parts.iter().map(sum).sum();
@@ -87,7 +87,7 @@ pub fn largest(budget: &Budget, group: &[usize]) -> Option<String> {
     (all > 0.0).then(|| format!("{} {percent:.0} %", part.source.name()))
 }
 
-/// Shares of every variance, one bar a parameter.
+/// Shares of every variance, one bar per parameter.
 pub fn figure(budget: &Budget, estimate: &Estimate) -> Plot {
     let parts = shown(budget, estimate);
     let own = &parts[..parts.len().min(SHOWN)];
@@ -134,13 +134,12 @@ pub fn figure(budget: &Budget, estimate: &Estimate) -> Plot {
         Sensor::ALL.map(panel),
     )
     .caption(
-        "Share of each source in the variance of every parameter. What takes most of a bar is what to improve: \
-         noise by more time at rest, the table's position by more positions, the prior by a path that shows the \
-         parameter.",
+        "Share of each source in the variance of every parameter. Improve the largest source first: noise with more \
+         time at rest, table position with more positions, the prior with a path that excites the parameter.",
     )
 }
 
-/// What σ do not hold: error terms that the record would not show and that change a group by more than its σ.
+/// Effects not included in σ: undetectable error terms that change a group by more than its σ.
 pub fn unseen(report: &Report, estimate: &Estimate) -> Option<String> {
     let claimed = estimate.sigma();
     let worst = |test: &ErrorTermTest| {
@@ -165,10 +164,11 @@ pub fn unseen(report: &Report, estimate: &Estimate) -> Option<String> {
     let more = unseen.len() - named.len();
     named.extend((more > 0).then(|| format!("{more} more")));
     let named = named.join(", ");
-    (!named.is_empty()).then(|| format!("{named}: not visible in this record, so not in σ"))
+    (!named.is_empty())
+        .then(|| format!("{named}: not visible in this recording, so not included in σ"))
 }
 
-/// What is in no sum: error terms that are not estimated.
+/// Effects not included in any sum: error terms that are not estimated.
 pub fn left_off(report: &Report, estimate: &Estimate) -> Table {
     let cell = |group: Group, of: &ParameterVector| or_dash(group.rms(of, estimate), sigma);
     let row = |test: &ErrorTermTest| {
@@ -184,20 +184,20 @@ pub fn left_off(report: &Report, estimate: &Estimate) -> Table {
         Some(row)
     };
     Table::new(
-        "Error terms that are not estimated: what they may add",
+        "Possible effect of error terms that are not estimated",
         group_columns("term"),
     )
     .section(report.effects.iter().filter_map(row))
     .note(format!(
-        "Taken as exact: the site's latitude, of which 0.001° would move gyro biases by up to {} °/h{}.",
+        "Taken as exact: the latitude of the site (0.001° changes gyro biases by up to {} °/h){}.",
         three_digits(ROTATION_RATE * LATITUDE / DEG_PER_H),
         match report.run.site.gravity_sigma > 0.0 {
             true => "",
-            false => ", and gravity, of which 1 mGal is 1.02 ppm of every accelerometer's scale factor",
+            false => " and gravity (1 mGal changes every accelerometer scale factor by 1.02 ppm)",
         }
     ))
     .note(
-        "In no sum above. RMS change of the parameters of a group if the term is as large as the record allows \
-         (in brackets: as large as its usual σ). Where it matters, estimate the term with --with.",
+        "Not included in the sums above. RMS change of the parameters of a group if the term is as large as the data \
+         allow (in brackets: as large as its usual σ). If it matters, estimate the term with --with.",
     )
 }

@@ -9,19 +9,19 @@ use crate::recording::{ImuSamples, TableLog};
 use crate::report::calibration::report::Report;
 use crate::report::prelude::*;
 
-/// Where the axis of estimates ends, in final σ: with the prior on it the end could not be read.
+/// End of the axis of estimates, in final σ; with the prior included, the final values would be unreadable.
 const EXTENT: f64 = 300.0;
 /// Beyond this an innovation is drawn at the edge.
 const EDGE: f64 = 6.0;
 /// Up to this many innovations are drawn as dots, more as a line through the extremes.
 const DOTS: usize = 150;
-/// Weaker correlations are not written out: they would only hide the strong ones.
+/// Weaker correlations are not written, because they would hide the strong ones.
 const WRITTEN: f64 = 0.2;
 /// Half the side of a square that would not be seen.
 const FAINT: f64 = 0.02;
 
 impl Report<'_> {
-    /// Every figure that there is something to show in.
+    /// All figures with data.
     pub(super) fn figures(&self) -> Vec<Plot> {
         let mut plots = Vec::new();
         plots.extend(match (self.truth_vector(), self.methods().as_slice()) {
@@ -39,7 +39,7 @@ impl Report<'_> {
         plots
     }
 
-    /// The filter's result where it has one time: several recordings have each their own.
+    /// The filter result if it has a single time axis, which several recordings do not.
     pub(super) fn against_time(&self) -> Option<&Outcome> {
         self.outcome.filter(|outcome| outcome.alone.len() < 2)
     }
@@ -49,7 +49,7 @@ impl Report<'_> {
         Axis::linear("time, s").between(start, end)
     }
 
-    /// σ of each parameter against time, with the largest true error where the truth is known.
+    /// σ of each parameter against time, with the largest true error if the truth is known.
     pub(super) fn sigma(&self, outcome: &Outcome) -> Option<Plot> {
         let (history, form) = (&outcome.history, outcome.estimate.form());
         let truth = self.truth_vector();
@@ -76,8 +76,8 @@ impl Report<'_> {
                 .with_all(error)
         };
         let mut caption =
-            "1σ of every parameter in the last pass, one panel for each group, logarithmic. Grey: \
-                           dwells; white: turns. A line that stays level was not observed."
+            "1σ of every parameter during the last pass, one panel per group, logarithmic. Grey: dwells; white: \
+             turns. A flat line means the parameter was not observed."
                 .to_owned();
         if truth.is_some() {
             caption += " Dashed: the largest true error in the group; it should end within a few σ of the lines.";
@@ -118,9 +118,9 @@ impl Report<'_> {
             panels.resize(panels.len().next_multiple_of(3), Panel::blank(""));
         }
         let caption = format!(
-            "Line: estimate as the instrument is turned, minus {minus}; band: its ±3σ. The vertical axis is linear \
-             within the final σ of the group and logarithmic beyond, and ends at {EXTENT} times that σ; what lies \
-             beyond is drawn at its edge. The line should stay in its band."
+            "Line: estimate over time, minus {minus}; band: its ±3σ. The vertical axis is linear within the final σ \
+             of the group, logarithmic beyond, and ends at {EXTENT} times that σ; larger values are drawn at the \
+             edge. The line should stay in its band."
         );
         let drawn = !outcome.history.is_empty() && !panels.is_empty();
         let heading = "Estimates and their ±3σ bands";
@@ -163,8 +163,8 @@ impl Report<'_> {
         let panels = kinds.flat_map(|kind| [0, 1, 2].map(|direction| panel(kind, direction)));
         let panels: Vec<Panel> = panels.collect();
         let caption = format!(
-            "Innovations of the last pass in units of their own σ; they should look like white noise of unit \
-             variance. Solid lines: ±1σ; dashed: ±3σ. Where they are many the line runs through the extremes of \
+            "Innovations of the last pass divided by their σ; they should look like white noise of unit variance. \
+             Solid lines: ±1σ; dashed: ±3σ. Dense data are drawn by the extremes of each interval. Crosses: rejected \
              each stretch. Crosses: rejected by the gate; at the edge: ±{EDGE}σ or more."
         );
         let drawn = !panels.is_empty();
@@ -172,7 +172,7 @@ impl Report<'_> {
         drawn.then(|| plot.caption(caption))
     }
 
-    /// A line across a turn would show what was not observed.
+    /// A line across a turn would suggest observations that do not exist.
     fn interrupted_by_turns(&self, points: &[(f64, f64)]) -> Vec<(f64, f64)> {
         let dwell = |t: f64| self.dwells.partition_point(|dwell| dwell.end < t);
         let pieces = points.chunk_by(|a, b| dwell(a.0) == dwell(b.0));
@@ -227,7 +227,7 @@ fn correlation(estimate: &Estimate) -> Option<Plot> {
     (!indices.is_empty()).then_some(plot)
 }
 
-/// Magnitude of each parameter's error by each method, with the σ that it claims.
+/// Magnitude of the error of each parameter for each method, with its stated σ.
 fn errors(methods: &[(&str, &Estimate)], truth: &ParameterVector) -> Plot {
     let form = methods[0].1.form();
     let panel = |group: Group| {
@@ -251,9 +251,8 @@ fn errors(methods: &[(&str, &Estimate)], truth: &ParameterVector) -> Plot {
         let x = Axis::places(indices.iter().map(|&i| axis_name(form, i)));
         Panel::new(group.titled(), x, Axis::log("")).with_all(series)
     };
-    let mut caption = "Magnitude of each parameter's true error, logarithmic. The whisker reaches up to the 1σ \
-                       that the method claims: about two marks in three should lie below the top of their \
-                       whisker."
+    let mut caption = "Magnitude of the true error of each parameter, logarithmic. The whisker ends at the stated \
+        1σ; about two marks in three should be below its top."
         .to_owned();
     if methods.len() == 2 {
         caption += " Open rings: closed form; filled dots: EKF.";
@@ -270,9 +269,9 @@ fn method_mark(name: &str) -> (Mark, Color) {
     }
 }
 
-/// Nearer to the plumb line than this an axis has no azimuth worth drawing.
+/// Closer to the vertical than this, the azimuth of an axis is not drawn.
 const STEEP: f64 = 80.0 * DEGREE;
-/// Azimuth up to which a curve may run past ±180° before it continues at the other end, °.
+/// Azimuth up to which a curve may exceed ±180° before it wraps, °.
 const PAST: f64 = 190.0;
 
 /// Elevation and azimuth of the body axes from the table, and body rates from the gyros.
@@ -301,11 +300,12 @@ fn path(report: &Report) -> Plot {
         panels.push(panel("azimuth of the body axes, °", y, &|axis| {
             azimuth(table, axis)
         }));
-        caption += "Elevation of each body axis above the horizon and its azimuth clockwise from North, as the \
-                    turntable reads them. Unlike heading, pitch and roll these are never singular; an axis has \
-                    no azimuth while it is within 10° of the plumb line. ";
+        caption += "Elevation of each body axis above the horizon and azimuth clockwise from North, from the \
+            turntable readings. Unlike heading, pitch and roll these have no singularity; azimuth is not drawn \
+            within 10° of the vertical. ";
     }
-    caption += "Rates are the raw gyro outputs about the body axes. Grey: dwells, numbered where there is room.";
+    caption +=
+        "Rates: raw gyro output about the body axes. Grey: dwells, numbered where space permits.";
     let y = Axis::linear("").including([0.0]).room(0.05, 0.16);
     panels.push(panel("rate about the body axes, °/s", y, &|axis| {
         samples(&report.run.recording.imu, Sensor::Gyro, axis, DEGREE)
@@ -319,7 +319,7 @@ fn elevation(table: &TableLog, axis: usize) -> Series {
     Series::line(line.map(|(&t, attitude)| (t, axis_elevation(&matrix(attitude), axis) / DEGREE)))
 }
 
-/// Azimuth of a body axis clockwise from North in degrees, interrupted where it jumps and where it is steep.
+/// Azimuth of a body axis clockwise from North in degrees, interrupted at jumps and near the vertical.
 fn azimuth(table: &TableLog, axis: usize) -> Series {
     let gap = (f64::NAN, f64::NAN);
     let (mut last, mut line) = (f64::NAN, Vec::new());

@@ -1,4 +1,4 @@
-//! The report of a calibration, and of both methods side by side.
+//! Report on a calibration, and comparison of both methods.
 
 mod brief;
 mod budget;
@@ -33,7 +33,7 @@ fn in_order(findings: &[Finding]) -> Vec<Finding> {
 }
 
 impl Report<'_> {
-    /// Everything that is said of the calibration. Its figures by name are in the calibration's own file.
+    /// The complete report on the calibration. Its named values are in the calibration file.
     pub fn document(&self) -> Document {
         let mut document = Document::new(self.title);
         document.verdict = self.verdict();
@@ -79,7 +79,7 @@ impl Report<'_> {
         document
     }
 
-    /// What ran on what.
+    /// Methods and data.
     fn lead(&self) -> Vec<String> {
         let imu = &self.run.recording.imu;
         let how = match self.table() {
@@ -115,7 +115,7 @@ impl Report<'_> {
 }
 
 impl Report<'_> {
-    /// Whether the calibration may be used, and how much of it was determined.
+    /// Whether the calibration can be used, and how many parameters were determined.
     pub(super) fn verdict(&self) -> Option<(Word, String)> {
         let word = Verdict::of(self.findings).word;
         let estimate = self.estimate()?;
@@ -123,7 +123,7 @@ impl Report<'_> {
         let hidden = self.outcome.map_or(0, |outcome| outcome.unobserved().len());
         let determined = estimated - hidden;
         let of_it = match word {
-            Word::Failed => "values and σ may not be used",
+            Word::Failed => "do not use values or σ",
             _ => &format!("{determined} of {estimated} parameters determined"),
         };
         let findings = match self.findings.len() {
@@ -135,7 +135,7 @@ impl Report<'_> {
     }
 }
 
-/// What was calibrated, by what its run says of it.
+/// The calibrated instrument, from the metadata of its run.
 pub(super) fn item(report: &Report) -> Facts {
     let meta = &report.run.recording.meta;
     let first = ["instrument", "serial", "date"];
@@ -146,7 +146,7 @@ pub(super) fn item(report: &Report) -> Facts {
     Facts::new("", rows)
 }
 
-/// What was recorded, where, and what was known before.
+/// Recording, site and prior.
 pub(super) fn run(report: &Report) -> Facts {
     let run = report.run;
     let (imu, site) = (&run.recording.imu, &run.site);
@@ -179,9 +179,9 @@ pub(super) fn run(report: &Report) -> Facts {
     }
     facts.push(
         "turntable",
-        report.table().map_or("its log was not used".to_owned(), |table| {
+        report.table().map_or("log not used".to_owned(), |table| {
             format!(
-                "{} readings; position {} ″ (1σ, new at every position), reading {} ″ (1σ, white)",
+                "{} readings; position {} ″ (1σ, independent at each position), reading {} ″ (1σ, white)",
                 count(table.time.len()),
                 sigma(run.table.position_sigma / ARCSEC),
                 sigma(run.table.reading_sigma / ARCSEC)
@@ -208,9 +208,8 @@ fn noise(sensor: Sensor, noise: &Noise) -> String {
 impl Report<'_> {
     /// The model, the method and the frame.
     pub(super) fn model(&self) -> Facts {
-        let symbols = "N: output per second over its nominal scale; u: angular rate or specific force along the \
-                       body axes; K: scale factors, given as departure from nominal; E: entries of C beside the \
-                       diagonal; D: bias";
+        let symbols = "N: output per second divided by its nominal scale; u: angular rate or specific force along \
+            the body axes; K: scale factors, shown as deviation from nominal; E: off-diagonal entries of C; D: bias";
         let equation = "N = K C u + D; u = (K C)⁻¹ (N − D)";
         let rows = [("equation", equation), ("symbols", symbols)];
         let mut facts = Facts::new("Model and method", rows);
@@ -220,10 +219,10 @@ impl Report<'_> {
         facts.push("body frame", self.body_frame.words());
         let (observed, found_in) = match self.table() {
             Some(_) => (
-                "zero velocity in dwells and the attitude of the table",
+                "zero velocity in dwells and table attitude",
                 "the table's log",
             ),
-            None => ("zero velocity in dwells", "the IMU's own readings"),
+            None => ("zero velocity in dwells", "the IMU readings"),
         };
         if let Some(outcome) = self.outcome {
             let filter = format!(

@@ -1,4 +1,4 @@
-//! What the report of a calibration is made of.
+//! Input of the report on a calibration.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -14,48 +14,47 @@ use crate::run::{Aiding, Run};
 use crate::study::navigation::NavigationStudyError;
 use crate::survey::Expected;
 
-/// What a report is made of. Every estimate and the truth have the same installation form and the same body
-/// frame.
+/// Input of a report. All estimates and the truth have the same installation form and body frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Report<'a> {
     /// Heading of the page.
     pub title: &'a str,
     /// The record.
     pub run: &'a Run,
-    /// What was observed at rest.
+    /// Observations at rest.
     pub aiding: Aiding,
-    /// What fixes the body axes.
+    /// Definition of the body axes.
     pub body_frame: BodyFrame,
-    /// The filter's result, if it ran.
+    /// The filter result, if the filter ran.
     pub outcome: Option<&'a Outcome>,
-    /// What must be known before the figures are used.
+    /// Findings to read before using the results.
     pub findings: &'a [Finding],
-    /// What error terms did to it, or would do.
+    /// Actual or possible effect of error terms.
     pub effects: &'a [ErrorTermTest],
-    /// Where the uncertainty of the filter's result comes from.
+    /// Uncertainty budget of the filter result.
     pub budget: Option<&'a Budget>,
-    /// The closed form's result, if there is one.
+    /// The closed-form result, if any.
     pub closed_form: Option<ClosedForm<'a>>,
-    /// The true triads, where they are known.
+    /// The true triads, if known.
     pub truth: Option<&'a PerSensor<Triad>>,
-    /// True auxiliary parameters by name, as far as they are known.
+    /// True auxiliary parameters by name, if known.
     pub true_terms: &'a BTreeMap<String, TermRecord>,
-    /// What was to be expected of such a record, where that is known.
+    /// Predicted accuracy, if known.
     pub predicted: Option<&'a Expected>,
     /// Residuals at rest and after turns.
     pub quality: Option<&'a Quality>,
     /// Dwells, s.
     pub dwells: &'a [Range<f64>],
-    /// Navigation errors by each calibration, the closed form first; or why the run's site has none.
+    /// Navigation errors with each calibration, the closed form first; or the reason why there are none.
     pub navigation: Result<&'a [Navigated], &'a NavigationStudyError>,
 }
 
-/// The closed form's result, the baseline of the comparison.
+/// The closed-form result, the baseline of the comparison.
 #[derive(Debug, Clone, Copy)]
 pub struct ClosedForm<'a> {
-    /// Its estimate with the σ it claims.
+    /// Its estimate with the stated σ.
     pub estimate: &'a Estimate,
-    /// What it was made of, such as `six positions, 60 min of its own`.
+    /// Its data, such as `six positions, 60 min of its own`.
     pub note: &'a str,
 }
 
@@ -66,7 +65,7 @@ impl Report<'_> {
         filtered.or(self.closed_form.map(|closed| closed.estimate))
     }
 
-    /// The table's readings, where they were observed.
+    /// The table readings, if observed.
     pub(super) fn table(&self) -> Option<&TableLog> {
         self.run.observed_table(self.aiding)
     }
@@ -75,7 +74,7 @@ impl Report<'_> {
         self.truth.map(to_vector)
     }
 
-    /// Begin and end of the record, s.
+    /// Start and end of the recording, s.
     pub(super) fn time_span(&self) -> (f64, f64) {
         let imu = &self.run.recording.imu;
         (imu.start(), imu.end())

@@ -4,7 +4,7 @@ use super::tables::{ANGLE, FORCE};
 use crate::calibration::{DwellResidual, Quality};
 use crate::report::prelude::*;
 
-/// Residuals of gravity's magnitude and direction against time; dwells that were left out of a fit as rings.
+/// Residuals of the magnitude and direction of gravity against time; dwells excluded from a fit as rings.
 pub fn figure(quality: &Quality) -> Plot {
     let panel = |name: &str, units, of: fn(&DwellResidual) -> Option<f64>| {
         let points = |dwells: &[DwellResidual]| -> Vec<Point> {
@@ -36,7 +36,8 @@ pub fn figure(quality: &Quality) -> Plot {
         }),
     ];
     Plot::new("residuals.svg", "Residuals in each dwell", (2, 220), panels).caption(
-        "Left: magnitude of the mean specific force minus gravity. Right: angle between the vertical that the gyros carry \
-         over from the dwell before and the one that the accelerometers measure. Rings: by a fit without that dwell.",
+        "Left: magnitude of the mean specific force minus gravity. Right: angle between the vertical carried over \
+         from the previous dwell by the gyros and the vertical measured by the accelerometers. Rings: from a fit \
+         without that dwell.",
     )
 }

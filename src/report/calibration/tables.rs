@@ -1,4 +1,4 @@
-//! The tables, alike for terminal and page.
+//! The tables, the same for terminal and page.
 
 use super::super::terms;
 use super::super::terms::improvement;
@@ -7,11 +7,11 @@ use crate::calibration::{Estimate, Measures, Nis, Outcome, Quality, Spread, para
 use crate::recording::TableLog;
 use crate::report::prelude::*;
 
-/// How many of the directions that were observed are shown.
+/// Number of observed directions shown.
 const WEAKEST: usize = 3;
 
 impl Report<'_> {
-    /// Every parameter with its accuracy, and its error where the truth is known.
+    /// Every parameter with its accuracy, and its error if the truth is known.
     pub(super) fn parameters(&self, estimate: &Estimate) -> Table {
         let prior = self.outcome.map(|outcome| outcome.prior_sigma);
         let truth = self.truth_vector();
@@ -49,7 +49,7 @@ impl Report<'_> {
     }
 }
 
-/// The directions that the data observed least: all that were not observed, and some that were.
+/// The least observed directions: all unobserved ones and some observed ones.
 pub fn weakest(outcome: &Outcome) -> Table {
     let observability = &outcome.observability;
     let shown = observability.unobserved().count() + WEAKEST;
@@ -57,8 +57,8 @@ pub fn weakest(outcome: &Outcome) -> Table {
     Table::new("Least observed directions", ["direction", "prior : σ"])
         .section(rows.map(|of| vec![of.words.clone(), improvement(1.0, of.remaining)]))
         .note(
-            "Combinations of parameters, each in units of its prior σ, that the data observed independently of \
-             each other. “With” joins errors of the same sign, “against” errors of opposite sign.",
+            "Combinations of parameters, each in units of its prior σ, that the data determine independently of each \
+             other. “With” joins errors of the same sign, “against” errors of opposite sign.",
         )
 }
 
@@ -96,7 +96,7 @@ pub fn nis(outcome: &Outcome) -> Vec<String> {
     observed(outcome).map(shown).collect()
 }
 
-/// How the innovations agree with their covariance.
+/// Consistency of the innovations with their covariance.
 pub fn consistency(outcome: &Outcome) -> Table {
     let rows = observed(outcome).map(|(name, nis)| {
         let (low, high) = nis.interval;
@@ -114,12 +114,12 @@ pub fn consistency(outcome: &Outcome) -> Table {
         ]
     });
     Table::new("Consistency", columns("observation | NIS per scalar | 95 % interval | lag-one correlation | scalars")).section(rows).note(
-        "A NIS within its interval and a correlation near zero say that the innovations are as large and as \
-         white as the filter claims.",
+        "If NIS is within its interval and the correlation is near zero, the innovations are as large and as white \
+         as the filter predicts.",
     )
 }
 
-/// Residuals in dwells that were left out of the fit, in a line.
+/// Residuals in dwells excluded from the fit, on one line.
 pub fn cross_validation(report: &Report) -> Option<String> {
     let held_out = report.quality?.held_out.as_ref()?;
     let of = |name: &str, spread: &Spread, units: &[(&'static str, f64); 2]| {
@@ -135,7 +135,7 @@ pub fn cross_validation(report: &Report) -> Option<String> {
     (!parts.is_empty()).then(|| format!("{} ({} dwells)", parts.join("; "), held_out.gravity.count))
 }
 
-/// Each residual over the whole record and over what was held out; empty where there is nothing to measure.
+/// Each residual over the whole recording and over the excluded dwells; empty without data.
 pub fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
     let turns = match table {
         Some(_) => "attitude after a turn, gyros minus table",
@@ -171,8 +171,7 @@ pub fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
     let table = Table::new("Residuals at rest and after turns", columns).section(rows);
     match quality.held_out.is_some() {
         true => table.note(
-            "Cross-validation: in dwells whose observations a calibration did without, and over the turns that \
-             end in them.",
+            "Cross-validation: residuals in dwells excluded from the fit, and over the turns that end in them.",
         ),
         false => table,
     }

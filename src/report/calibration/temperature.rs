@@ -1,4 +1,4 @@
-//! What changes with temperature, and what differs between recordings.
+//! Temperature dependence and differences between recordings.
 
 use crate::calibration::{
     Outcome, ParameterMatrix, ParameterVector, SeparateEstimate, Thermal, parameter_name,
@@ -16,7 +16,7 @@ pub fn figures(outcome: &Outcome) -> Vec<Plot> {
     outcome.thermal.as_ref().map_or_else(Vec::new, of)
 }
 
-/// Adds tables and figures, where anything changes or differs.
+/// Adds tables and figures, if anything changes or differs.
 pub fn add(document: &mut Document, outcome: &Outcome) {
     if let Some(thermal) = &outcome.thermal {
         document.both(orders(outcome, thermal));
@@ -30,7 +30,7 @@ pub fn add(document: &mut Document, outcome: &Outcome) {
     document.both(differences(outcome));
 }
 
-/// Change of all parameters from those at the reference, and σ of what they are then.
+/// Change of all parameters from those at the reference, and σ of the resulting values.
 fn there(
     outcome: &Outcome,
     thermal: &Thermal,
@@ -84,12 +84,12 @@ fn orders(outcome: &Outcome, thermal: &Thermal) -> Table {
             rows.filter_map(|i| row(group, i)).collect::<Vec<_>>()
         }))
         .note(format!(
-            "Legendre coefficients ± 1σ over {ranges}: what the parameter does within half the range. Of each \
-             kind the highest order whose likelihood ratio is significant at one in a thousand is kept."
+            "Legendre coefficients ± 1σ over {ranges}: change of the parameter over half the range. The order of \
+             each kind is the highest with a significant likelihood ratio (p < 0.001)."
         ))
 }
 
-/// What heating and cooling differ by.
+/// Differences between heating and cooling.
 fn hysteresis(outcome: &Outcome, thermal: &Thermal) -> Table {
     let form = outcome.estimate.form();
     let rows = thermal.coefficients.iter().enumerate();
@@ -107,7 +107,7 @@ fn hysteresis(outcome: &Outcome, thermal: &Thermal) -> Table {
         ])
     });
     Table::new(
-        "Hysteresis: heating less cooling at the same temperature",
+        "Hysteresis: heating minus cooling at the same temperature",
         columns("parameter | value ± 1σ | unit | at ± K/min"),
     )
     .section(rows)
@@ -171,12 +171,12 @@ fn curves(outcome: &Outcome, thermal: &Thermal) -> Plot {
     };
     let panels = against_temperature(outcome, thermal, 0.03, series);
     Plot::new("temperature.svg", "Parameters against temperature", (3, 330), panels).caption(
-        "Change of each parameter from its value at the reference temperature, with its ±1σ band. Rings: what \
-         each recording alone says, with stated noise.",
+        "Change of each parameter from its value at the reference temperature, with its ±1σ band. Rings: each \
+         recording alone, with stated noise.",
     )
 }
 
-/// What each recording alone says less the curve.
+/// Estimate of each recording alone minus the curve.
 fn departures(outcome: &Outcome, thermal: &Thermal) -> Plot {
     let (form, reference) = (outcome.estimate.form(), outcome.estimate.vector());
     let series = |group: Group, indices: &[usize]| {
@@ -199,11 +199,11 @@ fn departures(outcome: &Outcome, thermal: &Thermal) -> Plot {
         let marks = indices.iter().enumerate().map(of_parameter);
         std::iter::once(Series::zero()).chain(marks).collect()
     };
-    let heading = "Each recording alone, less all together";
+    let heading = "Each recording alone, minus the joint estimate";
     let panels = against_temperature(outcome, thermal, 0.06, series);
     Plot::new("recordings.svg", heading, (3, 330), panels).caption(
-        "What each recording alone says, ±1σ, less the parameter at its temperature by all together. Two thirds \
-         of the intervals should reach zero.",
+        "Estimate from each recording alone, ±1σ, minus the joint estimate at its temperature. Two thirds of the \
+         intervals should include zero.",
     )
 }
 
@@ -229,12 +229,12 @@ fn residuals(outcome: &Outcome) -> Plot {
     ];
     let heading = "Innovations of dwells against temperature";
     Plot::new("residuals-temperature.svg", heading, (2, 300), panels).caption(
-        "Sum of the whitened innovations of velocity in each dwell over the root of their number. Without a trend, \
-         and mostly within ±2, nothing of temperature is left.",
+        "Sum of the whitened velocity innovations in each dwell, divided by the square root of their number. No \
+         trend and values mostly within ±2 mean that no temperature effect remains.",
     )
 }
 
-/// Each recording with its temperature and how far it alone is from all together.
+/// Each recording with its temperature and its distance from the joint estimate.
 fn recordings(outcome: &Outcome) -> Table {
     if outcome.alone.len() < 2 {
         return Table::default();
@@ -255,16 +255,16 @@ fn recordings(outcome: &Outcome) -> Table {
     };
     Table::new(
         "Recordings",
-        columns("recording | °C | calibrates alone | χ²/n from all | 999 of 1000 below"),
+        columns("recording | °C | calibrates alone | χ²/n against all | 99.9 % limit"),
     )
     .section(outcome.alone.iter().enumerate().map(row))
     .note(
-        "χ²/n: squared distance of what the recording alone says from all together, for each of its parameters, by \
-         what it knows less than all and the stated difference from day to day.",
+        "χ²/n: squared difference between the estimate from one recording and the joint estimate, per parameter, \
+         normalised by their covariance and the stated [day_to_day] differences.",
     )
 }
 
-/// By how much parameters differ between recordings: repeatability.
+/// Differences of parameters between recordings (repeatability).
 fn differences(outcome: &Outcome) -> Table {
     let form = outcome.estimate.form();
     let rows = outcome.repeatability();
@@ -282,12 +282,12 @@ fn differences(outcome: &Outcome) -> Table {
     });
     Table::new(
         "Repeatability between recordings",
-        columns("parameter | spread ± 1σ | by σ alone | unit | χ²/n | 999 of 1000 below"),
+        columns("parameter | spread ± 1σ | by σ alone | unit | χ²/n | 99.9 % limit"),
     )
     .section(rows)
     .note(
-        "Spread: standard deviation of what each recording alone says about the common curve; by σ alone: what the \
-         claimed σ make of it. Where χ²/n is beyond its limit the instrument does not repeat: state the difference \
-         under [day_to_day].",
+        "Spread: standard deviation of the single-recording estimates about the common curve; by σ alone: value \
+         expected from their σ. If χ²/n exceeds its limit, the instrument does not repeat; state the difference in \
+         [day_to_day].",
     )
 }

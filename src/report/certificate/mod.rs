@@ -1,4 +1,4 @@
-//! A calibration certificate in words: a document, and what stands on every page of it.
+//! A calibration certificate: a document, and the content of every page margin.
 
 mod results;
 
@@ -17,10 +17,9 @@ use crate::imu::ParameterKind;
 use crate::report::prelude::*;
 use crate::run::Aiding;
 
-/// A certificate's files: PDF, XML and the calibration, which are in the PDF, too.
+/// Files of a certificate: PDF, XML and the calibration; the latter two are also embedded in the PDF.
 ///
-/// # Errors
-/// [`PdfError`] where a text cannot be shown.
+/// # Errors [`PdfError`] if a text cannot be shown.
 pub fn files(
     certificate: &Certificate,
     calibration: Vec<u8>,
@@ -70,7 +69,7 @@ fn frame(certificate: &Certificate) -> Frame {
     }
 }
 
-/// Everything that it says, in the order of ISO/IEC 17025, 7.8.2 and 7.8.4.
+/// The complete content, in the order of ISO/IEC 17025, 7.8.2 and 7.8.4.
 pub fn document(certificate: &Certificate) -> Document {
     let laboratory = &certificate.laboratory;
     let (issue, item) = (&laboratory.certificate, &laboratory.item);
@@ -163,7 +162,7 @@ fn method(certificate: &Certificate) -> Facts {
     facts.push(
         "model",
         format!(
-            "{}; N output per second, u angular rate or specific force along the body axes",
+            "{}; N: output per second; u: angular rate or specific force along the body axes",
             calibration.equation.as_deref().unwrap_or(EQUATION)
         ),
     );
@@ -202,7 +201,7 @@ fn evaluation(aiding: Option<Aiding>) -> &'static str {
 fn of_gravity(gravity: GravityRecord) -> String {
     let accuracy = match gravity.sigma_m_s2 > 0.0 {
         true => format!("U = {} m/s² (k = 2)", sigma(2.0 * gravity.sigma_m_s2)),
-        false => "taken as exact".to_owned(),
+        false => "assumed exact".to_owned(),
     };
     let digits = gravity.sigma_m_s2.max(1e-6);
     format!("{} m/s², {accuracy}", value(gravity.m_s2, digits))
@@ -227,29 +226,29 @@ fn verdict(conformity: &Conformity) -> String {
     let (limits, all) = (conformity.limits.len(), || conformity.limits.iter());
     let kept = all().filter(|of| of.decision == Decision::Pass).count();
     let first = match conformity.overall() {
-        Some(Decision::Pass) => format!("Every one of {limits} limits is kept."),
+        Some(Decision::Pass) => format!("All {limits} limits are met."),
         Some(worst) => format!(
-            "{kept} of {limits} limits are kept; overall: {}.",
+            "{kept} of {limits} limits are met; overall: {}.",
             worst.words()
         ),
-        None => "No limit concerns a parameter that was calibrated.".to_owned(),
+        None => "No limit applies to a calibrated parameter.".to_owned(),
     };
     let risk = all().map(|of| of.risk).fold(0.0, f64::max);
     let mut text = format!(
-        "{first} Decision rule: {}. Largest probability that a decision below is wrong: {}.",
+        "{first} Decision rule: {}. Largest probability of a wrong decision below: {}.",
         conformity.rule.words(),
         probability(risk)
     );
     if !conformity.not_decided.is_empty() {
         text += &format!(
-            " Not calibrated, so not decided: {}.",
+            " Not decided because not calibrated: {}.",
             conformity.not_decided.join(", ")
         );
     }
     text
 }
 
-/// A probability, as small as matters.
+/// A probability, down to the smallest relevant value.
 fn probability(of: f64) -> String {
     match of < 1e-6 {
         true => "below 0.0001 %".to_owned(),
@@ -281,11 +280,12 @@ fn limits(conformity: &Conformity) -> Table {
             probability(of.risk),
         ]
     });
-    Table::new("Conformity with the specification", columns("parameter | value | U (k = 2) | limits | unit | decision | wrong with"))
+    Table::new("Conformity with the specification", columns("parameter | value | U (k = 2) | limits | unit | \
+        decision | risk"))
         .section(rows)
         .note(
-            "In the general installation form. Wrong with: probability that the parameter is outside a limit that it \
-             passes (false acceptance) or inside one that it fails, given this calibration (JCGM 106, 9.3).",
+            "In the general installation form. Risk: probability, given this calibration, that the decision is wrong \
+             (false acceptance or false rejection; JCGM 106, 9.3).",
         )
 }
 
@@ -308,14 +308,14 @@ fn found(as_found: &AsFound) -> Table {
         ]
     });
     Table::new("As found and as left", columns("parameter | as found | as left | change | U (k = 2) | unit | change/U")).section(rows).note(format!(
-        "As found: the parameters of {}, with which the item was received; as left: those of this calibration. A \
-         change beyond its U shows that the item has drifted since. Body frame of both: {}.",
+        "As found: parameters from {}, valid when the item was received; as left: parameters from this calibration. \
+         A change beyond its U shows that the item has drifted. Body frame of both: {}.",
         as_found.earlier,
         as_found.body_frame.words()
     ))
 }
 
-/// Who authorises the certificate, with room for date and signature.
+/// Authorising person, with space for date and signature.
 fn signature(certificate: &Certificate) -> Facts {
     let Authorised { name, function } = &certificate.laboratory.authorised;
     let mut facts = Facts::new("Authorisation", [("name", format!("{name}, {function}"))]);

@@ -17,7 +17,7 @@ pub fn two_digits(of: f64, expanded: f64) -> (f64, f64) {
     }
 }
 
-/// Every parameter with its expanded uncertainty, and what both are.
+/// Every parameter with its expanded uncertainty, and their definitions.
 pub fn results(certificate: &Certificate) -> Table {
     let has_budget = certificate.calibration.budget.is_some();
     let row = |of: &Measured| {
@@ -49,22 +49,23 @@ pub fn results(certificate: &Certificate) -> Table {
         of_term.map(row).collect::<Vec<_>>()
     });
     let budget = match has_budget {
-        true => ", their uncertainty budget in calibration.json",
+        true => ", and calibration.json contains their uncertainty budget",
         false => "",
     };
     let table = Table::new("Results", columns("parameter | value ± U | unit | k | ν"))
         .sections(groups)
         .sections(terms)
         .note(format!(
-            "Scale factor: departure from nominal, for the gyroscopes {}; for the accelerometers {}. Misalignment: entries \
-             of the installation matrix by row and column.",
+            "Scale factor: deviation from nominal (gyroscopes {}; accelerometers {}). Misalignment: entries of the \
+             installation matrix by row and column.",
             nominal(certificate, Sensor::Gyro, "rad/s"),
             nominal(certificate, Sensor::Accel, "m/s²"),
         ))
         .note(format!(
             "U: expanded uncertainty, the standard uncertainty times the coverage factor k for a coverage probability \
-             of 95.45 % (JCGM 100); ν: effective degrees of freedom, – where not evaluated. Results are correlated: the covariance matrix of \
-             the scale factors, misalignments and biases is in both attached files{budget}.",
+             of 95.45 % (JCGM 100); ν: effective degrees of freedom, – where not evaluated. The results are \
+             correlated; both attached files contain the covariance matrix of scale factors, misalignments and \
+             biases{budget}.",
         ));
     match certificate.terms.is_empty() {
         true => table,
@@ -79,7 +80,7 @@ fn nominal(certificate: &Certificate, sensor: Sensor, input: &str) -> String {
     nominal_scale(*certificate.provenance.nominal.get(sensor), unit, input)
 }
 
-/// What the error terms that have results add to the model's input.
+/// Input added to the model by the error terms with results.
 fn of_terms(certificate: &Certificate) -> String {
     let has = |term: &Term| {
         let mut all = certificate.terms.iter();
@@ -88,7 +89,7 @@ fn of_terms(certificate: &Certificate) -> String {
     let words = |term: Term| format!("{} adds {}", term.name(), term.entry().adds);
     let all: Vec<String> = Term::ALL.into_iter().filter(has).map(words).collect();
     format!(
-        "Error terms, of which t of the model is the sum: {}; f specific force, w angular rate, q the parameter.",
+        "Error terms (their sum is t in the model): {}. f: specific force; w: angular rate; q: the parameter.",
         all.join("; ")
     )
 }

@@ -1,4 +1,4 @@
-//! The survey by name. Angles are in degrees, rates in deg/s, forces in m/s², times in s.
+//! The survey as named values. Angles are in degrees, rates in deg/s, forces in m/s², times in s.
 
 use std::collections::BTreeMap;
 
@@ -47,7 +47,7 @@ pub fn data(run: &Run, survey: &Survey) -> Value {
     data
 }
 
-/// Puts a number that may not be there.
+/// Adds an optional number.
 fn put(data: &mut Value, key: &str, value: Option<impl Into<Value>>) {
     if let Some(value) = value {
         data[key] = value.into();
@@ -145,7 +145,7 @@ fn section(check: &LabelCheck) -> Value {
     data
 }
 
-/// RMS 1σ by group, or why there is none.
+/// RMS 1σ by group, or the reason why there is none.
 fn method((path, expected): &(Path, Result<Expected, String>)) -> Value {
     let name = path.words();
     match expected {

@@ -1,4 +1,4 @@
-//! The record: what the gyros and accelerometers say against time, with dwells, turns and faults.
+//! The recording: gyro and accelerometer output against time, with dwells, turns and faults.
 
 use super::super::calibration::figures::samples;
 use super::words;
@@ -9,15 +9,15 @@ use crate::run::motion::{Rest, Turn};
 use crate::survey::Survey;
 
 pub fn figure(run: &Run, survey: &Survey) -> Plot {
-    let mut caption = "Gyro rates and specific force along body axes by nominal scales, as they stand in the file. \
-                       Grey: dwells, numbered as in the table and with the axis that is up; above the rates: \
-                       turns, by axis and angle, or angle alone if about several axes, where there is room."
+    let mut caption = "Gyro rates and specific force along body axes, from the file with nominal scales. Grey: \
+        dwells, with number and upward axis; above the rates: turns, with axis and angle (angle only if about \
+        several axes), where space permits."
         .to_owned();
     if !run.recording.imu.faults.is_empty() {
-        caption += " Crosses: faults of the log in the triad's samples, missing and duplicate rows in both.";
+        caption += " Crosses: log faults in the samples of the triad; missing and duplicate rows appear in both.";
     }
     let panels = Sensor::ALL.map(|sensor| panel(run, survey, sensor));
-    Plot::new("record.svg", "Record", (1, 310), panels).caption(caption)
+    Plot::new("record.svg", "Recording", (1, 310), panels).caption(caption)
 }
 
 fn panel(run: &Run, survey: &Survey, sensor: Sensor) -> Panel {

@@ -1,4 +1,4 @@
-//! The report of what a run holds: its log, dwells and turns, labels, and what the methods could observe.
+//! Report on the content of a run: log, dwells and turns, labels, and parameters observable by each method.
 
 mod data;
 mod figure;
@@ -11,7 +11,7 @@ use crate::survey::Survey;
 
 pub use words::{findings, way_up};
 
-/// Everything that is said of a run and what was found in it.
+/// The complete report on a run.
 pub fn document(run: &Run, survey: &Survey) -> Document {
     let imu = &run.recording.imu;
     let mut document = Document::new(format!(

@@ -34,11 +34,11 @@ pub fn log_columns(run: &Run) -> Table {
     Table::new(
         "Columns",
         columns(
-            "column | body axis | smallest | times | largest | times | unit | step | as a rate",
+            "column | body axis | smallest | count | largest | count | unit | step | step as rate",
         ),
     )
     .section(rows)
-    .note("Body axes are right, front, up. Step: of the grid on which all values lie.")
+    .note("Body axes are right, front, up. Step: resolution (all values are multiples of it).")
 }
 
 /// Columns of the log with triad and axis.
@@ -52,7 +52,7 @@ pub fn columns_of_log(run: &Run) -> impl Iterator<Item = (Sensor, char, &ColumnF
     })
 }
 
-/// A whole number as it is, others to four digits.
+/// A whole number unchanged, others to four digits.
 fn exactly(x: f64) -> String {
     if x.fract() == 0.0 {
         whole(x)
@@ -103,7 +103,7 @@ pub fn faults(run: &Run) -> Table {
     }
 }
 
-/// The file's column in which a fault is; `None` if it is in whole rows.
+/// The file column of a fault; `None` if whole rows are affected.
 pub fn column_of<'r>(run: &'r Run, fault: &Fault) -> Option<&'r str> {
     let (sensor, axis) = fault.axis?;
     Some(&run.recording.imu.log.as_ref()?.columns.get(sensor)[axis].name)
@@ -133,9 +133,10 @@ pub fn dwells(run: &Run, survey: &Survey) -> Table {
     Table::new("Dwells, and the turns after them", headings)
         .section(survey.rests.iter().enumerate().map(row))
         .note(
-            "By nominal scales and prior biases. Tilt: of that axis against the plumb line. By: right-handed, the \
-             gyros' output at the dwell before taken as zero; at: the fastest. Off gravity: between up as the \
-             gyros carry it to the next dwell and as the accelerometers observe it there.",
+            "From nominal scales and prior biases. Tilt: angle between that axis and the vertical. By: right-handed \
+             angle, with the gyro output in the previous dwell as zero; at: maximum rate. Off gravity: angle between \
+             the vertical carried to the next dwell by the gyros and the vertical measured there by the \
+             accelerometers.",
         )
 }
 
@@ -186,8 +187,8 @@ pub fn labels(survey: &Survey) -> Table {
 pub fn methods(survey: &Survey) -> Table {
     let heading = "What each method could observe, 1σ";
     let mut table = Table::new(heading, group_columns("")).note(
-        "RMS 1σ to be expected in the general form, from the prior's own σ on, linearised where the filter would \
-         begin; the closed form's from its equations. Error terms are not in it.",
+        "Predicted 1σ in the general form (RMS per group), from the prior σ and a linearisation at the filter start; \
+         for the closed form, from its equations. Noise of hand motion and error terms are not included.",
     );
     let mut rows = Vec::new();
     for (path, expected) in &survey.methods {
@@ -202,7 +203,7 @@ pub fn methods(survey: &Survey) -> Table {
                 if !expected.unobserved.is_empty() {
                     let names = expected.unobserved.join(", ");
                     table = table.note(format!(
-                        "{words} would leave these above half the σ that [imu.prior] states: {names}."
+                        "{words} would leave σ above half of the prior in [imu.prior] for: {names}."
                     ));
                 }
             }

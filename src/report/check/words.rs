@@ -1,4 +1,4 @@
-//! What has to be said of a run before it is calibrated.
+//! Findings about a run before calibration.
 
 use crate::imu::{AXES, Sensor};
 use crate::report::prelude::*;
@@ -6,15 +6,15 @@ use crate::run::motion::{LabelCheck, Turn};
 use crate::run::{LONG_ENOUGH, Run};
 use crate::survey::{APART, Survey};
 
-/// A turn of at least this much about a body axis shows its gyro's scale, rad.
+/// Smallest turn about a body axis that determines the scale factor of its gyro, rad.
 const WORTH: f64 = 60.0 * DEGREE;
-/// Parameters of the accelerometers without a table: as many directions of up are needed.
+/// Number of accelerometer parameters without a table, and of upward directions needed.
 const DIRECTIONS: usize = 9;
-/// An instrument whose temperature spans less, K, has soaked.
+/// Temperature span below which an instrument counts as soaked, K.
 const SOAKED: f64 = 1.0;
 const MICROSECOND: f64 = 1e-6;
 
-/// A degree sign behind a number.
+/// A degree sign after a number.
 pub fn degrees(angle: f64) -> String {
     value(angle / DEGREE, 1.0)
 }
@@ -24,7 +24,7 @@ pub fn way_up(axis: usize, down: bool) -> String {
     format!("{} {}", AXES[axis], if down { "down" } else { "up" })
 }
 
-/// Such as `x +360.0°`; about several axes only how far.
+/// Such as `x +360.0°`; for a turn about several axes, only the angle.
 pub fn turn(turn: &Turn) -> String {
     match turn.body_axis() {
         Some(axis) => format!("{} {}°", AXES[axis], signed(turn.angle)),
@@ -33,7 +33,7 @@ pub fn turn(turn: &Turn) -> String {
     }
 }
 
-/// Components of a turn's axis.
+/// Components of the axis of a turn.
 pub fn direction(turn: &Turn) -> String {
     let parts: Vec<String> = turn.axis.iter().map(|&part| value(part, 0.1)).collect();
     format!("({})", parts.join(", "))
@@ -47,7 +47,7 @@ pub fn signed(angle: f64) -> String {
 /// The log in a sentence or two.
 pub fn log(run: &Run, survey: &Survey) -> String {
     let mut text = format!(
-        "Stationary for {} s in all, at most {} s at a time; {}.",
+        "Stationary for {} s in total, at most {} s at a time; {}.",
         three_digits(survey.standing),
         three_digits(survey.longest),
         match (&run.recording.table, run.recording.segments.len()) {
@@ -58,7 +58,7 @@ pub fn log(run: &Run, survey: &Survey) -> String {
     );
     if let Some(log) = &run.recording.imu.log {
         text += &format!(
-            " {} rows; stamps are off the uniform clock by {} µs RMS, {} µs at most.",
+            " {} rows; time stamps deviate from a uniform clock by {} µs RMS, {} µs at most.",
             count(log.rows),
             value(log.jitter_rms / MICROSECOND, 1.0),
             value(log.jitter_max / MICROSECOND, 1.0)
@@ -76,7 +76,7 @@ pub fn log(run: &Run, survey: &Survey) -> String {
     text
 }
 
-/// How fast the instrument warms or cools, and whether it has soaked.
+/// Temperature rate of the instrument, and whether it has soaked.
 fn warming(run: &Run) -> String {
     let imu = &run.recording.imu;
     let Some(temperature) = &imu.temperature else {
@@ -96,12 +96,13 @@ fn warming(run: &Run) -> String {
         three_digits(last * MINUTE),
         match span < SOAKED {
             true => "soaked within 1 K",
-            false => "not soaked, parameters may change meanwhile; see calibrate --temperature",
+            false =>
+                "not soaked, so parameters may change during the recording (see calibrate --temperature)",
         }
     )
 }
 
-/// What to look at and what to change, a sentence or two each.
+/// Findings and recommended changes, one or two sentences each.
 pub fn findings(run: &Run, survey: &Survey) -> Vec<String> {
     let mut findings = [&run.recording.doubts[..], &run.recording.notes].concat();
     let contradiction = survey.contradiction.iter();
@@ -112,7 +113,7 @@ pub fn findings(run: &Run, survey: &Survey) -> Vec<String> {
     findings
 }
 
-/// What a label and the record disagree in.
+/// Disagreement between a label and the recording.
 pub fn of_label(check: &LabelCheck) -> Option<String> {
     let said = check.disagreement.as_ref()?;
     let at = value(check.segment.start, 1.0);
@@ -122,13 +123,13 @@ pub fn of_label(check: &LabelCheck) -> Option<String> {
     ))
 }
 
-/// What positions and turns lack.
+/// Missing positions and turns.
 fn of_motion(survey: &Survey) -> Vec<String> {
     let mut findings = Vec::new();
     if survey.rests.len() < 2 {
         findings.push(format!(
-            "There are fewer than two dwells: leave the instrument stationary for {LONG_ENOUGH} s or more between turns; \
-             if it was, check bias_sigma of the gyros and the noise figures."
+            "The recording has fewer than two dwells. Keep the instrument stationary for {LONG_ENOUGH} s or more \
+             between turns. If it was, check bias_sigma of the gyros and the noise figures."
         ));
         return findings;
     }
@@ -139,8 +140,8 @@ fn of_motion(survey: &Survey) -> Vec<String> {
         .collect();
     if !missing.is_empty() && survey.directions < DIRECTIONS {
         findings.push(format!(
-            "Of the six positions {} are missing, and there are {} directions of up that differ by {}°; the nine \
-             parameters of the accelerometers without a table need all six or {DIRECTIONS} directions.",
+            "Of the six positions, {} are missing, and only {} upward directions differ by {}° or more. Without a \
+             table, the nine accelerometer parameters need all six positions or {DIRECTIONS} directions.",
             missing.join(", "),
             survey.directions,
             degrees(APART)
@@ -151,7 +152,7 @@ fn of_motion(survey: &Survey) -> Vec<String> {
     let unturned: Vec<String> = unturned.map(|axis| AXES[axis].to_string()).collect();
     if !unturned.is_empty() {
         findings.push(format!(
-            "Nothing turns by more than {}° about {}: the scale of that gyro shows only in such a turn.",
+            "No turn exceeds {}° about {}, so the scale factor of that gyro cannot be determined. Add such a turn.",
             degrees(WORTH),
             unturned.join(" and ")
         ));
@@ -159,14 +160,14 @@ fn of_motion(survey: &Survey) -> Vec<String> {
     findings
 }
 
-/// Parameters that no method could see.
+/// Parameters that no method could observe.
 fn of_methods(survey: &Survey) -> Vec<String> {
     let methods = survey.methods.iter();
     let expected: Vec<_> = methods
         .filter_map(|(_, expected)| expected.as_ref().ok())
         .collect();
     let [first, others @ ..] = &expected[..] else {
-        let text = "No method can calibrate from this run; the table of methods says why.";
+        let text = "No method can calibrate this run; the table of methods gives the reasons.";
         return vec![text.to_owned()];
     };
     let by_none = |name: &&String| others.iter().all(|other| other.unobserved.contains(name));
@@ -175,8 +176,7 @@ fn of_methods(survey: &Survey) -> Vec<String> {
     match always.is_empty() {
         true => Vec::new(),
         false => vec![format!(
-            "By every method {} would stay above half the σ that [imu.prior] states: more positions and turns \
-             would show them.",
+            "With every method, σ of {} would stay above half of the prior. Add positions and turns.",
             always.join(", ")
         )],
     }

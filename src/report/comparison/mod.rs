@@ -1,4 +1,4 @@
-//! The report of calibrations side by side.
+//! Report on a comparison of calibrations.
 
 use crate::calibration::result::TermRecord;
 use crate::calibration::{
@@ -9,10 +9,10 @@ use crate::imu::{InstallationForm, Sensor};
 use crate::report::prelude::*;
 use crate::report::terms::unit;
 
-/// Beyond this many σ a difference is flagged.
+/// Differences beyond this many σ are flagged.
 const FLAGGED: f64 = 3.0;
 
-/// Everything that is said of a comparison.
+/// The complete report on a comparison.
 pub fn document(comparison: &Comparison) -> Document {
     let mut document = Document::new("Comparison of calibrations");
     let reference = match comparison.against_truth {
@@ -27,7 +27,12 @@ pub fn document(comparison: &Comparison) -> Document {
     document.warnings.items = comparison
         .calibrations()
         .filter(|calibration| !calibration.converged)
-        .map(|calibration| format!("{} did not converge: its σ mean nothing.", calibration.name))
+        .map(|calibration| {
+            format!(
+                "{} did not converge, so its σ are meaningless.",
+                calibration.name
+            )
+        })
         .collect();
     document.page(figure(comparison));
     document.both(parameters(comparison));
@@ -50,7 +55,7 @@ fn by_triad(rows: impl Fn(Group) -> Vec<Vec<String>>) -> [Vec<Vec<String>>; 2] {
     })
 }
 
-/// The reference's and for each calibration two columns.
+/// A column for the reference and two for each calibration.
 fn beside_reference(comparison: &Comparison) -> Vec<String> {
     let mut columns = cells!["", comparison.reference.name.as_str(), "unit"];
     for side in &comparison.sides {
@@ -85,14 +90,14 @@ fn parameters(comparison: &Comparison) -> Table {
     let rows = |group: Group| group.among(&comparison.parameters).into_iter().map(row);
     let table = Table::new("Parameters", beside_reference(comparison))
         .sections(by_triad(|group| rows(group).collect()))
-        .note("Calibrations: difference to the reference ± the 1σ that the calibration claims.")
+        .note("Calibrations: difference from the reference ± the 1σ of the calibration.")
         .note(format!(
-            "z: difference in σ of the difference, ! beyond {FLAGGED}."
+            "z: difference divided by its σ; ! beyond {FLAGGED}."
         ));
     let table = match comparison.stated_nominal {
         Some(_) => table,
         None => table.note(
-            "K of the reference is in the file's quantity: no file states nominal scale factors.",
+            "K of the reference is in the unit of the file, because no file states nominal scale factors.",
         ),
     };
     match comparison.against_truth {
@@ -101,7 +106,7 @@ fn parameters(comparison: &Comparison) -> Table {
     }
 }
 
-/// The smallest σ that any calibration claims for some parameters: what is finer means nothing.
+/// The smallest σ that any calibration states for some parameters; finer digits are meaningless.
 fn finest(comparison: &Comparison, indices: &[usize]) -> Option<f64> {
     comparison
         .calibrations()
@@ -111,7 +116,7 @@ fn finest(comparison: &Comparison, indices: &[usize]) -> Option<f64> {
         .reduce(f64::min)
 }
 
-/// The reference's own value; scale factors in the file's quantity where nothing states what they should be.
+/// The value of the reference; scale factors in the quantity of the file if no nominal value is stated.
 fn reference_value(comparison: &Comparison, index: usize) -> String {
     let own = comparison.reference.sigma().map(|s| s[index]);
     let (departure, scale) = (comparison.departure(index), comparison.scale_factor(index));
@@ -129,7 +134,7 @@ fn reference_value(comparison: &Comparison, index: usize) -> String {
     }
 }
 
-/// A number in a unit with its own σ, else with the digits of the finest.
+/// A number in a unit with its σ, otherwise with the digits of the finest.
 fn with_sigma(of: f64, own: Option<f64>, finest: Option<f64>, unit: f64) -> String {
     match (own.filter(|own| *own > 0.0), finest) {
         (Some(own), _) => plus_minus(of / unit, own / unit),
@@ -164,8 +169,8 @@ fn groups(comparison: &Comparison) -> Table {
     Table::new("Groups", columns)
         .sections(by_triad(row))
         .section([last])
-        .note("Largest and RMS: of the differences to the reference. RMS σ: of the claimed 1σ.")
-        .note("NEES/n, its 95 % interval and n: one if the σ are true, correlations included.")
+        .note("Largest and RMS: of the differences from the reference. RMS σ: of the stated 1σ.")
+        .note("NEES/n, its 95 % interval and n: 1 if the covariance is correct.")
 }
 
 fn nees(nees: Option<Nees>) -> [String; 3] {
@@ -176,7 +181,7 @@ fn nees(nees: Option<Nees>) -> [String; 3] {
     })
 }
 
-/// Auxiliary parameters that any calibration has.
+/// Auxiliary parameters of any calibration.
 fn auxiliary(comparison: &Comparison) -> Table {
     fn of<'a>(calibration: &'a Canonical, name: &str) -> Option<&'a TermRecord> {
         calibration.constants.get(name)
@@ -206,12 +211,12 @@ fn auxiliary(comparison: &Comparison) -> Table {
     Table::new("Auxiliary parameters", beside_reference(comparison))
         .section((0..AUXILIARY).filter_map(row))
         .note(
-            "Error terms of instrument and table: values ± the 1σ that each calibration claims; z: \
-             difference to the reference in its σ, where both have it.",
+            "Error terms of instrument and table: value ± 1σ of each calibration; z: difference from the reference \
+             divided by its σ, if both have the term.",
         )
 }
 
-/// From three calibrations on.
+/// For three or more calibrations.
 fn scatter(comparison: &Comparison) -> Table {
     let table = Table::new(
         "Scatter",
@@ -238,12 +243,12 @@ fn scatter(comparison: &Comparison) -> Table {
     table
         .sections(by_triad(rows))
         .section([all])
-        .note("Mean weighted by the claimed σ, ± its 1σ; scatter: sample standard deviation.")
+        .note("Mean: weighted by the stated σ, ± its 1σ; scatter: sample standard deviation.")
         .note(
-            "χ² of the scatter against the claimed σ, n its degrees of freedom; p: probability of as much or \
-             more. Near 0 the σ are too small, near 1 too large.",
+            "χ² of the scatter against the stated σ, n its degrees of freedom; p: probability of a larger value. \
+             Near 0 the σ are too small, near 1 too large.",
         )
-        .note("All: with correlations, over the calibrations that give them.")
+        .note("All: with correlations, for the calibrations that state them.")
 }
 
 fn chi_square(chi_square: Option<ChiSquare>) -> [String; 3] {
@@ -301,7 +306,7 @@ fn name(index: usize) -> String {
     parameter_name(InstallationForm::General, index).unwrap_or_default()
 }
 
-/// Of a group's differences.
+/// Statistics of the differences of a group.
 fn spread(comparison: &Comparison, group: Group, side: &Side) -> Value {
     let indices = group.among(&comparison.parameters);
     let of = |v: &ParameterVector| group.spread(v, &indices);
@@ -314,7 +319,7 @@ fn spread(comparison: &Comparison, group: Group, side: &Side) -> Value {
     })
 }
 
-/// The reference's value is in the file's quantity for scale factors, in the group's unit for others.
+/// The value of the reference is in the quantity of the file for scale factors, otherwise in the unit of the group.
 fn parameter(comparison: &Comparison, index: usize) -> Value {
     let group = Group::of(index);
     let unit = group.unit_value();
@@ -341,10 +346,9 @@ fn chi2(of: ChiSquare) -> Value {
 
 pub(super) fn figure(comparison: &Comparison) -> Plot {
     let panels = Group::all().map(|group| panel(comparison, group));
-    Plot::new("differences.svg", "Differences to the reference", (3, 320), panels).caption(format!(
-        "Each calibration minus the reference, {}; bars: the 1σ that it claims. About two bars in three should \
-         reach a true value. Where one calibration is far coarser than another, the axis is logarithmic away \
-         from zero.",
+    Plot::new("differences.svg", "Differences from the reference", (3, 320), panels).caption(format!(
+        "Each calibration minus the reference, {}; bars: stated 1σ. About two bars in three should include the true \
+         value. If one calibration is much less accurate than another, the axis is logarithmic away from zero.",
         comparison.reference.name
     ))
 }
@@ -382,7 +386,7 @@ fn panel(comparison: &Comparison, group: Group) -> Panel {
     .with_all(series)
 }
 
-/// How far points reach from zero with their σ.
+/// Largest distance of points from zero, including σ.
 fn reach(points: &[Point]) -> f64 {
     let reaches = points.iter().map(|(off, sigma)| off.abs() + sigma);
     reaches.fold(0.0, f64::max)

@@ -6,7 +6,7 @@ use crate::report::prelude::*;
 use crate::study::Experiment;
 use crate::study::experiment::{Estimator, Navigated, Worth};
 
-/// Below this nothing is worth a place on the axis of time, nmile.
+/// Lower end of the error axis against time, nmile.
 const LEAST: f64 = 0.01;
 
 pub fn figures(experiment: &Experiment) -> [Plot; 2] {
@@ -37,7 +37,7 @@ fn distribution(experiment: &Experiment) -> Plot {
     Plot::new("distribution.svg", "Position error at the end", (1, 330), panels).caption(
         "Horizontal position error at the end, logarithmic, the same axis for all. Small dots: instruments; large \
          dot with its value: median; box: the middle half; line: 95 % are below its end; dashed: median of what the \
-         noise of the instrument alone makes.",
+         due to instrument noise alone.",
     )
 }
 
@@ -85,12 +85,12 @@ fn against_time(experiment: &Experiment) -> Plot {
     let panels = experiment.navigations.iter().map(panel);
     Plot::new("time.svg", "Median position error against time", (1, 330), panels).caption(
         "Median over all instruments of the horizontal position error, logarithmic, the same axes for all. Colour: \
-         what calibrated; solid: general form, dashed: six-angle, dotted: three-angle. The lines of general and \
-         six-angle lie upon each other where both forms give the same.",
+         calibration method; solid: general form, dashed: six-angle, dotted: three-angle. The general and six-angle \
+         lines coincide where both forms give the same result.",
     )
 }
 
-/// Hours against nmile; the start, where there is no error, has no place on a logarithmic axis.
+/// Hours against nmile, without the start, where the error is zero and the axis is logarithmic.
 fn course(worth: &Worth) -> Vec<Point> {
     let points = worth.against_time.iter();
     let points = points.map(|&(time, median)| (time / HOUR, median));

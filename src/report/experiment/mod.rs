@@ -1,4 +1,4 @@
-//! The report of the turntable experiment.
+//! Report on the turntable experiment.
 
 mod figures;
 mod tables;
@@ -12,7 +12,7 @@ use crate::report::prelude::*;
 use crate::study::Experiment;
 use crate::study::experiment::{ALIGNMENT_TIME, Budget, Estimator, Method, Situation, Worth};
 
-/// Everything that is said of the experiment.
+/// The complete report on the experiment.
 pub fn document(experiment: &Experiment) -> Document {
     let instruments = count(experiment.trials.len());
     let title = format!("The turntable experiment with {instruments} simulated instruments");
@@ -50,22 +50,22 @@ fn facts(experiment: &Experiment) -> Facts {
         (
             "navigation",
             format!(
-                "{} h; stationary and level, heading North, and moving along {}; height held to the true one",
+                "{} h; stationary and level, heading North, and moving along {}; height fixed to the true value",
                 three_digits(hours(experiment)),
                 study.trajectory_name
             ),
         ),
         (
             "alignment",
-            "stationary: levelled by the calibrated accelerometers, North from the calibrated gyros, or given; \
+            "stationary: level from the calibrated accelerometers and North from the calibrated gyros, or given; \
              moving: given"
                 .to_owned(),
         ),
         (
             "noise",
             format!(
-                "left out of the errors of the methods, as it is the same for all; the line \"noise alone\" has \
-                 what it makes in alignment of {} and navigation",
+                "not included in the errors of the methods, because it is the same for all; the line \"noise alone\" \
+                 shows its effect in alignment of {} and navigation",
                 minutes(ALIGNMENT_TIME)
             ),
         ),
@@ -103,7 +103,7 @@ pub(super) fn data(experiment: &Experiment) -> Value {
     })
 }
 
-/// Intervals are of 99 %, by bootstrap over instruments.
+/// Intervals are 99 %, by bootstrap over instruments.
 fn method(experiment: &Experiment, place: usize, worth: &Worth) -> Value {
     let calibrations = || {
         experiment
@@ -139,7 +139,7 @@ fn method(experiment: &Experiment, place: usize, worth: &Worth) -> Value {
     })
 }
 
-/// What is compared with the closed form: in equal time stationary, in a sixth of it moving.
+/// Filter compared with the closed form: equal time if stationary, a sixth of it if moving.
 const COMPARED: [(Situation, Estimator); 4] = [
     (Situation::SelfAligned, Estimator::LongFilter),
     (Situation::SelfAligned, Estimator::Filter),
@@ -147,7 +147,7 @@ const COMPARED: [(Situation, Estimator); 4] = [
     (Situation::Moving, Estimator::Filter),
 ];
 
-/// Says what is better, what makes most of the error, and which calibrations failed.
+/// Reports the better method, the largest error contribution, and failed calibrations.
 pub(super) fn say(document: &mut Document, experiment: &Experiment) {
     for text in failures(experiment) {
         document.say(false, text);
@@ -177,7 +177,7 @@ fn compared(
     let judged = match () {
         () if low > 1.0 => "the EKF is better",
         () if high < 1.0 => "the closed form is better",
-        () => "no significant difference with this number of instruments",
+        () => "no significant difference for this number of instruments",
     };
     let text = format!(
         "{}, {} h: median {} nmile after {}, {} after {}, ratio {by} ({interval}): {judged}.",
@@ -210,14 +210,14 @@ fn limit(experiment: &Experiment, situation: Situation) -> Option<String> {
         Some(format!("{}: {most}", estimator_name(experiment, estimator)))
     });
     Some(format!(
-        "{}, most of the variance is made by: {}. Noise alone would leave a median of {} nmile.",
+        "{}, the largest contributors to the variance are: {}. Noise alone would give a median of {} nmile.",
         capital(situation_name(situation)),
         of.collect::<Option<Vec<_>>>()?.join("; "),
         three_digits(navigated.noise.median)
     ))
 }
 
-/// Calibrations that failed, did not converge, or whose data reject the form.
+/// Calibrations that failed, did not converge, or have data that reject the form.
 fn failures(experiment: &Experiment) -> Vec<String> {
     let trials = &experiment.trials;
     let mut sentences = Vec::new();
@@ -236,11 +236,11 @@ fn failures(experiment: &Experiment) -> Vec<String> {
             ),
             (
                 rejected,
-                "instruments have data that reject the form.".to_owned(),
+                "instruments have data that do not fit the form.".to_owned(),
             ),
             (
                 diverged,
-                "calibrations did not converge; they are counted as they are.".to_owned(),
+                "calibrations did not converge; the figures include them.".to_owned(),
             ),
         ] {
             if number > 0 {

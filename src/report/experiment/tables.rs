@@ -1,4 +1,4 @@
-//! The tables, alike for terminal and page.
+//! The tables, the same for terminal and page.
 
 use crate::calibration::Group;
 use crate::imu::{InstallationForm, Sensor};
@@ -7,7 +7,7 @@ use crate::study::Experiment;
 use crate::study::experiment::{Estimator, Method, Navigated, Situation, Worth};
 use crate::study::navigation::INTERVAL;
 
-/// The paper's position errors by one triad's errors after 40 h, nmile (Zhao, Jiang, Li 2016, §3.3, Figure 10).
+/// Position errors in the paper due to one triad after 40 h, nmile (Zhao, Jiang, Li 2016, §3.3, Figure 10).
 pub const PAPER: [(Sensor, InstallationForm, f64); 4] = [
     (Sensor::Gyro, InstallationForm::SixAngle, 6.10),
     (Sensor::Accel, InstallationForm::SixAngle, 4.16),
@@ -65,8 +65,8 @@ fn errors(experiment: &Experiment, navigated: &Navigated) -> Table {
         .sections(by_estimator.map(|of_estimator| of_estimator.iter().map(row)))
         .section([last])
         .note(
-            "Over all instruments. Largest: of all minutes. Closed form : EKF: ratio of the medians in the same \
-             installation form, above 1 where the EKF is better; intervals by bootstrap.",
+            "Over all instruments. Largest: maximum over all minutes. Closed form : EKF: ratio of the medians in the \
+             same installation form (above 1, the EKF is better); intervals by bootstrap.",
         )
 }
 
@@ -95,7 +95,7 @@ fn paper(experiment: &Experiment, navigated: &Navigated) -> Table {
             .map(|&(sensor, form, paper)| row(sensor, form, Some(paper)))
     });
     let situation = situation_name(navigated.situation);
-    let title = format!("Beside the paper: one triad's errors alone, {situation}");
+    let title = format!("Comparison with the paper: errors of one triad alone, {situation}");
     let table = Table::new(title, columns).section(general).sections(of_paper).note(
         "Position error at the end; the other triad is exact. Paper: one instrument on one table, closed form \
          (Zhao, Jiang, Li 2016, Figure 10), neither noise nor latitude stated.",
@@ -103,7 +103,7 @@ fn paper(experiment: &Experiment, navigated: &Navigated) -> Table {
     match hours(experiment) {
         PAPER_HOURS => table,
         hours => table.note(format!(
-            "The paper's are of {PAPER_HOURS} h, these of {} h.",
+            "The paper navigates for {PAPER_HOURS} h, this study for {} h.",
             three_digits(hours)
         )),
     }
@@ -144,9 +144,9 @@ fn budget(experiment: &Experiment, navigated: &Navigated) -> Table {
             total("all, actual", &|w| w.budget.actual),
         ])
         .note(
-            "General form, from the claimed covariance averaged over all instruments. Alone: what the group would \
-             make by itself. Share: of the variance, what two groups make together going half to each; below zero \
-             where a group makes up for another.",
+            "General form, from the stated covariance averaged over all instruments. Alone: effect of the group by \
+             itself. Share: part of the variance, with the covariance of two groups split equally; negative if a \
+             group compensates another.",
         )
 }
 
@@ -176,7 +176,7 @@ pub fn method_kind(estimator: Estimator) -> &'static str {
     }
 }
 
-/// Such as `EKF 10 min`, to the minute: the facts hold the rest.
+/// Such as `EKF 10 min`, to the minute; the facts give the exact value.
 pub fn estimator_name(experiment: &Experiment, estimator: Estimator) -> String {
     let minutes = table_time(experiment, estimator).unwrap_or(f64::NAN) / 60.0;
     format!("{} {minutes:.0} min", method_kind(estimator))
@@ -190,7 +190,7 @@ pub fn situation_name(situation: Situation) -> &'static str {
     }
 }
 
-/// What a method is worth in the general form.
+/// Error budget of a method in the general form.
 pub fn in_general(navigated: &Navigated, estimator: Estimator) -> Option<&Worth> {
     let general = Method {
         estimator,

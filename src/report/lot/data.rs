@@ -1,4 +1,4 @@
-//! The figures of a lot by name; the unit of each is in its `unit`.
+//! Named values of a lot; `unit` states the unit of each.
 
 use crate::lot::{
     Against, Check, FALSE_ALARM, FALSE_TREND, Lot, Quantity, Row, Sample, Statistics, Verdict,
@@ -20,7 +20,7 @@ pub fn data(lot: &Lot) -> Value {
     })
 }
 
-/// The limits that are not kept for certain, by unit and parameter.
+/// Limits exceeded or undecided, by unit and parameter.
 fn reasons(lot: &Lot) -> Vec<String> {
     let of_row = |row: &Row| {
         let open = row

@@ -1,4 +1,4 @@
-//! Figures of a lot: every unit's values with their σ, the mean, the limits.
+//! Figures of a lot: values of every unit with σ, mean and limits.
 
 use super::shown::{shown, together};
 use crate::lot::{Lot, Quantity, Sample};
@@ -13,8 +13,7 @@ pub fn parameters(lot: &Lot) -> Plot {
         panel.with_all(limits.into_iter().map(|y| Series::level(y).dashed()))
     });
     Plot::new("lot.svg", "Every unit", (2, 330), panels).caption(
-        "Units in the order given, with their own 1σ; long lines: limits that all axes share. Crosses are apart \
-         from the lot.",
+        "Units in the given order, with their 1σ; long lines: limits common to all axes. Crosses: outliers.",
     )
 }
 
@@ -25,11 +24,11 @@ pub fn noise(lot: &Lot) -> Plot {
         ..panel(lot, &title, &quantities, &names)
     });
     Plot::new("noise.svg", "Noise at rest", (2, 330), panels).caption(
-        "White-noise density of each axis in the dwells, with its 1σ; logarithmic. Crosses are apart from the lot.",
+        "White-noise density of each axis in the dwells, with its 1σ; logarithmic. Crosses: outliers.",
     )
 }
 
-/// Series for each quantity: bars and marks, crosses where a unit is apart.
+/// Series for each quantity: bars and marks, with crosses for outliers.
 fn panel(lot: &Lot, title: &str, quantities: &[Quantity], names: &[String]) -> Panel {
     let of_quantity = |(n, (&quantity, name)): (usize, (&Quantity, &String))| {
         let shift = beside(n, quantities.len(), 0.7);
@@ -50,7 +49,7 @@ fn panel(lot: &Lot, title: &str, quantities: &[Quantity], names: &[String]) -> P
     Panel::new(title, units, Axis::linear("").room(0.05, 0.05)).with_all(series)
 }
 
-/// Limits that all parameters of a group share.
+/// Limits common to all parameters of a group.
 fn limits(lot: &Lot, quantities: &[Quantity]) -> Vec<f64> {
     let Some(specification) = &lot.specification else {
         return Vec::new();

@@ -1,4 +1,4 @@
-//! The report of a lot: every parameter of every unit, mean and spread, limits, outliers, trends.
+//! Report on a lot: every parameter of every unit, mean and spread, limits, outliers, trends.
 
 mod data;
 mod figures;
@@ -15,7 +15,7 @@ use crate::imu::AXES;
 use crate::lot::{FALSE_ALARM, FALSE_TREND, Lot, Row, Verdict};
 use crate::report::prelude::*;
 
-/// Everything that is said of a lot.
+/// The complete report on a lot.
 pub fn document(lot: &Lot) -> Document {
     let mut document = Document::new(match &lot.rows[..] {
         [row] => row.unit.name.clone(),
@@ -23,7 +23,7 @@ pub fn document(lot: &Lot) -> Document {
     });
     document.verdict = verdict(lot);
     document.lead = vec![format!(
-        "General form, body frame: {}. Scale factors are departures from the lot's nominal ones. Every σ is 1σ.",
+        "General form, body frame: {}. Scale factors are deviations from the nominal values of the lot. Every σ is 1σ.",
         lot.body_frame.words()
     )];
     let failures = lot.failures();
@@ -66,7 +66,8 @@ fn facts(lot: &Lot) -> Facts {
         facts.push(
             "gravity",
             format!(
-                "the same for all, 1σ {:.1} ppm: in every σ of accelerometer K and in their mean, not in their scatter",
+                "the same for all units, 1σ {:.1} ppm: included in every σ of accelerometer K and in their mean, but \
+                 not in their scatter",
                 gravity / PPM
             ),
         );
@@ -97,7 +98,7 @@ fn kept(lot: &Lot) -> Vec<Sentence> {
     }
     if !undecided.is_empty() {
         let words = format!(
-            "Not decided with {percent} % confidence: {}. A smaller σ decides.",
+            "Not decided with {percent} % confidence: {}. A decision needs a smaller σ.",
             undecided.join(", ")
         );
         sentences.push((false, words));
@@ -115,7 +116,7 @@ fn outliers(lot: &Lot) -> Vec<Sentence> {
         let apart = lot.outliers_of(place).map(|of| title(of.quantity));
         let apart = apart.collect::<Vec<_>>().join(", ");
         let words = format!(
-            "{} is apart from the lot in {apart}; means and spreads there are without it.",
+            "{} is an outlier in {apart}; the means and spreads of these parameters exclude it.",
             row.unit.name
         );
         (!apart.is_empty()).then_some((false, words))
@@ -125,7 +126,7 @@ fn outliers(lot: &Lot) -> Vec<Sentence> {
         true => vec![(
             true,
             format!(
-                "No unit is apart from the others; a sound lot has one named in {} % of all cases.",
+                "No unit is an outlier (false-alarm rate {} % per lot).",
                 100.0 * FALSE_ALARM
             ),
         )],
@@ -133,14 +134,14 @@ fn outliers(lot: &Lot) -> Vec<Sentence> {
     }
 }
 
-/// Units of one type have one nominal scale: who states another is named, where most state the same.
+/// Units of one type have one nominal scale; units with a different one are named if most state the same.
 fn nominal(lot: &Lot) -> Vec<Sentence> {
     let stated = lot.rows.iter().filter(|row| row.unit.calibrated.is_ok());
     let other = |row: &Row| {
         let (sensor, axis, off) = row.nominal_off(&lot.nominal)?;
         let words = format!(
-            "{} states another nominal scale than the lot: {} {}, {} ppm off; its scale factors are given against \
-             the lot's.",
+            "{} states a different nominal scale from the lot ({} {}, {} ppm off); its scale factors are relative to \
+             the nominal scale of the lot.",
             row.unit.name,
             sensor.name(),
             AXES[axis],
@@ -155,7 +156,7 @@ fn nominal(lot: &Lot) -> Vec<Sentence> {
     }
 }
 
-/// What the units' own calibrations warn of, by kind.
+/// Findings of the unit calibrations, by kind.
 fn findings(lot: &Lot) -> Vec<Sentence> {
     let mut kinds: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     let calibrated = lot.rows.iter().filter_map(|row| {
@@ -177,7 +178,7 @@ fn findings(lot: &Lot) -> Vec<Sentence> {
             true => "all units".to_owned(),
             false => units.join(", "),
         };
-        (false, format!("Their own reports warn of `{kind}`: {who}."))
+        (false, format!("Reports with finding `{kind}`: {who}."))
     };
     kinds.into_iter().map(sentence).collect()
 }
@@ -192,8 +193,7 @@ fn trends(lot: &Lot) -> Vec<Sentence> {
         true => vec![(
             true,
             format!(
-                "No trend with serial or date, as far as runs state them; a lot without one has one told in {} % of \
-                 all cases.",
+                "No trend with serial number or date, where stated (false-alarm rate {} % per lot).",
                 100.0 * FALSE_TREND
             ),
         )],

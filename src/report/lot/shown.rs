@@ -1,4 +1,4 @@
-//! How quantities of a lot are spoken of.
+//! Names and units of the quantities of a lot.
 
 use crate::calibration::Word;
 use crate::imu::{AXES, InstallationForm, Sensor};
@@ -68,7 +68,7 @@ pub fn spread_symbol(quantity: Quantity) -> &'static str {
 /// A trend in a sentence.
 pub fn change(quantity: Quantity, trend: &Trend) -> String {
     let (what, unit) = match trend.against {
-        Against::Serial => ("the serial number", "for each number"),
+        Against::Serial => ("the serial number", "per number"),
         Against::Date => ("the date", "a day"),
     };
     let [slope, own] = [trend.slope, trend.sigma].map(|of| shown_spread(quantity, of));
@@ -81,7 +81,7 @@ pub fn change(quantity: Quantity, trend: &Trend) -> String {
     )
 }
 
-/// A spread with its own σ, or what it stays below.
+/// A spread with its σ, or its upper limit.
 pub fn spread(quantity: Quantity, of: &Spread) -> String {
     let shown = |x: f64| shown_spread(quantity, x);
     match of.sigma {
@@ -92,8 +92,7 @@ pub fn spread(quantity: Quantity, of: &Spread) -> String {
     }
 }
 
-/// Quantities that are shown together: the heading, the name of each, and which they are. First the groups of
-/// parameters, then the noise of each triad.
+/// Quantities shown together: heading, names and quantities. First the parameter groups, then the noise of each triad.
 pub fn together(lot: &Lot) -> Vec<(String, Vec<String>, Vec<Quantity>)> {
     let those = |is: &dyn Fn(Quantity) -> bool| -> Vec<Quantity> {
         let all = lot.statistics.iter().map(|of| of.quantity);
@@ -117,7 +116,7 @@ pub fn together(lot: &Lot) -> Vec<(String, Vec<String>, Vec<Quantity>)> {
     groups.chain(noises).collect()
 }
 
-/// Of all limits of all units, how many are exceeded, kept or neither for certain.
+/// Number of limits over all units that are exceeded, met or undecided.
 pub fn verdict(lot: &Lot) -> Option<(Word, String)> {
     let specification = lot.specification.as_ref()?;
     let all = || lot.rows.iter().flat_map(|row| &row.checks);
@@ -129,7 +128,7 @@ pub fn verdict(lot: &Lot) -> Option<(Word, String)> {
         _ => Word::Fail,
     };
     let words = format!(
-        "{failed} of {} limits exceeded, {passed} kept, {open} undecided ({} % each)",
+        "{failed} of {} limits exceeded, {passed} met, {open} undecided ({} % confidence each)",
         all().count(),
         100.0 * specification.confidence
     );

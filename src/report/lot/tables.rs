@@ -5,13 +5,13 @@ use crate::imu::Sensor;
 use crate::lot::{Calibrated, Check, FALSE_ALARM, Lot, Quantity, Row, Sample, Statistics, Verdict};
 use crate::report::prelude::*;
 
-/// One row a unit.
+/// One row per unit.
 pub fn units(lot: &Lot) -> Table {
     let mut columns = cells!["unit", "serial", "date"];
     if lot.specification.is_some() {
         columns.push("verdict".to_owned());
     }
-    columns.extend(cells!["NIS", "warnings", "apart in"]);
+    columns.extend(cells!["NIS", "warnings", "outlier in"]);
     let row = |(place, row): (usize, &Row)| {
         let meta = |key: &str| row.unit.meta.get(key).cloned().unwrap_or(NONE.to_owned());
         let mut cells = cells![row.unit.name.as_str(), meta("serial"), meta("date")];
@@ -42,10 +42,10 @@ pub fn units(lot: &Lot) -> Table {
     let mut table = Table::new("Units", columns)
         .section(lot.rows.iter().enumerate().map(row))
         .note(
-            "NIS: of all observations, one if the σ are true. Warnings: in the unit's own report.",
+            "NIS: of all observations, 1 if the σ are correct. Warnings: number in the report of the unit.",
         )
         .note(format!(
-            "Apart: from the other units, by a test that names any in {} % of sound lots.",
+            "Outlier: by a test with a false-alarm rate of {} % per lot.",
             100.0 * FALSE_ALARM
         ));
     let place = |column: &str| table.columns.iter().position(|name| name == column);
@@ -83,14 +83,15 @@ pub fn parameters(lot: &Lot) -> Table {
     });
     statistics("Parameters of the lot")
         .sections(sections)
-        .note("Mean: weighted by spread and own σ, ± its 1σ. Scatter: sample standard deviation as it stands.")
-        .note("χ²/n: of the scatter against the units' own σ; p: chance of as much if these explain it all.")
+        .note("Mean: weighted by spread and σ, ± its 1σ. Scatter: sample standard deviation.")
+        .note("χ²/n: scatter compared with the σ of the units; p: probability of a larger value if these σ alone \
+            explain it.")
         .note(format!(
-            "Spread: 1σ from unit to unit with the units' own σ taken out, ± its own, or its 95 % limit where it \
-             cannot be told from zero; real: not explained by their σ, at {} % false alarms for all rows together.",
+            "Spread: 1σ between units after subtracting the σ of the units, ± its 1σ, or its 95 % limit if not \
+             significant; real: not explained by these σ (false-alarm rate {} % for all rows together).",
             100.0 * FALSE_ALARM
         ))
-        .note("Outliers are left out.")
+        .note("Outliers are excluded.")
 }
 
 /// Noise at rest.
@@ -99,7 +100,8 @@ pub fn noise(lot: &Lot) -> Table {
     let rows = lot.statistics.iter().filter(of_noise).map(row);
     statistics("Noise at rest")
         .section(rows)
-        .note("White-noise density that has the Allan variance of the dwells at a quarter of their length; scatter and spread of its logarithm.")
+        .note("White-noise density from the Allan variance of the dwells at a quarter of their length; scatter and \
+            spread refer to its logarithm.")
 }
 
 fn statistics(heading: &str) -> Table {
@@ -140,7 +142,7 @@ fn row(of: &Statistics) -> Vec<String> {
     ]
 }
 
-/// χ²/n, whose size means nothing where it is far beyond chance.
+/// χ²/n, whose exact size is not meaningful far beyond chance.
 fn ratio(of: f64) -> String {
     const FAR: f64 = 1000.0;
     match of > FAR {
@@ -149,7 +151,7 @@ fn ratio(of: f64) -> String {
     }
 }
 
-/// Every parameter of every unit, a table for each group, and one of noise for each triad.
+/// Every parameter of every unit, one table per group, and one of noise per triad.
 pub fn values(lot: &Lot) -> Vec<Table> {
     let tables = together(lot).into_iter();
     let tables = tables.filter(|(.., quantities)| !quantities.is_empty());
@@ -171,7 +173,7 @@ pub fn values(lot: &Lot) -> Vec<Table> {
         };
         Table::new(heading, std::iter::once("unit".to_owned()).chain(axes))
             .section(lot.rows.iter().enumerate().map(row))
-            .note("± 1σ; ! apart from the lot, or outside its limit.")
+            .note("± 1σ; ! outlier or outside its limit.")
     };
     tables.map(table).collect()
 }
@@ -209,5 +211,6 @@ pub fn limits(lot: &Lot) -> Table {
         columns("unit | | unit | from nominal | limit | P(within) | verdict"),
     )
     .section(rows)
-    .note("A unit passes a limit if its probability of being within is at least the stated confidence, and fails if that of being outside is.")
+    .note("A unit passes a limit if the probability of being within it is at least the stated confidence, and fails \
+        if the probability of being outside is.")
 }

@@ -40,8 +40,8 @@ fn what_is_wrong_with_a_lot_is_said_with_the_names_of_its_units() {
     for expected in [
         "unit-7: no log",
         "Outside a limit with 95 % confidence: unit-4.",
-        "unit-4 is apart from the lot in gyro K x;",
-        "unit-4 states another nominal scale than the lot: gyro z",
+        "unit-4 is an outlier in gyro K x;",
+        "unit-4 states a different nominal scale from the lot (gyro z",
     ] {
         assert!(warnings.contains(expected), "{expected}\n{warnings}");
     }

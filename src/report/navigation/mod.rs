@@ -1,5 +1,5 @@
-//! The report of a navigation: errors with their predicted σ as table, as figures against time in the manner of
-//! the paper's Figures 2 to 10, minute by minute as CSV, and hour by hour as JSON.
+//! Report on a navigation: errors with predicted σ as a table, as figures against time like Figures 2 to 10 of the
+//! paper, per minute as CSV, and per hour as JSON.
 
 mod outlook;
 #[cfg(test)]
@@ -15,27 +15,27 @@ use crate::study::navigation::{INTERVAL, Mission, Motion, Outlook, Quantity, War
 pub use outlook::{Flown, Navigated, add_missions};
 pub(super) use outlook::{add, line};
 
-/// Hours over which the paper gives the drift of position.
+/// Hours over which the paper states the position drift.
 const PAPER_HOURS: f64 = 40.0;
 
-/// A navigation with what it was made of.
+/// A navigation with its input.
 #[derive(Debug, Clone, Copy)]
 pub struct Navigation<'a> {
     /// Name of the calibration.
     pub calibration: &'a str,
     /// Name of the truth.
     pub truth: &'a str,
-    /// False if the calibration says that its method did not converge.
+    /// False if the calibration states that its method did not converge.
     pub converged: bool,
     /// Whether one of the two has error terms in addition to K, E and D, which navigation does not use.
     pub terms: bool,
-    /// What fixes the body axes.
+    /// Definition of the body axes.
     pub body_frame: BodyFrame,
-    /// The triad whose errors were navigated with; `None` for both.
+    /// The triad whose errors were included; `None` for both.
     pub only: Option<Sensor>,
-    /// How the body moved, and how long.
+    /// Motion of the body and its duration.
     pub mission: &'a Mission,
-    /// How the instrument warmed up meanwhile, if it did, and whether the calibration follows that.
+    /// Warm-up of the instrument, if any, and whether the calibration includes temperature.
     pub warming: Option<(&'a Warming, bool)>,
     /// Name of the trajectory, if it moved.
     pub trajectory: Option<&'a str>,
@@ -44,7 +44,7 @@ pub struct Navigation<'a> {
 }
 
 impl Navigation<'_> {
-    /// Everything that is said of the navigation.
+    /// The complete report on the navigation.
     pub fn document(&self) -> Document {
         let (calibration, truth) = (self.calibration, self.truth);
         let title = format!("Navigation error of {calibration} against {truth}");
@@ -85,7 +85,7 @@ impl Navigation<'_> {
             Some(Sensor::Gyro) => "of the gyros; the accelerometers are exact",
             Some(Sensor::Accel) => "of the accelerometers; the gyros are exact",
         };
-        let start = "perfect alignment, velocity and position; height is held to the true one";
+        let start = "perfect alignment, velocity and position; height fixed to the true value";
         let warming = self.warming.map(|(warming, _)| {
             let words = format!(
                 "from {} to {} °C with a time constant of {} h",
@@ -109,25 +109,27 @@ impl Navigation<'_> {
         let name = self.calibration;
         let mut warnings = Vec::new();
         if !self.converged {
-            warnings.push(format!("{name} did not converge: its σ mean nothing."));
+            warnings.push(format!(
+                "{name} did not converge, so its σ are meaningless."
+            ));
         }
         if let Some((_, false)) = self.warming {
             warnings.push(format!(
-                "{name} does not change with temperature: its σ are those of the temperature that it was made at."
+                "{name} does not include temperature, so its σ are valid only at its calibration temperature."
             ));
         }
         if self.navigated.outlook.iter().any(|m| m.sigma.is_none()) {
-            warnings.push(format!("{name} claims no σ, so none is predicted."));
+            warnings.push(format!("{name} states no σ, so none is predicted."));
         }
         if self.terms {
-            let text = "Error terms other than K, E and D are assumed exact: these are the errors that K, E and D \
-                        leave.";
+            let text =
+                "Only errors of K, E and D are included; other error terms are assumed exact.";
             warnings.push(text.to_owned());
         }
         warnings
     }
 
-    /// Position error at the end over the time, nmile/h.
+    /// Position error at the end divided by time, nmile/h.
     fn drift(&self) -> Option<f64> {
         let last = self
             .navigated
@@ -151,8 +153,7 @@ impl Navigation<'_> {
 
     /// Attitude, velocity and position against time with their predicted σ as a band.
     fn figures(&self) -> [Plot; 3] {
-        let horizontal =
-            " Horizontal: length of both components, with the root of its predicted mean square.";
+        let horizontal = " Horizontal: magnitude of both components, with its predicted RMS.";
         let figures = [
             ("attitude.svg", "Attitude error", ""),
             ("velocity.svg", "Velocity error", horizontal),
@@ -164,14 +165,14 @@ impl Navigation<'_> {
             let navigated = std::slice::from_ref(self.navigated);
             let panels = quantities.map(|of| outlook::panel(*of, navigated));
             Plot::new(file, heading, (1, 210), panels).caption(format!(
-                "Computed minus true. Line: actual error by full navigation; band: ±1σ predicted from the \
-                 calibration's covariance by the linear model, within which the error of two calibrations in \
-                 three lies at any one time.{more}"
+                "Computed minus true. Line: actual error from full navigation; band: ±1σ predicted from the \
+                 covariance of the calibration with the linear model, which contains the errors of about two \
+                 calibrations in three at any time.{more}"
             ))
         })
     }
 
-    /// A row a minute: time, errors, predicted σ where there is one.
+    /// One row per minute: time, errors, and predicted σ if available.
     fn csv(&self) -> String {
         let with_sigma = self.navigated.outlook.iter().all(|m| m.sigma.is_some());
         let keys = Quantity::ALL.map(|quantity| quantity.key);

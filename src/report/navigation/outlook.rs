@@ -11,22 +11,22 @@ const HEADING: &str = "Navigation with this calibration";
 pub struct Navigated {
     /// Its name beside the others', such as `EKF` or `closed form`.
     pub method: &'static str,
-    /// The errors, as far as they are known.
+    /// The errors, if known.
     pub outlook: Vec<Outlook>,
 }
 
 /// One way of navigating by several calibrations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flown {
-    /// How the body moved, such as `stationary and level`.
+    /// Motion of the body, such as `stationary and level`.
     pub how: &'static str,
-    /// What it shows, in a sentence.
+    /// Its conclusion, in a sentence.
     pub shows: &'static str,
-    /// The end of it by each calibration, in the order of the methods.
+    /// The final state with each calibration, in the order of the methods.
     pub ends: Vec<Outlook>,
 }
 
-/// Adds position errors at the end of each mission by each method, a row for each mission.
+/// Adds position errors at the end of each mission for each method, one row per mission.
 pub fn add_missions(document: &mut Document, methods: &[String], missions: &[Flown]) {
     let [.., horizontal] = Quantity::ALL;
     let of_missions = missions.iter().flat_map(|flown| [flown.how, "σ"]);
@@ -218,14 +218,14 @@ fn figure(navigated: &[Navigated], last: &str) -> Plot {
         true => (
             "Position error in navigation",
             format!(
-                "Computed minus true, by full navigation from perfect alignment, stationary and level, height \
-                 held. Band: ±1σ of the {last} predicted from its covariance."
+                "Computed minus true, from full navigation with perfect alignment, stationary and level, with fixed \
+                 height. Band: ±1σ of the {last} predicted from its covariance."
             ),
         ),
         false => (
             "Predicted position error in navigation",
-            "±1σ of the error predicted from the covariance of the calibration, from perfect alignment, \
-             stationary and level, height held."
+            "±1σ of the error predicted from the covariance of the calibration, with perfect alignment, stationary \
+             and level, with fixed height."
                 .to_owned(),
         ),
     };

@@ -1,7 +1,7 @@
-//! Fonts of a printed page: which glyph shows a character, and how wide it is.
+//! Fonts of a printed page: glyphs and widths of characters.
 //!
-//! Both are Noto Sans (SIL Open Font License 1.1, see the file next to the fonts), cut down to Latin, Greek,
-//! Cyrillic and a few signs.
+//! Both are Noto Sans (SIL Open Font License 1.1, see the file next to the fonts), reduced to Latin, Greek, Cyrillic
+//! and a few signs.
 
 use krilla::text::{Font, GlyphId, KrillaGlyph};
 use ttf_parser::Face;
@@ -22,7 +22,7 @@ pub struct Fonts {
 }
 
 impl Fonts {
-    /// None if they cannot be read, which the tests rule out.
+    /// `None` if they cannot be read, which the tests exclude.
     pub fn new() -> Option<Self> {
         Some(Self {
             regular: Typeface::new(REGULAR)?,
@@ -52,7 +52,7 @@ impl Typeface {
         text.chars().filter(shown)
     }
 
-    /// Glyphs of a text, one a character, with advances for a size of one.
+    /// Glyphs of a text, one per character, with advances for a font size of one.
     pub fn glyphs(&self, text: &str) -> Vec<KrillaGlyph> {
         let units = f32::from(self.face.units_per_em());
         let glyph = |(at, character): (usize, char)| {
@@ -82,7 +82,7 @@ impl Typeface {
     }
 }
 
-/// What shows a character: a space is as wide as a space, broken or not.
+/// Glyph of a character; breaking and non-breaking spaces have the same width.
 fn shape(character: char) -> char {
     match character {
         '\u{202f}' | '\u{a0}' | '\u{2009}' => ' ',

@@ -1,4 +1,4 @@
-//! Where the parts of a document stand on pages.
+//! Layout of the parts of a document on pages.
 
 use crate::report::document::{Block, Document, Facts, List, Table};
 use crate::report::pdf::font::Fonts;
@@ -15,14 +15,14 @@ const BODY: f32 = 9.0;
 const SMALL: f32 = 7.5;
 const NOTE: u8 = 85;
 const INK: u8 = 20;
-/// Line to line over the size of letters.
+/// Line spacing divided by font size.
 const LEADING: f32 = 1.38;
-/// Width of the names of facts.
+/// Width of the name column of facts.
 const NAMES: f32 = 128.0;
-/// Between columns of a table.
+/// Space between table columns.
 const GAP: f32 = 14.0;
 
-/// What is drawn on a page.
+/// Drawn content of a page.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Drawn {
     Text {
@@ -37,7 +37,7 @@ pub enum Drawn {
     },
 }
 
-/// How letters are.
+/// Font style.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Style {
     pub size: f32,
@@ -60,12 +60,12 @@ const REMARK: Style = Style {
     ..PLAIN
 };
 
-/// Pages in the making.
+/// Pages under construction.
 pub struct Layout<'a> {
     fonts: &'a Fonts,
     frame: &'a Frame,
     pages: Vec<Vec<Drawn>>,
-    /// Where the next line begins.
+    /// Position of the next line.
     y: f32,
 }
 
@@ -125,7 +125,7 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// A heading, with room for so much of what follows.
+    /// A heading, with at least this much space for the following text.
     fn heading(&mut self, heading: &str, follows: f32) {
         if heading.is_empty() {
             return;
@@ -170,7 +170,7 @@ impl<'a> Layout<'a> {
         self.y += 2.0;
     }
 
-    /// Texts beside each other in a line of the last one's size.
+    /// Texts next to each other on a line of the size of the last one.
     fn line(&mut self, texts: &[(f32, &str, Style)]) {
         let size = texts.last().map_or(BODY, |(.., style)| style.size);
         self.need(size * LEADING);
@@ -235,7 +235,7 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// Cells of a row: the first to the left, the others to the right.
+    /// Cells of a row: the first left-aligned, the others right-aligned.
     fn row(&mut self, cells: &[String], widths: &[f32], rights: &[f32], shrink: f32, style: Style) {
         self.y += style.size;
         for (k, (cell, right)) in cells.iter().zip(rights).enumerate() {
@@ -258,7 +258,7 @@ impl<'a> Layout<'a> {
         self.y += 1.5;
     }
 
-    /// What stands on every page, once their number is known.
+    /// Adds the margins to every page, once the number of pages is known.
     fn frames(&mut self) {
         let total = self.pages.len();
         let style = Style {
@@ -299,7 +299,7 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// An error where a font lacks a character of what is drawn.
+    /// An error if a font lacks a character.
     fn check(&self) -> Result<(), PdfError> {
         for drawn in self.pages.iter().flatten() {
             if let Drawn::Text { text, style, .. } = drawn
@@ -330,7 +330,7 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// Begins another page where there is less room than this.
+    /// Starts a new page if less space than this remains.
     fn need(&mut self, room: f32) {
         if self.y + room > BOTTOM {
             self.next_page();
@@ -358,7 +358,7 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// A text in lines that are no wider than this; a word that is, is broken anywhere.
+    /// A text in lines of at most this width; longer words are broken anywhere.
     fn broken(&self, text: &str, style: Style, room: f32) -> Vec<String> {
         let mut lines = vec![String::new()];
         let (space, mut filled) = (self.width(" ", style), 0.0);
@@ -393,29 +393,29 @@ impl<'a> Layout<'a> {
     }
 }
 
-/// A document that could not be made a PDF.
+/// Error in creating a PDF.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PdfError {
     /// A character has no glyph.
     #[error(
-        "found the character {character:?} in {text:?}, expected Latin, Greek or Cyrillic: the fonts of the \
-         certificate have no other. Write it in those."
+        "found the character {character:?} in {text:?}, expected Latin, Greek or Cyrillic, which the certificate \
+         fonts support. Rewrite the text in these scripts."
     )]
     NoGlyph {
         /// The character.
         character: char,
-        /// Where it stands.
+        /// Its position.
         text: String,
     },
-    /// The file would not be what the standard asks for.
+    /// The file would violate the standard.
     #[error("the certificate cannot be written as PDF/A-3: {reason}")]
     Standard {
-        /// What is in the way.
+        /// The reason.
         reason: String,
     },
 }
 
-/// What stands on every page, and what the file says of itself.
+/// Page margins and file metadata.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Frame {
     /// Upper left.

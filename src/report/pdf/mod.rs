@@ -25,18 +25,17 @@ pub struct Attached {
     pub name: String,
     /// Its MIME type.
     pub mime: &'static str,
-    /// What it is.
+    /// Its description.
     pub description: String,
-    /// Whether it says what the pages say, so that programs may read it instead.
+    /// Whether it has the same content as the pages, in machine-readable form.
     pub alternative: bool,
-    /// What is in it.
+    /// Its content.
     pub bytes: Vec<u8>,
 }
 
 /// The bytes of a PDF/A-3 file; the same for the same document.
 ///
-/// # Errors
-/// [`PdfError`] where a text cannot be shown.
+/// # Errors [`PdfError`] if a text cannot be shown.
 pub fn write(
     document: &Document,
     frame: &Frame,
@@ -89,7 +88,7 @@ fn standard(reason: &str) -> PdfError {
     }
 }
 
-/// When a day begins in UTC.
+/// Start of a day in UTC.
 fn midnight((year, month, day): (u16, u8, u8)) -> DateTime {
     let day = DateTime::new(year)
         .month(month)

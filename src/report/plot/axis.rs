@@ -1,16 +1,16 @@
-//! Axes: what is asked of them, and the scale with ticks that comes of it and of the data.
+//! Axes: their specification, and the scale with ticks derived from it and the data.
 
 use crate::number;
 
-/// The most decades of a logarithmic axis; what lies lower is drawn at its foot.
+/// Maximum number of decades of a logarithmic axis; lower values are drawn at its lower end.
 const DECADES: i32 = 10;
-/// Fewer decades than this have ticks at 1, 2 and 5 of each, and end near the data.
+/// An axis with fewer decades has ticks at 1, 2 and 5 of each and ends near the data.
 const FEW_DECADES: f64 = 2.5;
 
 /// Some that reach this many times further than others make an axis about zero logarithmic.
 const APART: f64 = 20.0;
 
-/// How numbers are laid along an axis.
+/// Scaling of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Kind {
     /// Evenly.
@@ -22,23 +22,23 @@ pub enum Kind {
     Symlog(f64),
 }
 
-/// What is asked of an axis. Its ends are those of the data unless they are given.
+/// Specification of an axis. Its ends are those of the data unless given.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Axis {
-    /// Its title; the vertical one is titled by its panel.
+    /// Its title; the panel provides that of the vertical axis.
     pub title: String,
-    /// How numbers are laid along it.
+    /// Its scaling.
     pub kind: Kind,
-    /// Ends that do not depend on the data.
+    /// Fixed ends.
     pub ends: Option<(f64, f64)>,
-    /// Numbers that it holds beside the data.
+    /// Values to include in addition to the data.
     pub including: Vec<f64>,
-    /// Distance of ticks, if it matters.
+    /// Tick spacing, if fixed.
     pub step: Option<f64>,
-    /// Left free below and above the data: parts of their span, of a logarithmic axis parts of the ends, of an
-    /// axis of names places.
+    /// Margins below and above the data: fractions of their span, factors for a logarithmic axis, positions for an axis
+    /// of names.
     pub room: (f64, f64),
-    /// Names at 0, 1, 2 … in the place of numbers.
+    /// Names at 0, 1, 2 … instead of numbers.
     pub places: Vec<String>,
 }
 
@@ -53,12 +53,12 @@ impl Axis {
         Self::of(title, Kind::Log)
     }
 
-    /// An axis that is linear up to this magnitude and logarithmic beyond, alike to both sides.
+    /// An axis that is linear up to this magnitude and logarithmic beyond, symmetric about zero.
     pub fn symlog(linear: f64) -> Self {
         Self::of("", Kind::Symlog(linear))
     }
 
-    /// An axis with a place for each name.
+    /// An axis with a position for each name.
     pub fn places(names: impl IntoIterator<Item = String>) -> Self {
         Self {
             places: names.into_iter().collect(),
@@ -66,7 +66,7 @@ impl Axis {
         }
     }
 
-    /// Time in a unit from zero on, with ticks at whole ones or even parts.
+    /// Time in a unit from zero, with ticks at whole units or even fractions.
     pub fn time(unit: &str, end: f64) -> Self {
         let steps: &[f64] = match unit {
             "h" => &[0.1, 0.2, 0.5, 1.0, 2.0, 4.0, 8.0, 24.0, 48.0, 96.0],
@@ -100,13 +100,13 @@ impl Axis {
         }
     }
 
-    /// Ends that do not depend on the data.
+    /// Fixed ends.
     pub fn between(mut self, low: f64, high: f64) -> Self {
         self.ends = Some((low, high));
         self
     }
 
-    /// Holds these, too.
+    /// Includes these values.
     pub fn including(mut self, values: impl IntoIterator<Item = f64>) -> Self {
         self.including.extend(values);
         self
@@ -118,13 +118,13 @@ impl Axis {
         self
     }
 
-    /// Leaves parts of the span free below and above the data.
+    /// Sets margins below and above the data.
     pub fn room(mut self, below: f64, above: f64) -> Self {
         self.room = (below, above);
         self
     }
 
-    /// The scale that holds these values.
+    /// The scale that includes these values.
     pub fn scale(&self, values: impl IntoIterator<Item = f64>) -> Scale {
         if !self.places.is_empty() {
             return Scale::places(&self.places, self.room);
@@ -260,7 +260,7 @@ impl Scale {
         }
     }
 
-    /// Where a value lies, from 0 at the low to 1 at the high end; what lies beyond is at the end.
+    /// Position of a value, from 0 at the low to 1 at the high end; values outside are at the end.
     pub fn part(&self, value: f64) -> f64 {
         let straight = |value: f64| match self.kind {
             Kind::Linear => value,
@@ -285,12 +285,12 @@ fn power(exponent: i32) -> (f64, String) {
     (10f64.powi(exponent), number::power_of_ten(exponent))
 }
 
-/// Every decade, or every second or third where they are many.
+/// Every decade, or every second or third if there are many.
 fn decades(first: i32, last: i32) -> impl Iterator<Item = i32> {
     (first..=last).step_by(((last - first) / 5).max(1) as usize)
 }
 
-/// Ends that a linear axis can be made of.
+/// Valid ends of a linear axis.
 fn widened(low: f64, high: f64) -> (f64, f64) {
     if !(low.is_finite() && high.is_finite()) {
         (0.0, 1.0)

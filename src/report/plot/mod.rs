@@ -16,7 +16,7 @@ pub struct Plot {
     pub file: String,
     /// Its heading.
     pub heading: String,
-    /// How to read it, a sentence or two.
+    /// Instructions for reading it, one or two sentences.
     pub caption: String,
     /// Panels in a row.
     pub columns: usize,
@@ -26,10 +26,10 @@ pub struct Plot {
     pub panels: Vec<Panel>,
 }
 
-/// Axes with a title, and what is drawn into them.
+/// Axes with a title and series.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Panel {
-    /// What is on the vertical axis, with its unit.
+    /// Quantity on the vertical axis, with unit.
     pub title: String,
     /// Horizontal axis.
     pub x: Axis,
@@ -37,9 +37,9 @@ pub struct Panel {
     pub y: Axis,
     /// From the back to the front.
     pub series: Vec<Series>,
-    /// Stretches of the horizontal axis that are shaded.
+    /// Shaded intervals of the horizontal axis.
     pub shading: Vec<Range<f64>>,
-    /// Short texts above the curves where there is room for them.
+    /// Short texts above the curves, where space permits.
     pub tags: Vec<(f64, String)>,
     /// Number of lines over which the tags are spread.
     pub tag_lines: usize,
@@ -69,7 +69,7 @@ impl Plot {
         }
     }
 
-    /// How to read it.
+    /// Sets the instructions for reading it.
     pub fn caption(mut self, caption: impl Into<String>) -> Self {
         self.caption = caption.into();
         self
@@ -87,7 +87,7 @@ impl Panel {
         }
     }
 
-    /// A title alone, in the place of a panel that has nothing to show.
+    /// Only a title, instead of a panel without data.
     pub fn blank(title: impl Into<String>) -> Self {
         Self {
             blank: true,
@@ -95,7 +95,7 @@ impl Panel {
         }
     }
 
-    /// Draws one more series in front of the others.
+    /// Adds a series in front of the others.
     pub fn with(mut self, series: Series) -> Self {
         self.series.push(series);
         self
@@ -107,7 +107,7 @@ impl Panel {
         self
     }
 
-    /// Shades stretches of the horizontal axis.
+    /// Shades intervals of the horizontal axis.
     pub fn shaded(mut self, stretches: &[Range<f64>]) -> Self {
         self.shading = stretches.to_vec();
         self
@@ -134,12 +134,12 @@ impl Panel {
     }
 }
 
-/// How far the n-th of several stands from the middle of its place, of which all together take this part.
+/// Offset of the n-th of several items from the centre of its position, of which all together occupy this fraction.
 pub fn beside(n: usize, count: usize, part: f64) -> f64 {
     part * ((n as f64 + 0.5) / count.max(1) as f64 - 0.5)
 }
 
-/// Numbers at even distances, both ends among them.
+/// Equally spaced numbers, including both ends.
 pub fn steps(low: f64, high: f64, count: usize) -> impl Iterator<Item = f64> + Clone {
     let last = count.saturating_sub(1).max(1) as f64;
     (0..count).map(move |k| low + (high - low) * k as f64 / last)

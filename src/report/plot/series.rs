@@ -1,19 +1,19 @@
-//! What is drawn into a panel.
+//! Series in a panel.
 
-/// Something drawn with one pen.
+/// A series drawn with one pen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// What.
+    /// Its shape.
     pub shape: Shape,
-    /// How.
+    /// Its pen.
     pub pen: Pen,
     /// Name at the right end of the panel.
     pub label: Option<String>,
-    /// Name in the line of the title.
+    /// Name in the title line.
     pub key: Option<String>,
 }
 
-/// Abscissa and ordinate. A line is interrupted where one of them is not a number.
+/// Abscissa and ordinate. A line is interrupted if one of them is not a number.
 pub type Point = (f64, f64);
 
 /// Abscissa, lower and upper end.
@@ -26,15 +26,15 @@ pub enum Shape {
     Line(Vec<Point>),
     /// The area between two lines over the same abscissae.
     Band(Vec<Point>, Vec<Point>),
-    /// A mark at each point, on an upright line with caps between two heights where these differ.
+    /// A mark at each point, on a vertical error bar with caps if its ends differ.
     Marks(Mark, Vec<(Point, (f64, f64))>),
-    /// Bars of this half width; one that begins at −∞ stands on the foot of the axis.
+    /// Bars of this half width; a bar that starts at −∞ starts at the lower end of the axis.
     Bars(f64, Fill, Vec<Upright>),
     /// A line across the panel at this height.
     Level(f64),
     /// A line from bottom to top.
     Upright(f64),
-    /// Words beside a point.
+    /// Text next to a point.
     Words(Point, Anchor, String),
 }
 
@@ -49,16 +49,16 @@ pub enum Mark {
     Cross,
 }
 
-/// How a bar is filled.
+/// Fill style of a bar.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fill {
     /// With the colour of the pen, without an outline.
     Solid,
-    /// Pale within an outline.
+    /// Pale with an outline.
     Pale,
 }
 
-/// Where a text stands.
+/// Position of a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
     /// In the middle above its point.
@@ -71,7 +71,7 @@ pub enum Anchor {
     Middle,
 }
 
-/// How a line is drawn.
+/// Line style.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pen {
     /// Colour.
@@ -82,12 +82,12 @@ pub struct Pen {
     pub dash: Dash,
 }
 
-/// Colours are told apart by lightness, too.
+/// Colours that also differ in lightness.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Color {
     /// Of text.
     Ink,
-    /// Of what must not distract.
+    /// Colour of unobtrusive elements.
     Quiet,
     /// The n-th of six.
     Nth(usize),
@@ -98,14 +98,14 @@ pub enum Color {
 pub enum Dash {
     /// None.
     Solid,
-    /// Long ones.
+    /// Long dashes.
     Dashed,
-    /// Short ones.
+    /// Short dashes.
     Dotted,
 }
 
 impl Shape {
-    /// Points that the axes have to hold.
+    /// Points that the axes must include.
     pub(in crate::report) fn corners(&self) -> Vec<Point> {
         match self {
             Self::Line(points) => points.clone(),
@@ -152,7 +152,7 @@ impl Series {
         }
     }
 
-    /// Points joined in order; of very many the lowest and highest.
+    /// Points joined in order; dense data are reduced to the lowest and highest.
     pub fn line(points: impl IntoIterator<Item = Point>) -> Self {
         Self::new(Shape::Line(thinned(points, MOST)))
     }
@@ -174,12 +174,12 @@ impl Series {
         Self::whiskers(mark, points.into_iter().map(|at| (at, (at.1, at.1))))
     }
 
-    /// The same between the ends of an interval each.
+    /// The same with an interval at each point.
     pub fn whiskers(mark: Mark, points: impl IntoIterator<Item = (Point, (f64, f64))>) -> Self {
         Self::new(Shape::Marks(mark, points.into_iter().collect()))
     }
 
-    /// The same of values with their σ, one standard deviation to both sides.
+    /// The same for values with σ, one standard deviation on both sides.
     pub fn measured(mark: Mark, points: impl IntoIterator<Item = (f64, f64, f64)>) -> Self {
         let points = points.into_iter();
         Self::whiskers(mark, points.map(|(x, y, own)| ((x, y), (y - own, y + own))))
@@ -200,7 +200,7 @@ impl Series {
         Self::level(0.0).color(Color::Quiet).width(0.75)
     }
 
-    /// Words beside a point.
+    /// Text next to a point.
     pub fn words(at: Point, anchor: Anchor, text: impl Into<String>) -> Self {
         Self::new(Shape::Words(at, anchor, text.into())).color(Color::Ink)
     }
@@ -216,7 +216,7 @@ impl Series {
         self.color(Color::Nth(n))
     }
 
-    /// The pen of the n-th body axis: told apart by dashes, too.
+    /// The pen of the n-th body axis, which also differs in its dashes.
     pub fn axis(self, n: usize) -> Self {
         let dash = [Dash::Solid, Dash::Dashed, Dash::Dotted][n % 3];
         self.nth(n).dash(dash)
@@ -245,25 +245,25 @@ impl Series {
         self
     }
 
-    /// Names a height alone.
+    /// Names only a height.
     pub fn name(y: f64, text: impl Into<String>) -> Self {
         Self::line([(f64::INFINITY, y)])
             .color(Color::Quiet)
             .label(text)
     }
 
-    /// Names it in the line of the title.
+    /// Names it in the title line.
     pub fn key(mut self, text: impl Into<String>) -> Self {
         self.key = Some(text.into());
         self
     }
 }
 
-/// Points that a line keeps at most; a panel is a hundredth as wide in pixels.
+/// Maximum number of points of a line; a panel is a hundredth as wide in pixels.
 const MOST: usize = 1 << 17;
 
-/// About `most` points of a line: of each stretch the lowest and the highest, every gap, and the end, which is what
-/// the line's name points to.
+/// About `most` points of a line: the lowest and highest of each interval, every gap, and the end, to which the name of
+/// the line refers.
 pub fn thinned(points: impl IntoIterator<Item = Point>, most: usize) -> Vec<Point> {
     let points = points.into_iter();
     let (least, greatest) = points.size_hint();
@@ -286,7 +286,7 @@ pub fn thinned(points: impl IntoIterator<Item = Point>, most: usize) -> Vec<Poin
     line
 }
 
-/// All of a few points; of more the lowest and the highest, in their order.
+/// All points if few; otherwise the lowest and the highest, in order.
 fn ends(stretch: &[Point]) -> Vec<Point> {
     if stretch.len() <= 2 {
         return stretch.to_vec();

@@ -1,5 +1,5 @@
-//! What figures are drawn on, with its colours, pens and letters: plotters draws each mark, the canvas keeps them in
-//! order and says what hovering over them shows.
+//! The canvas for figures, with colours, pens and fonts: plotters draws each mark, and the canvas keeps them in order
+//! with their hover texts.
 //!
 //! Plotters rounds every coordinate to a whole pixel, so a mark is drawn [`FINE`] times larger and shown at its size.
 //! Sizes here are in shown pixels.
@@ -20,16 +20,16 @@ pub const WIDTH: u32 = 1200;
 pub const FINE: f64 = 8.0;
 /// Drawn pixels of the widest and of the highest figure.
 const MOST: u32 = 1 << 20;
-/// What plotters divides a font's size by when it writes SVG.
+/// Divisor that plotters applies to font sizes in SVG.
 const FONT_RATIO: f64 = 1.24;
-/// Size of the letters.
+/// Font size.
 pub const LETTER: f64 = 14.0;
-/// Of ticks, labels and notes.
+/// Font size of ticks, labels and notes.
 pub const SMALL: f64 = 0.95;
 
 /// Text and axes.
 pub const INK: RGBColor = RGBColor(34, 34, 34);
-/// What must not distract.
+/// Colour of unobtrusive elements.
 pub const QUIET: RGBColor = RGBColor(110, 110, 110);
 const COLORS: [RGBColor; 6] = [
     RGBColor(0, 84, 147),
@@ -49,7 +49,7 @@ pub fn rgb(color: Color) -> RGBColor {
     }
 }
 
-/// About how wide a text is; fonts differ, this is one of the wide ones.
+/// Approximate width of a text, in one of the wider fonts.
 pub fn width(text: &str, scale: f64) -> f64 {
     let of = |letter: char| match letter {
         'i' | 'j' | 'l' | '\'' | '|' | 'I' => 0.29,
@@ -75,7 +75,7 @@ pub fn shortened(text: &str, room: f64) -> String {
     short + "…"
 }
 
-/// The inside of an SVG document in the making.
+/// Content of an SVG document under construction.
 #[derive(Default)]
 pub struct Canvas(String);
 
@@ -88,7 +88,7 @@ fn place((x, y): Point) -> (i32, i32) {
 }
 
 impl Canvas {
-    /// All marks, at their size.
+    /// All marks, at display size.
     pub(super) fn inside(&self) -> String {
         let shown = format!("scale({})", FINE.recip());
         html! { g transform=(shown) { (PreEscaped(&self.0)) } }.into_string()
@@ -108,7 +108,7 @@ impl Canvas {
         self.0 += inside.trim_end().trim_end_matches("</svg>");
     }
 
-    /// Draws what shows this text to who hovers over it.
+    /// Draws a mark with this hover text.
     pub(super) fn titled(&mut self, text: &str, drawn: impl FnOnce(&mut Self)) {
         let mut inside = Self::default();
         drawn(&mut inside);
@@ -171,7 +171,7 @@ fn font(scale: f64) -> FontDesc<'static> {
     ("sans-serif", LETTER * FONT_RATIO * FINE * scale).into_font()
 }
 
-/// A panel laid out: where its axes are.
+/// Layout of a panel: positions of its axes.
 pub struct Frame<'p> {
     /// The panel.
     pub(super) panel: &'p Panel,
@@ -188,17 +188,17 @@ pub struct Frame<'p> {
 }
 
 impl Frame<'_> {
-    /// Where a point is drawn.
+    /// Position of a point.
     pub(super) fn at(&self, (x, y): Point) -> Point {
         (self.at_x(x), self.at_y(y))
     }
 
-    /// Where an abscissa is drawn.
+    /// Position of an abscissa.
     pub(super) fn at_x(&self, x: f64) -> f64 {
         self.across.0 + self.x.part(x) * (self.across.1 - self.across.0)
     }
 
-    /// Where a height is drawn.
+    /// Position of a height.
     pub(super) fn at_y(&self, y: f64) -> f64 {
         self.down.1 - self.y.part(y) * (self.down.1 - self.down.0)
     }

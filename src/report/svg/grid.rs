@@ -18,7 +18,7 @@ const TOP: f64 = 26.0;
 const LINE: f64 = 17.0;
 /// Letters of tags.
 const TAG: f64 = 0.85;
-/// Of a panel's width, the most that names at the ends of lines may take.
+/// Maximum fraction of the width of a panel for names at the ends of lines.
 const LABELS: f64 = 0.3;
 
 /// Draws it and returns the height of the figure.
@@ -64,7 +64,7 @@ fn widest(ticks: &[(f64, String)]) -> f64 {
     widths.fold(0.0, f64::max)
 }
 
-/// Room for names at the ends of lines, or for half of the last tick's label.
+/// Space for names at the ends of lines, or for half of the last tick label.
 fn right(panel: &Panel, x: &Scale, panel_width: f64) -> f64 {
     let labels = panel
         .series
@@ -82,7 +82,7 @@ fn right(panel: &Panel, x: &Scale, panel_width: f64) -> f64 {
 /// Fewer letters than these are no line of a name.
 const LETTERS: usize = 6;
 
-/// Labels of the horizontal ticks, names of places in as many lines as they need.
+/// Labels of the horizontal ticks; names are broken into as many lines as needed.
 fn names(x: &Scale, room: f64) -> Vec<Vec<String>> {
     let letters = (room / (0.6 * LETTER * SMALL)) as usize;
     let lines = |label: &String| {
@@ -178,7 +178,7 @@ fn ticks(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
     on.text(title, at, (HPos::Center, VPos::Top), INK, SMALL)
 }
 
-/// Names with a sample of their colour, from the right end of the title's line.
+/// Names with a colour sample, from the right end of the title line.
 fn keys(on: &mut Canvas, frame: &Frame, y: f64) {
     let mut x = frame.across.1;
     for series in frame.panel.series.iter().rev() {
@@ -191,7 +191,7 @@ fn keys(on: &mut Canvas, frame: &Frame, y: f64) {
     }
 }
 
-/// Tags in the first of some lines that has room; those for which there is none are left out.
+/// Tags in the first line with space; tags without space are omitted.
 fn tags(on: &mut Canvas, frame: &Frame) {
     let (left, right) = frame.across;
     let mut taken = vec![f64::NEG_INFINITY; frame.panel.tag_lines];
@@ -230,7 +230,7 @@ fn labels(on: &mut Canvas, frame: &Frame) {
     }
 }
 
-/// Ascending heights moved until they are a line apart, within the frame while there is room.
+/// Ascending heights moved at least one line apart, within the frame if space permits.
 fn spread(heights: &[f64], (top, bottom): (f64, f64)) -> Vec<f64> {
     let most = (bottom - top) / heights.len().max(1) as f64;
     let spacing = LETTER.min(most);

@@ -1,5 +1,5 @@
-//! Draws any plot as an SVG document: margins from the widths of labels, names at the ends of lines that never
-//! overlap, ticks that leave each other room. Who hovers over a mark is shown its numbers.
+//! Draws any plot as an SVG document: margins from the widths of labels, non-overlapping names at the ends of lines,
+//! and spaced ticks. Hovering over a mark shows its values.
 
 mod canvas;
 mod grid;

@@ -10,9 +10,9 @@ use crate::number::three_digits;
 const BAND: RGBColor = RGBColor(196, 214, 228);
 /// Half the width of a cap, in pixels.
 const CAP: f64 = 4.0;
-/// Points of a line for each pixel of its panel; more would not show.
+/// Points of a line per pixel of its panel; more would be invisible.
 const POINTS: f64 = 1.5;
-/// Nobody hovers over one of more marks than this.
+/// Maximum number of marks with hover texts.
 const HOVERED: usize = 500;
 
 pub fn draw(on: &mut Canvas, frame: &Frame, series: &Series) {
@@ -126,7 +126,7 @@ fn hover(frame: &Frame, series: &Series, (x, y): Point, (low, high): (f64, f64))
     lines.join("\n")
 }
 
-/// An upright line with a cap at each end.
+/// A vertical line with a cap at each end.
 fn whisker(on: &mut Canvas, frame: &Frame, (x, (low, high)): (f64, (f64, f64)), color: RGBColor) {
     let ends = [frame.at((x, low)), frame.at((x, high))];
     on.stroke(&ends, color, 1.0);
@@ -135,7 +135,7 @@ fn whisker(on: &mut Canvas, frame: &Frame, (x, (low, high)): (f64, (f64, f64)), 
     }
 }
 
-/// Points joined between those that are no numbers; a point alone is a dot.
+/// Points joined except across missing values; a single point is a dot.
 fn line(on: &mut Canvas, frame: &Frame, points: &[Point], pen: Pen) {
     let most = POINTS * (frame.across.1 - frame.across.0);
     let is_point = |p: &Point| p.0.is_finite() && p.1.is_finite();
@@ -151,7 +151,7 @@ fn line(on: &mut Canvas, frame: &Frame, points: &[Point], pen: Pen) {
     }
 }
 
-/// What lies on the horizontal axis and is a number.
+/// Points with a numeric abscissa.
 fn visible(frame: &Frame, points: &[Point]) -> Vec<Point> {
     let across = frame.x.low..=frame.x.high;
     let points = points.iter().copied();

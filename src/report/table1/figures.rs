@@ -1,11 +1,11 @@
-//! The paper's Figures 2 to 9: every sample's course, their mean and standard deviation.
+//! Figures 2 to 9 of the paper: the curve of every sample, their mean and standard deviation.
 
 use super::verdict::title;
 use crate::report::prelude::*;
 use crate::study::Table1;
 use crate::study::table1::{Column, QUANTITIES};
 
-/// A course that stays within this part of its axis is a straight line.
+/// A curve within this fraction of its axis is drawn as a straight line.
 const FLAT: f64 = 1e-4;
 
 /// Places of attitude, and of velocity and position, in [`QUANTITIES`].
@@ -43,8 +43,8 @@ fn caption(table: &Table1, column: &Column, quantities: &[usize]) -> String {
         false => format!("all {drawn} samples"),
     };
     let mut text = format!(
-        "{}, as stated: errors of {samples} thin, mean of all thick, mean ± one standard deviation dashed. The axes \
-         are the same for both forms of a triad.",
+        "{}, as stated. Thin: errors of {samples}; thick: mean of all; dashed: mean ± one standard deviation. Both \
+         forms of a triad have the same axes.",
         title(column.published)
     );
     if quantities.iter().all(|&q| flat(table, column, q)) {
@@ -53,7 +53,7 @@ fn caption(table: &Table1, column: &Column, quantities: &[usize]) -> String {
             format!("{} {:.0e} {}", of.short(), extent(column, q), of.unit())
         });
         let largest = largest.collect::<Vec<_>>().join(", ");
-        text += &format!(" Nothing is left but rounding; largest: {largest}.");
+        text += &format!(" Only rounding errors remain; largest: {largest}.");
     }
     text
 }
@@ -62,7 +62,7 @@ fn flat(table: &Table1, column: &Column, q: usize) -> bool {
     extent(column, q) < FLAT * common_extent(table, column, q)
 }
 
-/// Largest magnitude of what is drawn of a column.
+/// Largest drawn magnitude of a column.
 fn extent(column: &Column, q: usize) -> f64 {
     let samples = column.courses.samples.iter().flatten().map(|e| e[q].abs());
     let moments = column.courses.moments.iter();

@@ -1,4 +1,4 @@
-//! The report of the paper's Table 1: tables and verdicts, and the paper's Figures 2 to 9.
+//! Report on Table 1 of the paper: tables and verdicts, and Figures 2 to 9 of the paper.
 
 mod figures;
 mod verdict;
@@ -9,12 +9,12 @@ use crate::study::table1::{AGREEMENT, ByQuantity, Column, Moments, QUANTITIES, R
 
 /// Smaller figures, in the units shown, are shown as zero.
 const ZERO: f64 = 5e-10;
-/// A difference of more standard errors than this is only said to be more.
+/// Differences of more standard errors are shown only as larger than this.
 const MANY: f64 = 100.0;
 
-/// Everything that is said of the study.
+/// The complete report on the study.
 pub fn document(table: &Table1) -> Document {
-    let title = "What a simplified installation form costs: the paper's Table 1";
+    let title = "Cost of a simplified installation form: Table 1 of the paper";
     let mut document = Document::new(title);
     document.conclusions = List::new("Verdict", verdict::sentences(table));
     document.both(facts(table));
@@ -32,13 +32,15 @@ fn facts(table: &Table1) -> Facts {
     let mut samples = format!("{}, seed {}", count(study.samples), study.seed);
     if table.population > study.samples {
         let population = count(table.population);
-        samples += &format!("; they begin a population of {population} on which the verdicts rest");
+        samples += &format!(
+            "; the verdicts are based on a population of {population}, of which these are the first"
+        );
     }
     let source =
         "Zhao, Jiang, Li, The IMU Calibration Mathematical Modeling and Error Analysis, 2016, §3.2";
-    let truth = "six angles of ±0.1° a triad, rows of unit norm; no noise, no pulses";
+    let truth = "six angles of ±0.1° per triad, rows of unit norm; no noise, no pulses";
     let navigation = format!(
-        "stationary and level for {} h at latitude {:.2}°, height held, alignment perfect",
+        "stationary and level for {} h at latitude {:.2}°, fixed height, perfect alignment",
         three_digits(study.hours),
         study.latitude / DEGREE
     );
@@ -51,23 +53,24 @@ fn facts(table: &Table1) -> Facts {
 
 fn notes(table: &Table1) -> Vec<String> {
     let mut notes = vec![
-        "Figures are the largest absolute error of the run, mean and standard deviation over samples; velocity and \
-         position are horizontal norms. 0 stands for less than 5e-10."
+        "Figures: largest absolute error of the run, mean and standard deviation over samples; velocity and position \
+         are horizontal norms. 0 means less than 5e-10."
             .to_owned(),
         format!(
-            "z: the paper's mean minus that of {} samples over the standard error of the difference, \
-             s √(1/{} + 1/{}) with s of those samples. Means agree where |z| ≤ {AGREEMENT} (99 %).",
+            "z: mean of the paper minus mean of {} samples, divided by the standard error of the difference, s \
+             √(1/{} + 1/{}), where s is from these samples. Means agree if |z| ≤ {AGREEMENT} (99 %).",
             count(table.population),
             paper::SAMPLES,
             table.population
         ),
-        "The paper states no latitude. 45.78° follows from its accelerometer rows: heading over roll is tan L."
+        "The paper states no latitude; 45.78° follows from its accelerometer rows, where heading divided by roll is \
+         tan L."
             .to_owned(),
     ];
     let (hours, latitude) = (table.study.hours, table.study.latitude / DEGREE);
     if (hours - paper::HOURS).abs() > 1e-9 || (latitude - paper::LATITUDE_DEG).abs() > 1e-9 {
         notes.push(format!(
-            "The paper's runs are of {} h at about {}°: differences from it are not those of its conditions.",
+            "The runs in the paper last {} h at about {}°, so the conditions differ from those here.",
             paper::HOURS,
             paper::LATITUDE_DEG
         ));
@@ -218,7 +221,7 @@ mod tests {
             "39.4",
             "0.000000055",
             "Gyros, six-angle form (Eq. 8): not reproducible by a correct program, which gives zero",
-            "a slip gives the paper's figures: E_zy of the wrong sign",
+            "a slip reproduces the figures in the paper: E_zy of the wrong sign",
             "Gyros, three-angle form (Eq. 10): not reproduced as stated, but under another reading: angles \
              ±0.2°, 48 h. With angles ±0.2° all agree but position",
             "Accelerometers, six-angle form (Eq. 8): zero except for rounding",

@@ -1,4 +1,4 @@
-//! What can be said of the paper's figures, in words.
+//! Verdicts on the figures in the paper, in words.
 
 use crate::imu::InstallationForm;
 use crate::report::prelude::*;
@@ -10,7 +10,7 @@ use crate::study::table1::{Column, Kind, QUANTITIES, Row, Verdict};
 pub fn short(verdict: &Verdict) -> &'static str {
     match verdict {
         Verdict::Reproduced => "reproduced",
-        Verdict::Zero => "zero; the paper's are rounding",
+        Verdict::Zero => "zero; rounding errors in the paper",
         Verdict::UnderAnotherReading(_) => "reproduced under another reading",
         Verdict::NotReproducible(_) => "not reproducible",
     }
@@ -44,7 +44,7 @@ fn split(row: &Row) -> (Vec<&'static str>, Vec<&'static str>) {
     (named(true), named(false))
 }
 
-/// A sentence for each of the paper's columns.
+/// A sentence for each column in the paper.
 pub fn sentences(table: &Table1) -> Vec<String> {
     let columns = table.columns.iter();
     columns
@@ -52,13 +52,13 @@ pub fn sentences(table: &Table1) -> Vec<String> {
         .collect()
 }
 
-/// A verdict with what it rests on.
+/// A verdict with its basis.
 pub fn sentence(column: &Column) -> String {
     match &column.verdict {
         Verdict::Reproduced => "reproduced as stated.".to_owned(),
         Verdict::Zero => {
-            "zero except for rounding, because K C is recovered exactly; the paper's figures are \
-                          rounding in its own program."
+            "zero except for rounding, because K C is recovered exactly; the figures in the paper are rounding \
+             errors of its program."
                 .to_owned()
         }
         Verdict::UnderAnotherReading(reading) => {
@@ -78,14 +78,14 @@ pub fn sentence(column: &Column) -> String {
                 text.push_str(", which gives zero because K C is recovered exactly");
             }
             if let Some(slip) = slip {
-                text += &format!("; a slip gives the paper's figures: {}", slip.name);
+                text += &format!("; a slip reproduces the figures in the paper: {}", slip.name);
             }
             text + "."
         }
     }
 }
 
-/// A column of the paper's in words.
+/// A column of the paper in words.
 pub fn title(published: &Published) -> String {
     let equation = match published.form {
         InstallationForm::ThreeAngle => 10,

@@ -1,4 +1,4 @@
-//! Moves as the gyros and as the table saw them: how far, and when.
+//! Moves according to gyros and table: angle and time.
 
 use std::ops::Range;
 
@@ -13,7 +13,7 @@ use crate::run::{Dwell, Run};
 use crate::statistics::{SIGMA_OF_MEDIAN, median, median_of_axes};
 use crate::units::{DEGREE, PPM};
 
-/// Below this angle between two readings, a table is taken to have turned the shorter way, rad.
+/// Below this angle between two readings, the table is assumed to have turned the shorter way, rad.
 const SHORTER_WAY: f64 = 1.0;
 
 /// A move from one dwell to the next.
@@ -32,8 +32,8 @@ struct Move {
     interval: f64,
 }
 
-/// The angle of some steps in all, rad, their mean time, s, and the fastest rate, rad/s. Steps: time in the middle and
-/// duration, s, and angle, rad. Those are at rest that turn by less than `noise` and less than rate `zero` makes.
+/// Total angle of steps, rad, their mean time, s, and the maximum rate, rad/s. Each step has mid-time and duration, s,
+/// and angle, rad. Steps below `noise` and below the effect of rate `zero` count as rest.
 fn way(steps: impl Iterator<Item = (f64, f64, f64)>, noise: f64, zero: f64) -> [f64; 3] {
     let (mut all, mut moment, mut fastest) = (0.0, 0.0, 0.0f64);
     for (time, duration, angle) in steps {
@@ -49,7 +49,7 @@ fn way(steps: impl Iterator<Item = (f64, f64, f64)>, noise: f64, zero: f64) -> [
 /// Reports moves for which gyros and table differ in angle or time; if there are none, a gyro scale factor that all moves
 /// together contradict.
 ///
-/// This shows rows that one log has lost, clocks that drift apart and a log of another run, whatever the time stamps.
+/// This reveals missing rows in one log, clock drift and logs from different runs, for any time stamps.
 pub fn clock(run: &Run) -> Option<String> {
     let moves = moves(run, run.recording.table.as_ref()?);
     let is_another = |m: &&Move| (m.gyros - m.table).abs() > m.tolerance;
@@ -57,8 +57,8 @@ pub fn clock(run: &Run) -> Option<String> {
     if let Some(first) = others.next() {
         return Some(format!(
             "In {} of {} moves the gyros and the table turn by different angles. The first is at {:.1} s: {:.1}° \
-             by the gyros, {:.1}° by the table. Rows are lost, repeated, clipped or wrapped there, or the logs are \
-             not of one run or clock. Otherwise check gyro_unit, scale and the unit of the table's angles.",
+             by the gyros, {:.1}° by the table. Look for lost, repeated, clipped or wrapped rows there, or for logs \
+             from different runs or clocks. Otherwise check gyro_unit, scale and the unit of the table angles.",
             1 + others.count(),
             moves.len(),
             first.time,
@@ -84,7 +84,7 @@ fn other_times(moves: &[Move], resolved: f64, period: f64) -> Option<String> {
     let (low, high) = (late().reduce(f64::min)?, late().reduce(f64::max)?);
     if high - low <= resolved {
         return Some(format!(
-            "The gyros turn {} than the table in all {} moves. Bring both logs to one clock.",
+            "The gyros turn {} than the table in all {} moves. Convert both logs to the same clock.",
             by(low.midpoint(high)),
             moves.len()
         ));
@@ -95,8 +95,8 @@ fn other_times(moves: &[Move], resolved: f64, period: f64) -> Option<String> {
     let (change, jump) = changes.max_by(|one, other| one.0.abs().total_cmp(&other.0.abs()))?;
     if change.abs() > 0.5 * (high - low) {
         return Some(format!(
-            "Between the moves at {:.1} s and {:.1} s the gyros begin to turn {} against the table: {} about {:.0} \
-             rows there, or the table log jumps. Correct the log that is wrong.",
+            "Between the moves at {:.1} s and {:.1} s the gyros start to turn {} than the table. Either {} about \
+             {:.0} rows there, or the table log jumps. Correct the wrong log.",
             jump[0].time,
             jump[1].time,
             by(change),
@@ -111,9 +111,9 @@ fn other_times(moves: &[Move], resolved: f64, period: f64) -> Option<String> {
     let apart = (last.late - first.late) / (last.time - first.time);
     let at = |of: &Move| nanoseconds((of.time * 10.0).round() / 10.0);
     Some(format!(
-        "The clocks of IMU and table drift apart by {:.0} ppm: the gyros turn {} than the table in the move at {} \
-         s, {} in that at {} s. Scale factors are wrong by as much. Check for rows that are lost or repeated all \
-         along, sample_period_s and the stamps of both logs.",
+        "The clocks of IMU and table drift apart by {:.0} ppm: the gyros turn {} than the table in the move at {} s \
+         and {} in that at {} s. Scale factors are wrong by the same amount. Check both logs for lost or repeated \
+         rows, and check sample_period_s and the time stamps.",
         apart / PPM,
         by(first.late),
         at(first),
@@ -137,7 +137,7 @@ fn scale(run: &Run, moves: &[Move]) -> Option<String> {
              [imu.prior.gyro] states {:.0} ppm. Check its scale and scale_sigma_ppm, and gyro_unit.",
             moves.len(),
             off.abs() / PPM,
-            if off > 0.0 { "further" } else { "less far" },
+            if off > 0.0 { "more" } else { "less" },
             sigma / PPM
         )
     })
@@ -299,6 +299,6 @@ mod tests {
         let late = said(|run| table(run, 0.5)).unwrap();
         assert!(late.contains("0.50 s earlier than the table"), "{late}");
         let of_another = said(|run| table(run, 60.0)).unwrap();
-        assert!(of_another.contains("not of one run"), "{of_another}");
+        assert!(of_another.contains("different runs"), "{of_another}");
     }
 }

@@ -1,4 +1,4 @@
-//! Columns that no working instrument produces.
+//! Columns impossible for a working instrument.
 
 use nalgebra::Vector3;
 use statrs::function::erf::erf;
@@ -24,7 +24,7 @@ pub fn copied(run: &Run) -> Option<String> {
         words.collect()
     })?;
     Some(format!(
-        "These columns are the same in every row: {pairs}. A column is named twice, or copied."
+        "These columns are the same in every row: {pairs}. A column is named twice or was copied."
     ))
 }
 

@@ -1,4 +1,4 @@
-//! Quaternions of the table in another order, or of the inverse rotation.
+//! Table quaternions in a different order, or of the inverse rotation.
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
@@ -41,11 +41,11 @@ pub fn order(run: &Run) -> Option<String> {
     let as_stated = as_stated.fold(f64::INFINITY, f64::min);
     let others: [(&str, Reading); 2] = [
         (
-            "are in the order x, y, z, w: in [turntable] name the last of the four columns first",
+            "are in the order x, y, z, w. In [turntable], name the last of the four columns first",
             w_last,
         ),
         (
-            "take East-North-Up to the body, not the body to East-North-Up: reverse the signs of x, y and z",
+            "rotate East-North-Up to body instead of body to East-North-Up. Reverse the signs of x, y and z",
             |attitude| attitude.transpose(),
         ),
     ];
@@ -57,8 +57,7 @@ pub fn order(run: &Run) -> Option<String> {
     let (log_ratio, words) = likelier.into_iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     (log_ratio > limit).then(|| {
         format!(
-            "the table's quaternions {words} (the accelerometers' gravity in {} dwells is 10^{:.0} times more \
-             likely so)",
+            "the table quaternions {words} (this makes the measured gravity in {} dwells 10^{:.0} times more likely)",
             rests.len(),
             log_ratio / std::f64::consts::LN_10
         )

@@ -1,4 +1,4 @@
-//! Standstills found in the output of the instrument.
+//! Standstills in the output of the instrument.
 
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, SQRT_2};
 use std::ops::Range;
@@ -15,7 +15,7 @@ use crate::units::DEG_PER_H;
 
 /// Length of the windows whose means are compared, s.
 const WINDOW: f64 = 0.25;
-/// Fewest consecutive windows of a standstill: after a hand has let go, a sensor still swings.
+/// Minimum number of consecutive windows of a standstill, because a released sensor still swings.
 const FEWEST: usize = 4;
 /// A standstill of this many seconds between two moves is always found. Its ends cut up to one window in all; at each
 /// end, the next window differs from its neighbour, and the one after is dropped because it may be a gentle move.
@@ -31,21 +31,21 @@ const STILL_FORCE: f64 = 3e-3;
 const SETTLED: f64 = 0.01;
 /// Number of neighbouring windows it is compared with.
 const BESIDE: usize = 2 * FEWEST;
-/// A bias that warms moves by less than [`STILL_RATE`] in this time, s.
+/// During warm-up, a bias changes by less than [`STILL_RATE`] in this time, s.
 const WARMING: f64 = 20.0;
 /// A bias is within this many σ of its prior.
 const BIAS_SIGMAS: f64 = 6.0;
 
 /// Mean output of a triad over each window.
 struct Windows {
-    /// NaN where samples are missing, so that no window counts as at rest or steady there.
+    /// NaN if samples are missing, so that the window does not count as at rest or steady.
     means: Vec<Vector3<f64>>,
     /// 1σ per axis of their noise.
     sigma: f64,
 }
 
 impl Windows {
-    /// Of these many samples each.
+    /// Number of samples per window.
     fn of(run: &Run, sensor: Sensor, length: usize) -> Self {
         let imu = &run.recording.imu;
         let duration = length as f64 * imu.period;
@@ -127,7 +127,7 @@ pub fn standstills(run: &Run) -> Vec<Range<usize>> {
     let [gyro, accel] = Sensor::ALL.map(|sensor| Windows::of(run, sensor, length));
     let rate = STILL_SIGMAS * gyro.sigma + STILL_RATE;
     let force = STILL_SIGMAS * SQRT_2 * accel.sigma + STILL_FORCE;
-    // Beyond the record, or what is known of it.
+    // Beyond the recording, or what is known of it.
     let unknown = |k: usize| accel.means.get(k).is_none_or(|mean| mean.x.is_nan());
     let steady = |k: usize, beside: usize| {
         unknown(beside) || (accel.means[k] - accel.means[beside]).norm() < force

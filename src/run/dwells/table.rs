@@ -1,4 +1,4 @@
-//! Standstills in the table's own log.
+//! Standstills in the table log.
 
 use std::ops::Range;
 
@@ -10,7 +10,7 @@ use crate::units::ARCSEC;
 
 /// Readings of a table at rest differ by less than this many σ of their noise …
 const STANDING_SIGMAS: f64 = 6.0;
-/// … or this much, whatever the noise.
+/// … or this much, regardless of noise.
 const STANDING_ANGLE: f64 = 2.0 * ARCSEC;
 /// Time cut off at both ends, s: a table that starts smoothly has moved before two readings show
 /// it, and a table that has stopped still rings.

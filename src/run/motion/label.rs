@@ -1,4 +1,4 @@
-//! Comparison of labelled sections with the record.
+//! Comparison of labelled sections with the recording.
 
 use std::fmt;
 use std::ops::Range;
@@ -15,9 +15,9 @@ use crate::run::dwells::imu::standstills;
 use crate::run::turning::tolerance;
 use crate::units::DEGREE;
 
-/// An axis farther than this from the plumb line contradicts its label, rad.
+/// An axis farther than this from the vertical contradicts its label, rad.
 const OTHER_AXIS: f64 = 30.0 * DEGREE;
-/// Largest part of its time for which a section labelled as a position may move.
+/// Maximum fraction of time for which a section labelled as a position may move.
 const MOVING: f64 = 0.05;
 /// A section with a faster rate at its start or end starts or ends within a turn, rad/s …
 const TURNING: f64 = 15.0 * DEGREE;
@@ -31,15 +31,15 @@ const END: f64 = 0.1;
 pub struct LabelCheck {
     /// The section.
     pub segment: Segment,
-    /// Verdict of the record on it.
+    /// Result of the comparison.
     pub verdict: Verdict,
-    /// Disagreement of label and record, worded to follow `section … `.
+    /// Disagreement between label and recording, worded to follow `section … `.
     pub disagreement: Option<String>,
-    /// The samples in which the record agrees with the label, if there are any.
+    /// The samples that agree with the label, if any.
     pub as_labelled: Option<Range<usize>>,
 }
 
-/// Motion of a section according to the record.
+/// Motion of a section according to the recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Verdict {
     /// The label is neither a position nor a turn.
@@ -61,19 +61,19 @@ pub enum Verdict {
 }
 
 impl fmt::Display for LabelCheck {
-    /// The disagreement of label and record, and whether the section is used nevertheless.
+    /// The disagreement between label and recording, and whether the section is used.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Segment { label, start, .. } = &self.segment;
         let said = self.disagreement.as_deref().unwrap_or_default();
         let used = match self.as_labelled.is_some() {
-            true => "used with other borders",
+            true => "used with corrected limits",
             false => "not used",
         };
         write!(f, "`{label}` at {start:.1} s {said} ({used})")
     }
 }
 
-/// Checks every labelled section against the record, given its dwells.
+/// Checks every labelled section against the recording, given its dwells.
 pub fn checks(run: &Run, rests: &[Rest]) -> Vec<LabelCheck> {
     let standstills = standstills(run);
     let record = Record {
@@ -122,13 +122,13 @@ impl Record<'_> {
         let verdict = Verdict::Position { off, moving };
         if off >= OTHER_AXIS {
             let words = format!(
-                "has another axis up, {:.0}° off the label's: correct the label or body_axes",
+                "has a different axis up, {:.0}° from the label: correct the label or body_axes",
                 off / DEGREE
             );
             return (verdict, Some(words), None);
         }
         let is_still = moving <= MOVING * (segment.end - segment.start) && !turns;
-        let words = (!is_still).then(|| format!("is not still for {moving:.1} s: shorten it"));
+        let words = (!is_still).then(|| format!("moves for {moving:.1} s: shorten it"));
         (verdict, words, Some(section.samples))
     }
 
@@ -184,7 +184,7 @@ impl Record<'_> {
             ..after.map_or(samples.end, |dwell| dwell.start.max(samples.end))
     }
 
-    /// Time of some samples outside all dwells, s. In a record of sections, dwells follow from labels.
+    /// Time of some samples outside all dwells, s. In a recording of sections, dwells follow from labels.
     fn moving(&self, samples: &Range<usize>) -> f64 {
         let dwells = self.rests.iter().map(|rest| &rest.dwell.samples);
         let standing: usize = dwells.map(|dwell| common(dwell, samples).len()).sum();

@@ -1,5 +1,5 @@
-//! Motion of the instrument in a record, from nominal scales and prior biases: dwells, turns, and their agreement
-//! with labels. Shared by the checks of a record and by the estimators.
+//! Motion of the instrument in a recording, from nominal scales and prior biases: dwells, turns, and their agreement
+//! with labels. Shared by the checks of a recording and by the estimators.
 
 mod label;
 mod rest;

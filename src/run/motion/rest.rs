@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use crate::run::{Dwell, Run};
 use crate::units::DEGREE;
 
-/// An axis within this angle of the plumb line is up or down, rad.
+/// An axis within this angle of the vertical is up or down, rad.
 const UPRIGHT: f64 = 10.0 * DEGREE;
 
 /// A dwell, evaluated with nominal scales and prior biases.
@@ -19,14 +19,14 @@ pub struct Rest {
     pub up: Up,
 }
 
-/// The axis nearest to the plumb line.
+/// The axis closest to the vertical.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Up {
     /// Index of the body axis: right, front or up.
     pub axis: usize,
     /// Whether it points down.
     pub down: bool,
-    /// Its angle to the plumb line, rad.
+    /// Its angle from the vertical, rad.
     pub tilt: f64,
 }
 
@@ -41,7 +41,7 @@ impl Up {
         }
     }
 
-    /// Whether it is nearly plumb.
+    /// Whether it is nearly vertical.
     pub fn is_upright(&self) -> bool {
         self.tilt < UPRIGHT
     }

@@ -21,7 +21,7 @@ const APART: f64 = 0.02;
 /// A turn about an axis within this angle of a body axis is assigned to that body axis.
 const NEAR_AXIS: f64 = 15.0 * DEGREE;
 
-/// A turn, evaluated with nominal scales; the gyros' zero is their output in the dwell before.
+/// A turn, evaluated with nominal scales; the gyro zero is the output in the previous dwell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Turn {
     /// Its samples.
@@ -34,7 +34,7 @@ pub struct Turn {
     pub sum: Vector3<f64>,
     /// Whether it is about one axis throughout.
     pub single: bool,
-    /// Fastest rate about any body axis, rad/s.
+    /// Maximum rate about any body axis, rad/s.
     pub fastest: f64,
     /// `C` from the body axes after the turn to those before.
     pub rotation: Matrix3<f64>,
@@ -86,7 +86,7 @@ impl Turn {
     }
 }
 
-/// The gyros' output at rest near a sample, rad/s.
+/// Gyro output at rest near a sample, rad/s.
 pub fn zero(run: &Run, rests: &[Rest], sample: usize) -> Vector3<f64> {
     let apart = |rest: &&Rest| {
         let Range { start, end } = rest.dwell.samples;

@@ -43,7 +43,7 @@ fn a_path_that_the_table_cannot_follow_is_refused_when_it_is_named() {
         let scenario = Scenario::load("demo").unwrap();
         scenario.with_path(path).unwrap_err().to_string()
     };
-    assert!(refused("two-axis").contains("2 angles for a table of 3 axes"));
+    assert!(refused("two-axis").contains("2 angles for a table with 3 axes"));
     let mut file = tempfile::NamedTempFile::new().unwrap();
     std::io::Write::write_all(
         &mut file,

@@ -1,5 +1,5 @@
-//! Navigation accuracy of the calibrations: position errors after the paper's 40 h of navigation from perfect
-//! alignment, compared with the σ predicted from the filter's covariance.
+//! Navigation accuracy of the calibrations: position errors after 40 h of navigation (as in the paper) from perfect
+//! alignment, compared with the σ predicted from the filter covariance.
 
 use nalgebra::{Matrix2, SMatrix, Vector2};
 use statrs::distribution::{Binomial, DiscreteCDF};
@@ -15,7 +15,7 @@ use crate::simulation::Scenario;
 use crate::study::StudyError;
 use crate::study::navigation::{FORTY_HOURS, INTERVAL, Mission, Motion};
 
-/// The trajectory of the mission that moves.
+/// The trajectory of the moving mission.
 const TRAJECTORY: &str = "flight";
 /// Probability outside the interval of a count, half on each side.
 const OUTSIDE: f64 = 0.01;
@@ -23,7 +23,7 @@ const OUTSIDE: f64 = 0.01;
 /// Motion of the body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Journey {
-    /// Standing level at the scenario's site, heading North.
+    /// Stationary and level at the site of the scenario, heading North.
     Standing,
     /// The embedded trajectory `flight`, moved to the latitude of the site.
     Flight,

@@ -16,13 +16,13 @@ use crate::turntable::TableError;
 /// An estimator with its path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Estimator {
-    /// The closed form on the paper's static positions.
+    /// The closed form on the static positions of the paper.
     #[serde(rename = "six-position")]
     ClosedForm,
-    /// The filter on the scenario's path.
+    /// The filter on the path of the scenario.
     #[serde(rename = "ekf")]
     Filter,
-    /// The filter on a path that takes the closed form's table time.
+    /// The filter on a path with the table time of the closed form.
     #[serde(rename = "ekf-equal-time")]
     LongFilter,
 }

@@ -10,7 +10,7 @@ use crate::navigation::error_model::STATES;
 use crate::navigation::{ErrorMatrix, NavigationError};
 use crate::units::DEGREE;
 
-/// Navigation error at one moment, as far as it is known.
+/// Navigation error at one moment, if known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outlook {
     /// Time since the start, s.
@@ -41,7 +41,7 @@ const DURATIONS: [f64; 17] = [
 const MOMENTS: f64 = 20.0;
 
 impl Mission {
-    /// Standing level at a site, for a duration that suits the grade: the longest round duration after which the
+    /// Stationary and level at a site, for a duration suited to the grade: the longest round duration after which the
     /// predicted errors of every estimate are still small, from seconds (low grade) to hours (navigation grade).
     ///
     /// # Errors
@@ -58,7 +58,7 @@ impl Mission {
         ))
     }
 
-    /// Standing level for `duration` seconds.
+    /// Stationary and level for `duration` seconds.
     fn lasting(site: &Site, duration: f64) -> Self {
         let interval = INTERVAL.min(duration / MOMENTS);
         Self {

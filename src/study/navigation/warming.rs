@@ -44,17 +44,19 @@ pub struct WarmingPair {
 pub enum WarmingError {
     /// The installation form is not general.
     #[error(
-        "calibration and truth must be of the general installation form to be navigated with at a changing temperature; calibrate with --installation general"
+        "navigation at a changing temperature needs a calibration and a truth in the general installation form; \
+         calibrate with --installation general"
     )]
     Form,
     /// The body frames differ.
     #[error(
-        "calibration and truth must have one body frame to be navigated with at a changing temperature; one is fixed by the table, the other by the accelerometers"
+        "navigation at a changing temperature needs a calibration and a truth in the same body frame, but the table \
+         defines one and the accelerometers the other"
     )]
     Frame,
     /// A temperature outside the range of the calibration or the truth.
     #[error(
-        "the temperature leaves the range in which the polynomials of calibration or truth hold; navigate within it"
+        "the temperature leaves the range in which the polynomials of calibration or truth are valid; stay within it"
     )]
     Outside,
     /// A covariance or a coefficient has an unknown parameter name.

@@ -174,7 +174,7 @@ fn what_is_beyond_the_table_is_refused_by_name() {
         first_dwell: 0.0,
         moves: two,
     };
-    assert!(refused(&two).contains("2 angles for a table of 3 axes"));
+    assert!(refused(&two).contains("2 angles for a table with 3 axes"));
     let body = Path {
         first_dwell: 0.0,
         moves: Moves::Body {

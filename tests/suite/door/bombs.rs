@@ -116,7 +116,7 @@ fn ten_million_columns_are_refused_in_a_short_message() {
     fs::write(here.join("imu.csv"), "a,".repeat(500_000) + "\n").unwrap();
     refused(here, "init imu.csv", &["line 1:", "columns", "16384"]);
     fs::write(here.join("imu.csv"), "a".repeat(500_000) + ",b\n1,2\n").unwrap();
-    refused(here, "init imu.csv", &["line 1:", "a field of more"]);
+    refused(here, "init imu.csv", &["line 1:", "a field longer"]);
 }
 
 #[test]

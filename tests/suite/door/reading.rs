@@ -196,7 +196,7 @@ fn what_has_no_effect_yet_is_noted() {
         panic!("{:?}", run.recording.notes);
     };
     assert!(
-        note.contains("time_sigma") && note.contains("no effect yet"),
+        note.contains("time_sigma") && note.contains("no effect"),
         "{note}"
     );
 }

@@ -190,7 +190,7 @@ fn each_wrong_value_in_run_toml_has_its_message() {
             "[\"gx\", \"gy\"]",
             "imu.columns.gyro & three",
         ),
-        ("= 0.001", "= -0.001", "angle_random_walk & zero or"),
+        ("= 0.001", "= -0.001", "angle_random_walk & at least zero"),
         ("scale = 2000000.0", "", "[imu.prior.gyro] & scale & Add"),
         (
             "bias_sigma = 10.0",
@@ -212,7 +212,7 @@ fn each_wrong_value_in_run_toml_has_its_message() {
             "scale_sigma_ppm = 1000.0",
             "[imu.prior.gyro] & `scale` & count",
         ),
-        ("scale = 2000000.0", "scale = 0.0", "scale = 0.0 & no zeros"),
+        ("scale = 2000000.0", "scale = 0.0", "scale = 0.0 & non-zero"),
         (
             "[standstill]",
             "[imu.terms]\nlever_arm = { sigma = 0.1 }\n[standstill]",
@@ -320,7 +320,7 @@ fn each_wrong_row_or_column_has_its_message() {
             "imu.csv",
             "\n0.50,",
             "\n-3.5,",
-            "line 51 & going back from 0.49 s to -3.5 s",
+            "line 51 & steps back from 0.49 s to -3.5 s",
         ),
         (
             "table.csv",
@@ -334,19 +334,19 @@ fn each_wrong_row_or_column_has_its_message() {
             "\n0.4,0,1,",
             "line 7 & duplicate",
         ),
-        ("table.csv", "\n0.5,", "\n-1,", "line 7 & going back"),
+        ("table.csv", "\n0.5,", "\n-1,", "line 7 & steps back"),
         ("table.csv", "qw,", "q0,", "line 1 & named `qw`"),
         (
             "segments.csv",
             "0,1,",
             "1,1,",
-            "line 2 & end after the start",
+            "line 2 & end later than the start",
         ),
         (
             "segments.csv",
             "0,1,",
             "0,3,",
-            "line 2 & inside the IMU record",
+            "line 2 & within the IMU log",
         ),
         (
             "segments.csv",
@@ -391,7 +391,7 @@ fn each_wrong_file_has_its_message() {
         (
             "table.csv",
             "t,qw,qx,qy,qz\n0,1,0,0,0\n",
-            "single reading & at least 2",
+            "fewer than 2 readings & at least 2",
         ),
         ("run.toml", "", "no `format`"),
         ("run.toml", "format = \"turncal-run/1\"", "no [imu] & file"),
@@ -424,17 +424,17 @@ fn missing_damaged_and_foreign_files_have_their_message() {
     assert!(Run::read(&at("run.toml")).is_ok());
     for damaged in [&whole[..whole.len() / 2], &flipped] {
         fs::write(at("imu.csv.gz"), damaged).unwrap();
-        assert_says(&error(), "imu.csv.gz", "damaged or cut off");
+        assert_says(&error(), "imu.csv.gz", "damaged or truncated");
     }
 
     fs::write(at("imu.csv"), imu()).unwrap();
     fs::write(at("run.toml"), RUN.replace("\"gy\"", "\"gx\"")).unwrap();
-    assert_says(&error(), "imu.csv", "`gx` named for two & run.toml");
+    assert_says(&error(), "imu.csv", "`gx` used for two & run.toml");
 
     fs::write(at("run.toml"), RUN.replace("imu.csv", "imu.mat")).unwrap();
     assert_says(&error(), "imu.mat", "cannot open & relative to run.toml");
     fs::write(at("imu.mat"), b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR").unwrap();
-    assert_says(&error(), "imu.mat", "of another kind & rows of text");
+    assert_says(&error(), "imu.mat", "binary data & a text log");
     // What a file holds counts, not how it is called.
     fs::write(at("imu.mat"), imu()).unwrap();
     assert!(Run::read(&at("run.toml")).is_ok());
@@ -503,7 +503,7 @@ fn each_wrong_calibration_has_its_message() {
         (
             "\"covariance\":[[1,0],[0,2]]",
             "\"sigma\":{\"gyro\":TRIAD,\"accel\":TRIAD},\"covariance\":[[1,0],[0,2]]",
-            "-1 in sigma.gyro & zero or above",
+            "-1 in sigma.gyro & at least zero",
         ),
         (
             "\"gyro\":{\"scale\":[1,1,1]",

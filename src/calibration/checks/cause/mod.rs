@@ -1,8 +1,8 @@
-//! Causes of deviations of a record from its model: single events (a wrong position of the table, a turn that the
-//! gyros did not sense, a step of biases), and error terms.
+//! Causes of deviations of a recording from its model: single events (a wrong table position, a rotation that the gyros
+//! did not sense, a bias step) and error terms.
 //!
-//! They are searched before noise is estimated, which would grow to explain them. The effect of each on the estimate
-//! follows from its score and information, without another pass (Rao 1948, "Large sample tests of statistical
+//! They are searched before noise is estimated, because noise would grow to explain them. The effect of each on the
+//! estimate follows from its score and information, without another pass (Rao 1948, "Large sample tests of statistical
 //! hypotheses", Mathematical Proceedings of the Cambridge Philosophical Society 44(1)).
 
 mod score;
@@ -143,8 +143,8 @@ fn of_readings(innovations: &[Innovation]) -> Vec<FoundCause> {
     dwells.filter_map(of_dwell).collect()
 }
 
-/// All that may have happened once in the dwells that are tried, then all error terms that are off and that the record can
-/// hold, by their scores; and the number of causes if all dwells were tried.
+/// All possible single events in the tested dwells, then all disabled error terms that the recording can show, with
+/// their scores; and the number of causes if all dwells were tested.
 fn by_score(
     problem: &Problem,
     (priors, iterated): (&[AttitudePrior], &Iterated),
@@ -236,7 +236,7 @@ impl FoundCause {
         }
     }
 
-    /// A lasting cause (Earth rate) gets the chance level found while it is estimated; other causes are unchanged.
+    /// A permanent cause (Earth rate) gets the chance level found while it is estimated; other causes are unchanged.
     pub fn beside_what_it_leaves(self, left: &Causes) -> Self {
         match self.is_lasting() {
             true => self.beside(left.chance, self.limit),
@@ -294,7 +294,7 @@ impl FoundCause {
                 figures["term"] = json!(name);
                 let text = format!(
                     "The data show an error that scale factors, misalignments and biases cannot explain: {name}. turncal \
-                     estimated it with them, as --with {name} does. Apply the values together with this term"
+                     estimated it with them, as --with {name} does. Use the values only together with this term"
                 );
                 (Kind::ErrorTermEstimated, text)
             }
@@ -324,15 +324,15 @@ impl FoundCause {
                     String::new()
                 };
                 let text = format!(
-                    "The table's readings in dwell {number} are wrong{by} (at {time:.1} s). turncal left them out. Look \
-                     there for a bump or a wrong reading"
+                    "The table readings in dwell {number} are wrong{by} (at {time:.1} s). turncal excluded them. \
+                     Check the log there for a bump or a wrong reading"
                 );
                 (Kind::PositionWrong, text)
             }
             DisturbanceKind::Slip => {
                 let text = format!(
                     "In the move before dwell {number} (at {time:.1} s) the gyros missed a turn of {angle}. turncal \
-                     estimated it. Look there for lost samples, an exceeded range or a loose mount"
+                     estimated this angle. Check the log there for lost samples, an exceeded range or a loose mount"
                 );
                 (Kind::MoveWrong, text)
             }
@@ -340,7 +340,7 @@ impl FoundCause {
                 let value = self.value / DEG_PER_H;
                 let text = format!(
                     "The gyros sense an Earth rate that differs from the one at latitude_deg by {:+.4}, {:+.4}, {:+.4} °/h \
-                     (East, North, Up). turncal estimated it. Check latitude_deg, and the table's north and level",
+                     (East, North, Up). turncal estimated it. Check latitude_deg and the north and level of the table",
                     value.x, value.y, value.z
                 );
                 (Kind::EarthRateWrong, text)
@@ -352,8 +352,8 @@ impl FoundCause {
                 };
                 let text = format!(
                     "The {} bias stepped by {} {name} before dwell {number} (at {time:.1} s). turncal estimated the \
-                     step; the calibration has the mean of both biases. Look there for a shock, or a change of supply \
-                     or temperature",
+                     the step; the calibration contains the mean of both biases. Look for a shock or a change of \
+                     supply voltage or temperature at that time",
                     sensor.name(),
                     three_digits(self.value.norm() / unit),
                 );

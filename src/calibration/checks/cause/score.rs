@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use crate::calibration::checks::error_term_test::Evidence;
 use crate::calibration::{Constant, Disturbance, ErrorTerm, Prior, Reduction};
 
-/// A cause that explains a record better than its model.
+/// A cause that explains a recording better than its model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Cause {
     /// A single event.

@@ -108,8 +108,8 @@ pub fn is_longer(problem: &Problem, steps: usize) -> bool {
 pub fn finding(problem: &Problem, steps: usize) -> Option<Finding> {
     let seconds = problem.duration_of_steps(steps);
     let text = format!(
-        "The attitude settles for {seconds:.1} s after each stop. turncal skips that time after each move. Wait longer \
-         after each stop, or stiffen the mount."
+        "The attitude takes {seconds:.1} s to settle after each stop. turncal skipped that time after each move. \
+         Wait longer after each stop, or stiffen the mount."
     );
     (steps > 0).then(|| Finding::new(Kind::Settling, text, json!({ "skipped_s": seconds })))
 }

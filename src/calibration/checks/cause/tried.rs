@@ -1,22 +1,22 @@
-//! The dwells in which causes are looked for.
+//! The dwells in which causes are searched.
 
 use std::collections::BTreeSet;
 
 use crate::calibration::Innovation;
 
-/// Half as many dwells at most are tried because of their innovations, and as many evenly: every constant that is tried
-/// is a column of every row, so that a day of dwells would take its square in memory.
+/// At most this many dwells are tested: half selected by innovation, half evenly spaced. Every tested constant is a
+/// column of every row, so memory would grow with the square of the number of dwells.
 const HALF: usize = 20;
 
-/// The dwells in which causes are looked for: all, or in long records those of the largest innovations and, as a sample of
-/// chance, some evenly over the record.
+/// The dwells in which causes are searched: all, or in long recordings those with the largest innovations and, as a
+/// reference for chance, some evenly spaced ones.
 pub struct Tried {
     dwells: BTreeSet<usize>,
     evenly: BTreeSet<usize>,
 }
 
 impl Tried {
-    /// Of this many dwells, by the innovations of a pass.
+    /// Selects from this many dwells by the innovations of a pass.
     pub fn of(count: usize, innovations: &[Innovation]) -> Self {
         if count <= 2 * HALF {
             let all: BTreeSet<usize> = (0..count).collect();
@@ -36,19 +36,19 @@ impl Tried {
         }
     }
 
-    /// Whether causes are looked for in a dwell.
+    /// Whether causes are searched in a dwell.
     pub fn contains(&self, dwell: usize) -> bool {
         self.dwells.contains(&dwell)
     }
 
-    /// Whether it is one of those that show chance.
+    /// Whether it belongs to the reference for chance.
     pub fn evenly(&self, dwell: usize) -> bool {
         self.evenly.contains(&dwell)
     }
 }
 
-/// How large the innovations of a dwell are: the first, which shows the move before it, or their sum, which shows what
-/// lasts, each as χ².
+/// Size of the innovations of a dwell, as χ²: of the first, which shows the previous move, or of their sum, which shows
+/// lasting errors.
 fn size(of_dwell: &[Innovation]) -> f64 {
     let first = of_dwell.first().map_or(0.0, Innovation::distance);
     let sum = |axis: usize| of_dwell.iter().map(|of| of.whitened[axis]).sum::<f64>();

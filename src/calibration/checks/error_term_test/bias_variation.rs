@@ -13,7 +13,7 @@ use crate::calibration::{
 use crate::imu::{GaussMarkov, Noise, Sensor};
 use crate::run::Aiding;
 
-/// Least growth of σ that is reported.
+/// Smallest reported growth of σ.
 const SAID: f64 = 1.05;
 /// Values tried for σ of a varying bias, in 1σ of its logarithm around the usual value.
 const SIGMAS: [f64; 5] = [-2.0, -1.0, 0.0, 1.0, 2.0];
@@ -22,12 +22,12 @@ const SIGMAS: [f64; 5] = [-2.0, -1.0, 0.0, 1.0, 2.0];
 /// the stated noise is used, if the biases of both triads vary in the model already, or if a table is read, whose
 /// attitudes show bias variation.
 ///
-/// A short record hardly shows a slowly varying bias, and the likelihood that selected the noise prefers the simpler
+/// A short recording hardly shows a slowly varying bias, and the likelihood that selected the noise prefers the simpler
 /// model. If the data contradict the stated noise, its statement of constant biases is not reliable either. Constant
 /// and varying biases of a triad then have equal prior probabilities, with σ lognormal around the usual value, as for
 /// any stated figure. The mean square error of the estimate averages these models by their posterior probabilities
 /// (Hoeting, Madigan, Raftery, Volinsky 1999; see [`super::test_error_terms`]). Several values of σ are needed: with
-/// the usual one alone, σ of an accelerometer bias of a record by hand is half as large.
+/// only the usual one, σ of an accelerometer bias of a hand-turned recording is half as large.
 ///
 /// # Errors
 /// [`CalibrationError`] if the problem is not the one of the outcome.

@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 
 use crate::statistics::{chi_square_limit, ln_survival};
 
-/// If data remove a smaller share of a prior variance, it is only rounding.
+/// A smaller reduction of a prior variance is only rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// Improvement of the fit by some parameters, compared with chance.

@@ -28,11 +28,10 @@ pub struct ErrorTermTest {
     pub term: ErrorTerm,
     /// Whether it was on in the calibration; if not, it was tested with its usual σ.
     pub on: bool,
-    /// RMS σ of each of [`Group::all`] with the term over that without it; `None` if the group has
-    /// no σ.
+    /// RMS σ of each of [`Group::all`] with the term divided by that without it; `None` if the group has no σ.
     pub sigma_factors: [Option<f64>; 6],
     /// Decrease of the cost, −2 ln of likelihood and prior, with the term; for varying biases, which
-    /// are not constant, decrease of −2 ln of the likelihood of the whole record.
+    /// are not constant, decrease of −2 ln of the likelihood of the whole recording.
     pub gain: f64,
     /// Limit of the gain at this term's share of the false-alarm rate: χ² with as many degrees of freedom as the
     /// term has observed states; for varying biases, from the rule that a likelihood ratio exceeds 1/p with probability
@@ -41,7 +40,7 @@ pub struct ErrorTermTest {
     /// −2 ln of the p-value of the gain, by which terms with different numbers of states
     /// are compared.
     pub significance: f64,
-    /// Its role as an explanation of the record.
+    /// Its role as an explanation of the recording.
     pub role: Role,
     /// Cost per scalar observation, which is NIS, without it …
     pub without: f64,
@@ -57,15 +56,15 @@ pub struct ErrorTermTest {
 pub enum Role {
     /// None: it is on, or not observed, or another term explains the same.
     None,
-    /// The likeliest explanation of the record.
+    /// The most likely explanation of the recording.
     Likeliest,
-    /// An explanation that cannot be distinguished from the likeliest.
+    /// An explanation that cannot be distinguished from the most likely one.
     Alternative,
-    /// Still significant with the likeliest on.
+    /// Still significant with the most likely one on.
     Further,
 }
 
-/// Two explanations are distinguished if one is this many times likelier.
+/// Two explanations are distinguished if one is this many times more likely.
 const ODDS: f64 = 20.0;
 
 impl ErrorTermTest {
@@ -98,9 +97,9 @@ impl ErrorTermTest {
         self.gain > self.limit.max(1.0)
     }
 
-    /// Finding about the likeliest disabled error term that the data show, with the terms that cannot be
-    /// distinguished from it and those that remain significant with it on. `growth` is the factor by which
-    /// σ were widened because these terms are off; `None` if σ do not include it.
+    /// Finding about the most likely disabled error term, with the terms that cannot be distinguished from it and those
+    /// that remain significant with it on. `growth` is the factor by which σ were widened because these terms are off;
+    /// `None` if σ do not include it.
     pub fn most_significant(tests: &[Self], growth: Option<f64>) -> Option<Finding> {
         let likeliest = tests.iter().find(|test| test.role == Role::Likeliest)?;
         let names = |role: Role| -> Vec<&str> {
@@ -113,8 +112,8 @@ impl ErrorTermTest {
             "An unmodelled error is visible, best explained by {term} (χ² falls by {gain:.0}; limit {limit:.0})."
         );
         for (names, words) in [
-            (&alternatives, "This path cannot tell it from"),
-            (&further, "Also significant with it on"),
+            (&alternatives, "This path cannot separate it from"),
+            (&further, "With it on, also significant"),
         ] {
             if !names.is_empty() {
                 text += &format!(" {words}: {}.", names.join(", "));
@@ -132,7 +131,7 @@ impl ErrorTermTest {
     }
 }
 
-/// The effect of every error term that the runs of a problem can show, and the addition to the covariance of the
+/// The effect of every error term observable in the runs of a problem, and the addition to the covariance of the
 /// estimate for terms that are not estimated although the data support them.
 ///
 /// If the noise was estimated, terms are also tested with the stated noise, because a fit of noise alone treats
@@ -259,7 +258,7 @@ impl<'a> Tested<'a> {
         })
     }
 
-    /// Gives each test its role: the likeliest explanation first, then terms that are significant with it on, until
+    /// Gives each test its role: the most likely explanation first, then terms that are significant with it on, until
     /// none is.
     fn decide(&mut self, chance: f64) {
         let Self { tests, terms, .. } = self;

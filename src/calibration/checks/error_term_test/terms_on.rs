@@ -11,19 +11,19 @@ use crate::calibration::{
 /// 1σ of the change of each parameter by an error term that is not estimated; not part of any covariance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UnmodelledEffect {
-    /// If its own parameters have their usual σ around zero.
+    /// With the usual σ around zero.
     pub usual: ParameterVector,
-    /// RMS if the record's evidence of them is used as well.
+    /// RMS if the evidence in the recording is also used.
     pub shown: ParameterVector,
 }
 
-/// A term as an explanation of a record.
+/// A term as an explanation of a recording.
 pub struct Explanation {
     /// ln of the likelihood ratio of the model with this term and the others that are on to the model without any.
     pub ln_likelihood_ratio: f64,
     /// The same relative to the model with the others only.
     pub of_term: f64,
-    /// Mean square change of the parameters by all of them.
+    /// Mean square change of the parameters due to all of them.
     pub added: ParameterMatrix,
 }
 
@@ -52,7 +52,7 @@ pub fn seen_and_left_off(explanations: &[Explanation], tried: usize) -> Option<P
     Some(sum / weights)
 }
 
-/// Information of a calibrated record on every constant that it can show, for any choice of terms.
+/// Information of a calibrated recording on every observable constant, for any choice of terms.
 pub struct TermsOn<'a> {
     model: &'a Model,
     at: &'a Linearisation,
@@ -145,8 +145,7 @@ impl<'a> TermsOn<'a> {
         (!over_prior.is_empty()).then(|| Evidence::new(gain, &over_prior))
     }
 
-    /// A term of its usual size as an explanation with these others on; `None` if the data determine less of it than
-    /// they leave open.
+    /// A term of usual size as an explanation with these others on; `None` if the data determine less than half of it.
     pub fn explanation(&self, term: ErrorTerm, others: &[ErrorTerm]) -> Option<Explanation> {
         let alone = self.over_prior(term, &self.with(&[term]));
         if alone.is_empty() || alone.symmetric_eigenvalues().min() >= 0.5 {

@@ -3,7 +3,7 @@
 /// Severity of a finding, which determines the verdict.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
-    /// The values may not be used.
+    /// The values must not be used.
     Failed,
     /// The values may be used if the finding is taken into account.
     Care,
@@ -48,114 +48,119 @@ macro_rules! kinds {
 
 kinds! {
     Recording = "W01" "recording" Note:
-        "turncal repaired or assumed something when it read the log: gaps that were bridged, rows that were dropped, an \
-         uneven clock, a place or a noise figure that run.toml does not state. The σ include what it costs. If the text \
-         names a field, state it in run.toml; `turncal check` lists all faults of a log."
+        "turncal repaired or assumed something when it read the log: it bridged gaps, dropped rows, corrected an \
+         uneven clock, or assumed a location or noise figure that run.toml does not state. The σ include the effect. \
+         If the text names a field, state it in run.toml. `turncal check` lists all faults of a log."
     NotConverged = "W02" "not-converged" Failed:
-        "The iterations still moved a parameter when they ended, so neither values nor σ are those of the record. The \
-         usual causes are a wrong scale, unit, sample period or axis in run.toml, or a record with almost no motion. Run \
-         `turncal check` on the run: it compares scale, unit and axes with gravity and the turns."
+        "A parameter was still changing when the iterations ended, so neither the values nor σ can be used. The \
+         usual causes are a wrong scale, unit, sample period or axis in run.toml, or a recording with almost no \
+         motion. Run `turncal check`, which compares scale, unit and axes with gravity and the turns."
     Unexplained = "W03" "unexplained" Failed:
-        "The residuals are so large that no noise figure explains them, so the values belong to no instrument. The usual \
-         causes are labels or table attitudes of another record, axes in another order, a wrong unit, or a slip of the \
-         mount. The finding names the interval where the residuals are largest; look there first."
+        "The residuals are too large for any noise figure, so the values are meaningless. The usual causes are \
+         labels or table attitudes from a different recording, a wrong axis order, a wrong unit, or a mount that \
+         slipped. The finding names the interval with the largest residuals; look there first."
     NotObserved = "W04" "not-observed" Care:
-        "The record tells less than half of what was known before about these parameters: their values are mostly those of \
-         [imu.prior]. Add positions that put each axis up and down, and a turn of 90° or more about each axis. \
-         `turncal check` predicts the σ of each parameter for the record."
+        "The recording adds little information about these parameters: σ is still more than half of the prior, so \
+         the values come mostly from [imu.prior]. Add positions that put each axis up and down, and a turn of 90° or more about each axis. \
+         `turncal check` predicts the σ of each parameter."
     CombinationsNotObserved = "W05" "combinations-not-observed" Care:
-        "Each of these parameters alone is determined, but a combination of them is not: their errors compensate in every \
-         position of this path. Add positions or turns in which they have different effects. The correlation figure of \
-         the report shows which parameters depend on each other."
+        "Each of these parameters is determined on its own, but a combination of them is not, because their errors \
+         cancel in every position of this path. Add positions or turns in which they have different effects. The \
+         correlation figure in the report shows which parameters depend on each other."
     HeadingNotObserved = "W06" "heading-not-observed" Note:
-        "The gyros do not sense Earth rate well enough to find north. K, E and D do not need the heading; only the Earth \
-         rate in the gyro biases is estimated with less accuracy. If you need the heading, use a table, or gyros with a \
-         noise below 0.1 °/√h and dwells of a minute."
+        "The gyros do not sense Earth rate well enough to find north. K, E and D do not need the heading, but the \
+         gyro biases are less accurate because Earth rate is less certain. If you need the heading, use a table, or \
+         gyros with noise below 0.1 °/√h and dwells of one minute."
     NoiseLearnt = "W07" "noise-learnt" Care:
         "The residuals contradict the noise in [imu.noise] by a likelihood-ratio test with a false-alarm rate of 1 in \
-         1000. turncal estimated the noise from the record and used it for weights and σ. For a sensor turned by hand \
-         this is usual: motion adds noise that a data sheet does not state. To keep the estimate, paste noise.run_toml of \
+         1000. turncal estimated the noise from the record and used it for weights and σ. This is normal for a sensor turned by hand, because motion adds noise that a data sheet does not state. To keep the estimate, paste noise.run_toml of \
          calibration.json into [imu.noise]; to use the stated noise anyway, add --noise stated."
     ScatterAtRest = "W08" "scatter-at-rest" Care:
-        "In dwells, samples scatter more or less than the stated white noise implies. The figure is measured over 0.1 s, so \
-         vibration of the mount adds to it. Record an hour at rest and run `turncal allan` to separate noise and \
-         vibration, then state the result in [imu.noise]."
+        "In dwells, the samples scatter more or less than the stated white noise implies. The estimate uses 0.1 s \
+         averages, so mount vibration adds to it. Record an hour at rest, run `turncal allan` to separate noise from \
+         vibration, and state the result in [imu.noise]."
     BiasesMayVary = "W09" "biases-may-vary" Note:
-        "A short record cannot show how the biases wander. turncal assumed the variation that is usual for this class of \
-         sensor and widened σ by it. Record several hours at rest, run `turncal allan`, and state the bias instability \
+        "A short recording cannot show bias drift. turncal assumed the drift that is typical for this class of \
+         sensor and widened σ to include it. Record several hours at rest, run `turncal allan`, and state the bias instability \
          and its correlation time in [imu.noise]."
     Inconsistent = "W10" "inconsistent" Care:
-        "The normalised innovation squared (NIS) is outside its 99.9 % interval: the residuals are larger or smaller than \
-         noise and model predict. Larger only after moves: table position, a scale factor or a time offset. Larger in \
-         dwells: bias drift, often by temperature (--temperature). Everywhere: the white noise in [imu.noise]."
+        "The normalised innovation squared (NIS) is outside its 99.9 % interval: the residuals are larger or smaller \
+         than predicted. If they are larger only after moves, suspect the table position, a scale factor or a time \
+         offset; if in dwells, bias drift, often due to temperature (--temperature); if everywhere, the white noise \
+         in [imu.noise]."
     ErrorTermSignificant = "W11" "error-term-significant" Care:
-        "An error that K, E and D cannot describe is visible, and an error term that is off explains it best. Until the \
-         term is estimated, σ are widened by what it may do to the parameters. Rerun with --with and the term."
+        "The data show an error that K, E and D cannot describe, and the named error term explains it best. Until \
+         you estimate that term, σ include its possible effect on the parameters. Rerun with --with and the term."
     ErrorTermEstimated = "W12" "error-term-estimated" Care:
-        "The record shows an error term beyond chance, so turncal estimated it together with K, E and D. The values are \
-         right only together with this term: `turncal apply` removes it, while export formats without terms leave it in \
-         and say so. To leave it out, list the terms you want: --with none."
+        "The recording shows a significant error term, so turncal estimated it together with K, E and D. The values \
+         are valid only together with this term: `turncal apply` removes it, while export formats without error \
+         terms leave it in and report this. To switch it off, list the terms you want, or use --with none."
     DwellsScatter = "W13" "dwells-scatter" Care:
-        "The dwells disagree with each other more than their σ allow, which no estimated noise or term explains. turncal \
-         widened σ by the observed scatter. Look at the effects of error terms in the report; one of them may explain it."
+        "The dwells disagree by more than their σ allow, and neither the estimated noise nor the estimated terms \
+         explain it. turncal widened σ by the observed scatter. Check the error terms in the report; one of them may \
+         explain it."
     Outliers = "W14" "outliers" Note:
-        "Single observations were outside their gate and left out. A few in ten thousand are chance; several in one dwell \
-         point to a bump or to motion in the dwell. Look at the residuals of that dwell in the report."
+        "Some observations were outside their gate and were rejected. A few in ten thousand occur by chance; several \
+         in one dwell indicate a bump or motion. Look at the residuals of that dwell in the report."
     Settling = "W15" "settling" Note:
-        "After each stop the attitude or the sensors need some time to settle. turncal leaves that time out of every \
-         dwell. Wait longer after each stop, or stiffen the mount, if dwells become too short."
+        "After each stop the attitude or the sensors take some time to settle. turncal excludes that time from every \
+         dwell. If dwells become too short, wait longer after each stop or stiffen the mount."
     PositionWrong = "W16" "position-wrong" Care:
-        "The table's attitude in one dwell contradicts gyros and accelerometers. turncal left out its readings there and \
-         used the rest. Look in the table's log for a missed step, a wrong label or a bump at that time."
+        "The table attitude in one dwell contradicts the gyros and accelerometers. turncal excluded the table \
+         readings of that dwell and used the rest. Check the table log for a missed step, a wrong label or a bump at \
+         that time."
     MoveWrong = "W17" "move-wrong" Care:
-        "In one move the gyros integrate to another angle than the attitudes before and after it show. turncal estimated \
-         the difference. Look there for lost samples, a rate beyond the range of the gyros, or a mount that slipped."
+        "In one move the integrated gyro angle differs from the change of attitude. turncal estimated the \
+         difference. Check that move for lost samples, a rate beyond the gyro range, or a mount that slipped."
     BiasStep = "W18" "bias-step" Care:
-        "A bias changed between two dwells and stayed changed. turncal estimated the step; the calibration holds the mean \
-         of the bias before and after it. Look there for a shock or a change of supply or temperature, and repeat the \
-         record if the bias matters."
+        "A bias changed permanently between two dwells. turncal estimated the step; the calibration contains the \
+         mean of the bias before and after it. Look for a shock or a change of supply voltage or temperature at that \
+         time, and repeat the recording if the bias matters."
     EarthRateWrong = "W19" "earth-rate-wrong" Care:
-        "The gyros sense another Earth rate than the one at the stated latitude, through all attitudes. turncal estimated \
-         the difference. Check latitude_deg (its sign first), and north and level of the table."
+        "In all attitudes, the gyros sense an Earth rate that does not match the stated latitude. turncal estimated \
+         the difference. Check latitude_deg (first its sign) and the north and level of the table."
     FarFromPrior = "W20" "far-from-prior" Care:
-        "Parameters are many σ of [imu.prior] away from the prior. Either run.toml states a wrong unit, scale, sign or axis \
-         order, or the prior σ are too small for this instrument. The finding lists likely causes."
+        "Some parameters are many prior σ away from [imu.prior]. Either run.toml contains a wrong unit, scale, sign \
+         or axis order, or the prior σ are too small for this instrument. The finding lists likely causes."
     FormRejected = "W21" "form-rejected" Care:
-        "The chosen installation form has fewer angles than the record shows. Values in this form are wrong by more than \
+        "The data need more angles than the chosen installation form has. Values in this form are wrong by more than \
          their σ. Rerun with --installation general."
     Rounded = "W22" "rounded" Care:
         "The log rounds values more coarsely than their noise, so averaging cannot recover the mean within a step. σ \
-         include it. Log more digits, or raw counts."
+         include this error. Log more digits or raw counts."
     ChangesInTime = "W23" "changes-in-time" Care:
-        "The residuals show a parameter that drifts during the record. The calibration holds its mean. Let the instrument \
+        "The residuals show a parameter that drifts during the recording. The calibration contains its mean. Let the \
+         instrument \
          warm up, keep its temperature constant, or use --temperature if the log has a temperature column."
     EvenTermsInseparable = "W24" "even-terms-inseparable" Care:
-        "With an axis up or down, an accelerometer's second-order term and its asymmetry have the same effect. Add dwells with \
-         axes at about 45°, or leave one of the two terms off."
+        "When an axis points up or down, the second-order term and the asymmetry of its accelerometer have the same \
+         effect. Add dwells with axes at about 45°, or switch off one of the two terms."
     TemperatureNotSeen = "W25" "temperature-not-seen" Care:
-        "The record does not show how these parameters change with temperature, so they are valid only at the recorded \
-         temperatures. Record positions and turns at several temperatures."
+        "The recording does not show how these parameters change with temperature, so they are valid only at the \
+         recorded temperatures. Record positions and turns at several temperatures."
     RecordingsDiffer = "W26" "recordings-differ" Care:
-        "Recordings of one instrument differ more than their σ and [day_to_day] allow. turncal estimated the difference and \
-         included it in σ. Usual causes are the change of bias at switch-on, remounting, and a temperature sensor away \
+        "The recordings of this instrument differ by more than their σ and [day_to_day] allow. turncal estimated the \
+         difference and \
+         included it in σ. Usual causes are bias changes at switch-on, remounting, and a temperature sensor away \
          from the inertial sensors."
     LabelsContradicted = "W27" "labels-contradicted" Care:
-        "Labels of sections contradict gravity or the gyros. The finding says which, and whether the section was used. \
-         Correct the label in the file of [segments]."
+        "The labels of some sections contradict gravity or the gyros. The finding names them and says whether \
+         turncal used the section. Correct the labels in the [segments] file."
     SectionsLost = "W28" "sections-lost" Care:
-        "A labelled section was skipped: too many rows are missing. Record it again, or remove it from [segments]."
+        "A labelled section was skipped because too many rows are missing. Record it again, or remove it from \
+         [segments]."
     ResidualsLarge = "W29" "residuals-large" Care:
-        "The closed form leaves larger residuals than stated noise and table errors explain. turncal widened σ by as much. \
-         The finding names the interval with the largest residual: look there for a bump, a wrong label or attitude; else \
-         check the noise figures, and level and north of the table."
+        "The closed form leaves residuals that stated noise and table errors do not explain. turncal widened σ to \
+         match. The finding names the interval with the largest residual: look there for a bump, a wrong label or a \
+         wrong attitude. Otherwise check the noise figures and the level and north of the table."
     StatementDoubted = "W30" "statement-doubted" Care:
-        "A statement of run.toml hardly fits the log: gravity far from normal gravity at the place, a column that never \
-         changes or is there twice, a table log of another time or clock. Each of them changes the result by more than its \
-         σ. Correct the field or the log that the finding names."
+        "Some data in run.toml contradict the log: for example, gravity far from normal gravity at the site, a \
+         constant or duplicate column, or a table log from a different time or clock. Each of these can change the \
+         result by more than its σ. Correct the field or log that the finding names."
     PriorContradicted = "W31" "prior-contradicted" Failed:
-        "A scale factor is so far from the stated one that no careless prior explains it: by more than 10 σ of the prior and \
-         more than 10 %, or by more than 41 %. The estimate may be of another turn or another unit. Correct scale, unit or \
-         sample_period_s in [imu], or widen scale_sigma_ppm if the sensor really is so far off."
+        "A scale factor differs from the stated one by more than 10 prior σ and more than 10 %, or by more than 41 \
+         %. The estimate may result from a wrong turn angle or unit. Correct scale, unit or sample_period_s in \
+         [imu], or widen scale_sigma_ppm if the sensor really differs that much."
 }
 
 impl Kind {

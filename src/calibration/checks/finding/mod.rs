@@ -1,4 +1,4 @@
-//! Findings: facts that a calibration engineer must know before using the figures.
+//! Findings: facts that a calibration engineer must know before using the results.
 
 pub mod kind;
 pub mod verdict;
@@ -37,13 +37,13 @@ impl Finding {
         }
     }
 
-    /// A fault that the reader of the files repaired, or a statement without effect.
+    /// A fault repaired by the file reader, or a statement without effect.
     pub fn of_recording(note: String) -> Self {
         let figures = serde_json::json!({ "note": note });
         Self::new(Kind::Recording, note, figures)
     }
 
-    /// A statement that hardly fits the record.
+    /// A statement that contradicts the recording.
     pub fn of_statement(doubt: String) -> Self {
         let figures = serde_json::json!({ "doubt": doubt });
         Self::new(Kind::StatementDoubted, doubt, figures)

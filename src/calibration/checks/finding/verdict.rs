@@ -13,10 +13,10 @@ pub enum Word {
     /// It converged, its σ agree with its residuals, and all requested parameters are determined.
     #[serde(rename = "good")]
     Good,
-    /// As good, with the restrictions that its reasons state.
+    /// Usable, with the restrictions stated in its reasons.
     #[serde(rename = "use with care")]
     UseWithCare,
-    /// Its values may not be used.
+    /// Its values must not be used.
     #[serde(rename = "failed")]
     Failed,
     /// Every limit of a specification is met.

@@ -48,7 +48,7 @@ pub fn temperature_not_seen(parameters: Vec<String>) -> Option<Finding> {
 /// The finding on unobserved combinations of parameters that are observed individually, if any.
 fn combinations(combinations: Vec<String>) -> Option<Finding> {
     let text = format!(
-        "Not determined by this path, though each parameter alone was: {}. Add positions or turns that separate \
+        "Not determined by this path, although each parameter alone is: {}. Add positions or turns that separate \
          them.",
         combinations.join("; ")
     );
@@ -61,8 +61,8 @@ fn combinations(combinations: Vec<String>) -> Option<Finding> {
 fn heading(sigma_rad: f64) -> Finding {
     let text = format!(
         "Heading could not be determined (σ = {:.1}°): the gyros are too noisy to sense Earth rate, or their biases \
-         mask it. The other parameters were still estimated. If you need the heading, read a table or stand for \
-         longer.",
+         mask it. The other parameters were still estimated. If you need the heading, log a turntable or make the \
+         dwells longer.",
         sigma_rad / DEGREE
     );
     let figures = json!({ "sigma_rad": sigma_rad });
@@ -71,8 +71,8 @@ fn heading(sigma_rad: f64) -> Finding {
 
 /// The finding that second order and asymmetry of the accelerometers cannot be distinguished.
 fn even_terms() -> Finding {
-    let text = "Second order and asymmetry of the accelerometers have the same effect in dwells with an axis up or \
-                down. Add dwells between them, such as at 45°, or leave one of the two terms off.";
+    let text = "The second-order and asymmetry terms of the accelerometers have the same effect in dwells with an \
+        axis up or down. Add dwells at about 45°, or switch off one of the two terms.";
     Finding::new(Kind::EvenTermsInseparable, text.to_owned(), json!(null))
 }
 

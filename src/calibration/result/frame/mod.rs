@@ -1,11 +1,10 @@
 //! Conversion of calibrations to the general form, one body frame and one nominal scale, so that they can
 //! be subtracted.
 //!
-//! The same instrument has another `C` in every body frame: `K C u = K (C Rᵀ)(R u)`. In the
-//! accelerometer frame (`x` along accelerometer x, `y` in the plane of accelerometers x and y) `R`
-//! is the orthogonal factor of the LQ decomposition of the accelerometers' `K C` (Golub, Van Loan,
-//! *Matrix Computations*, 4th ed., §5.2). Row norms of `K C`, so the general form's scale factors,
-//! and biases are the same in every frame.
+//! The same instrument has a different `C` in every body frame: `K C u = K (C Rᵀ)(R u)`. In the accelerometer frame
+//! (`x` along accelerometer x, `y` in the plane of accelerometers x and y) `R` is the orthogonal factor of the LQ
+//! decomposition of the accelerometers' `K C` (Golub, Van Loan, *Matrix Computations*, 4th ed., §5.2). Row norms of `K
+//! C`, so the general form's scale factors, and biases are the same in every frame.
 
 use std::collections::BTreeMap;
 
@@ -40,8 +39,8 @@ pub struct Canonical {
 }
 
 impl Canonical {
-    /// Brings a record to a body frame and to nominal scales. A frame on the table cannot be had from
-    /// a record in the accelerometer frame: there the table was not seen.
+    /// Converts a record to a body frame and nominal scales. A record in the accelerometer frame cannot be converted to
+    /// the table frame, because the table was not observed.
     pub(crate) fn new(
         name: &str,
         record: &Calibration,
@@ -107,7 +106,7 @@ impl Estimate {
         }
     }
 
-    /// Derivatives of the parameters in the general form, in a body frame, by these.
+    /// Derivatives of the parameters in the general form, in a body frame, with respect to these.
     pub fn to_general_form(&self, body_frame: BodyFrame) -> ParameterMatrix {
         if (self.form(), body_frame) == (InstallationForm::General, BodyFrame::Table) {
             return ParameterMatrix::identity();
@@ -119,8 +118,8 @@ impl Estimate {
     }
 }
 
-/// The same triads, given on any body axes, on those of a body frame; as they are on the table's,
-/// which they do not tell.
+/// The same triads, given in any body axes, converted to those of a body frame; unchanged for the table frame, which
+/// they do not determine.
 pub fn in_body_frame(triads: &PerSensor<Triad>, body_frame: BodyFrame) -> PerSensor<Triad> {
     if body_frame == BodyFrame::Table {
         return *triads;

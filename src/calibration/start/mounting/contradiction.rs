@@ -1,22 +1,22 @@
-//! What `run.toml` states and the record contradicts, in words.
+//! Messages about statements in `run.toml` that the recording contradicts.
 
 use std::fmt;
 
 use super::sensitivity::Sensitivity;
 use super::statement::Mounting;
 
-/// What `run.toml` states and the record contradicts.
+/// A statement in `run.toml` that the recording contradicts.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Contradiction {
     /// Axes that are swapped, reversed or left-handed.
     Axes(Mounting),
-    /// A triad that is this many times as sensitive as stated.
+    /// A triad with a sensitivity different from the stated one.
     Sensitivity(Sensitivity),
-    /// Quaternions of the table in another order, or of the inverse, in words.
+    /// Table quaternions in a different order or inverted, in words.
     Quaternions(String),
-    /// Motion that nothing explains that is tried.
+    /// Motion that no hypothesis explains.
     Unexplained,
-    /// Columns of gyros named for accelerometers, and the other way round.
+    /// Gyro and accelerometer columns swapped.
     Exchanged,
 }
 
@@ -27,13 +27,13 @@ impl fmt::Display for Contradiction {
             Self::Sensitivity(sensitivity) => sensitivity.fmt(f),
             Self::Quaternions(said) => f.write_str(said),
             Self::Unexplained => f.write_str(
-                "gyros, accelerometers and what run.toml states of the motion do not fit together, nor with other axes \
-                 or sensitivities. turncal check shows the turns: look for logs of two runs or clocks, rows that are \
-                 lost, labels of other sections, a dead axis",
+                "the gyros, the accelerometers and the motion stated in run.toml contradict each other, and no other \
+                 axis order or sensitivity resolves this. Look at the turns in turncal check for logs of different \
+                 runs or clocks, lost rows, wrong labels or a dead axis",
             ),
             Self::Exchanged => f.write_str(
-                "the columns of gyros and accelerometers are exchanged: gravity is in the columns that run.toml names \
-                 for the gyros. Exchange gyro and accel in columns of [imu], with their units and [imu.prior]",
+                "the gyro and accelerometer columns are swapped: gravity appears in the columns that run.toml names \
+                 for the gyros. Swap gyro and accel in columns of [imu], with their units and [imu.prior]",
             ),
         }
     }

@@ -1,7 +1,7 @@
-//! How likely a record's motion makes each order of a triad's axes.
+//! Likelihood of each axis order of a triad, given the motion of a recording.
 //!
-//! All is written along the axes of the columns as they stand: an order turns what is known, not what was
-//! measured. So errors of the triads mean the same under each.
+//! All vectors are in the axes of the columns: an order rotates the known quantities, not the measurements, so the
+//! errors of the triads have the same meaning for each.
 
 use nalgebra::{Matrix3, Vector1, Vector3};
 
@@ -11,8 +11,8 @@ use crate::calibration::parameters::{ParameterVector, parameter};
 use crate::calibration::start::equations::{Equations, OfTriad, Rows, of, of_sensitivity};
 use crate::imu::{AxisOrder, PerSensor, Sensor};
 
-/// Factors by which noise and prior may each be stated too small, all equally likely: then neither a careless prior nor
-/// motion that is no white noise counts for another mounting.
+/// Factors by which stated noise and prior may be too small, all equally likely, so that neither an inaccurate prior
+/// nor non-white motion favours another axis order.
 #[derive(Debug, Clone, Copy)]
 pub struct TooSmall {
     pub noise: &'static [f64],
@@ -35,14 +35,14 @@ impl TooSmall {
     };
 }
 
-/// 1σ of what the triads may be off by, and how much too small it may be.
+/// 1σ of the triad errors, and the factors by which it may be too small.
 #[derive(Debug, Clone)]
 pub struct Errors {
     pub sigma: ParameterVector,
     pub too_small: TooSmall,
 }
 
-/// Logarithm of the likelihood of each order, and of none of them.
+/// Logarithm of the likelihood of each order, and of no order.
 #[derive(Debug, Clone)]
 pub struct Likelihoods {
     pub of: Vec<f64>,
@@ -50,7 +50,7 @@ pub struct Likelihoods {
 }
 
 impl Likelihoods {
-    /// Of the residuals of these rows, the errors of the triads being integrated out with this prior.
+    /// Likelihood of the residuals of these rows, with the errors of the triads integrated out with this prior.
     fn new(
         errors: &Errors,
         orders: &[AxisOrder],
@@ -74,7 +74,7 @@ impl Likelihoods {
     }
 }
 
-/// The table holds gravity and turns: each triad by itself against it.
+/// With a table, which gives gravity and turns: each triad is tested separately.
 pub fn by_table(
     motion: &Motion,
     errors: &Errors,
@@ -96,7 +96,7 @@ pub fn by_table(
     })
 }
 
-/// Labels state which axis is up and about which it turns: each triad by itself against them.
+/// With labels, which state the upward axis and the turn axis: each triad is tested separately.
 pub fn by_labels(motion: &Motion, errors: &Errors, orders: &[AxisOrder]) -> PerSensor<Likelihoods> {
     PerSensor::from_fn(|sensor| {
         Likelihoods::new(errors, orders, |equations, order| {
@@ -109,9 +109,9 @@ pub fn by_labels(motion: &Motion, errors: &Errors, orders: &[AxisOrder]) -> PerS
     })
 }
 
-/// Gravity's direction turns against the body as the gyros turn it, and Earth turns upward as the latitude
-/// has it: one triad against the other. By the accelerometers' order as the gyros' axes see it, with the gyros
-/// as they are and with all of them reversed.
+/// Without both: the gravity direction rotates as sensed by the gyros, and the vertical Earth rate is that of the
+/// latitude, so one triad is tested against the other. The result is by the accelerometer order in gyro axes, with the
+/// gyros unchanged and with all of them reversed.
 pub fn by_gravity(motion: &Motion, errors: &Errors, orders: &[AxisOrder]) -> [Likelihoods; 2] {
     [0, 1].map(|reversed| {
         Likelihoods::new(errors, orders, |equations, order| {
@@ -135,7 +135,7 @@ pub fn by_gravity(motion: &Motion, errors: &Errors, orders: &[AxisOrder]) -> [Li
     })
 }
 
-/// `found = (I + δA) u + δD` with what is known as `u`.
+/// `found = (I + δA) u + δD` with the known quantity `u`.
 fn add_sensed(
     equations: &mut Equations,
     sensor: Sensor,
@@ -155,7 +155,7 @@ fn add_sensed(
     ));
 }
 
-/// A turn by the gyros against one that is known.
+/// A turn measured by the gyros against a known one.
 fn add_turn(equations: &mut Equations, turn: &Move, order: &AxisOrder) {
     let Some(known) = turn.known else {
         return;
@@ -192,8 +192,8 @@ fn add_carried(
     equations.add(&Rows::new(partials, carried - matrix * up_before, variance));
 }
 
-/// The rate about up at rest. Up is tilted by what the prior allows the accelerometers, and by as much of the level part
-/// of Earth rate the rate is off.
+/// The rate about Up at rest. Its error includes the horizontal Earth rate times the tilt of Up that the accelerometer
+/// prior allows.
 fn add_earth_rate(
     equations: &mut Equations,
     upward: f64,
@@ -215,7 +215,7 @@ fn add_earth_rate(
     equations.add(&Rows::new(partials, residual, variance));
 }
 
-/// Logarithm of the likelihood of the residuals, the unknowns being integrated out.
+/// Logarithm of the likelihood of the residuals, with the unknowns integrated out.
 fn log_likelihood(equations: &Equations, too_small: TooSmall) -> f64 {
     let (design, residual) = equations.in_sigmas();
     let (information, vector) = (design.tr_mul(&design), design.tr_mul(&residual));
@@ -249,7 +249,7 @@ fn log_likelihood(equations: &Equations, too_small: TooSmall) -> f64 {
     largest + (sum / logarithms.len() as f64).ln()
 }
 
-/// The same if nothing of what is measured is as it should be: residuals of its own size.
+/// The same if no measurement is as expected: residuals of the size of the measurements.
 fn log_likelihood_of_none(equations: &Equations) -> f64 {
     let deviance = equations.weighted().map(|(residual, variance)| {
         let any = 1.0 + variance;

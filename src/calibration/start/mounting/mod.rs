@@ -1,11 +1,10 @@
-//! Axes that are swapped, reversed or left-handed, in either triad or between instrument and table: found
-//! before the first pass, and named with the line of `run.toml` that puts them right.
+//! Axes that are swapped, reversed or left-handed, in either triad or between instrument and table: found before the
+//! first pass and reported with the corrected line for `run.toml`.
 //!
-//! Each of the 48 signed permutations of each triad is a hypothesis, and the marginal likelihood of what
-//! the record shows is its weight: prior errors of the triads are integrated out, and so are factors by
-//! which prior and noise may be stated too small. So nothing is decided by a residual's size, only by one
-//! mounting being likelier than another. A likelihood ratio of X in favour of a wrong hypothesis comes up
-//! at most once in X records.
+//! Each of the 48 signed permutations of each triad is a hypothesis, weighted by its marginal likelihood: the prior
+//! errors of the triads are integrated out, as are factors by which prior and noise may be stated too small. The
+//! decision thus depends only on likelihood ratios, not on the size of residuals. A likelihood ratio of X in favour of
+//! a wrong hypothesis occurs at most once in X recordings.
 
 mod contradiction;
 mod likelihood;
@@ -26,15 +25,15 @@ pub use sensitivity::Sensitivity;
 pub use statement::Mounting;
 use statement::{line, prior_differs};
 
-/// Part of correct records for which another mounting is found.
+/// False-alarm rate: fraction of correct recordings for which a different axis order is found.
 const FALSE_ALARMS: f64 = 1e-6;
-/// Mountings that are this many times less likely than the likeliest are no longer considered.
+/// Axis orders that are this many times less likely than the best are not considered.
 const TOLD_APART: f64 = 1e3;
-/// Largest number of others that are named.
+/// Maximum number of alternatives that are reported.
 const OTHERS: usize = 2;
 
 impl Mounting {
-    /// The likeliest one, if it is not the one that is stated.
+    /// The most likely one, if it differs from the stated one.
     fn likeliest(problem: &Problem, run: &Run, motion: &Motion) -> Option<Self> {
         let hypotheses = Hypotheses::of(problem, run, motion);
         let (likely, log_ratio) = hypotheses.likely()?;
@@ -58,20 +57,20 @@ impl Mounting {
     }
 }
 
-/// What the motion is known from.
+/// Source of the known motion.
 fn known_from(problem: &Problem, motion: &Motion) -> &'static str {
     match problem.model.aiding {
-        Aiding::Table => "the table's attitudes",
+        Aiding::Table => "the table attitudes",
         Aiding::Velocity if motion.labels.is_empty() => {
-            "gravity's direction before and after moves, and Earth rate"
+            "the gravity direction before and after moves and Earth rate"
         }
-        Aiding::Velocity => "labels, and gravity's direction before and after moves",
+        Aiding::Velocity => "the labels and the gravity direction before and after moves",
     }
 }
 
-/// 1σ of the errors of both triads, alike on all axes. Where several orders are tried, whether a value of the prior goes
-/// with the column or with the place where it is put is not known, so differences between axes and biases that a reversed
-/// column may not have count as errors. Biases are over gravity and Earth rate.
+/// 1σ of the errors of both triads, equal for all axes. It is unknown whether a prior value belongs to the column or to
+/// the axis, so differences between axes, and biases that a reversed column may not have, count as errors. Biases are
+/// divided by gravity or Earth rate.
 fn prior_sigma(run: &Run, is_order_known: bool) -> ParameterVector {
     let mut sigma = ParameterVector::zeros();
     let unknown = f64::from(u8::from(!is_order_known));
@@ -95,22 +94,22 @@ fn prior_sigma(run: &Run, is_order_known: bool) -> ParameterVector {
     sigma
 }
 
-/// How likely each mounting is.
+/// Likelihood of each axis order.
 struct Hypotheses {
-    /// Of each triad by itself, against what is known of body axes.
+    /// Of each triad separately, relative to known body axes.
     each: PerSensor<Likelihoods>,
-    /// Of one triad against the other, as they are and with the gyros reversed.
+    /// Of one triad relative to the other, unchanged and with the gyros reversed.
     together: Option<[Likelihoods; 2]>,
 }
 
 impl Hypotheses {
-    /// All mountings of one run of a problem.
+    /// All axis orders of one run of a problem.
     fn of(problem: &Problem, run: &Run, motion: &Motion) -> Self {
         let orders: Vec<AxisOrder> = AxisOrder::all().collect();
         Self::among(problem, run, motion, &orders, TooSmall::ANY)
     }
 
-    /// The mountings of some orders.
+    /// The result for these orders.
     fn among(
         problem: &Problem,
         run: &Run,
@@ -137,8 +136,8 @@ impl Hypotheses {
         Self { each, together }
     }
 
-    /// The mountings that are hardly less likely than the likeliest, the simplest first, if what is stated is not likely
-    /// enough against it; and the logarithm of that ratio.
+    /// The axis orders hardly less likely than the best, the simplest first, if the stated one is too unlikely; and the
+    /// logarithm of that ratio.
     fn likely(&self) -> Option<(Vec<PerSensor<AxisOrder>>, f64)> {
         let pairs = AxisOrder::all()
             .flat_map(|accel| AxisOrder::all().map(move |gyro| PerSensor { gyro, accel }));
@@ -175,7 +174,7 @@ impl Hypotheses {
         Some((likely, log_ratio))
     }
 
-    /// The likelihood of a pair of orders by each thing that motion is known from.
+    /// The likelihood of a pair of orders for each source of known motion.
     fn parts(&self, pair: &PerSensor<AxisOrder>) -> Vec<Part> {
         let each = Sensor::ALL.map(|sensor| {
             Part::of(
@@ -193,17 +192,17 @@ impl Hypotheses {
     }
 }
 
-/// Logarithms of the likelihoods by one thing that motion is known from.
+/// Logarithms of the likelihoods for one source of known motion.
 struct Part {
     of: f64,
-    /// Of nothing being explained.
+    /// For no explanation.
     none: f64,
-    /// The largest there is.
+    /// The largest likelihood.
     largest: f64,
 }
 
 impl Part {
-    /// Of an order by one of some likelihoods.
+    /// Likelihood of an order.
     fn of(all: &[Likelihoods], which: usize, order: &AxisOrder) -> Self {
         let place = AxisOrder::all().position(|other| other == *order);
         let largest =
@@ -216,8 +215,8 @@ impl Part {
     }
 }
 
-/// Each order of the gyros' axes with the logarithm of its likelihood by the motion that a run, with the dwells of a problem,
-/// makes, and that of nothing being explained; the accelerometers' axes are as stated.
+/// Each gyro axis order with the logarithm of its likelihood given the motion of a run with the dwells of a problem,
+/// and that of no explanation; the accelerometer axes are as stated.
 pub fn orders_of_gyros(problem: &Problem, run: &Run) -> Vec<(AxisOrder, f64, f64)> {
     let hypotheses = Hypotheses::of(problem, run, &Motion::of(problem, 0, run));
     let weighed = |gyro| {

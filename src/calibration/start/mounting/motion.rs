@@ -1,4 +1,4 @@
-//! What a record shows of its motion, as the columns stand: dwells, moves between them, labelled sections.
+//! Motion in a recording, in column axes: dwells, moves between them, labelled sections.
 
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -15,16 +15,16 @@ use crate::imu::{PerSensor, Sensor};
 use crate::recording::{LabelledMotion, TableLog};
 use crate::run::{Dwell, Run};
 
-/// What a sum of rotations by whole samples leaves of coning and of turns within a sample, rad. It stands
-/// for all that a noiseless record is off by.
+/// Residual error of summed rotations due to coning and motion within a sample, rad. It represents all errors of a
+/// noise-free recording.
 const FLOOR: f64 = 1e-4;
-/// A part of a move that turns by more is cut at the next reading of the table, rad: half a turn has no sense.
+/// A part of a move with a larger rotation is cut at the next table reading, rad, because half a turn has no direction.
 const LEG: f64 = 1.0;
 
-/// A vector by the columns as they stand, and along body axes as it is known.
+/// A vector as measured in column axes, and as known in body axes.
 #[derive(Debug, Clone)]
 pub struct Sensed {
-    /// Over gravity or Earth rate, or an angle turned in rad; without the bias of the prior.
+    /// Divided by gravity or Earth rate, or a rotation angle in rad; without the prior bias.
     pub found: Vector3<f64>,
     pub known: Option<Vector3<f64>>,
     /// Variance of each component.
@@ -36,40 +36,40 @@ pub struct Sensed {
 pub struct Move {
     /// The dwell before it, by number.
     pub from: usize,
-    /// `C` from the body axes after it to those before, by the table.
+    /// Rotation matrix from the body axes after the move to those before it, according to the table.
     pub known: Option<Matrix3<f64>>,
-    /// The turn that the gyros make as they are, and the one with all of them reversed.
+    /// Rotation from the gyros, unchanged and with all of them reversed.
     pub turns: [Turned; 2],
-    /// Variance of the turn about each axis, rad².
+    /// Variance of the rotation about each axis, rad².
     pub variance: f64,
-    /// All that the gyros turn, one way and the other, rad.
+    /// Total rotation sensed by the gyros, in both directions, rad.
     pub way: f64,
 }
 
-/// A turn as gyros make it.
+/// A rotation measured by gyros.
 #[derive(Debug, Clone)]
 pub struct Turned {
     /// `C` from the axes after it to those before.
     pub rotation: Matrix3<f64>,
-    /// How the gyros' sensitivity turns the whole about the axes before, rad; their zero is that at rest.
+    /// Effect of the gyro sensitivity on the total rotation, about the axes before it, rad; zero is the output at rest.
     pub partials: OfTriad<3>,
 }
 
-/// All that is known of the motion of one recording.
+/// Known motion of one recording.
 #[derive(Debug, Clone)]
 pub struct Motion {
-    /// Dwells: force over gravity, rate over Earth rate. `known` is set where there is a log of the table.
+    /// Dwells: force divided by gravity, rate divided by Earth rate. `known` is set if there is a table log.
     pub rests: Vec<PerSensor<Sensed>>,
-    /// With a table in parts from reading to reading, for a whole move may end as it began.
+    /// With a table, in parts from reading to reading, because a whole move may end where it started.
     pub moves: Vec<Move>,
-    /// Labelled sections: force over gravity, or the angle turned.
+    /// Labelled sections: force divided by gravity, or rotation angle.
     pub labels: Vec<(Sensor, Sensed)>,
-    /// Upward part of Earth rate over the whole, where the place is known.
+    /// Vertical component of Earth rate divided by the total, if the site is known.
     pub upward: Option<f64>,
 }
 
 impl Motion {
-    /// Whether the gyros miss any turn by more than this part of their way.
+    /// Whether the gyros miss any turn by more than this fraction of its angle.
     pub fn misses_a_turn(&self, part: f64) -> bool {
         self.moves.iter().any(|of| {
             let turned = &of.turns[0].rotation;
@@ -85,7 +85,7 @@ impl Motion {
         })
     }
 
-    /// That of the recording with this number.
+    /// Motion of the recording with this number.
     pub fn of(problem: &Problem, recording: usize, run: &Run) -> Self {
         let stretches = problem.stretches().iter();
         let stretches = stretches.filter(|stretch| stretch.recording == recording);
@@ -142,8 +142,7 @@ fn rest(run: &Run, dwell: &Dwell) -> PerSensor<Sensed> {
     })
 }
 
-/// Variance of an angle by gyros whose zero is that at rest nearby: noise, and Earth rate, which turns
-/// with them.
+/// Variance of a gyro angle with zero from a nearby dwell: noise, and Earth rate, which rotates relative to the gyros.
 fn angle_variance(run: &Run, samples: &Range<usize>) -> f64 {
     let duration = samples.len() as f64 * run.recording.imu.period;
     run.instrument.noise.gyro.random_walk.powi(2) * duration
@@ -151,11 +150,11 @@ fn angle_variance(run: &Run, samples: &Range<usize>) -> f64 {
         + FLOOR.powi(2)
 }
 
-/// Makes the parts of a move.
+/// Splits a move into parts.
 struct Legs<'a> {
     run: &'a Run,
     from: usize,
-    /// What the gyros sum up in a sample at rest, rad.
+    /// Gyro increment per sample at rest, rad.
     zero: Vector3<f64>,
     position_sigma: f64,
 }
@@ -192,7 +191,7 @@ impl Legs<'_> {
         legs
     }
 
-    /// The sample edge nearest to each of some readings, with its attitude.
+    /// The sample edge nearest to each reading, with its attitude.
     fn readings(
         &self,
         table: &TableLog,
@@ -206,13 +205,13 @@ impl Legs<'_> {
         })
     }
 
-    /// The turn of each sample, rad.
+    /// The rotation in each sample, rad.
     fn increments(&self, samples: Range<usize>) -> impl Iterator<Item = Vector3<f64>> {
         let increments = self.run.recording.imu.gyro.within(samples);
         increments.map(|increment| increment - self.zero)
     }
 
-    /// `fastest`: by the table, rad a sample.
+    /// `fastest`: from the table, rad per sample.
     fn leg(&self, samples: Range<usize>, known: Option<Matrix3<f64>>, fastest: f64) -> Move {
         let turned = |sign: f64| {
             let mut rotation = Matrix3::identity();

@@ -1,8 +1,8 @@
-//! What `run.toml` states and the record contradicts, before any estimate: axes, the sensitivity of a triad, triads whose
-//! columns are exchanged.
+//! Statements in `run.toml` that the recording contradicts, before any estimate: axes, the sensitivity of a triad,
+//! swapped triads.
 //!
-//! Each statement has rivals, and the likelihood of the motion under each is its weight, as for axes. Another
-//! sensitivity of the gyros is only looked for where they miss a turn.
+//! Each statement competes with alternatives, weighted by the likelihood of the motion, as for axes. A different gyro
+//! sensitivity is searched only if the gyros miss a turn.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -16,18 +16,18 @@ use crate::imu::{AxisOrder, PerSensor, Sensor};
 use crate::run::Run;
 use crate::statistics::median;
 
-/// Sensitivities from a tenth to ten times the stated one are tried, which is beyond the next two ranges of an
-/// instrument; units are told apart by their nominal scale as run.toml is read …
+/// Sensitivities from a tenth to ten times the stated one are tested, which is beyond the next two ranges of an
+/// instrument; wrong units are detected by their nominal scale when run.toml is read …
 const WIDEST: f64 = 10.0;
-/// … each this many times the one before: a residual turn between two of them is in the linear range.
+/// … each this many times the previous one, so that a residual rotation between two of them is in the linear range.
 const STEP: f64 = 1.1;
-/// Within the widest tolerance of data sheets, 10 %, a stated sensitivity is right however small its prior, half way to
-/// the next range it is wrong however large. Between these it may be this many σ of its prior off.
+/// Within the widest data-sheet tolerance, 10 %, a stated sensitivity counts as correct for any prior; more than
+/// halfway to the next range, it counts as wrong. In between, it may deviate by this many prior σ.
 const CARELESS: f64 = 10.0;
 const WIDEST_TOLERANCE: f64 = 0.1;
 
 impl Contradiction {
-    /// The first run of a problem that contradicts what is stated of it, if there is one.
+    /// The first run of a problem that contradicts its statements, if any.
     pub fn of<'a>(problem: &Problem<'a>) -> Option<(&'a Run, Self)> {
         let mut runs = problem.runs().enumerate();
         runs.find_map(|(recording, run)| Some((run, Self::of_run(problem, recording, run)?)))
@@ -91,7 +91,7 @@ impl Contradiction {
     }
 }
 
-/// Whether a triad this many times as sensitive as stated has another sensitivity, and not a prior stated too small.
+/// Whether a triad this many times as sensitive as stated has a different sensitivity, rather than too small a prior.
 fn is_another(run: &Run, sensor: Sensor, factor: f64) -> bool {
     let prior = run.instrument.prior.get(sensor);
     let mut sigma = prior.scale_sigma.max();
@@ -101,15 +101,15 @@ fn is_another(run: &Run, sensor: Sensor, factor: f64) -> bool {
     is_beyond_tolerance(factor, sigma)
 }
 
-/// Whether a sensitivity this many times the stated one is another, and not a prior σ (relative) stated too small.
+/// Whether a sensitivity this many times the stated one is different, rather than a relative prior σ stated too small.
 pub fn is_beyond_tolerance(factor: f64, sigma: f64) -> bool {
     factor.abs().ln().abs() > (CARELESS * sigma).clamp(WIDEST_TOLERANCE, NEXT_RANGE.ln())
 }
 
-/// The accelerometers whose specific force at rest is another than gravity, and how many times it is that.
+/// The accelerometers whose specific force at rest differs from gravity, with the ratio.
 ///
-/// Where the attitudes tell the axes apart, `Σ (f_i / s_i)² = 1` of all dwells gives the sensitivity of each; else the
-/// magnitude gives that of the triad.
+/// If the attitudes separate the axes, `Σ (f_i / s_i)² = 1` over all dwells gives the sensitivity of each; otherwise
+/// the magnitude gives that of the triad.
 fn by_magnitude(run: &Run, motion: &Motion) -> Option<(Axes, f64)> {
     let mut forces: Vec<Vector3<f64>> = motion.rests.iter().map(|rest| rest.accel.found).collect();
     if forces.is_empty() {
@@ -143,7 +143,7 @@ fn by_magnitude(run: &Run, motion: &Motion) -> Option<(Axes, f64)> {
     is_another(&magnitude).then_some((Axes::All, magnitude))
 }
 
-/// The likeliest factor, and those that are hardly less likely and differ from all before.
+/// The most likely factor, and others that are hardly less likely and distinct.
 fn told_apart(tried: &[(f64, f64)]) -> Vec<f64> {
     let mut chosen: Vec<f64> = Vec::new();
     let hardly_less = tried
@@ -160,8 +160,8 @@ fn told_apart(tried: &[(f64, f64)]) -> Vec<f64> {
     chosen
 }
 
-/// The gyros' sensitivities that are tried with the logarithm of the likelihood of each, the likeliest first; it is found
-/// to a thousandth.
+/// The tested gyro sensitivities with the logarithm of the likelihood of each, the most likely first, accurate to a
+/// thousandth.
 fn factors(log_likelihood: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
     let reach = (WIDEST.ln() / STEP.ln()) as i32;
     let weighed = |factor| (factor, log_likelihood(factor));
@@ -193,7 +193,7 @@ fn less_sensitive(run: &Run, axes: Axes, factor: f64) -> Run {
     run
 }
 
-/// A run with the columns of its triads exchanged.
+/// A run with the columns of its triads swapped.
 fn exchanged(run: &Run) -> Run {
     let mut run = run.clone();
     let nominal = &run.instrument.nominal;
@@ -210,13 +210,13 @@ fn exchanged(run: &Run) -> Run {
     run
 }
 
-/// What is stated, or a rival of it, weighed by the motion that it makes of a record.
+/// A statement or an alternative, weighted by the likelihood of the resulting motion.
 struct Weighed {
-    /// Logarithm of its likelihood, noise and prior being nearly as they are stated.
+    /// Logarithm of its likelihood with noise and prior close to the stated ones.
     log_likelihood: f64,
-    /// Whether it is hardly more likely with any other noise and prior, and more than that nothing is as it should be.
+    /// Whether it is hardly more likely with any other noise and prior, and more likely than no explanation.
     is_explained: bool,
-    /// Whether no noise and no prior make it likelier than that.
+    /// Whether no noise and no prior make it more likely than no explanation.
     is_nothing: bool,
 }
 
@@ -233,7 +233,7 @@ impl Weighed {
         }
     }
 
-    /// Whether it explains the motion, and is likelier than this.
+    /// Whether it explains the motion and is more likely than this.
     fn explains(&self, least: f64) -> bool {
         self.is_explained && self.log_likelihood > least
     }
@@ -244,7 +244,7 @@ const AS_STATED: PerSensor<AxisOrder> = PerSensor {
     accel: AxisOrder::IDENTITY,
 };
 
-/// How likely the motion is with these axes, by all that it is known from.
+/// Likelihood of the motion with these axes, from all sources.
 fn parts(
     problem: &Problem,
     run: &Run,

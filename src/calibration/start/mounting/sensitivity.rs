@@ -1,4 +1,4 @@
-//! A triad of another sensitivity than is stated, in words.
+//! Message about a triad with a sensitivity different from the stated one.
 
 use std::fmt;
 
@@ -7,21 +7,21 @@ use crate::number::three_digits;
 use crate::run::Run;
 use crate::units::{DEGREE, STANDARD_GRAVITY};
 
-/// Half way to the sensitivity of the next range, which differs by two.
+/// Halfway to the sensitivity of the next range, which differs by a factor of two.
 pub const NEXT_RANGE: f64 = std::f64::consts::SQRT_2;
 
-/// A triad of another sensitivity than is stated, or one axis of it.
+/// A triad, or one axis of it, with a sensitivity different from the stated one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensitivity {
-    /// Which triad.
+    /// The triad.
     pub sensor: Sensor,
-    /// Which axes.
+    /// The axes.
     pub axes: Axes,
-    /// How many times as sensitive as stated: the likeliest, and others that are hardly less likely.
+    /// Factors relative to the stated sensitivity: the most likely, and others that are hardly less likely.
     pub factors: Vec<f64>,
-    /// What its rows hold, where a file says so.
+    /// Quantity of its rows, if a file states it.
     output: Option<Output>,
-    /// The unit that is stated.
+    /// The stated unit.
     unit: String,
 }
 
@@ -58,7 +58,7 @@ impl Sensitivity {
         }
     }
 
-    /// What may be wrong, as run.toml has it.
+    /// Possible causes, in terms of run.toml.
     fn causes(&self, factor: f64) -> Vec<String> {
         let name = self.sensor.name();
         let mut causes = Vec::new();
@@ -75,7 +75,7 @@ impl Sensitivity {
             Axes::One(axis) => format!(" of {}", AXES[axis]),
         };
         causes.push(format!(
-            "prior.{name}.scale{axis}, which is {times} times the stated one"
+            "prior.{name}.scale{axis} (should be {times} times the stated value)"
         ));
         // If a row lasts longer by a factor, the same turn takes a rate smaller by that factor.
         let lasts = match (self.output, self.sensor) {
@@ -85,7 +85,7 @@ impl Sensitivity {
         };
         if let Some(lasts) = lasts.filter(|_| self.axes == Axes::All) {
             causes.push(format!(
-                "sample_period_s or time_unit, if a row lasts {} times as long as stated",
+                "sample_period_s or time_unit (if a row lasts {} times as long as stated)",
                 three_digits(lasts)
             ));
         }
@@ -100,12 +100,12 @@ impl fmt::Display for Sensitivity {
         match self.sensor {
             Sensor::Gyro => write!(
                 f,
-                "the record turns as if {} were {times} times as sensitive as run.toml states",
+                "the turns fit only if {} are {times} times as sensitive as run.toml states",
                 self.named("the gyros")
             )?,
             Sensor::Accel => write!(
                 f,
-                "of gravity {} show {} m/s² at rest, {times} times as much as they should",
+                "{} measure gravity as {} m/s² at rest, {times} times the true value",
                 self.named("the accelerometers"),
                 three_digits(factor * STANDARD_GRAVITY)
             )?,
@@ -114,18 +114,21 @@ impl fmt::Display for Sensitivity {
             && !others.is_empty()
         {
             let others: Vec<String> = others.iter().map(|&other| three_digits(other)).collect();
-            write!(f, " ({} times is hardly less likely)", others.join(", "))?;
+            write!(
+                f,
+                " (a factor of {} is almost equally likely)",
+                others.join(", ")
+            )?;
         }
         write!(
             f,
-            ". In [imu] correct one of these: {}",
+            ". Correct one of these in [imu]: {}",
             self.causes(factor).join("; ")
         )
     }
 }
 
-/// Units that are stated for another: of a triad, the stated one, the true one, and how many times as sensitive the triad
-/// then is.
+/// Units commonly confused: triad, stated unit, true unit, and the resulting sensitivity factor.
 const UNITS: [(Sensor, &str, &str, f64); 6] = [
     (Sensor::Gyro, "rad/s", "deg/s", 1.0 / DEGREE),
     (Sensor::Gyro, "deg/s", "rad/s", DEGREE),

@@ -1,4 +1,4 @@
-//! A wrong mounting in words and as a line of `run.toml`.
+//! Message about a wrong axis order, with the corrected line for `run.toml`.
 
 use std::fmt;
 
@@ -10,23 +10,23 @@ use crate::recording::{FileColumn, NamedColumns};
 use crate::run::Run;
 use crate::units::DEGREE;
 
-/// What `run.toml` says of the axes and the motion contradicts.
+/// An axis order in `run.toml` that the motion contradicts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mounting {
-    /// The order of each triad's outputs, as they come in along right-front-up, that puts it right.
+    /// The correct order of the outputs of each triad, along right-front-up.
     pub orders: PerSensor<AxisOrder>,
-    /// What it is known from, in a few words.
+    /// Source of the evidence, in a few words.
     pub known_from: &'static str,
-    /// Natural logarithm of how much likelier the record is so.
+    /// Natural logarithm of the likelihood ratio in its favour.
     pub log_ratio: f64,
-    /// The line of `run.toml` for it.
+    /// The corrected line for `run.toml`.
     pub line: String,
-    /// Lines of other mountings that the record does not tell from it.
+    /// Lines for other axis orders that the recording cannot separate from it.
     pub others: Vec<String>,
-    /// Whether a latitude of the other sign would explain it as well.
+    /// Whether a latitude of opposite sign would explain it equally well.
     pub or_latitude: bool,
-    /// Triads of which `[imu.prior]` gives values that differ by axis, or biases that a reversed column
-    /// does not have.
+    /// Triads whose `[imu.prior]` has values that differ between axes, or biases that change sign with a reversed
+    /// column.
     pub prior_differs: Vec<Sensor>,
 }
 
@@ -34,28 +34,27 @@ impl fmt::Display for Mounting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "the axes are not as run.toml has them: {}; by {} the record is e^{:.0} times likelier so. In \
-             [imu] of run.toml write\n  {}",
+            "the axes in run.toml are wrong: {} (e^{:.0} times more likely, from {}). In [imu] of run.toml write\n  {}",
             said(&self.orders),
-            self.known_from,
             self.log_ratio,
+            self.known_from,
             self.line
         )?;
         if !self.others.is_empty() {
             write!(
                 f,
-                "\nThis record does not tell it from\n  {}",
+                "\nThis recording cannot separate it from\n  {}",
                 self.others.join("\n  ")
             )?;
         }
         if self.or_latitude {
-            f.write_str("\nA latitude of the other sign would explain it as well.")?;
+            f.write_str("\nA latitude of opposite sign would explain the data equally well.")?;
         }
         for sensor in &self.prior_differs {
             write!(
                 f,
-                "\n[imu.prior.{}] speaks of the columns as they are then read, in that order: bring its scale \
-                 and bias to it, too, where they are those of the columns.",
+                "\n[imu.prior.{}] refers to the columns in the new order and sign. If its scale and bias are those \
+                 of the columns, rearrange them as well.",
                 sensor.name()
             )?;
         }
@@ -63,18 +62,18 @@ impl fmt::Display for Mounting {
     }
 }
 
-/// What is wrong.
+/// The error in words.
 fn said(orders: &PerSensor<AxisOrder>) -> String {
     let PerSensor { gyro, accel } = orders;
     if gyro == accel && gyro.is_rotation() {
         return format!(
-            "the instrument is turned by {}, both triads alike",
+            "both triads are rotated together by {}",
             turn(&gyro.matrix())
         );
     }
     if gyro == accel {
         return format!(
-            "both triads are left-handed alike, {}",
+            "both triads are left-handed in the same way, {}",
             axes(Sensor::Gyro, gyro)
         );
     }
@@ -106,10 +105,10 @@ fn turn(rotation: &Matrix3<f64>) -> String {
     format!("{:.0}° about ({x:.2}, {y:.2}, {z:.2})", angle / DEGREE)
 }
 
-/// Such as `gyro x is what comes in as -y, gyro y is what comes in as x (turned by 90° about z)`.
+/// Such as `gyro x is read as −y, gyro y is read as x (rotated by 90° about z)`.
 fn of_triad(sensor: Sensor, order: &AxisOrder) -> String {
     let how = if order.is_rotation() {
-        format!("turned by {}", turn(&order.matrix()))
+        format!("rotated by {}", turn(&order.matrix()))
     } else {
         "left-handed".to_owned()
     };
@@ -123,13 +122,13 @@ fn axes(sensor: Sensor, order: &AxisOrder) -> String {
         .map(|axis| {
             let sign = if order.reversed[axis] { "−" } else { "" };
             let source = AXES[order.source[axis]];
-            format!("{name} {} is what comes in as {sign}{source}", AXES[axis])
+            format!("{name} {} is read as {sign}{source}", AXES[axis])
         })
         .collect();
     axes.join(", ")
 }
 
-/// The line of `run.toml`, or for a run that was made the orders by name.
+/// The line for `run.toml`, or the orders by name for a simulated run.
 pub fn line(run: &Run, orders: &PerSensor<AxisOrder>) -> String {
     // A nominal scale below zero turns what comes in already.
     let as_columns = PerSensor::from_fn(|sensor| {
@@ -146,7 +145,7 @@ pub fn line(run: &Run, orders: &PerSensor<AxisOrder>) -> String {
     }
 }
 
-/// The columns of a run that no file holds.
+/// The columns of a run without a file.
 fn made() -> NamedColumns {
     let of_triad = |sensor: Sensor| {
         AXES.map(|axis| FileColumn {

@@ -9,10 +9,10 @@ use std::path::{Path, PathBuf};
 /// The list's name in its directory.
 pub const FILE: &str = ".turncal";
 
-const FIRST_LINE: &str = "turncal-output/1: turncal wrote what is listed here, and --force replaces \
-                          this directory only while it holds nothing else";
+const FIRST_LINE: &str = "turncal-output/1: turncal wrote the files listed here; --force replaces this directory \
+    only if it contains nothing else";
 
-/// The list of all that is in a directory.
+/// The list of all entries of a directory.
 pub fn of_all(directory: &Path) -> io::Result<String> {
     let mut names = Vec::new();
     search(directory, Path::new(""), &mut |entry| {
@@ -22,14 +22,13 @@ pub fn of_all(directory: &Path) -> io::Result<String> {
     Ok(of_names(names.iter().map(String::as_str)))
 }
 
-/// The list of a directory that grows, of these entries. What is in an entry that ends in `/` has a list of its
-/// own.
+/// The list of a growing directory with these entries. Entries that end in `/` have their own list.
 pub fn of_names<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     let lines = std::iter::once(FIRST_LINE).chain(names);
     lines.flat_map(|line| [line, "\n"]).collect()
 }
 
-/// What the list of a directory names, itself among it; `None` without a list.
+/// The names in the list of a directory, including the list itself; `None` without a list.
 fn listed(directory: &Path) -> Option<BTreeSet<String>> {
     let file = directory.join(FILE);
     let text = match fs::symlink_metadata(&file) {
@@ -41,7 +40,7 @@ fn listed(directory: &Path) -> Option<BTreeSet<String>> {
     is_list.then(|| lines.chain([FILE]).map(str::to_owned).collect())
 }
 
-/// Files that the list of a directory names, in it and not further below.
+/// Files named in the list of a directory, without subdirectories.
 pub fn listed_files(directory: &Path) -> Vec<PathBuf> {
     let names = listed(directory).unwrap_or_default().into_iter();
     let here = names.filter(|name| !name.contains('/') && name != FILE);
@@ -74,7 +73,7 @@ pub fn foreign(directory: &Path) -> io::Result<Option<PathBuf>> {
     })
 }
 
-/// The first entry below `root` that is wanted, in the order of their names; links are not followed.
+/// The first matching entry below `root`, in order of name; links are not followed.
 fn search(
     root: &Path,
     below: &Path,
@@ -97,7 +96,7 @@ fn search(
     Ok(None)
 }
 
-/// An entry as the list names it, alike on every system.
+/// Name of an entry in the list, identical on every system.
 fn name(entry: &Path) -> String {
     let parts: Vec<_> = entry.iter().map(|part| part.to_string_lossy()).collect();
     parts.join("/")

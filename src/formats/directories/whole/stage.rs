@@ -1,4 +1,4 @@
-//! A place beside an output in which it is made.
+//! A temporary location next to an output.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions, TryLockError};
@@ -11,21 +11,21 @@ use std::time::Duration;
 use super::{FileError, taken, unwritable};
 
 const PREFIX: &str = ".turncal-";
-/// Locked as long as the process lives that made the stage.
+/// Locked during the lifetime of the process that created the stage.
 const LOCK: &str = "turncal.lock";
 const NEW: &str = "new";
 const OLD: &str = "old";
 
-/// The stages of this process, each with the directories that were made for it, innermost first.
+/// The stages of this process, each with the directories created for it, innermost first.
 static UNFINISHED: Mutex<BTreeMap<PathBuf, Vec<PathBuf>>> = Mutex::new(BTreeMap::new());
 
-/// Whoever holds this is not interrupted by a signal's end of the process.
+/// While held, a signal does not end the process.
 fn unfinished() -> MutexGuard<'static, BTreeMap<PathBuf, Vec<PathBuf>>> {
     UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes what this process has begun and not finished, and lets no output appear any more: for a
-/// process that is about to end. Threads that begin, finish or give up an output wait for that end.
+/// Removes unfinished output of this process and blocks further output, for a process that is about to end. Threads
+/// that start, finish or abandon an output wait.
 pub fn abandon_unfinished() {
     let unfinished = unfinished();
     for (stage, parents) in unfinished.iter() {
@@ -40,7 +40,7 @@ pub fn abandon_unfinished() {
     std::mem::forget(unfinished);
 }
 
-/// Removes a stage and the directories that were made for it, as far as they are empty.
+/// Removes a stage and the directories created for it, if empty.
 fn remove(stage: &Path, parents: &[PathBuf]) -> bool {
     let gone = match fs::remove_dir_all(stage) {
         Ok(()) => true,
@@ -51,11 +51,11 @@ fn remove(stage: &Path, parents: &[PathBuf]) -> bool {
     gone
 }
 
-/// A place that something new is going to take.
+/// A target for new output.
 pub struct Stage {
-    /// Holds the new thing and, while they change places, the old one. Goes away on drop.
+    /// Contains the new output and, during the exchange, the old one. Removed on drop.
     beside: PathBuf,
-    /// None where the file system has no locks.
+    /// `None` if the file system has no locks.
     lock: Option<File>,
     target: PathBuf,
 }
@@ -65,8 +65,8 @@ impl Stage {
         if target.file_name().is_none() {
             return Err(FileError::of(
                 target,
-                "a path without a name of its own",
-                "the name of something to be written",
+                "a path that does not end in a name",
+                "the name of a file or directory to write",
                 "Give a name that does not end in `..` or `/`.",
             ));
         }
@@ -101,7 +101,7 @@ impl Stage {
                     |file| {
                         FileError::of(
                             target,
-                            format_args!("a file, {}, on the way", file.display()),
+                            format_args!("the file {} in the path", file.display()),
                             "directories",
                             "Choose another name.",
                         )
@@ -119,7 +119,7 @@ impl Stage {
         &self.target
     }
 
-    /// Puts the new thing in its place; what is there is replaced only with `force`.
+    /// Moves the new output into place; existing output is replaced only with `force`.
     pub fn commit(self, force: bool) -> Result<(), FileError> {
         let mut unfinished = unfinished();
         let old = self.beside.join(OLD);
@@ -141,7 +141,7 @@ impl Stage {
         if exists && fs::rename(&old, &self.target).is_err() {
             unfinished.remove(&self.beside);
             let doing = format!(
-                "put the output in place; the old one is in {}",
+                "put the output in place (the old output is in {})",
                 self.beside.display()
             );
             return Err(FileError::io(
@@ -165,7 +165,7 @@ impl Drop for Stage {
     }
 }
 
-/// Makes a stage and locks it.
+/// Creates and locks a stage.
 fn begin(parent: &Path) -> io::Result<(PathBuf, Option<File>)> {
     const ATTEMPTS: usize = 20;
     for _ in 0..ATTEMPTS {
@@ -192,7 +192,7 @@ fn begin(parent: &Path) -> io::Result<(PathBuf, Option<File>)> {
     Err(io::ErrorKind::ResourceBusy.into())
 }
 
-/// Removes the stages in a directory whose processes live no more.
+/// Removes stages of processes that no longer exist from a directory.
 pub fn remove_abandoned(parent: &Path) {
     let Ok(entries) = fs::read_dir(parent) else {
         return;
@@ -239,7 +239,7 @@ fn remove_if_abandoned(stage: &Path) -> io::Result<()> {
     fs::remove_dir(stage)
 }
 
-/// Lets two things change places at once.
+/// Exchanges two paths atomically.
 #[cfg(any(target_os = "linux", target_vendor = "apple"))]
 fn exchange(a: &Path, b: &Path) -> io::Result<()> {
     use rustix::fs::{CWD, RenameFlags, renameat_with};

@@ -10,10 +10,10 @@ use crate::formats::small_file;
 use crate::imu::{GaussMarkov, Noise, PerSensor, Sensor};
 
 const RATE: &str = "update_rate";
-/// Of the Gauss–Markov bias that stands for a random walk, s: longer than most recordings.
+/// Correlation time of the Gauss–Markov bias that represents a random walk, s; longer than most recordings.
 const CORRELATION_TIME: f64 = 3600.0;
 
-/// What a file of Kalibr states of an IMU.
+/// IMU noise from a Kalibr file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KalibrImu {
     /// Samples a second.
@@ -23,7 +23,7 @@ pub struct KalibrImu {
 }
 
 impl KalibrImu {
-    /// Reads the lines `key: value` of one IMU; keys that do not concern noise are passed over.
+    /// Reads the lines `key: value` of one IMU; keys unrelated to noise are ignored.
     ///
     /// # Errors
     /// [`FileError`] if the file cannot be read, lacks a noise density, or states a wrong number or a key twice.
@@ -61,8 +61,8 @@ impl KalibrImu {
                 return wrong(found, "a number above zero", "Correct this value.");
             };
             if figures.insert(key, number).is_some() {
-                let found = format!("`{key}` for the second time");
-                return wrong(found, "it once", "Leave the lines of one IMU in the file.");
+                let found = format!("a second `{key}`");
+                return wrong(found, "one line per key", "Keep only the lines of one IMU.");
             }
         }
         let noise = |sensor| {
@@ -82,7 +82,7 @@ impl KalibrImu {
     }
 }
 
-/// The keys of a triad's white noise, and of the random walk of its bias.
+/// Keys of the white noise and the bias random walk of a triad.
 fn keys(sensor: Sensor) -> [&'static str; 2] {
     sensor.pick(
         ["gyroscope_noise_density", "gyroscope_random_walk"],
@@ -90,7 +90,7 @@ fn keys(sensor: Sensor) -> [&'static str; 2] {
     )
 }
 
-/// A bias that grows like the random walk over times short against its correlation time.
+/// A bias that grows like the random walk over times much shorter than its correlation time.
 fn bias_of(walk: f64) -> GaussMarkov {
     GaussMarkov {
         sigma: walk * (CORRELATION_TIME / 2.0).sqrt(),
@@ -104,7 +104,7 @@ fn missing(path: &Path, key: &str, others: &[&str]) -> FileError {
         Some(other) => format!("Rename `{other}`, or add the line."),
         None => "Add the line.".to_owned(),
     };
-    FileError::of(path, found, "a noise density of each triad", advice)
+    FileError::of(path, found, "a noise density for each triad", advice)
 }
 
 #[cfg(test)]
@@ -185,7 +185,7 @@ update_rate:                 200.0      #Hz (for discretization of the values ab
             ("update_rate: inf\n", &["line 1", "above zero"]),
             (
                 "update_rate: 200\nimu1:\n update_rate: 100\n",
-                &["line 3", "second time", "one IMU"],
+                &["line 3", "a second", "one IMU"],
             ),
         ] {
             let error = read(text).unwrap_err();

@@ -11,10 +11,10 @@ use super::name::{self, Unit};
 use crate::formats::quantity::{OUTPUTS, Of, units};
 use crate::imu::{Noise, PerSensor, Sensor};
 
-/// What a user states of a log that has no `run.toml`; what is not stated is found, or wide.
+/// User statements about a log without a `run.toml`; other fields are detected or have a wide prior.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Stated {
-    /// The file of the accelerometers, if the log has the rows of the gyros only.
+    /// The accelerometer file, if the log contains only the gyros.
     pub accel_file: Option<PathBuf>,
     /// Rows a second.
     pub rate_hz: Option<f64>,
@@ -30,14 +30,14 @@ pub struct Stated {
     pub accel_unit: Option<StatedUnit>,
     /// Noise figures.
     pub noise: Option<PerSensor<Noise>>,
-    /// Tolerances of the instrument as its maker delivers it.
+    /// Tolerances of the instrument as delivered.
     pub tolerances: Option<Tolerances>,
 }
 
-/// 1σ of what an instrument of a kind may be off by before calibration.
+/// 1σ tolerances of an instrument before calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tolerances {
-    /// Of which kind.
+    /// Its kind.
     pub of: String,
     /// Scale factor, relative.
     pub scale: PerSensor<f64>,
@@ -50,10 +50,9 @@ pub struct Tolerances {
 pub struct StatedUnit(pub(super) Unit);
 
 impl StatedUnit {
-    /// Of the triad of this sensor.
+    /// Parses the unit for the triad of this sensor.
     ///
-    /// # Errors
-    /// What may be stated, if this cannot.
+    /// # Errors The accepted units, if this is none of them.
     pub fn parse(sensor: Sensor, text: &str) -> Result<Self, String> {
         let is_of_it = |unit: &Unit| match unit.of {
             Of::Rows(of, _) => of == sensor,
@@ -69,7 +68,7 @@ impl StatedUnit {
             let words: Vec<&str> = words.into_iter().collect();
             let example = sensor.pick("1/131 deg/s", "1/16384 g");
             let words = words.join(", ");
-            format!("expected one of {words}, or what one count is, such as '{example}'")
+            format!("expected one of {words}, or the size of one count, such as '{example}'")
         })
     }
 }

@@ -31,8 +31,8 @@ fn the_zero_of_a_register_is_where_gravity_at_rest_is_centred() {
     has(
         &text,
         &[
-            "scale = 1879.302  # 32.8 counts for 1 deg/s",
-            "scale = 417.6758  # 4096 counts for one g",
+            "scale = 1879.302  # 32.8 counts per deg/s",
+            "scale = 417.6758  # 4096 counts per g",
         ],
     );
     let bias: Vec<f64> = text
@@ -84,7 +84,7 @@ fn gyros_get_the_order_and_the_signs_of_the_axes_that_gravity_turns_about() {
         &text,
         &[
             "columns = { time = \"t\", gyro = [\"gy\", \"gz\", \"gx\"], accel = [\"ax\", \"ay\", \"az\"] }",
-            "scale = [3752.874, -3752.874, -3752.874]  # 65.5 counts for 1 deg/s",
+            "scale = [3752.874, -3752.874, -3752.874]  # 65.5 counts per deg/s",
         ],
     );
 }
@@ -115,11 +115,11 @@ fn one_attitude_leaves_the_zero_open_and_motion_without_rest_the_scale() {
     has(
         &text,
         &[
-            "scale = 835.3515  # 8192 counts for one g; ",
-            "# scale =  # TODO: counts for one rad/s",
+            "scale = 835.3515  # 8192 counts per g; ",
+            "# scale =  # TODO: counts per rad/s",
         ],
     );
-    assert!(text.contains("if its zero offset is zero"), "{text}");
+    assert!(text.contains("if the zero offset is zero"), "{text}");
     let text = draft(HEADER, |k, _| {
         let t = k as f64 * 0.01;
         let (level, turned) = (0.9 * t, 1.7 * t);
@@ -135,9 +135,9 @@ fn one_attitude_leaves_the_zero_open_and_motion_without_rest_the_scale() {
     });
     has(
         &text,
-        &["# scale =  # TODO: counts for one m/s² by the data sheet"],
+        &["# scale =  # TODO: counts per m/s² from the data sheet"],
     );
-    assert!(text.contains("nothing is at rest"), "{text}");
+    assert!(text.contains("no dwells to estimate it from"), "{text}");
 }
 
 #[test]
@@ -160,6 +160,6 @@ fn columns_of_counts_that_hold_something_else_stay_open() {
     said(
         HEADER,
         |v| v.map(|value| value.rem_euclid(65_536.0)),
-        "written as unsigned ones",
+        "written as unsigned:",
     );
 }

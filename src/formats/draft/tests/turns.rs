@@ -87,7 +87,7 @@ fn what_turned_where_rows_are_missing_is_no_cut_and_the_other_turns_tell_the_uni
     has(
         &drafted(&rows),
         &[
-            "continuous = true  # but rows are missing in one place",
+            "continuous = true  # rows are missing in one place",
             "gyro_unit = \"rad/s\"",
         ],
     );
@@ -104,12 +104,12 @@ fn without_a_time_turns_tell_the_unit_that_has_a_usual_rate() {
         .collect();
     fs::write(&path, "wx,wy,wz,fx,fy,fz\n".to_owned() + &rows).unwrap();
     let text = Draft::of_file(&path).unwrap().to_toml("log.csv");
-    let why = "gyro_unit = \"rad/s\"  # gravity turns as far at about ";
+    let why = "gyro_unit = \"rad/s\"  # integrated gyro angles match the change of gravity direction at about ";
     has(
         &text,
         &[
             why,
-            "# no column goes forward like a time: the period of the rows is found from the turns",
+            "# no column increases like a time; the sample period is estimated from the turns",
         ],
     );
     let rate = text.split(why).nth(1).unwrap().split(' ').next().unwrap();
@@ -127,7 +127,7 @@ fn one_rough_turn_and_none_are_told_apart() {
     let never = &rows[..200].to_vec();
     has(
         &drafted(never),
-        &["# gyro_unit =  # TODO: gravity does not turn, so nothing shows it"],
+        &["# gyro_unit =  # TODO: gravity direction does not change, so it cannot be estimated"],
     );
     // A hand that shakes as it turns.
     for row in rows.iter_mut().skip(200).step_by(2).take(50) {
@@ -137,6 +137,6 @@ fn one_rough_turn_and_none_are_told_apart() {
     rows.truncate(500);
     has(
         &drafted(&rows),
-        &["# gyro_unit =  # TODO: gravity turns too seldom or too roughly to show it"],
+        &["# gyro_unit =  # TODO: too few usable turns of gravity to estimate it"],
     );
 }

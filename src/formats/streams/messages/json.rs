@@ -5,9 +5,9 @@ use serde_json::Value;
 use crate::formats::streams::Column;
 use crate::formats::streams::bytes::Broken;
 
-/// Longer lists are no columns.
+/// Maximum length of a list that becomes columns.
 const LONGEST: usize = 64;
-/// As many columns as a sheet has.
+/// Maximum number of columns, as in a spreadsheet.
 const MOST: usize = 16_384;
 
 /// The numbers of a message with their names, a time of seconds and nanoseconds as one.
@@ -49,7 +49,7 @@ fn flatten(value: &Value, path: &str, all: &mut Vec<(String, f64)>) {
     }
 }
 
-/// The columns that the first message of a stream shows.
+/// The columns of the first message of a stream.
 pub fn columns(bytes: &[u8], offset: u64) -> Result<Vec<Column>, Broken> {
     let all = numbers(bytes, offset)?;
     Ok(all
@@ -58,7 +58,7 @@ pub fn columns(bytes: &[u8], offset: u64) -> Result<Vec<Column>, Broken> {
         .collect())
 }
 
-/// The numbers of a message in these columns, NaN where it has none.
+/// The numbers of a message in these columns; NaN if missing.
 pub fn values(
     columns: &[Column],
     bytes: &[u8],

@@ -1,4 +1,4 @@
-//! Topics of a log: messages of one type each, with the time at which they were logged.
+//! Topics of a log: messages of one type each, with their log times.
 
 #[cfg(feature = "mcap")]
 pub mod json;
@@ -13,16 +13,16 @@ use super::bytes::Broken;
 use super::{Column, Log, Stream};
 use ros::Encoding;
 
-/// A format of messages, each with the number of its topic and the time at which it was logged.
+/// A message format; each message has a topic number and a log time.
 pub trait Messages {
-    /// Goes to the next message, and adds the topics described before it; number and time in ns, `None` at the end of
-    /// the file.
+    /// Advances to the next message and adds the topics described before it; returns number and time in ns, or `None`
+    /// at the end of the file.
     fn advance(&mut self, topics: &mut Topics) -> Result<Option<(u32, u64)>, Broken>;
 
     /// The content of the message.
     fn data(&self) -> &[u8];
 
-    /// Where it is in the file.
+    /// Its offset in the file.
     fn offset(&self) -> u64;
 }
 
@@ -70,7 +70,7 @@ impl<M: Messages> Log for MessageLog<M> {
     }
 }
 
-/// The topics of a log, by the numbers that its messages have.
+/// The topics of a log, by number.
 #[derive(Default)]
 pub struct Topics {
     streams: Vec<Stream>,
@@ -94,12 +94,12 @@ impl Topics {
         self.of_number.insert(number, stream);
     }
 
-    /// The stream of a message, whose columns its first message may show.
+    /// The stream of a message; its first message may define the columns.
     #[cfg_attr(not(feature = "mcap"), allow(unused_variables))]
     fn stream(&mut self, number: u32, data: &[u8], offset: u64) -> Result<usize, Broken> {
         let stream = self.of_number.get(&number).copied().ok_or_else(|| {
-            let found = format_args!("a message of channel {number}");
-            Broken::new(offset, found, "a channel that was described before it")
+            let found = format_args!("a message on channel {number}");
+            Broken::new(offset, found, "a channel described earlier in the file")
         })?;
         #[cfg(feature = "mcap")]
         if let Reader::Json(columns) = &mut self.readers[stream]
@@ -112,27 +112,27 @@ impl Topics {
     }
 }
 
-/// The column of the time of logging, in s.
+/// The log-time column, in s.
 const LOG_TIME: &str = "log_time";
 
-/// How its messages are read.
+/// Reader of its messages.
 pub enum Reader {
     Ros(ros::Message),
     #[cfg(feature = "mcap")]
     Protobuf(protobuf::Message),
-    /// The first message shows its columns.
+    /// The first message defines the columns.
     #[cfg(feature = "mcap")]
     Json(Vec<Column>),
-    /// Only the time of its messages is known; why.
+    /// Only the message times are known, for this reason.
     Unknown(String),
 }
 
 impl Reader {
-    /// Of messages of ROS by the text of their definition.
+    /// For ROS messages, from the text of their definition.
     pub fn of_ros(name: &str, definition: &str, encoding: Encoding) -> Self {
         match ros::Message::parse(name, definition, encoding) {
             Ok(message) => Self::Ros(message),
-            Err(wrong) => Self::Unknown(format!("its definition cannot be read: {wrong}")),
+            Err(wrong) => Self::Unknown(format!("turncal cannot read its definition ({wrong})")),
         }
     }
 
@@ -157,7 +157,7 @@ impl Reader {
         }
     }
 
-    /// The values of a message that was logged at this time in ns.
+    /// The values of a message with this log time in ns.
     fn values(
         &self,
         time: u64,

@@ -1,10 +1,10 @@
-//! Records that a log packs together.
+//! Compressed records of a log.
 
 use std::io::Read;
 
 use crate::formats::streams::bytes::Broken;
 
-/// Chunks are of some megabytes; what claims more is damaged or a bomb.
+/// Maximum chunk size: real chunks have a few megabytes, and larger claims are damage or decompression bombs.
 const LONGEST: u64 = 1 << 27;
 
 /// Unpacks a chunk into `size` bytes by the method that the file names.
@@ -13,12 +13,16 @@ pub fn unpack(method: &str, packed: &[u8], size: u64, offset: u64) -> Result<Vec
         return Err(Broken::new(
             offset,
             format_args!("a chunk of {size} bytes"),
-            format_args!("at most {LONGEST}"),
+            format_args!("at most {LONGEST} bytes"),
         ));
     }
     let mut unpacked = Vec::new();
     let broken = |error: &dyn std::fmt::Display| {
-        Broken::new(offset, error, format_args!("a chunk packed by {method}"))
+        Broken::new(
+            offset,
+            error,
+            format_args!("a chunk compressed with {method}"),
+        )
     };
     let read = match method {
         "" | "none" => {
@@ -40,8 +44,8 @@ pub fn unpack(method: &str, packed: &[u8], size: u64, offset: u64) -> Result<Vec
         other => {
             return Err(Broken::new(
                 offset,
-                format_args!("a chunk packed by `{other}`"),
-                "none, lz4, zstd or bz2",
+                format_args!("a chunk compressed with `{other}`"),
+                "no compression, lz4, zstd or bz2",
             ));
         }
     };
@@ -50,7 +54,7 @@ pub fn unpack(method: &str, packed: &[u8], size: u64, offset: u64) -> Result<Vec
         return Err(Broken::new(
             offset,
             format_args!("{} bytes in a chunk", unpacked.len()),
-            format_args!("{size}, as it says"),
+            format_args!("{size} bytes as its header states"),
         ));
     }
     Ok(unpacked)

@@ -1,4 +1,4 @@
-//! Messages of Protocol Buffers by their descriptors: numbers get a column each, named by their path.
+//! Protocol Buffers messages with descriptors: each number becomes a column named by its path.
 
 use prost_reflect::{
     DescriptorPool, DynamicMessage, FieldDescriptor, Kind, MessageDescriptor, ReflectMessage, Value,
@@ -20,7 +20,7 @@ pub struct Message {
 }
 
 impl Message {
-    /// By a set of descriptors; `None` if they lack a type.
+    /// From a set of descriptors; `None` if a type is missing.
     pub fn parse(name: &str, set: &[u8]) -> Option<Self> {
         let descriptor = DescriptorPool::decode(set)
             .ok()?
@@ -34,7 +34,7 @@ impl Message {
         Some(message)
     }
 
-    /// Adds the numbers of a type; lists, texts and bytes are no columns, and a type may hold itself.
+    /// Adds the numbers of a type; lists, texts and bytes do not become columns, and a type may contain itself.
     fn add(&mut self, of: &MessageDescriptor, prefix: &str, path: &[FieldDescriptor]) {
         for field in of
             .fields()
@@ -59,10 +59,10 @@ impl Message {
         }
     }
 
-    /// The numbers of a message; NaN in messages that it lacks.
+    /// The numbers of a message; NaN for missing submessages.
     pub fn values(&self, bytes: &[u8], offset: u64, row: &mut Vec<f64>) -> Result<(), Broken> {
         let message = DynamicMessage::decode(self.descriptor.clone(), bytes)
-            .map_err(|error| Broken::new(offset, error, "a message of Protocol Buffers"))?;
+            .map_err(|error| Broken::new(offset, error, "a Protocol Buffers message"))?;
         let values = self.paths.iter().map(|path| number(&message, path));
         row.extend(values.map(|value| value.unwrap_or(f64::NAN)));
         Ok(())

@@ -1,7 +1,7 @@
-//! Messages of ROS by their definitions: ROS 1's serialisation, and CDR as ROS 2 has it.
+//! ROS messages with definitions: ROS 1 serialisation, and CDR as in ROS 2.
 //!
-//! Numbers get a column each, named by their path: `angular_velocity.x`, `orientation_covariance[0]`; a time of
-//! seconds and nanoseconds is one column in s. Texts and lists of any length are passed over.
+//! Each number becomes a column named by its path: `angular_velocity.x`, `orientation_covariance[0]`; a time of seconds
+//! and nanoseconds is one column in s. Texts and variable-length lists are skipped.
 //!
 //! Source: wiki.ros.org/msg and wiki.ros.org/ROS/Technical Overview; ROS 2 design, "Interface definition"; OMG CDR
 //! (CORBA 3.3, 9.3) with the encapsulation of RTPS 2.3, 10.
@@ -12,10 +12,10 @@ use crate::formats::streams::Column;
 use crate::formats::streams::bytes::{Broken, Kind, Slice};
 use definition::Parser;
 
-/// Longer arrays of numbers are no columns.
+/// Maximum length of an array that becomes columns.
 const LONGEST: usize = 64;
 
-/// How numbers follow one another.
+/// Serialisation of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Encoding {
     Ros1,
@@ -45,14 +45,14 @@ enum FieldKind {
 #[derive(Clone, Copy, PartialEq)]
 enum Many {
     One,
-    /// So many.
+    /// A fixed number.
     Fixed(usize),
-    /// As many as the message says.
+    /// Number stated in the message.
     Any,
 }
 
 impl Many {
-    /// Whether numbers of it are columns.
+    /// Whether its numbers become columns.
     fn is_column(self) -> bool {
         match self {
             Self::One => true,
@@ -63,8 +63,7 @@ impl Many {
 }
 
 impl Message {
-    /// By the text of its definition, behind which are those of the types that it needs; what is wrong with it if
-    /// it cannot be read.
+    /// From the text of its definition, followed by those of the required types; an error message if invalid.
     pub fn parse(name: &str, definition: &str, encoding: Encoding) -> Result<Self, String> {
         let mut parser = Parser::new(name, definition, encoding);
         let fields = parser.message()?;
@@ -75,7 +74,7 @@ impl Message {
         })
     }
 
-    /// The numbers of a message whose bytes begin at this place of the file.
+    /// The numbers of a message whose bytes start at this offset of the file.
     pub fn values(&self, bytes: &[u8], offset: u64, row: &mut Vec<f64>) -> Result<(), Broken> {
         let mut reader = Reader {
             bytes: Slice::packed(bytes, offset),
@@ -91,7 +90,7 @@ impl Message {
 
 struct Reader<'a> {
     bytes: Slice<'a>,
-    /// From where on alignment counts.
+    /// Origin of the alignment.
     begin: usize,
     /// The widest alignment.
     widest: usize,
@@ -99,7 +98,7 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     fn encapsulation(&mut self) -> Result<(), Broken> {
-        let head = self.bytes.take(4, "the head of a message")?;
+        let head = self.bytes.take(4, "a message header")?;
         (self.bytes.big_endian, self.widest) = match head[1] {
             0 => (true, 8),
             1 => (false, 8),
@@ -108,8 +107,8 @@ impl Reader<'_> {
             _ => {
                 return Err(Broken::new(
                     self.bytes.offset(),
-                    format_args!("a message that begins with {head:02x?}"),
-                    "the four bytes of CDR: 0, then 0, 1, 6 or 7",
+                    format_args!("a message that starts with {head:02x?}"),
+                    "a CDR header (0, then 0, 1, 6 or 7)",
                 ));
             }
         };
@@ -134,11 +133,11 @@ impl Reader<'_> {
 
     fn pass(&mut self, bytes: usize) -> Result<(), Broken> {
         self.bytes
-            .take(bytes, "a field that the message definition declares")
+            .take(bytes, "a field of the message definition")
             .map(|_| ())
     }
 
-    /// Reads all fields; numbers that are columns are added to the row.
+    /// Reads all fields and adds column values to the row.
     fn message(&mut self, fields: &[Field], mut row: Option<&mut Vec<f64>>) -> Result<(), Broken> {
         for field in fields {
             let (count, is_column) = match field.many {

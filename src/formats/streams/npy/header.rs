@@ -1,4 +1,4 @@
-//! The head of an array: a Python dictionary of its type, order and shape.
+//! The header of an array: a Python dictionary with type, order and shape.
 
 use std::io::Read;
 
@@ -8,14 +8,14 @@ use super::super::arrays::Field;
 use super::super::bytes::{Broken, Kind, Slice};
 use super::LONGEST_HEADER;
 
-/// Longer arrays within an item are no columns.
+/// Maximum length of an array within an item that becomes columns.
 const MOST_NUMBERS: usize = 64;
 
 pub struct Header {
     /// The numbers in each item of the array, and its size in bytes.
     pub fields: Vec<Field>,
     pub size: usize,
-    /// Names of what is no number.
+    /// Names of non-numeric fields.
     left_out: Vec<String>,
     pub first_is_fastest: bool,
     pub shape: Vec<usize>,
@@ -31,24 +31,24 @@ impl Header {
                 Ok(read) if read as u64 == count => Ok(bytes),
                 Ok(read) => Err(Broken::new(
                     offset,
-                    format_args!("{read} bytes to the end of an array"),
-                    format_args!("{count} bytes of {what}"),
+                    format_args!("only {read} bytes before the end of the array"),
+                    format_args!("{count} bytes for {what}"),
                 )),
                 Err(error) => Err(Broken::new(offset, error, what)),
             }
         };
-        let first = take(8, "an array's first bytes")?;
+        let first = take(8, "the first bytes of an array")?;
         let width = if first[6] == 1 { 2 } else { 4 };
-        let length = take(width, "the length of the head")?;
+        let length = take(width, "the length of the header")?;
         let length = Slice::new(&length, offset).whole(width as usize, "a length")?;
         if length > LONGEST_HEADER {
-            let found = format_args!("a head of {length} bytes");
-            return Err(Broken::new(offset, found, "a short one"));
+            let found = format_args!("a header of {length} bytes");
+            return Err(Broken::new(offset, found, "a shorter header"));
         }
-        let bytes = take(length, "the head")?;
+        let bytes = take(length, "the header")?;
         let text = String::from_utf8_lossy(&bytes);
         let wrong =
-            |what: &str| Broken::new(offset, format_args!("the head `{}`", text.trim()), what);
+            |what: &str| Broken::new(offset, format_args!("the header `{}`", text.trim()), what);
         let head = format!("head = {}", as_toml(text.trim()));
         let Ok(Document { head }) = toml::from_str(&head) else {
             return Err(wrong(
@@ -64,18 +64,18 @@ impl Header {
             begin: 8 + width + length,
         };
         let described = header.describe(name, &head.descr);
-        described.ok_or_else(|| wrong("a type of numbers"))?;
+        described.ok_or_else(|| wrong("a numeric type"))?;
         Ok(header)
     }
 
-    /// What is no number and is left out, in a sentence.
+    /// Remark on omitted non-numeric fields.
     pub fn left_out(&self) -> Option<String> {
         let are = match self.left_out.len() {
             0 => return None,
-            1 => "holds text and is",
-            _ => "hold text and are",
+            1 => "contains text and was",
+            _ => "contain text and were",
         };
-        Some(format!("{} {are} left out.", self.left_out.join(", ")))
+        Some(format!("{} {are} ignored.", self.left_out.join(", ")))
     }
 
     fn describe(&mut self, name: &str, items: &Descr) -> Option<()> {
@@ -121,7 +121,7 @@ impl Header {
     }
 }
 
-/// The kind of a number, whether it is big-endian, and its size in bytes; no kind for what is no number.
+/// Kind of a number (`None` if not numeric), byte order, and size in bytes.
 fn item_kind(text: &str) -> Option<(Option<(Kind, bool)>, usize)> {
     let (order, rest) = text.split_at_checked(1)?;
     let (letter, size) = rest.split_at_checked(1)?;
@@ -141,7 +141,7 @@ fn item_kind(text: &str) -> Option<(Option<(Kind, bool)>, usize)> {
     Some((Some((kind, order == ">")), size))
 }
 
-/// A head by the name that makes it a TOML document.
+/// A header with the name that makes it a TOML document.
 #[derive(Deserialize)]
 struct Document {
     head: Head,
@@ -169,7 +169,7 @@ enum Named {
     Array(String, String, Vec<usize>),
 }
 
-/// A Python dictionary as TOML has it, which has other brackets, colons and words for truth.
+/// Converts a Python dictionary to TOML, which differs in brackets, colons and booleans.
 fn as_toml(text: &str) -> String {
     let mut quote = None;
     let outside = |c: char| match c {

@@ -116,7 +116,7 @@ fn samples_before_the_first_selection_are_those_of_the_device_that_it_names() {
     assert!(
         remarks
             .iter()
-            .all(|remark| remark.ends_with(": this is undone."))
+            .all(|remark| remark.ends_with(". turncal undid this correction."))
     );
 }
 
@@ -134,7 +134,7 @@ fn where_device_or_parameters_change_each_sample_is_undone_by_its_own_and_all_ar
     let (offsets, remarks) = undone(&devices);
     assert_eq!(offsets, [1.0, 2.0, 0.0]);
     for (n, words) in ["GYRO0", "GYRO1", "used unchanged"].iter().enumerate() {
-        let number = format!("from number {}: ", n + 1);
+        let number = format!("From sample {} on, ", n + 1);
         assert!(
             remarks[n].contains(&number) && remarks[n].contains(words),
             "{remarks:?}"

@@ -1,5 +1,5 @@
-//! What PX4 corrects: `vehicle_imu`, `sensor_combined` and the topics of drivers before version 1.11, which have
-//! `x_raw`; `sensor_accel` and `sensor_gyro` of later versions are as the sensor gave them.
+//! Topics corrected by PX4: `vehicle_imu`, `sensor_combined` and the topics of drivers before version 1.11, which have
+//! `x_raw`; `sensor_accel` and `sensor_gyro` of later versions are raw.
 
 use std::collections::BTreeMap;
 
@@ -11,17 +11,17 @@ use crate::imu::{PerSensor, Sensor};
 /// Numbers of calibrations of a kind of sensor.
 const CALIBRATIONS: usize = 4;
 
-/// `P` messages, and the devices that PX4 says it has selected.
+/// `P` messages, and the devices selected by PX4.
 #[derive(Default)]
 pub struct Parameters {
     values: BTreeMap<String, f64>,
     pub selected: PerSensor<Option<f64>>,
-    /// How often one of them was set.
+    /// Number of parameter changes.
     pub changes: u64,
 }
 
 impl Parameters {
-    /// None yet, with devices that were selected before.
+    /// No parameters yet, with these selected devices.
     pub fn of(selected: PerSensor<Option<f64>>) -> Self {
         Self {
             selected,
@@ -37,7 +37,7 @@ impl Parameters {
     }
 
     pub fn take(&mut self, content: &mut Slice) -> Result<(), Broken> {
-        let key = content.measured_text(1, "a parameter's name")?;
+        let key = content.measured_text(1, "a parameter name")?;
         let offset = content.offset();
         let (kind, name) = match key.split_once(' ') {
             Some(("float", name)) => (Kind::F32, name),
@@ -66,7 +66,7 @@ impl Parameters {
         self.values.get(name).copied()
     }
 
-    /// What is applied to a device of this number, else to the selected or the only one.
+    /// Corrections applied to the device with this number, otherwise to the selected or only one.
     pub fn applied(&self, sensor: Sensor, device: Option<f64>) -> Option<Applied> {
         let device = device.or(*self.selected.get(sensor));
         let (kind, temperature) = sensor.pick(("GYRO", "TC_G_ENABLE"), ("ACC", "TC_A_ENABLE"));
@@ -94,7 +94,7 @@ impl Parameters {
     }
 }
 
-/// Columns of the devices that a topic says are selected; one says so when that changes, the other at intervals.
+/// Columns of the selected devices in a topic; one topic is logged on change, the other at intervals.
 pub fn selects(topic: &str, columns: &[Column]) -> PerSensor<Option<usize>> {
     PerSensor::from_fn(|sensor| {
         let name = match topic {
@@ -106,7 +106,7 @@ pub fn selects(topic: &str, columns: &[Column]) -> PerSensor<Option<usize>> {
     })
 }
 
-/// The corrections of a topic's samples, which have to be undone.
+/// The corrections of the samples of a topic, which must be removed.
 pub fn of_topic(topic: &str, columns: &[Column]) -> Undo {
     let place = |name: &str| columns.iter().position(|column| column.name == name);
     let corrected = PerSensor::from_fn(|sensor| {

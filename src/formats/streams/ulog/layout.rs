@@ -1,13 +1,13 @@
-//! Where the numbers of a topic are in its messages.
+//! Layout of the numbers in the messages of a topic.
 
 use std::collections::BTreeMap;
 
 use super::super::Column;
 use super::super::bytes::{Broken, Kind};
 
-/// More numbers than a message of 65,535 bytes holds.
+/// Limit above the capacity of a message of 65,535 bytes.
 const MOST: usize = 1 << 16;
-/// Topics within topics: those of PX4 go one deep.
+/// Maximum nesting of topics; PX4 uses one level.
 const DEEPEST: usize = 8;
 
 pub struct Layout {
@@ -16,7 +16,7 @@ pub struct Layout {
     length: usize,
 }
 
-/// What was found, what was expected.
+/// Content found and content expected.
 type Wrong = (String, &'static str);
 
 impl Layout {
@@ -44,7 +44,7 @@ impl Layout {
             .ok_or_else(|| {
                 (
                     format!("a field of type `{format}`"),
-                    "a type of a number or a format of this file",
+                    "a numeric type or a format defined in this file",
                 )
             })?;
         for field in fields.split(';').filter(|field| !field.trim().is_empty()) {
@@ -66,8 +66,8 @@ impl Layout {
                 self.number(topic, name, kind, formats, depth)?;
                 if self.length > MOST {
                     return Err((
-                        format!("a topic `{topic}` of more than {MOST} bytes"),
-                        "less",
+                        format!("a topic `{topic}` longer than {MOST} bytes"),
+                        "a shorter topic",
                     ));
                 }
             }
@@ -105,7 +105,7 @@ impl Layout {
         kind.number(data.get(place..)?, false)
     }
 
-    /// The numbers of a message whose data begin at this place of the file.
+    /// The numbers of a message whose data start at this offset of the file.
     pub fn values(&self, data: &[u8], offset: u64, row: &mut Vec<f64>) -> Result<(), Broken> {
         row.clear();
         for &(place, kind) in &self.places {
@@ -114,7 +114,7 @@ impl Layout {
                 Broken::new(
                     offset,
                     format_args!("{} bytes of data", data.len()),
-                    format_args!("the {} that their format has", self.length),
+                    format_args!("the {} bytes of their format", self.length),
                 )
             })?;
             row.push(number);
@@ -123,7 +123,7 @@ impl Layout {
     }
 }
 
-/// The unit of a field, by PX4's message definitions.
+/// The unit of a field, from the PX4 message definitions.
 fn unit(topic: &str, name: &str) -> &'static str {
     let of = |start: &str| name.starts_with(start);
     let is_axis = matches!(name, "x" | "y" | "z");

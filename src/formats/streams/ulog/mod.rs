@@ -1,4 +1,4 @@
-//! PX4's ULog.
+//! PX4 ULog.
 //!
 //! Source: PX4 User Guide, "ULog File Format": a header of 16 bytes, then messages, each with its size in two
 //! bytes, its kind in one and its content.
@@ -16,10 +16,10 @@ use corrections::Parameters;
 use layout::Layout;
 
 const HEADER: u64 = 16;
-/// The only incompatible flag that is known: data are appended.
+/// The only known incompatible flag: appended data.
 const APPENDED: u8 = 1;
 
-/// Topics of what an instrument senses, without filters behind it.
+/// Topics of unfiltered instrument output.
 const INERTIAL: [&str; 4] = [
     "sensor_accel",
     "sensor_gyro",
@@ -38,15 +38,15 @@ pub fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
 
 struct Ulog {
     input: Input,
-    /// Fields of each named format, as they are written.
+    /// Fields of each named format, as written.
     formats: BTreeMap<String, String>,
     parameters: Parameters,
-    /// Whether it says that PX4 wrote it, whose axes are front, right, down.
+    /// Whether PX4 wrote it, with axes front, right, down.
     is_px4: bool,
     streams: Vec<Stream>,
-    /// By the number that data messages have.
+    /// Topics by the number in data messages.
     topics: HashMap<u16, Topic>,
-    /// Where data were appended behind a message that may be cut.
+    /// Offset of data appended after a possibly truncated message.
     appended: Vec<u64>,
     message: Vec<u8>,
     offset: u64,
@@ -58,7 +58,7 @@ struct Topic {
     stream: usize,
     layout: Layout,
     undo: Undo,
-    /// Columns of the devices that are selected.
+    /// Columns of the selected devices.
     selects: PerSensor<Option<usize>>,
 }
 
@@ -79,7 +79,11 @@ impl Log for Ulog {
                 b'I' => self.information(),
                 b'A' => self.subscribe()?,
                 b'D' => {
-                    let number = self.content().whole(2, "the number of a topic")? as u16;
+                    let number = self.content().whole(
+                        2,
+                        "a topic \
+                        number",
+                    )? as u16;
                     if let Some(topic) = self.topics.get(&number) {
                         let data = self.message.get(2..).unwrap_or_default();
                         for sensor in Sensor::ALL {
@@ -95,8 +99,8 @@ impl Log for Ulog {
                     }
                     return Err(Broken::new(
                         self.offset,
-                        format_args!("data of topic {number}"),
-                        "a topic that was named before its data",
+                        format_args!("data for topic {number}"),
+                        "a topic subscribed before its data",
                     ));
                 }
                 // More that is said of the log, its text messages, marks and lost data.
@@ -104,8 +108,8 @@ impl Log for Ulog {
                 other => {
                     return Err(Broken::new(
                         self.offset,
-                        format_args!("a message of kind {other}"),
-                        "one of ULog's kinds",
+                        format_args!("a message of type {other}"),
+                        "a message type of ULog",
                     ));
                 }
             }
@@ -136,7 +140,7 @@ impl Log for Ulog {
 }
 
 impl Ulog {
-    /// At the first message, where these devices are the selected ones.
+    /// Starts at the first message, with these selected devices.
     fn begin(input: Input, selected: PerSensor<Option<f64>>) -> Self {
         Self {
             input,
@@ -170,10 +174,10 @@ impl Ulog {
             return Ok(None);
         }
         self.input
-            .take(3, &mut self.message, "a message's size and kind")?;
+            .take(3, &mut self.message, "the size and type of a message")?;
         let mut head = Slice::new(&self.message, self.offset);
-        let size = head.whole(2, "a message's size")?;
-        let kind = head.whole(1, "a message's kind")? as u8;
+        let size = head.whole(2, "a message size")?;
+        let kind = head.whole(1, "a message type")? as u8;
         let end = self.offset + 3 + size;
         // A message that the appended data cut off never ended.
         let cut = self
@@ -197,13 +201,13 @@ impl Ulog {
         if unknown {
             return Err(Broken::new(
                 self.offset,
-                "a flag of a later version of the format",
-                "data that this version can read",
+                "a flag of a later format version",
+                "a format version that turncal supports",
             ));
         }
         let mut offsets = Vec::new();
         for _ in 0..3 {
-            let offset = content.whole(8, "the place of appended data")?;
+            let offset = content.whole(8, "the offset of appended data")?;
             if offset > self.offset {
                 offsets.push(offset);
             }
@@ -213,7 +217,7 @@ impl Ulog {
         Ok(())
     }
 
-    /// What is said of the log; nothing of it is needed.
+    /// Information about the log, mostly unused.
     fn information(&mut self) {
         let mut content = self.content();
         let length = content.length(1, "the length of a name").unwrap_or(0);
@@ -241,9 +245,9 @@ impl Ulog {
     fn subscribe(&mut self) -> Result<(), Broken> {
         let mut content = self.content();
         let instance = content.whole(1, "an instance")?;
-        let number = content.whole(2, "the number of a topic")? as u16;
+        let number = content.whole(2, "a topic number")? as u16;
         let length = content.left();
-        let name = content.text(length, "the name of a topic")?;
+        let name = content.text(length, "a topic name")?;
         let layout = Layout::of(&name, &self.formats)
             .map_err(|(found, expected)| Broken::new(self.offset, found, expected))?;
         let undo = corrections::of_topic(&name, &layout.columns);

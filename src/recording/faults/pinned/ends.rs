@@ -303,7 +303,7 @@ mod tests {
     }
 
     const HELD_ROWS: usize = 18_000;
-    /// A third of the record at this level.
+    /// A third of the recording at this level.
     const HIGH: Range<usize> = 6_000..12_000;
 
     /// Three axes on a grid of one, with noise of these σ where the first is high and elsewhere.

@@ -1,4 +1,4 @@
-//! Types of messages by the text of their definitions.
+//! Message types from the text of their definitions.
 
 use super::{Encoding, Field, FieldKind, Many};
 use crate::formats::streams::Column;
@@ -6,12 +6,12 @@ use crate::formats::streams::bytes::Kind;
 
 /// Types within types.
 const DEEPEST: usize = 16;
-/// A message of more fields is none of an instrument.
+/// Maximum number of fields of an instrument message.
 const MOST_FIELDS: usize = 4096;
 
-/// Definitions on their way to a type.
+/// Definitions while a type is built.
 pub struct Parser {
-    /// Names and texts; the first is the message's.
+    /// Names and texts; the first is that of the message.
     definitions: Vec<(String, String)>,
     encoding: Encoding,
     pub columns: Vec<Column>,
@@ -19,17 +19,17 @@ pub struct Parser {
     count: usize,
 }
 
-/// A field's place in a message.
+/// Position of a field in a message.
 struct Place<'a> {
     path: &'a str,
     many: Many,
-    /// Whether its numbers are columns.
+    /// Whether its numbers become columns.
     is_column: bool,
     depth: usize,
 }
 
 impl Parser {
-    /// Of a type and the text of its definition, behind which are those of the types that it needs.
+    /// From a type and the text of its definition, followed by those of the required types.
     pub fn new(name: &str, definition: &str, encoding: Encoding) -> Self {
         let mut definitions = vec![(name.replace("/msg/", "/"), String::new())];
         for line in definition.lines() {
@@ -88,7 +88,9 @@ impl Parser {
                     "" => (kind, Many::Any),
                     bounded if bounded.starts_with("<=") => (kind, Many::Any),
                     fixed => {
-                        let size = fixed.parse().map_err(|_| format!("the field `{line}`"))?;
+                        let size = fixed
+                            .parse()
+                            .map_err(|_| format!("a malformed field `{line}`"))?;
                         (kind, Many::Fixed(size))
                     }
                 },
