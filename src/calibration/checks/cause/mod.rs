@@ -353,7 +353,7 @@ impl FoundCause {
                 let text = format!(
                     "The {} bias stepped by {} {name} before dwell {number} (at {time:.1} s). turncal estimated the \
                      step; the calibration has the mean of both biases. Look there for a shock, or a change of supply \
-                     or temperature",
+                     or temperature; if the log has a temperature column, rerun with --temperature",
                     sensor.name(),
                     three_digits(self.value.norm() / unit),
                 );
