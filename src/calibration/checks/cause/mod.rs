@@ -352,8 +352,8 @@ impl FoundCause {
                 };
                 let text = format!(
                     "The {} bias stepped by {} {name} before dwell {number} (at {time:.1} s). turncal estimated the \
-                     the step; the calibration contains the mean of both biases. Look for a shock or a change of \
-                     supply voltage or temperature at that time",
+                     step; the calibration contains the mean of both biases. Look for a shock or a change of supply \
+                     voltage or temperature at that time; if the log has a temperature column, rerun with --temperature",
                     sensor.name(),
                     three_digits(self.value.norm() / unit),
                 );
