@@ -63,8 +63,8 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The same with another run of the instrument. The priors of the instrument and of the table remain those of the
-    /// first run; each site has its own gravity.
+    /// The same problem with another run of the instrument. The priors of the instrument and of the table remain those
+    /// of the first run; each site has its own gravity.
     pub fn and(&self, run: &'a Run) -> Self {
         let mut all = self.stretches.to_vec();
         all.extend(stretches(run, self.others.len() + 1, &self.model));

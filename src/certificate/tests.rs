@@ -179,7 +179,7 @@ fn results_that_change_with_temperature_state_at_which_they_hold() {
         text.contains("gyros at 21.5 °C, valid from −20.0 to 60.0 °C"),
         "{text}"
     );
-    assert!(xml.contains("accelerometers at 21.5 °C, known from -20.0 to 60.0 °C"));
+    assert!(xml.contains("accelerometers at 21.5 °C, valid from -20.0 to 60.0 °C"));
 }
 
 #[test]

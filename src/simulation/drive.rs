@@ -18,7 +18,7 @@ pub struct Drive {
     pub(super) ideal: PerSensor<Vec<Vector3<f64>>>,
     /// Time, position number and attitude of a perfect table at each reading.
     pub(super) read: Vec<(f64, usize, Matrix3<f64>)>,
-    /// Axis angles in the position held or left at each of these times.
+    /// Axis angles at each of these times; during a move, those of the position before it.
     pub(super) axes: Vec<AxisAngles>,
 }
 

@@ -49,7 +49,7 @@ impl Chamber {
         }
     }
 
-    /// The instrument's temperature and its rate every second of a time in s.
+    /// The instrument's temperature and temperature rate at every second of a duration in s.
     pub(super) fn instrument(&self, duration: f64) -> Warming {
         let steps = (duration / STEP).ceil() as usize + 1;
         let keep = match self.time_constant > 0.0 {

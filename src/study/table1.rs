@@ -136,7 +136,7 @@ impl Row {
 pub struct Courses {
     /// Times, s.
     pub times: Vec<f64>,
-    /// Errors at each time of the first samples, at most as many as in the paper.
+    /// Errors of the first samples (at most as many as in the paper) at each time.
     pub samples: Vec<Vec<ByQuantity<f64>>>,
     /// Moments over all samples of the study, at each time.
     pub moments: Vec<ByQuantity<Moments>>,

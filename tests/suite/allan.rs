@@ -65,7 +65,7 @@ fn deviations_of_a_real_sensor_are_those_of_an_independent_program() {
     };
     let run = directory.join("run.toml");
     let document = json(&turncal(&["allan", run.to_str().unwrap(), "--json"]).success());
-    assert_eq!(document["stretch"], "the whole record");
+    assert_eq!(document["stretch"], "the whole recording");
     // allantools 2024.6, oadev, data_type="freq", of the same samples.
     for (triad, axis, tau, expected) in REFERENCE {
         let axis = &document[triad][axis];

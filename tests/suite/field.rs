@@ -126,7 +126,7 @@ fn the_log_of_a_camera_has_its_scales_before_its_names() {
             &[
                 "gyro_unit = \"count\"  # stated in the file",
                 "accel_unit = \"count\"  # stated in the file",
-                "time_unit = \"ms\"  # as the file says",
+                "time_unit = \"ms\"  # stated in the file",
                 "scale = 818.5115",
                 "scale = 208.838",
                 "columns = { time = \"t\", gyro = [\"gx\", \"gy\", \"gz\"], accel = [\"ax\", \"ay\", \"az\"] }",
@@ -272,9 +272,9 @@ fn of_four_lines_of_names_the_columns_with_units_are_taken() {
         has(
             &draft(&log),
             &[
-                "gyro_unit = \"deg/s\"  # as the file says",
-                "accel_unit = \"m/s^2\"  # as the file says",
-                "time_unit = \"ms\"  # as the file says",
+                "gyro_unit = \"deg/s\"  # stated in the file",
+                "accel_unit = \"m/s^2\"  # stated in the file",
+                "time_unit = \"ms\"  # stated in the file",
                 &format!(
                     "columns = {{ time = \"{time}\", gyro = [\"Gyroscope X CAL\", \"Gyroscope Y CAL\", \"Gyroscope Z \
                      CAL\"], accel = [\"Wide Range Accelerometer X CAL\", "
@@ -392,7 +392,7 @@ fn a_log_of_one_triad_has_allan_figures_and_no_calibration() {
     let refused = turncal("calibrate");
     let message = String::from_utf8_lossy(&refused.stderr);
     assert!(
-        refused.status.code() == Some(1) && message.contains("no columns of accel"),
+        refused.status.code() == Some(1) && message.contains("no accel columns"),
         "{message}"
     );
 }

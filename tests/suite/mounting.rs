@@ -98,6 +98,6 @@ fn a_gyro_that_is_half_as_sensitive_as_stated_is_named_with_its_axis() {
         let said = turncal(&["calibrate", run.to_str().unwrap(), "--method", method]);
         let said = said.failure().code(1);
         let message = String::from_utf8_lossy(&said.get_output().stderr).into_owned();
-        assert!(message.contains("gyro x were 0.5"), "{method}: {message}");
+        assert!(message.contains("gyro x is 0.5"), "{method}: {message}");
     }
 }

@@ -22,8 +22,8 @@ use cause::{FoundCause, settling};
 use error_term_test::{ErrorTermTest, biases_may_vary};
 use finding::Finding;
 
-/// Findings of all checks of a filter's outcome, and earlier findings; causes before their possible consequences. The
-/// problem is the one as stated.
+/// Findings of all checks of a filter's outcome, and earlier findings; causes before their possible consequences.
+/// `problem` is the problem as stated.
 pub fn findings(problem: &Problem, outcome: &Outcome, others: Vec<Finding>) -> Vec<Finding> {
     let (estimate, innovations) = (&outcome.estimate, &outcome.innovations);
     let rounding = outcome.part(BudgetSource::Rounding);

@@ -59,7 +59,7 @@ pub struct CoefficientRecord {
     pub sigma: Option<f64>,
 }
 
-/// A recording of a calibration from several.
+/// One of the recordings of a joint calibration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RecordingRecord {
     /// Its name.

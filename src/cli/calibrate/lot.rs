@@ -190,7 +190,7 @@ pub fn deliver(
     }
 }
 
-/// The lot was calibrated, but units do not meet their specification.
+/// The lot was calibrated, but some units do not meet their specification.
 #[derive(Debug, thiserror::Error)]
 #[error("the specification is not met: {0}")]
 pub struct NotMet(pub String);

@@ -116,11 +116,16 @@ fn a_quote_that_is_not_closed_is_named_where_it_is() {
     for stray in ["0,\"1,2\n", "0,1,\"2\n", "\"0,1,2\n"] {
         let text = format!("{names}{good}{stray}{good}");
         let error = rows("a.csv", text.as_bytes()).unwrap_err().to_string();
-        assert!(error.contains("line 502: found a quote"), "{error}");
+        assert!(
+            error.contains("line 502: found an unclosed quote"),
+            "{error}"
+        );
     }
     let error = rows("a.csv", b"t,\"gx,ax\n0,1,2\n").unwrap_err();
     assert!(
-        error.to_string().contains("line 1: found a quote"),
+        error
+            .to_string()
+            .contains("line 1: found an unclosed quote"),
         "{error}"
     );
     // A quote within a field is a letter of it: an inch.

@@ -37,7 +37,7 @@ const FEWEST_ROWS: usize = 100;
 /// Minimum number of samples at rest for a noise estimate.
 const FEWEST_AT_REST: usize = 64;
 
-const NO_COLUMNS: &str = "not recognized by name or values";
+const NO_COLUMNS: &str = "not recognised by name or values";
 const AXES_OF_PROGRAM: &str = "axis convention of the program that wrote the log";
 
 /// Information in a log about the instrument and its recording.

@@ -66,8 +66,8 @@ impl Course {
     ///
     /// Every second edge is omitted and interpolated from its neighbours, and every fourth one from those two away. The
     /// squared error due to white noise, which the filter models, grows linearly with edge distance, and that of a
-    /// signal not followed by the cubic with its eighth power. This separates the two, and the signal part at the
-    /// actual distance is 2⁻⁸ of that at twice the distance.
+    /// signal not followed by the cubic with its eighth power. The two parts can therefore be separated; the signal
+    /// part at the actual distance is 2⁻⁸ of that at twice the distance.
     pub fn edge_error(&self) -> [f64; 3] {
         self.sums.each_ref().map(|sums| {
             let missed = |apart: usize| {

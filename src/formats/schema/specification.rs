@@ -187,7 +187,7 @@ mod tests {
                 "[gyro]\nscale_ppm = { within = 3, w = 1 }\n",
                 "unknown field `w`",
             ),
-            ("confidence = 95\n[gyro]\nscale_ppm = 3\n", "0.5 to"),
+            ("confidence = 95\n[gyro]\nscale_ppm = 3\n", "at least 0.5"),
             ("confidence = 0.9\n", "limits"),
         ] {
             let message = read(&format!("{format}{text}")).unwrap_err().to_string();

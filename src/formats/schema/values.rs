@@ -97,7 +97,7 @@ impl<const N: usize> TryFrom<Vec<String>> for Names<N> {
     fn try_from(names: Vec<String>) -> Result<Self, Self::Error> {
         names.try_into().map(Self).map_err(|_| match N {
             4 => "four columns in the order w, x, y, z",
-            _ => "three texts in quotes",
+            _ => "three strings in quotes",
         })
     }
 }

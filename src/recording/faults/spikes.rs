@@ -21,8 +21,8 @@ const SIDE: usize = TRIALS + LINES[LINES.len() - 1];
 ///
 /// A sample belongs to the motion if the line from before or from after fits it, or if it lies between the two: then a
 /// turn started or ended there. The error of a line is measured on the surrounding samples, and therefore includes
-/// noise, grid and motion. The limit follows the tail of the second differences of the whole column. A knock is also
-/// motion: it lasts longer than one sample, or appears on other axes.
+/// noise, resolution and motion. The limit follows the tail of the second differences of the whole column. A knock is
+/// also motion: it lasts longer than one sample, or appears on other axes.
 pub fn spikes(columns: &[&[f64]; 6], steps: &[f64], limit: Limit) -> [Vec<usize>; 6] {
     if columns[0].len() < 2 * TRIALS {
         return [const { Vec::new() }; 6];

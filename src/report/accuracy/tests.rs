@@ -193,7 +193,9 @@ fn position_errors_beyond_their_predicted_sigma_are_called_so() {
     (held.within, held.interval) = (0, (1, 3));
     let doubts = doubts(&accuracy);
     assert!(
-        doubts.contains("stationary, the position error does not lie"),
+        doubts.contains(
+            "stationary, the position error is within its predicted σ less or more often"
+        ),
         "{doubts}"
     );
     assert!(

@@ -79,7 +79,7 @@ fn data_are_hourly_and_have_lengths_of_components_and_of_their_sigma() {
 #[test]
 fn without_covariance_nothing_is_predicted_and_that_is_said() {
     let document = document(&moments(false));
-    assert!(document.warnings.items[0].contains("monday claims no σ"));
+    assert!(document.warnings.items[0].contains("monday states no σ"));
     assert!(document.data["series"][0]["sigma"].is_null());
     assert!(!document.files[0].1.contains("sigma"));
 }

@@ -72,7 +72,7 @@ impl Typeface {
         text.char_indices().map(glyph).collect()
     }
 
-    /// Width of a text, pt.
+    /// Width of the text, pt.
     pub fn width(&self, text: &str, size: f32) -> f32 {
         self.glyphs(text)
             .iter()

@@ -134,7 +134,7 @@ impl Panel {
     }
 }
 
-/// Offset of the n-th of several items from the centre of its position, of which all together occupy this fraction.
+/// Offset of the n-th of several items from the centre of their position; together they occupy this fraction of it.
 pub fn beside(n: usize, count: usize, part: f64) -> f64 {
     part * ((n as f64 + 0.5) / count.max(1) as f64 - 0.5)
 }

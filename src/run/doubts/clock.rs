@@ -272,7 +272,7 @@ mod tests {
             imu.gyro.to_mut().iter_mut().for_each(|row| *row *= 1.05);
         });
         let off = off.unwrap();
-        assert!(off.contains("ppm further than the table"), "{off}");
+        assert!(off.contains("ppm more than the table"), "{off}");
     }
 
     #[test]

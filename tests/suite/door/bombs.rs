@@ -191,6 +191,6 @@ fn a_record_that_outgrows_memory_is_refused_at_the_row_where_it_does() {
     refused(
         here,
         "init imu.csv.gz",
-        &["imu.csv.gz, line", "found row", "memory"],
+        &["imu.csv.gz, line", "rows so far", "memory"],
     );
 }

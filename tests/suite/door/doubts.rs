@@ -138,7 +138,7 @@ fn rows_of_zeros_and_values_beyond_any_instrument_are_found_and_bridged() {
     assert!(says(&run, "3 rows are zero in all columns") && says(&run, "first in line 102,"));
     assert!(says(
         &run,
-        "2 samples of `gx` are beyond what any instrument measures"
+        "2 samples of `gx` are beyond the range of any instrument"
     ));
     let sound = made_run("made").recording.imu;
     for (kind, sample) in [
@@ -178,7 +178,7 @@ fn rows_lost_behind_a_counter_that_wraps_are_not_counted_in_silence() {
         fs::write(place.join("run.toml"), text).unwrap();
         let run = read(&place);
         assert_eq!(run.recording.imu.len(), 300);
-        let words = "the counter wraps every 256 samples, 2 s";
+        let words = "the counter wraps every 256 samples (2";
         assert_eq!(says(&run, words), said, "{:?}", run.recording.doubts);
     }
 }

@@ -246,7 +246,7 @@ fn each_wrong_value_in_run_toml_has_its_message() {
         (
             "quaternion = [\"qw\", \"qx\", \"qy\", \"qz\"]",
             "angles = [\"qw\"], axes = [\"x\", \"y\"]",
-            "each of 2 axes",
+            "each of the 2 axes",
         ),
         ("\"qz\"]", "\"qz\", \"qw\"]", "\"qw\"] & four columns"),
     ] {
@@ -332,7 +332,7 @@ fn each_wrong_row_or_column_has_its_message() {
             "table.csv",
             "\n0.5,1,0,",
             "\n0.4,0,1,",
-            "line 7 & duplicate",
+            "line 7 & same time",
         ),
         ("table.csv", "\n0.5,", "\n-1,", "line 7 & steps back"),
         ("table.csv", "qw,", "q0,", "line 1 & named `qw`"),
@@ -384,7 +384,7 @@ fn each_wrong_file_has_its_message() {
         (
             "imu.csv",
             &twice_as_slow,
-            "steps of 0.02 s & sample_period_s",
+            "a time step of 0.02 s & sample_period_s",
         ),
         ("imu.csv", &parted, "line 102 & gap & 1 s to 100 s & split"),
         ("table.csv", &table_elsewhere, "90 s to 92 s & overlap"),

@@ -110,8 +110,8 @@ pub fn by_labels(motion: &Motion, errors: &Errors, orders: &[AxisOrder]) -> PerS
 }
 
 /// Without both: the gravity direction rotates as sensed by the gyros, and the vertical Earth rate is that of the
-/// latitude, so one triad is tested against the other. The result is by the accelerometer order in gyro axes, with the
-/// gyros unchanged and with all of them reversed.
+/// latitude, so one triad is tested against the other. Returns the likelihood of each accelerometer order relative to
+/// the gyro axes, with the gyros unchanged and with all of them reversed.
 pub fn by_gravity(motion: &Motion, errors: &Errors, orders: &[AxisOrder]) -> [Likelihoods; 2] {
     [0, 1].map(|reversed| {
         Likelihoods::new(errors, orders, |equations, order| {

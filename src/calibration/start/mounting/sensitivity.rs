@@ -97,15 +97,19 @@ impl fmt::Display for Sensitivity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let factor = self.factors.first().copied().unwrap_or(1.0);
         let times = three_digits(factor);
+        let (are, measure) = match self.axes {
+            Axes::All => ("are", "measure"),
+            Axes::One(_) => ("is", "measures"),
+        };
         match self.sensor {
             Sensor::Gyro => write!(
                 f,
-                "the turns fit only if {} are {times} times as sensitive as run.toml states",
+                "the turns fit only if {} {are} {times} times as sensitive as run.toml states",
                 self.named("the gyros")
             )?,
             Sensor::Accel => write!(
                 f,
-                "{} measure gravity as {} m/s² at rest, {times} times the true value",
+                "{} {measure} gravity as {} m/s² at rest, {times} times the true value",
                 self.named("the accelerometers"),
                 three_digits(factor * STANDARD_GRAVITY)
             )?,

@@ -22,7 +22,7 @@ pub fn of_all(directory: &Path) -> io::Result<String> {
     Ok(of_names(names.iter().map(String::as_str)))
 }
 
-/// The list of a growing directory with these entries. Entries that end in `/` have their own list.
+/// Text of the list of a growing directory that has these entries. Entries that end in `/` have their own list.
 pub fn of_names<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     let lines = std::iter::once(FIRST_LINE).chain(names);
     lines.flat_map(|line| [line, "\n"]).collect()

@@ -202,7 +202,7 @@ fn a_file_on_the_way_to_the_output_is_named() {
     let root = tempfile::tempdir().unwrap();
     fs::write(root.path().join("x"), "1").unwrap();
     let error = write_whole(&root.path().join("x/y/z"), b"1", true).unwrap_err();
-    assert!(error.to_string().contains("a file, "), "{error}");
+    assert!(error.to_string().contains("found the file "), "{error}");
     assert_eq!(names(root.path()), ["x"]);
 }
 

@@ -76,7 +76,7 @@ fn a_turn_within_two_rows_is_no_cut_if_gyros_show_it() {
     };
     has(
         &drafted(&laid_end_to_end.rows()),
-        &["continuous = false  # gravity changes its direction at once"],
+        &["continuous = false  # gravity direction jumps in 4 places"],
     );
 }
 

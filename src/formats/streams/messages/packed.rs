@@ -54,7 +54,7 @@ pub fn unpack(method: &str, packed: &[u8], size: u64, offset: u64) -> Result<Vec
         return Err(Broken::new(
             offset,
             format_args!("{} bytes in a chunk", unpacked.len()),
-            format_args!("{size} bytes as its header states"),
+            format_args!("{size} bytes, as its header states"),
         ));
     }
     Ok(unpacked)

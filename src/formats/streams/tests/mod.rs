@@ -193,10 +193,7 @@ fn every_format_gives_all_samples_and_what_the_sensor_gave() {
             assert_eq!(off, None, "{name}, sample {k}: {found:?} {expected:?}");
             let corrected = added != 0.0;
             assert_eq!(
-                stream
-                    .remarks
-                    .iter()
-                    .any(|remark| remark.contains("undone")),
+                stream.remarks.iter().any(|remark| remark.contains("undid")),
                 corrected
             );
             k += 1;

@@ -143,7 +143,7 @@ fn where_device_or_parameters_change_each_sample_is_undone_by_its_own_and_all_ar
     let (offsets, remarks) = undone(&[Selected(1), Sample, Offset(3.0), Sample]);
     assert_eq!(offsets, [1.0, 3.0]);
     assert!(
-        remarks[0].contains("which change within the log: this is undone"),
+        remarks[0].contains("which change within the log. turncal undid this correction"),
         "{remarks:?}"
     );
     assert!(!remarks[1].contains("change"), "{remarks:?}");
