@@ -260,7 +260,7 @@ impl Screen {
         if self.is_terminal && !self.silent {
             return self.draw(&session::screen(run, status, specification));
         }
-        // The last dwell goes on while the instrument is at rest.
+        // The last dwell is not complete while the instrument is at rest.
         let whole = status.survey.rests.len() - usize::from(status.still > 0.0);
         while self.told < whole {
             if let Some(line) = session::line(status, self.told) {
