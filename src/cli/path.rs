@@ -21,6 +21,8 @@ use crate::cli::terminal::Activity;
 
 /// Tells what a path of turntable or hand will give, before any data exist
 #[derive(Debug, clap::Args)]
+#[command(arg_required_else_help = true)]
+#[command(after_help = "Example:  turncal path evaluate three-axis")]
 pub struct PathCommand {
     #[command(subcommand)]
     command: Command,

@@ -12,6 +12,8 @@ use crate::survey::decided;
 const NOT_SHOWN: f64 = 0.5;
 /// Number of combinations of parameters that the page lists.
 const LISTED: usize = 5;
+/// Number of error terms and combinations that the terminal names.
+const NAMED: usize = 2;
 
 /// A path as it is reported.
 pub struct Report<'a> {
@@ -132,37 +134,38 @@ impl Report<'_> {
             ),
         );
         let directions = &evaluation.bound.observability.directions;
-        let weakest = directions.iter().take(2);
+        let weakest = directions.iter().take(NAMED);
         let weakest = weakest.map(|of| format!("{} ({} %)", of.words, percent(of.remaining)));
         facts.push("weakest", weakest.collect::<Vec<_>>().join("; "));
         facts.push("navigation", navigation::line(&self.navigated()));
-        let hidden = evaluation
-            .left_off
-            .iter()
-            .filter(|of| of.remaining > NOT_SHOWN);
-        let hidden: Vec<String> = hidden.map(|of| self.effect(of)).collect();
+        let hidden = evaluation.left_off.iter();
+        let hidden = hidden.filter(|of| of.remaining > NOT_SHOWN);
+        let mut hidden: Vec<_> = hidden.filter_map(|of| self.effect(of)).collect();
+        hidden.sort_by(|a, b| b.0.total_cmp(&a.0));
         if !hidden.is_empty() {
-            facts.push("not shown", hidden.join("; "));
+            let named = hidden.iter().take(NAMED).map(|(_, text)| text.as_str());
+            let mut text = named.collect::<Vec<_>>().join("; ");
+            if let more @ 1.. = hidden.len().saturating_sub(NAMED) {
+                text += &format!("; {more} more");
+            }
+            facts.push("not shown", text);
         }
         facts
     }
 
-    /// A term that is left off with its largest effect, relative to the expected σ.
-    fn effect(&self, of: &TermLeftOff) -> String {
+    /// Largest effect of a term that is left off: relative to the expected σ, and in words.
+    fn effect(&self, of: &TermLeftOff) -> Option<(f64, String)> {
         let sigma = self.rms(&self.evaluation.bound.estimate.sigma());
         let change = self.rms(&of.change);
         let groups = Group::all().zip(sigma).zip(change);
         let ratio =
-            groups.filter_map(|((group, sigma), change)| Some((group, change?, change? / sigma?)));
-        let largest = ratio.max_by(|a, b| a.2.total_cmp(&b.2));
-        largest.map_or(String::new(), |(group, change, _)| {
-            let (change, unit) = (three_digits(change), group.unit());
-            format!(
-                "{} (could change {} by {change} {unit})",
-                of.term.name(),
-                group.short()
-            )
-        })
+            groups.filter_map(|((group, sigma), change)| Some((change? / sigma?, group, change?)));
+        let (ratio, group, change) = ratio.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let (change, unit, name) = (three_digits(change), group.unit(), of.term.name());
+        Some((
+            ratio,
+            format!("{name} (could change {} by {change} {unit})", group.short()),
+        ))
     }
 
     /// σ of each group without each move, over σ with all.

@@ -182,7 +182,7 @@ fn without_truth_or_baseline_no_error_is_claimed() {
     assert!(!names(&files).contains(&"comparison.svg"));
     let page = page(&report);
     assert!(!page.contains("error / σ") && !page.contains("EKF: largest"));
-    assert!(page.contains("The truth is unknown"));
+    assert!(page.contains("The truth is not known"));
     report.closed_form = None;
     report.navigation = Ok(&navigation[1..]);
     assert_sound(&written(&report));

@@ -48,7 +48,7 @@ fn what_is_wrong_with_a_lot_is_said_with_the_names_of_its_units() {
     assert!(!warnings.contains("Not decided"), "{warnings}");
     let text = terminal::text(&document, Some(100));
     assert!(
-        text.contains("1 of 20 limits exceeded, 18 kept, 1 undecided"),
+        text.contains("1 of 20 limits exceeded, 18 met, 1 undecided"),
         "{text}"
     );
     assert!(text.contains("fail: gyro K x") && text.contains("not calibrated"));
