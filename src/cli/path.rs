@@ -49,11 +49,9 @@ impl PathCommand {
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal path evaluate three-axis
-  turncal path evaluate my-path.toml --imu navigation-fog \\
-      --specification specification.toml
-  turncal path evaluate \"z_up, turn x 90, turn x 90, x_up, x_down, y_up\" \\
-      --imu bmi088
-  turncal path evaluate my-run/run.toml -o expected")]
+  turncal path evaluate three-axis --imu navigation-fog -o expected
+  turncal path evaluate z_up,x_up,x_down,y_up,y_down --imu bmi088
+  turncal path evaluate my-run/run.toml")]
 pub struct Evaluate {
     /// Path: a TOML file, an embedded name, words for a path by hand, or a run.toml
     path: String,

@@ -85,8 +85,9 @@ impl PathStudy {
         );
         let mut evaluation = whole?;
         evaluation.standing = self.scenario.standing_time()?;
+        let duration = self.scenario.duration()?;
         for mut without in without? {
-            without.time = evaluation.duration - without.time;
+            without.time = duration - without.time;
             evaluation.without.push(without);
         }
         Ok(evaluation)

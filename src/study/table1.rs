@@ -20,12 +20,12 @@ use paper::Published;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use response::{Response, errors, standing};
+use response::{Moment, Response, errors, standing};
 
 use crate::earth::ROTATION_RATE;
 use crate::imu::{InstallationForm, PerSensor, Sensor, Triad};
 use crate::models::{InstallationModel, Instrument, ModelError, Place};
-use crate::study::navigation::{Exposure, NavigationStudyError};
+use crate::study::navigation::NavigationStudyError;
 
 pub use paper::{ByQuantity, Installation, Kind, QUANTITIES, Reading};
 pub use response::Moments;
@@ -268,12 +268,12 @@ impl Table1Study {
     /// As [`Self::run`].
     pub fn courses(&self, sensor: Sensor, row: &Row) -> Result<Courses, Table1Error> {
         let response = Response::new(&standing(self.latitude, row.hours * 3600.0))?;
-        let exposures: Vec<&Exposure> = response.thinned(TIMES).collect();
+        let exposures: Vec<&Moment> = response.thinned(TIMES).collect();
         let course = |sensed: &Vector3<f64>| {
             let errors = exposures.iter().map(|at| errors(at, sensor, sensed));
             errors.collect()
         };
-        let moments = |at: &&Exposure| {
+        let moments = |at: &&Moment| {
             let all: Vec<_> = row.sensed.iter().map(|s| errors(at, sensor, s)).collect();
             std::array::from_fn(|q| Moments::of(all.iter().map(|errors| errors[q])))
         };

@@ -239,6 +239,49 @@ mod by_hand {
     }
 
     #[test]
+    fn a_session_gives_what_the_whole_record_gives_and_refuses_what_is_no_number() {
+        let mut person = Person::new(3);
+        for up in [
+            Vector3::x(),
+            -Vector3::x(),
+            Vector3::y(),
+            -Vector3::y(),
+            -Vector3::z(),
+        ] {
+            person.does(Move::Up(up));
+        }
+        let run = person.run();
+        let imu = &run.recording.imu;
+        let rates = |of: Vec<Vector3<f64>>| -> Vec<Vector3<f64>> {
+            of.into_iter().map(|sample| sample / imu.period).collect()
+        };
+        let [gyro, accel] = [&imu.gyro, &imu.accel].map(|of| rates(of.iter().collect()));
+        let mut session = Session::new(run.instrument.clone(), run.site, imu.period);
+        let mut told = 0;
+        for (gyro, accel) in gyro.chunks(70).zip(accel.chunks(70)) {
+            told += usize::from(session.push(gyro, accel).unwrap().is_some());
+        }
+        let seconds = imu.duration();
+        assert!(
+            (0.6..=1.0).contains(&(told as f64 / seconds)),
+            "{told} in {seconds} s"
+        );
+        assert!(
+            session
+                .push(&[Vector3::repeat(f64::NAN)], &[Vector3::z()])
+                .is_err()
+        );
+        let [live, whole] = [
+            session.status().unwrap(),
+            Status::of(&run, None, &mut Advisor::default()),
+        ];
+        assert_eq!(live.survey.rests.len(), 6);
+        assert_eq!(live.survey.rests.len(), whole.survey.rests.len());
+        let [live, whole] = [live, whole].map(|of| of.expected.unwrap().bound.estimate.sigma());
+        assert!((live - whole).amax() <= 1e-6 * whole.amax());
+    }
+
+    #[test]
     #[ignore = "statistical"]
     fn who_does_what_is_said_needs_hardly_more_dwells_than_the_best_of_fifty_orders() {
         let mut ratios = Vec::new();

@@ -108,7 +108,7 @@ fn a_growing_file_ends_when_it_no_longer_grows() {
 
 #[cfg(unix)]
 #[test]
-fn a_device_that_goes_comes_again_and_ctrl_c_calibrates_what_was_read() {
+fn a_device_that_goes_comes_again_and_a_request_to_end_calibrates_what_was_read() {
     let directory = tempfile::tempdir().unwrap();
     let rows = rows(directory.path());
     let made = Command::new("mkfifo")
@@ -125,10 +125,11 @@ fn a_device_that_goes_comes_again_and_ctrl_c_calibrates_what_was_read() {
         fs::write(&device, part).unwrap();
         thread::sleep(Duration::from_secs(2));
     }
+    // As Ctrl-C, which processes in the background of a shell may ignore.
     let id = child.id().to_string();
     assert!(
         Command::new("kill")
-            .args(["-INT", &id])
+            .args(["-TERM", &id])
             .status()
             .unwrap()
             .success()

@@ -7,7 +7,7 @@ static ENDS_GENTLY: AtomicBool = AtomicBool::new(false);
 /// … and whether it was pressed.
 static ENDED: AtomicBool = AtomicBool::new(false);
 
-/// From here on, the first Ctrl-C makes [`is_ended`] true; the next one ends the command.
+/// From here on, the first Ctrl-C or request to end makes [`is_ended`] true; the next one ends the command.
 pub fn end_gently() {
     ENDS_GENTLY.store(true, Ordering::SeqCst);
 }
@@ -43,7 +43,7 @@ pub fn leave_nothing_behind() {
         .name("signals".into())
         .spawn(move || {
             for signal in signals.forever() {
-                if signal == SIGINT && ENDS_GENTLY.swap(false, Ordering::SeqCst) {
+                if signal != SIGHUP && ENDS_GENTLY.swap(false, Ordering::SeqCst) {
                     ENDED.store(true, Ordering::SeqCst);
                     continue;
                 }

@@ -1,11 +1,12 @@
 //! Effect of constant sensor errors on the navigation of a body at rest.
 
-use nalgebra::Vector3;
+use nalgebra::{SMatrix, Vector3};
 
 use super::paper::{ByQuantity, QUANTITIES};
 use crate::calibration::parameter;
 use crate::earth::Site;
 use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+use crate::navigation::error_model::STATES;
 use crate::study::navigation::{Exposure, Mission, NavigationStudyError};
 
 /// Longest output step in s. The largest of a Schuler swing of 84 min lies within half a step of an
@@ -48,19 +49,34 @@ pub fn standing(latitude: f64, duration: f64) -> Mission {
 /// At rest under constant sensor errors, the linear error model has constant coefficients: its response to each
 /// unit error, that of the bias of an ideal instrument, is computed once, and every sample is a linear combination
 /// of the responses.
-pub struct Response(Vec<Exposure>);
+pub struct Response(Vec<Moment>);
+
+/// Navigation errors at one time per unit of the sensed errors of each triad.
+#[derive(Debug, Clone)]
+pub struct Moment {
+    /// Time, s.
+    pub time: f64,
+    by_sensed: PerSensor<SMatrix<f64, STATES, 3>>,
+}
 
 impl Response {
     pub(super) fn new(mission: &Mission) -> Result<Self, NavigationStudyError> {
         let ideal = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
-        mission.exposure(&ideal).map(Self)
+        let moment = |exposure: &Exposure| Moment {
+            time: exposure.time,
+            by_sensed: PerSensor::from_fn(|sensor| {
+                let bias = parameter(sensor, PER_TRIAD - 3);
+                exposure.by_parameter.fixed_columns::<3>(bias).into_owned()
+            }),
+        };
+        Ok(Self(mission.exposure(&ideal)?.iter().map(moment).collect()))
     }
 
     /// Largest absolute error over the run.
     pub(super) fn largest(&self, sensor: Sensor, sensed: &Vector3<f64>) -> ByQuantity<f64> {
         let mut largest = [0.0; 5];
-        for exposure in &self.0 {
-            for (largest, error) in largest.iter_mut().zip(errors(exposure, sensor, sensed)) {
+        for moment in &self.0 {
+            for (largest, error) in largest.iter_mut().zip(errors(moment, sensor, sensed)) {
                 *largest = f64::max(*largest, error.abs());
             }
         }
@@ -68,15 +84,14 @@ impl Response {
     }
 
     /// About this many moments, evenly spaced from the first on.
-    pub(super) fn thinned(&self, moments: usize) -> impl Iterator<Item = &Exposure> {
+    pub(super) fn thinned(&self, moments: usize) -> impl Iterator<Item = &Moment> {
         self.0.iter().step_by(self.0.len().div_ceil(moments.max(1)))
     }
 }
 
 /// Errors at one moment: attitude with its sign, velocity and position as norms.
-pub fn errors(exposure: &Exposure, sensor: Sensor, sensed: &Vector3<f64>) -> ByQuantity<f64> {
-    let bias = parameter(sensor, PER_TRIAD - 3);
-    let errors = exposure.by_parameter.fixed_columns::<3>(bias) * sensed;
+pub fn errors(moment: &Moment, sensor: Sensor, sensed: &Vector3<f64>) -> ByQuantity<f64> {
+    let errors = moment.by_sensed.get(sensor) * sensed;
     QUANTITIES.map(|quantity| quantity.of(&errors))
 }
 
