@@ -1,4 +1,4 @@
-//! A calibration under way: samples are pushed as they come, and each second tells what to do next.
+//! A calibration in progress: samples are pushed as they arrive, and the session recommends the next move.
 //!
 //! Run it with `cargo run --release --example session`.
 
@@ -9,7 +9,7 @@ use turncal::simulation::Scenario;
 use turncal::survey::Session;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    // Where a program of your own reads a sensor, this one takes the samples of a simulated one.
+    // Your own program would read a sensor here; this one uses simulated samples.
     let run = Scenario::load("mems")?.simulate(7, 0)?.run;
     let imu = &run.recording.imu;
     let rates = |of: Vec<Vector3<f64>>| of.into_iter().map(|sample| sample / imu.period).collect();

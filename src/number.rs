@@ -45,7 +45,7 @@ pub fn whole(x: f64) -> String {
     if !x.is_finite() {
         return value(x, x);
     }
-    // Beyond this neither a floating-point number nor a reader knows the last digit.
+    // Beyond this size, the last digit of a floating-point number has no meaning.
     if x.abs() >= 1e15 {
         return format!("{x:.2e}").replace('-', "−");
     }
@@ -71,7 +71,7 @@ pub fn stated(x: f64) -> String {
     plain(to_twelve_digits(x))
 }
 
-/// The same of three axes; one number if all are equal.
+/// The same for three axes; one number if all are equal.
 pub fn stated_axes(of: [f64; 3]) -> String {
     let mut all = of.map(stated).to_vec();
     all.dedup();
@@ -106,7 +106,7 @@ pub fn with_interval(of: f64, (low, high): (f64, f64)) -> [String; 2] {
     [value(of, 0.5 * (high - low)), interval((low, high))]
 }
 
-/// A value with its 1σ; to three digits where it has none.
+/// A value with its 1σ; to three digits if it has none.
 pub fn plus_minus(of: f64, own: f64) -> String {
     if own <= 0.0 {
         return three_digits(of);
@@ -119,7 +119,7 @@ pub fn or_dash(of: Option<f64>, shown: impl FnOnce(f64) -> String) -> String {
     of.map_or_else(|| "–".to_owned(), shown)
 }
 
-/// The first of some units, the largest first, of which a size in SI has one at least; else the last.
+/// The first unit, from the largest down, that does not exceed a size in SI; the last unit if all exceed it.
 pub fn readable(units: &[(&'static str, f64)], size: f64) -> (&'static str, f64) {
     let fits = units.iter().find(|(_, unit)| size >= *unit);
     fits.or(units.last()).copied().unwrap_or(("", 1.0))

@@ -10,7 +10,7 @@ use crate::calibration::{
 };
 use crate::imu::{PerSensor, TermVector, ThermalCoefficients, Triad};
 
-/// The bound of a run: the least covariance of any estimator.
+/// The bound of a run: the smallest covariance that any estimator can reach.
 #[derive(Debug, Clone)]
 pub struct Bound {
     /// The truth, with the bound as its covariance.
@@ -25,13 +25,13 @@ pub struct Bound {
     pub observability: Observability,
 }
 
-/// An error term that a bound leaves off.
+/// An error term that a bound does not include.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TermLeftOff {
     /// The term.
     pub term: ErrorTerm,
-    /// Largest remaining part of the prior σ of any combination of its parameters if it were estimated with its usual σ:
-    /// from 0 (known) to 1 (not observed).
+    /// Largest remaining part of the prior σ of any combination of its parameters, if it were estimated with its usual
+    /// σ: from 0 (known) to 1 (not observed).
     pub remaining: f64,
     /// 1σ of the change of each parameter if the term has its usual size.
     pub change: ParameterVector,
@@ -69,7 +69,7 @@ pub fn bound(
     })
 }
 
-/// The constant error terms that a problem leaves off, at a truth as for [`bound`].
+/// The constant error terms that a problem does not estimate, at a truth as for [`bound`].
 ///
 /// # Errors
 /// [`CalibrationError`] as for [`super::estimate`].

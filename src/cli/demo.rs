@@ -50,17 +50,17 @@ pub struct Demo {
     /// Seed of all random numbers [default: the scenario's]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
-    /// Play a sensor that is turned by hand, and follow its rows
+    /// Simulate a sensor turned by hand, and follow its rows as they arrive
     #[arg(long)]
     follow: bool,
-    /// With --follow: how many times as fast as the sensor
+    /// With --follow: playback speed, as a multiple of real time
     #[arg(long, value_name = "N", value_parser = positive, default_value = "5", requires = "follow")]
     speed: f64,
     #[command(flatten)]
     overwrite: Overwrite,
 }
 
-/// The hand's path; its third dwell is too short to be one.
+/// Path of the sensor turned by hand; its third dwell is too short to count.
 const BY_HAND: &str = "z_up, turn x 180, turn y 20, x_up, x_down, turn z 90, y_up, y_down, turn y 180, turn z 180, \
                        turn x 90, turn x 180, turn y 90, z_up, turn z 180";
 const TOO_SHORT: usize = 1;
@@ -125,7 +125,7 @@ impl Demo {
 }
 
 impl Demo {
-    /// Plays a sensor in the hand into a growing log that is followed.
+    /// Writes the rows of a sensor turned by hand into a growing log, and follows it.
     fn followed(&self) -> anyhow::Result<()> {
         let mut scenario = Scenario::load("mems")?;
         scenario.path = path_by_hand(BY_HAND).map_err(anyhow::Error::msg)?;

@@ -19,7 +19,7 @@ use crate::cli::NotMet;
 use crate::cli::arguments::{Delivery, OfLog, error_term, needs_table};
 use crate::cli::terminal::Activity;
 
-/// Tells what a path of turntable or hand will give, before any data exist
+/// Predicts calibration accuracy for a path of a table or by hand, before any data exist
 #[derive(Debug, clap::Args)]
 #[command(arg_required_else_help = true)]
 #[command(after_help = "Example:  turncal path evaluate three-axis")]
@@ -40,10 +40,10 @@ impl PathCommand {
     }
 }
 
-/// Predicts σ, the value of each move, and what a path cannot show
+/// Predicts σ, the value of each move, and errors that a path cannot reveal
 ///
 /// The path is a TOML file or an embedded name, or words for a sensor turned by hand: x_up … z_down, and turns such
-/// as "turn x 90", separated by commas. For a run.toml, σ are those expected from its own record. The prediction
+/// as "turn x 90", separated by commas. For a run.toml, σ are those expected from its own recording. The prediction
 /// is the Cramér–Rao bound for the stated noise. With a specification, the exit status is 3 if σ are too large to
 /// decide a limit.
 #[derive(Debug, clap::Args)]
@@ -53,15 +53,15 @@ impl PathCommand {
   turncal path evaluate z_up,x_up,x_down,y_up,y_down --imu bmi088
   turncal path evaluate my-run/run.toml")]
 pub struct Evaluate {
-    /// Path: a TOML file, an embedded name, words for a path by hand, or a run.toml
+    /// Path: a TOML file, an embedded name, words for turns by hand, or a run.toml
     path: String,
     /// Scenario with site, rate, instrument and table [default: demo; by hand: mems]
     #[arg(long, value_name = "SCENARIO")]
     scenario: Option<String>,
-    /// Instrument: a TOML file or an embedded name, in place of the scenario's
+    /// Instrument that replaces the scenario's: a TOML file or an embedded name
     #[arg(long, value_name = "MODEL")]
     imu: Option<String>,
-    /// Table: a TOML file or an embedded name, in place of the scenario's
+    /// Table that replaces the scenario's: a TOML file or an embedded name
     #[arg(long, value_name = "MODEL")]
     table: Option<String>,
     /// Observations of the filter [default: table; by hand: velocity]
@@ -70,7 +70,7 @@ pub struct Evaluate {
     /// Error terms to estimate
     #[arg(long, value_name = "TERM", value_parser = error_term(), value_delimiter = ',')]
     with: Vec<ErrorTerm>,
-    /// Limits that the calibration is to decide: a specification.toml
+    /// Limits that the calibration must decide (a specification.toml)
     #[arg(long, value_name = "FILE")]
     specification: Option<PathBuf>,
     #[command(flatten)]
@@ -130,10 +130,7 @@ impl Evaluate {
         let Opened { run, .. } = OfLog::default().open(file)?;
         let options = self.options(self.aiding.unwrap_or_else(|| run.aiding()));
         let evaluation = Evaluation::of_run(&run, &options).with_context(|| self.path.clone())?;
-        let with = format!(
-            "The record of {}, with the noise that its run.toml states",
-            self.path
-        );
+        let with = format!("Recording of {}, with the noise stated there", self.path);
         Ok((run.recording.name.clone(), with, Vec::new(), evaluation))
     }
 

@@ -1,4 +1,4 @@
-//! Paths of a sensor that is turned by hand, in words.
+//! Paths of a sensor turned by hand, stated in words.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -8,24 +8,24 @@ use crate::units::DEGREE;
 
 /// Duration of each dwell, s.
 const DWELL: f64 = 10.0;
-/// Mean rate of a turn, rad/s …
+/// Mean rate of a turn without its start and end, rad/s.
 const RATE: f64 = 45.0 * DEGREE;
-/// … beyond this time for its start and end, s.
+/// Additional time for the start and end of a turn, s.
 const START_AND_END: f64 = 1.0;
 /// Angular acceleration at the start and end of a turn, rad/s².
 const ACCELERATION: f64 = 90.0 * DEGREE;
 
-/// A path in words, separated by commas: `x_up` … `z_down` for an axis that points up or down, `turn x 90` for a turn
-/// about a body axis, right-handed, in degrees. Each dwell lasts 10 s.
+/// A path from words separated by commas: `x_up` … `z_down` for an axis that points up or down, `turn x 90` for a
+/// right-handed turn about a body axis in degrees. Each dwell lasts 10 s.
 ///
 /// # Errors
-/// The word that is none of these.
+/// A message with the first word that is neither.
 pub fn path_by_hand(words: &str) -> Result<Path, String> {
     let rotations = words.split(',').map(|word| rotation(word.trim()));
     let mut rotations = rotations.collect::<Result<Vec<_>, _>>()?.into_iter();
     let mut attitude = Matrix3::identity();
     let mut steps = Vec::new();
-    // The first position is where it starts.
+    // The path starts at the first position.
     if let Some(first @ Rotation::Point { .. }) = rotations.as_slice().first().copied() {
         attitude = exp(first.vector(&attitude));
         rotations.next();

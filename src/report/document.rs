@@ -23,7 +23,7 @@ pub struct Document {
     pub warnings: List,
     /// Conclusions from the figures, the most important first.
     pub conclusions: List,
-    /// Facts, tables and plots in their order, and which the page alone has room for.
+    /// Facts, tables and plots in order, each with whether only the page shows it.
     pub blocks: Vec<(PageOnly, Block)>,
     /// The figures by name, with the unit in the name; NaN is null.
     pub data: Value,

@@ -1,4 +1,4 @@
-//! The report of what a path will give: expected σ, what each move is worth, what the path cannot show.
+//! Report on a path: expected σ, the value of each move, and errors that the path cannot reveal.
 
 use super::navigation::{self, Navigated};
 use super::prelude::*;
@@ -8,14 +8,14 @@ use crate::lot::{Check, Specification, Verdict};
 use crate::study::path::{Evaluation, Without};
 use crate::survey::decided;
 
-/// From this remaining part of a term's prior σ on, the path does not show the term.
+/// A term is not observed if more than this part of its prior σ remains.
 const NOT_SHOWN: f64 = 0.5;
-/// Number of combinations of parameters that the page lists.
+/// Number of combinations of parameters on the page.
 const LISTED: usize = 5;
-/// Number of error terms and combinations that the terminal names.
+/// Number of error terms and combinations on the terminal.
 const NAMED: usize = 2;
 
-/// A path as it is reported.
+/// A path with its evaluation.
 pub struct Report<'a> {
     /// Name of the path.
     pub name: &'a str,
@@ -23,7 +23,7 @@ pub struct Report<'a> {
     pub with: &'a str,
     /// Each move in words.
     pub moves: &'a [String],
-    /// What is expected of it.
+    /// Its expected results.
     pub evaluation: &'a Evaluation,
     /// The specification that the calibration is to decide, if any.
     pub specification: Option<&'a Specification>,
@@ -34,10 +34,13 @@ impl Report<'_> {
     pub fn document(&self) -> Document {
         let evaluation = self.evaluation;
         let checks = self.specification.map(|of| decided(of, &evaluation.bound));
-        let mut document = Document::new(format!("What the path {} will give", self.name));
+        let mut document = Document::new(format!(
+            "Predicted calibration accuracy of the path {}",
+            self.name
+        ));
         document.verdict = Some(self.verdict(checks.as_deref()));
         document.lead = vec![format!(
-            "{}. σ are the Cramér–Rao bound of a record along this path with the stated noise; nothing was measured.",
+            "{}. σ are the Cramér–Rao bound for a recording of this path with the stated noise; no data were measured.",
             self.with
         )];
         document.both(self.groups(checks.as_deref()));
@@ -64,7 +67,7 @@ impl Report<'_> {
                     .filter(|check| check.verdict != Verdict::Pass)
                     .count();
                 let text = match open {
-                    0 => format!("a unit at its nominal values passes every limit after {time}"),
+                    0 => format!("after {time}, a unit at its nominal values passes every limit"),
                     open => format!(
                         "after {time}, σ are too large to decide {open} of {} limits",
                         checks.len()
@@ -90,12 +93,12 @@ impl Report<'_> {
         }
     }
 
-    /// Expected σ of each group, the largest part of the prior that remains, and the tightest limit.
+    /// Expected σ and prior σ of each group, and the number of limits that are decided.
     fn groups(&self, checks: Option<&[Check]>) -> Table {
         let bound = &self.evaluation.bound;
         let sigma = bound.estimate.sigma();
         let mut columns = cells!["", "expected 1σ", "largest 1σ", "prior 1σ"];
-        columns.extend(checks.map(|_| "decides".to_owned()));
+        columns.extend(checks.map(|_| "decided".to_owned()));
         let row = |group: Group| {
             let indices = group.estimated(&bound.estimate);
             let with_unit = |value: Option<f64>| {
@@ -128,14 +131,15 @@ impl Report<'_> {
         facts.push(
             "time",
             format!(
-                "{}, of which {} at rest",
+                "{}, including {} at rest",
                 minutes(evaluation.duration),
                 minutes(evaluation.standing)
             ),
         );
         let directions = &evaluation.bound.observability.directions;
         let weakest = directions.iter().take(NAMED);
-        let weakest = weakest.map(|of| format!("{} ({} %)", of.words, percent(of.remaining)));
+        let weakest =
+            weakest.map(|of| format!("{} ({} % of prior σ)", of.words, percent(of.remaining)));
         facts.push("weakest", weakest.collect::<Vec<_>>().join("; "));
         facts.push("navigation", navigation::line(&self.navigated()));
         let hidden = evaluation.left_off.iter();
@@ -148,12 +152,12 @@ impl Report<'_> {
             if let more @ 1.. = hidden.len().saturating_sub(NAMED) {
                 text += &format!("; {more} more");
             }
-            facts.push("not shown", text);
+            facts.push("unobserved terms", text);
         }
         facts
     }
 
-    /// Largest effect of a term that is left off: relative to the expected σ, and in words.
+    /// Largest effect of a term that is not estimated: relative to the expected σ, and in words.
     fn effect(&self, of: &TermLeftOff) -> Option<(f64, String)> {
         let sigma = self.rms(&self.evaluation.bound.estimate.sigma());
         let change = self.rms(&of.change);
@@ -168,7 +172,7 @@ impl Report<'_> {
         ))
     }
 
-    /// σ of each group without each move, over σ with all.
+    /// σ of each group without each move, divided by σ with all moves.
     fn moves(&self) -> Table {
         let all = self.rms(&self.evaluation.bound.estimate.sigma());
         let row = |(number, without): (usize, &Without)| {
@@ -186,15 +190,15 @@ impl Report<'_> {
         };
         let groups = Group::all().map(Group::short);
         let columns = cells!["", "move", "s"].into_iter().chain(groups);
-        let mut table = Table::new("σ without each move, over σ with all moves", columns)
+        let mut table = Table::new("σ without each move, divided by σ with all moves", columns)
             .section(self.evaluation.without.iter().enumerate().map(row))
-            .note("1.00: the move and the dwell after it can be left out. Turns are relative: without one, all later positions \
-                   differ, so that a figure below one is a better path.");
+            .note("1.00: the move and the dwell after it can be left out. Turns are relative, so omitting one changes \
+                   all later positions; if the figure is below 1, the path is better without it.");
         table.optional = vec![2];
         table
     }
 
-    /// Error terms that are left off: whether the path would show them, and how far they move the groups.
+    /// Error terms that are not estimated: whether the path would reveal them, and their effect on the groups.
     fn terms(&self) -> Table {
         let mut terms: Vec<_> = self.evaluation.left_off.iter().collect();
         terms.sort_by(|a, b| b.remaining.total_cmp(&a.remaining));
@@ -217,10 +221,10 @@ impl Report<'_> {
             row
         };
         let groups = Group::all().map(|group| format!("{}, {}", group.short(), group.unit()));
-        let columns = cells!["error term", "shown"].into_iter().chain(groups);
+        let columns = cells!["error term", "observed"].into_iter().chain(groups);
         Table::new("Error terms of usual size that are not estimated, and their effect (RMS, 1σ)", columns)
             .section(terms.iter().map(row))
-            .note("Shown: the data of this path would determine all of the term's parameters to half of their usual σ.")
+            .note("Observed: data from this path would halve, at least, the usual σ of every parameter of the term.")
     }
 
     /// σ of each group against time.
@@ -243,8 +247,8 @@ impl Report<'_> {
         };
         let panels = Group::all().map(panel);
         Plot::new("sigma.svg", "Expected 1σ against time", (3, 330), panels).caption(
-            "1σ of every parameter as the path is followed. A line that stays level is not observed by that part of \
-             the path.",
+            "1σ of every parameter along the path. Where a line stays level, that part of the path does not \
+             determine the parameter.",
         )
     }
 
@@ -351,7 +355,7 @@ impl Report<'_> {
     }
 }
 
-/// How many limits of a group are decided.
+/// Number of decided limits of a group.
 fn how_many(group: Group, checks: &[Check]) -> String {
     let of_group = || {
         checks
@@ -367,7 +371,7 @@ fn how_many(group: Group, checks: &[Check]) -> String {
     }
 }
 
-/// Every limit with the σ that decides it or not.
+/// Every limit with the expected σ, and whether that is small enough to decide it.
 fn limits(checks: &[Check]) -> Table {
     let form = InstallationForm::General;
     let row = |check: &Check| {
@@ -387,7 +391,7 @@ fn limits(checks: &[Check]) -> Table {
     };
     Table::new("Limits", columns("parameter | within ± | expected 1σ | unit | decided"))
         .section(checks.iter().map(row))
-        .note("Decided: a unit at its nominal value would pass with the confidence that the specification asks for.")
+        .note("Decided: a unit at its nominal value would pass with the confidence that the specification requires.")
 }
 
 fn percent(part: f64) -> String {

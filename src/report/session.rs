@@ -1,4 +1,4 @@
-//! A calibration under way, as a screen that is redrawn or as lines.
+//! Status of a calibration in progress, as a screen that is redrawn or as lines.
 
 use nalgebra::Vector3;
 
@@ -9,20 +9,20 @@ use crate::lot::{Specification, Verdict};
 use crate::run::Run;
 use crate::survey::{Move, Progress, Status, needed};
 
-/// A direction of up counts as tried within this angle, rad.
+/// An upward direction counts as tried within this angle, rad.
 const NEAR: f64 = 15.0 * DEGREE;
-/// A turn about a body axis of at least this counts, rad.
+/// Minimum turn about a body axis that counts, rad.
 const TURNED: f64 = 60.0 * DEGREE;
-/// Number of findings that a screen shows.
+/// Maximum number of findings on a screen.
 const SHOWN: usize = 3;
 
-/// What to do, in words.
+/// A move in words.
 pub fn words(next: Move) -> String {
     let up = match next {
         Move::HalfTurn { axis, is_negative } => {
             let sign = if is_negative { "−" } else { "" };
             return format!(
-                "turn it half round about {sign}{} (right-handed), slowly",
+                "turn it slowly by 180° about {sign}{} (right-handed)",
                 AXES[axis]
             );
         }
@@ -39,12 +39,12 @@ pub fn words(next: Move) -> String {
         ["−y"] => "stand it on its front end (y down)".to_owned(),
         ["z"] => "lay it flat, top up (z up)".to_owned(),
         ["−z"] => "lay it flat, upside down (z down)".to_owned(),
-        [_, _] => format!("hold it on an edge, {} up at 45° each", axes.join(" and ")),
+        [_, _] => format!("hold it on an edge, {} both 45° up", axes.join(" and ")),
         _ => format!("hold it on a corner, {} equally far up", axes.join(", ")),
     }
 }
 
-/// The screen: at most 80 columns, the state first, what to do last.
+/// The screen: at most 80 columns, the state first, the next move last.
 pub fn screen(run: &Run, status: &Status, specification: Option<&Specification>) -> Vec<String> {
     let mut lines = vec![
         format!("{}; {}", so_far(status), moving(status)),
@@ -63,8 +63,8 @@ pub fn screen(run: &Run, status: &Status, specification: Option<&Specification>)
     };
     lines.extend(findings.iter().take(SHOWN).map(first));
     lines.push(match status.next {
-        Some(next) => format!("next: {}; hold it still for 5 s", words(next)),
-        None => "every limit of the specification can be decided".to_owned(),
+        Some(next) => format!("next: {}, then keep still for 5 s", words(next)),
+        None => "σ are small enough to decide every limit of the specification".to_owned(),
     });
     lines
 }
@@ -81,7 +81,7 @@ pub fn line(status: &Status, dwell: usize) -> Option<String> {
     let Ok(progress) = &status.expected else {
         return Some(line + "; no calibration yet");
     };
-    // The history may lack the first dwells, before there is anything to start from.
+    // The history may lack the first dwells, when no initial estimate exists yet.
     let behind = status.survey.rests.len() - dwell;
     let of_dwell = progress
         .history
@@ -114,7 +114,7 @@ fn moving(status: &Status) -> String {
     }
 }
 
-/// σ of each group, and what is asked of it.
+/// σ of each group, and the σ that the specification requires.
 fn groups(progress: &Progress, specification: Option<&Specification>) -> Vec<String> {
     let row = |(group, sigma): &(Group, Option<f64>)| {
         let shown = |sigma: f64| {
@@ -141,7 +141,11 @@ fn groups(progress: &Progress, specification: Option<&Specification>) -> Vec<Str
         );
         row.trim_end().to_owned()
     };
-    let asked = if specification.is_some() { "asked" } else { "" };
+    let asked = if specification.is_some() {
+        "required"
+    } else {
+        ""
+    };
     let heading = format!("{:<24}{:>14}{asked:>14}", "", "expected 1σ");
     let last = progress.history.last();
     let rows = last.into_iter().flat_map(|(_, groups)| groups).map(row);
@@ -150,7 +154,7 @@ fn groups(progress: &Progress, specification: Option<&Specification>) -> Vec<Str
         .collect()
 }
 
-/// Which axes were up and down, and about which it was turned.
+/// Axes that were up or down, and axes of turns.
 fn coverage(status: &Status) -> String {
     let mark = |done: bool| if done { "●" } else { "○" };
     let rests = &status.survey.rests;
@@ -170,7 +174,7 @@ fn coverage(status: &Status) -> String {
     text
 }
 
-/// The state as data: σ of each group, what is observed and what comes next.
+/// The state as data: σ of each group, unobserved parameters and the next move.
 pub fn data(status: &Status) -> Value {
     let progress = status.expected.as_ref().ok();
     let last = progress.and_then(|progress| progress.history.last());

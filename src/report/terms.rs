@@ -54,8 +54,8 @@ pub fn rows(
     auxiliary.estimated().filter_map(row).collect()
 }
 
-/// A row of the table of parameters: a value with its σ, which is zero where it is fixed; what the data made of the
-/// prior σ; and its error, as far as it is known, in a table that has errors.
+/// A row of the table of parameters: a value with its σ, which is zero if it is fixed; the ratio of prior to posterior
+/// σ; and, in a table with errors, its error if known.
 pub fn parameter_row(
     name: String,
     unit: &str,

@@ -88,12 +88,12 @@ pub struct Navigated {
     pub situation: Situation,
     /// Each of [`Method::all`].
     pub methods: Vec<Worth>,
-    /// Horizontal position error at the end in nmile that the noise of alignment and navigation makes by
-    /// itself, after any calibration.
+    /// Horizontal position error at the end in nmile due to the noise of alignment and navigation alone, the
+    /// same after every calibration.
     pub noise: Spread,
 }
 
-/// What a method is worth: horizontal position errors in nmile over all instruments.
+/// Accuracy of a method: horizontal position errors in nmile over all instruments.
 #[derive(Debug, Clone)]
 pub struct Worth {
     /// The method.
@@ -120,7 +120,7 @@ pub struct Worth {
 /// Distribution of a length.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spread {
-    /// Half of all are below.
+    /// Half of all values are below it.
     pub median: f64,
     /// The mean.
     pub mean: f64,
@@ -129,10 +129,10 @@ pub struct Spread {
     /// First and third quartile.
     #[serde(skip)]
     pub quartiles: (f64, f64),
-    /// 68 % are below.
+    /// 68 % of all values are below it.
     #[serde(rename = "below_68_percent")]
     pub below_68: f64,
-    /// 95 % are below.
+    /// 95 % of all values are below it.
     #[serde(rename = "below_95_percent")]
     pub below_95: f64,
 }

@@ -23,18 +23,18 @@ pub use ratio::Ratio;
 pub use shard::{Shard, ShardError};
 pub use table1::{Table1, Table1Study};
 
-/// A study of runs that are given by their numbers, each with random streams of its own: neither the number of cores
-/// nor a division into parts changes its result.
+/// A study of numbered runs, each with its own random streams: its result depends neither on the number of cores nor on
+/// a division into parts.
 pub trait Study: Sync {
-    /// What one run gives.
+    /// Result of one run.
     type Trial: Send;
-    /// What all of them give.
+    /// Result of all runs.
     type Outcome;
 
     /// Number of runs.
     fn runs(&self) -> u64;
 
-    /// What makes a run of a number.
+    /// A function that makes the run with a given number.
     ///
     /// # Errors
     /// [`StudyError`] if no run can be made.
@@ -43,13 +43,13 @@ pub trait Study: Sync {
     /// The outcome of all runs, in the order of their numbers.
     ///
     /// # Errors
-    /// [`StudyError`] if they cannot be judged.
+    /// [`StudyError`] if they cannot be evaluated.
     fn outcome(&self, trials: Vec<Self::Trial>) -> Result<Self::Outcome, StudyError>;
 
     /// Makes some of the runs on all cores; `done` is called after each.
     ///
     /// # Errors
-    /// [`StudyError`] if runs cannot be made. A run that gives no calibration is not an error: it is counted.
+    /// [`StudyError`] if runs cannot be made. A run without a calibration is not an error: it is counted.
     fn trials(
         &self,
         runs: &[u64],

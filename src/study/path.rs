@@ -1,4 +1,4 @@
-//! What a path will give, before any data exist: σ from the covariance of a record made along it.
+//! Predicted accuracy of a path, before any data exist: σ from the covariance of a recording along it.
 
 use rayon::prelude::*;
 
@@ -24,7 +24,7 @@ pub struct PathStudy {
     pub options: Options,
 }
 
-/// What a path, or the record of a run, is expected to give.
+/// Expected results of a path, or of the recording of a run.
 #[derive(Debug, Clone)]
 pub struct Evaluation {
     /// Duration, s.
@@ -48,7 +48,7 @@ pub struct Evaluation {
 pub struct Without {
     /// Time that it takes, s.
     pub time: f64,
-    /// Expected σ without it; `None` if the rest is no path that can be calibrated by.
+    /// Expected σ without it; `None` if no calibration is possible along the remaining path.
     pub sigma: Option<ParameterVector>,
 }
 
@@ -61,7 +61,7 @@ pub enum PathError {
     /// No calibration is possible.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
-    /// A calibration by which nobody can navigate.
+    /// The calibration cannot be used for navigation.
     #[error(transparent)]
     Navigation(#[from] NavigationStudyError),
 }
@@ -105,7 +105,7 @@ impl PathStudy {
         Ok(Without { time, sigma })
     }
 
-    /// A record along a path, with its truth.
+    /// A simulated recording along a path, with its truth.
     fn record(
         &self,
         scenario: &Scenario,
@@ -121,7 +121,7 @@ impl PathStudy {
 }
 
 impl Evaluation {
-    /// What a calibration of a run's own record is expected to give, at the triads at which the filter would start.
+    /// Expected results of calibrating a run's own recording, linearised at the triads where the filter would start.
     ///
     /// # Errors
     /// [`PathError`] if no calibration is possible.

@@ -151,7 +151,7 @@ impl Table1Study {
         if self.samples < 2 {
             return Err(Table1Error::Samples(self.samples));
         }
-        // Written so that not-a-number is refused as well.
+        // This form of the condition also rejects NaN.
         if !(self.hours > 0.0 && self.hours.is_finite()) {
             return Err(Table1Error::Hours(self.hours));
         }

@@ -1,6 +1,6 @@
-//! What to do next with a sensor in the hand: of 26 attitudes and six turns, the one that lowers σ most.
+//! The next move of a hand-held sensor: of 26 attitudes and six turns, the one that lowers σ most.
 //!
-//! The information of a move is that of a short record of it, dwell, turn and dwell, which adds to that of the record
+//! The information of a move is that of a short recording of it (dwell, turn, dwell), added to that of the recording
 //! so far.
 
 use std::collections::BTreeMap;
@@ -39,13 +39,13 @@ const PERIOD: f64 = 0.05;
 /// A move of the instrument, to be followed by a dwell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Move {
-    /// To where this direction along right-front-up points up: an axis, an edge or a corner.
+    /// To the attitude in which this direction along right-front-up points up: an axis, an edge or a corner.
     Up(Vector3<f64>),
-    /// By half a turn about this body axis, right-handed about the positive or negative axis.
+    /// Half a turn about this body axis, right-handed about the positive or negative axis.
     HalfTurn {
         /// Index of the axis: right, front, up.
         axis: usize,
-        /// Whether about the negative axis.
+        /// Whether the turn is about the negative axis.
         is_negative: bool,
     },
 }
@@ -85,14 +85,14 @@ fn ups() -> impl Iterator<Item = Vector3<f64>> {
     })
 }
 
-/// Chooses moves. Information of moves is kept for each attitude at which they begin.
+/// Chooses moves. The information of moves is cached for each attitude at which they begin.
 #[derive(Debug, Clone, Default)]
 pub struct Advisor {
     from: BTreeMap<usize, Vec<(Move, DMatrix<f64>)>>,
 }
 
 impl Advisor {
-    /// What to do before any calibration is possible: the first axis that was neither up nor down, from the first on.
+    /// Move before any calibration is possible: the axis whose upward position is farthest from all dwells.
     pub fn first(&self, survey: &Survey) -> Move {
         let faces = ups().take(6);
         let apart = |up: &Vector3<f64>| {
@@ -103,8 +103,8 @@ impl Advisor {
         Move::Up(farthest.unwrap_or(Vector3::z()))
     }
 
-    /// The move that lowers most what is missing, from where this direction along body axes points up: σ beyond those
-    /// that a specification needs, else all σ.
+    /// The move that lowers σ most, from the attitude in which this direction along body axes points up: only σ beyond
+    /// those that a specification needs count; without a specification, all σ.
     pub fn next(
         &mut self,
         run: &Run,
@@ -133,7 +133,8 @@ impl Advisor {
     }
 }
 
-/// Sum of the logarithms of σ, in units of their prior: over what a specification needs, or of all.
+/// Sum of the logarithms of σ: relative to the σ that a specification needs, where larger; without a specification,
+/// of all σ in units of their prior.
 fn missing(
     bound: &Bound,
     sigma: &[f64],
@@ -166,7 +167,7 @@ fn information(bound: &Bound) -> Option<DMatrix<f64>> {
     Some(covariance.cholesky()?.inverse())
 }
 
-/// What each move from an attitude gains, without the prior.
+/// Information from each move that begins at an attitude, without the prior.
 fn worth(run: &Run, from: &Vector3<f64>) -> Vec<(Move, DMatrix<f64>)> {
     let gained = |of: Move| {
         let information = information(&alone(run, from, of)?)?;
@@ -176,7 +177,7 @@ fn worth(run: &Run, from: &Vector3<f64>) -> Vec<(Move, DMatrix<f64>)> {
     Move::all().filter_map(gained).collect()
 }
 
-/// The bound of a short record of one move.
+/// The bound of a short recording of one move.
 fn alone(run: &Run, from: &Vector3<f64>, of: Move) -> Option<Bound> {
     let start = level(from);
     let rotation = of.rotation();
@@ -204,7 +205,7 @@ fn alone(run: &Run, from: &Vector3<f64>, of: Move) -> Option<Bound> {
     bound(&problem, &truth, &TermVector::zeros()).ok()
 }
 
-/// The record of a path by an instrument like that of a run, with its noise.
+/// The recording of a path by an instrument like that of a run, with its noise.
 fn recording(run: &Run, path: &Path) -> Option<Recording> {
     let fast = Axis {
         name: String::new(),

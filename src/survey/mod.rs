@@ -78,7 +78,7 @@ pub struct Expected {
 }
 
 impl Survey {
-    /// Looks at a run, and at what each method could see in it.
+    /// Surveys a run, and the parameters that each method could observe in it.
     pub fn of(run: &Run) -> Self {
         let expected = |path| {
             (
@@ -92,7 +92,7 @@ impl Survey {
         }
     }
 
-    /// Looks at a run, without the methods.
+    /// Surveys a run, without the methods.
     pub fn of_motion(run: &Run) -> Self {
         let rests = motion::rests(run);
         let durations = || {
@@ -158,10 +158,11 @@ impl Expected {
     }
 }
 
-/// What the filter ends with by a record: the bound where the filter would begin, with the noise that shows there.
+/// Expected covariance of the filter for a recording: the bound at the filter's starting point, with the noise that the
+/// recording shows there.
 ///
 /// # Errors
-/// [`CalibrationError`] if the record allows no calibration.
+/// [`CalibrationError`] if the recording cannot be calibrated.
 pub fn bound_of_record(run: &Run, options: &Options) -> Result<Bound, CalibrationError> {
     let problem = Problem::new(run, options);
     let start = coarse_start(&problem)?;

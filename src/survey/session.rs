@@ -1,4 +1,4 @@
-//! A calibration while its rows come in: what they give so far, and what to do next.
+//! A calibration in progress: its expected accuracy so far, and the next move.
 
 use nalgebra::Vector3;
 
@@ -13,21 +13,21 @@ use crate::lot::{Check, Limit, Sample, Specification, Verdict, checks};
 use crate::recording::{Recording, SampleError};
 use crate::run::Run;
 
-/// Rows are evaluated again after this time, s.
+/// Interval between evaluations, s.
 const EVERY: f64 = 1.0;
 
-/// State of a calibration under way.
+/// State of a calibration in progress.
 #[derive(Debug, Clone)]
 pub struct Status {
     /// Duration of the record, s.
     pub duration: f64,
-    /// What the rows show: dwells, turns, contradictions.
+    /// Content of the rows: dwells, turns, contradictions.
     pub survey: Survey,
-    /// How long the instrument has been at rest, s; zero while it moves.
+    /// Time for which the instrument has been at rest, s; zero while it moves.
     pub still: f64,
-    /// Expected σ, or why there is none yet.
+    /// Expected σ, or the reason why there is none yet.
     pub expected: Result<Progress, CalibrationError>,
-    /// What to do next; `None` if nothing is missing.
+    /// The next move; `None` if nothing is missing.
     pub next: Option<Move>,
 }
 
@@ -36,8 +36,8 @@ pub struct Status {
 pub struct Progress {
     /// Covariance, and its history.
     pub bound: Bound,
-    /// For each dwell, time of its end in s and expected RMS σ of each group's parameters there, rad/s or m/s²
-    /// normalised.
+    /// For each dwell: the time of its end in s, and the expected RMS σ of each group's parameters at that time, rad/s
+    /// or m/s² normalised.
     pub history: Vec<(f64, Vec<(Group, Option<f64>)>)>,
     /// Parameters that keep more than half of their prior σ.
     pub unobserved: Vec<String>,
@@ -46,7 +46,7 @@ pub struct Progress {
 }
 
 impl Status {
-    /// Of the record up to now.
+    /// State of the recording so far.
     pub fn of(run: &Run, specification: Option<&Specification>, advisor: &mut Advisor) -> Self {
         let imu = &run.recording.imu;
         let survey = Survey::of_motion(run);
@@ -124,7 +124,7 @@ impl Progress {
 pub fn decided(specification: &Specification, bound: &Bound) -> Vec<Check> {
     let sigma = bound.estimate.in_general_form().sigma();
     let mut specification = specification.clone();
-    // What the body frame fixes has no error.
+    // Parameters that the body frame fixes have no error.
     specification
         .limits
         .retain(|limit| sigma[limit.parameter] > 0.0);
@@ -151,9 +151,9 @@ fn rms(sigma: &ParameterVector, indices: &[usize]) -> Option<f64> {
     (!indices.is_empty()).then(|| (sum / indices.len() as f64).sqrt())
 }
 
-/// A calibration under way whose samples are pushed as they come. It has no thread of its own.
+/// A calibration in progress, whose samples are pushed as they arrive. It has no thread of its own.
 ///
-/// Rates are in rad/s and specific forces in m/s², along right-front-up body axes, one sample each period.
+/// Rates are in rad/s and specific forces in m/s², along right-front-up body axes, one sample per period.
 #[derive(Debug, Clone)]
 pub struct Session {
     instrument: Instrument,
@@ -167,7 +167,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// A session without samples, of an instrument with samples of this period in s.
+    /// A session without samples, for an instrument with this sample period in s.
     pub fn new(instrument: Instrument, site: Site, period: f64) -> Self {
         Self {
             instrument,
@@ -181,7 +181,7 @@ impl Session {
         }
     }
 
-    /// With limits that the calibration is to decide.
+    /// Sets the limits that the calibration is to decide.
     pub fn to_decide(self, specification: Specification) -> Self {
         Self {
             specification: Some(specification),
@@ -189,7 +189,7 @@ impl Session {
         }
     }
 
-    /// Adds samples; `None` until another second of them has come.
+    /// Adds samples; returns `None` until another second of samples has arrived.
     ///
     /// # Errors
     /// [`SampleError`] if a number is not finite, the triads differ in length, or the period is not positive. The
@@ -207,7 +207,7 @@ impl Session {
         (new >= EVERY).then(|| self.status()).transpose()
     }
 
-    /// The state with all samples up to now.
+    /// The state with all samples so far.
     ///
     /// # Errors
     /// [`SampleError`] if there are none.
@@ -221,7 +221,7 @@ impl Session {
         ))
     }
 
-    /// The run of all samples up to now, to be calibrated.
+    /// The run of all samples so far, ready for calibration.
     ///
     /// # Errors
     /// [`SampleError`] if there are none.

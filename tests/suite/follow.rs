@@ -1,4 +1,4 @@
-//! `turncal calibrate --follow`: rows that come in are evaluated, kept, and calibrated in the end.
+//! `turncal calibrate --follow`: rows are evaluated as they arrive, kept, and finally calibrated.
 
 use std::fs::{self, OpenOptions};
 use std::io::Write;
@@ -16,7 +16,7 @@ const PATH: &str =
     "z_up, turn x 180, x_up, x_down, turn z 90, y_up, y_down, turn y 180, turn x 90, turn z 180";
 const STATED: [&str; 2] = ["--latitude", "34"];
 
-/// Rows of a sensor that is turned by hand, 100 a second.
+/// Rows of a sensor turned by hand, 100 per second.
 fn rows(directory: &Path) -> String {
     let mut scenario = Scenario::load("mems").unwrap();
     scenario.path = path_by_hand(PATH).unwrap();
@@ -67,7 +67,7 @@ fn rows_of_a_pipe_are_kept_and_calibrated_as_the_file_of_them() {
         &["--follow", "-", "--keep", "kept.csv", "--json"],
     );
     let mut stdin = child.stdin.take().unwrap();
-    // Half a row now, the other half later, and an end within a row.
+    // Half a row first, the other half later, and the end of input within a row.
     let cut = rows.len() / 2 + 7;
     for part in [&rows[..cut], &rows[cut..rows.len() - 3]] {
         stdin.write_all(part.as_bytes()).unwrap();
@@ -153,7 +153,7 @@ fn what_keeps_rows_from_being_read_is_told_while_they_come() {
     let directory = tempfile::tempdir().unwrap();
     let mut child = spawned(directory.path(), &["--follow", "-", "--keep", "kept.csv"]);
     let mut stdin = child.stdin.take().unwrap();
-    // As a serial line at another baud rate.
+    // Like a serial line at the wrong baud rate.
     let noise: Vec<u8> = (0..4000_u32)
         .map(|k| (k * 7919 % 251) as u8 | 0x80)
         .collect();

@@ -1,4 +1,4 @@
-//! `turncal path evaluate`: what is said of a path before any data exist.
+//! `turncal path evaluate`: predictions for a path before any data exist.
 
 use assert_cmd::Command;
 use serde_json::Value;
@@ -18,7 +18,7 @@ fn sigma(of: &Value, group: &str) -> f64 {
     of["sigma"][group].as_f64().unwrap()
 }
 
-/// By the bound, the σ of a path without a move are those of the path in whose file the move is missing.
+/// The predicted σ without a move equal those of a path file that omits the move.
 #[test]
 fn a_move_is_worth_what_the_path_without_it_lacks() {
     let steps = [
@@ -45,7 +45,7 @@ fn a_move_is_worth_what_the_path_without_it_lacks() {
         let ratio = sigma(first, group) / sigma(&without, group);
         assert!((ratio - 1.0).abs() < 1e-3, "{group}: {ratio}");
     }
-    // Only the two full turns about y show its scale factor.
+    // Only the two full turns about y reveal its scale factor.
     assert!(sigma(first, "gyro.scale_ppm") > 10.0 * sigma(&whole, "gyro.scale_ppm"));
     let time = |of: &Value| of["duration_s"].as_f64().unwrap();
     let saved = first["time_s"].as_f64().unwrap();

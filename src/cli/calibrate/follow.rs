@@ -1,4 +1,4 @@
-//! `turncal calibrate --follow`: evaluates rows while they come in, until they are enough or no more come.
+//! `turncal calibrate --follow`: evaluates rows as they arrive, until they suffice or no more arrive.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, IsTerminal, Read, Write};
@@ -17,12 +17,12 @@ use turncal::survey::{Advisor, Status};
 use crate::cli::arguments::OfLog;
 use crate::cli::terminal::{columns, end_gently, is_ended, print};
 
-/// The screen is drawn again after this time.
+/// Interval between redraws of the screen.
 const REDRAW: Duration = Duration::from_millis(250);
-/// Evaluations take at most one part in this many of the time of a processor, and start a second apart.
+/// Evaluations use at most one part in this many of a processor's time, and start at least a second apart.
 const SHARE: u32 = 20;
 const APART: Duration = Duration::from_secs(1);
-/// A device that is gone is looked for again after this time.
+/// Interval between attempts to reopen a device that disappeared.
 const AGAIN: Duration = Duration::from_secs(1);
 
 /// Rows to follow.
@@ -31,16 +31,16 @@ pub struct Follow<'a> {
     pub source: &'a Path,
     pub of_log: &'a OfLog,
     pub specification: Option<&'a Specification>,
-    /// Where rows of a pipe or a device are kept.
+    /// File that keeps the rows of a pipe or a device.
     pub keep: Option<&'a Path>,
-    /// A file that has not grown for this time has ended.
+    /// A file that has not grown for this time is complete.
     pub patience: Duration,
-    /// Whether standard output belongs to the result.
+    /// Whether standard output is reserved for the result.
     pub silent: bool,
 }
 
 impl Follow<'_> {
-    /// Follows the rows to their end, and returns the log in which they are.
+    /// Follows the rows to their end, and returns the log that contains them.
     pub fn run(&self) -> anyhow::Result<PathBuf> {
         end_gently();
         let mut rows = self.begin()?;
@@ -67,11 +67,14 @@ impl Follow<'_> {
         if rows.size > known {
             self.evaluate(&rows.log, &mut advisor, &mut screen)?;
         }
-        tell!("following ended: {end}; rows are in {}", rows.log.display());
+        tell!(
+            "stopped following: {end}; the rows are in {}",
+            rows.log.display()
+        );
         Ok(rows.log)
     }
 
-    /// Shows what the rows give so far; whether they are enough.
+    /// Shows the result of the rows so far; returns whether they suffice.
     fn evaluate(
         &self,
         log: &Path,
@@ -129,7 +132,7 @@ fn processor_time() -> Duration {
     Duration::try_from(time).unwrap_or_default()
 }
 
-/// The time itself, where the system does not tell that of the processor.
+/// Elapsed time, where the system does not report processor time.
 #[cfg(not(any(target_os = "linux", target_vendor = "apple")))]
 fn processor_time() -> Duration {
     SystemTime::now()
@@ -144,10 +147,10 @@ fn default_log() -> PathBuf {
     PathBuf::from(format!("follow-{}.csv", now.as_secs()))
 }
 
-/// Rows that come in, and the log in which they are.
+/// Incoming rows, and the log that contains them.
 struct Incoming {
     log: PathBuf,
-    /// Bytes up to now.
+    /// Bytes so far.
     size: u64,
     kind: Kind,
 }
@@ -155,7 +158,7 @@ struct Incoming {
 enum Kind {
     /// Another program writes the log.
     Growing { grew: Instant, patience: Duration },
-    /// What is read is kept in the log.
+    /// Bytes that are read are written to the log.
     Kept {
         file: File,
         chunks: Receiver<io::Result<Vec<u8>>>,
@@ -194,7 +197,7 @@ impl Incoming {
     }
 }
 
-/// Reads standard input or a device. A device that goes is opened again when it comes; a row that was cut is ended.
+/// Reads standard input or a device. A device that disappears is reopened when it returns; a truncated row is ended.
 fn read_in_background(source: PathBuf) -> anyhow::Result<Receiver<io::Result<Vec<u8>>>> {
     let (chunks, received) = mpsc::channel();
     let is_stdin = source == Path::new("-");
@@ -219,7 +222,10 @@ fn read_in_background(source: PathBuf) -> anyhow::Result<Receiver<io::Result<Vec
                 if in_row && chunks.send(Ok(b"\n".to_vec())).is_err() {
                     return;
                 }
-                tell!("{}: gone; waiting for it (Ctrl-C ends)", source.display());
+                tell!(
+                    "{}: gone; waiting for it to return (Ctrl-C stops)",
+                    source.display()
+                );
             }
             thread::sleep(AGAIN);
         }
@@ -228,13 +234,13 @@ fn read_in_background(source: PathBuf) -> anyhow::Result<Receiver<io::Result<Vec
     Ok(received)
 }
 
-/// What is shown: a screen that is redrawn on a terminal, else a line for each dwell.
+/// Output: a screen that is redrawn on a terminal, otherwise a line for each dwell.
 struct Screen {
     is_terminal: bool,
     silent: bool,
     /// Lines on the terminal that the next screen replaces.
     drawn: usize,
-    /// Dwells that were told.
+    /// Number of dwells already reported.
     told: usize,
     trouble: String,
 }
@@ -276,13 +282,10 @@ impl Screen {
         Ok(())
     }
 
-    /// What keeps the rows from being evaluated, once.
+    /// Reports once why the rows cannot be evaluated.
     fn trouble(&mut self, text: &str) -> anyhow::Result<()> {
         if self.is_terminal && !self.silent {
-            return self.draw(&[
-                "waiting for rows that can be read".to_owned(),
-                text.to_owned(),
-            ]);
+            return self.draw(&["waiting for readable rows".to_owned(), text.to_owned()]);
         }
         if self.trouble != text {
             text.clone_into(&mut self.trouble);

@@ -32,8 +32,8 @@ use follow::Follow;
 
 /// Highest order of the polynomials of outputs at rest.
 const HIGHEST_ORDER_AT_REST: usize = 5;
-/// Heading of the options of a log that is still being written.
-const FOLLOWING: &str = "Of a log that is being written";
+/// Heading of the options for a log that is still being written.
+const FOLLOWING: &str = "Following a log";
 
 /// Estimates scale factors, misalignments and biases from a run
 ///
@@ -89,14 +89,14 @@ pub struct Calibrate {
     /// Calibrate part i of M of a lot, for turncal merge
     #[arg(long, value_name = "i/M", value_parser = shard, requires = "output", conflicts_with_all = ["json", "truth"], help_heading = "Advanced")]
     shard: Option<Shard>,
-    /// Follow a growing log, - or a serial device: show what its rows give so far and what to do next, and calibrate
-    /// when the specification is reached, no more rows come, or Ctrl-C is pressed
+    /// Follow a growing log, - or a serial device: show the accuracy so far and the next move, and calibrate when the
+    /// specification can be decided, no more rows arrive, or Ctrl-C is pressed
     #[arg(long, conflicts_with_all = ["shard", "temperature", "truth"], help_heading = FOLLOWING)]
     follow: bool,
-    /// File that keeps the rows of - or a device; an existing one is continued [default: follow-TIME.csv]
+    /// File to keep the rows of - or a device in; rows are appended to an existing file [default: follow-TIME.csv]
     #[arg(long, value_name = "FILE", requires = "follow", help_heading = FOLLOWING)]
     keep: Option<PathBuf>,
-    /// A followed file ends when it has not grown for this time, s
+    /// Time without growth after which a followed file is complete, s
     #[arg(long, value_name = "S", requires = "follow", value_parser = seconds, default_value = "30", help_heading = FOLLOWING)]
     patience: Duration,
     /// Print the calibration, or the evaluation of the lot, as one JSON document and nothing else
@@ -129,7 +129,7 @@ impl Calibrate {
     /// Follows the rows of a log to their end, then calibrates them.
     fn followed(&self) -> anyhow::Result<()> {
         let [source] = self.runs.as_slice() else {
-            let message = "--follow is of one log; calibrate several when they are complete\n";
+            let message = "--follow takes one log; calibrate several logs when they are complete\n";
             clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
         };
         let specification = self.specification.as_deref().map(models::specification);
@@ -174,7 +174,7 @@ impl Calibrate {
                 let together = Together::default();
                 let problem = self.estimation.together(&[run], &together);
                 let problem = problem.inspect_err(|_| say(&run.recording))?;
-                // Without a turn, only what is at rest against temperature can be had.
+                // Without a turn, only the output at rest against temperature can be determined.
                 if problem.dwells().nth(1).is_none()
                     && let Some(at_rest) = AtRest::new(run, HIGHEST_ORDER_AT_REST)
                 {
@@ -253,12 +253,12 @@ impl Calibrate {
         let begin = |target: &PathBuf| self.overwrite.directory(target, &inputs);
         let directory = target.as_ref().map(begin).transpose()?;
 
-        // What was found in the files may be why.
+        // Problems found in the files may be the cause.
         let mut solution = solve(problem, self.estimation.method, &activity)
             .inspect_err(|_| say(&run.recording))?;
         let calibrated = Calibrated::new(problem, &mut solution)?.of_files(path, run);
         activity.next("writing");
-        // Standard output alone, as JSON, takes no report.
+        // JSON on standard output has no report.
         let document = (directory.is_some() || !self.json).then(|| {
             let method = self.estimation.method;
             calibrated.document((problem, name), &solution, method, truth.as_ref())
@@ -291,7 +291,7 @@ impl Calibrate {
     }
 }
 
-/// The run.toml by which a run was read: of a log, the one that is written next to the result; of a campaign, any.
+/// The run.toml of a run: for a log, the one written next to the result; for a campaign, a placeholder.
 fn read_by(opened: Option<&Opened>, target: Option<&Path>, path: &Path) -> PathBuf {
     match (opened, target) {
         (Some(opened), Some(target)) if opened.is_of_log() => target.join("run.toml"),
@@ -320,7 +320,7 @@ fn files(target: Option<&Path>, run: &Path, document: &Document) -> Facts {
         .findings
         .first()
         .map(|finding| format!(", or turncal explain {}", finding.code));
-    // What is there already is replaced by the same.
+    // The same command would replace the existing files.
     let force = target.map_or("", |_| " --force");
     let more = format!("--verbose{force}{}", explain.unwrap_or_default());
     facts.push("more", more);

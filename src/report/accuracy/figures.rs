@@ -9,9 +9,9 @@ use crate::report::prelude::*;
 use crate::study::accuracy::{Position, Region};
 use crate::study::{Accuracy, Figures, NavigationAccuracy, Ratio};
 
-/// The narrowest axis of ratios: its ends are this factor apart.
+/// Minimum span of an axis of ratios, as a factor.
 const NARROWEST: f64 = 1.08;
-/// Left free at both ends of it, in parts of its length.
+/// Margin at both ends of it, as a fraction of its length.
 const FREE: f64 = 0.2;
 pub fn figures(accuracy: &Accuracy) -> Vec<Plot> {
     let mut plots = vec![
@@ -33,7 +33,7 @@ fn ratio(accuracy: &Accuracy) -> Plot {
     )
 }
 
-/// Error of the closed form over that of the filter.
+/// Error of the closed form divided by that of the filter.
 fn gain(accuracy: &Accuracy) -> Plot {
     let own = format!("closed form {}", minutes(accuracy.baseline.table_time));
     let mut all: Vec<(&str, OfFigures)> = vec![(&own, |f| f.gain)];
@@ -60,7 +60,7 @@ fn gain(accuracy: &Accuracy) -> Plot {
 
 type OfFigures = fn(&Figures) -> Option<Ratio>;
 
-/// Ratios by name, each with its interval and its value beyond that, away from the line at 1.
+/// Ratios by name, each with its interval and, beyond the interval's end away from the line at 1, its value.
 fn ratios(accuracy: &Accuracy, title: &str, all: &[(&str, OfFigures)]) -> Panel {
     let compared = compared(accuracy);
     let (mut low, mut high) = (1.0, 1.0);
@@ -122,8 +122,8 @@ pub fn errors(accuracy: &Accuracy) -> Plot {
             .noted(notes)
     });
     Plot::new("errors.svg", "Errors over claimed σ", (3, 300), panels).caption(
-        "Density of parameter errors divided by the filter's σ, all runs. Line: standard normal density, which \
-         normal density, which it follows if the σ are true; RMS is then 1.",
+        "Density of parameter errors divided by the filter's σ, all runs. Line: standard normal density, \
+         which the errors follow if the σ are correct; RMS is then 1.",
     )
 }
 

@@ -33,7 +33,7 @@ fn ratio_cells(of: Option<&Ratio>) -> [String; 2] {
     cells.unwrap_or([NONE; 2].map(str::to_owned))
 }
 
-/// One row each, with a section per triad and one for navigation.
+/// One row per item, with a section for each triad and one for navigation.
 fn sections(
     accuracy: &Accuracy,
     cells: impl Fn(&Compared) -> Vec<String>,

@@ -32,7 +32,7 @@ fn small() -> Accuracy {
     STUDY.get_or_init(study).clone()
 }
 
-/// The same as if the filter had failed on every run.
+/// The same study, as if the filter had failed in every run.
 fn all_failed() -> Accuracy {
     let mut accuracy = small();
     for trial in &mut accuracy.trials {
@@ -63,7 +63,7 @@ fn json(accuracy: &Accuracy) -> Value {
     document(accuracy).data
 }
 
-/// Sentences that say that something is wrong.
+/// Sentences that report a problem.
 fn doubts(accuracy: &Accuracy) -> String {
     document(accuracy).warnings.items.join("\n")
 }

@@ -193,7 +193,7 @@ fn form(accuracy: &Accuracy) -> Option<(bool, String)> {
     if form.holds(truth) {
         text += " It is the correct form; one run in a thousand rejects it by chance.";
     }
-    // Three σ of a Poisson number beyond what chance gives.
+    // Three σ of a Poisson count beyond its mean by chance.
     let by_chance = 1e-3 * tested as f64;
     let few = rejections as f64 <= by_chance + 3.0 * by_chance.sqrt();
     Some((form.holds(truth) && few, text))

@@ -84,7 +84,7 @@ fn correlation_time(found: Found) -> String {
         return NONE.to_owned();
     };
     match found.sigma_log_time {
-        // Where it is known to a factor only, its logarithm is what has a σ.
+        // If it is known only to within a factor, σ is that of its logarithm.
         Some(of) if of > 0.5 => {
             format!(
                 "{} ×÷ {}",

@@ -55,7 +55,7 @@ pub fn warnings(analysis: &NoiseAnalysis) -> Vec<String> {
                 Some(of) if of.misfit > SMALL => warnings.push(format!(
                     "{name} {letter}: its deviations differ from every sum of processes by {} %, which σ include. \
                      Possible causes are vibration, filters, temperature steps, or pulses coarser than the noise.",
-                    // Of a deviation, half as much as of a variance.
+                    // The relative error of a deviation is half of that of a variance.
                     sigma(50.0 * of.misfit)
                 )),
                 Some(of) => {

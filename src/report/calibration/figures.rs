@@ -15,9 +15,9 @@ const EXTENT: f64 = 300.0;
 const EDGE: f64 = 6.0;
 /// Up to this many innovations are drawn as dots, more as a line through the extremes.
 const DOTS: usize = 150;
-/// Weaker correlations are not written, because they would hide the strong ones.
+/// Weaker correlations are not printed, because they would hide the strong ones.
 const WRITTEN: f64 = 0.2;
-/// Half the side of a square that would not be seen.
+/// Half the side of a square that is too small to be seen.
 const FAINT: f64 = 0.02;
 
 impl Report<'_> {
@@ -164,8 +164,8 @@ impl Report<'_> {
         let panels: Vec<Panel> = panels.collect();
         let caption = format!(
             "Innovations of the last pass divided by their σ; they should look like white noise of unit variance. \
-             Solid lines: ±1σ; dashed: ±3σ. Dense data are drawn by the extremes of each interval. Crosses: rejected \
-             each stretch. Crosses: rejected by the gate; at the edge: ±{EDGE}σ or more."
+             Solid lines: ±1σ; dashed: ±3σ. Dense data are drawn as the extremes of each interval. \
+             Crosses: rejected by the gate; at the edge: ±{EDGE}σ or more."
         );
         let drawn = !panels.is_empty();
         let plot = Plot::new("innovations.svg", "Innovations", (3, 270), panels);
@@ -220,8 +220,8 @@ fn correlation(estimate: &Estimate) -> Option<Plot> {
     panel.square = true;
     let plot = Plot::new("correlation.svg", "Correlations", (1, 1000), [panel]).caption(format!(
         "Correlation of the estimated parameters. Below the diagonal the side of a square grows with the magnitude; \
-         blue squares are positive, orange ones negative. Above it stands the coefficient in hundredths where its \
-         magnitude is at least {WRITTEN}. Strongly correlated parameters were observed by this path as a sum or \
+         blue squares are positive, orange ones negative. Above the diagonal, the coefficient is given in hundredths \
+         if its magnitude is at least {WRITTEN}. Strongly correlated parameters were observed by this path as a sum or \
          difference rather than each alone."
     ));
     (!indices.is_empty()).then_some(plot)

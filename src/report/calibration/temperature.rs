@@ -10,7 +10,7 @@ use crate::report::prelude::*;
 /// Points of a curve.
 const POINTS: usize = 81;
 
-/// How parameters change with temperature, and whether anything of it is left.
+/// Change of parameters with temperature, and any remaining effect of temperature.
 pub fn figures(outcome: &Outcome) -> Vec<Plot> {
     let of = |thermal| vec![curves(outcome, thermal), residuals(outcome)];
     outcome.thermal.as_ref().map_or_else(Vec::new, of)
@@ -113,7 +113,7 @@ fn hysteresis(outcome: &Outcome, thermal: &Thermal) -> Table {
     .section(rows)
 }
 
-/// A panel for each group with its parameters against temperature; left free at both ends is this part of the range.
+/// A panel for each group: its parameters against temperature, with a margin of this part of the range at both ends.
 fn against_temperature(
     outcome: &Outcome,
     thermal: &Thermal,
@@ -131,7 +131,7 @@ fn against_temperature(
     Group::all().map(panel).collect()
 }
 
-/// What each recording alone says of a parameter: temperature at its axis, value and σ.
+/// Estimate of a parameter from each recording alone: temperature at its axis, value and σ.
 fn alone(outcome: &Outcome, index: usize) -> impl Iterator<Item = (f64, f64, f64)> {
     let (sensor, _) = sensor_and_parameter(index);
     outcome.alone.iter().filter_map(move |alone| {
@@ -146,7 +146,7 @@ fn alone(outcome: &Outcome, index: usize) -> impl Iterator<Item = (f64, f64, f64
     })
 }
 
-/// Every parameter against temperature, with what each recording alone says.
+/// Every parameter against temperature, with the estimates from each recording alone.
 fn curves(outcome: &Outcome, thermal: &Thermal) -> Plot {
     let (form, reference) = (outcome.estimate.form(), outcome.estimate.vector());
     let series = |group: Group, indices: &[usize]| {

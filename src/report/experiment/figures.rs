@@ -35,8 +35,8 @@ fn distribution(experiment: &Experiment) -> Plot {
     };
     let panels = experiment.navigations.iter().map(panel);
     Plot::new("distribution.svg", "Position error at the end", (1, 330), panels).caption(
-        "Horizontal position error at the end, logarithmic, the same axis for all. Small dots: instruments; large \
-         dot with its value: median; box: the middle half; line: 95 % are below its end; dashed: median of what the \
+        "Horizontal position error at the end, logarithmic, same axis for all. Small dots: instruments; large \
+         dot with its value: median; box: the middle half; line: 95 % are below its end; dashed: median error \
          due to instrument noise alone.",
     )
 }
@@ -84,7 +84,7 @@ fn against_time(experiment: &Experiment) -> Plot {
     };
     let panels = experiment.navigations.iter().map(panel);
     Plot::new("time.svg", "Median position error against time", (1, 330), panels).caption(
-        "Median over all instruments of the horizontal position error, logarithmic, the same axes for all. Colour: \
+        "Median over all instruments of the horizontal position error, logarithmic, same axes for all. Colour: \
          calibration method; solid: general form, dashed: six-angle, dotted: three-angle. The general and six-angle \
          lines coincide where both forms give the same result.",
     )

@@ -296,7 +296,7 @@ mod tests {
             for (place, method) in methods.iter().enumerate() {
                 let number = |key: &str| method["position_nmile"][key].as_f64().unwrap();
                 assert!(number("median") > 0.0 && number("below_95_percent") >= number("median"));
-                // Three methods of the closed form, which is not compared with itself.
+                // The first three methods are closed forms, which are not compared with themselves.
                 assert_eq!(method["closed_form_over_ekf"].is_null(), place < 3);
             }
         }

@@ -166,8 +166,8 @@ impl Navigation<'_> {
             let panels = quantities.map(|of| outlook::panel(*of, navigated));
             Plot::new(file, heading, (1, 210), panels).caption(format!(
                 "Computed minus true. Line: actual error from full navigation; band: ±1σ predicted from the \
-                 covariance of the calibration with the linear model, which contains the errors of about two \
-                 calibrations in three at any time.{more}"
+                 covariance of the calibration with the linear model. At any time, about two calibrations in three \
+                 have errors within the band.{more}"
             ))
         })
     }

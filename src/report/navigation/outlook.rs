@@ -1,5 +1,5 @@
-//! Navigation errors by one calibration or by several side by side, or where the truth is not known their predicted
-//! σ alone: a table of all quantities at the end, and a panel for each quantity against time.
+//! Navigation errors of one calibration or of several side by side (only their predicted σ if the truth is not known):
+//! a table of all quantities at the end, and a panel for each quantity against time.
 
 use crate::report::prelude::*;
 use crate::study::navigation::{NavigationStudyError, Outlook, Quantity};
@@ -9,13 +9,13 @@ const HEADING: &str = "Navigation with this calibration";
 /// The navigation errors that one calibration leads to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Navigated {
-    /// Its name beside the others', such as `EKF` or `closed form`.
+    /// Name that distinguishes it from others, such as `EKF` or `closed form`.
     pub method: &'static str,
     /// The errors, if known.
     pub outlook: Vec<Outlook>,
 }
 
-/// One way of navigating by several calibrations.
+/// One mission, navigated with several calibrations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flown {
     /// Motion of the body, such as `stationary and level`.
@@ -56,7 +56,7 @@ pub fn add(document: &mut Document, navigation: Result<&[Navigated], &Navigation
         Ok(navigated @ [.., last]) => {
             let how = format!(
                 "{} stationary and level at the site of the run, heading North, from perfect alignment, height \
-                 held: as long as predicted errors stay small (1° and 1 % of the Earth's radius).",
+                 fixed, for as long as predicted errors stay small (1° and 1 % of the Earth's radius).",
                 long(navigated)
             );
             document.page(table(HEADING, navigated).note(how));
@@ -110,8 +110,8 @@ pub fn line(navigated: &[Navigated]) -> String {
     )
 }
 
-/// One quantity by one calibration: the largest error with its time, the error at the end, its σ, and what the error
-/// is of that.
+/// One quantity with one calibration: the largest error with its time, the error at the end, its σ, and the ratio of
+/// error to σ.
 struct Figures {
     largest: Option<Point>,
     at_end: Option<f64>,
@@ -153,7 +153,7 @@ impl Figures {
     }
 }
 
-/// Every quantity at the end of navigation, and the largest of each where errors are known.
+/// Every quantity at the end of navigation, and its maximum if errors are known.
 pub fn table(heading: &str, navigated: &[Navigated]) -> Table {
     let known = is_known(navigated);
     let (unit_of_time, second) = clock(navigated);
@@ -236,7 +236,7 @@ fn figure(navigated: &[Navigated], last: &str) -> Plot {
     Plot::new("navigation.svg", heading, (1, 250), panels).caption(caption)
 }
 
-/// Errors against time, over the band of ±σ of the last, in a readable unit; bounds of σ where no error is known.
+/// Errors against time in a readable unit, over the ±σ band of the last calibration; only ±σ if no error is known.
 pub fn panel(quantity: Quantity, navigated: &[Navigated]) -> Panel {
     let (unit_of_time, second) = clock(navigated);
     let time = Axis::time(unit_of_time, duration(navigated) / second);

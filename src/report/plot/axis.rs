@@ -7,18 +7,18 @@ const DECADES: i32 = 10;
 /// An axis with fewer decades has ticks at 1, 2 and 5 of each and ends near the data.
 const FEW_DECADES: f64 = 2.5;
 
-/// Some that reach this many times further than others make an axis about zero logarithmic.
+/// An axis about zero becomes logarithmic if some series reach this many times further than others.
 const APART: f64 = 20.0;
 
 /// Scaling of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Kind {
-    /// Evenly.
+    /// Linear.
     #[default]
     Linear,
-    /// By their logarithm.
+    /// Logarithmic.
     Log,
-    /// Linear to both sides of zero up to this magnitude, logarithmic beyond.
+    /// Linear on both sides of zero up to this magnitude, logarithmic beyond.
     Symlog(f64),
 }
 
@@ -79,14 +79,14 @@ impl Axis {
         }
     }
 
-    /// An axis that holds zero and is logarithmic to both sides of it where some of what is drawn reaches much further
-    /// than the rest; and what its title says of that.
+    /// An axis that includes zero, and an addition to its title: it is logarithmic on both sides of zero if some series
+    /// reach much further than others.
     pub fn about_zero(reaches: impl Iterator<Item = f64>) -> (Self, &'static str) {
         let (least, most) = positive_range(reaches);
         match most > APART * least {
             true => (
                 Self::symlog(0.3 * least).room(0.0, 0.5),
-                ", logarithmic to both sides",
+                ", logarithmic on both sides",
             ),
             false => (Self::linear("").including([0.0]).room(0.06, 0.06), ""),
         }
@@ -205,7 +205,7 @@ impl Scale {
             };
             let mut ticks: Vec<(f64, String)> = ticks.map(label).collect();
             if ticks.len() < 2 {
-                // So short an axis is hardly curved.
+                // An axis this short is nearly linear.
                 ticks = Self::linear(low, high, None).ticks;
             }
             return Self {
@@ -272,7 +272,7 @@ impl Scale {
     }
 }
 
-/// The least positive number and the largest.
+/// The smallest and the largest positive number.
 pub fn positive_range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let positive = values.filter(|value| *value > 0.0);
     positive.fold((f64::INFINITY, 0.0), |(low, high), value| {

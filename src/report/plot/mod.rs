@@ -1,4 +1,4 @@
-//! A plot as a value: panels with axes and series. It knows nothing of where it is drawn.
+//! A plot as a value: panels with axes and series, independent of the renderer.
 
 mod axis;
 mod series;

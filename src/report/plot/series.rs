@@ -327,7 +327,7 @@ mod tests {
             assert!(line.contains(&point(extreme)), "{extreme}");
         }
         assert_eq!(line.iter().filter(|point| point.1.is_nan()).count(), 1);
-        // The picture is the same all along: hardly a piece without its own swing.
+        // The picture is uniform: nearly every piece has its own oscillation.
         let swing =
             |piece: &[Point]| piece.iter().any(|p| p.1 > 0.9) && piece.iter().any(|p| p.1 < -0.9);
         assert!(line.chunks(64).all(swing));

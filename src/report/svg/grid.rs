@@ -10,13 +10,13 @@ use super::series;
 
 /// Grid lines.
 const GRID: RGBColor = RGBColor(218, 218, 214);
-/// The time of a dwell.
+/// Shading of dwells.
 const SHADE: RGBColor = RGBColor(243, 243, 238);
-/// Above the axes, for the title.
+/// Space above the axes for the title.
 const TOP: f64 = 26.0;
-/// Between one line of text and the next.
+/// Distance between lines of text.
 const LINE: f64 = 17.0;
-/// Letters of tags.
+/// Relative size of the letters of tags.
 const TAG: f64 = 0.85;
 /// Maximum fraction of the width of a panel for names at the ends of lines.
 const LABELS: f64 = 0.3;
@@ -79,7 +79,7 @@ fn right(panel: &Panel, x: &Scale, panel_width: f64) -> f64 {
     widest.min(LABELS * panel_width).max(half)
 }
 
-/// Fewer letters than these are no line of a name.
+/// Minimum number of letters in a line of a name.
 const LETTERS: usize = 6;
 
 /// Labels of the horizontal ticks; names are broken into as many lines as needed.

@@ -90,7 +90,7 @@ fn bars(
         let (before, after) = (x - half, x + half);
         let corners = [(before, low), (before, high), (after, high), (after, low)];
         let corners = corners.map(|corner| frame.at(corner));
-        // Of stacked bars the height is what each adds.
+        // For stacked bars, the height is that of each bar alone.
         let height = if fill == Fill::Solid {
             high - low
         } else {

@@ -44,7 +44,7 @@ fn texts(svg: &str) -> Vec<(String, [f64; 4])> {
     .collect()
 }
 
-/// What must hold of any figure: whole, of numbers, with its labels inside.
+/// Requirements for any figure: complete, finite numbers, labels inside.
 pub fn assert_sound(figures: &[String]) {
     for svg in figures {
         let head = &svg[..svg.find('>').unwrap()];
@@ -72,7 +72,7 @@ pub fn assert_sound(figures: &[String]) {
     }
 }
 
-/// Figures that were drawn and found sound.
+/// Figures that were drawn and meet the requirements.
 pub fn drawn<'a>(plots: impl Iterator<Item = &'a Plot>) -> Vec<String> {
     let figures: Vec<String> = plots.map(draw).collect();
     assert_sound(&figures);

@@ -13,7 +13,7 @@ use crate::study::StudyError;
 use crate::turntable::Table;
 
 /// The runs of the closed form. It is also evaluated on the first part of every dwell, as if the dwells
-/// were as short as the filter's table time has them.
+/// were short enough for the filter's table time.
 #[derive(Debug, Clone)]
 pub struct Baseline {
     /// The simulated scenario.

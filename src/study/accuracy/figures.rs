@@ -44,7 +44,7 @@ impl Figures {
             runs.iter().filter_map(one).collect()
         };
         let some = |squares: Vec<f64>| (!squares.is_empty()).then(|| rms(&squares));
-        // A ratio takes only runs that have both.
+        // A ratio uses only runs that have both.
         let ratio = |over: &dyn Fn(&Squares) -> Option<f64>,
                      under: &dyn Fn(&Squares) -> Option<f64>| {
             let both = runs.iter().filter_map(|s| over(s).zip(under(s)));
@@ -68,7 +68,7 @@ impl Figures {
     }
 }
 
-/// Figures of each group of which any run has a bound.
+/// Figures of each group that has a bound in any run.
 pub fn of_groups(trials: &[Trial]) -> Vec<(Group, Figures)> {
     let has_bound = |&i: &usize| trials.iter().any(|trial| trial.bound[i] > 0.0);
     let of_group = |group: Group| {

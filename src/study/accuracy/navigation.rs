@@ -79,7 +79,7 @@ pub struct Containment {
     pub interval: (usize, usize),
 }
 
-/// Linear model of a mission, computed once: the model of one instrument is valid for all of its grade.
+/// Linear model of a mission, computed once: the model of one instrument is valid for all instruments of its grade.
 pub struct Way {
     journey: Journey,
     by_parameter: SMatrix<f64, 2, PARAMETERS>,
@@ -250,8 +250,8 @@ mod tests {
 
     #[test]
     fn errors_are_counted_in_each_region_that_holds_them() {
-        // Along the correlation an error of 1σ of both is inside the ellipse of 1.2σ, across it
-        // outside that of 1.9σ.
+        // Errors of 1σ in both are inside the 1.2σ ellipse along the correlation, and outside
+        // the 1.9σ ellipse across it.
         let errors = [
             (0.0, 0.0),
             (2.9, 3.9),

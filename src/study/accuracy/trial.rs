@@ -80,7 +80,7 @@ impl AccuracyStudy {
             .installation(self.form)
             .aiding(aiding)
             .noise(self.noise);
-        // What stays unmodelled is to show what it does.
+        // Terms that are left unmodelled on purpose must not be switched on automatically.
         options.auto_terms = self.unmodelled.is_empty();
         let mut problem = Problem::new(&record, &options);
         let form = self.bound_form(&truth);

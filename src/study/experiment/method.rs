@@ -134,7 +134,7 @@ fn calibrated(
             rejects_form,
         }
     };
-    // What a scenario states of noise is right.
+    // The noise that a scenario states is correct.
     let options = Options::default().noise(NoisePolicy::Stated);
     let problem = Problem::new(run, &options.installation(form));
     match estimator {

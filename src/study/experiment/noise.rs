@@ -24,7 +24,7 @@ const DRAWS: usize = 20_000;
 
 type Inputs = SVector<f64, INPUTS>;
 type InputCovariance = SMatrix<f64, INPUTS, INPUTS>;
-/// Of the navigation errors and of the Gauss–Markov biases behind them.
+/// Joint covariance of the navigation errors and the Gauss–Markov biases that cause them.
 type Joint = SMatrix<f64, { STATES + INPUTS }, { STATES + INPUTS }>;
 
 /// Variances of the noise of the sensed rate and force.
@@ -97,7 +97,7 @@ pub fn position(
     Ok(by_state * errors * by_state.transpose())
 }
 
-/// A matrix of four blocks, of which that of the biases by errors is zero.
+/// A matrix of four blocks; the block of biases by errors is zero.
 fn joint(errors: &ErrorMatrix, between: &InputMatrix, bias: &InputCovariance) -> Joint {
     let mut joint = Joint::zeros();
     joint
@@ -124,7 +124,7 @@ impl Step {
         let keep = variances
             .correlation_time
             .map(|time| (-duration / time).exp());
-        // Constant over the step with the variance of white noise's mean.
+        // White noise as a constant over the step, with the variance of its mean.
         let white = InputCovariance::from_diagonal(&(variances.white / duration));
         let bias_added = variances.bias.zip_map(&keep, |v, k| v * (1.0 - k * k));
         let diagonal = InputCovariance::from_diagonal;
@@ -210,7 +210,7 @@ mod tests {
             sensed.fixed_rows_mut::<3>(3).copy_from(&accel);
             let linear = by_itself(&truth) * sensed;
             let linear = linear.fixed_rows::<3>(ATTITUDE).into_owned();
-            // What is left out is of second order, 0.2° of heading times itself.
+            // The neglected terms are of second order: 0.2° of heading squared.
             assert_abs_diff_eq!(linear, phi, epsilon = 1e-2 * phi.amax());
             assert!(phi.amax() > 0.05 * DEGREE);
         }

@@ -38,9 +38,9 @@ fn what_exposure_says_is_what_nonlinear_navigation_does_for_many_hours() {
     ]);
 }
 
-/// Installation form, minutes, and how far apart positions may be in parts of the largest.
+/// Installation form, minutes, and allowed difference of positions relative to the largest.
 fn exposure_against_navigation(cases: &[(InstallationForm, u32, f64)]) {
-    // Scale factors are a few parts in a thousand from those of the instrument that is followed, and
+    // Scale factors differ by a few parts in a thousand from those of the simulated instrument, and
     // half a degree of attitude or a hundred miles are no longer small.
     for &(form, minutes, within) in cases {
         let study = study(minutes);

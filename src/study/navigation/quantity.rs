@@ -1,11 +1,11 @@
-//! What is reported of a navigation error, and in which unit.
+//! Reported quantities of a navigation error, and their units.
 
 use super::Outlook;
 use crate::navigation::ErrorVector;
 use crate::number::readable;
 use crate::units::{ARCSEC, DEGREE, NAUTICAL_MILE};
 
-/// Units of one kind with their size in SI, the usual one first.
+/// Units of one kind with their value in SI, the usual unit first.
 type Units = &'static [(&'static str, f64)];
 const ANGLES: Units = &[("°", DEGREE), ("″", ARCSEC)];
 const SPEEDS: Units = &[("m/s", 1.0), ("cm/s", 0.01), ("mm/s", 0.001)];
@@ -18,7 +18,7 @@ pub struct Quantity {
     pub name: &'static str,
     /// Its name in documents, with its unit.
     pub key: &'static str,
-    /// Place in [`Outlook::sigma`]; of a horizontal length that of its first component.
+    /// Index in [`Outlook::sigma`]; for a horizontal length, that of its first component.
     place: usize,
     /// Whether it has a sign, and a normal distribution where parameters have one.
     pub is_component: bool,
@@ -56,7 +56,7 @@ impl Quantity {
         horizontal(6, "position, horizontal", "position_nmile", LENGTHS),
     ];
 
-    /// Its name without what kind of length it is.
+    /// Its name up to the comma, without the kind of length.
     pub fn short(self) -> &'static str {
         self.name.split(',').next().unwrap_or(self.name)
     }
@@ -70,8 +70,8 @@ impl Quantity {
         self.units[0].1
     }
 
-    /// A unit in which values up to this one, in the usual unit, have few zeros; and how many of it
-    /// make the usual unit.
+    /// A unit in which values up to this one, given in the usual unit, have few zeros; and its number in the usual
+    /// unit.
     pub fn readable_unit(self, largest: f64) -> (&'static str, f64) {
         let (unit, value) = readable(self.units, largest * self.unit_value());
         (unit, self.unit_value() / value)
@@ -82,12 +82,12 @@ impl Quantity {
         Some(self.of(&moment.error.as_ref()?.to_vector()))
     }
 
-    /// Predicted 1σ in the usual unit; of a horizontal length the root of its mean square.
+    /// Predicted 1σ in the usual unit; for a horizontal length, its root mean square.
     pub fn sigma(self, moment: &Outlook) -> Option<f64> {
         Some(self.of(moment.sigma.as_ref()?))
     }
 
-    /// The same of all errors or their σ, in the order of [`Outlook::sigma`].
+    /// The same for all errors or their σ, in the order of [`Outlook::sigma`].
     pub fn of(self, all: &ErrorVector) -> f64 {
         let si = match self.is_component {
             true => all[self.place],

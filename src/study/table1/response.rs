@@ -106,7 +106,7 @@ mod tests {
         let response = Response::new(&standing(45.0 * DEGREE, 3.0 * 3600.0)).unwrap();
         let error = 100.0 * MICRO_G;
         let largest = response.largest(Sensor::Accel, &(Vector3::y() * error));
-        // Level at first, the tilt swings about that which hides the error: from 0 to 2 ∇/g.
+        // From level, the tilt oscillates about the value that cancels the error: from 0 to 2 ∇/g.
         let expected = 2.0 * error / normal_gravity(45.0 * DEGREE, 0.0) / DEGREE;
         assert!((largest[0] / expected - 1.0).abs() < 0.02, "{largest:?}");
     }

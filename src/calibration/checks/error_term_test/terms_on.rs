@@ -13,7 +13,7 @@ use crate::calibration::{
 pub struct UnmodelledEffect {
     /// With the usual σ around zero.
     pub usual: ParameterVector,
-    /// RMS if the evidence in the recording is also used.
+    /// RMS, also given the evidence in the recording.
     pub shown: ParameterVector,
 }
 
@@ -73,7 +73,7 @@ pub struct With {
 }
 
 impl<'a> TermsOn<'a> {
-    /// Of a problem at a point, with the `reduction` of its record by [`with_everything`].
+    /// The information of a problem at a point, with the `reduction` of its recording by [`with_everything`].
     pub fn new(problem: &'a Problem, at: &'a Linearisation, reduction: Reduction) -> Self {
         let model = &problem.model;
         Self {
@@ -174,7 +174,7 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    /// One parameter misses by 3 with a term for which the data speak, and by 100 with one against which they do.
+    /// One parameter changes by 3 with a term that the data support, and by 100 with a term that they contradict.
     #[test]
     fn explanations_count_as_much_as_each_is_likely() {
         let of = |ratio: f64, squared: f64| Explanation {
@@ -188,7 +188,7 @@ mod tests {
             9.0 * 10.0 / 15.0,
             max_relative = 1e-12
         );
-        // Where one is beyond doubt what it does is all that counts.
+        // If a term is beyond doubt, only its effect counts.
         let added = seen_and_left_off(&[of(1e300, 9.0), of(10.0, 1e4)], 5);
         assert_relative_eq!(added.unwrap()[(0, 0)], 9.0, max_relative = 1e-12);
         assert_eq!(seen_and_left_off(&[of(0.5, 1e4)], 5), None);
