@@ -31,6 +31,9 @@ pub struct Status {
     pub next: Option<Move>,
 }
 
+/// RMS σ of each group's parameters, rad/s or m/s² normalised; `None` if all are fixed.
+pub type GroupSigma = Vec<(Group, Option<f64>)>;
+
 /// Expected σ of the rows so far.
 #[derive(Debug, Clone)]
 pub struct Progress {
@@ -38,7 +41,7 @@ pub struct Progress {
     pub bound: Bound,
     /// For each dwell: the time of its end in s, and the expected RMS σ of each group's parameters at that time, rad/s
     /// or m/s² normalised.
-    pub history: Vec<(f64, Vec<(Group, Option<f64>)>)>,
+    pub history: Vec<(f64, GroupSigma)>,
     /// Parameters that keep more than half of their prior σ.
     pub unobserved: Vec<String>,
     /// Every limit of the specification, for a unit at its nominal values.

@@ -1,7 +1,7 @@
 //! IMU intrinsics for Kalibr, model `scale-misalignment`, and for OpenVINS.
 //!
-//! From true to measured, in rad/s and m/s²: `a = M_a C_i_b f + b_a`, `ω = M_g C_gyro_i C_i_b ω_b + A C_gyro_i C_i_b f
-//! + b_g`, with both `M` lower triangular and both `C` rotations. `C_i_b`, in `T_i_b`, rotates the body frame of the
+//! From true to measured, in rad/s and m/s²: `a = M_a C_i_b f + b_a`,
+//! `ω = M_g C_gyro_i C_i_b ω_b + A C_gyro_i C_i_b f + b_g`, with both `M` lower triangular and both `C` rotations. `C_i_b`, in `T_i_b`, rotates the body frame of the
 //! calibration into the accelerometer axes, so K and E are represented completely.
 //!
 //! Source: Rehder et al., "Extending kalibr: calibrating the extrinsics of multiple IMUs and of
