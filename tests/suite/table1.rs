@@ -182,7 +182,8 @@ fn the_linear_courses_are_those_of_nonlinear_navigation_but_for_the_second_order
     for column in &table.columns {
         let sensor = column.published.sensor;
         for row in column.rows() {
-            if row.sample[0].mean < 1e-15 {
+            // Rounding, in degrees.
+            if row.sample[0].mean < 1e-12 {
                 continue;
             }
             let courses = table.study.courses(sensor, row).unwrap();
