@@ -121,7 +121,7 @@ impl Series {
     }
 }
 
-/// Collects samples in the quantity of a file, plain or packed.
+/// Collects samples of the quantity that a file stores, rates or increments, plain or packed.
 pub enum SeriesWriter {
     Whole(Vec<Vector3<f64>>),
     Packed(Packer),

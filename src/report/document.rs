@@ -19,7 +19,7 @@ pub struct Document {
     pub findings: Vec<Finding>,
     /// One-screen version instead of the blocks; if empty, the blocks are shown.
     pub brief: Vec<Block>,
-    /// Warnings for the use of the figures.
+    /// Cautions about using the figures.
     pub warnings: List,
     /// Conclusions from the figures, the most important first.
     pub conclusions: List,

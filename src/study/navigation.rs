@@ -380,7 +380,7 @@ impl<'a> Course<'a> {
         }
     }
 
-    /// Continues until a time in s since the start, like [`Strides::go`].
+    /// Continues until the given time, in s since the start, like [`Strides::go`].
     fn go<E>(
         &mut self,
         until: f64,

@@ -10,7 +10,7 @@ use nalgebra::{Matrix3, Vector3};
 use crate::calibration::{ParameterMatrix, parameter};
 use crate::imu::{PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector};
 
-/// Step of the second differences; the third derivatives of the forms are at most of order one.
+/// Step of the second differences; the third derivatives of the sensitivity matrix are at most of order one.
 const STEP: f64 = 1e-3;
 
 /// Mean squares of the second-order terms in the errors of the three parameters of each row, for errors with this

@@ -85,7 +85,7 @@ impl Known {
     }
 }
 
-/// The upper triangle R with `RᵀR` equal to that of these rows, by Householder's reflections.
+/// The upper-triangular R with `RᵀR = AᵀA`, A consisting of these rows, by Householder reflections.
 pub fn triangle(rows: &DMatrix<f64>) -> DMatrix<f64> {
     let rows = MatRef::from_column_major_slice(rows.as_slice(), rows.nrows(), rows.ncols());
     let qr = rows.qr();

@@ -103,7 +103,7 @@ impl Source {
         !seen && self.sigma(problem) > 0.0
     }
 
-    /// Its σ in the model of a problem, in SI and radians; the floor of the standstill noise counts
+    /// Its σ as modelled in a problem, in SI units and radians; the floor of the standstill noise counts
     /// as zero.
     pub(in crate::calibration) fn sigma(self, problem: &Problem) -> f64 {
         let (model, sensor) = (&problem.model, self.triad());

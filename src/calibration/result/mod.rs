@@ -118,7 +118,7 @@ pub struct Calibration {
     /// Whether the values may be used; `None` for values that were not estimated, such as a truth.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub verdict: Option<Verdict>,
-    /// Warnings for the use of the values.
+    /// Cautions about using the values.
     #[serde(default)]
     pub warnings: Vec<String>,
     /// The same in structured form: kind, text, figures.

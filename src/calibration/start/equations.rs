@@ -291,7 +291,7 @@ impl Equations {
         (residual - spread * &self.mean, covariance)
     }
 
-    /// Contribution of each of [`BY_HAND`] to each of the scaled rows.
+    /// Contribution of each source in [`BY_HAND`] to each scaled row.
     pub fn by_hand(&self) -> Parts {
         std::array::from_fn(|source| {
             let part = |k: usize, _| self.rows[k].by_hand[source] / self.rows[k].weighted.x;

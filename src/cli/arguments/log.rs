@@ -80,7 +80,7 @@ impl OfLog {
         self.open_with(path, |found| show_found(path, found))
     }
 
-    /// The same; `show` is given what was found in a log.
+    /// As [`Self::open`], but passes the fields found in a log to `show`.
     pub fn open_with(&self, path: &Path, show: impl FnOnce(&[Found])) -> anyhow::Result<Opened> {
         let (stream, stated) = self.stated()?;
         Ok(Opened::new(path, stream, &stated, show)?)

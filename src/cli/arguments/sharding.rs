@@ -18,7 +18,7 @@ pub struct Sharding {
 }
 
 impl Sharding {
-    /// Makes the requested part of a study, unless that part exists; returns false if the whole study is requested.
+    /// Runs the requested part of a study, unless its results already exist; returns false if the whole study is requested.
     pub fn make<S: Study<Trial: Serialize> + Serialize>(
         self,
         job: JobKind,

@@ -3,7 +3,7 @@
 use crate::formats::quantity::{Of, spelled};
 use crate::imu::Sensor;
 
-/// A unit of `run.toml`, and the size of the file unit in it.
+/// A `run.toml` unit, and the size of the file's unit expressed in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
     pub word: &'static str,

@@ -216,7 +216,7 @@ pub fn day_to_day(
     Ok(differ)
 }
 
-/// Makes groups independent by a 1σ as large as between instruments.
+/// Lets groups differ freely between recordings: by the 1σ by which instruments differ.
 fn own_parameters(
     document: Document,
     own: &[String],

@@ -82,7 +82,7 @@ impl Strides<'_> {
         self.leg.at(time).instant(place, self.trajectory.banks)
     }
 
-    /// Continues until a time in s since the start and passes on every stride. The computed solution rotates at
+    /// Continues until the given time, in s since the start, and passes on every stride. The computed solution rotates at
     /// `beside` rad/s relative to the body.
     ///
     /// # Errors
@@ -108,7 +108,7 @@ impl Strides<'_> {
         Ok(())
     }
 
-    /// Continues until a time in s since the start.
+    /// Continues until the given time, in s since the start.
     pub fn pass(&mut self, until: f64) {
         let Ok(()) = self.go(until, 0.0, |_| Ok::<_, Infallible>(()));
     }

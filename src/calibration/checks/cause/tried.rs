@@ -16,7 +16,7 @@ pub struct Tried {
 }
 
 impl Tried {
-    /// Selects from this many dwells by the innovations of a pass.
+    /// Selects dwells out of `count` by the innovations of a pass.
     pub fn of(count: usize, innovations: &[Innovation]) -> Self {
         if count <= 2 * HALF {
             let all: BTreeSet<usize> = (0..count).collect();
