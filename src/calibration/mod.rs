@@ -65,7 +65,7 @@ pub use parameters::error_term::ErrorTerm;
 pub use parameters::group::Group;
 pub use parameters::{
     OBSERVED_BELOW, PARAMETERS, ParameterMatrix, ParameterVector, from_vector, in_general_form,
-    parameter, parameter_index, parameter_name, sensor_and_parameter, to_vector,
+    parameter, parameter_index, parameter_name, sensor_and_parameter, stacked, to_vector,
 };
 use pass::{Gate, PassResult, pass};
 pub use problem::Problem;

@@ -30,7 +30,7 @@ use super::calibrate::{dwell_times, navigate, note, solve, stamp, write_report};
 use super::simulate::{simulated, write};
 
 use crate::cli::Cli;
-use crate::cli::arguments::{Overwrite, positive, seed};
+use crate::cli::arguments::{Overwrite, number, seed};
 use crate::cli::terminal::{Activity, show_brief};
 
 /// Simulates a calibration and compares it with the truth
@@ -54,7 +54,7 @@ pub struct Demo {
     #[arg(long)]
     follow: bool,
     /// With --follow: playback speed, as a multiple of real time
-    #[arg(long, value_name = "N", value_parser = positive, default_value = "5", requires = "follow")]
+    #[arg(long, value_name = "N", value_parser = speed, default_value = "5", requires = "follow")]
     speed: f64,
     #[command(flatten)]
     overwrite: Overwrite,
@@ -64,6 +64,11 @@ pub struct Demo {
 const BY_HAND: &str = "z_up, turn x 180, turn y 20, x_up, x_down, turn z 90, y_up, y_down, turn y 180, turn z 180, \
                        turn x 90, turn x 180, turn y 90, z_up, turn z 180";
 const TOO_SHORT: usize = 1;
+
+/// How many times as fast as the sensor.
+fn speed(text: &str) -> Result<f64, String> {
+    number(text, 0.1, 1000.0)
+}
 
 impl Demo {
     pub fn run(&self) -> anyhow::Result<()> {

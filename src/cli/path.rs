@@ -4,15 +4,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Subcommand;
-use turncal::calibration::{ErrorTerm, Options};
+use turncal::calibration::{ErrorTerm, Options, Word};
 use turncal::formats::Opened;
 use turncal::models::{Instrument, Place, path_by_hand, specification, turntable};
-use turncal::report::path::Report;
+use turncal::report::path::{Report, moves_in_words};
 use turncal::run::Aiding;
 use turncal::simulation::Scenario;
 use turncal::study::path::{Evaluation, PathStudy};
-use turncal::survey::decided;
-use turncal::turntable::{Moves, Rotation};
 use turncal::units::DEGREE;
 
 use crate::cli::NotMet;
@@ -99,18 +97,11 @@ impl Evaluate {
             evaluation: &evaluation,
             specification: specification.as_ref(),
         };
-        begun.deliver(&report.document())?;
-        let checks = specification
-            .map(|of| decided(&of, &evaluation.bound))
-            .unwrap_or_default();
-        let open = checks
-            .iter()
-            .filter(|check| check.verdict != turncal::lot::Verdict::Pass);
-        match open.count() {
-            0 => Ok(()),
-            open => {
-                Err(NotMet(format!("{name}: σ are too large to decide {open} limit(s)")).into())
-            }
+        let document = report.document();
+        begun.deliver(&document)?;
+        match document.verdict {
+            Some((Word::Undecided, text)) => Err(NotMet(format!("{name}: {text}")).into()),
+            _ => Ok(()),
         }
     }
 
@@ -145,9 +136,9 @@ impl Evaluate {
             (scenario.table, scenario.table_name) = turntable(model, &Place::CommandLine)?;
         }
         if by_hand {
-            scenario.path = path_by_hand(&self.path).map_err(anyhow::Error::msg)?;
-            scenario.path_name = "by hand".to_owned();
             scenario.integrator.lever_arm = Default::default();
+            let along = path_by_hand(&self.path).and_then(|path| scenario.along(path, "by hand"));
+            scenario = along.map_err(anyhow::Error::msg)?;
         } else {
             scenario = scenario.with_path(&self.path)?;
         }
@@ -171,7 +162,7 @@ impl Evaluate {
             1.0 / scenario.integrator.period,
             scenario.site.latitude / DEGREE
         );
-        let (name, moves) = (scenario.path_name.clone(), words(&scenario));
+        let (name, moves) = (scenario.path_name.clone(), moves_in_words(&scenario));
         let options = self.options(aiding);
         let study = PathStudy {
             scenario,
@@ -186,51 +177,4 @@ impl Evaluate {
 /// Whether a file describes a run.
 fn is_run(file: &Path) -> bool {
     file.is_file() && std::fs::read_to_string(file).is_ok_and(|text| text.contains("turncal-run/"))
-}
-
-/// Each move in words.
-fn words(scenario: &Scenario) -> Vec<String> {
-    let degrees = |angle: f64| format!("{:+.0}°", angle / DEGREE);
-    match &scenario.path.moves {
-        Moves::Axes { steps, .. } => {
-            let step = |angles: &[f64]| {
-                let axes = scenario.table.axes.iter().zip(angles);
-                let turned = axes.filter(|(_, angle)| **angle != 0.0);
-                let words =
-                    turned.map(|(axis, angle)| format!("{} {}", axis.name, degrees(*angle)));
-                words.collect::<Vec<_>>().join(", ")
-            };
-            steps.iter().map(|of| step(&of.angles)).collect()
-        }
-        Moves::Body { steps, .. } => steps.iter().map(|of| rotation(&of.rotation)).collect(),
-    }
-}
-
-fn rotation(rotation: &Rotation) -> String {
-    let vector = match rotation {
-        Rotation::By(vector) => vector / DEGREE,
-        Rotation::Point { axis, .. } => *axis,
-    };
-    let axes = ["x", "y", "z"].into_iter().zip(&vector);
-    let along = axes.filter(|(_, part)| **part != 0.0);
-    match rotation {
-        Rotation::By(_) => {
-            let words = along.map(|(axis, angle)| format!("{axis} {angle:+.0}°"));
-            format!("turn {}", words.collect::<Vec<_>>().join(", "))
-        }
-        Rotation::Point { along: to, .. } => {
-            let words = along.map(|(axis, sign)| {
-                if *sign < 0.0 {
-                    format!("−{axis}")
-                } else {
-                    axis.to_owned()
-                }
-            });
-            let words = words.collect::<String>();
-            match to.z > 0.999 {
-                true => format!("{words} up"),
-                false => format!("{words} along ({:.2}, {:.2}, {:.2})", to.x, to.y, to.z),
-            }
-        }
-    }
 }

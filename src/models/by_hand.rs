@@ -3,6 +3,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use crate::attitude::exp;
+use crate::imu::AxisOrder;
+use crate::recording::LabelledMotion;
 use crate::turntable::{BodyStep, Moves, Path, Rotation};
 use crate::units::DEGREE;
 
@@ -48,33 +50,21 @@ pub fn path_by_hand(words: &str) -> Result<Path, String> {
 }
 
 fn rotation(word: &str) -> Result<Rotation, String> {
-    let expected = || {
-        format!(
-            "found `{word}`, expected x_up, x_down, y_up … z_down, or a turn in degrees such as `turn x 90`"
-        )
-    };
-    let axis = |name: &str| {
-        let axis = ["x", "y", "z"].into_iter().position(|axis| axis == name);
-        axis.map(|axis| Vector3::ith(axis, 1.0))
-            .ok_or_else(expected)
-    };
     let parts: Vec<&str> = word.split_whitespace().collect();
-    if let ["turn", name, angle] = parts[..] {
-        let angle: f64 = angle.parse().map_err(|_| expected())?;
-        let turns = (0.0..=3600.0).contains(&angle.abs()) && angle != 0.0;
-        let vector = axis(name)? * (angle * DEGREE);
-        return turns.then_some(Rotation::By(vector)).ok_or_else(expected);
-    }
-    let (name, way) = word.split_once('_').ok_or_else(expected)?;
-    let sign = match way {
-        "up" => 1.0,
-        "down" => -1.0,
-        _ => return Err(expected()),
+    let label = match parts[..] {
+        ["turn", axis, angle] => format!("rot_{axis}{angle}"),
+        _ => word.to_owned(),
     };
-    Ok(Rotation::Point {
-        axis: axis(name)? * sign,
-        along: Vector3::z(),
-    })
+    match LabelledMotion::of_label(&label, AxisOrder::IDENTITY) {
+        Some(LabelledMotion::Stands { up }) => Ok(Rotation::Point {
+            axis: up,
+            along: Vector3::z(),
+        }),
+        Some(LabelledMotion::Turns { axis, angle }) => Ok(Rotation::By(axis * angle)),
+        None => Err(format!(
+            "found `{word}`, expected x_up, x_down, y_up … z_down, or a turn in degrees such as `turn x 90`"
+        )),
+    }
 }
 
 #[cfg(test)]

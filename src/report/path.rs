@@ -3,10 +3,12 @@
 use super::navigation::{self, Navigated};
 use super::prelude::*;
 use crate::calibration::{ParameterVector, TermLeftOff, Word, auxiliary_name, parameter_name};
-use crate::imu::InstallationForm;
+use crate::imu::{AXES, InstallationForm};
 use crate::lot::{Check, Specification, Verdict};
+use crate::simulation::Scenario;
 use crate::study::path::{Evaluation, Without};
 use crate::survey::decided;
+use crate::turntable::{Moves, Rotation};
 
 /// A term is not observed if more than this part of its prior σ remains.
 const NOT_SHOWN: f64 = 0.5;
@@ -33,7 +35,9 @@ impl Report<'_> {
     /// The report.
     pub fn document(&self) -> Document {
         let evaluation = self.evaluation;
-        let checks = self.specification.map(|of| decided(of, &evaluation.bound));
+        let checks = self
+            .specification
+            .map(|of| decided(of, &evaluation.bound.estimate));
         let mut document = Document::new(format!(
             "Predicted calibration accuracy of the path {}",
             self.name
@@ -402,5 +406,49 @@ fn minutes(seconds: f64) -> String {
     match seconds < 120.0 {
         true => format!("{} s", value(seconds, 1.0)),
         false => format!("{} min", value(seconds / 60.0, 0.1)),
+    }
+}
+
+/// Each move of a scenario in words.
+pub fn moves_in_words(scenario: &Scenario) -> Vec<String> {
+    let degrees = |angle: f64| format!("{:+.0}°", angle / DEGREE);
+    match &scenario.path.moves {
+        Moves::Axes { steps, .. } => {
+            let step = |angles: &[f64]| {
+                let axes = scenario.table.axes.iter().zip(angles);
+                let turned = axes.filter(|(_, angle)| **angle != 0.0);
+                let words =
+                    turned.map(|(axis, angle)| format!("{} {}", axis.name, degrees(*angle)));
+                words.collect::<Vec<_>>().join(", ")
+            };
+            steps.iter().map(|of| step(&of.angles)).collect()
+        }
+        Moves::Body { steps, .. } => steps.iter().map(|of| rotation(&of.rotation)).collect(),
+    }
+}
+
+fn rotation(rotation: &Rotation) -> String {
+    let vector = match rotation {
+        Rotation::By(vector) => vector / DEGREE,
+        Rotation::Point { axis, .. } => *axis,
+    };
+    let axes = AXES.into_iter().zip(&vector);
+    let along = axes.filter(|(_, part)| **part != 0.0);
+    match rotation {
+        Rotation::By(_) => {
+            let words = along.map(|(axis, angle)| format!("{axis} {angle:+.0}°"));
+            format!("turn {}", words.collect::<Vec<_>>().join(", "))
+        }
+        Rotation::Point { along: to, .. } => {
+            let words = along.map(|(axis, sign)| {
+                let minus = if *sign < 0.0 { "−" } else { "" };
+                format!("{minus}{axis}")
+            });
+            let words = words.collect::<String>();
+            match to.z > 0.999 {
+                true => format!("{words} up"),
+                false => format!("{words} along ({:.2}, {:.2}, {:.2})", to.x, to.y, to.z),
+            }
+        }
     }
 }

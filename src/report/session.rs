@@ -1,4 +1,4 @@
-//! Status of a calibration in progress, as a screen that is redrawn or as lines.
+//! Status of a calibration in attained, as a screen that is redrawn or as lines.
 
 use nalgebra::Vector3;
 
@@ -7,7 +7,7 @@ use super::prelude::*;
 use crate::imu::AXES;
 use crate::lot::{Specification, Verdict};
 use crate::run::Run;
-use crate::survey::{Move, Progress, Status, needed};
+use crate::survey::{Attained, Move, Status, needed};
 
 /// An upward direction counts as tried within this angle, rad.
 const NEAR: f64 = 15.0 * DEGREE;
@@ -52,7 +52,7 @@ pub fn screen(run: &Run, status: &Status, specification: Option<&Specification>)
     ];
     match &status.expected {
         Err(error) => lines.push(format!("no calibration yet: {error}")),
-        Ok(progress) => lines.extend(groups(progress, specification)),
+        Ok(attained) => lines.extend(groups(attained, specification)),
     }
     lines.push(String::new());
     lines.push(coverage(status));
@@ -78,16 +78,16 @@ pub fn line(status: &Status, dwell: usize) -> Option<String> {
         dwell + 1,
         three_digits(rest.up.tilt / DEGREE)
     );
-    let Ok(progress) = &status.expected else {
+    let Ok(attained) = &status.expected else {
         return Some(line + "; no calibration yet");
     };
     // The history may lack the first dwells, when no initial estimate exists yet.
     let behind = status.survey.rests.len() - dwell;
-    let of_dwell = progress
+    let of_dwell = attained
         .history
         .len()
         .checked_sub(behind)
-        .map(|k| &progress.history[k]);
+        .map(|k| &attained.history[k]);
     if let Some((time, groups)) = of_dwell {
         let sigma = groups.iter().filter_map(|(group, sigma)| {
             let sigma = three_digits((*sigma)? / group.unit_value());
@@ -115,7 +115,7 @@ fn moving(status: &Status) -> String {
 }
 
 /// σ of each group, and the σ that the specification requires.
-fn groups(progress: &Progress, specification: Option<&Specification>) -> Vec<String> {
+fn groups(attained: &Attained, specification: Option<&Specification>) -> Vec<String> {
     let row = |(group, sigma): &(Group, Option<f64>)| {
         let shown = |sigma: f64| {
             format!(
@@ -125,7 +125,7 @@ fn groups(progress: &Progress, specification: Option<&Specification>) -> Vec<Str
             )
         };
         let asked = specification.and_then(|of| needed(of, *group));
-        let open = progress.checks.iter().any(|check| {
+        let open = attained.checks.iter().any(|check| {
             Group::of(check.limit.parameter) == *group && check.verdict != Verdict::Pass
         });
         let state = match (asked, open) {
@@ -147,7 +147,7 @@ fn groups(progress: &Progress, specification: Option<&Specification>) -> Vec<Str
         ""
     };
     let heading = format!("{:<24}{:>14}{asked:>14}", "", "expected 1σ");
-    let last = progress.history.last();
+    let last = attained.history.last();
     let rows = last.into_iter().flat_map(|(_, groups)| groups).map(row);
     std::iter::once(heading.trim_end().to_owned())
         .chain(rows)
@@ -176,8 +176,8 @@ fn coverage(status: &Status) -> String {
 
 /// The state as data: σ of each group, unobserved parameters and the next move.
 pub fn data(status: &Status) -> Value {
-    let progress = status.expected.as_ref().ok();
-    let last = progress.and_then(|progress| progress.history.last());
+    let attained = status.expected.as_ref().ok();
+    let last = attained.and_then(|attained| attained.history.last());
     let sigma = last.into_iter().flat_map(|(_, groups)| groups);
     let sigma =
         sigma.map(|(group, sigma)| (group.key(), sigma.map(|s| s / group.unit_value()).into()));
@@ -186,7 +186,7 @@ pub fn data(status: &Status) -> Value {
         "dwells": status.survey.rests.len(),
         "still_s": status.still,
         "sigma": sigma.collect::<Map<_, _>>(),
-        "not_observed": progress.map(|progress| &progress.unobserved),
+        "not_observed": attained.map(|attained| &attained.unobserved),
         "next": status.next.map(words),
     })
 }

@@ -122,11 +122,24 @@ impl Scenario {
     ///
     /// # Errors
     /// If it does not exist, is malformed, or does not fit the table.
-    pub fn with_path(mut self, name_or_path: &str) -> Result<Self, ModelError> {
-        (self.path, self.path_name) = models::path(name_or_path, &Place::CommandLine, &self.site)?;
-        let checked = self.check();
-        checked.map_err(|message| models::inconsistent(name_or_path, message))?;
-        Ok(self)
+    pub fn with_path(self, name_or_path: &str) -> Result<Self, ModelError> {
+        let (path, name) = models::path(name_or_path, &Place::CommandLine, &self.site)?;
+        let along = self.along(path, &name);
+        along.map_err(|message| models::inconsistent(name_or_path, message))
+    }
+
+    /// The same scenario along a path of this name.
+    ///
+    /// # Errors
+    /// A message if it does not fit the table, or takes too many samples.
+    pub fn along(self, path: Path, path_name: &str) -> Result<Self, String> {
+        let scenario = Self {
+            path,
+            path_name: path_name.to_owned(),
+            ..self
+        };
+        scenario.check()?;
+        Ok(scenario)
     }
 
     /// The same scenario with an error term, of usual magnitude unless its models state one.

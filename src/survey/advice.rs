@@ -147,9 +147,16 @@ fn missing(
     };
     let over = |check: &Check| {
         let k = estimated.iter().position(|&k| k == check.limit.parameter)?;
-        let allowed = specification.deciding_sigma(check.limit.within);
-        let allowed = allowed / bound.prior_sigma[check.limit.parameter];
-        Some((sigma[k] / allowed).ln().max(0.0))
+        // A calibration may have found more noise than is expected of the record.
+        let (_, found) = check.off?;
+        let expected =
+            bound.estimate.covariance[(check.limit.parameter, check.limit.parameter)].sqrt();
+        let allowed = specification.deciding_sigma(check.limit.within) * expected / found;
+        Some(
+            (sigma[k] * bound.prior_sigma[check.limit.parameter] / allowed)
+                .ln()
+                .max(0.0),
+        )
     };
     let open = checks.iter().filter(|check| check.verdict != Verdict::Pass);
     open.filter_map(over).sum()

@@ -5,12 +5,12 @@ mod advice;
 mod session;
 
 pub use advice::{Advisor, Move, TURNED_BY_HAND};
-pub use session::{Progress, Session, Status, decided, needed};
+pub use session::{Attained, Session, Status, decided, needed};
 
 use crate::calibration::{
-    Bound, CalibrationError, Contradiction, Estimate, Group, OBSERVED_BELOW, Options, Problem,
+    Bound, CalibrationError, Contradiction, Estimate, Group, OBSERVED_BELOW, Options,
+    ParameterVector, Problem, bound, coarse_start, parameter_name, six_position, stacked,
 };
-use crate::calibration::{bound, coarse_start, parameter_name, sensor_and_parameter, six_position};
 use crate::imu::{BodyFrame, InstallationForm, TermVector};
 use crate::run::motion::{self, LabelCheck, Rest, Turn};
 use crate::run::{Aiding, Run};
@@ -68,11 +68,14 @@ impl Path {
     }
 }
 
+/// RMS σ of each group's estimated parameters, rad/s or m/s² normalised; `None` if all are fixed.
+pub type GroupSigma = Vec<(Group, Option<f64>)>;
+
 /// Predicted σ, in the general installation form.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expected {
     /// RMS σ of the estimated parameters of each group, rad/s or m/s² normalised; `None` if all are fixed.
-    pub sigma: Vec<(Group, Option<f64>)>,
+    pub sigma: GroupSigma,
     /// Parameters with σ above half of the prior, or determined only by the prior.
     pub unobserved: Vec<String>,
 }
@@ -172,21 +175,34 @@ pub fn bound_of_record(run: &Run, options: &Options) -> Result<Bound, Calibratio
 
 fn summary(run: &Run, body_frame: BodyFrame, estimate: &Estimate) -> Expected {
     let sigma = estimate.sigma();
-    let prior = run.instrument.prior_sigma(FORM, body_frame);
-    let group = |group: Group| {
-        let indices = group.estimated(estimate);
-        let mean = indices.iter().map(|&k| sigma[k].powi(2)).sum::<f64>() / indices.len() as f64;
-        (group, (!indices.is_empty()).then(|| mean.sqrt()))
-    };
-    let hidden = |&k: &usize| {
-        let (sensor, of_triad) = sensor_and_parameter(k);
-        sigma[k] > OBSERVED_BELOW * prior.get(sensor)[of_triad]
-    };
-    let unobserved = estimate.estimated().filter(hidden);
+    let prior = stacked(&run.instrument.prior_sigma(FORM, body_frame));
     Expected {
-        sigma: Group::all().map(group).collect(),
-        unobserved: unobserved.filter_map(|k| parameter_name(FORM, k)).collect(),
+        sigma: by_group(&sigma, estimate),
+        unobserved: unobserved(&sigma, &prior, estimate),
     }
+}
+
+/// RMS of each group of σ.
+fn by_group(sigma: &ParameterVector, estimate: &Estimate) -> GroupSigma {
+    let rms = |group: Group| {
+        let indices = group.estimated(estimate);
+        let sum: f64 = indices.iter().map(|&k| sigma[k].powi(2)).sum();
+        let rms = (sum / indices.len() as f64).sqrt();
+        (group, (!indices.is_empty()).then_some(rms))
+    };
+    Group::all().map(rms).collect()
+}
+
+/// Names of the parameters that keep more than half of their prior σ.
+fn unobserved(
+    sigma: &ParameterVector,
+    prior: &ParameterVector,
+    estimate: &Estimate,
+) -> Vec<String> {
+    let hidden = |&k: &usize| sigma[k] > OBSERVED_BELOW * prior[k];
+    let hidden = estimate.estimated().filter(hidden);
+    let name = |k| parameter_name(estimate.form(), k);
+    hidden.filter_map(name).collect()
 }
 
 #[cfg(test)]

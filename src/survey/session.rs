@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 
 use super::advice::{Advisor, Move};
-use super::{Survey, bound_of_record};
+use super::{GroupSigma, Survey, bound_of_record, by_group, unobserved};
 use crate::calibration::{
-    Bound, CalibrationError, Group, OBSERVED_BELOW, Options, ParameterVector, parameter_name,
+    Bound, CalibrationError, Estimate, Group, Method, Options, Problem, Solution, UNWATCHED,
 };
 use crate::earth::Site;
 use crate::imu::Instrument;
@@ -26,21 +26,18 @@ pub struct Status {
     /// Time for which the instrument has been at rest, s; zero while it moves.
     pub still: f64,
     /// Expected σ, or the reason why there is none yet.
-    pub expected: Result<Progress, CalibrationError>,
+    pub expected: Result<Attained, CalibrationError>,
     /// The next move; `None` if nothing is missing.
     pub next: Option<Move>,
 }
 
-/// RMS σ of each group's parameters, rad/s or m/s² normalised; `None` if all are fixed.
-pub type GroupSigma = Vec<(Group, Option<f64>)>;
-
-/// Expected σ of the rows so far.
+/// Accuracy of the rows so far.
 #[derive(Debug, Clone)]
-pub struct Progress {
-    /// Covariance, and its history.
+pub struct Attained {
+    /// Expected covariance, and its history.
     pub bound: Bound,
-    /// For each dwell: the time of its end in s, and the expected RMS σ of each group's parameters at that time, rad/s
-    /// or m/s² normalised.
+    /// For each dwell: the time of its end in s, and the expected σ at that time. If the expected σ are small enough to
+    /// decide every limit, those of the last dwell are the σ of a calibration.
     pub history: Vec<(f64, GroupSigma)>,
     /// Parameters that keep more than half of their prior σ.
     pub unobserved: Vec<String>,
@@ -58,10 +55,10 @@ impl Status {
         let still = standing.map_or(0.0, |rest| rest.dwell.duration(imu));
         let up = last.map_or(Vector3::z(), |rest| rest.force.normalize());
         let bound = bound_of_record(run, &Options::default());
-        let expected = bound.map(|bound| Progress::new(run, &survey, bound, specification));
+        let expected = bound.map(|bound| Attained::new(run, &survey, bound, specification));
         let next = match &expected {
-            Ok(progress) if progress.is_met() => None,
-            Ok(Progress { bound, checks, .. }) => {
+            Ok(attained) if attained.is_met() => None,
+            Ok(Attained { bound, checks, .. }) => {
                 advisor.next(run, &up, (bound, checks), specification)
             }
             Err(_) => Some(advisor.first(&survey)),
@@ -77,41 +74,54 @@ impl Status {
 
     /// Whether a specification is given and every limit can be decided.
     pub fn is_met(&self) -> bool {
-        self.expected.as_ref().is_ok_and(Progress::is_met)
+        self.expected.as_ref().is_ok_and(Attained::is_met)
     }
 }
 
-impl Progress {
+impl Attained {
+    /// By expected σ, which lack the noise that only a calibration finds; if they are small enough, by a calibration.
     fn new(
         run: &Run,
         survey: &Survey,
         bound: Bound,
         specification: Option<&Specification>,
     ) -> Self {
-        let sigma = bound.estimate.sigma();
+        let (estimate, sigma) = (&bound.estimate, bound.estimate.sigma());
         let ends = survey.rests.iter().map(|rest| rest.dwell.times(run)[1]);
         let history = ends.filter_map(|end| {
-            let before = bound
-                .history
-                .iter()
-                .take_while(|epoch| epoch.time <= end + 0.5 * EVERY);
-            let at_end = before.last()?;
-            let groups = Group::all().map(|group| {
-                let indices = group.estimated(&bound.estimate);
-                (group, rms(&at_end.sigma, &indices))
-            });
-            Some((end, groups.collect()))
+            let mut epochs = bound.history.iter();
+            let at_end = epochs.rfind(|epoch| epoch.time <= end + 0.5 * EVERY)?;
+            Some((end, by_group(&at_end.sigma, estimate)))
         });
-        let form = bound.estimate.form();
-        let hidden = |&k: &usize| sigma[k] > OBSERVED_BELOW * bound.prior_sigma[k];
-        let hidden = bound.estimate.estimated().filter(hidden);
-        Self {
+        let mut attained = Self {
             history: history.collect(),
-            unobserved: hidden.filter_map(|k| parameter_name(form, k)).collect(),
-            checks: specification
-                .map(|of| decided(of, &bound))
-                .unwrap_or_default(),
+            unobserved: unobserved(&sigma, &bound.prior_sigma, estimate),
+            checks: specification.map_or_else(Vec::new, |of| decided(of, estimate)),
             bound,
+        };
+        if let (true, Some(specification)) = (attained.is_met(), specification) {
+            attained.calibrate(run, specification);
+        }
+        attained
+    }
+
+    /// Replaces the checks and the last σ by those of a calibration; no limit is decided if it fails.
+    fn calibrate(&mut self, run: &Run, specification: &Specification) {
+        let problem = Problem::new(run, &Options::default());
+        let calibrated = problem.solve(Method::Ekf, UNWATCHED);
+        let calibrated = calibrated.and_then(|mut solution| {
+            solution.assess(&problem)?;
+            Ok(solution)
+        });
+        let usable = calibrated.ok().filter(Solution::is_usable);
+        let Some(solution) = usable else {
+            let open = |check: &mut Check| check.verdict = Verdict::NotDecided;
+            return self.checks.iter_mut().for_each(open);
+        };
+        let estimate = solution.estimate();
+        self.checks = decided(specification, estimate);
+        if let Some((_, last)) = self.history.last_mut() {
+            *last = by_group(&estimate.sigma(), estimate);
         }
     }
 
@@ -122,10 +132,10 @@ impl Progress {
     }
 }
 
-/// A unit at its nominal values against every limit of an estimated parameter: it passes if the expected σ are small
-/// enough to decide the limit.
-pub fn decided(specification: &Specification, bound: &Bound) -> Vec<Check> {
-    let sigma = bound.estimate.in_general_form().sigma();
+/// A unit at its nominal values against every limit of an estimated parameter: it passes if the σ of an estimate are
+/// small enough to decide the limit.
+pub fn decided(specification: &Specification, estimate: &Estimate) -> Vec<Check> {
+    let sigma = estimate.in_general_form().sigma();
     let mut specification = specification.clone();
     // Parameters that the body frame fixes have no error.
     specification
@@ -147,11 +157,6 @@ pub fn needed(specification: &Specification, group: Group) -> Option<f64> {
     let limits = specification.limits.iter().filter(of_group);
     let tightest = limits.map(|limit| limit.within).reduce(f64::min)?;
     Some(specification.deciding_sigma(tightest))
-}
-
-fn rms(sigma: &ParameterVector, indices: &[usize]) -> Option<f64> {
-    let sum: f64 = indices.iter().map(|&k| sigma[k].powi(2)).sum();
-    (!indices.is_empty()).then(|| (sum / indices.len() as f64).sqrt())
 }
 
 /// A calibration in progress, whose samples are pushed as they arrive. It has no thread of its own.
@@ -192,7 +197,8 @@ impl Session {
         }
     }
 
-    /// Adds samples; returns `None` until another second of samples has arrived.
+    /// Adds samples; returns `None` until another second of samples has arrived. An evaluation takes some tens of
+    /// milliseconds, and as long as a calibration once the specification seems to be met.
     ///
     /// # Errors
     /// [`SampleError`] if a number is not finite, the triads differ in length, or the period is not positive. The
@@ -202,6 +208,9 @@ impl Session {
         gyro: &[Vector3<f64>],
         accel: &[Vector3<f64>],
     ) -> Result<Option<Status>, SampleError> {
+        if gyro.is_empty() && accel.is_empty() {
+            return Ok(None);
+        }
         Recording::from_samples("", 0.0, self.period, gyro.to_vec(), accel.to_vec())?;
         let integral = |of: &Vector3<f64>| of * self.period;
         self.gyro.extend(gyro.iter().map(integral));

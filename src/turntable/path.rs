@@ -85,12 +85,14 @@ impl Moves {
         self.len() == 0
     }
 
-    /// The same without one of them and the dwell after it.
+    /// The same without one of them and the dwell after it; unchanged if there is no such move.
     pub fn without(&self, number: usize) -> Self {
         let mut moves = self.clone();
-        match &mut moves {
-            Self::Axes { steps, .. } => drop(steps.remove(number)),
-            Self::Body { steps, .. } => drop(steps.remove(number)),
+        if number < moves.len() {
+            match &mut moves {
+                Self::Axes { steps, .. } => drop(steps.remove(number)),
+                Self::Body { steps, .. } => drop(steps.remove(number)),
+            }
         }
         moves
     }

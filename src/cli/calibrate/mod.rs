@@ -126,7 +126,7 @@ impl Calibrate {
         }
     }
 
-    /// Follows the rows of a log to their end, then calibrates them.
+    /// Follows a log until it ends, then calibrates it.
     fn followed(&self) -> anyhow::Result<()> {
         let [source] = self.runs.as_slice() else {
             let message = "--follow takes one log; calibrate several logs when they are complete\n";

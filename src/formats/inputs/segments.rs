@@ -2,13 +2,10 @@
 
 use std::path::Path;
 
-use nalgebra::Vector3;
-
 use super::source::Source;
 use crate::formats::error::FileError;
 use crate::imu::AxisOrder;
 use crate::recording::{ImuSamples, LabelledMotion, Segment};
-use crate::units::DEGREE;
 
 /// Reads the sections of a run with these samples, with stamps `lag` samples after their start; `notes` receives
 /// remarks about the file.
@@ -59,7 +56,7 @@ pub fn read(
             start,
             end,
             samples: row(start)..row(end),
-            motion: motion_of(&label, axes),
+            motion: LabelledMotion::of_label(&label, axes),
             label,
         });
     }
@@ -69,58 +66,4 @@ pub fn read(
             .filter(|_| label_column + 1 != csv.header().len()),
     );
     Ok(segments)
-}
-
-/// Motion stated by a label, in the axes of the file.
-fn motion_of(label: &str, axes: AxisOrder) -> Option<LabelledMotion> {
-    let axis = |name: &str| {
-        let index = ["x", "y", "z"].into_iter().position(|axis| axis == name)?;
-        Some(axes.apply(&Vector3::ith(index, 1.0)))
-    };
-    if let Some(turn) = label.strip_prefix("rot_") {
-        let (name, angle) = turn.split_at_checked(1)?;
-        let angle: f64 = angle.parse().ok()?;
-        let turns = angle.is_finite() && angle != 0.0;
-        return turns.then_some(LabelledMotion::Turns {
-            axis: axis(name)?,
-            angle: angle * DEGREE,
-        });
-    }
-    let (name, way) = label.split_once('_')?;
-    let up = match way {
-        "up" => axis(name)?,
-        "down" => -axis(name)?,
-        _ => return None,
-    };
-    Some(LabelledMotion::Stands { up })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn labels_name_axes_of_the_file() {
-        let frd = AxisOrder::FRONT_RIGHT_DOWN;
-        let of = |label| motion_of(label, frd);
-        let up = |up| Some(LabelledMotion::Stands { up });
-        assert_eq!(of("x_up"), up(Vector3::y()));
-        assert_eq!(of("z_down"), up(Vector3::z()));
-        let Some(LabelledMotion::Turns { axis, angle }) = of("rot_z-360") else {
-            panic!("no turn");
-        };
-        assert_eq!(axis * angle, Vector3::z() * (360.0 * DEGREE));
-        for other in [
-            "still",
-            "x_left",
-            "w_up",
-            "rot_",
-            "rot_x",
-            "rot_é+90",
-            "rot_x+NaN",
-            "_up",
-        ] {
-            assert_eq!(of(other), None, "{other}");
-        }
-    }
 }
