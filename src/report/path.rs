@@ -411,7 +411,7 @@ fn minutes(seconds: f64) -> String {
 
 /// Each move of a scenario in words.
 pub fn moves_in_words(scenario: &Scenario) -> Vec<String> {
-    let degrees = |angle: f64| format!("{:+.0}°", angle / DEGREE);
+    let degrees = |angle: f64| format!("{:+.0}°", angle / DEGREE).replace('-', "−");
     match &scenario.path.moves {
         Moves::Axes { steps, .. } => {
             let step = |angles: &[f64]| {
@@ -436,7 +436,7 @@ fn rotation(rotation: &Rotation) -> String {
     let along = axes.filter(|(_, part)| **part != 0.0);
     match rotation {
         Rotation::By(_) => {
-            let words = along.map(|(axis, angle)| format!("{axis} {angle:+.0}°"));
+            let words = along.map(|(axis, angle)| format!("{axis} {angle:+.0}°").replace('-', "−"));
             format!("turn {}", words.collect::<Vec<_>>().join(", "))
         }
         Rotation::Point { along: to, .. } => {
