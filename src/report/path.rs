@@ -402,7 +402,8 @@ fn percent(part: f64) -> String {
     three_digits(100.0 * part)
 }
 
-fn minutes(seconds: f64) -> String {
+/// A time with its unit: seconds below two minutes.
+pub fn minutes(seconds: f64) -> String {
     match seconds < 120.0 {
         true => format!("{} s", value(seconds, 1.0)),
         false => format!("{} min", value(seconds / 60.0, 0.1)),

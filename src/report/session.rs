@@ -1,16 +1,15 @@
-//! Status of a calibration in attained, as a screen that is redrawn or as lines.
+//! Status of a calibration in progress, as a screen that is redrawn or as lines.
 
 use nalgebra::Vector3;
 
 use super::check;
 use super::prelude::*;
+use crate::calibration::{Finding, Verdict};
 use crate::imu::AXES;
-use crate::lot::{Specification, Verdict};
+use crate::lot::{self, Specification};
 use crate::run::Run;
-use crate::survey::{Attained, Move, Status, needed};
+use crate::survey::{Attained, Calibrated, Move, Status, needed};
 
-/// An upward direction counts as tried within this angle, rad.
-const NEAR: f64 = 15.0 * DEGREE;
 /// Minimum turn about a body axis that counts, rad.
 const TURNED: f64 = 60.0 * DEGREE;
 /// Maximum number of findings on a screen.
@@ -54,14 +53,22 @@ pub fn screen(run: &Run, status: &Status, specification: Option<&Specification>)
         Err(error) => lines.push(format!("no calibration yet: {error}")),
         Ok(attained) => lines.extend(groups(attained, specification)),
     }
+    lines.extend(status.calibrated.as_ref().map(calibrated));
     lines.push(String::new());
-    lines.push(coverage(status));
-    let findings = check::findings(run, &status.survey);
+    lines.extend(coverage(status));
+    lines.push(String::new());
     let first = |finding: &String| {
         let sentence = finding.split_inclusive(". ").next().unwrap_or_default();
         format!("note: {}", sentence.trim_end())
     };
-    lines.extend(findings.iter().take(SHOWN).map(first));
+    lines.extend(findings(run, status).iter().take(SHOWN).map(first));
+    if let Ok(Some(left)) = status
+        .expected
+        .as_ref()
+        .map(|of| of.time_left(specification))
+    {
+        lines.push(format!("about {} left", super::path::minutes(left)));
+    }
     lines.push(match status.next {
         Some(next) => format!("next: {}, then keep still for 5 s", words(next)),
         None => "σ are small enough to decide every limit of the specification".to_owned(),
@@ -126,7 +133,7 @@ fn groups(attained: &Attained, specification: Option<&Specification>) -> Vec<Str
         };
         let asked = specification.and_then(|of| needed(of, *group));
         let open = attained.checks.iter().any(|check| {
-            Group::of(check.limit.parameter) == *group && check.verdict != Verdict::Pass
+            Group::of(check.limit.parameter) == *group && check.verdict != lot::Verdict::Pass
         });
         let state = match (asked, open) {
             (None, _) => "",
@@ -154,24 +161,77 @@ fn groups(attained: &Attained, specification: Option<&Specification>) -> Vec<Str
         .collect()
 }
 
-/// Axes that were up or down, and axes of turns.
-fn coverage(status: &Status) -> String {
-    let mark = |done: bool| if done { "●" } else { "○" };
-    let rests = &status.survey.rests;
-    let mut text = "up ".to_owned();
-    for (axis, name) in AXES.into_iter().enumerate() {
-        for (sign, part) in [("", 1.0), ("−", -1.0)] {
-            let up = Vector3::ith(axis, part);
-            let done = rests.iter().any(|rest| rest.force.angle(&up) < NEAR);
-            text += &format!(" {sign}{name} {}", mark(done));
-        }
-    }
-    text += "   turned about ";
-    for (axis, name) in AXES.into_iter().enumerate() {
-        let far = |turn: &crate::run::motion::Turn| turn.sum[axis].abs() > TURNED;
-        text += &format!(" {name} {}", mark(status.survey.turns.iter().any(far)));
-    }
-    text
+/// The last calibration in one line.
+fn calibrated(last: &Calibrated) -> String {
+    let Verdict { word, reasons } = &last.verdict;
+    let codes = if reasons.is_empty() {
+        String::new()
+    } else {
+        format!(" ({})", reasons.join(", "))
+    };
+    let time = value(last.duration, 1.0);
+    format!("calibration of the first {time} s: {word}{codes}")
+}
+
+/// Findings about the rows, then those that restrict the use of the last calibration.
+fn findings(run: &Run, status: &Status) -> Vec<String> {
+    let mut findings = check::findings(run, &status.survey);
+    let Some(last) = &status.calibrated else {
+        return findings;
+    };
+    let is_reason = |of: &&Finding| last.verdict.reasons.contains(&of.code);
+    let reasons = last.findings.iter().filter(is_reason);
+    findings.extend(reasons.map(|of| format!("{}: {}", of.code, of.text)));
+    findings
+}
+
+/// Upward directions seen from above the sensor: three layers of nine directions, those with z up, level, down; then the
+/// turns about both directions of each axis.
+fn coverage(status: &Status) -> Vec<String> {
+    let mark = |done: bool| if done { '●' } else { '○' };
+    let direction = |x: i32, y: i32, z: i32| Vector3::new(x, y, z).map(f64::from).normalize();
+    let all = (0..27)
+        .filter(|k| *k != 13)
+        .map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]);
+    let nearest = |force: &Vector3<f64>| {
+        let apart = |&[x, y, z]: &[i32; 3]| force.angle(&direction(x, y, z));
+        all.clone().min_by(|a, b| apart(a).total_cmp(&apart(b)))
+    };
+    let tried: Vec<_> = status
+        .survey
+        .rests
+        .iter()
+        .map(|rest| nearest(&rest.force))
+        .collect();
+    let layer = |y: i32, z: i32| {
+        let cell = |x: i32| match [x, y, z] {
+            [0, 0, 0] => ' ',
+            of => mark(tried.contains(&Some(of))),
+        };
+        format!("{} {} {}", cell(-1), cell(0), cell(1))
+    };
+    let row = |(y, name): (i32, &str)| {
+        format!(
+            "{name:<8}{}    {}    {}",
+            layer(y, 1),
+            layer(y, 0),
+            layer(y, -1)
+        )
+    };
+    let mut lines = vec!["up      z up     level    z down".to_owned()];
+    lines.extend([(1, "  y up"), (0, "  level"), (-1, "  y down")].map(row));
+    let turned = AXES.iter().enumerate().map(|(axis, name)| {
+        let by = |sign: f64| {
+            let mut turns = status.survey.turns.iter();
+            mark(turns.any(|turn| sign * turn.sum[axis] > TURNED))
+        };
+        format!("{name} {} −{name} {}", by(1.0), by(-1.0))
+    });
+    lines.push(format!(
+        "turned  {}",
+        turned.collect::<Vec<_>>().join("   ")
+    ));
+    lines
 }
 
 /// The state as data: σ of each group, unobserved parameters and the next move.

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::Survey;
+use super::{Attained, Survey};
 use crate::attitude::level;
 use crate::calibration::{Bound, Options, Problem, bound};
 use crate::imu::{InstallationForm, MotionNoise, NoiseSource, Sensor, TermVector};
@@ -109,10 +109,10 @@ impl Advisor {
         &mut self,
         run: &Run,
         up: &Vector3<f64>,
-        (bound, checks): (&Bound, &[Check]),
+        attained: &Attained,
         specification: Option<&Specification>,
     ) -> Option<Move> {
-        let known = information(bound)?;
+        let known = information(&attained.bound)?;
         let place = ups()
             .enumerate()
             .min_by(|(_, a), (_, b)| a.angle(up).total_cmp(&b.angle(up)));
@@ -124,7 +124,7 @@ impl Advisor {
                 return f64::INFINITY;
             };
             let sigma = covariance.diagonal().map(f64::sqrt);
-            missing(bound, sigma.as_slice(), checks, specification)
+            missing(attained, sigma.as_slice(), specification)
         };
         let best = moves
             .iter()
@@ -135,28 +135,23 @@ impl Advisor {
 
 /// Sum of the logarithms of σ: relative to the σ that a specification needs, where larger; without a specification,
 /// of all σ in units of their prior.
-fn missing(
-    bound: &Bound,
-    sigma: &[f64],
-    checks: &[Check],
-    specification: Option<&Specification>,
-) -> f64 {
+fn missing(attained: &Attained, sigma: &[f64], specification: Option<&Specification>) -> f64 {
+    let Attained {
+        bound,
+        inflation,
+        checks,
+        ..
+    } = attained;
     let estimated: Vec<usize> = bound.estimate.estimated().collect();
     let Some(specification) = specification else {
         return sigma.iter().map(|sigma| sigma.ln()).sum();
     };
     let over = |check: &Check| {
-        let k = estimated.iter().position(|&k| k == check.limit.parameter)?;
-        // A calibration may have found more noise than is expected of the record.
-        let (_, found) = check.off?;
-        let expected =
-            bound.estimate.covariance[(check.limit.parameter, check.limit.parameter)].sqrt();
-        let allowed = specification.deciding_sigma(check.limit.within) * expected / found;
-        Some(
-            (sigma[k] * bound.prior_sigma[check.limit.parameter] / allowed)
-                .ln()
-                .max(0.0),
-        )
+        let parameter = check.limit.parameter;
+        let k = estimated.iter().position(|&k| k == parameter)?;
+        let expected = sigma[k] * bound.prior_sigma[parameter] * inflation[parameter];
+        let needed = specification.deciding_sigma(check.limit.within);
+        Some((expected / needed).ln().max(0.0))
     };
     let open = checks.iter().filter(|check| check.verdict != Verdict::Pass);
     open.filter_map(over).sum()

@@ -2,10 +2,12 @@
 //! prior biases are used.
 
 mod advice;
+mod evaluator;
 mod session;
 
-pub use advice::{Advisor, Move, TURNED_BY_HAND};
-pub use session::{Attained, Session, Status, decided, needed};
+pub use advice::{Move, TURNED_BY_HAND};
+pub use evaluator::{Attained, Calibrated, Evaluator, Status, decided, needed};
+pub use session::Session;
 
 use crate::calibration::{
     Bound, CalibrationError, Contradiction, Estimate, Group, OBSERVED_BELOW, Options,

@@ -147,9 +147,11 @@ mod by_hand {
     use rand::seq::SliceRandom;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
+    use rayon::prelude::*;
 
     use super::*;
     use crate::attitude::exp;
+    use crate::calibration::UNWATCHED;
     use crate::models;
     use crate::turntable::{BodyStep, Moves, Path, Rotation};
 
@@ -214,28 +216,31 @@ mod by_hand {
         models::specification(std::path::Path::new("mems-by-hand")).unwrap()
     }
 
+    fn evaluator() -> Evaluator {
+        Evaluator::new(Options::default(), Some(specification()))
+    }
+
     /// Dwells that a random order needs: the first at whose end every limit can be decided.
     fn random_order(seed: u64, order: u64) -> Option<usize> {
         let mut moves: Vec<Move> = Move::all().collect();
         moves.shuffle(&mut ChaCha8Rng::seed_from_u64(order));
         let mut person = Person::new(seed);
         moves.into_iter().for_each(|next| person.does(next));
-        let mut status = Status::of(
-            &person.run(),
-            Some(&specification()),
-            &mut Advisor::default(),
-        );
-        let progress = status.expected.as_mut().unwrap();
-        let bound = progress.bound.clone();
-        let of_parameter = |limit: &crate::lot::Limit| (limit.parameter, limit.within / 1.96);
-        let needed: Vec<(usize, f64)> = specification().limits.iter().map(of_parameter).collect();
-        let ends = progress.history.iter().map(|(end, _)| *end);
+        let run = person.run();
+        let bound = bound_of_record(&run, &Options::default()).unwrap();
+        let specification = specification();
         let is_met = |end: f64| {
             let epoch = bound.history.iter().rfind(|epoch| epoch.time <= end + 0.5);
-            epoch.is_some_and(|epoch| needed.iter().all(|&(k, sigma)| epoch.sigma[k] < sigma))
+            epoch.is_some_and(|epoch| {
+                let mut limits = specification.limits.iter();
+                limits.all(|of| epoch.sigma[of.parameter] < specification.deciding_sigma(of.within))
+            })
         };
-        let first = ends.into_iter().position(is_met)?;
-        Some(first + 1 + status.survey.rests.len() - status.expected.ok()?.history.len())
+        let rests = crate::run::motion::rests(&run);
+        let first = rests
+            .iter()
+            .position(|rest| is_met(rest.dwell.times(&run)[1]))?;
+        Some(first + 1)
     }
 
     #[test]
@@ -273,7 +278,7 @@ mod by_hand {
         );
         let [live, whole] = [
             session.status().unwrap(),
-            Status::of(&run, None, &mut Advisor::default()),
+            Evaluator::default().status(&run, UNWATCHED),
         ];
         assert_eq!(live.survey.rests.len(), 6);
         assert_eq!(live.survey.rests.len(), whole.survey.rests.len());
@@ -285,17 +290,18 @@ mod by_hand {
     #[ignore = "statistical"]
     fn who_does_what_is_said_needs_hardly_more_dwells_than_the_best_of_fifty_orders() {
         let mut ratios = Vec::new();
-        for seed in 0..4 {
-            let (mut person, mut advisor) = (Person::new(seed), Advisor::default());
+        for seed in 0..20 {
+            let (mut person, mut evaluator) = (Person::new(seed), evaluator());
             let mut dwells = 1;
             loop {
-                let status = Status::of(&person.run(), Some(&specification()), &mut advisor);
+                let status = evaluator.status(&person.run(), UNWATCHED);
                 let Some(next) = status.next else { break };
                 assert!(dwells < 40, "seed {seed}: {:?}", status.expected);
                 person.does(next);
                 dwells += 1;
             }
-            let best = (0..50).filter_map(|order| random_order(seed, order)).min();
+            let orders = (0..50).into_par_iter();
+            let best = orders.filter_map(|order| random_order(seed, order)).min();
             ratios.push((dwells, best));
         }
         println!("{ratios:?}");

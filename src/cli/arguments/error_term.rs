@@ -50,8 +50,8 @@ pub fn needs_table(term: ErrorTerm, aiding: Option<Aiding>) {
     }
 }
 
-/// Switches on an error term in a problem.
-pub fn switch_on(term: ErrorTerm, problem: &mut Problem) -> anyhow::Result<()> {
+/// Fails if a run lacks what an error term needs.
+pub fn supported(term: ErrorTerm, problem: &Problem) -> anyhow::Result<()> {
     if !problem.model.can_have(term) {
         bail!(
             "{}: --with {} needs {}. Omit it, or add this to the run",
@@ -63,6 +63,5 @@ pub fn switch_on(term: ErrorTerm, problem: &mut Problem) -> anyhow::Result<()> {
             }
         );
     }
-    problem.model.switch_on(term);
     Ok(())
 }

@@ -9,7 +9,7 @@ use turncal::calibration::{
 use turncal::imu::InstallationForm;
 use turncal::run::{Aiding, Run};
 
-use super::error_term::{error_term, needs_table, switch_on};
+use super::error_term::{error_term, needs_table, supported};
 
 /// Estimation options.
 #[derive(Debug, Clone, Serialize, clap::Args)]
@@ -53,9 +53,9 @@ impl Estimation {
         if self.aiding == Some(Aiding::Table) && run.recording.table.is_none() {
             return Err(CalibrationError::NoTable).with_context(|| path.display().to_string());
         }
-        let mut problem = Problem::new(run, &self.options());
+        let problem = Problem::new(run, &self.options());
         for &term in &self.with {
-            switch_on(term, &mut problem)?;
+            supported(term, &problem)?;
         }
         Ok(problem)
     }
@@ -72,20 +72,23 @@ impl Estimation {
                  separately"
             );
         }
-        let mut problem = Problem::together(runs, &self.options(), together)?;
+        let problem = Problem::together(runs, &self.options(), together)?;
         for &term in &self.with {
-            switch_on(term, &mut problem)?;
+            supported(term, &problem)?;
         }
         Ok(problem)
     }
 
-    fn options(&self) -> Options {
-        let mut options = Options::default()
-            .installation(self.installation)
-            .noise(self.noise);
-        options.auto_terms = self.with.is_empty();
-        options.aiding = self.aiding;
-        options
+    /// The options, without checks of a run.
+    pub fn options(&self) -> Options {
+        Options {
+            form: self.installation,
+            aiding: self.aiding,
+            terms: self.with.clone(),
+            auto_terms: self.with.is_empty(),
+            noise: self.noise,
+            ..Options::default()
+        }
     }
 }
 

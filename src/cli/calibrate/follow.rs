@@ -2,17 +2,19 @@
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, IsTerminal, Read, Write};
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::thread;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use anyhow::Context;
+use anyhow::{Context, bail};
+use turncal::calibration::Options;
 use turncal::lot::Specification;
 use turncal::report::session;
 use turncal::report::terminal::{printable, wrapped};
 use turncal::run::Run;
-use turncal::survey::{Advisor, Status};
+use turncal::survey::{Evaluator, Status};
 
 use crate::cli::arguments::OfLog;
 use crate::cli::terminal::{columns, end_gently, is_ended, print};
@@ -30,7 +32,10 @@ pub struct Follow<'a> {
     /// A growing file, `-` or a device.
     pub source: &'a Path,
     pub of_log: &'a OfLog,
-    pub specification: Option<&'a Specification>,
+    /// The run.toml of the rows; it names the file that keeps those of a pipe or a device.
+    pub run: Option<&'a Path>,
+    pub options: Options,
+    pub specification: Option<Specification>,
     /// File that keeps the rows of a pipe or a device.
     pub keep: Option<&'a Path>,
     /// A file that has not grown for this time is complete.
@@ -40,12 +45,13 @@ pub struct Follow<'a> {
 }
 
 impl Follow<'_> {
-    /// Follows the rows to their end, and returns the log that contains them.
-    pub fn run(&self) -> anyhow::Result<PathBuf> {
+    /// Follows the rows to their end, and returns the run.toml or log to calibrate.
+    pub fn run(self) -> anyhow::Result<PathBuf> {
         end_gently();
         let mut rows = self.begin()?;
         let mut screen = Screen::new(self.silent);
-        let mut advisor = Advisor::default();
+        let mut evaluator = Evaluator::new(self.options.clone(), self.specification.clone());
+        let read = self.run.unwrap_or(&rows.log).to_owned();
         let mut due = Instant::now();
         let mut known = 0;
         let end = loop {
@@ -58,33 +64,36 @@ impl Follow<'_> {
             if rows.size > known && Instant::now() >= due {
                 let (begun, spent) = (Instant::now(), processor_time());
                 known = rows.size;
-                if self.evaluate(&rows.log, &mut advisor, &mut screen)? {
+                if self.evaluate(&read, &mut evaluator, &mut screen)? {
                     break "the specification can be decided";
                 }
                 due = begun + APART.max(processor_time().saturating_sub(spent) * SHARE);
             }
         };
         if rows.size > known {
-            self.evaluate(&rows.log, &mut advisor, &mut screen)?;
+            self.evaluate(&read, &mut evaluator, &mut screen)?;
         }
         tell!(
             "stopped following: {end}; the rows are in {}",
             rows.log.display()
         );
-        Ok(rows.log)
+        Ok(read)
     }
 
     /// Shows the result of the rows so far; returns whether they suffice.
     fn evaluate(
         &self,
-        log: &Path,
-        advisor: &mut Advisor,
+        read: &Path,
+        evaluator: &mut Evaluator,
         screen: &mut Screen,
     ) -> anyhow::Result<bool> {
-        match self.of_log.open_with(log, |_| ()) {
+        match self.of_log.open_with(read, |_| ()) {
             Ok(opened) => {
-                let status = Status::of(&opened.run, self.specification, advisor);
-                screen.show(&opened.run, &status, self.specification)?;
+                let status = evaluator.status(&opened.run, &|_| match is_ended() {
+                    true => ControlFlow::Break(()),
+                    false => ControlFlow::Continue(()),
+                });
+                screen.show(&opened.run, &status, evaluator.specification())?;
                 Ok(status.is_met())
             }
             Err(error) => {
@@ -97,7 +106,9 @@ impl Follow<'_> {
     fn begin(&self) -> anyhow::Result<Incoming> {
         let named =
             |error: io::Error| anyhow::Error::new(error).context(self.source.display().to_string());
+        let named_by_run = self.run.map(Run::imu_file).transpose()?;
         if self.source.is_file() {
+            self.check_named(named_by_run.as_deref())?;
             return Ok(Incoming {
                 log: self.source.to_owned(),
                 size: 0,
@@ -111,7 +122,8 @@ impl Follow<'_> {
         if !is_stdin {
             self.source.metadata().map_err(named)?;
         }
-        let log = self.keep.map_or_else(default_log, Path::to_owned);
+        let log = self.keep.map(Path::to_owned).or(named_by_run);
+        let log = log.unwrap_or_else(default_log);
         let file = OpenOptions::new().create(true).append(true).open(&log);
         let file = file.with_context(|| log.display().to_string())?;
         Ok(Incoming {
@@ -122,6 +134,23 @@ impl Follow<'_> {
             },
             log,
         })
+    }
+
+    /// A run.toml has to name the growing file.
+    fn check_named(&self, named: Option<&Path>) -> anyhow::Result<()> {
+        let (Some(run), Some(named)) = (self.run, named) else {
+            return Ok(());
+        };
+        let same = self.source.canonicalize().ok() == named.canonicalize().ok();
+        match same {
+            true => Ok(()),
+            false => bail!(
+                "{}: [imu] names {}, but --follow {}. Follow the file named in run.toml",
+                run.display(),
+                named.display(),
+                self.source.display()
+            ),
+        }
     }
 }
 

@@ -24,7 +24,7 @@ use turncal::report::{self, Document, Facts};
 use turncal::run::Run;
 use turncal::study::Shard;
 
-use crate::cli::arguments::{Estimation, OfLog, Overwrite, run_or_log, seconds, shard};
+use crate::cli::arguments::{Estimation, OfLog, Overwrite, run_file, run_or_log, seconds, shard};
 use crate::cli::terminal::{Activity, print, show, show_brief};
 
 use calibrated::{Calibrated, read_truth};
@@ -96,6 +96,9 @@ pub struct Calibrate {
     /// File to keep the rows of - or a device in; rows are appended to an existing file [default: follow-TIME.csv]
     #[arg(long, value_name = "FILE", requires = "follow", help_heading = FOLLOWING)]
     keep: Option<PathBuf>,
+    /// The run.toml that describes the rows; those of - or a device are kept in the file named there
+    #[arg(long, value_name = "RUN.toml", requires = "follow", conflicts_with = "keep", value_parser = run_file, help_heading = FOLLOWING)]
+    run: Option<PathBuf>,
     /// Time without growth after which a followed file is complete, s
     #[arg(long, value_name = "S", requires = "follow", value_parser = seconds, default_value = "30", help_heading = FOLLOWING)]
     patience: Duration,
@@ -137,7 +140,9 @@ impl Calibrate {
         let follow = Follow {
             source,
             of_log: &self.of_log,
-            specification: specification.as_ref(),
+            run: self.run.as_deref(),
+            options: self.estimation.options(),
+            specification,
             keep: self.keep.as_deref(),
             patience: self.patience,
             silent: self.json,

@@ -84,6 +84,15 @@ impl Run {
         Ok(run)
     }
 
+    /// The file of the IMU that a `run.toml` names; it need not exist.
+    ///
+    /// # Errors [`FileError`] if the `run.toml` is invalid.
+    pub fn imu_file(path: &Path) -> Result<PathBuf, FileError> {
+        let text = text_of(path)?;
+        let file = run_file(Document::of(path, &text))?.imu.file;
+        Ok(path.parent().unwrap_or(Path::new("")).join(file))
+    }
+
     /// Only `[meta]` of a `run.toml`, for a run with unreadable logs.
     ///
     /// # Errors [`FileError`] if it cannot be read.

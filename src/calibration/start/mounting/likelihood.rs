@@ -217,6 +217,9 @@ fn add_earth_rate(
 
 /// Logarithm of the likelihood of the residuals, with the unknowns integrated out.
 fn log_likelihood(equations: &Equations, too_small: TooSmall) -> f64 {
+    if equations.count() == 0 {
+        return 0.0;
+    }
     let (design, residual) = equations.in_sigmas();
     let (information, vector) = (design.tr_mul(&design), design.tr_mul(&residual));
     // Samples of absurd size overflow, and tell nothing.
@@ -227,18 +230,15 @@ fn log_likelihood(equations: &Equations, too_small: TooSmall) -> f64 {
         .weighted()
         .map(|(_, variance)| variance.ln())
         .sum();
-    let eigen = information.symmetric_eigen();
-    let along = eigen.eigenvectors.tr_mul(&vector);
+    // One tridiagonal form serves all factors.
+    let (basis, diagonal, off_diagonal) = information.symmetric_tridiagonalize().unpack();
+    let along = basis.tr_mul(&vector);
+    let tridiagonal = (diagonal.as_slice(), off_diagonal.as_slice());
     let mut logarithms = Vec::with_capacity(too_small.noise.len() * too_small.prior.len());
     for noise in too_small.noise {
         for prior in too_small.prior {
             let ratio = (prior / noise).powi(2);
-            let (mut explained, mut determinant) = (0.0, 0.0);
-            for (value, part) in eigen.eigenvalues.iter().zip(&along) {
-                let gain = ratio * value.max(0.0);
-                explained += part.powi(2) * ratio / (1.0 + gain);
-                determinant += gain.ln_1p();
-            }
+            let (explained, determinant) = explained(tridiagonal, along.as_slice(), ratio);
             let squares = (residual.norm_squared() - explained).max(0.0) / noise.powi(2);
             let noise = log_variances + 2.0 * residual.len() as f64 * noise.ln();
             logarithms.push(-0.5 * (squares + noise + determinant));
@@ -247,6 +247,27 @@ fn log_likelihood(equations: &Equations, too_small: TooSmall) -> f64 {
     let largest = logarithms.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let sum: f64 = logarithms.iter().map(|l| (l - largest).exp()).sum();
     largest + (sum / logarithms.len() as f64).ln()
+}
+
+/// For a tridiagonal T ≥ 0, given by diagonal and off-diagonal, and a vector v: `r vᵀ (I + r T)⁻¹ v` and
+/// `ln det(I + r T)`, from the factors L D Lᵀ.
+fn explained((diagonal, off_diagonal): (&[f64], &[f64]), v: &[f64], r: f64) -> (f64, f64) {
+    let (mut sum, mut log_determinant, mut product) = (0.0, 0.0, 1.0);
+    let (mut pivot, mut part) = (1.0, 0.0);
+    for (k, (along_diagonal, v)) in diagonal.iter().zip(v).enumerate() {
+        let off = if k > 0 { r * off_diagonal[k - 1] } else { 0.0 };
+        part = v - off / pivot * part;
+        // No pivot is below 1, whatever rounding says.
+        pivot = f64::max(1.0 + r * along_diagonal - off * off / pivot, 1.0);
+        sum += part * part / pivot;
+        product *= pivot;
+        // A logarithm for each few factors, before they overflow.
+        if k % 4 == 3 || k + 1 == diagonal.len() {
+            log_determinant += product.ln();
+            product = 1.0;
+        }
+    }
+    (r * sum, log_determinant)
 }
 
 /// The same if no measurement is as expected: residuals of the size of the measurements.
@@ -260,7 +281,29 @@ fn log_likelihood_of_none(equations: &Equations) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{DMatrix, DVector};
+
     use super::*;
+
+    #[test]
+    fn the_tridiagonal_form_gives_the_same_as_the_whole_matrix() {
+        let design = DMatrix::from_fn(9, 7, |i, j| ((3 * i + 5 * j) as f64).sin() + 0.1 * j as f64);
+        let v = DVector::from_fn(7, |k, _| (k as f64).cos());
+        let information = design.tr_mul(&design);
+        let (basis, diagonal, off) = information.clone().symmetric_tridiagonalize().unpack();
+        let along = basis.tr_mul(&v);
+        for r in [1e-6, 1.0, 1e6] {
+            let whole = DMatrix::identity(7, 7) + &information * r;
+            let root = whole.cholesky().unwrap();
+            let expected = (
+                r * v.dot(&root.solve(&v)),
+                2.0 * root.l().diagonal().map(f64::ln).sum(),
+            );
+            let found = explained((diagonal.as_slice(), off.as_slice()), along.as_slice(), r);
+            approx::assert_relative_eq!(found.0, expected.0, max_relative = 1e-9);
+            approx::assert_relative_eq!(found.1, expected.1, max_relative = 1e-9);
+        }
+    }
 
     #[test]
     fn an_error_beyond_the_prior_is_less_likely_and_one_within_hardly() {

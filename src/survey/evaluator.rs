@@ -1,0 +1,251 @@
+//! Accuracy of a recording in progress, and the next move.
+
+use nalgebra::Vector3;
+
+use super::advice::{Advisor, Move};
+use super::{GroupSigma, Survey, bound_of_record, by_group, unobserved};
+use crate::calibration::{
+    Bound, CalibrationError, Estimate, Finding, Group, Method, OBSERVED_BELOW, Options,
+    ParameterVector, Problem, Progress, Verdict, Word,
+};
+use crate::lot::{self, Check, Limit, Sample, Specification, checks};
+use crate::run::Run;
+
+/// Growth of a recording after which it is calibrated again: all calibrations together take at most three times as long
+/// as the last.
+const GROWTH: f64 = 1.5;
+/// Spacing of the epochs of a history, s.
+const EPOCH: f64 = 1.0;
+
+/// State of a calibration in progress.
+#[derive(Debug, Clone)]
+pub struct Status {
+    /// Duration of the record, s.
+    pub duration: f64,
+    /// Content of the rows: dwells, turns, contradictions.
+    pub survey: Survey,
+    /// Time for which the instrument has been at rest, s; zero while it moves.
+    pub still: f64,
+    /// Expected σ, or the reason why there is none yet.
+    pub expected: Result<Attained, CalibrationError>,
+    /// The last calibration, of the rows at that time.
+    pub calibrated: Option<Calibrated>,
+    /// The next move; `None` if nothing is missing.
+    pub next: Option<Move>,
+}
+
+/// Accuracy of the rows so far.
+#[derive(Debug, Clone)]
+pub struct Attained {
+    /// Expected covariance with the stated noise, and its history.
+    pub bound: Bound,
+    /// Expected σ relative to those of the bound.
+    pub inflation: ParameterVector,
+    /// For each dwell: the time of its end in s, and the expected σ at that time.
+    pub history: Vec<(f64, GroupSigma)>,
+    /// Parameters that keep more than half of their prior σ.
+    pub unobserved: Vec<String>,
+    /// Every limit of the specification, for a unit at its nominal values.
+    pub checks: Vec<Check>,
+}
+
+/// A calibration of the rows so far. Only a calibration finds the actual noise, unmodelled errors and their σ.
+#[derive(Debug, Clone)]
+pub struct Calibrated {
+    /// Duration of the record at that time, s.
+    pub duration: f64,
+    /// Its verdict.
+    pub verdict: Verdict,
+    /// Its findings.
+    pub findings: Vec<Finding>,
+    /// σ relative to those of the bound.
+    inflation: ParameterVector,
+}
+
+/// Evaluates a recording again and again while it grows.
+#[derive(Debug, Clone, Default)]
+pub struct Evaluator {
+    options: Options,
+    specification: Option<Specification>,
+    advisor: Advisor,
+    calibrated: Option<Calibrated>,
+}
+
+impl Evaluator {
+    /// For these options and, if any, limits to decide.
+    pub fn new(options: Options, specification: Option<Specification>) -> Self {
+        Self {
+            options,
+            specification,
+            ..Self::default()
+        }
+    }
+
+    /// The limits to decide.
+    pub fn specification(&self) -> Option<&Specification> {
+        self.specification.as_ref()
+    }
+
+    /// State of the recording so far. σ are those of the last calibration, changed by the expected effect of the rows
+    /// since. The rows are calibrated after every growth by half, and when every limit seems to be decided.
+    pub fn status(&mut self, run: &Run, progress: Progress) -> Status {
+        let imu = &run.recording.imu;
+        let survey = Survey::of_motion(run);
+        let last = survey.rests.last();
+        let standing = last.filter(|rest| rest.dwell.samples.end == imu.len());
+        let still = standing.map_or(0.0, |rest| rest.dwell.duration(imu));
+        let up = last.map_or(Vector3::z(), |rest| rest.force.normalize());
+        let expected = bound_of_record(run, &self.options)
+            .map(|bound| self.attained(run, &survey, bound, progress));
+        let next = match &expected {
+            Ok(attained) if attained.is_met() => None,
+            Ok(attained) => self
+                .advisor
+                .next(run, &up, attained, self.specification.as_ref()),
+            Err(_) => Some(self.advisor.first(&survey)),
+        };
+        Status {
+            duration: imu.duration(),
+            survey,
+            still,
+            expected,
+            calibrated: self.calibrated.clone(),
+            next,
+        }
+    }
+
+    fn attained(
+        &mut self,
+        run: &Run,
+        survey: &Survey,
+        bound: Bound,
+        progress: Progress,
+    ) -> Attained {
+        let duration = run.recording.imu.duration();
+        let last = self.calibrated.as_ref().map_or(0.0, |of| of.duration);
+        let is_due = duration >= GROWTH * last;
+        let seems_met = |it: &Self| it.of_bound(run, survey, &bound).is_met();
+        if is_due || (duration > last && seems_met(self)) {
+            self.calibrated = Calibrated::of(run, &self.options, &bound, progress);
+        }
+        self.of_bound(run, survey, &bound)
+    }
+
+    fn of_bound(&self, run: &Run, survey: &Survey, bound: &Bound) -> Attained {
+        let estimate = &bound.estimate;
+        let inflation = match &self.calibrated {
+            Some(of) => of.inflation,
+            None => ParameterVector::repeat(1.0),
+        };
+        let ends = survey.rests.iter().map(|rest| rest.dwell.times(run)[1]);
+        let history = ends.filter_map(|end| {
+            let mut epochs = bound.history.iter();
+            let at_end = epochs.rfind(|epoch| epoch.time <= end + 0.5 * EPOCH)?;
+            let sigma = at_end.sigma.component_mul(&inflation);
+            Some((end, by_group(&sigma, estimate)))
+        });
+        let history = history.collect();
+        let mut inflated = estimate.clone();
+        for (i, part) in inflation.iter().enumerate() {
+            inflated.covariance.row_mut(i).scale_mut(*part);
+            inflated.covariance.column_mut(i).scale_mut(*part);
+        }
+        let mut checks = self
+            .specification
+            .as_ref()
+            .map_or_else(Vec::new, |of| decided(of, &inflated));
+        let is_usable = |of: &Calibrated| of.verdict.word != Word::Failed;
+        if !self.calibrated.as_ref().is_some_and(is_usable) {
+            checks
+                .iter_mut()
+                .for_each(|check| check.verdict = lot::Verdict::NotDecided);
+        }
+        Attained {
+            history,
+            unobserved: unobserved(&inflated.sigma(), &bound.prior_sigma, estimate),
+            checks,
+            inflation,
+            bound: bound.clone(),
+        }
+    }
+}
+
+impl Calibrated {
+    /// `None` if the rows cannot be calibrated, or progress is stopped.
+    fn of(run: &Run, options: &Options, bound: &Bound, progress: Progress) -> Option<Self> {
+        let problem = Problem::new(run, options);
+        let mut solution = problem.solve(Method::Ekf, progress).ok()?;
+        let assessment = solution.assess(&problem).ok()?;
+        let findings = solution.findings(&assessment);
+        let [found, expected] = [solution.estimate(), &bound.estimate].map(Estimate::sigma);
+        Some(Self {
+            duration: run.recording.imu.duration(),
+            verdict: Verdict::of(&findings),
+            findings,
+            inflation: found.zip_map(&expected, |found, expected| match expected > 0.0 {
+                true => found / expected,
+                false => 1.0,
+            }),
+        })
+    }
+}
+
+impl Status {
+    /// Whether a specification is given and every limit can be decided.
+    pub fn is_met(&self) -> bool {
+        self.expected.as_ref().is_ok_and(Attained::is_met)
+    }
+}
+
+impl Attained {
+    /// Whether a specification is given and every limit can be decided.
+    pub fn is_met(&self) -> bool {
+        let decided = |check: &Check| check.verdict == lot::Verdict::Pass;
+        !self.checks.is_empty() && self.checks.iter().all(decided)
+    }
+
+    /// Time until every limit can be decided, s, if the rest of the record adds information as the rows so far; `None`
+    /// without a specification, or if the rows so far do not show a parameter.
+    pub fn time_left(&self, specification: Option<&Specification>) -> Option<f64> {
+        let specification = specification?;
+        let duration = self.bound.history.last()?.time;
+        let is_open = |check: &&Check| check.verdict != lot::Verdict::Pass;
+        let times = self.checks.iter().filter(is_open).map(|check| {
+            let Limit {
+                parameter, within, ..
+            } = check.limit;
+            let (_, sigma) = check.off?;
+            let is_shown = sigma < OBSERVED_BELOW * self.bound.prior_sigma[parameter];
+            let ratio = sigma / specification.deciding_sigma(within);
+            is_shown.then_some(duration * (ratio.powi(2) - 1.0).max(0.0))
+        });
+        times.reduce(|a, b| Some(a?.max(b?)))?
+    }
+}
+
+/// A unit at its nominal values against every limit of an estimated parameter: it passes if the σ of an estimate are
+/// small enough to decide the limit.
+pub fn decided(specification: &Specification, estimate: &Estimate) -> Vec<Check> {
+    let sigma = estimate.in_general_form().sigma();
+    let mut specification = specification.clone();
+    // Parameters that the body frame fixes have no error.
+    specification
+        .limits
+        .retain(|limit| sigma[limit.parameter] > 0.0);
+    checks(&specification, |parameter| {
+        let mut limits = specification.limits.iter();
+        let limit = limits.find(|limit| limit.parameter == parameter)?;
+        Some(Sample {
+            value: limit.nominal,
+            sigma: sigma[parameter],
+        })
+    })
+}
+
+/// σ of a group's parameters that decides its tightest limit for a unit at its nominal values; `None` without a limit.
+pub fn needed(specification: &Specification, group: Group) -> Option<f64> {
+    let of_group = |limit: &&Limit| Group::of(limit.parameter) == group;
+    let limits = specification.limits.iter().filter(of_group);
+    let tightest = limits.map(|limit| limit.within).reduce(f64::min)?;
+    Some(specification.deciding_sigma(tightest))
+}
