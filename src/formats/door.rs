@@ -74,6 +74,18 @@ impl Opened {
         })
     }
 
+    /// Reads a log that has grown, with the fields found before.
+    ///
+    /// # Errors
+    /// [`FileError`] if it cannot be read.
+    pub fn read_again(&mut self) -> Result<(), FileError> {
+        if let Some(Log { path, draft, .. }) = &self.log {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            self.run = Run::of_text(path, &draft.to_toml(&name), None)?;
+        }
+        Ok(())
+    }
+
     /// Whether there was no `run.toml`.
     pub fn is_of_log(&self) -> bool {
         self.log.is_some()

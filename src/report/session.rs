@@ -175,7 +175,8 @@ fn calibrated(last: &Calibrated) -> String {
 
 /// Findings about the rows, then those that restrict the use of the last calibration.
 fn findings(run: &Run, status: &Status) -> Vec<String> {
-    let mut findings = check::findings(run, &status.survey);
+    let mut findings = run.recording.doubts.clone();
+    findings.extend(check::of_survey(&status.survey));
     let Some(last) = &status.calibrated else {
         return findings;
     };
@@ -219,7 +220,7 @@ fn coverage(status: &Status) -> Vec<String> {
         )
     };
     let mut lines = vec!["up      z up     level    z down".to_owned()];
-    lines.extend([(1, "  y up"), (0, "  level"), (-1, "  y down")].map(row));
+    lines.extend([(1, "y up"), (0, "level"), (-1, "y down")].map(row));
     let turned = AXES.iter().enumerate().map(|(axis, name)| {
         let by = |sign: f64| {
             let mut turns = status.survey.turns.iter();

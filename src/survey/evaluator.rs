@@ -13,7 +13,7 @@ use crate::run::Run;
 
 /// Growth of a recording after which it is calibrated again: all calibrations together take at most three times as long
 /// as the last.
-const GROWTH: f64 = 1.5;
+pub const GROWTH: f64 = 1.5;
 /// Spacing of the epochs of a history, s.
 const EPOCH: f64 = 1.0;
 

@@ -6,7 +6,7 @@ mod evaluator;
 mod session;
 
 pub use advice::{Move, TURNED_BY_HAND};
-pub use evaluator::{Attained, Calibrated, Evaluator, Status, decided, needed};
+pub use evaluator::{Attained, Calibrated, Evaluator, GROWTH, Status, decided, needed};
 pub use session::Session;
 
 use crate::calibration::{

@@ -225,7 +225,11 @@ mod by_hand {
         let mut moves: Vec<Move> = Move::all().collect();
         moves.shuffle(&mut ChaCha8Rng::seed_from_u64(order));
         let mut person = Person::new(seed);
-        moves.into_iter().for_each(|next| person.does(next));
+        // The best need half as many.
+        moves
+            .into_iter()
+            .take(14)
+            .for_each(|next| person.does(next));
         let run = person.run();
         let bound = bound_of_record(&run, &Options::default()).unwrap();
         let specification = specification();
@@ -284,6 +288,38 @@ mod by_hand {
         assert_eq!(live.survey.rests.len(), whole.survey.rests.len());
         let [live, whole] = [live, whole].map(|of| of.expected.unwrap().bound.estimate.sigma());
         assert!((live - whole).amax() <= 1e-6 * whole.amax());
+    }
+
+    #[test]
+    fn who_turns_a_sensor_only_about_the_vertical_is_told_what_is_missing() {
+        let mut person = Person::new(11);
+        for k in 0..8 {
+            person.does(Move::HalfTurn {
+                axis: 2,
+                is_negative: k % 2 == 1,
+            });
+        }
+        let status = evaluator().status(&person.run(), UNWATCHED);
+        assert!(!status.is_met());
+        let attained = status.expected.unwrap();
+        let is_open = |name| {
+            attained.checks.iter().any(|check| {
+                check.verdict != crate::lot::Verdict::Pass
+                    && parameter_name(FORM, check.limit.parameter).as_deref() == Some(name)
+            })
+        };
+        let missing = [
+            "gyro.scale.x",
+            "gyro.scale.y",
+            "accel.scale.x",
+            "accel.scale.y",
+        ];
+        assert!(missing.into_iter().all(is_open), "{:?}", attained.checks);
+        let is_tried = |of: Move| match of {
+            Move::Up(up) => up.z > 0.9,
+            Move::HalfTurn { axis, .. } => axis == 2,
+        };
+        assert!(!is_tried(status.next.unwrap()), "{:?}", status.next);
     }
 
     #[test]

@@ -85,6 +85,54 @@ fn rows_of_a_pipe_are_kept_and_calibrated_as_the_file_of_them() {
 }
 
 #[test]
+fn a_run_toml_describes_rows_and_names_the_file_that_keeps_them() {
+    let directory = tempfile::tempdir().unwrap();
+    let rows = rows(directory.path());
+    let run = fs::read_to_string(directory.path().join("whole/run.toml")).unwrap();
+    let run = run.replace("imu.csv.gz", "rows.csv");
+    fs::write(directory.path().join("run.toml"), run).unwrap();
+    let follow = |source: &str| {
+        let mut child = Command::new(assert_cmd::cargo::cargo_bin("turncal"))
+            .current_dir(directory.path())
+            .args([
+                "calibrate",
+                "--follow",
+                source,
+                "--run",
+                "run.toml",
+                "--json",
+            ])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let written = child.stdin.take().unwrap().write_all(rows.as_bytes());
+        (child.wait_with_output().unwrap(), written.is_ok())
+    };
+    let (output, _) = follow("-");
+    assert!(output.status.success(), "{}", text(&output));
+    assert_eq!(
+        fs::read_to_string(directory.path().join("rows.csv")).unwrap(),
+        rows
+    );
+    let offline = Command::new(assert_cmd::cargo::cargo_bin("turncal"))
+        .current_dir(directory.path())
+        .args(["calibrate", "run.toml", "--json"])
+        .output()
+        .unwrap();
+    assert_eq!(output.stdout, offline.stdout);
+
+    fs::write(directory.path().join("other.csv"), &rows).unwrap();
+    let (output, _) = follow("other.csv");
+    let told = text(&output);
+    assert!(
+        !output.status.success() && told.contains("run.toml: [imu] names rows.csv"),
+        "{told}"
+    );
+}
+
+#[test]
 fn a_growing_file_ends_when_it_no_longer_grows() {
     let directory = tempfile::tempdir().unwrap();
     let rows = rows(directory.path());

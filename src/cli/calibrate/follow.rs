@@ -1,7 +1,7 @@
 //! `turncal calibrate --follow`: evaluates rows as they arrive, until they suffice or no more arrive.
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, IsTerminal, Read, Write};
+use std::io::{self, IsTerminal, Read, Seek, SeekFrom, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
@@ -10,11 +10,13 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, bail};
 use turncal::calibration::Options;
+use turncal::formats::Opened;
 use turncal::lot::Specification;
+use turncal::number::count;
 use turncal::report::session;
 use turncal::report::terminal::{printable, wrapped};
 use turncal::run::Run;
-use turncal::survey::{Evaluator, Status};
+use turncal::survey::{Evaluator, GROWTH, Status};
 
 use crate::cli::arguments::OfLog;
 use crate::cli::terminal::{columns, end_gently, is_ended, print};
@@ -50,8 +52,12 @@ impl Follow<'_> {
         end_gently();
         let mut rows = self.begin()?;
         let mut screen = Screen::new(self.silent);
-        let mut evaluator = Evaluator::new(self.options.clone(), self.specification.clone());
-        let read = self.run.unwrap_or(&rows.log).to_owned();
+        let mut followed = Followed {
+            of_log: self.of_log,
+            read: self.run.unwrap_or(&rows.log).to_owned(),
+            opened: None,
+            evaluator: Evaluator::new(self.options.clone(), self.specification.clone()),
+        };
         let mut due = Instant::now();
         let mut known = 0;
         let end = loop {
@@ -61,46 +67,24 @@ impl Follow<'_> {
             if !rows.wait(REDRAW)? {
                 break "no more rows";
             }
-            if rows.size > known && Instant::now() >= due {
+            screen.count(rows.received.lines)?;
+            if rows.received.bytes > known && Instant::now() >= due {
                 let (begun, spent) = (Instant::now(), processor_time());
-                known = rows.size;
-                if self.evaluate(&read, &mut evaluator, &mut screen)? {
+                known = rows.received.bytes;
+                if followed.evaluate(known, &mut screen)? {
                     break "the specification can be decided";
                 }
                 due = begun + APART.max(processor_time().saturating_sub(spent) * SHARE);
             }
         };
-        if rows.size > known {
-            self.evaluate(&read, &mut evaluator, &mut screen)?;
+        if rows.received.bytes > known {
+            followed.evaluate(rows.received.bytes, &mut screen)?;
         }
         tell!(
             "stopped following: {end}; the rows are in {}",
             rows.log.display()
         );
-        Ok(read)
-    }
-
-    /// Shows the result of the rows so far; returns whether they suffice.
-    fn evaluate(
-        &self,
-        read: &Path,
-        evaluator: &mut Evaluator,
-        screen: &mut Screen,
-    ) -> anyhow::Result<bool> {
-        match self.of_log.open_with(read, |_| ()) {
-            Ok(opened) => {
-                let status = evaluator.status(&opened.run, &|_| match is_ended() {
-                    true => ControlFlow::Break(()),
-                    false => ControlFlow::Continue(()),
-                });
-                screen.show(&opened.run, &status, evaluator.specification())?;
-                Ok(status.is_met())
-            }
-            Err(error) => {
-                screen.trouble(&format!("{error:#}"))?;
-                Ok(false)
-            }
-        }
+        Ok(followed.read)
     }
 
     fn begin(&self) -> anyhow::Result<Incoming> {
@@ -111,7 +95,7 @@ impl Follow<'_> {
             self.check_named(named_by_run.as_deref())?;
             return Ok(Incoming {
                 log: self.source.to_owned(),
-                size: 0,
+                received: Received::default(),
                 kind: Kind::Growing {
                     grew: Instant::now(),
                     patience: self.patience,
@@ -127,7 +111,10 @@ impl Follow<'_> {
         let file = OpenOptions::new().create(true).append(true).open(&log);
         let file = file.with_context(|| log.display().to_string())?;
         Ok(Incoming {
-            size: file.metadata().map_err(named)?.len(),
+            received: Received {
+                bytes: file.metadata().map_err(named)?.len(),
+                lines: 0,
+            },
             kind: Kind::Kept {
                 file,
                 chunks: read_in_background(self.source.to_owned())?,
@@ -151,6 +138,47 @@ impl Follow<'_> {
                 self.source.display()
             ),
         }
+    }
+}
+
+/// The rows so far, and their evaluation.
+struct Followed<'a> {
+    of_log: &'a OfLog,
+    /// The run.toml or log to read.
+    read: PathBuf,
+    /// What was read, and the size of the log when its fields were found.
+    opened: Option<(Opened, u64)>,
+    evaluator: Evaluator,
+}
+
+impl Followed<'_> {
+    /// Shows the result of the rows so far; returns whether they suffice.
+    fn evaluate(&mut self, size: u64, screen: &mut Screen) -> anyhow::Result<bool> {
+        if let Err(error) = self.open(size) {
+            screen.trouble(&format!("{error:#}"))?;
+            return Ok(false);
+        }
+        let Some((Opened { run, .. }, _)) = &self.opened else {
+            return Ok(false);
+        };
+        let status = self.evaluator.status(run, &|_| match is_ended() {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        });
+        screen.show(run, &status, self.evaluator.specification())?;
+        Ok(status.is_met())
+    }
+
+    /// Reads the rows; the fields of a log are found again after every growth by half.
+    fn open(&mut self, size: u64) -> anyhow::Result<()> {
+        if let Some((opened, found_at)) = &mut self.opened
+            && (size as f64) < GROWTH * *found_at as f64
+            && opened.read_again().is_ok()
+        {
+            return Ok(());
+        }
+        self.opened = Some((self.of_log.open_with(&self.read, |_| ())?, size));
+        Ok(())
     }
 }
 
@@ -179,8 +207,7 @@ fn default_log() -> PathBuf {
 /// Incoming rows, and the log that contains them.
 struct Incoming {
     log: PathBuf,
-    /// Bytes so far.
-    size: u64,
+    received: Received,
     kind: Kind,
 }
 
@@ -200,9 +227,14 @@ impl Incoming {
         match &mut self.kind {
             Kind::Growing { grew, patience } => {
                 thread::sleep(most);
-                let size = self.log.metadata().map_or(self.size, |of| of.len());
-                if size != self.size {
-                    (self.size, *grew) = (size, Instant::now());
+                // A file that is gone for a while does not grow.
+                let mut file = File::open(&self.log);
+                let read = file.as_mut().map(|file| {
+                    file.seek(SeekFrom::Start(self.received.bytes))?;
+                    io::copy(file, &mut self.received)
+                });
+                if matches!(read, Ok(Ok(1..))) {
+                    *grew = Instant::now();
                 }
                 Ok(grew.elapsed() < *patience)
             }
@@ -214,7 +246,7 @@ impl Incoming {
                             let bytes = bytes.with_context(|| self.log.display().to_string())?;
                             file.write_all(&bytes)
                                 .with_context(|| self.log.display().to_string())?;
-                            self.size += bytes.len() as u64;
+                            self.received.write_all(&bytes)?;
                         }
                         Err(RecvTimeoutError::Timeout) => break,
                         Err(RecvTimeoutError::Disconnected) => return Ok(false),
@@ -223,6 +255,25 @@ impl Incoming {
                 Ok(true)
             }
         }
+    }
+}
+
+/// What has been received.
+#[derive(Default)]
+struct Received {
+    bytes: u64,
+    lines: usize,
+}
+
+impl Write for Received {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.bytes += bytes.len() as u64;
+        self.lines += bytes.iter().filter(|byte| **byte == b'\n').count();
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
     }
 }
 
@@ -272,6 +323,9 @@ struct Screen {
     /// Number of dwells already reported.
     told: usize,
     trouble: String,
+    /// Content of the screen below the number of lines received.
+    content: Vec<String>,
+    received: usize,
 }
 
 impl Screen {
@@ -282,6 +336,8 @@ impl Screen {
             drawn: 0,
             told: 0,
             trouble: String::new(),
+            content: Vec::new(),
+            received: 0,
         }
     }
 
@@ -293,7 +349,7 @@ impl Screen {
     ) -> anyhow::Result<()> {
         self.trouble.clear();
         if self.is_terminal && !self.silent {
-            return self.draw(&session::screen(run, status, specification));
+            return self.draw(session::screen(run, status, specification));
         }
         // The last dwell is not complete while the instrument is at rest.
         let whole = status.survey.rests.len() - usize::from(status.still > 0.0);
@@ -314,7 +370,10 @@ impl Screen {
     /// Reports once why the rows cannot be evaluated.
     fn trouble(&mut self, text: &str) -> anyhow::Result<()> {
         if self.is_terminal && !self.silent {
-            return self.draw(&["waiting for readable rows".to_owned(), text.to_owned()]);
+            return self.draw(vec![
+                "waiting for readable rows".to_owned(),
+                text.to_owned(),
+            ]);
         }
         if self.trouble != text {
             text.clone_into(&mut self.trouble);
@@ -333,7 +392,24 @@ impl Screen {
         }
     }
 
-    fn draw(&mut self, lines: &[String]) -> anyhow::Result<()> {
+    /// Shows at once that lines arrive, before they are evaluated.
+    fn count(&mut self, received: usize) -> anyhow::Result<()> {
+        if received == self.received {
+            return Ok(());
+        }
+        self.received = received;
+        match self.is_terminal && !self.silent {
+            true => self.redraw(),
+            false => Ok(()),
+        }
+    }
+
+    fn draw(&mut self, content: Vec<String>) -> anyhow::Result<()> {
+        self.content = content;
+        self.redraw()
+    }
+
+    fn redraw(&mut self) -> anyhow::Result<()> {
         let width = usize::from(columns().unwrap_or(80)).max(20);
         let mut text = String::new();
         if self.drawn > 0 {
@@ -341,7 +417,8 @@ impl Screen {
         }
         text += "\u{1b}[J";
         self.drawn = 0;
-        for line in lines {
+        let received = format!("{} lines received", count(self.received));
+        for line in std::iter::once(&received).chain(&self.content) {
             for part in wrapped(&printable(line), "  ", Some(width)) {
                 text += &part;
                 text.push('\n');

@@ -9,7 +9,7 @@ use crate::report::prelude::*;
 use crate::run::Run;
 use crate::survey::Survey;
 
-pub use words::{findings, way_up};
+pub use words::{findings, of_survey, way_up};
 
 /// The complete report on a run.
 pub fn document(run: &Run, survey: &Survey) -> Document {

@@ -105,11 +105,19 @@ fn warming(run: &Run) -> String {
 /// Findings and recommended changes, one or two sentences each.
 pub fn findings(run: &Run, survey: &Survey) -> Vec<String> {
     let mut findings = [&run.recording.doubts[..], &run.recording.notes].concat();
-    let contradiction = survey.contradiction.iter();
-    findings.extend(contradiction.map(|of| capital(&of.to_string())));
-    findings.extend(survey.labels.iter().filter_map(of_label));
-    findings.extend(of_motion(survey));
+    findings.extend(of_survey(survey));
     findings.extend(of_methods(survey));
+    findings
+}
+
+/// Findings about dwells, turns and labels.
+pub fn of_survey(survey: &Survey) -> Vec<String> {
+    let contradiction = survey.contradiction.iter();
+    let mut findings: Vec<String> = contradiction
+        .map(|of| capital(&of.to_string()))
+        .chain(survey.labels.iter().filter_map(of_label))
+        .collect();
+    findings.extend(of_motion(survey));
     findings
 }
 
