@@ -8,23 +8,23 @@ use std::path::PathBuf;
 use std::thread;
 use std::time::{Duration, Instant};
 
+use crate::calibration::{
+    self, Assessment, ClosedForm, Estimate, Method, Options, Problem, Solution,
+};
+use crate::imu::{PerSensor, Triad};
+use crate::models::{self, Place, path_by_hand};
+use crate::report::calibration::{self as of_calibration, Report};
+use crate::report::navigation::{Flown, add_missions};
+use crate::report::{Document, Facts};
+use crate::run::{Dwell, Run};
+use crate::simulation::{Scenario, Simulated};
+use crate::study::navigation::{FORTY_HOURS, Mission, Motion};
+use crate::turntable::Moves;
+use crate::units::DEGREE;
 use anyhow::{Context, bail};
 use clap::Parser;
 use flate2::read::GzDecoder;
 use rayon::prelude::*;
-use turncal::calibration::{
-    self, Assessment, ClosedForm, Estimate, Method, Options, Problem, Solution,
-};
-use turncal::imu::{PerSensor, Triad};
-use turncal::models::{self, Place, path_by_hand};
-use turncal::report::calibration::{self as of_calibration, Report};
-use turncal::report::navigation::{Flown, add_missions};
-use turncal::report::{Document, Facts};
-use turncal::run::{Dwell, Run};
-use turncal::simulation::{Scenario, Simulated};
-use turncal::study::navigation::{FORTY_HOURS, Mission, Motion};
-use turncal::turntable::Moves;
-use turncal::units::DEGREE;
 
 use super::calibrate::{dwell_times, navigate, note, solve, stamp, write_report};
 use super::simulate::{simulated, write};

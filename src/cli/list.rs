@@ -1,8 +1,8 @@
 //! `turncal list`
 
+use crate::models::Embedded;
+use crate::report::{Document, Facts};
 use serde::Serialize;
-use turncal::models::Embedded;
-use turncal::report::{Document, Facts};
 
 use crate::cli::terminal::show;
 

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::formats::write_whole;
 use clap::CommandFactory;
 use clap_mangen::Man;
-use turncal::formats::write_whole;
 
 use super::Cli;
 

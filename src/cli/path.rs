@@ -2,16 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::calibration::{ErrorTerm, Options, Word};
+use crate::formats::Opened;
+use crate::models::{Instrument, Place, path_by_hand, specification, turntable};
+use crate::report::path::{Report, moves_in_words};
+use crate::run::Aiding;
+use crate::simulation::Scenario;
+use crate::study::path::{Evaluation, PathStudy};
+use crate::units::DEGREE;
 use anyhow::Context;
 use clap::Subcommand;
-use turncal::calibration::{ErrorTerm, Options, Word};
-use turncal::formats::Opened;
-use turncal::models::{Instrument, Place, path_by_hand, specification, turntable};
-use turncal::report::path::{Report, moves_in_words};
-use turncal::run::Aiding;
-use turncal::simulation::Scenario;
-use turncal::study::path::{Evaluation, PathStudy};
-use turncal::units::DEGREE;
 
 use crate::cli::NotMet;
 use crate::cli::arguments::{Delivery, OfLog, error_term, needs_table};

@@ -1,6 +1,6 @@
 //! `turncal schema`
 
-use turncal::formats::run_schema;
+use crate::formats::run_schema;
 
 use crate::cli::terminal::print;
 

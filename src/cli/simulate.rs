@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use crate::calibration::result::Calibration;
+use crate::calibration::result::TermRecord;
+use crate::calibration::truth_record;
+use crate::formats::{campaign_text, write_run};
+use crate::imu::{TERM_PARAMETERS, Term};
+use crate::simulation::{Scenario, Simulated, SimulatedCampaign};
 use anyhow::Context;
-use turncal::calibration::result::Calibration;
-use turncal::calibration::result::TermRecord;
-use turncal::calibration::truth_record;
-use turncal::formats::{campaign_text, write_run};
-use turncal::imu::{TERM_PARAMETERS, Term};
-use turncal::simulation::{Scenario, Simulated, SimulatedCampaign};
 
 use crate::cli::arguments::{Overwrite, seed};
 use crate::cli::terminal::Activity;

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::formats::{FileError, WholeDirectory};
+use crate::report::{self, Document};
 use anyhow::bail;
-use turncal::formats::{FileError, WholeDirectory};
-use turncal::report::{self, Document};
 
 use crate::cli::terminal::show;
 

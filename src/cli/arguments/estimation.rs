@@ -1,13 +1,13 @@
 //! Estimation options of a run, identical for a single run and a lot.
 
+use crate::calibration::{
+    CalibrationError, ErrorTerm, Method, NoisePolicy, Options, Problem, Together,
+};
+use crate::imu::InstallationForm;
+use crate::run::{Aiding, Run};
 use anyhow::Context;
 use clap::error::ErrorKind;
 use serde::{Serialize, Serializer};
-use turncal::calibration::{
-    CalibrationError, ErrorTerm, Method, NoisePolicy, Options, Problem, Together,
-};
-use turncal::imu::InstallationForm;
-use turncal::run::{Aiding, Run};
 
 use super::error_term::{error_term, needs_table, switch_on};
 

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use turncal::formats::Opened;
-use turncal::formats::draft::{Found, KalibrImu, Stated, StatedUnit, Tolerances};
-use turncal::imu::{PerSensor, Sensor};
-use turncal::models::{Instrument, Place};
-use turncal::report::terminal::printable;
+use crate::formats::Opened;
+use crate::formats::draft::{Found, KalibrImu, Stated, StatedUnit, Tolerances};
+use crate::imu::{PerSensor, Sensor};
+use crate::models::{Instrument, Place};
+use crate::report::terminal::printable;
 
 use super::{latitude, positive};
 

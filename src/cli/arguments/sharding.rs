@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
+use crate::formats::{Job, JobKind, Part, part_is_there, write_part};
+use crate::study::{Shard, Study};
 use serde::Serialize;
-use turncal::formats::{Job, JobKind, Part, part_is_there, write_part};
-use turncal::study::{Shard, Study};
 
 use super::{Delivery, shard};
 use crate::cli::terminal::Runs;

@@ -4,20 +4,20 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
-use anyhow::{Context, bail};
-use rayon::prelude::*;
-use turncal::calibration::result::{InputFile, TermRecord};
-use turncal::calibration::{
+use crate::calibration::result::{InputFile, TermRecord};
+use crate::calibration::{
     Assessment, Calibration, ClosedForm, Estimate, Method, Problem, Reference, Solution,
     in_body_frame, triads_of,
 };
-use turncal::formats::input_digests;
-use turncal::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
-use turncal::report::Document;
-use turncal::report::calibration::{self as of_calibration, Navigated, Report};
-use turncal::run::{Aiding, Run};
-use turncal::study::navigation::{Mission, NavigationStudyError};
-use turncal::survey::{self, Expected};
+use crate::formats::input_digests;
+use crate::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
+use crate::report::Document;
+use crate::report::calibration::{self as of_calibration, Navigated, Report};
+use crate::run::{Aiding, Run};
+use crate::study::navigation::{Mission, NavigationStudyError};
+use crate::survey::{self, Expected};
+use anyhow::{Context, bail};
+use rayon::prelude::*;
 
 /// A true calibration, in the general form, with its error terms.
 pub struct Truth {
@@ -178,7 +178,7 @@ pub fn dwell_times(problem: &Problem) -> Vec<Range<f64>> {
 pub fn write_report(document: &Document, directory: &Path) -> anyhow::Result<()> {
     std::fs::create_dir(directory)
         .with_context(|| format!("cannot create {}", directory.display()))?;
-    Ok(turncal::report::write(document, directory)?)
+    Ok(crate::report::write(document, directory)?)
 }
 
 /// A truth, converted to the general form, which can represent any other.

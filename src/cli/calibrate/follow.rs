@@ -7,12 +7,12 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::thread;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
+use crate::lot::Specification;
+use crate::report::session;
+use crate::report::terminal::{printable, wrapped};
+use crate::run::Run;
+use crate::survey::{Advisor, Status};
 use anyhow::Context;
-use turncal::lot::Specification;
-use turncal::report::session;
-use turncal::report::terminal::{printable, wrapped};
-use turncal::run::Run;
-use turncal::survey::{Advisor, Status};
 
 use crate::cli::arguments::OfLog;
 use crate::cli::terminal::{columns, end_gently, is_ended, print};

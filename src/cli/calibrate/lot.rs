@@ -3,18 +3,18 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use crate::calibration::{UNWATCHED, Word};
+use crate::formats::{Job, JobKind, LotDirectory, Part, unit_key};
+use crate::imu::PerSensor;
+use crate::lot::{self, Lot, Unit};
+use crate::models;
+use crate::noise::RestNoise;
+use crate::report;
+use crate::report::Document;
+use crate::report::terminal::printable;
+use crate::run::Run;
+use crate::study::Shard;
 use anyhow::bail;
-use turncal::calibration::{UNWATCHED, Word};
-use turncal::formats::{Job, JobKind, LotDirectory, Part, unit_key};
-use turncal::imu::PerSensor;
-use turncal::lot::{self, Lot, Unit};
-use turncal::models;
-use turncal::noise::RestNoise;
-use turncal::report;
-use turncal::report::Document;
-use turncal::report::terminal::printable;
-use turncal::run::Run;
-use turncal::study::Shard;
 
 use super::calibrated::{Calibrated, write_report};
 

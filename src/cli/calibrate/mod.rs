@@ -13,16 +13,16 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use crate::calibration::{AtRest, Method, Problem, Solution, Together, Word};
+use crate::formats::{Campaign, Opened};
+use crate::models;
+use crate::recording::Recording;
+use crate::report::terminal::printable;
+use crate::report::{self, Document, Facts};
+use crate::run::Run;
+use crate::study::Shard;
 use anyhow::{Context, bail};
 use clap::error::ErrorKind;
-use turncal::calibration::{AtRest, Method, Problem, Solution, Together, Word};
-use turncal::formats::{Campaign, Opened};
-use turncal::models;
-use turncal::recording::Recording;
-use turncal::report::terminal::printable;
-use turncal::report::{self, Document, Facts};
-use turncal::run::Run;
-use turncal::study::Shard;
 
 use crate::cli::arguments::{Estimation, OfLog, Overwrite, run_or_log, seconds, shard};
 use crate::cli::terminal::{Activity, print, show, show_brief};

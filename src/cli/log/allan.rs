@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
+use crate::noise::{NoiseAnalysis, Stretch};
+use crate::report::allan;
 use anyhow::Context;
-use turncal::noise::{NoiseAnalysis, Stretch};
-use turncal::report::allan;
 
 use crate::cli::arguments::{Delivery, OfLog, run_or_log};
 use crate::cli::terminal::Activity;

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use turncal::report::check;
-use turncal::survey::Survey;
+use crate::report::check;
+use crate::survey::Survey;
 
 use crate::cli::arguments::{Delivery, OfLog, run_or_log};
 use crate::cli::terminal::Activity;

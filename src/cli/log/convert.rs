@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use turncal::formats::draft::Draft;
+use crate::formats::draft::Draft;
 
 use crate::cli::arguments::{OfLog, Overwrite};
 use crate::cli::terminal::Activity;

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use turncal::formats::draft::Draft;
-use turncal::formats::write_whole;
+use crate::formats::draft::Draft;
+use crate::formats::write_whole;
 
 use crate::cli::arguments::{OfLog, keep, show_found};
 use crate::cli::terminal::{Activity, print};

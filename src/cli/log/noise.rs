@@ -1,7 +1,7 @@
 //! `turncal noise`
 
-use turncal::noise::conventions::{convert, known};
-use turncal::report::conversion;
+use crate::noise::conventions::{convert, known};
+use crate::report::conversion;
 
 use crate::cli::arguments::positive;
 use crate::cli::terminal::show;

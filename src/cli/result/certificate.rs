@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::calibration::result::Calibration;
+use crate::certificate::{Certificate as Content, Conformity, Decision, Laboratory};
+use crate::formats::digest_of_bytes;
+use crate::models;
+use crate::report::certificate;
 use anyhow::Context;
-use turncal::calibration::result::Calibration;
-use turncal::certificate::{Certificate as Content, Conformity, Decision, Laboratory};
-use turncal::formats::digest_of_bytes;
-use turncal::models;
-use turncal::report::certificate;
 
 use crate::cli::NotMet;
 use crate::cli::arguments::Overwrite;

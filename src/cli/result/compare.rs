@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::calibration::{Named, compare};
+use crate::report::comparison;
 use clap::error::ErrorKind;
-use turncal::calibration::{Named, compare};
-use turncal::report::comparison;
 
 use crate::cli::arguments::{Delivery, at_temperature};
 use crate::cli::terminal::short_names;

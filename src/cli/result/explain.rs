@@ -1,9 +1,9 @@
 //! `turncal explain`
 
+use crate::calibration::{FindingKind, Level};
+use crate::report::document::Block;
+use crate::report::{Document, Facts};
 use anyhow::bail;
-use turncal::calibration::{FindingKind, Level};
-use turncal::report::document::Block;
-use turncal::report::{Document, Facts};
 
 use crate::cli::terminal::show;
 

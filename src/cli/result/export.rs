@@ -2,10 +2,10 @@
 
 use std::path::PathBuf;
 
+use crate::formats::export;
+use crate::formats::write_whole;
+use crate::run::Run;
 use anyhow::Context;
-use turncal::formats::export;
-use turncal::formats::write_whole;
-use turncal::run::Run;
 
 use crate::cli::arguments::{at_temperature, keep, run_file};
 use crate::cli::terminal::print;

@@ -2,17 +2,17 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::attitude::from_pitch_roll_heading;
+use crate::calibration::{Calibration, Named};
+use crate::imu::Sensor;
+use crate::models::{self, Place};
+use crate::navigation::Solution;
+use crate::report::navigation::{Navigated, Navigation};
+use crate::study::navigation::{INTERVAL, Mission, Motion, Pair, Warming, WarmingPair};
+use crate::units::DEGREE;
 use anyhow::{Context, bail};
 use clap::ValueEnum;
 use nalgebra::Vector3;
-use turncal::attitude::from_pitch_roll_heading;
-use turncal::calibration::{Calibration, Named};
-use turncal::imu::Sensor;
-use turncal::models::{self, Place};
-use turncal::navigation::Solution;
-use turncal::report::navigation::{Navigated, Navigation};
-use turncal::study::navigation::{INTERVAL, Mission, Motion, Pair, Warming, WarmingPair};
-use turncal::units::DEGREE;
 
 use crate::cli::arguments::{Delivery, at_temperature, hours, latitude, number};
 use crate::cli::terminal::{Activity, short_names};

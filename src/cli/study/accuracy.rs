@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use turncal::calibration::{ErrorTerm, NoisePolicy};
-use turncal::formats::JobKind;
-use turncal::imu::InstallationForm;
-use turncal::models::{InstallationModel, Place};
-use turncal::report;
-use turncal::run::Aiding;
-use turncal::simulation::{Scenario, SimulatedCampaign};
-use turncal::study::{AccuracyStudy, CampaignStudy};
+use crate::calibration::{ErrorTerm, NoisePolicy};
+use crate::formats::JobKind;
+use crate::imu::InstallationForm;
+use crate::models::{InstallationModel, Place};
+use crate::report;
+use crate::run::Aiding;
+use crate::simulation::{Scenario, SimulatedCampaign};
+use crate::study::{AccuracyStudy, CampaignStudy};
 
 use super::carry_out;
 use crate::cli::arguments::{Delivery, Sharding, at_least_two, error_term, needs_table, seed};

@@ -6,9 +6,9 @@ mod table1;
 
 use std::path::Path;
 
+use crate::report::Document;
+use crate::study;
 use clap::Subcommand;
-use turncal::report::Document;
-use turncal::study;
 
 use crate::cli::arguments::Delivery;
 use crate::cli::terminal::Runs;

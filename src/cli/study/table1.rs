@@ -1,9 +1,9 @@
 //! `turncal study table1`
 
-use turncal::report;
-use turncal::study::Table1Study;
-use turncal::study::table1::paper;
-use turncal::units::DEGREE;
+use crate::report;
+use crate::study::Table1Study;
+use crate::study::table1::paper;
+use crate::units::DEGREE;
 
 use crate::cli::arguments::{Delivery, at_least_two, hours, latitude, seed};
 use crate::cli::terminal::Activity;

@@ -4,9 +4,9 @@ use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::thread;
 use std::time::Duration;
 
+use crate::calibration::Pass;
+use crate::report::terminal::printable;
 use indicatif::{ProgressBar, ProgressStyle};
-use turncal::calibration::Pass;
-use turncal::report::terminal::printable;
 
 /// Current activity with its elapsed time.
 pub struct Activity {
