@@ -2,13 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::formats::write_whole;
 use clap::CommandFactory;
 use clap_mangen::Man;
 
 use super::Cli;
-
 use crate::cli::terminal::print;
+use crate::formats::write_whole;
 
 /// Writes the manual pages
 ///

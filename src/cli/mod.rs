@@ -25,8 +25,9 @@ mod tests;
 
 use std::ffi::OsString;
 
-use crate::report::terminal::printable;
 use clap::{Parser, Subcommand};
+
+use crate::report::terminal::printable;
 
 use calibrate::NotMet;
 use terminal::{leave_nothing_behind, with_threads};

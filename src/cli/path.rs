@@ -2,7 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use anyhow::Context;
+use clap::Subcommand;
+
 use crate::calibration::{ErrorTerm, Options, Word};
+use crate::cli::NotMet;
+use crate::cli::arguments::{Delivery, OfLog, error_term, needs_table};
+use crate::cli::terminal::Activity;
 use crate::formats::Opened;
 use crate::models::{Instrument, Place, path_by_hand, specification, turntable};
 use crate::report::path::{Report, moves_in_words};
@@ -10,12 +16,6 @@ use crate::run::Aiding;
 use crate::simulation::Scenario;
 use crate::study::path::{Evaluation, PathStudy};
 use crate::units::DEGREE;
-use anyhow::Context;
-use clap::Subcommand;
-
-use crate::cli::NotMet;
-use crate::cli::arguments::{Delivery, OfLog, error_term, needs_table};
-use crate::cli::terminal::Activity;
 
 /// Predicts calibration accuracy for a path of a table or by hand, before any data exist
 #[derive(Debug, clap::Args)]

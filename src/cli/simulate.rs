@@ -3,16 +3,16 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use anyhow::Context;
+
 use crate::calibration::result::Calibration;
 use crate::calibration::result::TermRecord;
 use crate::calibration::truth_record;
+use crate::cli::arguments::{Overwrite, seed};
+use crate::cli::terminal::Activity;
 use crate::formats::{campaign_text, write_run};
 use crate::imu::{TERM_PARAMETERS, Term};
 use crate::simulation::{Scenario, Simulated, SimulatedCampaign};
-use anyhow::Context;
-
-use crate::cli::arguments::{Overwrite, seed};
-use crate::cli::terminal::Activity;
 
 /// Simulates a run directory with known truth from a scenario
 ///

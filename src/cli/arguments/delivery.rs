@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::formats::{FileError, WholeDirectory};
-use crate::report::{self, Document};
 use anyhow::bail;
 
 use crate::cli::terminal::show;
+use crate::formats::{FileError, WholeDirectory};
+use crate::report::{self, Document};
 
 /// Overwrite option of all commands that write files.
 #[derive(Debug, Clone, Copy, clap::Args)]

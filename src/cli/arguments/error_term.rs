@@ -1,11 +1,12 @@
 //! Error terms as arguments.
 
-use crate::calibration::{ErrorTerm, Problem};
-use crate::run::Aiding;
-use crate::turntable::AxisError;
 use anyhow::bail;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::error::ErrorKind;
+
+use crate::calibration::{ErrorTerm, Problem};
+use crate::run::Aiding;
+use crate::turntable::AxisError;
 
 /// Parses the name of an error term.
 pub fn error_term() -> impl TypedValueParser<Value = ErrorTerm> {

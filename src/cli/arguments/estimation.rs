@@ -1,15 +1,15 @@
 //! Estimation options of a run, identical for a single run and a lot.
 
-use crate::calibration::{
-    CalibrationError, ErrorTerm, Method, NoisePolicy, Options, Problem, Together,
-};
-use crate::imu::InstallationForm;
-use crate::run::{Aiding, Run};
 use anyhow::Context;
 use clap::error::ErrorKind;
 use serde::{Serialize, Serializer};
 
 use super::error_term::{error_term, needs_table, switch_on};
+use crate::calibration::{
+    CalibrationError, ErrorTerm, Method, NoisePolicy, Options, Problem, Together,
+};
+use crate::imu::InstallationForm;
+use crate::run::{Aiding, Run};
 
 /// Estimation options.
 #[derive(Debug, Clone, Serialize, clap::Args)]

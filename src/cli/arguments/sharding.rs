@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use crate::formats::{Job, JobKind, Part, part_is_there, write_part};
-use crate::study::{Shard, Study};
 use serde::Serialize;
 
 use super::{Delivery, shard};
 use crate::cli::terminal::Runs;
+use crate::formats::{Job, JobKind, Part, part_is_there, write_part};
+use crate::study::{Shard, Study};
 
 /// Part of a study to compute.
 #[derive(Debug, Clone, Copy, clap::Args)]

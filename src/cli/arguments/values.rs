@@ -3,10 +3,11 @@
 use std::path::Path;
 use std::time::Duration;
 
+use anyhow::Context;
+
 use crate::calibration::result::Calibration;
 use crate::study::navigation::INTERVAL;
 use crate::study::{Shard, ShardError};
-use anyhow::Context;
 
 const HOUR: f64 = 3600.0;
 

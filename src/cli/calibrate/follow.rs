@@ -7,15 +7,15 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::thread;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
+use anyhow::Context;
+
+use crate::cli::arguments::OfLog;
+use crate::cli::terminal::{columns, end_gently, is_ended, print};
 use crate::lot::Specification;
 use crate::report::session;
 use crate::report::terminal::{printable, wrapped};
 use crate::run::Run;
 use crate::survey::{Advisor, Status};
-use anyhow::Context;
-
-use crate::cli::arguments::OfLog;
-use crate::cli::terminal::{columns, end_gently, is_ended, print};
 
 /// Interval between redraws of the screen.
 const REDRAW: Duration = Duration::from_millis(250);

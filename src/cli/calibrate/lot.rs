@@ -3,7 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use anyhow::bail;
+
+use super::write_report;
 use crate::calibration::{UNWATCHED, Word};
+use crate::cli::arguments::{Estimation, OfLog};
+use crate::cli::terminal::{Runs, piece_by_piece, show};
 use crate::formats::{Job, JobKind, LotDirectory, Part, unit_key};
 use crate::imu::PerSensor;
 use crate::lot::{self, Lot, Unit};
@@ -11,15 +16,10 @@ use crate::models;
 use crate::noise::RestNoise;
 use crate::report;
 use crate::report::Document;
+use crate::report::calibration::Calibrated;
 use crate::report::terminal::printable;
 use crate::run::Run;
 use crate::study::Shard;
-use anyhow::bail;
-
-use super::calibrated::{Calibrated, write_report};
-
-use crate::cli::arguments::{Estimation, OfLog};
-use crate::cli::terminal::{Runs, piece_by_piece, show};
 
 /// Default output directory.
 pub const DIRECTORY: &str = "lot-calibration";

@@ -2,18 +2,17 @@
 
 use std::path::{Path, PathBuf};
 
+use anyhow::Context;
+use serde::de::DeserializeOwned;
+
+use super::lot;
+use crate::cli::arguments::Delivery;
 use crate::formats::{JobKind, LotDirectory, Part, Parts, read_part_unit};
 use crate::lot::{Lot, Unit};
 use crate::report;
 use crate::report::Document;
 use crate::report::terminal::printable;
 use crate::study::{AccuracyStudy, ExperimentStudy, Study};
-use anyhow::Context;
-use serde::de::DeserializeOwned;
-
-use super::lot;
-
-use crate::cli::arguments::Delivery;
 
 /// Merges the parts of a sharded job; the result is identical to a single run
 ///

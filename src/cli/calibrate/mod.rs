@@ -1,11 +1,9 @@
 //! `turncal calibrate`
 
-mod calibrated;
 mod follow;
 mod lot;
 mod merge;
 
-pub use calibrated::{dwell_times, navigate, note, stamp, write_report};
 pub use lot::NotMet;
 pub use merge::Merge;
 
@@ -13,21 +11,24 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use crate::calibration::{AtRest, Method, Problem, Solution, Together, Word};
+use anyhow::{Context, bail};
+use clap::error::ErrorKind;
+
+use crate::calibration::{
+    AtRest, Calibration, Method, Problem, Solution, Together, Word, in_body_frame, triads_of,
+};
+use crate::cli::arguments::{Estimation, OfLog, Overwrite, run_or_log, seconds, shard};
+use crate::cli::terminal::{Activity, print, show, show_brief};
 use crate::formats::{Campaign, Opened};
+use crate::imu::{BodyFrame, InstallationForm};
 use crate::models;
 use crate::recording::Recording;
+use crate::report::calibration::{Calibrated, Truth};
 use crate::report::terminal::printable;
 use crate::report::{self, Document, Facts};
 use crate::run::Run;
 use crate::study::Shard;
-use anyhow::{Context, bail};
-use clap::error::ErrorKind;
 
-use crate::cli::arguments::{Estimation, OfLog, Overwrite, run_or_log, seconds, shard};
-use crate::cli::terminal::{Activity, print, show, show_brief};
-
-use calibrated::{Calibrated, read_truth};
 use follow::Follow;
 
 /// Highest order of the polynomials of outputs at rest.
@@ -342,4 +343,33 @@ pub fn solve(problem: &Problem, method: Method, activity: &Activity) -> anyhow::
         ControlFlow::Continue(())
     });
     solution.with_context(|| name.clone())
+}
+
+/// Writes a report into a new directory.
+pub fn write_report(document: &Document, directory: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir(directory)
+        .with_context(|| format!("cannot create {}", directory.display()))?;
+    Ok(report::write(document, directory)?)
+}
+
+/// A truth, converted to the general form, which can represent any other.
+pub fn read_truth(path: &Path, run: &Run, body_frame: BodyFrame) -> anyhow::Result<Truth> {
+    let record = Calibration::read(path)?;
+    if let Some(unit) = &record.unit
+        && *unit != run.instrument.unit
+    {
+        bail!(
+            "{}: units are {} and {}, but those of the run are {} and {}. Give the truth of this run",
+            path.display(),
+            unit.gyro,
+            unit.accel,
+            run.instrument.unit.gyro,
+            run.instrument.unit.accel
+        );
+    }
+    let triads = triads_of(&record, &run.instrument.nominal, InstallationForm::General);
+    Ok(Truth {
+        triads: in_body_frame(&triads, body_frame),
+        terms: record.terms,
+    })
 }

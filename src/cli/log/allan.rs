@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use crate::noise::{NoiseAnalysis, Stretch};
-use crate::report::allan;
 use anyhow::Context;
 
 use crate::cli::arguments::{Delivery, OfLog, run_or_log};
 use crate::cli::terminal::Activity;
+use crate::noise::{NoiseAnalysis, Stretch};
+use crate::report::allan;
 
 /// Computes the Allan deviation of a stationary recording and its noise figures
 ///

@@ -2,16 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::calibration::result::Calibration;
-use crate::certificate::{Certificate as Content, Conformity, Decision, Laboratory};
-use crate::formats::digest_of_bytes;
-use crate::models;
-use crate::report::certificate;
 use anyhow::Context;
 
+use crate::calibration::result::Calibration;
+use crate::certificate::{Certificate as Content, Conformity, Decision, Laboratory};
 use crate::cli::NotMet;
 use crate::cli::arguments::Overwrite;
 use crate::cli::terminal::print;
+use crate::formats::digest_of_bytes;
+use crate::models;
+use crate::report::certificate;
 
 /// Writes a calibration certificate as PDF/A-3 with an embedded Digital Calibration Certificate
 ///

@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::calibration::{Named, compare};
-use crate::report::comparison;
 use clap::error::ErrorKind;
 
+use crate::calibration::{Named, compare};
 use crate::cli::arguments::{Delivery, at_temperature};
 use crate::cli::terminal::short_names;
+use crate::report::comparison;
 
 /// Compares calibrations, parameter by parameter, with their σ
 ///

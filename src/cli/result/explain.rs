@@ -1,11 +1,11 @@
 //! `turncal explain`
 
-use crate::calibration::{FindingKind, Level};
-use crate::report::document::Block;
-use crate::report::{Document, Facts};
 use anyhow::bail;
 
+use crate::calibration::{FindingKind, Level};
 use crate::cli::terminal::show;
+use crate::report::document::Block;
+use crate::report::{Document, Facts};
 
 /// Explains a finding: meaning, cause and remedy
 #[derive(Debug, clap::Args)]

@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
-use crate::formats::export;
-use crate::formats::write_whole;
-use crate::run::Run;
 use anyhow::Context;
 
 use crate::cli::arguments::{at_temperature, keep, run_file};
 use crate::cli::terminal::print;
+use crate::formats::export;
+use crate::formats::write_whole;
+use crate::run::Run;
 
 /// Exports a calibration for other programs (Kalibr, PX4, ROS, C, …)
 ///

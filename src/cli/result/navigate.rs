@@ -2,20 +2,20 @@
 
 use std::path::{Path, PathBuf};
 
+use anyhow::{Context, bail};
+use clap::ValueEnum;
+use nalgebra::Vector3;
+
 use crate::attitude::from_pitch_roll_heading;
 use crate::calibration::{Calibration, Named};
+use crate::cli::arguments::{Delivery, at_temperature, hours, latitude, number};
+use crate::cli::terminal::{Activity, short_names};
 use crate::imu::Sensor;
 use crate::models::{self, Place};
 use crate::navigation::Solution;
 use crate::report::navigation::{Navigated, Navigation};
 use crate::study::navigation::{INTERVAL, Mission, Motion, Pair, Warming, WarmingPair};
 use crate::units::DEGREE;
-use anyhow::{Context, bail};
-use clap::ValueEnum;
-use nalgebra::Vector3;
-
-use crate::cli::arguments::{Delivery, at_temperature, hours, latitude, number};
-use crate::cli::terminal::{Activity, short_names};
 
 const HOUR: f64 = 3600.0;
 /// Largest pitch at which roll and heading are distinguishable, degrees.

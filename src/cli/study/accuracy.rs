@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
+use super::carry_out;
 use crate::calibration::{ErrorTerm, NoisePolicy};
+use crate::cli::arguments::{Delivery, Sharding, at_least_two, error_term, needs_table, seed};
 use crate::formats::JobKind;
 use crate::imu::InstallationForm;
 use crate::models::{InstallationModel, Place};
@@ -10,9 +12,6 @@ use crate::report;
 use crate::run::Aiding;
 use crate::simulation::{Scenario, SimulatedCampaign};
 use crate::study::{AccuracyStudy, CampaignStudy};
-
-use super::carry_out;
-use crate::cli::arguments::{Delivery, Sharding, at_least_two, error_term, needs_table, seed};
 
 /// Tests the accuracy of the filter and the consistency of its σ
 ///

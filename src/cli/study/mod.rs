@@ -6,12 +6,12 @@ mod table1;
 
 use std::path::Path;
 
-use crate::report::Document;
-use crate::study;
 use clap::Subcommand;
 
 use crate::cli::arguments::Delivery;
 use crate::cli::terminal::Runs;
+use crate::report::Document;
+use crate::study;
 
 /// Runs a Monte Carlo study
 #[derive(Debug, clap::Args)]

@@ -4,9 +4,10 @@ use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::thread;
 use std::time::Duration;
 
+use indicatif::{ProgressBar, ProgressStyle};
+
 use crate::calibration::Pass;
 use crate::report::terminal::printable;
-use indicatif::{ProgressBar, ProgressStyle};
 
 /// Current activity with its elapsed time.
 pub struct Activity {

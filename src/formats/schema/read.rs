@@ -15,6 +15,7 @@ use crate::formats::error::FileError;
 use crate::formats::imu_log::ImuLog;
 use crate::formats::inputs::segments;
 use crate::formats::small_file;
+use crate::formats::table::Table;
 use crate::imu::{Instrument, NoiseKeys, Output, PerSensor, Sensor};
 use crate::noise;
 use crate::recording::{ImuSamples, Recording, faults, nanoseconds};
@@ -33,6 +34,20 @@ impl Run {
 
     /// The same from the text of a `run.toml` located (or assumed) next to this file and read from `source`.
     pub fn of_text(path: &Path, text: &str, source: Option<&Path>) -> Result<Self, FileError> {
+        Self::of_parts(path, text, source, None)
+    }
+
+    /// The same with the samples of a table in place of a log.
+    pub fn of_table(table: &Table, text: &str) -> Result<Self, FileError> {
+        Self::of_parts(table.name(), text, None, Some(table))
+    }
+
+    fn of_parts(
+        path: &Path,
+        text: &str,
+        source: Option<&Path>,
+        table: Option<&Table>,
+    ) -> Result<Self, FileError> {
         let document = Document::of(path, text);
         let file = run_file(document)?;
         let directory = path.parent().unwrap_or(Path::new(""));
@@ -40,6 +55,7 @@ impl Run {
             document,
             run: &file,
             directory,
+            table,
             notes: Vec::new(),
         };
         let site = fields.site()?;
@@ -50,7 +66,7 @@ impl Run {
 
         // The small files' fields are checked before the large files are read.
         let mut files: Vec<PathBuf> = source.map(Path::to_owned).into_iter().collect();
-        files.push(instrument.log.source.file.clone());
+        files.extend(table.is_none().then(|| instrument.log.source.file.clone()));
         files.extend(other_file(&instrument.log));
         files.extend(table_log.as_ref().map(|log| log.source.file.clone()));
         files.extend(segments_file.clone());
@@ -107,6 +123,7 @@ pub fn check(document: Document) -> Result<(), FileError> {
         document,
         run: &run,
         directory: Path::new(""),
+        table: None,
         notes: Vec::new(),
     };
     fields.site()?;
