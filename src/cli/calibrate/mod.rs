@@ -31,8 +31,6 @@ use crate::study::Shard;
 
 use follow::Follow;
 
-/// Highest order of the polynomials of outputs at rest.
-const HIGHEST_ORDER_AT_REST: usize = 5;
 /// Heading of the options for a log that is still being written.
 const FOLLOWING: &str = "Following a log";
 
@@ -177,7 +175,7 @@ impl Calibrate {
                 let problem = problem.inspect_err(|_| say(&run.recording))?;
                 // Without a turn, only the output at rest against temperature can be determined.
                 if problem.dwells().nth(1).is_none()
-                    && let Some(at_rest) = AtRest::new(run, HIGHEST_ORDER_AT_REST)
+                    && let Some(at_rest) = AtRest::new(run, AtRest::HIGHEST_ORDER)
                 {
                     return self.at_rest(&at_rest, &opened, path);
                 }
