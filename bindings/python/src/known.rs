@@ -53,6 +53,21 @@ impl Known {
     }
 }
 
+impl Known {
+    /// A sensor at a site.
+    pub fn of_sensor(
+        sensor: &str,
+        latitude: Option<f64>,
+        height: Option<f64>,
+        gravity: Option<f64>,
+    ) -> PyResult<Self> {
+        let (none, name) = (None, Some(sensor));
+        Self::new(
+            none, latitude, height, gravity, None, None, name, None, None, None,
+        )
+    }
+}
+
 fn unit(sensor: Sensor, text: Option<&str>) -> PyResult<Option<StatedUnit>> {
     let parse = |text| {
         let refused = |expected: String| {

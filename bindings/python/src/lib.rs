@@ -8,7 +8,10 @@ mod calibration;
 mod errors;
 mod known;
 mod report;
+mod results;
 mod run;
+mod session;
+mod study;
 mod wait;
 
 use std::ffi::OsString;
@@ -36,5 +39,11 @@ mod _turncal {
     #[pymodule_export]
     use super::report::Report;
     #[pymodule_export]
+    use super::results::{certificate, compare, export, navigate};
+    #[pymodule_export]
     use super::run::{Run, allan, init, read, run};
+    #[pymodule_export]
+    use super::session::Session;
+    #[pymodule_export]
+    use super::study::{evaluate, simulate, study, study_merged, study_options, study_part};
 }

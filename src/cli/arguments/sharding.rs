@@ -1,5 +1,6 @@
 //! Parts of studies.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use serde::Serialize;
@@ -39,7 +40,10 @@ impl Sharding {
         let begun = delivery.begin(inputs)?;
         let held = part.held();
         let progress = Runs::new(held.len() as u64);
-        let made = study.trials(&held, &|| progress.one_done())?;
+        let made = study.trials(&held, &|| {
+            progress.one_done();
+            ControlFlow::Continue(())
+        })?;
         drop(progress);
         let written = begun.fill(|directory| write_part(directory, part.clone(), &made));
         // Another process may have made the same part in the meantime.

@@ -4,6 +4,7 @@ mod accuracy;
 mod experiment;
 mod table1;
 
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use clap::Subcommand;
@@ -48,7 +49,10 @@ fn carry_out<S: study::Study>(
 ) -> anyhow::Result<()> {
     let begun = delivery.begin(inputs)?;
     let runs = Runs::new(study.runs());
-    let outcome = study.run(&|| runs.one_done())?;
+    let outcome = study.run(&|| {
+        runs.one_done();
+        ControlFlow::Continue(())
+    })?;
     drop(runs);
     begun.deliver(&document(&outcome))
 }

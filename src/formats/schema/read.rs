@@ -267,11 +267,6 @@ pub fn name(path: &Path) -> String {
     )
 }
 
-/// 1σ of an unstated height, m.
-const USUAL_HEIGHT: f64 = 500.0;
-/// Decrease of gravity with height, (m/s²)/m.
-const FREE_AIR: f64 = 0.3086 * MILLIGAL;
-
 impl Fields<'_> {
     fn site(&mut self) -> Result<Site, FileError> {
         let file = &self.run.site;
@@ -282,15 +277,8 @@ impl Fields<'_> {
         }
         let longitude = file.longitude_deg.map_or(0.0, |degrees| degrees.0 * DEGREE);
         let height = file.height_m.map(|height| height.0);
-        let mut site = match file.latitude_deg {
-            Some(degrees) => {
-                Site::with_normal_gravity(degrees.0 * DEGREE, longitude, height.unwrap_or(0.0))
-            }
-            None => Site::unknown(),
-        };
-        if height.is_none() {
-            site.gravity_sigma = site.gravity_sigma.hypot(FREE_AIR * USUAL_HEIGHT);
-        }
+        let latitude = file.latitude_deg.map(|degrees| degrees.0 * DEGREE);
+        let mut site = Site::of_knowledge(latitude, longitude, height);
         if let Some(gravity) = &file.gravity_m_s2 {
             let sigma = stated_gravity_sigma(self.document.written(gravity.span()));
             site = site.with_gravity(gravity.get_ref().0, sigma);
@@ -337,7 +325,7 @@ fn place_note(site: &Site, has_gravity: bool, has_height: bool) -> Option<String
 }
 
 /// 1σ of a gravity stated without σ, m/s²: from its last digit, at least one milligal.
-fn stated_gravity_sigma(written: &str) -> f64 {
+pub fn stated_gravity_sigma(written: &str) -> f64 {
     let digits = written
         .split_once('.')
         .map_or(0, |(_, digits)| digits.len());

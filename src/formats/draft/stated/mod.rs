@@ -8,12 +8,15 @@ use std::path::{Path, PathBuf};
 pub use kalibr::KalibrImu;
 
 use super::name::{self, Unit};
+use crate::earth::Site;
 use crate::formats::FileError;
 use crate::formats::error::{choice, suggestion};
 use crate::formats::quantity::{OUTPUTS, Of, units};
+use crate::formats::schema::stated_gravity_sigma;
 use crate::formats::table::Table;
 use crate::imu::{Noise, PerSensor, Sensor};
 use crate::models::{Instrument, ModelError, Place};
+use crate::units::DEGREE;
 
 /// User statements about a log without a `run.toml`; other fields are detected or have a wide prior.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -52,6 +55,18 @@ pub enum DataSheetError {
 }
 
 impl Stated {
+    /// The site, with wide σ of what is not stated.
+    pub fn site(&self) -> Site {
+        let latitude = self.latitude_deg.map(|degrees| degrees * DEGREE);
+        let site = Site::of_knowledge(latitude, 0.0, self.height_m);
+        match self.gravity_m_s2 {
+            Some(gravity) => {
+                site.with_gravity(gravity, stated_gravity_sigma(&format!("{gravity:?}")))
+            }
+            None => site,
+        }
+    }
+
     /// Adds noise and tolerances of a sensor, by its name or file, and the figures of a Kalibr `imu.yaml`, which
     /// prevail. A stated rate remains.
     ///
