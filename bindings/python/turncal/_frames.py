@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Union
 
@@ -34,7 +35,7 @@ def run(
     height: float | None = None,
     gravity: float | None = None,
     sensor: str | None = None,
-    noise_file: str | None = None,
+    noise_file: str | "os.PathLike[str]" | None = None,
 ) -> Run:
     """A run from a table.
 
@@ -72,38 +73,55 @@ def run(
         If columns are missing or not numeric, or if a unit or the rate can be found neither in the arguments nor in
         the data.
     """
-    triads = {"gyro": _triad("gyro", gyro), "accel": _triad("accel", accel)}
     known = Known(
         rate=rate,
         latitude=latitude,
         height=height,
         gravity=gravity,
-        gyro_unit=triads["gyro"][1],
-        accel_unit=triads["accel"][1],
+        gyro_unit=_unit("gyro", gyro),
+        accel_unit=_unit("accel", accel),
         sensor=sensor,
         noise_file=noise_file,
     )
+    return run_of(data, [triad("gyro", gyro), triad("accel", accel)], time, temperature, known)
+
+
+def run_of(
+    data: Data,
+    triads: list[list[str] | None],
+    time: str | int | None,
+    temperature: str | int | None,
+    known: Known,
+) -> Run:
+    """A run from a table; columns of None are found."""
     table = dict(_columns(data))
-    named = [*(triads["gyro"][0] or ()), *(triads["accel"][0] or ())]
     single = [None if column is None else str(column) for column in (time, temperature)]
-    for name in [*named, *(column for column in single if column is not None)]:
-        if name in table and _numbers(table[name]) is None:
-            raise Error(f"column {name!r}: found {_kind(table[name])}, expected numbers. Convert the column.")
     numbers = {name: _numbers(column) for name, column in table.items()}
+    stated = [*(triads[0] or ()), *(triads[1] or ()), *(column for column in single if column is not None)]
+    for name in stated:
+        if name in table and numbers[name] is None:
+            raise Error(f"column {name!r}: found {_kind(table[name])}, expected numbers. Convert the column.")
     columns = [(name, column) for name, column in numbers.items() if column is not None]
-    return _turncal.run("data", columns, triads["gyro"][0], triads["accel"][0], *single, known)
+    return _turncal.run("data", columns, triads[0], triads[1], single[0], single[1], known)
 
 
-def _triad(name: str, columns: Columns | None) -> tuple[list[str] | None, str | None]:
-    """The names of three columns, and their unit."""
+def triad(name: str, columns: Columns | None) -> list[str] | None:
+    """The names of three columns."""
     if columns is None:
-        return None, None
+        return None
     if isinstance(columns, str) or not isinstance(columns, Sequence) or len(columns) not in (3, 4):
         raise Error(f"{name}: found {columns!r}, expected three columns, or three columns and a unit")
-    unit = columns[3] if len(columns) == 4 else None
-    if not (unit is None or isinstance(unit, str)):
+    return [str(column) for column in columns[:3]]
+
+
+def _unit(name: str, columns: Columns | None) -> str | None:
+    """The unit after three columns."""
+    if columns is None or triad(name, columns) is None or len(columns) == 3:
+        return None
+    unit = columns[3]
+    if not isinstance(unit, str):
         raise Error(f"{name}: found the unit {unit!r}, expected a text such as 'deg/s' or 'm/s^2'")
-    return [str(column) for column in columns[:3]], unit
+    return unit
 
 
 def _columns(data: Data) -> Iterator[tuple[str, Any]]:
@@ -158,7 +176,9 @@ def applied(
 
         samples = _turncal.samples(calibration, data)
         return pandas.DataFrame(samples, columns=["start_s", "end_s", *OUTPUT], copy=False)
-    columns, per_row, rate = _turncal.inputs(calibration, *_triad("gyro", gyro), *_triad("accel", accel), rate)
+    columns, per_row, rate = _turncal.inputs(
+        calibration, triad("gyro", gyro), _unit("gyro", gyro), triad("accel", accel), _unit("accel", accel), rate
+    )
     taken = _taken(data, columns)
     rows = len(taken[0][0])
     out = np.empty((6, rows))
@@ -171,7 +191,7 @@ def applied(
     return _like(data, out)
 
 
-def _taken(data: Data, columns: list[tuple[str, float]] | None) -> list[tuple[Any, float]]:
+def _taken(data: Data, columns: list[tuple[str, float]] | None) -> list[tuple[npt.NDArray[Any], float]]:
     """The six columns of a table, each with its sign."""
     table = dict(_columns(data))
     if columns is None or (isinstance(data, np.ndarray) and data.ndim == 2 and columns[0][0] not in table):
@@ -180,12 +200,14 @@ def _taken(data: Data, columns: list[tuple[str, float]] | None) -> list[tuple[An
     if missing or len(columns) < 6:
         what = f"a column {missing[0]!r}" if missing else "six columns"
         raise Error(f"data: found the columns {', '.join(table)}, expected {what}. Name the columns with gyro and accel.")
-    taken = [(_plain(table[name]), sign) for name, sign in columns]
-    for (name, _), (column, _) in zip(columns, taken):
+    taken: list[tuple[npt.NDArray[Any], float]] = []
+    for name, sign in columns:
+        column = _plain(table[name])
         if column is None:
             raise Error(f"column {name!r}: found {_kind(table[name])}, expected numbers. Convert the column.")
-        if len(column) != len(taken[0][0]):
+        if taken and len(column) != len(taken[0][0]):
             raise Error(f"column {name!r}: found {len(column)} values, expected {len(taken[0][0])} as in the others")
+        taken.append((column, sign))
     return taken
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any, Callable, Optional
 
 from turncal._turncal import Error
@@ -32,7 +33,7 @@ def shown(progress: bool | Shown) -> Shown | None:
     if not progress:
         return None
     try:
-        from tqdm.auto import tqdm
+        bars = import_module("tqdm.auto").tqdm
     except ImportError:
         return None
-    return Bar(tqdm)
+    return Bar(bars)
