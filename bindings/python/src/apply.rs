@@ -1,7 +1,7 @@
 //! Application of a calibration to columns.
 
 use nalgebra::Vector3;
-use numpy::{PyArray2, PyReadonlyArray1, PyReadwriteArray2};
+use numpy::{PyArray2, PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use turncal::calibration::Correction;
@@ -107,15 +107,15 @@ fn columns(named: &NamedColumns, sensor: Sensor) -> [(String, f64); 3] {
     })
 }
 
-/// Writes the calibrated values of some rows into `out`, of shape (6, rows). The first `before` rows and those beyond
-/// the size of `out` are neighbours only.
+/// Writes the calibrated values of some rows into six columns `out`. The first `before` rows and those beyond the
+/// length of `out` are neighbours only.
 #[pyfunction]
 pub fn correct(
     py: Python,
     calibration: &Calibration,
     columns: [PyReadonlyArray1<f64>; 6],
     before: usize,
-    mut out: PyReadwriteArray2<f64>,
+    mut out: [PyReadwriteArray1<f64>; 6],
     per_row: f64,
     rate: f64,
 ) -> PyResult<()> {
@@ -127,23 +127,15 @@ pub fn correct(
              calibration.apply(turncal.run(data, temperature=…)).",
         ));
     }
-    let slices = columns.each_ref().map(|column| column.as_slice());
-    let [a, b, c, d, e, f] = slices;
+    let [a, b, c, d, e, f] = columns.each_ref().map(|column| column.as_slice());
     let rows = Rows {
         columns: [a?, b?, c?, d?, e?, f?],
         per_row,
         rate,
     };
-    let mut out = out.as_array_mut();
-    let mut lanes = out.rows_mut().into_iter();
-    let mut lane = || {
-        lanes
-            .next()
-            .and_then(|lane| lane.into_slice())
-            .unwrap_or_default()
-    };
-    let lanes: [&mut [f64]; 6] = std::array::from_fn(|_| lane());
-    py.detach(|| write(&rows, &by, before, lanes));
+    let [a, b, c, d, e, f] = out.each_mut().map(|column| column.as_slice_mut());
+    let out = [a?, b?, c?, d?, e?, f?];
+    py.detach(|| write(&rows, &by, before, out));
     Ok(())
 }
 

@@ -181,23 +181,50 @@ def applied(
     )
     taken = _taken(data, columns)
     rows = len(taken[0][0])
-    out = np.empty((6, rows))
+    out = _Output(data, rows)
     for first in range(0, rows, ROWS):
         last = min(first + ROWS, rows)
         # Neighbours give the angular acceleration.
         begin, end = max(first - 1, 0), min(last + 1, rows)
         part = [_part(column, sign, begin, end) for column, sign in taken]
-        _turncal.correct(calibration, part, first - begin, out[:, first:last], per_row, rate)
-    return _like(data, out)
+        _turncal.correct(calibration, part, first - begin, out.part(first, last), per_row, rate)
+    return out.table()
+
+
+class _Output:
+    """Six columns of a table of the kind of `data`, in memory once."""
+
+    def __init__(self, data: Data, rows: int) -> None:
+        self.data = data
+        self.is_polars = hasattr(data, "get_columns")
+        block = np.empty((0 if self.is_polars else 6, rows))
+        self.block = block
+        self.columns = [np.empty(rows) for _ in OUTPUT] if self.is_polars else list(block)
+
+    def part(self, first: int, last: int) -> list[npt.NDArray[np.float64]]:
+        return [column[first:last] for column in self.columns]
+
+    def table(self) -> Any:
+        if self.is_polars:
+            import polars
+
+            # A copy, so that each column is released after its own.
+            return polars.DataFrame([polars.Series(name, self.columns.pop(0)) for name in OUTPUT])
+        if hasattr(self.data, "iloc"):
+            import pandas
+
+            return pandas.DataFrame(self.block.T, columns=list(OUTPUT), index=self.data.index, copy=False)
+        return self.block.T
 
 
 def _taken(data: Data, columns: list[tuple[str, float]] | None) -> list[tuple[npt.NDArray[Any], float]]:
     """The six columns of a table, each with its sign."""
     table = dict(_columns(data))
-    if columns is None or (isinstance(data, np.ndarray) and data.ndim == 2 and columns[0][0] not in table):
-        columns = [(name, 1.0) for name in list(table)[:6]]
+    is_bare = isinstance(data, np.ndarray) and data.ndim == 2
+    if columns is None or (is_bare and columns[0][0] not in table):
+        columns = [(name, 1.0) for name in table]
     missing = [name for name, _ in columns if name not in table]
-    if missing or len(columns) < 6:
+    if missing or len(columns) != 6:
         what = f"a column {missing[0]!r}" if missing else "six columns"
         raise Error(f"data: found the columns {', '.join(table)}, expected {what}. Name the columns with gyro and accel.")
     taken: list[tuple[npt.NDArray[Any], float]] = []
@@ -220,19 +247,6 @@ def _plain(column: Any) -> npt.NDArray[Any] | None:
 def _part(column: npt.NDArray[Any], sign: float, begin: int, end: int) -> npt.NDArray[np.float64]:
     part = np.ascontiguousarray(column[begin:end], dtype=np.float64)
     return part if sign > 0 else -part
-
-
-def _like(data: Data, out: npt.NDArray[np.float64]) -> Any:
-    """Six rows as a table of the kind of `data`."""
-    if hasattr(data, "get_columns"):
-        import polars
-
-        return polars.DataFrame({name: out[place] for place, name in enumerate(OUTPUT)})
-    if hasattr(data, "iloc"):
-        import pandas
-
-        return pandas.DataFrame(out.T, columns=list(OUTPUT), index=data.index, copy=False)
-    return out.T
 
 
 def parameters(names: list[str], values: list[float], sigma: list[float | None]) -> Any:
