@@ -13,7 +13,7 @@ use turncal::report::{Document, at_rest, terminal, write};
 use crate::errors::{raise, raised};
 use crate::report::{brief, framed};
 use crate::run::{Recorded, Request};
-use crate::wait::{Progress, wait};
+use crate::wait::finish;
 
 /// What a report needs beside the calibration.
 struct Solved {
@@ -112,8 +112,7 @@ impl Calibration {
                  its run. Calibrate the run again.",
             ));
         };
-        let silent = Progress::new(py, None, None)?;
-        let document = wait(py, &silent, move |_| solved.document())?.map_err(raise)?;
+        let document = finish(py, move || solved.document())?.map_err(raise)?;
         Ok(self.document.get_or_init(|| document))
     }
 

@@ -17,7 +17,7 @@ use crate::calibration::Calibration;
 use crate::errors::{raise, raised, within};
 use crate::report::Report;
 use crate::run::Run;
-use crate::wait::{Progress, wait};
+use crate::wait::finish;
 
 const HOUR: f64 = 3600.0;
 
@@ -141,8 +141,7 @@ pub fn navigate(
     let has_terms = |of: &Calibration| !of.record.terms.is_empty();
     let terms = has_terms(calibration) || has_terms(truth);
     let converged = calibration.record.converged != Some(false);
-    let silent = Progress::new(py, None, None)?;
-    let report = wait(py, &silent, move |_| {
+    let report = finish(py, move || {
         let navigated = Navigated {
             method: "error",
             outlook: mission.navigate(&pair)?,

@@ -20,7 +20,7 @@ use crate::calibration::{Calibration, calibrated};
 use crate::errors::{named, raise, raised};
 use crate::known::Known;
 use crate::report::Report;
-use crate::wait::{Progress, wait};
+use crate::wait::{Progress, finish, wait};
 
 /// Recordings of one instrument with what is known of it.
 pub struct Recorded {
@@ -107,8 +107,7 @@ impl Run {
     ) -> PyResult<Report> {
         self.one()?;
         let of = self.of.clone();
-        let silent = Progress::new(py, None, None)?;
-        wait(py, &silent, move |_| make(&of.runs[0]))?.map_err(raise)
+        finish(py, move || make(&of.runs[0]))?.map_err(raise)
     }
 }
 
@@ -234,8 +233,7 @@ pub fn error_terms(argument: &str, names: &[String]) -> PyResult<Vec<ErrorTerm>>
 #[pyfunction]
 pub fn read(py: Python, path: PathBuf, known: &Known) -> PyResult<Run> {
     let (stated, stream) = (known.stated.clone(), known.stream.clone());
-    let silent = Progress::new(py, None, None)?;
-    let recorded = wait(py, &silent, move |_| match Campaign::is_at(&path) {
+    let recorded = finish(py, move || match Campaign::is_at(&path) {
         true => Campaign::read(&path).map(|campaign| Recorded {
             name: campaign.name,
             runs: campaign.runs,
@@ -276,8 +274,7 @@ pub fn run(
         .into_iter()
         .map(|(name, of)| (name, of.as_array().to_vec()));
     let table = Table::new(name, columns.collect()).map_err(raise)?;
-    let silent = Progress::new(py, None, None)?;
-    let opened = wait(py, &silent, move |_| Opened::of_table(&table, &stated))?;
+    let opened = finish(py, move || Opened::of_table(&table, &stated))?;
     Ok(Run::new(
         Recorded::of_run(opened.map_err(raise)?.run, None),
         None,
@@ -287,8 +284,7 @@ pub fn run(
 #[pyfunction]
 pub fn init(py: Python, path: PathBuf, known: &Known) -> PyResult<String> {
     let (stated, stream) = (known.stated.clone(), known.stream.clone());
-    let silent = Progress::new(py, None, None)?;
-    let draft = wait(py, &silent, move |_| {
+    let draft = finish(py, move || {
         let name = path
             .file_name()
             .unwrap_or_default()

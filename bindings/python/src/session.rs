@@ -14,7 +14,7 @@ use turncal::survey::{self, Status};
 use crate::errors::{positive, raise, raised, wrong};
 use crate::known::Known;
 use crate::run::{Recorded, Run};
-use crate::wait::{Progress, wait};
+use crate::wait::finish;
 
 /// A calibration in progress: rows are pushed as they arrive, and the next move is recommended.
 ///
@@ -108,8 +108,7 @@ impl Session {
         question: impl FnOnce(&mut survey::Session) -> Result<T, SampleError> + Send + 'static,
     ) -> PyResult<T> {
         let session = self.0.clone();
-        let silent = Progress::new(py, None, None)?;
-        let answer = wait(py, &silent, move |_| {
+        let answer = finish(py, move || {
             let mut session: MutexGuard<_> = session.lock().unwrap_or_else(PoisonError::into_inner);
             question(&mut session)
         });

@@ -24,7 +24,7 @@ use crate::calibration::Calibration;
 use crate::errors::{named, raise, raised, wrong};
 use crate::report::Report;
 use crate::run::{Recorded, Run, error_terms};
-use crate::wait::{Progress, Watch, wait};
+use crate::wait::{Progress, Watch, finish, wait};
 
 /// Fewest and most runs of a study.
 const RUNS: [u64; 2] = [2, 1_000_000];
@@ -32,8 +32,7 @@ const RUNS: [u64; 2] = [2, 1_000_000];
 #[pyfunction]
 pub fn simulate(py: Python, scenario: &str, seed: Option<u64>) -> PyResult<Run> {
     let scenario = Scenario::load(scenario).map_err(raise)?;
-    let silent = Progress::new(py, None, None)?;
-    let simulated = wait(py, &silent, move |_| {
+    let simulated = finish(py, move || {
         scenario.simulate(seed.unwrap_or(scenario.seed), 0)
     });
     let simulated = simulated?.map_err(raise)?;
@@ -235,8 +234,7 @@ pub fn evaluate(
         .map(specification)
         .transpose()
         .map_err(raise)?;
-    let silent = Progress::new(py, None, None)?;
-    let report = wait(py, &silent, move |_| {
+    let report = finish(py, move || {
         let study = PathStudy::load(&Named {
             path: &path,
             scenario: scenario.as_deref(),

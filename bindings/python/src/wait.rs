@@ -35,7 +35,8 @@ impl Watch {
     }
 }
 
-/// What a call shows of its progress.
+/// What a call shows of its progress; nothing by default.
+#[derive(Default)]
 pub struct Progress {
     show: Option<Py<PyAny>>,
     total: Option<u64>,
@@ -101,6 +102,14 @@ pub fn wait<T: Send + 'static>(
     seen.and(closed)?;
     py.detach(|| thread.join())
         .map_err(|panic| resume_unwind(panic))
+}
+
+/// Does work in another thread without showing progress.
+pub fn finish<T: Send + 'static>(
+    py: Python,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
+    wait(py, &Progress::default(), |_| work())
 }
 
 /// Looks at signals and shows steps until the work is done.

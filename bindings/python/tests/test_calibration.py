@@ -1,6 +1,7 @@
 """Calibrations from tables and files are those of the command."""
 
 import json
+import re
 
 import numpy as np
 import pandas
@@ -34,9 +35,7 @@ def calibration(run):
 
 def without_files(text):
     """calibration.json without the files that were read: a table has none."""
-    parsed = json.loads(text)
-    del parsed["provenance"]["inputs"]
-    return json.dumps(parsed, indent=2, ensure_ascii=False) + "\n"
+    return re.sub(r' *"inputs": \[.*?\n *\],\n', "", text, count=1, flags=re.DOTALL)
 
 
 def test_a_table_gives_the_bytes_of_the_command_except_the_names_of_files(of_command, calibration):
