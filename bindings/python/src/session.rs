@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use nalgebra::Vector3;
-use numpy::PyReadonlyArray2;
+use numpy::{AllowTypeChange, PyArrayLike2};
 use pyo3::prelude::*;
 use turncal::models::specification;
 use turncal::recording::SampleError;
@@ -74,8 +74,8 @@ impl Session {
     fn push<'py>(
         &self,
         py: Python<'py>,
-        gyro: PyReadonlyArray2<f64>,
-        accel: PyReadonlyArray2<f64>,
+        gyro: Samples,
+        accel: Samples,
     ) -> PyResult<Option<Bound<'py, PyAny>>> {
         let (gyro, accel) = (samples("gyro", &gyro)?, samples("accel", &accel)?);
         let status = self.ask(py, move |session| session.push(&gyro, &accel))?;
@@ -125,8 +125,11 @@ fn as_dict<'py>(py: Python<'py>, status: &Status) -> PyResult<Bound<'py, PyAny>>
     py.import("json")?.call_method1("loads", (json,))
 }
 
+/// Rows of numbers of any type.
+type Samples<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
+
 /// Rows of three numbers.
-fn samples(name: &str, of: &PyReadonlyArray2<f64>) -> PyResult<Vec<Vector3<f64>>> {
+fn samples(name: &str, of: &Samples) -> PyResult<Vec<Vector3<f64>>> {
     let of = of.as_array();
     match of.ncols() {
         3 => Ok(of

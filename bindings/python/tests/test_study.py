@@ -9,24 +9,25 @@ from conftest import command
 
 import turncal
 
-RUNS = 40
+RUNS = 20
 
 
 @pytest.fixture(scope="module")
 def of_command():
-    return command("study", "accuracy", "demo-six-position", "--runs", RUNS, "--seed", 3, "--json")
+    return command("study", "accuracy", "single-axis", "--runs", RUNS, "--seed", 3, "--json")
 
 
 def test_a_study_is_that_of_the_command(of_command):
     seen = []
     report = turncal.study(
-        "accuracy", "demo-six-position", runs=RUNS, seed=3, progress=lambda done, total: seen.append((done, total))
+        "accuracy", "single-axis", runs=RUNS, seed=3, progress=lambda done, total: seen.append((done, total))
     )
     assert report.to_json().encode() == of_command
     assert seen[-1] == (RUNS, RUNS)
 
 
-def test_a_study_on_two_workers_one_of_which_is_killed_is_the_same(of_command):
+def test_a_study_on_two_workers_one_of_which_is_killed_is_the_same(of_command, monkeypatch):
+    monkeypatch.setattr("turncal._study.RUNS", 2)
     from dask.distributed import LocalCluster, Client
 
     killed = []
@@ -38,7 +39,7 @@ def test_a_study_on_two_workers_one_of_which_is_killed_is_the_same(of_command):
 
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
         report = turncal.study(
-            "accuracy", "demo-six-position", runs=RUNS, seed=3, client=client, progress=kill_one
+            "accuracy", "single-axis", runs=RUNS, seed=3, client=client, progress=kill_one
         )
     assert killed and report.to_json().encode() == of_command
 

@@ -144,7 +144,8 @@ def _columns(data: Data) -> Iterator[tuple[str, Any]]:
 
 
 def _kind(column: Any) -> str:
-    return f"{getattr(column, 'dtype', type(column).__name__)}"
+    shape = np.shape(column)
+    return f"{getattr(column, 'dtype', type(column).__name__)}" + (f" of shape {shape}" if len(shape) != 1 else "")
 
 
 def _numbers(column: Any) -> npt.NDArray[np.float64] | None:
