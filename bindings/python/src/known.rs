@@ -72,7 +72,11 @@ fn unit(sensor: Sensor, text: Option<&str>) -> PyResult<Option<StatedUnit>> {
     let parse = |text| {
         let refused = |expected: String| {
             let name = format!("{}_unit", sensor.name());
-            wrong(&name, format_args!("{text:?}"), expected.trim_start_matches("expected "))
+            wrong(
+                &name,
+                format_args!("{text:?}"),
+                expected.trim_start_matches("expected "),
+            )
         };
         StatedUnit::parse(sensor, text).map_err(refused)
     };

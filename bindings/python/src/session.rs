@@ -4,14 +4,15 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use nalgebra::Vector3;
-use numpy::{AllowTypeChange, PyArrayLike2};
+use numpy::PyReadonlyArray2;
+use numpy::ndarray::ArrayView1;
 use pyo3::prelude::*;
 use turncal::models::specification;
 use turncal::recording::SampleError;
 use turncal::report::session::data;
 use turncal::survey::{self, Status};
 
-use crate::errors::{positive, raise, raised, wrong};
+use crate::errors::{positive, raise, raised};
 use crate::known::Known;
 use crate::run::{Recorded, Run};
 use crate::wait::finish;
@@ -74,10 +75,10 @@ impl Session {
     fn push<'py>(
         &self,
         py: Python<'py>,
-        gyro: Samples,
-        accel: Samples,
+        gyro: &Bound<PyAny>,
+        accel: &Bound<PyAny>,
     ) -> PyResult<Option<Bound<'py, PyAny>>> {
-        let (gyro, accel) = (samples("gyro", &gyro)?, samples("accel", &accel)?);
+        let (gyro, accel) = (samples("gyro", gyro)?, samples("accel", accel)?);
         let status = self.ask(py, move |session| session.push(&gyro, &accel))?;
         status.map(|status| as_dict(py, &status)).transpose()
     }
@@ -125,22 +126,11 @@ fn as_dict<'py>(py: Python<'py>, status: &Status) -> PyResult<Bound<'py, PyAny>>
     py.import("json")?.call_method1("loads", (json,))
 }
 
-/// Rows of numbers of any type.
-type Samples<'py> = PyArrayLike2<'py, f64, AllowTypeChange>;
-
 /// Rows of three numbers.
-fn samples(name: &str, of: &Samples) -> PyResult<Vec<Vector3<f64>>> {
-    let of = of.as_array();
-    match of.ncols() {
-        3 => Ok(of
-            .rows()
-            .into_iter()
-            .map(|row| Vector3::new(row[0], row[1], row[2]))
-            .collect()),
-        columns => Err(wrong(
-            name,
-            format_args!("{columns} columns"),
-            "an array of shape (n, 3)",
-        )),
-    }
+fn samples(name: &str, of: &Bound<PyAny>) -> PyResult<Vec<Vector3<f64>>> {
+    let frames = of.py().import("turncal._frames")?;
+    let of: PyReadonlyArray2<f64> = frames.call_method1("samples", (name, of))?.extract()?;
+    let rows = of.as_array();
+    let vector = |row: ArrayView1<f64>| Vector3::new(row[0], row[1], row[2]);
+    Ok(rows.rows().into_iter().map(vector).collect())
 }

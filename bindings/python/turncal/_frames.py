@@ -168,6 +168,14 @@ def _numbers(column: Any) -> npt.NDArray[np.float64] | None:
     return np.ascontiguousarray(values, dtype=np.float64)
 
 
+def samples(name: str, of: Any) -> npt.NDArray[np.float64]:
+    """Rows of three numbers."""
+    rows = np.asarray(of)
+    if rows.dtype.kind not in "iuf" or rows.shape[1:] != (3,):
+        raise Error(f"{name}: found {_kind(rows)}, expected an array of shape (n, 3) of numbers")
+    return np.ascontiguousarray(rows, dtype=np.float64)
+
+
 def applied(
     calibration: Calibration, data: Data, gyro: Columns | None, accel: Columns | None, rate: float | None
 ) -> Any:
