@@ -6,7 +6,7 @@
 use turncal::imu::InstallationForm;
 use turncal::report::{accuracy, terminal};
 use turncal::simulation::Scenario;
-use turncal::study::{AccuracyStudy, Study};
+use turncal::study::{AccuracyStudy, Study, UNWATCHED};
 
 /// Enough for the root mean squares to be known within a few per cent.
 const RUNS: u64 = 40;
@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         runs: RUNS,
         seed: SEED,
     };
-    let document = accuracy::document(&study.run(&|| {})?);
+    let document = accuracy::document(&study.run(UNWATCHED)?);
     print!("{}", terminal::text(&document, None));
     Ok(())
 }

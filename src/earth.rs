@@ -120,6 +120,11 @@ fn known() -> bool {
 /// RMS of 30 to 40 mGal over the Earth (Torge, *Gravimetry*, §2.1).
 pub const ANOMALY_SIGMA: f64 = 30.0 * MILLIGAL;
 
+/// 1σ of an unknown height, m.
+const USUAL_HEIGHT: f64 = 500.0;
+/// Decrease of gravity with height, (m/s²)/m.
+const FREE_AIR: f64 = 0.3086 * MILLIGAL;
+
 /// Mean gravity at the surface and its 1σ from place to place, m/s²: normal gravity is 9.780 at the equator and 9.832
 /// at the poles.
 const ANYWHERE: (f64, f64) = (9.806, 0.015);
@@ -148,6 +153,18 @@ impl Site {
             gravity_sigma: ANOMALY_SIGMA,
             is_known: true,
         }
+    }
+
+    /// A site of which the latitude, the height or both may be unknown; gravity then has a larger σ.
+    pub fn of_knowledge(latitude: Option<f64>, longitude: f64, height: Option<f64>) -> Self {
+        let mut site = match latitude {
+            Some(latitude) => Self::with_normal_gravity(latitude, longitude, height.unwrap_or(0.0)),
+            None => Self::unknown(),
+        };
+        if height.is_none() {
+            site.gravity_sigma = site.gravity_sigma.hypot(FREE_AIR * USUAL_HEIGHT);
+        }
+        site
     }
 
     /// The same site with a measured gravity and its 1σ, m/s².

@@ -57,6 +57,8 @@ pub mod attitude;
 pub mod calibration;
 #[cfg(feature = "certificate")]
 pub mod certificate;
+#[cfg(feature = "cli")]
+mod cli;
 pub mod earth;
 pub mod formats;
 pub mod imu;
@@ -77,3 +79,7 @@ pub mod study;
 pub mod survey;
 pub mod turntable;
 pub mod units;
+
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub use cli::command;

@@ -20,7 +20,7 @@ use turncal::imu::{InstallationForm, PerSensor, Triad};
 use turncal::navigation::{Navigator, ProcessNoise, State};
 use turncal::run::Run;
 use turncal::simulation::{Scenario, Simulated};
-use turncal::study::{AccuracyStudy, Study};
+use turncal::study::{self, AccuracyStudy, Study};
 
 fn main() {
     divan::main();
@@ -155,14 +155,14 @@ fn calibrate(bencher: Bencher, name: &str) {
 #[divan::bench(sample_count = 1)]
 fn hundred_monte_carlo_runs(bencher: Bencher) {
     let study = study(100);
-    bencher.bench(|| study.run(&|| {}).expect("a sound study"));
+    bencher.bench(|| study.run(study::UNWATCHED).expect("a sound study"));
 }
 
 /// Simulation, both methods and the bound.
 #[divan::bench(sample_count = 5)]
 fn one_monte_carlo_run(bencher: Bencher) {
     let study = study(1);
-    bencher.bench(|| study.run(&|| {}).expect("a sound study"));
+    bencher.bench(|| study.run(study::UNWATCHED).expect("a sound study"));
 }
 
 fn study(runs: u64) -> AccuracyStudy {

@@ -4,7 +4,6 @@ use clap::CommandFactory;
 use clap_complete::Shell;
 
 use super::Cli;
-
 use crate::cli::terminal::print;
 
 /// Prints a shell-completion script

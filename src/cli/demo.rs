@@ -12,26 +12,27 @@ use anyhow::{Context, bail};
 use clap::Parser;
 use flate2::read::GzDecoder;
 use rayon::prelude::*;
-use turncal::calibration::{
+
+use super::calibrate::{solve, write_report};
+use super::simulate::{simulated, write};
+use crate::calibration::{
     self, Assessment, ClosedForm, Estimate, Method, Options, Problem, Solution,
 };
-use turncal::imu::{PerSensor, Triad};
-use turncal::models::{self, Place, path_by_hand};
-use turncal::report::calibration::{self as of_calibration, Report};
-use turncal::report::navigation::{Flown, add_missions};
-use turncal::report::{Document, Facts};
-use turncal::run::{Dwell, Run};
-use turncal::simulation::{Scenario, Simulated};
-use turncal::study::navigation::{FORTY_HOURS, Mission, Motion};
-use turncal::turntable::Moves;
-use turncal::units::DEGREE;
-
-use super::calibrate::{dwell_times, navigate, note, solve, stamp, write_report};
-use super::simulate::{simulated, write};
-
 use crate::cli::Cli;
 use crate::cli::arguments::{Overwrite, number, seed};
 use crate::cli::terminal::{Activity, show_brief};
+use crate::imu::{PerSensor, Triad};
+use crate::models::{self, Place, path_by_hand};
+use crate::report::calibration::{
+    self as of_calibration, Report, dwell_times, navigate, note, stamp,
+};
+use crate::report::navigation::{Flown, add_missions};
+use crate::report::{Document, Facts};
+use crate::run::{Dwell, Run};
+use crate::simulation::{Scenario, Simulated};
+use crate::study::navigation::{FORTY_HOURS, Mission, Motion};
+use crate::turntable::Moves;
+use crate::units::DEGREE;
 
 /// Simulates a calibration and compares it with the truth
 ///

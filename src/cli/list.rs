@@ -1,10 +1,10 @@
 //! `turncal list`
 
 use serde::Serialize;
-use turncal::models::Embedded;
-use turncal::report::{Document, Facts};
 
 use crate::cli::terminal::show;
+use crate::models::Embedded;
+use crate::report::{Document, Facts};
 
 /// Shows the embedded scenarios, instruments, installations, tables, paths and trajectories
 ///

@@ -4,11 +4,10 @@ use std::path::{Path, PathBuf};
 
 use clap::CommandFactory;
 use clap_mangen::Man;
-use turncal::formats::write_whole;
 
 use super::Cli;
-
 use crate::cli::terminal::print;
+use crate::formats::write_whole;
 
 /// Writes the manual pages
 ///

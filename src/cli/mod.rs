@@ -1,5 +1,12 @@
 //! Commands: each parses its arguments, calls the library and reports the result.
 
+/// Prints a line on standard error. A closed pipe, as with `head`, is not a failure.
+macro_rules! tell {
+    ($($words:tt)*) => {
+        let _ = std::io::Write::write_fmt(&mut std::io::stderr(), format_args!("{}\n", format_args!($($words)*)));
+    };
+}
+
 mod arguments;
 mod calibrate;
 mod completions;
@@ -16,10 +23,14 @@ mod terminal;
 #[cfg(test)]
 mod tests;
 
-pub use calibrate::NotMet;
-pub use terminal::{leave_nothing_behind, with_threads};
+use std::ffi::OsString;
 
 use clap::{Parser, Subcommand};
+
+use crate::report::terminal::printable;
+
+use calibrate::NotMet;
+use terminal::{leave_nothing_behind, with_threads};
 
 /// Calibrates an inertial measurement unit on a turntable or by hand, with realistic uncertainties.
 #[derive(Debug, Parser)]
@@ -45,7 +56,7 @@ Advanced (each with --help):
   completions  print a shell-completion script
   man          write the manual pages"
 )]
-pub struct Cli {
+struct Cli {
     #[command(subcommand)]
     command: Command,
 }
@@ -81,9 +92,24 @@ enum Command {
     Man(man::Manual),
 }
 
+/// Runs a command line, whose first argument is the name of the command, and returns its exit status. Wrong usage exits
+/// at once.
+pub fn command(arguments: impl IntoIterator<Item = OsString>) -> u8 {
+    let cli = Cli::parse_from(arguments);
+    leave_nothing_behind();
+    let done = with_threads(|| cli.run()).unwrap_or_else(|error| Err(error.into()));
+    let Err(error) = done else {
+        return 0;
+    };
+    tell!("turncal: {}", printable(&format!("{error:#}")));
+    match error.is::<NotMet>() {
+        true => 3,
+        false => 1,
+    }
+}
+
 impl Cli {
-    /// Runs the command line.
-    pub fn run(&self) -> anyhow::Result<()> {
+    fn run(&self) -> anyhow::Result<()> {
         match &self.command {
             Command::Demo(demo) => demo.run(),
             Command::Simulate(simulate) => simulate.run(),

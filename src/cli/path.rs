@@ -4,18 +4,16 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Subcommand;
-use turncal::calibration::{ErrorTerm, Options, Word};
-use turncal::formats::Opened;
-use turncal::models::{Instrument, Place, path_by_hand, specification, turntable};
-use turncal::report::path::{Report, moves_in_words};
-use turncal::run::Aiding;
-use turncal::simulation::Scenario;
-use turncal::study::path::{Evaluation, PathStudy};
-use turncal::units::DEGREE;
 
+use crate::calibration::{ErrorTerm, Word};
 use crate::cli::NotMet;
 use crate::cli::arguments::{Delivery, OfLog, error_term, needs_table};
 use crate::cli::terminal::Activity;
+use crate::formats::Opened;
+use crate::models::specification;
+use crate::report::path::{Report, in_words, moves_in_words};
+use crate::run::Aiding;
+use crate::study::path::{Evaluation, Named, PathStudy};
 
 /// Predicts calibration accuracy for a path of a table or by hand, before any data exist
 #[derive(Debug, clap::Args)]
@@ -105,72 +103,37 @@ impl Evaluate {
         }
     }
 
-    fn options(&self, aiding: Aiding) -> Options {
-        let terms = self
-            .with
-            .iter()
-            .inspect(|&&term| needs_table(term, Some(aiding)));
-        Options {
-            terms: terms.copied().collect(),
-            aiding: Some(aiding),
-            ..Options::default()
+    fn named(&self) -> Named<'_> {
+        Named {
+            path: &self.path,
+            scenario: self.scenario.as_deref(),
+            imu: self.imu.as_deref(),
+            table: self.table.as_deref(),
+            aiding: self.aiding,
+            terms: self.with.clone(),
         }
     }
 
     fn of_run(&self, file: &Path) -> anyhow::Result<(String, String, Vec<String>, Evaluation)> {
         let Opened { run, .. } = OfLog::default().open(file)?;
-        let options = self.options(self.aiding.unwrap_or_else(|| run.aiding()));
+        let aiding = self.aiding.unwrap_or_else(|| run.aiding());
+        self.with
+            .iter()
+            .for_each(|&term| needs_table(term, Some(aiding)));
+        let options = self.named().options(aiding);
         let evaluation = Evaluation::of_run(&run, &options).with_context(|| self.path.clone())?;
         let with = format!("Recording of {}, with the noise stated there", self.path);
         Ok((run.recording.name.clone(), with, Vec::new(), evaluation))
     }
 
     fn of_path(&self) -> anyhow::Result<(String, String, Vec<String>, Evaluation)> {
-        let by_hand = self.path.contains(',') || self.path.starts_with("turn ");
-        let usual = if by_hand { "mems" } else { "demo" };
-        let mut scenario = Scenario::load(self.scenario.as_deref().unwrap_or(usual))?;
-        if let Some(model) = &self.imu {
-            scenario.instrument = Instrument::load(model, &Place::CommandLine)?;
-        }
-        if let Some(model) = &self.table {
-            (scenario.table, scenario.table_name) = turntable(model, &Place::CommandLine)?;
-        }
-        if by_hand {
-            scenario.integrator.lever_arm = Default::default();
-            let along = path_by_hand(&self.path).and_then(|path| scenario.along(path, "by hand"));
-            scenario = along.map_err(anyhow::Error::msg)?;
-        } else {
-            scenario = scenario.with_path(&self.path)?;
-        }
-        let aiding = match (self.aiding, by_hand) {
-            (Some(aiding), _) => aiding,
-            (None, true) => Aiding::Velocity,
-            (None, false) => Aiding::Table,
-        };
-        scenario.body_frame = aiding.body_frame();
-        for &term in &self.with {
-            scenario = scenario.with_error_term(term);
-        }
-        let table = if by_hand {
-            "turned by hand"
-        } else {
-            &scenario.table_name
-        };
-        let with = format!(
-            "Instrument {}, {table}, {:.0} Hz, latitude {:.1}°",
-            scenario.instrument.name,
-            1.0 / scenario.integrator.period,
-            scenario.site.latitude / DEGREE
-        );
-        let (name, moves) = (scenario.path_name.clone(), moves_in_words(&scenario));
-        let options = self.options(aiding);
-        let study = PathStudy {
-            scenario,
-            by_hand,
-            options,
-        };
+        let study = PathStudy::load(&self.named())?;
+        let aiding = study.options.aiding;
+        self.with.iter().for_each(|&term| needs_table(term, aiding));
+        let name = study.scenario.path_name.clone();
+        let moves = moves_in_words(&study.scenario);
         let evaluation = study.evaluate().with_context(|| format!("path {name}"))?;
-        Ok((name, with, moves, evaluation))
+        Ok((name, in_words(&study), moves, evaluation))
     }
 }
 

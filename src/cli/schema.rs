@@ -1,8 +1,7 @@
 //! `turncal schema`
 
-use turncal::formats::run_schema;
-
 use crate::cli::terminal::print;
+use crate::formats::run_schema;
 
 /// Prints the JSON schema of run.toml, for completion and checks in editors
 ///

@@ -1,18 +1,13 @@
 //! `turncal simulate`
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use turncal::calibration::result::Calibration;
-use turncal::calibration::result::TermRecord;
-use turncal::calibration::truth_record;
-use turncal::formats::{campaign_text, write_run};
-use turncal::imu::{TERM_PARAMETERS, Term};
-use turncal::simulation::{Scenario, Simulated, SimulatedCampaign};
 
 use crate::cli::arguments::{Overwrite, seed};
 use crate::cli::terminal::Activity;
+use crate::formats::{campaign_text, write_run};
+use crate::simulation::{Scenario, Simulated, SimulatedCampaign};
 
 /// Simulates a run directory with known truth from a scenario
 ///
@@ -113,22 +108,9 @@ pub fn simulated(scenario: &Scenario, seed: Option<u64>) -> anyhow::Result<Simul
         .with_context(|| format!("scenario {} cannot be simulated", scenario.name))
 }
 
-/// The true parameters of the terms that are on.
-fn true_terms(simulated: &Simulated) -> BTreeMap<String, TermRecord> {
-    let on = (0..TERM_PARAMETERS).filter(|&k| simulated.run.instrument.term_sigma[k] > 0.0);
-    let term = |k: usize| {
-        let (value, sigma) = (simulated.terms[k], None);
-        Some((Term::parameter_name(k)?, TermRecord { value, sigma }))
-    };
-    on.filter_map(term).collect()
-}
-
 /// Writes a simulated run with its truth into an existing directory.
 pub fn write(simulated: &Simulated, directory: &Path) -> anyhow::Result<()> {
-    let truth = Calibration {
-        terms: true_terms(simulated),
-        ..truth_record(&simulated.truth_here(), &simulated.run)
-    };
+    let truth = simulated.truth_record();
     write_run(directory, &simulated.run, simulated.output, Some(&truth))?;
     Ok(())
 }

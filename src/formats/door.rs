@@ -9,6 +9,7 @@ use tempfile::TempDir;
 
 use super::draft::{Draft, Found, Stated};
 use super::error::FileError;
+use super::table::Table;
 use crate::run::Run;
 
 /// The log on standard input.
@@ -84,6 +85,20 @@ impl Opened {
             self.run = Run::of_text(path, &draft.to_toml(&name), None)?;
         }
         Ok(())
+    }
+
+    /// The same for a table in memory.
+    ///
+    /// # Errors
+    /// [`FileError`] if required fields are neither detected nor stated.
+    pub fn of_table(table: &Table, stated: &Stated) -> Result<Self, FileError> {
+        let draft = Draft::of_table(table, stated)?;
+        if let Some([found, expected, advice]) = draft.open_question() {
+            return Err(FileError::of(table.name(), found, expected, advice));
+        }
+        let name = table.name().to_string_lossy();
+        let run = Run::of_table(table, &draft.to_toml(&name))?;
+        Ok(Self { run, log: None })
     }
 
     /// Whether there was no `run.toml`.

@@ -38,6 +38,13 @@ pub enum Place {
         /// Name in the header.
         column: String,
     },
+    /// A row of a table in memory, from zero, and a column of it.
+    Row {
+        /// Row.
+        row: u64,
+        /// Name of the column at fault, if any.
+        column: Option<String>,
+    },
     /// A byte of a binary file; the first is 0.
     Byte(u64),
     /// A sample of a stream of such a file.
@@ -61,6 +68,13 @@ impl fmt::Display for Place {
             Self::Character { line, column } => write!(f, ", line {line}, column {column}"),
             Self::Column { line, column } => {
                 write!(f, ", line {line}, column `{}`", excerpt(column))
+            }
+            Self::Row { row, column } => {
+                write!(f, ", row {row}")?;
+                match column {
+                    Some(column) => write!(f, ", column `{}`", excerpt(column)),
+                    None => Ok(()),
+                }
             }
             Self::Byte(byte) => write!(f, ", byte {byte}"),
             Self::Sample {

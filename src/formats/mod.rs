@@ -19,6 +19,7 @@ mod schema;
 mod sheet;
 mod small_file;
 mod streams;
+mod table;
 
 pub use crate::imu::NoiseKeys;
 pub(crate) use directories::write_whole_with;
@@ -41,3 +42,4 @@ pub(crate) use schema::{
     term_sigma, write_rows,
 };
 pub(crate) use sheet::Sheet;
+pub use table::Table;

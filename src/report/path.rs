@@ -6,7 +6,7 @@ use crate::calibration::{ParameterVector, TermLeftOff, Word, auxiliary_name, par
 use crate::imu::{AXES, InstallationForm};
 use crate::lot::{Check, Specification, Verdict};
 use crate::simulation::Scenario;
-use crate::study::path::{Evaluation, Without};
+use crate::study::path::{Evaluation, PathStudy, Without};
 use crate::survey::decided;
 use crate::turntable::{Moves, Rotation};
 
@@ -408,6 +408,21 @@ pub fn minutes(seconds: f64) -> String {
         true => format!("{} s", value(seconds, 1.0)),
         false => format!("{} min", value(seconds / 60.0, 0.1)),
     }
+}
+
+/// Instrument, table and site in words.
+pub fn in_words(study: &PathStudy) -> String {
+    let scenario = &study.scenario;
+    let table = match study.by_hand {
+        true => "turned by hand",
+        false => &scenario.table_name,
+    };
+    format!(
+        "Instrument {}, {table}, {:.0} Hz, latitude {:.1}°",
+        scenario.instrument.name,
+        1.0 / scenario.integrator.period,
+        scenario.site.latitude / DEGREE
+    )
 }
 
 /// Each move of a scenario in words.

@@ -25,9 +25,11 @@ use thermal::Warming;
 pub use thermal::{Chamber, ThermalTruth};
 
 use crate::attitude::{exp, quaternion};
-use crate::calibration::Difference;
+use crate::calibration::result::TermRecord;
+use crate::calibration::{Calibration, Difference, truth_record};
 use crate::imu::{
-    Instrument, NoiseSource, Nominal, Output, PerSensor, Pulses, Sensor, TermVector, Triad,
+    Instrument, NoiseSource, Nominal, Output, PerSensor, Pulses, Sensor, TERM_PARAMETERS, Term,
+    TermVector, Triad,
 };
 use crate::navigation::samples_of;
 use crate::recording::{ImuSamples, Recording, TableLog};
@@ -56,6 +58,19 @@ pub struct Simulated {
 }
 
 impl Simulated {
+    /// The truth as a record: triads at the mean temperature of the recording, and error terms that are on.
+    pub fn truth_record(&self) -> Calibration {
+        let on = (0..TERM_PARAMETERS).filter(|&k| self.run.instrument.term_sigma[k] > 0.0);
+        let term = |k: usize| {
+            let (value, sigma) = (self.terms[k], None);
+            Some((Term::parameter_name(k)?, TermRecord { value, sigma }))
+        };
+        Calibration {
+            terms: on.filter_map(term).collect(),
+            ..truth_record(&self.truth_here(), &self.run)
+        }
+    }
+
     /// The true triads at the mean temperature of the recording.
     pub fn truth_here(&self) -> PerSensor<Triad> {
         let imu = &self.run.recording.imu;

@@ -9,6 +9,8 @@ mod ratio;
 mod shard;
 pub mod table1;
 
+use std::ops::ControlFlow;
+
 use navigation::NavigationStudyError;
 use rayon::prelude::*;
 
@@ -22,6 +24,12 @@ pub use experiment::{Experiment, ExperimentStudy};
 pub use ratio::Ratio;
 pub use shard::{Shard, ShardError};
 pub use table1::{Table1, Table1Study};
+
+/// Callback after each run, which may stop the study.
+pub type Done<'a> = &'a (dyn Fn() -> ControlFlow<()> + Sync);
+
+/// A callback that does nothing.
+pub const UNWATCHED: Done<'static> = &|| ControlFlow::Continue(());
 
 /// A study of numbered runs, each with its own random streams: its result depends neither on the number of cores nor on
 /// a division into parts.
@@ -46,20 +54,18 @@ pub trait Study: Sync {
     /// [`StudyError`] if they cannot be evaluated.
     fn outcome(&self, trials: Vec<Self::Trial>) -> Result<Self::Outcome, StudyError>;
 
-    /// Makes some of the runs on all cores; `done` is called after each.
+    /// Makes some of the runs on all cores; `done` is called after each and may stop the study.
     ///
     /// # Errors
-    /// [`StudyError`] if runs cannot be made. A run without a calibration is not an error: it is counted.
-    fn trials(
-        &self,
-        runs: &[u64],
-        done: &(dyn Fn() + Sync),
-    ) -> Result<Vec<Self::Trial>, StudyError> {
+    /// [`StudyError`] if runs cannot be made, or if the study was stopped. A run without a calibration is not an error: it is counted.
+    fn trials(&self, runs: &[u64], done: Done) -> Result<Vec<Self::Trial>, StudyError> {
         let make = self.maker()?;
         let all = runs.par_iter().with_max_len(1).map(|&run| {
-            let trial = make(run);
-            done();
-            trial
+            let trial = make(run)?;
+            match done() {
+                ControlFlow::Continue(()) => Ok(trial),
+                ControlFlow::Break(()) => Err(StudyError::Stopped),
+            }
         });
         all.collect()
     }
@@ -68,7 +74,7 @@ pub trait Study: Sync {
     ///
     /// # Errors
     /// As [`Self::trials`] and [`Self::outcome`].
-    fn run(&self, done: &(dyn Fn() + Sync)) -> Result<Self::Outcome, StudyError> {
+    fn run(&self, done: Done) -> Result<Self::Outcome, StudyError> {
         let all: Vec<u64> = (0..self.runs()).collect();
         self.outcome(self.trials(&all, done)?)
     }
@@ -94,4 +100,7 @@ pub enum StudyError {
         /// The cause.
         source: CalibrationError,
     },
+    /// Stopped by its callback.
+    #[error("the study was stopped before its end")]
+    Stopped,
 }

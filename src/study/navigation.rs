@@ -14,6 +14,7 @@ use crate::calibration::{
 };
 use crate::earth::Site;
 use crate::imu::{BodyFrame, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+use crate::models::{self, ModelError, Place};
 use crate::navigation::error_model::{POSITION, STATES};
 use crate::navigation::{
     ErrorMatrix, ErrorVector, Forcing, InputError, Instant, Linearisation, NavigationError,
@@ -36,6 +37,38 @@ pub enum Motion {
     Standing(Solution),
     /// Along a trajectory.
     Moving(Trajectory),
+}
+
+impl Motion {
+    /// At rest at a latitude in rad and a height in m, with pitch, roll and heading in rad.
+    pub fn at_rest(latitude: f64, height: f64, [pitch, roll, heading]: [f64; 3]) -> Self {
+        Self::Standing(Solution {
+            attitude: from_pitch_roll_heading(pitch, roll, heading),
+            velocity: Vector3::zeros(),
+            latitude,
+            longitude: 0.0,
+            height,
+        })
+    }
+
+    /// Along a named trajectory, which is also returned by its name, moved to another latitude in rad or height in m.
+    ///
+    /// # Errors
+    /// [`ModelError`] if it cannot be read.
+    pub fn along(
+        name: &str,
+        latitude: Option<f64>,
+        height: Option<f64>,
+    ) -> Result<(Self, String), ModelError> {
+        let (mut trajectory, name) = models::trajectory(name, &Place::CommandLine)?;
+        if let Some(latitude) = latitude {
+            trajectory = trajectory.at_latitude(latitude);
+        }
+        if let Some(height) = height {
+            trajectory = trajectory.at_height(height);
+        }
+        Ok((Self::Moving(trajectory), name))
+    }
 }
 
 /// Motion and duration of navigation, from perfect alignment, with the height held to the true height.

@@ -4,10 +4,11 @@ use rayon::prelude::*;
 
 use super::navigation::{Mission, NavigationStudyError, Outlook};
 use crate::calibration::{
-    Bound, CalibrationError, Options, ParameterVector, Problem, TermLeftOff, bound, coarse_start,
-    terms_left_off,
+    Bound, CalibrationError, ErrorTerm, Options, ParameterVector, Problem, TermLeftOff, bound,
+    coarse_start, terms_left_off,
 };
 use crate::imu::{PerSensor, TermVector, Triad};
+use crate::models::{Instrument, ModelError, Place, path_by_hand, turntable};
 use crate::run::{Aiding, Run};
 use crate::simulation::Scenario;
 use crate::survey::TURNED_BY_HAND;
@@ -22,6 +23,23 @@ pub struct PathStudy {
     pub by_hand: bool,
     /// Options of the calibration.
     pub options: Options,
+}
+
+/// Names of a path and of what it is evaluated with.
+#[derive(Debug, Clone, Default)]
+pub struct Named<'a> {
+    /// The path: a TOML file, an embedded name, or words for turns by hand.
+    pub path: &'a str,
+    /// The scenario; `None` for the usual one.
+    pub scenario: Option<&'a str>,
+    /// Instrument in place of the scenario's.
+    pub imu: Option<&'a str>,
+    /// Table in place of the scenario's.
+    pub table: Option<&'a str>,
+    /// Observations of the filter; `None` for the table, or velocity by hand.
+    pub aiding: Option<Aiding>,
+    /// Error terms to estimate.
+    pub terms: Vec<ErrorTerm>,
 }
 
 /// Expected results of a path, or of the recording of a run.
@@ -52,9 +70,26 @@ pub struct Without {
     pub sigma: Option<ParameterVector>,
 }
 
+impl Named<'_> {
+    /// Options of a calibration with this aiding.
+    pub fn options(&self, aiding: Aiding) -> Options {
+        Options {
+            terms: self.terms.clone(),
+            aiding: Some(aiding),
+            ..Options::default()
+        }
+    }
+}
+
 /// Errors in evaluating a path.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum PathError {
+    /// A model cannot be read.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// Words that are not turns.
+    #[error("{0}")]
+    Words(String),
     /// The table cannot follow it.
     #[error(transparent)]
     Table(#[from] TableError),
@@ -67,6 +102,43 @@ pub enum PathError {
 }
 
 impl PathStudy {
+    /// A path with the models that are named.
+    ///
+    /// # Errors
+    /// [`PathError`] if one cannot be read, or the words are not turns.
+    pub fn load(named: &Named) -> Result<Self, PathError> {
+        let by_hand = named.path.contains(',') || named.path.starts_with("turn ");
+        let usual = if by_hand { "mems" } else { "demo" };
+        let mut scenario = Scenario::load(named.scenario.unwrap_or(usual))?;
+        if let Some(model) = named.imu {
+            scenario.instrument = Instrument::load(model, &Place::CommandLine)?;
+        }
+        if let Some(model) = named.table {
+            (scenario.table, scenario.table_name) = turntable(model, &Place::CommandLine)?;
+        }
+        if by_hand {
+            scenario.integrator.lever_arm = Default::default();
+            let along = path_by_hand(named.path).and_then(|path| scenario.along(path, "by hand"));
+            scenario = along.map_err(PathError::Words)?;
+        } else {
+            scenario = scenario.with_path(named.path)?;
+        }
+        let aiding = match (named.aiding, by_hand) {
+            (Some(aiding), _) => aiding,
+            (None, true) => Aiding::Velocity,
+            (None, false) => Aiding::Table,
+        };
+        scenario.body_frame = aiding.body_frame();
+        for &term in &named.terms {
+            scenario = scenario.with_error_term(term);
+        }
+        Ok(Self {
+            scenario,
+            by_hand,
+            options: named.options(aiding),
+        })
+    }
+
     /// Evaluates the path, and the path without each of its moves.
     ///
     /// # Errors

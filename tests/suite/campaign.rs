@@ -415,7 +415,7 @@ fn sigma_of_coefficients_are_true_and_orders_right() {
     use turncal::calibration::NoisePolicy;
     use turncal::imu::InstallationForm;
     use turncal::simulation::SimulatedCampaign;
-    use turncal::study::{CampaignStudy, Study};
+    use turncal::study::{CampaignStudy, Study, UNWATCHED};
     let study = CampaignStudy {
         campaign: SimulatedCampaign::load("five-soaks").unwrap(),
         form: InstallationForm::General,
@@ -424,7 +424,7 @@ fn sigma_of_coefficients_are_true_and_orders_right() {
         seed: 4711,
         rate: true,
     };
-    let accuracy = study.run(&|| {}).unwrap();
+    let accuracy = study.run(UNWATCHED).unwrap();
     assert_eq!(accuracy.failures, 0);
     let (anees, (low, high)) = accuracy.anees().unwrap();
     println!("{anees} {low} {high}");

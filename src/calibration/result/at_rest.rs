@@ -81,6 +81,9 @@ pub struct Second {
 }
 
 impl AtRest {
+    /// Highest order of the polynomials in a calibration.
+    pub const HIGHEST_ORDER: usize = 5;
+
     /// The evaluation of a run at rest throughout; `None` without temperature, or if it changes too little or too
     /// briefly.
     pub fn new(run: &Run, highest_order: usize) -> Option<Self> {

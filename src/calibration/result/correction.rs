@@ -192,12 +192,12 @@ impl Correction {
                 Some((_, here, in_range)) => (here, *in_range),
                 None => (self, true),
             };
-            let of_triads = PerSensor::from_fn(|sensor| here.of_triad(sensor, run, &near, k));
-            let u = if plain {
-                of_triads
-            } else {
-                here.without_terms(&of_triads, here.angular_acceleration(run, &near, k))
+            let outputs = PerSensor::from_fn(|sensor| output(sensor, run, &near, k));
+            let acceleration = match plain {
+                true => Vector3::zeros(),
+                false => here.angular_acceleration(run, &near, k),
             };
+            let u = here.of_outputs(&outputs, &acceleration);
             Calibrated {
                 in_range,
                 start: run.recording.imu.time(k),
@@ -206,6 +206,20 @@ impl Correction {
                 force: u.accel,
             }
         })
+    }
+
+    /// Angular rate and specific force of one sample of outputs, in the file's quantity per second, for an angular
+    /// acceleration in rad/s² (used by size effect and time offset). Temperature dependence is not applied.
+    pub fn of_outputs(
+        &self,
+        outputs: &PerSensor<Vector3<f64>>,
+        angular_acceleration: &Vector3<f64>,
+    ) -> PerSensor<Vector3<f64>> {
+        let of_triads = PerSensor::from_fn(|sensor| self.of_triad(sensor, outputs.get(sensor)));
+        match self.terms().next() {
+            None => of_triads,
+            Some(_) => self.without_terms(&of_triads, angular_acceleration),
+        }
     }
 
     /// Whether it depends on temperature.
@@ -230,11 +244,8 @@ impl Correction {
         known.unwrap_or_else(|| (self.clone(), false))
     }
 
-    /// `(K C)⁻¹ (N − D)` of sample `k`.
-    fn of_triad(&self, sensor: Sensor, run: &Run, near: &Near, k: usize) -> Vector3<f64> {
-        let increment = near.at(k).get(sensor).to_owned();
-        let output = increment.component_mul(&run.instrument.nominal.get(sensor).0)
-            / run.recording.imu.period;
+    /// `(K C)⁻¹ (N − D)`.
+    pub fn of_triad(&self, sensor: Sensor, output: &Vector3<f64>) -> Vector3<f64> {
         self.matrix.get(sensor) * (output - self.bias.get(sensor))
     }
 
@@ -244,21 +255,21 @@ impl Correction {
         if !run.recording.imu.continuous || first == last {
             return Vector3::zeros();
         }
-        let rate = |k| self.of_triad(Sensor::Gyro, run, near, k);
+        let rate = |k| self.of_triad(Sensor::Gyro, &output(Sensor::Gyro, run, near, k));
         (rate(last) - rate(first)) / ((last - first) as f64 * run.recording.imu.period)
     }
 
     fn without_terms(
         &self,
         of_triads: &PerSensor<Vector3<f64>>,
-        angular_acceleration: Vector3<f64>,
+        angular_acceleration: &Vector3<f64>,
     ) -> PerSensor<Vector3<f64>> {
         let mut u = *of_triads;
         for _ in 0..ROUNDS {
             let sensed = Sensed {
                 rate: u.gyro,
                 rate_over_earth: u.gyro,
-                angular_acceleration,
+                angular_acceleration: *angular_acceleration,
                 force: u.accel,
             };
             u = PerSensor::from_fn(|sensor| {
@@ -267,4 +278,9 @@ impl Correction {
         }
         u
     }
+}
+/// `N` of sample `k`, in the file's quantity per second.
+fn output(sensor: Sensor, run: &Run, near: &Near, k: usize) -> Vector3<f64> {
+    let increment = near.at(k).get(sensor).to_owned();
+    increment.component_mul(&run.instrument.nominal.get(sensor).0) / run.recording.imu.period
 }

@@ -335,6 +335,20 @@ impl Calibration {
         of_triads.or_else(|| self.terms.get(name).map(|term| &term.value))
     }
 
+    /// The names of all parameters, estimated or not.
+    pub fn names(&self) -> Vec<String> {
+        let of_triad = |sensor: Sensor| {
+            let scale = AXES.map(|axis| format!("scale.{axis}"));
+            let rows = AXES.into_iter();
+            let installation = rows.flat_map(|i| AXES.map(|j| format!("installation.{i}{j}")));
+            let bias = AXES.map(|axis| format!("bias.{axis}"));
+            let all = scale.into_iter().chain(installation).chain(bias);
+            all.map(move |name| format!("{}.{name}", sensor.name()))
+        };
+        let of_triads = Sensor::ALL.into_iter().flat_map(of_triad);
+        of_triads.chain(self.terms.keys().cloned()).collect()
+    }
+
     /// 1σ of a parameter by name, zero if it was not estimated; `None` if no σ is stated.
     pub fn sigma_of(&self, name: &str) -> Option<&f64> {
         let sigma = self.sigma.as_ref()?;

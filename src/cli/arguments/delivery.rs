@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
-use turncal::formats::{FileError, WholeDirectory};
-use turncal::report::{self, Document};
 
 use crate::cli::terminal::show;
+use crate::formats::{FileError, WholeDirectory};
+use crate::report::{self, Document};
 
 /// Overwrite option of all commands that write files.
 #[derive(Debug, Clone, Copy, clap::Args)]

@@ -3,9 +3,10 @@
 use anyhow::bail;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::error::ErrorKind;
-use turncal::calibration::{ErrorTerm, Problem};
-use turncal::run::Aiding;
-use turncal::turntable::AxisError;
+
+use crate::calibration::{ErrorTerm, Problem};
+use crate::run::Aiding;
+use crate::turntable::AxisError;
 
 /// Parses the name of an error term.
 pub fn error_term() -> impl TypedValueParser<Value = ErrorTerm> {

@@ -3,13 +3,13 @@
 use anyhow::Context;
 use clap::error::ErrorKind;
 use serde::{Serialize, Serializer};
-use turncal::calibration::{
-    CalibrationError, ErrorTerm, Method, NoisePolicy, Options, Problem, Together,
-};
-use turncal::imu::InstallationForm;
-use turncal::run::{Aiding, Run};
 
 use super::error_term::{error_term, needs_table, supported};
+use crate::calibration::{
+    CalibrationError, ErrorTerm, Method, NoisePolicy, Options, Problem, Together,
+};
+use crate::imu::InstallationForm;
+use crate::run::{Aiding, Run};
 
 /// Estimation options.
 #[derive(Debug, Clone, Serialize, clap::Args)]

@@ -2,13 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use turncal::formats::Opened;
-use turncal::formats::draft::{Found, KalibrImu, Stated, StatedUnit, Tolerances};
-use turncal::imu::{PerSensor, Sensor};
-use turncal::models::{Instrument, Place};
-use turncal::report::terminal::printable;
-
 use super::{latitude, positive};
+use crate::formats::Opened;
+use crate::formats::draft::{Found, Stated, StatedUnit};
+use crate::imu::Sensor;
+use crate::report::terminal::printable;
 
 /// Statements about a log without a run.toml.
 #[derive(Debug, Clone, PartialEq, Default, clap::Args)]
@@ -50,28 +48,17 @@ pub struct OfLog {
 impl OfLog {
     /// Stream name and statements.
     pub fn stated(&self) -> anyhow::Result<(Option<&str>, Stated)> {
-        let kalibr = self.noise_file.as_deref();
-        let kalibr = kalibr.map(KalibrImu::read).transpose()?;
-        let sensor = self.sensor.as_deref();
-        let sensor = sensor.map(|name| Instrument::load(name, &Place::CommandLine));
-        let sensor = sensor.transpose()?;
-        let of_sensor = sensor.as_ref().map(|of| of.noise);
-        let tolerances = |of: Instrument| Tolerances {
-            scale: PerSensor::from_fn(|sensor| of.variation.get(sensor).scale.sigma()),
-            bias: PerSensor::from_fn(|sensor| of.variation.get(sensor).bias.sigma()),
-            of: of.name,
-        };
         let stated = Stated {
             accel_file: self.accel_file.clone(),
-            rate_hz: self.rate.or(kalibr.and_then(|imu| imu.rate_hz)),
+            rate_hz: self.rate,
             latitude_deg: self.latitude,
             height_m: self.height,
             gravity_m_s2: self.gravity,
             gyro_unit: self.gyro_unit,
             accel_unit: self.accel_unit,
-            noise: kalibr.map(|imu| imu.noise).or(of_sensor),
-            tolerances: sensor.map(tolerances),
+            ..Stated::default()
         };
+        let stated = stated.with_data_sheets(self.sensor.as_deref(), self.noise_file.as_deref())?;
         Ok((self.stream.as_deref(), stated))
     }
 

@@ -1,13 +1,14 @@
 //! Parts of studies.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use serde::Serialize;
-use turncal::formats::{Job, JobKind, Part, part_is_there, write_part};
-use turncal::study::{Shard, Study};
 
 use super::{Delivery, shard};
 use crate::cli::terminal::Runs;
+use crate::formats::{Job, JobKind, Part, part_is_there, write_part};
+use crate::study::{Shard, Study};
 
 /// Part of a study to compute.
 #[derive(Debug, Clone, Copy, clap::Args)]
@@ -39,7 +40,10 @@ impl Sharding {
         let begun = delivery.begin(inputs)?;
         let held = part.held();
         let progress = Runs::new(held.len() as u64);
-        let made = study.trials(&held, &|| progress.one_done())?;
+        let made = study.trials(&held, &|| {
+            progress.one_done();
+            ControlFlow::Continue(())
+        })?;
         drop(progress);
         let written = begun.fill(|directory| write_part(directory, part.clone(), &made));
         // Another process may have made the same part in the meantime.

@@ -4,9 +4,10 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Context;
-use turncal::calibration::result::Calibration;
-use turncal::study::navigation::INTERVAL;
-use turncal::study::{Shard, ShardError};
+
+use crate::calibration::result::Calibration;
+use crate::study::navigation::INTERVAL;
+use crate::study::{Shard, ShardError};
 
 const HOUR: f64 = 3600.0;
 

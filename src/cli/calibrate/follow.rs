@@ -9,17 +9,17 @@ use std::thread;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, bail};
-use turncal::calibration::Options;
-use turncal::formats::Opened;
-use turncal::lot::Specification;
-use turncal::number::count;
-use turncal::report::session;
-use turncal::report::terminal::{printable, wrapped};
-use turncal::run::Run;
-use turncal::survey::{Evaluator, GROWTH, Status};
 
+use crate::calibration::Options;
 use crate::cli::arguments::OfLog;
 use crate::cli::terminal::{columns, end_gently, is_ended, print};
+use crate::formats::Opened;
+use crate::lot::Specification;
+use crate::number::count;
+use crate::report::session;
+use crate::report::terminal::{printable, wrapped};
+use crate::run::Run;
+use crate::survey::{Evaluator, GROWTH, Status};
 
 /// Interval between redraws of the screen.
 const REDRAW: Duration = Duration::from_millis(250);

@@ -4,22 +4,22 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
-use turncal::calibration::{UNWATCHED, Word};
-use turncal::formats::{Job, JobKind, LotDirectory, Part, unit_key};
-use turncal::imu::PerSensor;
-use turncal::lot::{self, Lot, Unit};
-use turncal::models;
-use turncal::noise::RestNoise;
-use turncal::report;
-use turncal::report::Document;
-use turncal::report::terminal::printable;
-use turncal::run::Run;
-use turncal::study::Shard;
 
-use super::calibrated::{Calibrated, write_report};
-
+use super::write_report;
+use crate::calibration::{UNWATCHED, Word};
 use crate::cli::arguments::{Estimation, OfLog};
 use crate::cli::terminal::{Runs, piece_by_piece, show};
+use crate::formats::{Job, JobKind, LotDirectory, Part, unit_key};
+use crate::imu::PerSensor;
+use crate::lot::{self, Lot, Unit};
+use crate::models;
+use crate::noise::RestNoise;
+use crate::report;
+use crate::report::Document;
+use crate::report::calibration::Calibrated;
+use crate::report::terminal::printable;
+use crate::run::Run;
+use crate::study::Shard;
 
 /// Default output directory.
 pub const DIRECTORY: &str = "lot-calibration";

@@ -4,16 +4,15 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use serde::de::DeserializeOwned;
-use turncal::formats::{JobKind, LotDirectory, Part, Parts, read_part_unit};
-use turncal::lot::{Lot, Unit};
-use turncal::report;
-use turncal::report::Document;
-use turncal::report::terminal::printable;
-use turncal::study::{AccuracyStudy, ExperimentStudy, Study};
 
 use super::lot;
-
 use crate::cli::arguments::Delivery;
+use crate::formats::{JobKind, LotDirectory, Part, Parts, read_part_unit};
+use crate::lot::{Lot, Unit};
+use crate::report;
+use crate::report::Document;
+use crate::report::terminal::printable;
+use crate::study::{AccuracyStudy, ExperimentStudy, Study};
 
 /// Merges the parts of a sharded job; the result is identical to a single run
 ///

@@ -1,11 +1,9 @@
 //! `turncal calibrate`
 
-mod calibrated;
 mod follow;
 mod lot;
 mod merge;
 
-pub use calibrated::{dwell_times, navigate, note, stamp, write_report};
 pub use lot::NotMet;
 pub use merge::Merge;
 
@@ -15,23 +13,24 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use clap::error::ErrorKind;
-use turncal::calibration::{AtRest, Method, Problem, Solution, Together, Word};
-use turncal::formats::{Campaign, Opened};
-use turncal::models;
-use turncal::recording::Recording;
-use turncal::report::terminal::printable;
-use turncal::report::{self, Document, Facts};
-use turncal::run::Run;
-use turncal::study::Shard;
 
+use crate::calibration::{
+    AtRest, Calibration, Method, Problem, Solution, Together, Word, in_body_frame, triads_of,
+};
 use crate::cli::arguments::{Estimation, OfLog, Overwrite, run_file, run_or_log, seconds, shard};
 use crate::cli::terminal::{Activity, print, show, show_brief};
+use crate::formats::{Campaign, Opened};
+use crate::imu::{BodyFrame, InstallationForm};
+use crate::models;
+use crate::recording::Recording;
+use crate::report::calibration::{Calibrated, Truth};
+use crate::report::terminal::printable;
+use crate::report::{self, Document, Facts};
+use crate::run::Run;
+use crate::study::Shard;
 
-use calibrated::{Calibrated, read_truth};
 use follow::Follow;
 
-/// Highest order of the polynomials of outputs at rest.
-const HIGHEST_ORDER_AT_REST: usize = 5;
 /// Heading of the options for a log that is still being written.
 const FOLLOWING: &str = "Following a log";
 
@@ -181,7 +180,7 @@ impl Calibrate {
                 let problem = problem.inspect_err(|_| say(&run.recording))?;
                 // Without a turn, only the output at rest against temperature can be determined.
                 if problem.dwells().nth(1).is_none()
-                    && let Some(at_rest) = AtRest::new(run, HIGHEST_ORDER_AT_REST)
+                    && let Some(at_rest) = AtRest::new(run, AtRest::HIGHEST_ORDER)
                 {
                     return self.at_rest(&at_rest, &opened, path);
                 }
@@ -347,4 +346,33 @@ pub fn solve(problem: &Problem, method: Method, activity: &Activity) -> anyhow::
         ControlFlow::Continue(())
     });
     solution.with_context(|| name.clone())
+}
+
+/// Writes a report into a new directory.
+pub fn write_report(document: &Document, directory: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir(directory)
+        .with_context(|| format!("cannot create {}", directory.display()))?;
+    Ok(report::write(document, directory)?)
+}
+
+/// A truth, converted to the general form, which can represent any other.
+pub fn read_truth(path: &Path, run: &Run, body_frame: BodyFrame) -> anyhow::Result<Truth> {
+    let record = Calibration::read(path)?;
+    if let Some(unit) = &record.unit
+        && *unit != run.instrument.unit
+    {
+        bail!(
+            "{}: units are {} and {}, but those of the run are {} and {}. Give the truth of this run",
+            path.display(),
+            unit.gyro,
+            unit.accel,
+            run.instrument.unit.gyro,
+            run.instrument.unit.accel
+        );
+    }
+    let triads = triads_of(&record, &run.instrument.nominal, InstallationForm::General);
+    Ok(Truth {
+        triads: in_body_frame(&triads, body_frame),
+        terms: record.terms,
+    })
 }

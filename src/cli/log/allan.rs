@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use anyhow::Context;
-use turncal::noise::{NoiseAnalysis, Stretch};
-use turncal::report::allan;
 
 use crate::cli::arguments::{Delivery, OfLog, run_or_log};
 use crate::cli::terminal::Activity;
+use crate::noise::{NoiseAnalysis, Stretch};
+use crate::report::allan;
 
 /// Computes the Allan deviation of a stationary recording and its noise figures
 ///

@@ -2,11 +2,10 @@
 
 use std::path::PathBuf;
 
-use turncal::report::check;
-use turncal::survey::Survey;
-
 use crate::cli::arguments::{Delivery, OfLog, run_or_log};
 use crate::cli::terminal::Activity;
+use crate::report::check;
+use crate::survey::Survey;
 
 /// Describes a run and the parameters that each method could observe
 ///

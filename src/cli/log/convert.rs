@@ -2,10 +2,9 @@
 
 use std::path::PathBuf;
 
-use turncal::formats::draft::Draft;
-
 use crate::cli::arguments::{OfLog, Overwrite};
 use crate::cli::terminal::Activity;
+use crate::formats::draft::Draft;
 
 /// Converts the log of another program to a plain run directory
 ///

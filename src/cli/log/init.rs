@@ -2,11 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use turncal::formats::draft::Draft;
-use turncal::formats::write_whole;
-
 use crate::cli::arguments::{OfLog, keep, show_found};
 use crate::cli::terminal::{Activity, print};
+use crate::formats::draft::Draft;
+use crate::formats::write_whole;
 
 /// Writes a draft of run.toml for a log without one
 ///

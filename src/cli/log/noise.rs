@@ -1,10 +1,9 @@
 //! `turncal noise`
 
-use turncal::noise::conventions::{convert, known};
-use turncal::report::conversion;
-
 use crate::cli::arguments::positive;
 use crate::cli::terminal::show;
+use crate::noise::conventions::{convert, known};
+use crate::report::conversion;
 
 /// Converts a noise figure to every convention: data sheets, Kalibr, PSINS, KF-GINS
 ///

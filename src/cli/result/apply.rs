@@ -5,16 +5,16 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::error::ErrorKind;
-use turncal::calibration::result::Calibration;
-use turncal::calibration::{Correction, TEMPERATURE_TOLERANCE, ThermalRecord};
-use turncal::formats::export::{sample_rows, write_samples};
-use turncal::imu::{Sensor, Term};
-use turncal::report::terminal::printable;
-use turncal::run::Run;
-use turncal::units::PPM;
 
+use crate::calibration::result::Calibration;
+use crate::calibration::{Correction, TEMPERATURE_TOLERANCE, ThermalRecord};
 use crate::cli::arguments::{OfLog, keep, run_or_log};
 use crate::cli::terminal::{Activity, stream};
+use crate::formats::export::{sample_rows, write_samples};
+use crate::imu::{Sensor, Term};
+use crate::report::terminal::printable;
+use crate::run::Run;
+use crate::units::PPM;
 
 /// A scale factor that differs by more than this many prior σ probably belongs to another instrument.
 const SUSPECT_SIGMAS: f64 = 10.0;

@@ -3,15 +3,15 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use turncal::calibration::result::Calibration;
-use turncal::certificate::{Certificate as Content, Conformity, Decision, Laboratory};
-use turncal::formats::digest_of_bytes;
-use turncal::models;
-use turncal::report::certificate;
 
+use crate::calibration::result::Calibration;
+use crate::certificate::{Certificate as Content, Conformity, Decision, Laboratory};
 use crate::cli::NotMet;
 use crate::cli::arguments::Overwrite;
 use crate::cli::terminal::print;
+use crate::formats::digest_of_bytes;
+use crate::models;
+use crate::report::certificate;
 
 /// Writes a calibration certificate as PDF/A-3 with an embedded Digital Calibration Certificate
 ///

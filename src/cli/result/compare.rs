@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::error::ErrorKind;
-use turncal::calibration::{Named, compare};
-use turncal::report::comparison;
 
+use crate::calibration::{Named, compare};
 use crate::cli::arguments::{Delivery, at_temperature};
 use crate::cli::terminal::short_names;
+use crate::report::comparison;
 
 /// Compares calibrations, parameter by parameter, with their σ
 ///

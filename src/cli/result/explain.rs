@@ -1,11 +1,11 @@
 //! `turncal explain`
 
 use anyhow::bail;
-use turncal::calibration::{FindingKind, Level};
-use turncal::report::document::Block;
-use turncal::report::{Document, Facts};
 
+use crate::calibration::{FindingKind, Level};
 use crate::cli::terminal::show;
+use crate::report::document::Block;
+use crate::report::{Document, Facts};
 
 /// Explains a finding: meaning, cause and remedy
 #[derive(Debug, clap::Args)]

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use anyhow::Context;
-use turncal::formats::export;
-use turncal::formats::write_whole;
-use turncal::run::Run;
 
 use crate::cli::arguments::{at_temperature, keep, run_file};
 use crate::cli::terminal::print;
+use crate::formats::export;
+use crate::formats::write_whole;
+use crate::run::Run;
 
 /// Exports a calibration for other programs (Kalibr, PX4, ROS, C, …)
 ///

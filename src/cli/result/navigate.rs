@@ -4,18 +4,14 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::ValueEnum;
-use nalgebra::Vector3;
-use turncal::attitude::from_pitch_roll_heading;
-use turncal::calibration::{Calibration, Named};
-use turncal::imu::Sensor;
-use turncal::models::{self, Place};
-use turncal::navigation::Solution;
-use turncal::report::navigation::{Navigated, Navigation};
-use turncal::study::navigation::{INTERVAL, Mission, Motion, Pair, Warming, WarmingPair};
-use turncal::units::DEGREE;
 
+use crate::calibration::{Calibration, Named};
 use crate::cli::arguments::{Delivery, at_temperature, hours, latitude, number};
 use crate::cli::terminal::{Activity, short_names};
+use crate::imu::Sensor;
+use crate::report::navigation::{Navigated, Navigation};
+use crate::study::navigation::{INTERVAL, Mission, Motion, Pair, Warming, WarmingPair};
+use crate::units::DEGREE;
 
 const HOUR: f64 = 3600.0;
 /// Largest pitch at which roll and heading are distinguishable, degrees.
@@ -183,29 +179,17 @@ impl Navigate {
     fn motion(&self, calibration: &Calibration) -> anyhow::Result<(Motion, Option<String>)> {
         let latitude = self.latitude_deg.map(|latitude| latitude * DEGREE);
         if let Some(name) = &self.trajectory {
-            let (mut trajectory, name) = models::trajectory(name, &Place::CommandLine)?;
-            if let Some(latitude) = latitude {
-                trajectory = trajectory.at_latitude(latitude);
-            }
-            if let Some(height) = self.height_m {
-                trajectory = trajectory.at_height(height);
-            }
-            return Ok((Motion::Moving(trajectory), Some(name)));
+            let (motion, name) = Motion::along(name, latitude, self.height_m)?;
+            return Ok((motion, Some(name)));
         }
         let of_run = calibration.provenance.as_ref();
         let of_run = of_run.map(|of| of.latitude_deg * DEGREE);
         let Some(latitude) = latitude.or(of_run) else {
             bail!("no latitude: give --latitude-deg, or --trajectory");
         };
-        let [pitch, roll, heading] = self.attitude_deg.0.map(|angle| angle * DEGREE);
-        let standing = Solution {
-            attitude: from_pitch_roll_heading(pitch, roll, heading),
-            velocity: Vector3::zeros(),
-            latitude,
-            longitude: 0.0,
-            height: self.height_m.unwrap_or(0.0),
-        };
-        Ok((Motion::Standing(standing), None))
+        let attitude = self.attitude_deg.0.map(|angle| angle * DEGREE);
+        let height = self.height_m.unwrap_or(0.0);
+        Ok((Motion::at_rest(latitude, height, attitude), None))
     }
 }
 

@@ -2,17 +2,16 @@
 
 use std::path::Path;
 
-use turncal::calibration::{ErrorTerm, NoisePolicy};
-use turncal::formats::JobKind;
-use turncal::imu::InstallationForm;
-use turncal::models::{InstallationModel, Place};
-use turncal::report;
-use turncal::run::Aiding;
-use turncal::simulation::{Scenario, SimulatedCampaign};
-use turncal::study::{AccuracyStudy, CampaignStudy};
-
 use super::carry_out;
+use crate::calibration::{ErrorTerm, NoisePolicy};
 use crate::cli::arguments::{Delivery, Sharding, at_least_two, error_term, needs_table, seed};
+use crate::formats::JobKind;
+use crate::imu::InstallationForm;
+use crate::models::{InstallationModel, Place};
+use crate::report;
+use crate::run::Aiding;
+use crate::simulation::{Scenario, SimulatedCampaign};
+use crate::study::{AccuracyStudy, CampaignStudy};
 
 /// Tests the accuracy of the filter and the consistency of its σ
 ///

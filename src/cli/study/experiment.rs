@@ -2,15 +2,14 @@
 
 use std::path::Path;
 
-use turncal::formats::JobKind;
-use turncal::models::{self, Place};
-use turncal::report;
-use turncal::simulation::Scenario;
-use turncal::study::ExperimentStudy;
-use turncal::study::navigation::INTERVAL;
-
 use super::carry_out;
 use crate::cli::arguments::{Delivery, Sharding, at_least_two, hours, seed};
+use crate::formats::JobKind;
+use crate::models::{self, Place};
+use crate::report;
+use crate::simulation::Scenario;
+use crate::study::ExperimentStudy;
+use crate::study::navigation::INTERVAL;
 
 const HOUR: f64 = 3600.0;
 const SCENARIO: &str = "experiment";

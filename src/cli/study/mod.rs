@@ -4,14 +4,15 @@ mod accuracy;
 mod experiment;
 mod table1;
 
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use clap::Subcommand;
-use turncal::report::Document;
-use turncal::study;
 
 use crate::cli::arguments::Delivery;
 use crate::cli::terminal::Runs;
+use crate::report::Document;
+use crate::study;
 
 /// Runs a Monte Carlo study
 #[derive(Debug, clap::Args)]
@@ -48,7 +49,10 @@ fn carry_out<S: study::Study>(
 ) -> anyhow::Result<()> {
     let begun = delivery.begin(inputs)?;
     let runs = Runs::new(study.runs());
-    let outcome = study.run(&|| runs.one_done())?;
+    let outcome = study.run(&|| {
+        runs.one_done();
+        ControlFlow::Continue(())
+    })?;
     drop(runs);
     begun.deliver(&document(&outcome))
 }

@@ -1,12 +1,11 @@
 //! `turncal study table1`
 
-use turncal::report;
-use turncal::study::Table1Study;
-use turncal::study::table1::paper;
-use turncal::units::DEGREE;
-
 use crate::cli::arguments::{Delivery, at_least_two, hours, latitude, seed};
 use crate::cli::terminal::Activity;
+use crate::report;
+use crate::study::Table1Study;
+use crate::study::table1::paper;
+use crate::units::DEGREE;
 
 /// Reproduces Table 1 of the paper: navigation errors due to a simplified installation form
 ///

@@ -2,8 +2,8 @@
 
 use std::io::{self, BufWriter, IsTerminal, Write};
 
-use turncal::calibration::Word;
-use turncal::report::{self, Document, terminal};
+use crate::calibration::Word;
+use crate::report::{self, Document, terminal};
 
 /// Prints a document as text in the width of the terminal, or as JSON.
 pub fn show(document: &Document, json: bool) -> anyhow::Result<()> {

@@ -5,8 +5,9 @@ use std::thread;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use turncal::calibration::Pass;
-use turncal::report::terminal::printable;
+
+use crate::calibration::Pass;
+use crate::report::terminal::printable;
 
 /// Current activity with its elapsed time.
 pub struct Activity {

@@ -25,11 +25,11 @@ pub fn leave_nothing_behind() {
     use std::sync::Arc;
     use std::thread;
 
+    use crate::formats::abandon_unfinished;
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     use signal_hook::flag::register_conditional_default;
     use signal_hook::iterator::Signals;
     use signal_hook::low_level::emulate_default_handler;
-    use turncal::formats::abandon_unfinished;
 
     let heeded = || {
         let all = [SIGINT, SIGTERM, SIGHUP].into_iter();

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::name::Name;
+use super::stated::StatedColumns;
 use super::units::offset;
 use crate::formats::Sheet;
 use crate::imu::{PerSensor, Sensor};
@@ -98,6 +99,28 @@ impl Columns {
             temperature,
             quaternion,
         }
+    }
+
+    /// Replaces columns by those that the user states.
+    pub fn state(&mut self, stated: &StatedColumns) {
+        let place = |name: &String| self.names.iter().position(|of| of == name);
+        let of_triads = PerSensor::from_fn(|sensor| {
+            let [x, y, z] = stated.triads.get(sensor).as_ref()?;
+            Some([place(x)?, place(y)?, place(z)?])
+        });
+        let time = stated.time.as_ref().and_then(place);
+        let temperature = stated.temperature.as_ref().and_then(place);
+        for sensor in Sensor::ALL {
+            if let Some(triad) = of_triads.get(sensor) {
+                *self.triads.get_mut(sensor) = Some(*triad);
+                self.others.get_mut(sensor).clear();
+                self.by_size = false;
+            }
+        }
+        if time.is_some() {
+            (self.time, self.nanoseconds) = (time, None);
+        }
+        self.temperature = temperature.or(self.temperature);
     }
 
     /// The times of all rows, in the unit of the column.

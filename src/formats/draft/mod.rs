@@ -20,6 +20,8 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use crate::formats::instrument::USUAL_PERIOD;
+use crate::formats::rows::LogRows;
+use crate::formats::table::Table;
 use crate::formats::{FileError, Sheet};
 use crate::imu::{PerSensor, Sensor};
 use crate::noise::{Clusters, TriadNoise};
@@ -27,7 +29,7 @@ use columns::Columns;
 pub use found::{Certainty, Found};
 use motion::{FOLLOWED, Motion};
 use registers::{Registers, Rows};
-pub use stated::{KalibrImu, Stated, StatedUnit, Tolerances};
+pub use stated::{DataSheetError, KalibrImu, Stated, StatedColumns, StatedUnit, Tolerances};
 use streams::Streams;
 use time::Clock;
 use units::Quantities;
@@ -101,6 +103,16 @@ impl Draft {
         Ok(Self::of_sheet(sheet, None, stated))
     }
 
+    /// Examines a table in memory.
+    ///
+    /// # Errors
+    /// [`FileError`] if it has too few rows or lacks a stated column.
+    pub fn of_table(table: &Table, stated: &Stated) -> Result<Self, FileError> {
+        stated.columns.check(table)?;
+        let sheet = Sheet::of(LogRows::new(table.rows()), FEWEST_ROWS)?;
+        Ok(Self::of_sheet(sheet, None, stated))
+    }
+
     /// Examines two files of rows, of gyros and of accelerometers. `accel_name` is the name of the latter in the draft.
     ///
     /// # Errors
@@ -123,6 +135,7 @@ impl Draft {
             None => retain_instance(&mut sheet),
         };
         let mut columns = Columns::find(&sheet);
+        columns.state(&stated.columns);
         retain_samples(&mut sheet, &columns);
         let clock = Clock::find(&sheet, &mut columns);
         let rows = columns.samples(&sheet).map(|(numbers, triads)| {

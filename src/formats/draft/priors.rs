@@ -2,12 +2,12 @@
 
 use nalgebra::Vector3;
 
-use super::Draft;
 use super::text::seven;
 use super::units::short;
+use super::{Draft, Stated};
 use crate::formats::instrument::{USUAL_BIAS, USUAL_INSTALLATION, USUAL_SCALE};
 use crate::formats::schema::page::Page;
-use crate::imu::Sensor;
+use crate::imu::{Instrument, PerSensor, Prior, Sensor};
 use crate::units::{ARCSEC, DEG_PER_SQRT_H, DEGREE, MICRO_G_PER_SQRT_HZ, PPM};
 
 /// Typical prior of a class of instruments, 1σ.
@@ -48,10 +48,9 @@ const CLASSES: [Class; 3] = [
     },
 ];
 
-impl Draft {
-    /// From the gyro noise, otherwise the accelerometer noise.
-    fn class(&self) -> &'static Class {
-        let walk = |sensor| self.white_noise(sensor);
+impl Class {
+    /// From the white noise of the gyros, otherwise of the accelerometers.
+    fn of(walk: impl Fn(Sensor) -> Option<f64>) -> &'static Self {
         let is_of = |class: &&Class| match (walk(Sensor::Gyro), walk(Sensor::Accel)) {
             (Some(walk), _) => walk < class.angle_random_walk,
             (None, Some(walk)) => walk < class.velocity_random_walk,
@@ -61,12 +60,38 @@ impl Draft {
         CLASSES.iter().find(is_of).unwrap_or(widest)
     }
 
+    fn bias(&self, sensor: Sensor) -> f64 {
+        sensor.pick(self.gyro_bias, self.accel_bias)
+    }
+}
+
+impl Stated {
+    /// An instrument with outputs in rad/s and m/s², if its noise is stated.
+    pub fn instrument(&self) -> Option<Instrument> {
+        let noise = self.noise?;
+        let class = Class::of(|sensor| Some(noise.get(sensor).random_walk));
+        let stated = self.tolerances.as_ref();
+        let prior = |sensor: Sensor| Prior {
+            scale_sigma: Vector3::repeat(
+                stated.map_or(class.scale_ppm * PPM, |of| *of.scale.get(sensor)),
+            ),
+            installation_sigma: Vector3::repeat(class.installation),
+            bias: Vector3::zeros(),
+            bias_sigma: Vector3::repeat(
+                stated.map_or(class.bias(sensor), |of| *of.bias.get(sensor)),
+            ),
+        };
+        Some(Instrument::new(PerSensor::from_fn(prior), noise))
+    }
+}
+
+impl Draft {
     pub(super) fn prior(&self, page: &mut Page, sensor: Sensor) {
-        let (class, unit) = (self.class(), self.quantities.units.get(sensor));
+        let class = Class::of(|sensor| self.white_noise(sensor));
+        let unit = self.quantities.units.get(sensor);
         let stated = self.stated.tolerances.as_ref();
         let scale_sigma = stated.map_or(class.scale_ppm, |of| of.scale.get(sensor) / PPM);
-        let usual = sensor.pick(class.gyro_bias, class.accel_bias);
-        let bias_sigma = stated.map_or(usual, |of| *of.bias.get(sensor));
+        let bias_sigma = stated.map_or(class.bias(sensor), |of| *of.bias.get(sensor));
         let from = stated.map_or_else(
             || {
                 format!(

@@ -9,6 +9,7 @@ use crate::formats::rows::LogRows;
 use crate::formats::schema::instrument::Fields;
 use crate::formats::schema::{Positive, TimeColumn};
 use crate::formats::streams::{self, StreamRows};
+use crate::formats::table::Table;
 
 /// Source of rows.
 #[derive(Debug, Clone)]
@@ -18,6 +19,8 @@ pub struct Source<'a> {
     pub stream: Option<&'a str>,
     /// Whether the intact part of a damaged file is used.
     pub salvage: bool,
+    /// Rows in memory, in place of those of the file.
+    pub table: Option<&'a Table>,
 }
 
 impl Source<'_> {
@@ -27,11 +30,15 @@ impl Source<'_> {
             file: file.to_owned(),
             stream: None,
             salvage: false,
+            table: None,
         }
     }
 
     /// Opens it according to its content.
     pub fn open(&self) -> Result<LogRows, FileError> {
+        if let Some(table) = self.table {
+            return Ok(LogRows::new(table.rows()));
+        }
         let Some(log) = streams::open(&self.file)? else {
             return CsvFile::open(&self.file, self.stream).map(LogRows::new);
         };
@@ -52,6 +59,7 @@ impl<'a> Fields<'a> {
             file: self.directory.join(file),
             stream: stream.as_deref(),
             salvage: salvage.unwrap_or(false),
+            table: None,
         }
     }
 
@@ -102,6 +110,7 @@ impl<'a> Fields<'a> {
             file: file.map_or_else(|| gyro.file.clone(), |file| self.directory.join(file)),
             stream: fields.stream.as_deref().or(gyro.stream),
             salvage: fields.salvage.unwrap_or(gyro.salvage),
+            table: None,
         };
         let stated = (fields.time_unit, fields.sample_period_s);
         let mut clock = self.clock("imu.accel_from", fields.time.as_ref(), stated)?;

@@ -15,6 +15,7 @@ use crate::formats::error::FileError;
 use crate::formats::imu_log::ImuLog;
 use crate::formats::inputs::segments;
 use crate::formats::small_file;
+use crate::formats::table::Table;
 use crate::imu::{Instrument, NoiseKeys, Output, PerSensor, Sensor};
 use crate::noise;
 use crate::recording::{ImuSamples, Recording, faults, nanoseconds};
@@ -33,6 +34,20 @@ impl Run {
 
     /// The same from the text of a `run.toml` located (or assumed) next to this file and read from `source`.
     pub fn of_text(path: &Path, text: &str, source: Option<&Path>) -> Result<Self, FileError> {
+        Self::of_parts(path, text, source, None)
+    }
+
+    /// The same with the samples of a table in place of a log.
+    pub fn of_table(table: &Table, text: &str) -> Result<Self, FileError> {
+        Self::of_parts(table.name(), text, None, Some(table))
+    }
+
+    fn of_parts(
+        path: &Path,
+        text: &str,
+        source: Option<&Path>,
+        table: Option<&Table>,
+    ) -> Result<Self, FileError> {
         let document = Document::of(path, text);
         let file = run_file(document)?;
         let directory = path.parent().unwrap_or(Path::new(""));
@@ -40,6 +55,7 @@ impl Run {
             document,
             run: &file,
             directory,
+            table,
             notes: Vec::new(),
         };
         let site = fields.site()?;
@@ -50,7 +66,7 @@ impl Run {
 
         // The small files' fields are checked before the large files are read.
         let mut files: Vec<PathBuf> = source.map(Path::to_owned).into_iter().collect();
-        files.push(instrument.log.source.file.clone());
+        files.extend(table.is_none().then(|| instrument.log.source.file.clone()));
         files.extend(other_file(&instrument.log));
         files.extend(table_log.as_ref().map(|log| log.source.file.clone()));
         files.extend(segments_file.clone());
@@ -116,6 +132,7 @@ pub fn check(document: Document) -> Result<(), FileError> {
         document,
         run: &run,
         directory: Path::new(""),
+        table: None,
         notes: Vec::new(),
     };
     fields.site()?;
@@ -259,11 +276,6 @@ pub fn name(path: &Path) -> String {
     )
 }
 
-/// 1σ of an unstated height, m.
-const USUAL_HEIGHT: f64 = 500.0;
-/// Decrease of gravity with height, (m/s²)/m.
-const FREE_AIR: f64 = 0.3086 * MILLIGAL;
-
 impl Fields<'_> {
     fn site(&mut self) -> Result<Site, FileError> {
         let file = &self.run.site;
@@ -274,15 +286,8 @@ impl Fields<'_> {
         }
         let longitude = file.longitude_deg.map_or(0.0, |degrees| degrees.0 * DEGREE);
         let height = file.height_m.map(|height| height.0);
-        let mut site = match file.latitude_deg {
-            Some(degrees) => {
-                Site::with_normal_gravity(degrees.0 * DEGREE, longitude, height.unwrap_or(0.0))
-            }
-            None => Site::unknown(),
-        };
-        if height.is_none() {
-            site.gravity_sigma = site.gravity_sigma.hypot(FREE_AIR * USUAL_HEIGHT);
-        }
+        let latitude = file.latitude_deg.map(|degrees| degrees.0 * DEGREE);
+        let mut site = Site::of_knowledge(latitude, longitude, height);
         if let Some(gravity) = &file.gravity_m_s2 {
             let sigma = stated_gravity_sigma(self.document.written(gravity.span()));
             site = site.with_gravity(gravity.get_ref().0, sigma);
@@ -329,7 +334,7 @@ fn place_note(site: &Site, has_gravity: bool, has_height: bool) -> Option<String
 }
 
 /// 1σ of a gravity stated without σ, m/s²: from its last digit, at least one milligal.
-fn stated_gravity_sigma(written: &str) -> f64 {
+pub fn stated_gravity_sigma(written: &str) -> f64 {
     let digits = written
         .split_once('.')
         .map_or(0, |(_, digits)| digits.len());

@@ -10,7 +10,7 @@ use crate::calibration::Group;
 use crate::imu::InstallationForm;
 use crate::navigation::NearPole;
 use crate::simulation::Scenario;
-use crate::study::{AccuracyStudy, Study};
+use crate::study::{AccuracyStudy, Study, UNWATCHED};
 
 /// Three runs of the demo at a low sample rate.
 fn small() -> Accuracy {
@@ -27,7 +27,7 @@ fn small() -> Accuracy {
             runs,
             seed,
         };
-        study.run(&|| {}).unwrap()
+        study.run(UNWATCHED).unwrap()
     };
     STUDY.get_or_init(study).clone()
 }

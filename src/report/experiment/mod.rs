@@ -258,7 +258,7 @@ mod tests {
     use crate::models::{Place, trajectory};
     use crate::simulation::Scenario;
     use crate::study::experiment::Method;
-    use crate::study::{ExperimentStudy, Study};
+    use crate::study::{ExperimentStudy, Study, UNWATCHED};
 
     #[test]
     #[ignore = "slow: an experiment whole"]
@@ -274,12 +274,12 @@ mod tests {
             intervals: 120,
             samples: 2,
         };
-        let with_two = study.run(&|| {}).unwrap();
+        let with_two = study.run(UNWATCHED).unwrap();
         let none = ExperimentStudy {
             samples: 0,
             ..study
         };
-        for experiment in [&with_two, &none.run(&|| {}).unwrap()] {
+        for experiment in [&with_two, &none.run(UNWATCHED).unwrap()] {
             let document = document(experiment);
             let drawn = svg::drawn(document.plots());
             assert_eq!(drawn.len(), 2);

@@ -3,19 +3,28 @@
 mod kalibr;
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 pub use kalibr::KalibrImu;
 
 use super::name::{self, Unit};
+use crate::earth::Site;
+use crate::formats::FileError;
+use crate::formats::error::{choice, suggestion};
 use crate::formats::quantity::{OUTPUTS, Of, units};
+use crate::formats::schema::stated_gravity_sigma;
+use crate::formats::table::Table;
 use crate::imu::{Noise, PerSensor, Sensor};
+use crate::models::{Instrument, ModelError, Place};
+use crate::units::DEGREE;
 
 /// User statements about a log without a `run.toml`; other fields are detected or have a wide prior.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Stated {
     /// The accelerometer file, if the log contains only the gyros.
     pub accel_file: Option<PathBuf>,
+    /// Columns, by name.
+    pub columns: StatedColumns,
     /// Rows a second.
     pub rate_hz: Option<f64>,
     /// Geodetic latitude, north positive.
@@ -32,6 +41,91 @@ pub struct Stated {
     pub noise: Option<PerSensor<Noise>>,
     /// Tolerances of the instrument as delivered.
     pub tolerances: Option<Tolerances>,
+}
+
+/// Errors in reading a data sheet.
+#[derive(Debug, thiserror::Error)]
+pub enum DataSheetError {
+    /// A sensor.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// A file of noise figures.
+    #[error(transparent)]
+    File(#[from] FileError),
+}
+
+impl Stated {
+    /// The site, with wide σ of what is not stated.
+    pub fn site(&self) -> Site {
+        let latitude = self.latitude_deg.map(|degrees| degrees * DEGREE);
+        let site = Site::of_knowledge(latitude, 0.0, self.height_m);
+        match self.gravity_m_s2 {
+            Some(gravity) => {
+                site.with_gravity(gravity, stated_gravity_sigma(&format!("{gravity:?}")))
+            }
+            None => site,
+        }
+    }
+
+    /// Adds noise and tolerances of a sensor, by its name or file, and the figures of a Kalibr `imu.yaml`, which
+    /// prevail. A stated rate remains.
+    ///
+    /// # Errors
+    /// [`DataSheetError`] if one cannot be read.
+    pub fn with_data_sheets(
+        self,
+        sensor: Option<&str>,
+        noise_file: Option<&Path>,
+    ) -> Result<Self, DataSheetError> {
+        let kalibr = noise_file.map(KalibrImu::read).transpose()?;
+        let sensor = sensor.map(|name| Instrument::load(name, &Place::CommandLine));
+        let sensor = sensor.transpose()?;
+        let of_sensor = sensor.as_ref().map(|of| of.noise);
+        let tolerances = |of: Instrument| Tolerances {
+            scale: PerSensor::from_fn(|sensor| of.variation.get(sensor).scale.sigma()),
+            bias: PerSensor::from_fn(|sensor| of.variation.get(sensor).bias.sigma()),
+            of: of.name,
+        };
+        Ok(Self {
+            rate_hz: self.rate_hz.or(kalibr.and_then(|imu| imu.rate_hz)),
+            noise: kalibr.map(|imu| imu.noise).or(of_sensor),
+            tolerances: sensor.map(tolerances),
+            ..self
+        })
+    }
+}
+
+/// Columns of a table that the user states; the others are detected.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct StatedColumns {
+    /// Each triad along right, front and up.
+    pub triads: PerSensor<Option<[String; 3]>>,
+    /// Time.
+    pub time: Option<String>,
+    /// Temperature of the instrument.
+    pub temperature: Option<String>,
+}
+
+impl StatedColumns {
+    /// Refuses a column that the table does not have.
+    pub(super) fn check(&self, table: &Table) -> Result<(), FileError> {
+        let triads = Sensor::ALL
+            .into_iter()
+            .flat_map(|of| self.triads.get(of).iter().flatten());
+        let mut all = triads.chain(&self.time).chain(&self.temperature);
+        let Some(missing) = all.find(|name| !table.names().contains(name)) else {
+            return Ok(());
+        };
+        let names = || table.names().iter().map(String::as_str);
+        let found = format_args!("the columns {}", choice(missing, names()));
+        let advice = suggestion(missing, names(), "Correct the name.");
+        Err(FileError::of(
+            table.name(),
+            found,
+            format_args!("a column `{missing}`"),
+            advice,
+        ))
+    }
 }
 
 /// 1σ tolerances of an instrument before calibration.

@@ -1,39 +1,45 @@
-//! Calibration of a run with its checks, the same for a single run and a lot.
+//! A calibration with its checks and its report.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
 
-use anyhow::{Context, bail};
 use rayon::prelude::*;
-use turncal::calibration::result::{InputFile, TermRecord};
-use turncal::calibration::{
-    Assessment, Calibration, ClosedForm, Estimate, Method, Problem, Reference, Solution,
-    in_body_frame, triads_of,
+
+use super::{ClosedForm as ClosedFormPart, Navigated, Report};
+use crate::calibration::result::{InputFile, TermRecord};
+use crate::calibration::{
+    Assessment, Calibration, CalibrationError, ClosedForm, Estimate, Method, Problem, Reference,
+    Solution,
 };
-use turncal::formats::input_digests;
-use turncal::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
-use turncal::report::Document;
-use turncal::report::calibration::{self as of_calibration, Navigated, Report};
-use turncal::run::{Aiding, Run};
-use turncal::study::navigation::{Mission, NavigationStudyError};
-use turncal::survey::{self, Expected};
+use crate::formats::input_digests;
+use crate::imu::{PerSensor, Triad};
+use crate::report::Document;
+use crate::run::{Aiding, Run};
+use crate::study::navigation::{Mission, NavigationStudyError};
+use crate::survey::{self, Expected};
 
 /// A true calibration, in the general form, with its error terms.
 pub struct Truth {
-    triads: PerSensor<Triad>,
-    terms: BTreeMap<String, TermRecord>,
+    /// Both triads.
+    pub triads: PerSensor<Triad>,
+    /// Error terms by name.
+    pub terms: BTreeMap<String, TermRecord>,
 }
 
 /// A calibration with its checks.
 pub struct Calibrated {
+    /// The calibration.
     pub calibration: Calibration,
     assessment: Assessment,
 }
 
 impl Calibrated {
     /// Checks a solution.
-    pub fn new(problem: &Problem, solution: &mut Solution) -> anyhow::Result<Self> {
+    ///
+    /// # Errors
+    /// [`CalibrationError`] if the problem is not the one of the solution.
+    pub fn new(problem: &Problem, solution: &mut Solution) -> Result<Self, CalibrationError> {
         let assessment = solution.assess(problem)?;
         Ok(Self {
             calibration: solution.calibration(problem, &assessment),
@@ -88,12 +94,10 @@ impl Calibrated {
             predicted: predicted.as_ref(),
             quality: Some(&assessment.quality),
             true_terms: truth.map_or(&no_terms, |truth| &truth.terms),
-            closed_form: solution
-                .closed_form()
-                .map(|closed_form| of_calibration::ClosedForm {
-                    estimate: &closed_form.estimate,
-                    note: &note,
-                }),
+            closed_form: solution.closed_form().map(|closed_form| ClosedFormPart {
+                estimate: &closed_form.estimate,
+                note: &note,
+            }),
             truth: in_form.as_ref(),
             dwells: &dwells,
             navigation: navigation.as_deref(),
@@ -151,11 +155,14 @@ pub fn note(closed_form: &ClosedForm) -> String {
 
 /// Simulates stationary, level navigation at the site of the run with the calibration of each method, for a duration
 /// suited to both.
+///
+/// # Errors
+/// [`NavigationStudyError`] if there is no such duration.
 pub fn navigate(
     run: &Run,
     methods: &[(&'static str, &Estimate)],
     truth: Option<&PerSensor<Triad>>,
-) -> std::result::Result<Vec<Navigated>, NavigationStudyError> {
+) -> Result<Vec<Navigated>, NavigationStudyError> {
     let estimates: Vec<&Estimate> = methods.iter().map(|(_, estimate)| *estimate).collect();
     let mission = Mission::suited(&run.site, &estimates)?;
     let all = methods.par_iter().map(|&(method, estimate)| {
@@ -172,33 +179,4 @@ pub fn dwell_times(problem: &Problem) -> Vec<Range<f64>> {
     dwells
         .map(|dwell| imu.time(dwell.samples.start)..imu.time(dwell.samples.end))
         .collect()
-}
-
-/// Writes a report into a new directory.
-pub fn write_report(document: &Document, directory: &Path) -> anyhow::Result<()> {
-    std::fs::create_dir(directory)
-        .with_context(|| format!("cannot create {}", directory.display()))?;
-    Ok(turncal::report::write(document, directory)?)
-}
-
-/// A truth, converted to the general form, which can represent any other.
-pub fn read_truth(path: &Path, run: &Run, body_frame: BodyFrame) -> anyhow::Result<Truth> {
-    let record = Calibration::read(path)?;
-    if let Some(unit) = &record.unit
-        && *unit != run.instrument.unit
-    {
-        bail!(
-            "{}: units are {} and {}, but those of the run are {} and {}. Give the truth of this run",
-            path.display(),
-            unit.gyro,
-            unit.accel,
-            run.instrument.unit.gyro,
-            run.instrument.unit.accel
-        );
-    }
-    let triads = triads_of(&record, &run.instrument.nominal, InstallationForm::General);
-    Ok(Truth {
-        triads: in_body_frame(&triads, body_frame),
-        terms: record.terms,
-    })
 }

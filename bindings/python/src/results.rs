@@ -1,0 +1,168 @@
+//! What is made of calibrations: comparison, export, certificate, navigation.
+
+use std::path::{Path, PathBuf};
+
+use pyo3::prelude::*;
+use turncal::calibration::result::Calibration as Record;
+use turncal::calibration::{Named, compare as compared};
+use turncal::certificate::{Certificate, Laboratory};
+use turncal::formats::{digest_of_bytes, export as formats};
+use turncal::models::specification;
+use turncal::report::navigation::{Navigated, Navigation};
+use turncal::report::{certificate as of_certificate, comparison};
+use turncal::study::navigation::{INTERVAL, Mission, Motion, NavigationStudyError, Pair};
+use turncal::units::DEGREE;
+
+use crate::calibration::Calibration;
+use crate::errors::{raise, raised, within};
+use crate::report::Report;
+use crate::run::Run;
+use crate::wait::finish;
+
+const HOUR: f64 = 3600.0;
+
+#[pyfunction]
+pub fn compare(
+    names: Vec<String>,
+    calibrations: Vec<PyRef<Calibration>>,
+    truth: Option<PyRef<Calibration>>,
+) -> PyResult<Report> {
+    let named = names.iter().zip(&calibrations);
+    let named = named.map(|(name, of)| Named {
+        name,
+        record: &of.record,
+    });
+    let named: Vec<Named> = named.collect();
+    let truth = truth.as_ref().map(|of| Named {
+        name: "truth",
+        record: &of.record,
+    });
+    let comparison = compared(&named, truth).map_err(raise)?;
+    Ok(Report(comparison::document(&comparison)))
+}
+
+#[pyfunction]
+pub fn export(calibration: &Calibration, format: &str, run: Option<&Run>) -> PyResult<Vec<u8>> {
+    let names = || formats::Format::all().iter().map(|format| format.name);
+    let format = formats::Format::named(format).ok_or_else(|| {
+        let known = names().collect::<Vec<_>>().join(", ");
+        raised(format_args!(
+            "format: found {format:?}, expected one of {known}"
+        ))
+    })?;
+    let run = run.map(Run::one).transpose()?;
+    let exported = formats::write(&calibration.record, format, run).map_err(raise)?;
+    Ok(exported.bytes)
+}
+
+#[pyfunction]
+pub fn certificate(
+    calibration: &Calibration,
+    laboratory: PathBuf,
+    directory: PathBuf,
+    limits: Option<PathBuf>,
+    as_found: Option<PathBuf>,
+) -> PyResult<()> {
+    let record = &calibration.record;
+    let bytes = record
+        .to_json(Path::new("calibration.json"))
+        .map_err(raise)?;
+    let laboratory = Laboratory::read(&laboratory, |key| record.meta.get(key).cloned());
+    let laboratory = laboratory.map_err(raise)?;
+    let limits = limits
+        .as_deref()
+        .map(specification)
+        .transpose()
+        .map_err(raise)?;
+    let earlier = as_found
+        .as_deref()
+        .map(|path| -> PyResult<(String, Record)> {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            let digest = digest_of_bytes(&std::fs::read(path)?);
+            Ok((
+                format!("{name}, SHA-256 {digest}"),
+                Record::read(path).map_err(raise)?,
+            ))
+        });
+    let earlier = earlier.transpose()?;
+    let earlier = earlier.as_ref().map(|(name, record)| (&**name, record));
+    let digest = digest_of_bytes(&bytes);
+    let content = Certificate::new(record.clone(), digest, laboratory, limits.as_ref(), earlier);
+    let files = of_certificate::files(&content.map_err(raise)?, bytes).map_err(raise)?;
+    std::fs::create_dir_all(&directory)?;
+    for (name, bytes) in files {
+        std::fs::write(directory.join(name), bytes)?;
+    }
+    Ok(())
+}
+
+#[pyfunction]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "called from one place, by keyword"
+)]
+pub fn navigate(
+    py: Python,
+    calibration: &Calibration,
+    truth: &Calibration,
+    latitude: Option<f64>,
+    height: Option<f64>,
+    hours: f64,
+    trajectory: Option<&str>,
+) -> PyResult<Report> {
+    let latitude = within("latitude", latitude, [-90.0, 90.0])?.map(|of| of * DEGREE);
+    let height = within("height", height, [-12e3, 1e5])?;
+    within("hours", Some(hours), [INTERVAL / HOUR, 1000.0])?;
+    let provenance = calibration.record.provenance.as_ref();
+    let (motion, name) = match (trajectory, latitude, provenance) {
+        (Some(name), ..) => Motion::along(name, latitude, height)
+            .map(|(motion, name)| (motion, Some(name)))
+            .map_err(raise)?,
+        (None, Some(latitude), _) => (at_rest(latitude, height), None),
+        (None, None, Some(of)) => (at_rest(of.latitude_deg * DEGREE, height), None),
+        (None, None, None) => {
+            return Err(raised(
+                "latitude: found none, expected degrees, or a calibration that states its site. Give latitude or \
+                 trajectory.",
+            ));
+        }
+    };
+    let names = ["calibration", "truth"];
+    let [own, true_one] = [(names[0], calibration), (names[1], truth)].map(|(name, of)| Named {
+        name,
+        record: &of.record,
+    });
+    let (pair, body_frame) = Pair::of_records(own, true_one).map_err(raise)?;
+    let mission = Mission {
+        motion,
+        intervals: (hours * HOUR / INTERVAL).round() as u32,
+        interval: INTERVAL,
+    };
+    let has_terms = |of: &Calibration| !of.record.terms.is_empty();
+    let terms = has_terms(calibration) || has_terms(truth);
+    let converged = calibration.record.converged != Some(false);
+    let report = finish(py, move || {
+        let navigated = Navigated {
+            method: "error",
+            outlook: mission.navigate(&pair)?,
+        };
+        let navigation = Navigation {
+            calibration: names[0],
+            truth: names[1],
+            converged,
+            terms,
+            body_frame,
+            only: None,
+            mission: &mission,
+            warming: None,
+            trajectory: name.as_deref(),
+            navigated: &navigated,
+        };
+        Ok::<_, NavigationStudyError>(Report(navigation.document()))
+    });
+    report?.map_err(raise)
+}
+
+fn at_rest(latitude: f64, height: Option<f64>) -> Motion {
+    Motion::at_rest(latitude, height.unwrap_or(0.0), [0.0; 3])
+}

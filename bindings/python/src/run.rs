@@ -1,0 +1,308 @@
+//! Runs: recordings with what is known of instrument and site.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use numpy::PyReadonlyArray1;
+use pyo3::prelude::*;
+use turncal::calibration::{
+    CalibrationError, ErrorTerm, Method, NoisePolicy, Options, Problem, Together,
+};
+use turncal::formats::draft::{Draft, StatedColumns};
+use turncal::formats::{Campaign, Opened, Table};
+use turncal::imu::PerSensor;
+use turncal::noise::{NoiseAnalysis, Stretch};
+use turncal::report::{allan as of_noise, check};
+use turncal::run::Run as Recording;
+use turncal::survey::Survey;
+
+use crate::calibration::{Calibration, calibrated};
+use crate::errors::{named, raise, raised};
+use crate::known::Known;
+use crate::report::Report;
+use crate::wait::{Progress, finish, wait};
+
+/// Recordings of one instrument with what is known of it.
+pub struct Recorded {
+    pub name: String,
+    /// Several in a campaign.
+    pub runs: Vec<Recording>,
+    together: Option<Together>,
+    /// The file that it was read from.
+    pub path: Option<PathBuf>,
+}
+
+impl Recorded {
+    pub fn of_run(run: Recording, path: Option<PathBuf>) -> Self {
+        Self {
+            name: run.recording.name.clone(),
+            runs: vec![run],
+            together: None,
+            path,
+        }
+    }
+
+    /// The problem of a request.
+    pub fn problem(&self, request: &Request) -> Result<Problem<'_>, CalibrationError> {
+        let runs: Vec<&Recording> = self.runs.iter().collect();
+        let usual = request.temperature.then(Together::default);
+        let mut problem = match self.together.or(usual) {
+            Some(together) => Problem::together(&runs, &request.options, &together)?,
+            None => Problem::new(runs[0], &request.options),
+        };
+        request
+            .terms
+            .iter()
+            .for_each(|&term| problem.model.switch_on(term));
+        Ok(problem)
+    }
+}
+
+/// A request for a calibration.
+pub struct Request {
+    pub method: Method,
+    pub temperature: bool,
+    terms: Vec<ErrorTerm>,
+    options: Options,
+}
+
+/// A recording with what is known of instrument and site, from :func:`read`, :func:`run` or :func:`simulate`.
+///
+/// Attributes
+/// ----------
+/// truth : Calibration or None
+///     True parameters of a simulated run.
+#[pyclass(frozen, module = "turncal")]
+pub struct Run {
+    pub of: Arc<Recorded>,
+    #[pyo3(get)]
+    truth: Option<Py<Calibration>>,
+}
+
+impl Run {
+    pub fn new(of: Recorded, truth: Option<Py<Calibration>>) -> Self {
+        Self {
+            of: Arc::new(of),
+            truth,
+        }
+    }
+
+    /// The run, if it is not a campaign.
+    pub fn one(&self) -> PyResult<&Recording> {
+        match &self.of.runs[..] {
+            [run] => Ok(run),
+            runs => Err(raised(format_args!(
+                "{}: found a campaign of {} recordings, expected one recording. Read its run.toml.",
+                self.of.name,
+                runs.len()
+            ))),
+        }
+    }
+
+    /// Makes a report of the run.
+    fn report<E: std::error::Error + Send + 'static>(
+        &self,
+        py: Python,
+        make: impl FnOnce(&Recording) -> Result<Report, E> + Send + 'static,
+    ) -> PyResult<Report> {
+        self.one()?;
+        let of = self.of.clone();
+        finish(py, move || make(&of.runs[0]))?.map_err(raise)
+    }
+}
+
+#[pymethods]
+impl Run {
+    /// Dwells, turns, faults of the log, and the accuracy to expect, without a calibration.
+    ///
+    /// Returns
+    /// -------
+    /// Report
+    fn check(&self, py: Python) -> PyResult<Report> {
+        self.report(py, |run| {
+            let survey = Survey::of(run);
+            Ok::<_, CalibrationError>(Report(check::document(run, &survey)))
+        })
+    }
+
+    /// Estimates scale factors, misalignments and biases.
+    ///
+    /// Parameters
+    /// ----------
+    /// method : {"ekf", "six-position"}
+    ///     The filter over the whole run, or the closed form from dwells.
+    /// with_ : sequence of str
+    ///     Error terms to estimate, such as "accel-second-order". Default: those that the data support.
+    /// noise : {"auto", "stated", "learnt"}
+    ///     Stated noise unless the data contradict it, stated noise, or noise estimated from the run.
+    /// temperature : bool
+    ///     Parameters follow the temperature of the run.
+    /// progress : callable or bool, optional
+    ///     Called as ``progress(iterations, None)`` after each iteration; True shows a bar if tqdm is installed. An
+    ///     exception in it ends the calibration.
+    ///
+    /// Returns
+    /// -------
+    /// Calibration
+    ///
+    /// Raises
+    /// ------
+    /// Error
+    ///     If the run cannot be calibrated. Read `verdict` before using the values of one that could.
+    #[pyo3(signature = (method="ekf", with_=None, noise="auto", temperature=false, progress=None))]
+    fn calibrate(
+        &self,
+        py: Python,
+        method: &str,
+        with_: Option<Vec<String>>,
+        noise: &str,
+        temperature: bool,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<Calibration> {
+        let with_ = with_.unwrap_or_default();
+        let methods = [("ekf", Method::Ekf), ("six-position", Method::SixPosition)];
+        let mut options = Options::default().noise(named(
+            "noise",
+            noise,
+            &NoisePolicy::ALL.map(|policy| (policy.name(), policy)),
+        )?);
+        options.auto_terms = with_.is_empty();
+        let request = Request {
+            method: named("method", method, &methods)?,
+            temperature,
+            terms: error_terms("with_", &with_)?,
+            options,
+        };
+        self.refuse(&request)?;
+        let progress = Progress::new(py, progress, None)?;
+        let of = self.of.clone();
+        let work = move |watch: &crate::wait::Watch| calibrated(of, request, &|_| watch.step());
+        wait(py, &progress, work)?.map_err(raise)
+    }
+
+    fn __repr__(&self) -> String {
+        let seconds: f64 = self
+            .of
+            .runs
+            .iter()
+            .map(|run| run.recording.imu.duration())
+            .sum();
+        format!("<turncal.Run: {}, {seconds:.1} s>", self.of.name)
+    }
+}
+
+impl Run {
+    /// Refuses requests that no run of this kind can meet.
+    fn refuse(&self, request: &Request) -> PyResult<()> {
+        let is_joint = request.temperature || self.of.together.is_some();
+        match (request.method, request.terms.first()) {
+            (Method::SixPosition, Some(term)) => Err(raised(format_args!(
+                "with_: found {}, which method \"six-position\" cannot estimate. Omit it, or use method \"ekf\".",
+                term.name()
+            ))),
+            (Method::SixPosition, None) if is_joint => Err(raised(
+                "method \"six-position\" handles one recording at one temperature. Use method \"ekf\".",
+            )),
+            _ => {
+                let problem = self.of.problem(request).map_err(raise)?;
+                let lacking = request
+                    .terms
+                    .iter()
+                    .find(|&&term| !problem.model.can_have(term));
+                lacking.map_or(Ok(()), |term| {
+                    Err(raised(format_args!(
+                        "with_: {} needs a table log, and the axis errors of a table its angles. Omit it, or add them \
+                         to the run.",
+                        term.name()
+                    )))
+                })
+            }
+        }
+    }
+}
+
+/// Error terms by name.
+pub fn error_terms(argument: &str, names: &[String]) -> PyResult<Vec<ErrorTerm>> {
+    let all = ErrorTerm::ALL.map(|term| (term.name(), term));
+    names
+        .iter()
+        .map(|name| named(argument, name, &all))
+        .collect()
+}
+
+#[pyfunction]
+pub fn read(py: Python, path: PathBuf, known: &Known) -> PyResult<Run> {
+    let (stated, stream) = (known.stated.clone(), known.stream.clone());
+    let recorded = finish(py, move || match Campaign::is_at(&path) {
+        true => Campaign::read(&path).map(|campaign| Recorded {
+            name: campaign.name,
+            runs: campaign.runs,
+            together: Some(campaign.together),
+            path: Some(path),
+        }),
+        false => Opened::new(&path, stream.as_deref(), &stated, |_| ())
+            .map(|opened| Recorded::of_run(opened.run, Some(path))),
+    });
+    Ok(Run::new(recorded?.map_err(raise)?, None))
+}
+
+/// Columns of a triad along right, front and up.
+type Triad = Option<[String; 3]>;
+
+#[pyfunction]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "called from one place, by keyword"
+)]
+pub fn run(
+    py: Python,
+    name: &str,
+    columns: Vec<(String, PyReadonlyArray1<f64>)>,
+    gyro: Triad,
+    accel: Triad,
+    time: Option<String>,
+    temperature: Option<String>,
+    known: &Known,
+) -> PyResult<Run> {
+    let mut stated = known.stated.clone();
+    stated.columns = StatedColumns {
+        triads: PerSensor { gyro, accel },
+        time,
+        temperature,
+    };
+    let columns = columns
+        .into_iter()
+        .map(|(name, of)| (name, of.as_array().to_vec()));
+    let table = Table::new(name, columns.collect()).map_err(raise)?;
+    let opened = finish(py, move || Opened::of_table(&table, &stated))?;
+    Ok(Run::new(
+        Recorded::of_run(opened.map_err(raise)?.run, None),
+        None,
+    ))
+}
+
+#[pyfunction]
+pub fn init(py: Python, path: PathBuf, known: &Known) -> PyResult<String> {
+    let (stated, stream) = (known.stated.clone(), known.stream.clone());
+    let draft = finish(py, move || {
+        let name = path
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        Draft::of_stream(&path, stream.as_deref(), &stated).map(|draft| draft.to_toml(&name))
+    });
+    draft?.map_err(raise)
+}
+
+#[pyfunction]
+pub fn allan(py: Python, run: &Run) -> PyResult<Report> {
+    run.report(py, |run| {
+        let stretch = Stretch::find(run, None)?;
+        let analysis = NoiseAnalysis::new(run, stretch);
+        Ok::<_, turncal::noise::StretchError>(Report(of_noise::document(
+            &run.recording.name,
+            &analysis,
+        )))
+    })
+}

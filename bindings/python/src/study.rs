@@ -1,0 +1,257 @@
+//! Simulations, studies of many of them, and paths before there are data.
+
+use std::path::PathBuf;
+
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use rayon::ThreadPoolBuilder;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use turncal::calibration::NoisePolicy;
+use turncal::imu::InstallationForm;
+use turncal::models::{self, Place, specification};
+use turncal::report::path::{Report as OfPath, in_words, moves_in_words};
+use turncal::report::{Document, accuracy, experiment};
+use turncal::run::Aiding;
+use turncal::simulation::{Scenario, SimulatedCampaign};
+use turncal::study::navigation::FORTY_HOURS;
+use turncal::study::path::{Named, PathError, PathStudy};
+use turncal::study::{
+    AccuracyStudy, ExperimentStudy, Shard, Study as Makes, StudyError, UNWATCHED,
+};
+
+use crate::calibration::Calibration;
+use crate::errors::{named, raise, raised, wrong};
+use crate::report::Report;
+use crate::run::{Recorded, Run, error_terms};
+use crate::wait::{Progress, Watch, finish, wait};
+
+/// Fewest and most runs of a study.
+const RUNS: [u64; 2] = [2, 1_000_000];
+
+#[pyfunction]
+pub fn simulate(py: Python, scenario: &str, seed: Option<u64>) -> PyResult<Run> {
+    let scenario = Scenario::load(scenario).map_err(raise)?;
+    let simulated = finish(py, move || {
+        scenario.simulate(seed.unwrap_or(scenario.seed), 0)
+    });
+    let simulated = simulated?.map_err(raise)?;
+    let truth = Py::new(py, Calibration::of_record(simulated.truth_record()))?;
+    Ok(Run::new(Recorded::of_run(simulated.run, None), Some(truth)))
+}
+
+/// A study with its options, which JSON preserves.
+#[derive(Clone, Serialize, Deserialize)]
+enum Study {
+    Accuracy(AccuracyStudy),
+    Experiment(ExperimentStudy),
+}
+
+/// Calls a function with the study in a variant and the report on its outcome.
+macro_rules! with_study {
+    ($of:expr, $function:ident($($argument:expr),*)) => {
+        match $of {
+            Study::Accuracy(study) => $function(study, accuracy::document, $($argument),*),
+            Study::Experiment(study) => $function(study, experiment::document, $($argument),*),
+        }
+    };
+}
+
+impl Study {
+    fn of_json(json: &str) -> PyResult<Self> {
+        serde_json::from_str(json).map_err(raise)
+    }
+
+    fn runs(&self) -> u64 {
+        match self {
+            Self::Accuracy(study) => study.runs,
+            Self::Experiment(study) => study.samples,
+        }
+    }
+}
+
+/// Options of a study as JSON, for [`study`], [`study_part`] and [`study_merged`].
+#[pyfunction]
+pub fn study_options(
+    name: &str,
+    scenario: Option<&str>,
+    runs: u64,
+    seed: Option<u64>,
+    with_: Vec<String>,
+    unmodelled: Vec<String>,
+) -> PyResult<String> {
+    if !(RUNS[0]..=RUNS[1]).contains(&runs) {
+        let expected = format!("a whole number from {} to {}", RUNS[0], RUNS[1]);
+        return Err(wrong("runs", runs, &expected));
+    }
+    let of = named("name", name, &[("accuracy", true), ("experiment", false)])?;
+    if !of && (scenario.is_some() || !with_.is_empty() || !unmodelled.is_empty()) {
+        return Err(raised(
+            "study \"experiment\": found scenario, with_ or unmodelled, expected none of them. Omit them, or use study \
+             \"accuracy\".",
+        ));
+    }
+    let usual = if of { "demo" } else { "experiment" };
+    let name = scenario.unwrap_or(usual);
+    if SimulatedCampaign::is_named(name) {
+        let expected =
+            "a scenario of one recording. Use the command turncal study accuracy for a campaign.";
+        return Err(wrong(
+            "scenario",
+            format_args!("the campaign {name:?}"),
+            expected,
+        ));
+    }
+    let mut scenario = Scenario::load(name).map_err(raise)?;
+    let seed = seed.unwrap_or(scenario.seed);
+    let study = match of {
+        true => {
+            scenario.body_frame = Aiding::Table.body_frame();
+            let unmodelled = error_terms("unmodelled", &unmodelled)?;
+            for &term in error_terms("with_", &with_)?.iter().chain(&unmodelled) {
+                scenario = scenario.with_error_term(term);
+            }
+            Study::Accuracy(AccuracyStudy {
+                scenario,
+                form: InstallationForm::default(),
+                unmodelled,
+                noise: NoisePolicy::Stated,
+                runs,
+                seed,
+            })
+        }
+        false => {
+            let (trajectory, trajectory_name) =
+                models::trajectory("flight", &Place::CommandLine).map_err(raise)?;
+            Study::Experiment(ExperimentStudy {
+                scenario,
+                trajectory,
+                trajectory_name,
+                intervals: FORTY_HOURS,
+                samples: runs,
+                seed,
+            })
+        }
+    };
+    serde_json::to_string(&study).map_err(raise)
+}
+
+/// The whole study on this computer.
+#[pyfunction]
+pub fn study(py: Python, options: &str, progress: Option<Py<PyAny>>) -> PyResult<Report> {
+    let of = Study::of_json(options)?;
+    let progress = Progress::new(py, progress, Some(of.runs()))?;
+    let made = wait(py, &progress, move |watch| with_study!(&of, whole(watch)));
+    made?.map(Report).map_err(raise)
+}
+
+fn whole<S: Makes>(
+    study: &S,
+    document: fn(&S::Outcome) -> Document,
+    watch: &Watch,
+) -> Result<Document, StudyError> {
+    Ok(document(&study.run(&|| watch.step())?))
+}
+
+/// Runs of part `part` of `parts`, on one thread, as bytes.
+#[pyfunction]
+pub fn study_part<'py>(
+    py: Python<'py>,
+    options: &str,
+    part: u64,
+    parts: u64,
+) -> PyResult<Bound<'py, PyBytes>> {
+    let of = Study::of_json(options)?;
+    let shard: Shard = format!("{part}/{parts}").parse().map_err(raise)?;
+    let pool = ThreadPoolBuilder::new()
+        .num_threads(1)
+        .build()
+        .map_err(raise)?;
+    let bytes = py.detach(|| pool.install(|| with_study!(&of, trials(shard))));
+    Ok(PyBytes::new(py, &bytes.map_err(raised)?))
+}
+
+fn trials<S: Makes<Trial: Serialize>>(
+    study: &S,
+    _: fn(&S::Outcome) -> Document,
+    shard: Shard,
+) -> Result<Vec<u8>, String> {
+    let made = study.trials(&shard.runs(study.runs()), UNWATCHED);
+    // MessagePack preserves every bit of a number.
+    let bytes = made.map(|made| rmp_serde::to_vec(&made));
+    bytes
+        .map_err(|error| error.to_string())?
+        .map_err(|error| error.to_string())
+}
+
+/// The study of all its parts, in order.
+#[pyfunction]
+pub fn study_merged(options: &str, parts: Vec<Vec<u8>>) -> PyResult<Report> {
+    let of = Study::of_json(options)?;
+    with_study!(&of, merged(&parts)).map(Report).map_err(raised)
+}
+
+fn merged<S: Makes<Trial: DeserializeOwned>>(
+    study: &S,
+    document: fn(&S::Outcome) -> Document,
+    parts: &[Vec<u8>],
+) -> Result<Document, String> {
+    let mut all = Vec::new();
+    for (bytes, part) in parts.iter().zip(1..) {
+        let shard: Shard = format!("{part}/{}", parts.len())
+            .parse()
+            .map_err(|error: turncal::study::ShardError| error.to_string())?;
+        let made: Vec<S::Trial> =
+            rmp_serde::from_slice(bytes).map_err(|error| error.to_string())?;
+        all.extend(shard.runs(study.runs()).into_iter().zip(made));
+    }
+    all.sort_by_key(|(run, _)| *run);
+    let trials = all.into_iter().map(|(_, trial)| trial).collect();
+    let outcome = study.outcome(trials).map_err(|error| error.to_string())?;
+    Ok(document(&outcome))
+}
+
+#[pyfunction]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "called from one place, by keyword"
+)]
+pub fn evaluate(
+    py: Python,
+    path: String,
+    scenario: Option<String>,
+    imu: Option<String>,
+    table: Option<String>,
+    aiding: Option<&str>,
+    with_: Vec<String>,
+    limits: Option<PathBuf>,
+) -> PyResult<Report> {
+    let all = [("table", Aiding::Table), ("velocity", Aiding::Velocity)];
+    let aiding = aiding.map(|name| named("aiding", name, &all)).transpose()?;
+    let terms = error_terms("with_", &with_)?;
+    let limits = limits
+        .as_deref()
+        .map(specification)
+        .transpose()
+        .map_err(raise)?;
+    let report = finish(py, move || {
+        let study = PathStudy::load(&Named {
+            path: &path,
+            scenario: scenario.as_deref(),
+            imu: imu.as_deref(),
+            table: table.as_deref(),
+            aiding,
+            terms,
+        })?;
+        let evaluation = study.evaluate()?;
+        let report = OfPath {
+            name: &study.scenario.path_name,
+            with: &in_words(&study),
+            moves: &moves_in_words(&study.scenario),
+            evaluation: &evaluation,
+            specification: limits.as_ref(),
+        };
+        Ok::<_, PathError>(Report(report.document()))
+    });
+    report?.map_err(raise)
+}

@@ -1,0 +1,79 @@
+"""Calibrated samples: by the equation, and as the command writes them."""
+
+import io
+
+import numpy as np
+import pandas
+import polars
+import pytest
+from conftest import command
+
+import turncal
+
+COLUMNS = ["gx", "gy", "gz", "ax", "ay", "az"]
+
+
+@pytest.fixture(scope="module")
+def run(log):
+    return turncal.read(log.parent / "run.toml")
+
+
+@pytest.fixture(scope="module")
+def calibration(run):
+    return run.calibrate(noise="stated")
+
+
+def by_hand(calibration, frame):
+    """u = (K C)⁻¹ (N − D)."""
+    parts = []
+    for sensor, columns in (("gyro", COLUMNS[:3]), ("accel", COLUMNS[3:])):
+        value = lambda name: calibration[f"{sensor}.{name}"]
+        scale = np.array([value(f"scale.{i}") for i in "xyz"])
+        installation = np.array([[value(f"installation.{i}{j}") for j in "xyz"] for i in "xyz"])
+        bias = np.array([value(f"bias.{i}") for i in "xyz"])
+        parts.append((frame[columns].to_numpy() - bias) @ np.linalg.inv(scale[:, None] * installation).T)
+    return np.hstack(parts)
+
+
+def test_a_run_is_calibrated_as_by_the_command(run, calibration, log, tmp_path):
+    path = tmp_path / "calibration.json"
+    path.write_text(calibration.to_json())
+    written = command("apply", path, log.parent / "run.toml")
+    expected = pandas.read_csv(io.BytesIO(written))
+    applied = calibration.apply(run)
+    assert list(applied) == list(expected)
+    assert np.array_equal(applied.to_numpy()[:, 2:], expected.to_numpy()[:, 2:])
+
+
+def test_a_table_is_calibrated_to_a_table_of_its_kind(calibration, frame):
+    expected = by_hand(calibration, frame)
+    applied = calibration.apply(frame)
+    assert isinstance(applied, pandas.DataFrame) and applied.index.equals(frame.index)
+    assert np.allclose(applied, expected, rtol=1e-12, atol=1e-12)
+    of_polars = calibration.apply(polars.from_pandas(frame))
+    assert isinstance(of_polars, polars.DataFrame) and np.array_equal(of_polars.to_numpy(), applied.to_numpy())
+    of_array = calibration.apply(frame[COLUMNS].to_numpy())
+    assert of_array.shape == (len(frame), 6) and np.array_equal(of_array, applied.to_numpy())
+
+
+def test_columns_may_be_named(calibration, frame):
+    renamed = frame.rename(columns=dict(zip(COLUMNS, "abcdef")))
+    applied = calibration.apply(renamed, gyro=("a", "b", "c", "rad/s"), accel=("d", "e", "f"))
+    assert np.array_equal(applied, calibration.apply(frame))
+    with pytest.raises(turncal.Error, match="'gx'.*Name the columns"):
+        calibration.apply(renamed)
+    with pytest.raises(turncal.Error, match="deg/s.*rad/s"):
+        calibration.apply(renamed, gyro=("a", "b", "c", "deg/s"), accel=("d", "e", "f"))
+
+
+def test_missing_values_stay_missing(calibration, frame):
+    with_gap = frame.copy()
+    with_gap.loc[3, "gx"] = np.nan
+    applied = calibration.apply(with_gap)
+    assert applied.iloc[3, :3].isna().all() and applied.drop(index=3).notna().all(axis=None)
+
+
+def test_rows_do_not_depend_on_how_many_are_converted_at_once(calibration, frame, monkeypatch):
+    whole = calibration.apply(frame)
+    monkeypatch.setattr("turncal._frames.ROWS", 1000)
+    assert np.array_equal(calibration.apply(frame), whole)

@@ -1,0 +1,165 @@
+"""Calibrations from tables and files are those of the command."""
+
+import json
+import re
+
+import numpy as np
+import pandas
+import polars
+import pytest
+from conftest import command
+
+import turncal
+
+KNOWN = {"rate": 100.0, "latitude": 34.0, "height": 0.0}
+OPTIONS = ["--rate", 100, "--latitude", 34.0, "--height", 0]
+GYRO, ACCEL = ("gx", "gy", "gz", "rad/s"), ("ax", "ay", "az", "m/s^2")
+
+
+@pytest.fixture(scope="module")
+def of_command(log):
+    """calibration.json of the command."""
+    units = ["--gyro-unit", "rad/s", "--accel-unit", "m/s^2"]
+    return command("calibrate", log, *OPTIONS, *units, "--json").decode()
+
+
+@pytest.fixture(scope="module")
+def run(frame):
+    return turncal.run(frame, gyro=GYRO, accel=ACCEL, time="t", **KNOWN)
+
+
+@pytest.fixture(scope="module")
+def calibration(run):
+    return run.calibrate()
+
+
+def without_files(text):
+    """calibration.json without the files that were read: a table has none."""
+    return re.sub(r' *"inputs": \[.*?\n *\],\n', "", text, count=1, flags=re.DOTALL)
+
+
+def test_a_table_gives_the_bytes_of_the_command_except_the_names_of_files(of_command, calibration):
+    assert calibration.to_json() == without_files(of_command)
+
+
+@pytest.mark.parametrize("kind", ["polars", "mapping", "array", "structured"])
+def test_every_kind_of_table_gives_the_same(kind, frame, of_command):
+    columns = {"gyro": GYRO, "accel": ACCEL, "time": "t"}
+    if kind == "polars":
+        data = polars.from_pandas(frame)
+    elif kind == "mapping":
+        data = {name: frame[name].to_numpy() for name in frame}
+    elif kind == "structured":
+        data = frame.to_records(index=False)
+    else:
+        data = frame[["t", "gx", "gy", "gz", "ax", "ay", "az"]].to_numpy()
+        columns = {"gyro": (1, 2, 3, "rad/s"), "accel": (4, 5, 6, "m/s^2"), "time": 0}
+    made = turncal.run(data, **columns, **KNOWN).calibrate()
+    assert made.to_json() == without_files(of_command)
+
+
+def test_what_is_not_said_is_found(frame, calibration):
+    found = turncal.run(frame, **KNOWN).calibrate()
+    assert found["gyro.bias.x"] == pytest.approx(calibration["gyro.bias.x"], rel=1e-9)
+
+
+def test_a_file_gives_the_bytes_of_the_command(log, tmp_path):
+    run_toml = log.parent / "run.toml"
+    made = turncal.read(run_toml).calibrate()
+    assert made.to_json().encode() == command("calibrate", run_toml, "--json")
+    assert turncal.init(log) == command("init", log).decode()
+
+
+def test_a_parameter_has_a_value_a_sigma_and_a_covariance(calibration):
+    table, covariance = calibration.parameters, calibration.covariance
+    value, sigma = table.loc["gyro.bias.x"]
+    assert (value, sigma) == (calibration["gyro.bias.x"], calibration.sigma("gyro.bias.x"))
+    assert covariance.loc["gyro.bias.x", "gyro.bias.x"] == pytest.approx(sigma**2, rel=1e-9)
+    assert np.allclose(covariance, covariance.T)
+    with pytest.raises(KeyError, match="gyro.bias.w"):
+        calibration["gyro.bias.w"]
+
+
+def test_a_verdict_is_explained(calibration):
+    assert calibration.verdict in {"good", "use with care", "failed"}
+    words = {finding["text"] for finding in json.loads(calibration.to_json())["findings"]}
+    assert {finding.split(" ", 1)[1] for finding in calibration.findings} == words
+    page = calibration._repr_html_()
+    assert calibration.verdict.upper() in page and "svg" in page
+
+
+def test_values_agree_with_the_truth(tmp_path):
+    run = turncal.simulate("mems", seed=7)
+    report = turncal.compare(run.calibrate(noise="stated"), truth=run.truth)
+    of_run = report.data["calibrations"][0]
+    low, high = of_run["nees_interval"]
+    assert low < of_run["nees_per_n"] < high
+
+
+def test_progress_sees_every_iteration_and_may_stop(run):
+    seen = []
+    run.calibrate(progress=lambda done, total: seen.append((done, total)))
+    assert seen[-1][0] >= 2 and all(total is None for _, total in seen)
+
+    def refuse(done, total):
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        run.calibrate(progress=refuse)
+    run.calibrate(progress=True)
+
+
+def test_a_report_is_a_directory_that_the_command_can_use(calibration, tmp_path, log):
+    calibration.report(tmp_path / "report")
+    page = (tmp_path / "report" / "index.html").read_text()
+    assert calibration.verdict.upper() in page
+    read = turncal.Calibration.read(tmp_path / "report" / "calibration.json")
+    assert read.to_json() == calibration.to_json()
+    with pytest.raises(turncal.Error, match="Calibrate the run again"):
+        read.report(tmp_path / "again")
+
+
+def test_exports_are_those_of_the_command(calibration, tmp_path):
+    path = tmp_path / "calibration.json"
+    path.write_text(calibration.to_json())
+    for name in ["c", "kalibr", "mat"]:
+        assert turncal.export(calibration, name) == command("export", path, "--format", name)
+
+
+def test_navigation_and_comparison_are_those_of_the_command(calibration, log, tmp_path):
+    path, truth = tmp_path / "calibration.json", log.parent / "truth.json"
+    path.write_text(calibration.to_json())
+    report = turncal.navigate(path, truth, hours=1.0)
+    of_command = json.loads(command("navigate", path, "--truth", truth, "--hours", 1, "--json"))
+    assert report.data["hours"] == of_command["hours"]
+    report = turncal.compare(path, truth=truth)
+    assert report.to_json().encode() == command("compare", path, "--truth", truth, "--json")
+
+
+def test_an_error_names_file_line_and_remedy(log, tmp_path):
+    text = (log.parent / "run.toml").read_text().replace("rad/s", "rad/fortnight", 1)
+    (tmp_path / "run.toml").write_text(text)
+    with pytest.raises(turncal.Error, match="fortnight.*expected") as raised:
+        turncal.read(tmp_path / "run.toml")
+    assert raised.value.file == tmp_path / "run.toml"
+    assert "fortnight" in text.splitlines()[raised.value.line - 1]
+
+
+def test_an_error_names_row_and_column(frame):
+    broken = frame.copy()
+    broken.loc[17, "gy"] = np.inf
+    with pytest.raises(turncal.Error, match="row 17") as raised:
+        turncal.run(broken, gyro=GYRO, accel=ACCEL, **KNOWN)
+    assert (raised.value.row, raised.value.column) == (17, "gy")
+
+
+def test_times_of_pandas_are_times(frame, calibration):
+    dated = frame.assign(t=pandas.Timestamp("2026-01-01") + pandas.to_timedelta(frame["t"], unit="s"))
+    run = turncal.run(dated, gyro=GYRO, accel=ACCEL, time="t", **KNOWN)
+    assert run.calibrate()["gyro.bias.x"] == pytest.approx(calibration["gyro.bias.x"], rel=1e-6)
+
+
+def test_a_certificate_is_written(calibration, tmp_path):
+    (tmp_path / "lab.toml").write_bytes(command("certificate", "--draft"))
+    with pytest.raises(turncal.Error, match="lab.toml"):
+        turncal.certificate(calibration, tmp_path / "lab.toml", tmp_path / "paper")
