@@ -24,7 +24,7 @@ use crate::survey::{Evaluator, GROWTH, Status};
 /// Interval between redraws of the screen.
 const REDRAW: Duration = Duration::from_millis(250);
 /// Evaluations use at most one part in this many of a processor's time, and start at least a second apart.
-const SHARE: u32 = 30;
+const SHARE: u32 = 40;
 const APART: Duration = Duration::from_secs(1);
 /// Interval between attempts to reopen a device that disappeared.
 const AGAIN: Duration = Duration::from_secs(1);
