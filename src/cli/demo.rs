@@ -17,7 +17,7 @@ use turncal::calibration::{
 };
 use turncal::imu::{PerSensor, Triad};
 use turncal::models::{self, Place, path_by_hand};
-use turncal::report::calibration::{self as of_calibration, Report};
+use turncal::report::calibration::{self as of_calibration, Report, dwell_times, navigate, note};
 use turncal::report::navigation::{Flown, add_missions};
 use turncal::report::{Document, Facts};
 use turncal::run::{Dwell, Run};
@@ -26,7 +26,7 @@ use turncal::study::navigation::{FORTY_HOURS, Mission, Motion};
 use turncal::turntable::Moves;
 use turncal::units::DEGREE;
 
-use super::calibrate::{dwell_times, navigate, note, solve, stamp, write_report};
+use super::calibrate::{solve, stamp, write_report};
 use super::simulate::{simulated, write};
 
 use crate::cli::Cli;

@@ -12,11 +12,12 @@ use turncal::models;
 use turncal::noise::RestNoise;
 use turncal::report;
 use turncal::report::Document;
+use turncal::report::calibration::Calibrated;
 use turncal::report::terminal::printable;
 use turncal::run::Run;
 use turncal::study::Shard;
 
-use super::calibrated::{Calibrated, write_report};
+use super::files::{stamp_files, write_report};
 
 use crate::cli::arguments::{Estimation, OfLog};
 use crate::cli::terminal::{Runs, piece_by_piece, show};
@@ -136,7 +137,8 @@ impl Request<'_> {
         let problem = self.estimation.problem(&run, path)?;
         let method = self.estimation.method;
         let mut solution = problem.solve(method, UNWATCHED)?;
-        let calibrated = Calibrated::new(&problem, &mut solution)?.of_files(path, &run);
+        let mut calibrated = Calibrated::new(&problem, &mut solution)?;
+        stamp_files(&mut calibrated.calibration, path, &run);
         let document =
             calibrated.document((&problem, &run.recording.name), &solution, method, None);
         let calibration = calibrated.calibration;

@@ -1,11 +1,11 @@
 //! `turncal calibrate`
 
-mod calibrated;
+mod files;
 mod follow;
 mod lot;
 mod merge;
 
-pub use calibrated::{dwell_times, navigate, note, stamp, write_report};
+pub use files::{stamp, write_report};
 pub use lot::NotMet;
 pub use merge::Merge;
 
@@ -19,6 +19,7 @@ use turncal::calibration::{AtRest, Method, Problem, Solution, Together, Word};
 use turncal::formats::{Campaign, Opened};
 use turncal::models;
 use turncal::recording::Recording;
+use turncal::report::calibration::Calibrated;
 use turncal::report::terminal::printable;
 use turncal::report::{self, Document, Facts};
 use turncal::run::Run;
@@ -27,7 +28,7 @@ use turncal::study::Shard;
 use crate::cli::arguments::{Estimation, OfLog, Overwrite, run_or_log, seconds, shard};
 use crate::cli::terminal::{Activity, print, show, show_brief};
 
-use calibrated::{Calibrated, read_truth};
+use files::{read_truth, stamp_files};
 use follow::Follow;
 
 /// Highest order of the polynomials of outputs at rest.
@@ -256,7 +257,8 @@ impl Calibrate {
         // Problems found in the files may be the cause.
         let mut solution = solve(problem, self.estimation.method, &activity)
             .inspect_err(|_| say(&run.recording))?;
-        let calibrated = Calibrated::new(problem, &mut solution)?.of_files(path, run);
+        let mut calibrated = Calibrated::new(problem, &mut solution)?;
+        stamp_files(&mut calibrated.calibration, path, run);
         activity.next("writing");
         // JSON on standard output has no report.
         let document = (directory.is_some() || !self.json).then(|| {

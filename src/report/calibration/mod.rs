@@ -2,6 +2,7 @@
 
 mod brief;
 mod budget;
+mod calibrated;
 pub(super) mod figures;
 mod report;
 mod residuals;
@@ -18,6 +19,7 @@ use crate::report::prelude::*;
 use crate::report::{navigation, terms};
 
 pub use super::navigation::Navigated;
+pub use calibrated::{Calibrated, Truth, dwell_times, navigate, note};
 pub use report::{ClosedForm, Report};
 
 /// The most severe first; of one level, the first of each kind before more of any.

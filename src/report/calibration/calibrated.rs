@@ -1,55 +1,59 @@
-//! Calibration of a run with its checks, the same for a single run and a lot.
+//! A solution with its checks, and its report.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::path::Path;
 
-use anyhow::{Context, bail};
 use rayon::prelude::*;
-use turncal::calibration::result::{InputFile, TermRecord};
-use turncal::calibration::{
-    Assessment, Calibration, ClosedForm, Estimate, Method, Problem, Reference, Solution,
-    in_body_frame, triads_of,
-};
-use turncal::formats::input_digests;
-use turncal::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
-use turncal::report::Document;
-use turncal::report::calibration::{self as of_calibration, Navigated, Report};
-use turncal::run::{Aiding, Run};
-use turncal::study::navigation::{Mission, NavigationStudyError};
-use turncal::survey::{self, Expected};
 
-/// A true calibration, in the general form, with its error terms.
+use super::{ClosedForm as Baseline, Report};
+use crate::calibration::result::TermRecord;
+use crate::calibration::{
+    Assessment, Calibration, CalibrationError, ClosedForm, Estimate, Method, Problem, Reference,
+    Solution, in_body_frame, triads_of,
+};
+use crate::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
+use crate::report::Document;
+use crate::report::navigation::Navigated;
+use crate::run::{Aiding, Run};
+use crate::study::navigation::{Mission, NavigationStudyError};
+use crate::survey::{self, Expected};
+
+/// A true calibration with its error terms, in the general form, which can represent any other.
 pub struct Truth {
     triads: PerSensor<Triad>,
     terms: BTreeMap<String, TermRecord>,
 }
 
+impl Truth {
+    /// The truth of a run, converted to this body frame.
+    pub fn new(record: Calibration, run: &Run, body_frame: BodyFrame) -> Self {
+        let nominal = &run.instrument.nominal;
+        let triads = triads_of(&record, nominal, InstallationForm::General);
+        Self {
+            triads: in_body_frame(&triads, body_frame),
+            terms: record.terms,
+        }
+    }
+}
+
 /// A calibration with its checks.
 pub struct Calibrated {
+    /// The calibration.
     pub calibration: Calibration,
     assessment: Assessment,
 }
 
 impl Calibrated {
     /// Checks a solution.
-    pub fn new(problem: &Problem, solution: &mut Solution) -> anyhow::Result<Self> {
+    ///
+    /// # Errors
+    /// [`CalibrationError`] if the checks do not fit into memory.
+    pub fn new(problem: &Problem, solution: &mut Solution) -> Result<Self, CalibrationError> {
         let assessment = solution.assess(problem)?;
         Ok(Self {
             calibration: solution.calibration(problem, &assessment),
             assessment,
         })
-    }
-
-    /// Adds the files that a run.toml or campaign.toml names.
-    pub fn of_files(mut self, path: &Path, run: &Run) -> Self {
-        stamp(&mut self.calibration, path);
-        let is_log = path.extension().is_none_or(|end| end != "toml");
-        // No run.toml names the second file of a log.
-        for file in run.recording.files.iter().skip(1).filter(|_| is_log) {
-            add(&mut self.calibration, file);
-        }
-        self
     }
 
     /// Its report.
@@ -88,12 +92,10 @@ impl Calibrated {
             predicted: predicted.as_ref(),
             quality: Some(&assessment.quality),
             true_terms: truth.map_or(&no_terms, |truth| &truth.terms),
-            closed_form: solution
-                .closed_form()
-                .map(|closed_form| of_calibration::ClosedForm {
-                    estimate: &closed_form.estimate,
-                    note: &note,
-                }),
+            closed_form: solution.closed_form().map(|closed_form| Baseline {
+                estimate: &closed_form.estimate,
+                note: &note,
+            }),
             truth: in_form.as_ref(),
             dwells: &dwells,
             navigation: navigation.as_deref(),
@@ -113,22 +115,6 @@ fn predicted(problem: &Problem, solution: &Solution) -> Option<Expected> {
     (outcome.alone.len() < 2)
         .then(|| Expected::of(problem.run(), path).ok())
         .flatten()
-}
-
-/// Records the input files in a calibration.
-pub fn stamp(calibration: &mut Calibration, path: &Path) {
-    if let Some(provenance) = &mut calibration.provenance {
-        provenance.inputs.clear();
-    }
-    add(calibration, path);
-}
-
-fn add(calibration: &mut Calibration, path: &Path) {
-    if let Some(provenance) = &mut calibration.provenance {
-        let inputs = input_digests(path).into_iter();
-        let inputs = inputs.map(|(name, sha256)| InputFile { name, sha256 });
-        provenance.inputs.extend(inputs);
-    }
 }
 
 /// Short description of the data used by a closed form.
@@ -155,7 +141,7 @@ pub fn navigate(
     run: &Run,
     methods: &[(&'static str, &Estimate)],
     truth: Option<&PerSensor<Triad>>,
-) -> std::result::Result<Vec<Navigated>, NavigationStudyError> {
+) -> Result<Vec<Navigated>, NavigationStudyError> {
     let estimates: Vec<&Estimate> = methods.iter().map(|(_, estimate)| *estimate).collect();
     let mission = Mission::suited(&run.site, &estimates)?;
     let all = methods.par_iter().map(|&(method, estimate)| {
@@ -172,33 +158,4 @@ pub fn dwell_times(problem: &Problem) -> Vec<Range<f64>> {
     dwells
         .map(|dwell| imu.time(dwell.samples.start)..imu.time(dwell.samples.end))
         .collect()
-}
-
-/// Writes a report into a new directory.
-pub fn write_report(document: &Document, directory: &Path) -> anyhow::Result<()> {
-    std::fs::create_dir(directory)
-        .with_context(|| format!("cannot create {}", directory.display()))?;
-    Ok(turncal::report::write(document, directory)?)
-}
-
-/// A truth, converted to the general form, which can represent any other.
-pub fn read_truth(path: &Path, run: &Run, body_frame: BodyFrame) -> anyhow::Result<Truth> {
-    let record = Calibration::read(path)?;
-    if let Some(unit) = &record.unit
-        && *unit != run.instrument.unit
-    {
-        bail!(
-            "{}: units are {} and {}, but those of the run are {} and {}. Give the truth of this run",
-            path.display(),
-            unit.gyro,
-            unit.accel,
-            run.instrument.unit.gyro,
-            run.instrument.unit.accel
-        );
-    }
-    let triads = triads_of(&record, &run.instrument.nominal, InstallationForm::General);
-    Ok(Truth {
-        triads: in_body_frame(&triads, body_frame),
-        terms: record.terms,
-    })
 }
