@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
+use super::data_file::DataFile;
 use super::draft::{Draft, Found, Stated};
 use super::error::FileError;
 use crate::run::Run;
@@ -44,29 +45,59 @@ impl Opened {
         stated: &Stated,
         show: impl FnOnce(&[Found]),
     ) -> Result<Self, FileError> {
-        if path.extension() == Some(OsStr::new("toml")) {
-            let run = Run::read(path)?;
+        if path != Path::new(STANDARD_INPUT) {
+            return Self::of_file(&path.into(), &[], (stream, stated), show);
+        }
+        let piped = piped(path)?;
+        let file = piped.path().join(PIPED).into();
+        let mut opened = Self::of_file(&file, &[], (stream, stated), show)?;
+        if let Some(log) = &mut opened.log {
+            log.piped = Some(piped);
+        }
+        Ok(opened)
+    }
+
+    /// The same for files in memory: a `run.toml` or a log, which may name the others.
+    ///
+    /// # Errors
+    /// As for [`Self::new`].
+    pub fn in_memory(
+        files: &[DataFile],
+        stream: Option<&str>,
+        stated: &Stated,
+        show: impl FnOnce(&[Found]),
+    ) -> Result<Self, FileError> {
+        let Some(file) = files.first() else {
+            let advice = "Give a log, or a run.toml with the files that it names.";
+            return Err(FileError::of(Path::new(""), "no file", "a log", advice));
+        };
+        Self::of_file(file, files, (stream, stated), show)
+    }
+
+    fn of_file(
+        file: &DataFile,
+        in_memory: &[DataFile],
+        (stream, stated): (Option<&str>, &Stated),
+        show: impl FnOnce(&[Found]),
+    ) -> Result<Self, FileError> {
+        if file.extension() == Some(OsStr::new("toml")) {
+            let run = match file.bytes().map(String::from_utf8_lossy) {
+                Some(text) => Run::of_text(file, &text, Some(file), in_memory)?,
+                None => Run::read(file)?,
+            };
             return Ok(Self { run, log: None });
         }
-        let piped = match path == Path::new(STANDARD_INPUT) {
-            true => Some(piped(path)?),
-            false => None,
-        };
-        let file = match &piped {
-            Some(directory) => directory.path().join(PIPED),
-            None => path.to_owned(),
-        };
-        let draft = Draft::of_stream(&file, stream, stated)?;
+        let draft = Draft::of_stream(file, stream, stated)?;
         show(&draft.found());
         if let Some([found, expected, advice]) = draft.open_question() {
-            return Err(FileError::of(path, found, expected, advice));
+            return Err(FileError::of(file, found, expected, advice));
         }
         let name = file.file_name().unwrap_or_default().to_string_lossy();
-        let run = Run::of_text(&file, &draft.to_toml(&name), None)?;
+        let run = Run::of_text(file, &draft.to_toml(&name), None, in_memory)?;
         let log = Log {
-            path: file,
+            path: file.to_path_buf(),
             draft,
-            piped,
+            piped: None,
         };
         Ok(Self {
             run,
@@ -77,6 +108,11 @@ impl Opened {
     /// Whether there was no `run.toml`.
     pub fn is_of_log(&self) -> bool {
         self.log.is_some()
+    }
+
+    /// The `run.toml` used to read a log, which it names `file`.
+    pub fn run_toml(&self, file: &str) -> Option<String> {
+        Some(self.log.as_ref()?.draft.to_toml(file))
     }
 
     /// Writes the `run.toml` used to read a log into a result directory.

@@ -5,6 +5,7 @@
 
 mod clock;
 mod csv_file;
+mod data_file;
 mod directories;
 mod door;
 pub mod draft;
@@ -21,6 +22,7 @@ mod small_file;
 mod streams;
 
 pub use crate::imu::NoiseKeys;
+pub use data_file::DataFile;
 pub(crate) use directories::write_whole_with;
 pub use directories::{
     JOB_FILE, Job, JobKind, LotDirectory, Part, Parts, WholeDirectory, abandon_unfinished,

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use turncal::formats::Opened;
-use turncal::formats::draft::{Found, KalibrImu, Stated, StatedUnit, Tolerances};
-use turncal::imu::{PerSensor, Sensor};
+use turncal::formats::draft::{Found, KalibrImu, Stated, StatedUnit};
+use turncal::formats::{DataFile, Opened};
+use turncal::imu::Sensor;
 use turncal::models::{Instrument, Place};
 use turncal::report::terminal::printable;
 
@@ -56,13 +56,8 @@ impl OfLog {
         let sensor = sensor.map(|name| Instrument::load(name, &Place::CommandLine));
         let sensor = sensor.transpose()?;
         let of_sensor = sensor.as_ref().map(|of| of.noise);
-        let tolerances = |of: Instrument| Tolerances {
-            scale: PerSensor::from_fn(|sensor| of.variation.get(sensor).scale.sigma()),
-            bias: PerSensor::from_fn(|sensor| of.variation.get(sensor).bias.sigma()),
-            of: of.name,
-        };
         let stated = Stated {
-            accel_file: self.accel_file.clone(),
+            accel_file: self.accel_file.as_deref().map(DataFile::from),
             rate_hz: self.rate.or(kalibr.and_then(|imu| imu.rate_hz)),
             latitude_deg: self.latitude,
             height_m: self.height,
@@ -70,7 +65,7 @@ impl OfLog {
             gyro_unit: self.gyro_unit,
             accel_unit: self.accel_unit,
             noise: kalibr.map(|imu| imu.noise).or(of_sensor),
-            tolerances: sensor.map(tolerances),
+            tolerances: sensor.as_ref().map(Instrument::tolerances),
         };
         Ok((self.stream.as_deref(), stated))
     }

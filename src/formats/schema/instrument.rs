@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 
 use super::{Document, Names, OneOrThree, RunFile, TermFile};
 use crate::formats::clock::{Breaks, Clock};
+use crate::formats::data_file::DataFile;
 use crate::formats::error::{FileError, list, suggestion};
 use crate::formats::imu_log::ImuLog;
 use crate::formats::inputs::temperature::{TemperatureColumns, TemperatureUnit};
@@ -39,6 +40,8 @@ pub struct Fields<'a> {
     pub document: Document<'a>,
     pub run: &'a RunFile,
     pub directory: &'a Path,
+    /// Files of this directory that are in memory.
+    pub in_memory: &'a [DataFile],
     pub notes: Vec<String>,
 }
 

@@ -3,11 +3,11 @@
 mod kalibr;
 
 use std::collections::BTreeSet;
-use std::path::PathBuf;
 
 pub use kalibr::KalibrImu;
 
 use super::name::{self, Unit};
+use crate::formats::DataFile;
 use crate::formats::quantity::{OUTPUTS, Of, units};
 use crate::imu::{Noise, PerSensor, Sensor};
 
@@ -15,7 +15,7 @@ use crate::imu::{Noise, PerSensor, Sensor};
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Stated {
     /// The accelerometer file, if the log contains only the gyros.
-    pub accel_file: Option<PathBuf>,
+    pub accel_file: Option<DataFile>,
     /// Rows a second.
     pub rate_hz: Option<f64>,
     /// Geodetic latitude, north positive.
