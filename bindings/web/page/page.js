@@ -1,0 +1,157 @@
+"use strict";
+
+const at = (id) => document.getElementById(id);
+const form = at("form");
+
+let chosen = [];
+let worker = null;
+let links = [];
+
+/** The engine, unpacked. */
+async function unpacked() {
+  const packed = Uint8Array.from(atob(at("engine").textContent), (c) => c.charCodeAt(0));
+  const plain = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Response(plain).arrayBuffer();
+}
+
+/** The fields of the form that are not empty. */
+function statements() {
+  const filled = [...form.elements].filter((field) => field.name && field.value.trim());
+  const value = (field) => (field.type === "number" ? field.valueAsNumber : field.value.trim());
+  return Object.fromEntries(filled.map((field) => [field.name, value(field)]));
+}
+
+/** Calibrates the chosen files in a new worker. */
+async function calibrate() {
+  if (!chosen.length || !form.reportValidity()) return;
+  end();
+  clear();
+  tell("starting");
+  const source = URL.createObjectURL(new Blob([at("worker").textContent], { type: "text/javascript" }));
+  const mine = (worker = new Worker(source));
+  URL.revokeObjectURL(source);
+  let panic = "";
+  mine.onmessage = ({ data: { kind, text, outputs } }) => {
+    if (kind === "activity") return tell(text);
+    if (kind === "found") return showFound(JSON.parse(text));
+    if (kind === "panic") return void (panic = text);
+    end();
+    if (kind === "done") return showResult(outputs);
+    fail(kind === "error" ? text : crashed(panic || text));
+  };
+  mine.onerror = (event) => {
+    event.preventDefault();
+    end();
+    fail(crashed(event.message));
+  };
+  const engine = await unpacked();
+  mine.postMessage({ engine, files: chosen, statements: statements() });
+}
+
+function crashed(reason) {
+  return (
+    `turncal stopped: ${reason}\nThe log may need more memory than a browser gives. Use a shorter log, or the ` +
+    "command turncal on a computer."
+  );
+}
+
+function end() {
+  worker?.terminate();
+  worker = null;
+  at("activity").hidden = true;
+}
+
+/** Removes the previous result. */
+function clear() {
+  for (const id of ["error", "found", "downloads", "report"]) at(id).hidden = true;
+  at("report").replaceChildren();
+  links.forEach(URL.revokeObjectURL);
+  links = [];
+  at("again").disabled = false;
+}
+
+function tell(activity) {
+  at("activity").hidden = false;
+  at("activity").querySelector("span").textContent = `${names()}: ${activity} …`;
+}
+
+function fail(message) {
+  at("error").hidden = false;
+  at("error").textContent = message;
+}
+
+function names() {
+  return chosen.map((file) => file.name).join(", ");
+}
+
+/** Shows what was found in a log: field, value, certainty, reason. */
+function showFound(fields) {
+  at("found").hidden = false;
+  at("found").querySelector("h2").textContent = `Found in ${names()}`;
+  const rows = fields.map(([what, value, certainty, why]) => {
+    const row = document.createElement("tr");
+    row.append(cell("th", what), cell("td", value), cell("td", `${certainty}: ${why}`));
+    return row;
+  });
+  at("found").querySelector("tbody").replaceChildren(...rows);
+}
+
+function showResult(outputs) {
+  const lists = at("downloads").querySelectorAll("dl");
+  const own = ["report.html", "calibration.json", "run.toml"];
+  const isOwn = (output) => own.includes(output.name);
+  lists[0].replaceChildren(...outputs.filter(isOwn).map(download));
+  lists[1].replaceChildren(...outputs.filter((output) => !isOwn(output)).map(download));
+  at("downloads").hidden = false;
+  const report = outputs.find((output) => output.name === "report.html");
+  const page = new DOMParser().parseFromString(new TextDecoder().decode(report.bytes), "text/html");
+  page.querySelector("footer").remove();
+  at("report").replaceChildren(...page.body.children);
+  at("report").hidden = false;
+  at("report").scrollIntoView({ behavior: "smooth" });
+}
+
+function download({ name, about, bytes }) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([bytes]));
+  link.download = name;
+  link.textContent = name;
+  links.push(link.href);
+  const row = document.createElement("div");
+  const term = document.createElement("dt");
+  term.append(link);
+  row.append(term, cell("dd", about));
+  return row;
+}
+
+function cell(kind, text) {
+  const cell = document.createElement(kind);
+  cell.textContent = text;
+  return cell;
+}
+
+function choose(files) {
+  chosen = [...files];
+  calibrate();
+}
+
+at("files").onchange = ({ target }) => {
+  choose(target.files);
+  // The same file can be chosen again after it has changed.
+  target.value = "";
+};
+form.onsubmit = (event) => {
+  event.preventDefault();
+  calibrate();
+};
+at("stop").onclick = end;
+document.ondragover = (event) => {
+  event.preventDefault();
+  at("drop").classList.add("over");
+};
+document.ondragleave = () => at("drop").classList.remove("over");
+document.ondrop = (event) => {
+  event.preventDefault();
+  at("drop").classList.remove("over");
+  choose(event.dataTransfer.files);
+};
