@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
 use super::data_file::DataFile;
-use super::draft::{Draft, Found, Stated};
+use super::draft::{Draft, Stated};
 use super::error::FileError;
 use crate::run::Run;
 
@@ -34,8 +34,8 @@ struct Log {
 }
 
 impl Opened {
-    /// Reads a `run.toml` (by extension), a log, or text on standard input (`-`). Detected fields of a log are shown
-    /// before any error.
+    /// Reads a `run.toml` (by extension), a log, or text on standard input (`-`). The draft for a log is shown before
+    /// any error.
     ///
     /// # Errors
     /// [`FileError`] if it cannot be read, or if required fields of a log are neither detected nor stated.
@@ -43,7 +43,7 @@ impl Opened {
         path: &Path,
         stream: Option<&str>,
         stated: &Stated,
-        show: impl FnOnce(&[Found]),
+        show: impl FnOnce(&Draft),
     ) -> Result<Self, FileError> {
         if path != Path::new(STANDARD_INPUT) {
             return Self::of_file(&path.into(), &[], (stream, stated), show);
@@ -65,7 +65,7 @@ impl Opened {
         files: &[DataFile],
         stream: Option<&str>,
         stated: &Stated,
-        show: impl FnOnce(&[Found]),
+        show: impl FnOnce(&Draft),
     ) -> Result<Self, FileError> {
         let Some(file) = files.first() else {
             let advice = "Give a log, or a run.toml with the files that it names.";
@@ -78,7 +78,7 @@ impl Opened {
         file: &DataFile,
         in_memory: &[DataFile],
         (stream, stated): (Option<&str>, &Stated),
-        show: impl FnOnce(&[Found]),
+        show: impl FnOnce(&Draft),
     ) -> Result<Self, FileError> {
         if file.extension() == Some(OsStr::new("toml")) {
             let run = match file.bytes().map(String::from_utf8_lossy) {
@@ -88,10 +88,8 @@ impl Opened {
             return Ok(Self { run, log: None });
         }
         let draft = Draft::of_stream(file, stream, stated)?;
-        show(&draft.found());
-        if let Some([found, expected, advice]) = draft.open_question() {
-            return Err(FileError::of(file, found, expected, advice));
-        }
+        show(&draft);
+        draft.check(file)?;
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let run = Run::of_text(file, &draft.to_toml(&name), None, in_memory)?;
         let log = Log {
@@ -108,11 +106,6 @@ impl Opened {
     /// Whether there was no `run.toml`.
     pub fn is_of_log(&self) -> bool {
         self.log.is_some()
-    }
-
-    /// The `run.toml` used to read a log, which it names `file`.
-    pub fn run_toml(&self, file: &str) -> Option<String> {
-        Some(self.log.as_ref()?.draft.to_toml(file))
     }
 
     /// Writes the `run.toml` used to read a log into a result directory.

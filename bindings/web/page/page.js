@@ -33,10 +33,10 @@ async function calibrate() {
   let panic = "";
   mine.onmessage = ({ data: { kind, text, outputs } }) => {
     if (kind === "activity") return tell(text);
-    if (kind === "found") return showFound(JSON.parse(text));
+    if (kind === "draft") return showDraft(JSON.parse(text));
     if (kind === "panic") return void (panic = text);
     end();
-    if (kind === "done") return showResult(outputs);
+    if (kind === "done") return showReport(outputs);
     fail(kind === "error" ? text : crashed(panic || text));
   };
   mine.onerror = (event) => {
@@ -63,8 +63,7 @@ function end() {
 
 /** Removes the previous result. */
 function clear() {
-  for (const id of ["error", "found", "downloads", "report"]) at(id).hidden = true;
-  at("report").replaceChildren();
+  for (const id of ["error", "found", "report"]) at(id).hidden = true;
   links.forEach(URL.revokeObjectURL);
   links = [];
   at("again").disabled = false;
@@ -84,10 +83,11 @@ function names() {
   return chosen.map((file) => file.name).join(", ");
 }
 
-/** Shows what was found in a log: field, value, certainty, reason. */
-function showFound(fields) {
+/** Shows what was found in a log, by field, value, certainty and reason, and the run.toml that says so. */
+function showDraft({ fields, run }) {
   at("found").hidden = false;
   at("found").querySelector("h2").textContent = `Found in ${names()}`;
+  at("found").querySelector("a").href = link(run);
   const rows = fields.map(([what, value, certainty, why]) => {
     const row = document.createElement("tr");
     row.append(cell("th", what), cell("td", value), cell("td", `${certainty}: ${why}`));
@@ -96,32 +96,33 @@ function showFound(fields) {
   at("found").querySelector("tbody").replaceChildren(...rows);
 }
 
-function showResult(outputs) {
-  const lists = at("downloads").querySelectorAll("dl");
-  const own = ["report.html", "calibration.json", "run.toml"];
-  const isOwn = (output) => own.includes(output.name);
-  lists[0].replaceChildren(...outputs.filter(isOwn).map(download));
-  lists[1].replaceChildren(...outputs.filter((output) => !isOwn(output)).map(download));
-  at("downloads").hidden = false;
-  const report = outputs.find((output) => output.name === "report.html");
+/** Shows the verdict, the files to download, and the other parts of the report. */
+function showReport([report, calibration, ...exports]) {
   const page = new DOMParser().parseFromString(new TextDecoder().decode(report.bytes), "text/html");
-  page.querySelector("footer").remove();
-  at("report").replaceChildren(...page.body.children);
+  const [header, ...sections] = page.body.children;
+  at("verdict").replaceChildren(header);
+  at("details").replaceChildren(...sections.filter((section) => section.tagName !== "FOOTER"));
+  const [own, others] = at("downloads").querySelectorAll("dl");
+  own.replaceChildren(download(report), download(calibration));
+  others.replaceChildren(...exports.map(download));
   at("report").hidden = false;
   at("report").scrollIntoView({ behavior: "smooth" });
 }
 
 function download({ name, about, bytes }) {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([bytes]));
-  link.download = name;
-  link.textContent = name;
-  links.push(link.href);
-  const row = document.createElement("div");
-  const term = document.createElement("dt");
-  term.append(link);
+  const anchor = document.createElement("a");
+  anchor.href = link(bytes);
+  anchor.download = anchor.textContent = name;
+  const [row, term] = ["div", "dt"].map((kind) => document.createElement(kind));
+  term.append(anchor);
   row.append(term, cell("dd", about));
   return row;
+}
+
+/** The address of a file with this content. */
+function link(content) {
+  links.push(URL.createObjectURL(new Blob([content])));
+  return links.at(-1);
 }
 
 function cell(kind, text) {

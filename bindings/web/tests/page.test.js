@@ -58,9 +58,10 @@ async function choose(files, stated = {}) {
 }
 
 async function download(name) {
+  await page.locator("#downloads details").evaluate((details) => (details.open = true));
   const [saved] = await Promise.all([
     page.waitForEvent("download"),
-    page.click(`#downloads a[download="${name}"]`),
+    page.click(`a[download="${name}"]`),
   ]);
   return fs.readFileSync(await saved.path(), "utf8");
 }

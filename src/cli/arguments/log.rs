@@ -78,7 +78,9 @@ impl OfLog {
     /// As [`Self::open`], but passes the fields found in a log to `show`.
     pub fn open_with(&self, path: &Path, show: impl FnOnce(&[Found])) -> anyhow::Result<Opened> {
         let (stream, stated) = self.stated()?;
-        Ok(Opened::new(path, stream, &stated, show)?)
+        Ok(Opened::new(path, stream, &stated, |draft| {
+            show(&draft.found());
+        })?)
     }
 }
 

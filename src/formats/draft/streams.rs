@@ -31,8 +31,8 @@ pub struct Streams {
     remarks: Vec<String>,
     /// Body axes of the program.
     pub axes: Option<&'static str>,
-    /// Place and reason of damage.
-    damage: Option<String>,
+    /// The first damage.
+    pub damage: Option<FileError>,
     /// The file of the accelerometers, where both triads are rows of text.
     pub written: Option<Written>,
 }
@@ -96,7 +96,7 @@ impl Streams {
             }
         };
         streams.listed = listed(&members);
-        streams.damage = damage.map(|damage| one_line(&damage.to_string()));
+        streams.damage = damage;
         Ok(Some((streams, sheet)))
     }
 
@@ -197,6 +197,7 @@ impl Streams {
         }
         self.remarks.iter().for_each(|remark| page.remark(remark));
         if let Some(damage) = self.damage.as_ref().filter(|_| self.written.is_none()) {
+            let damage = one_line(&damage.to_string());
             let why = format_args!("uncomment to use the intact part. {damage}");
             page.open("salvage = true", why);
         }
