@@ -27,6 +27,7 @@ async function calibrate() {
   end();
   clear();
   tell("starting");
+  at("activity").scrollIntoView({ block: "center" });
   const source = URL.createObjectURL(new Blob([at("worker").textContent], { type: "text/javascript" }));
   const mine = (worker = new Worker(source));
   URL.revokeObjectURL(source);
@@ -77,6 +78,9 @@ function tell(activity) {
 function fail(message) {
   at("error").hidden = false;
   at("error").textContent = message;
+  // The message may name an option that is missing.
+  at("statements").open ||= message.includes(" --");
+  at("error").scrollIntoView({ block: "center" });
 }
 
 function names() {
