@@ -3,6 +3,9 @@
 const at = (id) => document.getElementById(id);
 const form = at("form");
 
+/** Size of a log that takes minutes, bytes. */
+const LARGE = 5e7;
+
 let chosen = [];
 let worker = null;
 let links = [];
@@ -72,6 +75,7 @@ function clear() {
 
 function tell(activity) {
   at("activity").hidden = false;
+  at("activity").querySelector("p").hidden = chosen.every((file) => file.size < LARGE);
   at("activity").querySelector("span").textContent = `${names()}: ${activity} …`;
 }
 
