@@ -144,3 +144,45 @@ fn piped(path: &Path) -> Result<TempDir, FileError> {
         )
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RUN: &str = r#"
+        format = "turncal-run/1"
+        [imu]
+        file = "/home/me/imu.csv"
+        output = "rate"
+        gyro_unit = "rad/s"
+        accel_unit = "m/s^2"
+        time_stamp = "end"
+        columns = { time = "t", gyro = ["p", "q", "r"], accel = ["ax", "ay", "az"] }
+    "#;
+
+    fn rows() -> String {
+        let row = |k: u32| format!("{},0.001,0,0.002,0,0.{k},9.8\n", f64::from(k) / 100.0);
+        let rows: String = (1..500).map(row).collect();
+        format!("t,p,q,r,ax,ay,az\n{rows}")
+    }
+
+    #[test]
+    fn files_in_memory_give_the_samples_of_those_on_disk() {
+        let directory = tempfile::tempdir().unwrap();
+        let log = directory.path().join("imu.csv");
+        fs::write(&log, rows()).unwrap();
+        let run = directory.path().join("run.toml");
+        let text = RUN.replace("/home/me/", "");
+        let expected = Run::of_text(&run, &text, None, &[]).unwrap().recording.imu;
+        // A directory that a run.toml names does not exist in a browser.
+        let files = [
+            DataFile::in_memory("run.toml", RUN.as_bytes()),
+            DataFile::in_memory("imu.csv", rows().as_bytes()),
+        ];
+        let opened = Opened::in_memory(&files, None, &Stated::default(), |_| {}).unwrap();
+        assert_eq!(opened.run.recording.imu, expected);
+        let missing = Opened::in_memory(&files[..1], None, &Stated::default(), |_| {});
+        let message = missing.unwrap_err().to_string();
+        assert!(message.contains("add the file"), "{message}");
+    }
+}
