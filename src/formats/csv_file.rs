@@ -7,12 +7,12 @@ mod row;
 
 use std::borrow::Cow;
 use std::fmt::Display;
-use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 use flate2::read::MultiGzDecoder;
 
+use super::data_file::DataFile;
 use super::error::{FileError, Place};
 use super::rows::Rows;
 use crate::room;
@@ -62,21 +62,21 @@ enum Cut {
 
 impl CsvFile {
     /// Opens a file and reads its header; for tagged rows, selects those with this tag.
-    pub fn open(path: &Path, tag: Option<&str>) -> Result<Self, FileError> {
-        let stopped = |stop: Stop| stopped(path, &stop);
-        let mut lines = Lines::open(source(path)?).map_err(stopped)?;
+    pub fn open(file: &DataFile, tag: Option<&str>) -> Result<Self, FileError> {
+        let stopped = |stop: Stop| stopped(file, &stop);
+        let mut lines = Lines::open(source(file)?).map_err(stopped)?;
         let looks = Looks::of(lines.ahead());
         let tags = tag.map(|tag| {
             let tags = looks
                 .tags()
                 .filter(|tags| tags.names.iter().any(|name| name == tag));
-            tags.ok_or_else(|| no_tag(path, tag))
+            tags.ok_or_else(|| no_tag(file, tag))
         });
         let tags = tags.transpose()?;
         let heading = looks.heading(tags.as_ref().zip(tag)).map_err(stopped)?;
         let heading = heading.ok_or_else(|| {
             FileError::new(
-                path,
+                file,
                 Place::File,
                 "an empty file",
                 "a line of column names followed by rows",
@@ -85,7 +85,7 @@ impl CsvFile {
         })?;
         lines.skip(heading.above);
         Ok(Self {
-            file: path.to_owned(),
+            file: file.to_path_buf(),
             lines,
             row: Row::new(heading.delimiter.byte()),
             tag: tags
@@ -100,8 +100,8 @@ impl CsvFile {
     }
 
     /// Tags of rows of several kinds.
-    pub fn tags(path: &Path) -> Result<Vec<String>, FileError> {
-        let lines = Lines::open(source(path)?).map_err(|stop| stopped(path, &stop))?;
+    pub fn tags(file: &DataFile) -> Result<Vec<String>, FileError> {
+        let lines = Lines::open(source(file)?).map_err(|stop| stopped(file, &stop))?;
         Ok(Looks::of(lines.ahead())
             .tags()
             .map_or_else(Vec::new, |tags| tags.names))
@@ -267,35 +267,12 @@ fn no_tag(path: &Path, tag: &str) -> FileError {
     )
 }
 
-/// The bytes of a regular file, unzipped.
-fn source(path: &Path) -> Result<Box<dyn BufRead>, FileError> {
-    let refused = |error| {
-        FileError::io(
-            path,
-            "open the file",
-            &error,
-            "Names in run.toml are relative to run.toml; correct the name or add the file.",
-        )
-    };
-    // To open a pipe would wait for whoever writes into it.
-    let kind = fs::metadata(path).map_err(refused)?;
-    if !kind.is_file() {
-        return Err(FileError::new(
-            path,
-            Place::File,
-            match kind.is_dir() {
-                true => "a directory",
-                false => "a device or pipe",
-            },
-            "a regular file that can be read more than once",
-            "Save its output to a file and give that file.",
-        ));
-    }
-    let file = File::open(path).map_err(refused)?;
-    let mut plain = BufReader::with_capacity(1 << 16, file);
+/// The bytes of a file, unzipped.
+fn source(file: &DataFile) -> Result<Box<dyn BufRead>, FileError> {
+    let mut plain = BufReader::with_capacity(1 << 16, file.open()?);
     let begin = plain
         .fill_buf()
-        .map_err(|error| stopped(path, &Stop::System(error)))?;
+        .map_err(|error| stopped(file, &Stop::System(error)))?;
     Ok(match begin.starts_with(&GZIP) {
         true => Box::new(BufReader::with_capacity(
             1 << 16,

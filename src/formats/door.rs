@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-use super::draft::{Draft, Found, Stated};
+use super::data_file::DataFile;
+use super::draft::{Draft, Stated};
 use super::error::FileError;
 use super::table::Table;
 use crate::run::Run;
@@ -34,8 +35,8 @@ struct Log {
 }
 
 impl Opened {
-    /// Reads a `run.toml` (by extension), a log, or text on standard input (`-`). Detected fields of a log are shown
-    /// before any error.
+    /// Reads a `run.toml` (by extension), a log, or text on standard input (`-`). The draft for a log is shown before
+    /// any error.
     ///
     /// # Errors
     /// [`FileError`] if it cannot be read, or if required fields of a log are neither detected nor stated.
@@ -43,31 +44,59 @@ impl Opened {
         path: &Path,
         stream: Option<&str>,
         stated: &Stated,
-        show: impl FnOnce(&[Found]),
+        show: impl FnOnce(&Draft),
     ) -> Result<Self, FileError> {
-        if path.extension() == Some(OsStr::new("toml")) {
-            let run = Run::read(path)?;
+        if path != Path::new(STANDARD_INPUT) {
+            return Self::of_file(&path.into(), &[], (stream, stated), show);
+        }
+        let piped = piped(path)?;
+        let file = piped.path().join(PIPED).into();
+        let mut opened = Self::of_file(&file, &[], (stream, stated), show)?;
+        if let Some(log) = &mut opened.log {
+            log.piped = Some(piped);
+        }
+        Ok(opened)
+    }
+
+    /// The same for files in memory: a `run.toml` or a log, which may name the others.
+    ///
+    /// # Errors
+    /// As for [`Self::new`].
+    pub fn in_memory(
+        files: &[DataFile],
+        stream: Option<&str>,
+        stated: &Stated,
+        show: impl FnOnce(&Draft),
+    ) -> Result<Self, FileError> {
+        let Some(file) = files.first() else {
+            let advice = "Give a log, or a run.toml with the files that it names.";
+            return Err(FileError::of(Path::new(""), "no file", "a log", advice));
+        };
+        Self::of_file(file, files, (stream, stated), show)
+    }
+
+    fn of_file(
+        file: &DataFile,
+        in_memory: &[DataFile],
+        (stream, stated): (Option<&str>, &Stated),
+        show: impl FnOnce(&Draft),
+    ) -> Result<Self, FileError> {
+        if file.extension() == Some(OsStr::new("toml")) {
+            let run = match file.bytes().map(String::from_utf8_lossy) {
+                Some(text) => Run::of_text(file, &text, Some(file), in_memory)?,
+                None => Run::read(file)?,
+            };
             return Ok(Self { run, log: None });
         }
-        let piped = match path == Path::new(STANDARD_INPUT) {
-            true => Some(piped(path)?),
-            false => None,
-        };
-        let file = match &piped {
-            Some(directory) => directory.path().join(PIPED),
-            None => path.to_owned(),
-        };
-        let draft = Draft::of_stream(&file, stream, stated)?;
-        show(&draft.found());
-        if let Some([found, expected, advice]) = draft.open_question() {
-            return Err(FileError::of(path, found, expected, advice));
-        }
+        let draft = Draft::of_stream(file, stream, stated)?;
+        show(&draft);
+        draft.check(file)?;
         let name = file.file_name().unwrap_or_default().to_string_lossy();
-        let run = Run::of_text(&file, &draft.to_toml(&name), None)?;
+        let run = Run::of_text(file, &draft.to_toml(&name), None, in_memory)?;
         let log = Log {
-            path: file,
+            path: file.to_path_buf(),
             draft,
-            piped,
+            piped: None,
         };
         Ok(Self {
             run,
@@ -82,7 +111,7 @@ impl Opened {
     pub fn read_again(&mut self) -> Result<(), FileError> {
         if let Some(Log { path, draft, .. }) = &self.log {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
-            self.run = Run::of_text(path, &draft.to_toml(&name), None)?;
+            self.run = Run::of_text(path, &draft.to_toml(&name), None, &[])?;
         }
         Ok(())
     }
@@ -93,9 +122,7 @@ impl Opened {
     /// [`FileError`] if required fields are neither detected nor stated.
     pub fn of_table(table: &Table, stated: &Stated) -> Result<Self, FileError> {
         let draft = Draft::of_table(table, stated)?;
-        if let Some([found, expected, advice]) = draft.open_question() {
-            return Err(FileError::of(table.name(), found, expected, advice));
-        }
+        draft.check(table.name())?;
         let name = table.name().to_string_lossy();
         let run = Run::of_table(table, &draft.to_toml(&name))?;
         Ok(Self { run, log: None })
@@ -141,4 +168,46 @@ fn piped(path: &Path) -> Result<TempDir, FileError> {
             "Give the log as a file.",
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RUN: &str = r#"
+        format = "turncal-run/1"
+        [imu]
+        file = "/home/me/imu.csv"
+        output = "rate"
+        gyro_unit = "rad/s"
+        accel_unit = "m/s^2"
+        time_stamp = "end"
+        columns = { time = "t", gyro = ["p", "q", "r"], accel = ["ax", "ay", "az"] }
+    "#;
+
+    fn rows() -> String {
+        let row = |k: u32| format!("{},0.001,0,0.002,0,0.{k},9.8\n", f64::from(k) / 100.0);
+        let rows: String = (1..500).map(row).collect();
+        format!("t,p,q,r,ax,ay,az\n{rows}")
+    }
+
+    #[test]
+    fn files_in_memory_give_the_samples_of_those_on_disk() {
+        let directory = tempfile::tempdir().unwrap();
+        let log = directory.path().join("imu.csv");
+        fs::write(&log, rows()).unwrap();
+        let run = directory.path().join("run.toml");
+        let text = RUN.replace("/home/me/", "");
+        let expected = Run::of_text(&run, &text, None, &[]).unwrap().recording.imu;
+        // A directory that a run.toml names does not exist in a browser.
+        let files = [
+            DataFile::in_memory("run.toml", RUN.as_bytes()),
+            DataFile::in_memory("imu.csv", rows().as_bytes()),
+        ];
+        let opened = Opened::in_memory(&files, None, &Stated::default(), |_| {}).unwrap();
+        assert_eq!(opened.run.recording.imu, expected);
+        let missing = Opened::in_memory(&files[..1], None, &Stated::default(), |_| {});
+        let message = missing.unwrap_err().to_string();
+        assert!(message.contains("add the file"), "{message}");
+    }
 }

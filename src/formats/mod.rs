@@ -5,6 +5,7 @@
 
 mod clock;
 mod csv_file;
+mod data_file;
 mod directories;
 mod door;
 pub mod draft;
@@ -22,6 +23,7 @@ mod streams;
 mod table;
 
 pub use crate::imu::NoiseKeys;
+pub use data_file::DataFile;
 pub(crate) use directories::write_whole_with;
 pub use directories::{
     JOB_FILE, Job, JobKind, LotDirectory, Part, Parts, WholeDirectory, abandon_unfinished,

@@ -1,8 +1,7 @@
 //! The columns of a file of rows, unchanged.
 
-use std::path::Path;
-
 use super::FileError;
+use super::data_file::DataFile;
 use super::rows::LogRows;
 use super::source::Source;
 
@@ -25,8 +24,8 @@ const MOST: usize = 6 << 20;
 
 impl Sheet {
     /// Reads a file that has at least this many rows.
-    pub fn read(path: &Path, fewest: usize) -> Result<Self, FileError> {
-        Self::of(Source::of_file(path).open()?, fewest)
+    pub fn read(file: &DataFile, fewest: usize) -> Result<Self, FileError> {
+        Self::of(Source::of_file(file.clone()).open()?, fewest)
     }
 
     /// Reads as many rows as are needed to identify the columns; the log must have at least `fewest`.

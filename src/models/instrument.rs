@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use super::thermal::{ThermalFile, ThermalVariation, thermal_variation};
 use super::{ModelError, Place, Room, text};
+use crate::formats::draft::Tolerances;
 use crate::formats::{Finite, NonNegative, Positive, TermFile, term_sigma};
 use crate::imu::{
     ANGLES, GaussMarkov, InstallationForm, Noise, PerSensor, Prior, Sensor, TermVector,
@@ -119,6 +120,15 @@ impl InstallationModel {
 }
 
 impl Instrument {
+    /// 1σ tolerances before calibration, for a log of such an instrument.
+    pub fn tolerances(&self) -> Tolerances {
+        Tolerances {
+            scale: PerSensor::from_fn(|sensor| self.variation.get(sensor).scale.sigma()),
+            bias: PerSensor::from_fn(|sensor| self.variation.get(sensor).bias.sigma()),
+            of: self.name.clone(),
+        }
+    }
+
     /// Finds and reads one.
     ///
     /// # Errors

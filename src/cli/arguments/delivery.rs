@@ -99,15 +99,17 @@ impl Begun<'_> {
 }
 
 /// Refuses an output file that is one of the inputs, even with `--force`.
-pub fn keep<'a>(
+pub fn keep(
     output: &Path,
-    inputs: impl IntoIterator<Item = &'a PathBuf>,
+    inputs: impl IntoIterator<Item = impl AsRef<Path>>,
 ) -> anyhow::Result<()> {
     let Ok(target) = output.canonicalize() else {
         return Ok(());
     };
-    let is_target = |input: &PathBuf| input.canonicalize().is_ok_and(|input| input == target);
-    if inputs.into_iter().any(is_target) {
+    let mut inputs = inputs
+        .into_iter()
+        .map(|input| input.as_ref().canonicalize());
+    if inputs.any(|input| input.is_ok_and(|input| input == target)) {
         bail!(
             "{}: found an input of this command, expected an unused name. Choose another name, because replacing \
              this file would delete the input.",

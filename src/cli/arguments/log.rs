@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use super::{latitude, positive};
-use crate::formats::Opened;
 use crate::formats::draft::{Found, Stated, StatedUnit};
+use crate::formats::{DataFile, Opened};
 use crate::imu::Sensor;
 use crate::report::terminal::printable;
 
@@ -49,7 +49,7 @@ impl OfLog {
     /// Stream name and statements.
     pub fn stated(&self) -> anyhow::Result<(Option<&str>, Stated)> {
         let stated = Stated {
-            accel_file: self.accel_file.clone(),
+            accel_file: self.accel_file.as_deref().map(DataFile::from),
             rate_hz: self.rate,
             latitude_deg: self.latitude,
             height_m: self.height,
@@ -70,7 +70,9 @@ impl OfLog {
     /// As [`Self::open`], but passes the fields found in a log to `show`.
     pub fn open_with(&self, path: &Path, show: impl FnOnce(&[Found])) -> anyhow::Result<Opened> {
         let (stream, stated) = self.stated()?;
-        Ok(Opened::new(path, stream, &stated, show)?)
+        Ok(Opened::new(path, stream, &stated, |draft| {
+            show(&draft.found());
+        })?)
     }
 }
 

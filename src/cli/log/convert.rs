@@ -35,7 +35,7 @@ impl Convert {
         let directory = self.overwrite.directory(&self.output, &[&self.log])?;
         let activity = Activity::new("reading");
         let (stream, stated) = self.of_log.stated()?;
-        let draft = Draft::of_stream(&self.log, stream, &stated)?;
+        let draft = Draft::of_stream(&self.log.as_path().into(), stream, &stated)?;
         activity.next("writing");
         draft.convert(&self.log, &directory.path(), self.salvage)?;
         directory.commit()?;

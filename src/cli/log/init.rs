@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::cli::arguments::{OfLog, keep, show_found};
 use crate::cli::terminal::{Activity, print};
 use crate::formats::draft::Draft;
-use crate::formats::write_whole;
+use crate::formats::{DataFile, write_whole};
 
 /// Writes a draft of run.toml for a log without one
 ///
@@ -40,17 +40,18 @@ impl Init {
     pub fn run(&self) -> anyhow::Result<()> {
         let activity = Activity::new("reading");
         let (stream, stated) = self.of_log.stated()?;
-        let accel = self.accel.as_ref().or(stated.accel_file.as_ref());
+        let log = DataFile::from(self.log.as_path());
+        let accel = self.accel.as_deref().or(stated.accel_file.as_deref());
         let draft = match accel {
-            Some(accel) => Draft::of_two_files(&self.log, accel, &self.name(accel), &stated)?,
-            None => Draft::of_stream(&self.log, stream, &stated)?,
+            Some(accel) => Draft::of_two_files(&log, &accel.into(), &self.name(accel), &stated)?,
+            None => Draft::of_stream(&log, stream, &stated)?,
         };
         drop(activity);
         let text = draft.to_toml(&self.name(&self.log));
         let Some(output) = &self.output else {
             return print(text.as_bytes());
         };
-        keep(output, [&self.log].into_iter().chain(accel))?;
+        keep(output, [&*self.log].into_iter().chain(accel))?;
         write_whole(output, text.as_bytes(), self.force)?;
         show_found(&self.log, &draft.found());
         tell!("written: {}", output.display());

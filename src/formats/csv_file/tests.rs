@@ -8,7 +8,7 @@ fn rows(name: &str, content: &[u8]) -> Result<Vec<(u64, Vec<f64>)>, FileError> {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join(name);
     fs::write(&path, content).unwrap();
-    let mut csv = Source::of_file(&path).open()?;
+    let mut csv = Source::of_file(path.as_path()).open()?;
     let columns = ["t", "gx", "ax"].map(|name| csv.column(name));
     let columns: Vec<usize> = columns.into_iter().collect::<Result<_, _>>()?;
     let mut rows = Vec::new();
@@ -76,7 +76,7 @@ fn columns_without_names_are_numbered() {
     ] {
         let path = directory.path().join("a.txt");
         fs::write(&path, content).unwrap();
-        let mut csv = Source::of_file(&path).open().unwrap();
+        let mut csv = Source::of_file(path.as_path()).open().unwrap();
         assert_eq!(csv.header(), ["1", "2", "3"]);
         let column = csv.column("2").unwrap();
         assert!(csv.advance().unwrap());
@@ -145,7 +145,7 @@ fn a_file_that_ends_within_a_row_is_told_from_one_that_is_whole() {
         ("t,gx\n0,10\n1,\"2", 1, false, Some("fields are missing")),
     ] {
         fs::write(&path, content).unwrap();
-        let mut csv = Source::of_file(&path).open().unwrap();
+        let mut csv = Source::of_file(path.as_path()).open().unwrap();
         csv.column("gx").unwrap();
         let mut found = 0;
         while csv.advance().unwrap() {
@@ -177,7 +177,7 @@ fn columns_that_share_a_name_have_that_of_the_row_below_too() {
         ("t,gx,,,gy\ns,dps,,,dps\n".to_owned(), "t|gx|||gy", true),
     ] {
         fs::write(&path, format!("{head}0,1,2,3,4\n1,1,2,3,4\n")).unwrap();
-        let mut csv = Source::of_file(&path).open().unwrap();
+        let mut csv = Source::of_file(path.as_path()).open().unwrap();
         assert_eq!(csv.header().join("|"), names);
         assert_eq!(!csv.units().is_empty(), units);
         assert!(csv.advance().unwrap() && csv.number(0).unwrap() == 0.0);
@@ -215,7 +215,7 @@ fn a_preamble_is_told_from_names_and_rows() {
                 false => text.clone().into_bytes(),
             };
             fs::write(&path, bytes).unwrap();
-            let mut csv = Source::of_file(&path).open().unwrap();
+            let mut csv = Source::of_file(path.as_path()).open().unwrap();
             assert_eq!(csv.header().join("|"), names, "{text}");
             assert_eq!(csv.units().join("|"), units, "{text}");
             assert!(csv.advance().unwrap() && csv.number(2).unwrap() == 2.0);
@@ -229,15 +229,18 @@ fn rows_with_a_tag_are_streams_and_fields_without_a_value_stay_in_place() {
     let path = directory.path().join("a.txt");
     let rows = |k: usize| format!("Raw:{k},-2\nUni:{k}.5,-2.5,9\n");
     fs::write(&path, (0..20).map(rows).collect::<String>()).unwrap();
-    assert_eq!(CsvFile::tags(&path).unwrap(), ["Raw", "Uni"]);
-    let mut csv = LogRows::new(CsvFile::open(&path, Some("Uni")).unwrap());
+    assert_eq!(
+        CsvFile::tags(&path.as_path().into()).unwrap(),
+        ["Raw", "Uni"]
+    );
+    let mut csv = LogRows::new(CsvFile::open(&path.as_path().into(), Some("Uni")).unwrap());
     assert_eq!(csv.header(), ["1", "2", "3", "4"]);
     assert!(csv.advance().unwrap() && csv.advance().unwrap());
     assert_eq!((csv.line(), csv.number(1).unwrap()), (4, 1.5));
 
     fs::write(&path, "a\tb\tc\n\t1\t\n\t2\t3\n\t3\t\n").unwrap();
-    assert!(CsvFile::tags(&path).unwrap().is_empty());
-    let mut csv = Source::of_file(&path).open().unwrap();
+    assert!(CsvFile::tags(&path.as_path().into()).unwrap().is_empty());
+    let mut csv = Source::of_file(path.as_path()).open().unwrap();
     assert!(csv.advance().unwrap() && csv.advance().unwrap());
     assert!(csv.is_blank(0) && csv.number(2).unwrap() == 3.0);
 }

@@ -1,8 +1,11 @@
 //! Fields detected in a log, with their certainty.
 
+use std::path::Path;
+
 use super::motion::Motion;
 use super::units::short;
 use super::{AXES_OF_PROGRAM, Draft, NO_COLUMNS};
+use crate::formats::FileError;
 use crate::imu::Sensor;
 
 /// Certainty of a field.
@@ -52,8 +55,17 @@ impl Draft {
         ]
     }
 
+    /// Fails for a damaged log, and for a field that the log does not show but a run needs.
+    pub(in crate::formats) fn check(&self, file: &Path) -> Result<(), FileError> {
+        let damage = self.streams.as_ref().and_then(|of| of.damage.clone());
+        let open = self
+            .open_question()
+            .map(|[found, expected, advice]| FileError::of(file, found, expected, advice));
+        damage.or(open).map_or(Ok(()), Err)
+    }
+
     /// The first open field that prevents a run: evidence in the log, requirement, remedy.
-    pub(in crate::formats) fn open_question(&self) -> Option<[String; 3]> {
+    fn open_question(&self) -> Option<[String; 3]> {
         let (field, why) = self.page("log").open.into_iter().next()?;
         let is_zero = |motion: &Motion| motion.gravity == 0.0;
         let has_accels =

@@ -22,7 +22,7 @@ use nalgebra::Vector3;
 use crate::formats::instrument::USUAL_PERIOD;
 use crate::formats::rows::LogRows;
 use crate::formats::table::Table;
-use crate::formats::{FileError, Sheet};
+use crate::formats::{DataFile, FileError, Sheet};
 use crate::imu::{PerSensor, Sensor};
 use crate::noise::{Clusters, TriadNoise};
 use columns::Columns;
@@ -76,7 +76,7 @@ impl Draft {
     /// # Errors
     /// [`FileError`] if it cannot be read or has too few rows.
     pub fn of_file(path: &Path) -> Result<Self, FileError> {
-        Self::of_stream(path, None, &Stated::default())
+        Self::of_stream(&path.into(), None, &Stated::default())
     }
 
     /// The same for one stream of a log, with statements about it.
@@ -84,20 +84,20 @@ impl Draft {
     /// # Errors
     /// [`FileError`] if it cannot be read or has too few rows.
     pub fn of_stream(
-        path: &Path,
+        file: &DataFile,
         stream: Option<&str>,
         stated: &Stated,
     ) -> Result<Self, FileError> {
         if let Some(accel) = &stated.accel_file {
-            let whole = accel.canonicalize().unwrap_or_else(|_| accel.clone());
-            return Self::of_two_files(path, accel, &whole.to_string_lossy(), stated);
+            let whole = accel.canonicalize().unwrap_or_else(|_| accel.to_path_buf());
+            return Self::of_two_files(file, accel, &whole.to_string_lossy(), stated);
         }
-        if let Some((streams, sheet)) = Streams::of_file(path, stream)? {
+        if let Some((streams, sheet)) = Streams::of_file(file, stream)? {
             return Ok(Self::of_sheet(sheet, Some(streams), stated));
         }
-        let sheet = Sheet::read(path, FEWEST_ROWS)?;
+        let sheet = Sheet::read(file, FEWEST_ROWS)?;
         if columns::have_rows_of_their_own(&sheet) {
-            let (streams, sheet) = Streams::of_two_files(path, path, None)?;
+            let (streams, sheet) = Streams::of_two_files(file, file, None)?;
             return Ok(Self::of_sheet(sheet, Some(streams), stated));
         }
         Ok(Self::of_sheet(sheet, None, stated))
@@ -118,8 +118,8 @@ impl Draft {
     /// # Errors
     /// [`FileError`] if one cannot be read, has hardly any rows or lacks its triad or its time.
     pub fn of_two_files(
-        gyro: &Path,
-        accel: &Path,
+        gyro: &DataFile,
+        accel: &DataFile,
         accel_name: &str,
         stated: &Stated,
     ) -> Result<Self, FileError> {

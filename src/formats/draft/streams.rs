@@ -1,7 +1,5 @@
 //! Selection of the streams or files of the instrument.
 
-use std::path::{Path, PathBuf};
-
 use super::FEWEST_ROWS;
 use super::columns::{self, Columns, by_stem};
 use super::name::Name;
@@ -15,7 +13,7 @@ use crate::formats::rows::LogRows;
 use crate::formats::schema::page::Page;
 use crate::formats::source::Source;
 use crate::formats::streams::{self, Column, Found, Stream};
-use crate::formats::{FileError, Sheet};
+use crate::formats::{DataFile, FileError, Sheet};
 use crate::imu::{Output, PerSensor, Sensor};
 
 /// The gyro and accelerometer streams.
@@ -33,8 +31,8 @@ pub struct Streams {
     remarks: Vec<String>,
     /// Body axes of the program.
     pub axes: Option<&'static str>,
-    /// Place and reason of damage.
-    damage: Option<String>,
+    /// The first damage.
+    pub damage: Option<FileError>,
     /// The file of the accelerometers, where both triads are rows of text.
     pub written: Option<Written>,
 }
@@ -55,7 +53,7 @@ fn one_line(text: &str) -> String {
 
 /// A stream of a log, or a file of rows.
 struct Member {
-    file: PathBuf,
+    file: DataFile,
     is_stream: bool,
     found: Found,
     triads: PerSensor<Option<[usize; 3]>>,
@@ -65,7 +63,10 @@ struct Member {
 
 impl Streams {
     /// Examines a log; `None` for a text with a single stream.
-    pub fn of_file(file: &Path, wanted: Option<&str>) -> Result<Option<(Self, Sheet)>, FileError> {
+    pub fn of_file(
+        file: &DataFile,
+        wanted: Option<&str>,
+    ) -> Result<Option<(Self, Sheet)>, FileError> {
         let (members, damage) = match streams::open(file)? {
             Some(log) => {
                 let (found, damage) = streams::survey(file, log);
@@ -95,15 +96,15 @@ impl Streams {
             }
         };
         streams.listed = listed(&members);
-        streams.damage = damage.map(|damage| one_line(&damage.to_string()));
+        streams.damage = damage;
         Ok(Some((streams, sheet)))
     }
 
     /// Examines the files of both triads, as written by phones and `ulog2csv`, possibly one file with separate rows; a
     /// separate accelerometer file has this name in the draft.
     pub fn of_two_files(
-        gyro: &Path,
-        accel: &Path,
+        gyro: &DataFile,
+        accel: &DataFile,
         accel_name: Option<&str>,
     ) -> Result<(Self, Sheet), FileError> {
         let gyro = Member::of_rows(gyro, Sensor::Gyro)?;
@@ -196,6 +197,7 @@ impl Streams {
         }
         self.remarks.iter().for_each(|remark| page.remark(remark));
         if let Some(damage) = self.damage.as_ref().filter(|_| self.written.is_none()) {
+            let damage = one_line(&damage.to_string());
             let why = format_args!("uncomment to use the intact part. {damage}");
             page.open("salvage = true", why);
         }
@@ -203,7 +205,7 @@ impl Streams {
 }
 
 impl Member {
-    fn of_stream(file: &Path, found: Found) -> Self {
+    fn of_stream(file: &DataFile, found: Found) -> Self {
         let all: Vec<Name> = names(&found).iter().map(|name| Name::of(name)).collect();
         let triads = PerSensor::from_fn(|sensor| {
             let of = |k: &usize| all[*k].sensor() == Some(sensor);
@@ -220,7 +222,7 @@ impl Member {
         let named = best.filter(|&k| all[k].is_time() > 1).map(|k| &columns[k]);
         let time = named.or_else(|| columns.iter().find(has_word));
         Self {
-            file: file.to_owned(),
+            file: file.clone(),
             is_stream: true,
             triads,
             time: time.map(|column| (column.name.clone(), column.unit.to_owned())),
@@ -229,7 +231,7 @@ impl Member {
     }
 
     /// The rows of a file with values of a sensor.
-    fn of_rows(file: &Path, sensor: Sensor) -> Result<Self, FileError> {
+    fn of_rows(file: &DataFile, sensor: Sensor) -> Result<Self, FileError> {
         let mut sheet = Sheet::read(file, FEWEST_ROWS)?;
         let of_sensor = columns::named(&sheet, sensor);
         if !of_sensor.is_empty() {
@@ -254,7 +256,7 @@ impl Member {
         Source {
             stream: self.is_stream.then_some(&*self.found.stream.name),
             salvage,
-            ..Source::of_file(&self.file)
+            ..Source::of_file(self.file.clone())
         }
     }
 
@@ -375,11 +377,11 @@ fn names(found: &Found) -> Vec<String> {
 }
 
 /// The streams of a text whose rows are distinguished by tags; empty for other texts.
-fn tagged(file: &Path) -> Result<Vec<Member>, FileError> {
+fn tagged(file: &DataFile) -> Result<Vec<Member>, FileError> {
     let of_tag = |tag: String| {
         let source = Source {
             stream: Some(&tag),
-            ..Source::of_file(file)
+            ..Source::of_file(file.clone())
         };
         let mut sheet = Sheet::of(source.open()?, 1)?;
         let mut member = Member::of_stream(file, rows_as_stream(&tag, &sheet));

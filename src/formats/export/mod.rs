@@ -29,6 +29,8 @@ use source::Source;
 pub struct Format {
     /// Its name on the command line.
     pub name: &'static str,
+    /// Extension of its files.
+    pub extension: &'static str,
     /// Programs that read it.
     pub about: &'static str,
     write: fn(&Source) -> Exported,
@@ -36,9 +38,15 @@ pub struct Format {
     holds_temperature: bool,
 }
 
-const fn row(name: &'static str, about: &'static str, write: fn(&Source) -> Exported) -> Format {
+const fn row(
+    name: &'static str,
+    extension: &'static str,
+    about: &'static str,
+    write: fn(&Source) -> Exported,
+) -> Format {
     Format {
         name,
+        extension,
         about,
         write,
         holds_temperature: false,
@@ -48,28 +56,28 @@ const fn row(name: &'static str, about: &'static str, write: fn(&Source) -> Expo
 /// Every format.
 #[rustfmt::skip]
 static FORMATS: [Format; 20] = [
-    row("kalibr", "IMU intrinsics for Kalibr, model scale-misalignment", kalibr::write),
-    row("kf-gins", "IMU section of a KF-GINS configuration", kf_gins::write),
-    row("c", "A C99 header with constants and a function", code::c).with_temperature(),
-    row("octave", "An Octave or MATLAB function file", code::octave),
-    row("text", "All values with name, σ and unit", text::write),
-    row("px4", "PX4 parameters: CAL_GYRO0, CAL_ACC0", autopilot::px4).with_temperature(),
-    row("ardupilot", "ArduPilot parameters: INS_GYROFFS, INS_ACCOFFS, INS_ACCSCAL", autopilot::ardupilot)
+    row("kalibr", "yaml", "IMU intrinsics for Kalibr, model scale-misalignment", kalibr::write),
+    row("kf-gins", "yaml", "IMU section of a KF-GINS configuration", kf_gins::write),
+    row("c", "h", "A C99 header with constants and a function", code::c).with_temperature(),
+    row("octave", "m", "An Octave or MATLAB function file", code::octave),
+    row("text", "txt", "All values with name, σ and unit", text::write),
+    row("px4", "params", "PX4 parameters: CAL_GYRO0, CAL_ACC0", autopilot::px4).with_temperature(),
+    row("ardupilot", "param", "ArduPilot parameters: INS_GYROFFS, INS_ACCOFFS, INS_ACCSCAL", autopilot::ardupilot)
         .with_temperature(),
-    row("open-vins-kalibr", "IMU intrinsics for OpenVINS, model kalibr", kalibr::open_vins_kalibr),
-    row("open-vins-rpng", "IMU intrinsics for OpenVINS, model rpng", kalibr::open_vins_rpng),
-    row("ikalibr", "IMU intrinsics for iKalibr", ikalibr::write),
-    row("imu-calib", "Accelerometer calibration for the ROS package imu_calib", ros::imu_calib),
-    row("ros-covariance", "Covariances for ROS sensor_msgs/Imu; needs --run", ros::covariance),
-    row("dlio", "IMU intrinsics for DLIO (direct LiDAR-inertial odometry)", ros::dlio),
-    row("gazebo", "IMU noise for Gazebo", gazebo::write),
-    row("mat", "A MATLAB structure (MAT file)", mat::write),
-    row("betaflight", "Accelerometer zeros for Betaflight", autopilot::betaflight),
-    row("inav", "Zeros and gains for INAV", autopilot::inav),
-    row("realsense", "IMU calibration table of a RealSense D400 camera, as written by rs-imu-calibration",
+    row("open-vins-kalibr", "yaml", "IMU intrinsics for OpenVINS, model kalibr", kalibr::open_vins_kalibr),
+    row("open-vins-rpng", "yaml", "IMU intrinsics for OpenVINS, model rpng", kalibr::open_vins_rpng),
+    row("ikalibr", "yaml", "IMU intrinsics for iKalibr", ikalibr::write),
+    row("imu-calib", "yaml", "Accelerometer calibration for the ROS package imu_calib", ros::imu_calib),
+    row("ros-covariance", "yaml", "Covariances for ROS sensor_msgs/Imu; needs --run", ros::covariance),
+    row("dlio", "yaml", "IMU intrinsics for DLIO (direct LiDAR-inertial odometry)", ros::dlio),
+    row("gazebo", "sdf", "IMU noise for Gazebo", gazebo::write),
+    row("mat", "mat", "A MATLAB structure (MAT file)", mat::write),
+    row("betaflight", "txt", "Accelerometer zeros for Betaflight", autopilot::betaflight),
+    row("inav", "txt", "Zeros and gains for INAV", autopilot::inav),
+    row("realsense", "bin", "IMU calibration table of a RealSense D400 camera, as written by rs-imu-calibration",
         cameras::realsense),
-    row("depthai", "IMU calibration for a DepthAI (OAK) camera, JSON", cameras::depthai),
-    row("slimevr", "Calibration for a SlimeVR tracker", slimevr::write),
+    row("depthai", "json", "IMU calibration for a DepthAI (OAK) camera, JSON", cameras::depthai),
+    row("slimevr", "h", "Calibration for a SlimeVR tracker", slimevr::write),
 ];
 
 impl Format {

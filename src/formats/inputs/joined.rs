@@ -60,7 +60,7 @@ impl Joined {
         let mut resampled = Resampled::new(output);
         courses.iter().for_each(|course| resampled.measure(course));
         let rows = rows_of_both(&gyro, &accel, &courses, &mut resampled, lag);
-        let file = parts.gyro.source.file.clone();
+        let file = parts.gyro.source.file.to_path_buf();
         if rows.is_empty() {
             return Err(apart(&parts.accel.source.file, &gyro, &accel));
         }

@@ -1,8 +1,7 @@
 //! The file of labelled sections.
 
-use std::path::Path;
-
 use super::source::Source;
+use crate::formats::data_file::DataFile;
 use crate::formats::error::FileError;
 use crate::imu::AxisOrder;
 use crate::recording::{ImuSamples, LabelledMotion, Segment};
@@ -10,13 +9,13 @@ use crate::recording::{ImuSamples, LabelledMotion, Segment};
 /// Reads the sections of a run with these samples, with stamps `lag` samples after their start; `notes` receives
 /// remarks about the file.
 pub fn read(
-    file: &Path,
+    file: &DataFile,
     imu: &ImuSamples,
     lag: f64,
     axes: AxisOrder,
     notes: &mut Vec<String>,
 ) -> Result<Vec<Segment>, FileError> {
-    let mut csv = Source::of_file(file).open()?;
+    let mut csv = Source::of_file(file.clone()).open()?;
     let start_column = csv.column("start")?;
     let end_column = csv.column("end")?;
     let label_column = csv.column("label")?;

@@ -1,9 +1,8 @@
 //! Sources of rows, as described in `run.toml`.
 
-use std::path::{Path, PathBuf};
-
 use crate::formats::clock::{Breaks, Clock, TimeUnit};
 use crate::formats::csv_file::CsvFile;
+use crate::formats::data_file::DataFile;
 use crate::formats::error::FileError;
 use crate::formats::rows::LogRows;
 use crate::formats::schema::instrument::Fields;
@@ -14,7 +13,7 @@ use crate::formats::table::Table;
 /// Source of rows.
 #[derive(Debug, Clone)]
 pub struct Source<'a> {
-    pub file: PathBuf,
+    pub file: DataFile,
     /// The selected stream, if the file has several.
     pub stream: Option<&'a str>,
     /// Whether the intact part of a damaged file is used.
@@ -25,9 +24,9 @@ pub struct Source<'a> {
 
 impl Source<'_> {
     /// A file without further settings.
-    pub fn of_file(file: &Path) -> Self {
+    pub fn of_file(file: impl Into<DataFile>) -> Self {
         Self {
-            file: file.to_owned(),
+            file: file.into(),
             stream: None,
             salvage: false,
             table: None,
@@ -48,6 +47,11 @@ impl Source<'_> {
 }
 
 impl<'a> Fields<'a> {
+    /// The file of this name in `run.toml`.
+    pub fn file(&self, name: &str) -> DataFile {
+        DataFile::find(self.directory.join(name), self.in_memory)
+    }
+
     /// Source described by a TOML table.
     pub fn source(
         &self,
@@ -56,7 +60,7 @@ impl<'a> Fields<'a> {
         salvage: Option<bool>,
     ) -> Source<'a> {
         Source {
-            file: self.directory.join(file),
+            file: self.file(file),
             stream: stream.as_deref(),
             salvage: salvage.unwrap_or(false),
             table: None,
@@ -107,7 +111,7 @@ impl<'a> Fields<'a> {
         };
         let file = fields.file.as_ref();
         let source = Source {
-            file: file.map_or_else(|| gyro.file.clone(), |file| self.directory.join(file)),
+            file: file.map_or_else(|| gyro.file.clone(), |file| self.file(file)),
             stream: fields.stream.as_deref().or(gyro.stream),
             salvage: fields.salvage.unwrap_or(gyro.salvage),
             table: None,

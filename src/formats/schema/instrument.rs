@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 
 use super::{Document, Names, OneOrThree, RunFile, TermFile};
 use crate::formats::clock::{Breaks, Clock};
+use crate::formats::data_file::DataFile;
 use crate::formats::error::{FileError, list, suggestion};
 use crate::formats::imu_log::ImuLog;
 use crate::formats::inputs::temperature::{TemperatureColumns, TemperatureUnit};
@@ -43,6 +44,8 @@ pub struct Fields<'a> {
     pub directory: &'a Path,
     /// Rows of the instrument in memory, in place of its log.
     pub table: Option<&'a Table>,
+    /// Files of this directory that are in memory.
+    pub in_memory: &'a [DataFile],
     pub notes: Vec<String>,
 }
 

@@ -10,6 +10,7 @@ use toml::de::DeTable;
 use super::instrument::{Fields, InstrumentFields};
 use super::{Document, FORMAT, META, RunFile, StandstillFile};
 use crate::earth::Site;
+use crate::formats::data_file::DataFile;
 use crate::formats::draft::turned_angle;
 use crate::formats::error::FileError;
 use crate::formats::imu_log::ImuLog;
@@ -29,23 +30,30 @@ impl Run {
     /// nominal scales and priors are returned along right-front-up for any `body_axes`. Unstated site, noise, period
     /// and prior get wide defaults, with a note.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        Self::of_text(path, &text_of(path)?, Some(path))
+        Self::of_text(path, &text_of(path)?, Some(path), &[])
     }
 
-    /// The same from the text of a `run.toml` located (or assumed) next to this file and read from `source`.
-    pub fn of_text(path: &Path, text: &str, source: Option<&Path>) -> Result<Self, FileError> {
-        Self::of_parts(path, text, source, None)
+    /// The same from the text of a `run.toml` located (or assumed) next to this file and read from `source`; the files
+    /// that it names may be in memory.
+    pub fn of_text(
+        path: &Path,
+        text: &str,
+        source: Option<&Path>,
+        in_memory: &[DataFile],
+    ) -> Result<Self, FileError> {
+        Self::of_parts(path, text, source, in_memory, None)
     }
 
     /// The same with the samples of a table in place of a log.
     pub fn of_table(table: &Table, text: &str) -> Result<Self, FileError> {
-        Self::of_parts(table.name(), text, None, Some(table))
+        Self::of_parts(table.name(), text, None, &[], Some(table))
     }
 
     fn of_parts(
         path: &Path,
         text: &str,
         source: Option<&Path>,
+        in_memory: &[DataFile],
         table: Option<&Table>,
     ) -> Result<Self, FileError> {
         let document = Document::of(path, text);
@@ -56,20 +64,25 @@ impl Run {
             run: &file,
             directory,
             table,
+            in_memory,
             notes: Vec::new(),
         };
         let site = fields.site()?;
         let instrument = fields.instrument()?;
         let table_log = fields.table_log()?;
+        let segments_file = file.segments.as_ref().map(|of| fields.file(&of.file));
         let mut notes = fields.notes;
-        let segments_file = file.segments.as_ref().map(|of| directory.join(&of.file));
 
         // The small files' fields are checked before the large files are read.
         let mut files: Vec<PathBuf> = source.map(Path::to_owned).into_iter().collect();
-        files.extend(table.is_none().then(|| instrument.log.source.file.clone()));
+        files.extend(
+            table
+                .is_none()
+                .then(|| instrument.log.source.file.to_path_buf()),
+        );
         files.extend(other_file(&instrument.log));
-        files.extend(table_log.as_ref().map(|log| log.source.file.clone()));
-        files.extend(segments_file.clone());
+        files.extend(table_log.as_ref().map(|log| log.source.file.to_path_buf()));
+        files.extend(segments_file.as_deref().map(Path::to_owned));
         let imu = instrument.samples(&mut notes)?;
         let known = instrument.with_noise(&imu, &mut notes);
         let table = (table_log.as_ref()).map(|log| log.read(&imu, &mut notes));
@@ -133,6 +146,7 @@ pub fn check(document: Document) -> Result<(), FileError> {
         run: &run,
         directory: Path::new(""),
         table: None,
+        in_memory: &[],
         notes: Vec::new(),
     };
     fields.site()?;
@@ -165,7 +179,7 @@ fn fill<'a, T: Deserialize<'a>>(
 /// The accelerometer file, if different from the gyro file.
 fn other_file(log: &ImuLog) -> Option<PathBuf> {
     let (source, _) = log.accel_from.as_ref()?;
-    (source.file != log.source.file).then(|| source.file.clone())
+    (source.file != log.source.file).then(|| source.file.to_path_buf())
 }
 
 fn text_of(path: &Path) -> Result<String, FileError> {

@@ -2,9 +2,7 @@
 
 use std::io::{self, Read, Seek, SeekFrom};
 
-/// Source of the bytes of a log.
-pub trait Source: Read + Seek + Send {}
-impl<T: Read + Seek + Send> Source for T {}
+use crate::formats::data_file::Content;
 
 /// Why and where reading of a file stopped.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -27,13 +25,13 @@ impl Broken {
 
 /// A file read from its start.
 pub struct Input {
-    source: Box<dyn Source>,
+    source: Box<dyn Content>,
     offset: u64,
     length: u64,
 }
 
 impl Input {
-    pub fn new(mut source: Box<dyn Source>) -> io::Result<Self> {
+    pub fn new(mut source: Box<dyn Content>) -> io::Result<Self> {
         let length = source.seek(SeekFrom::End(0))?;
         source.seek(SeekFrom::Start(0))?;
         Ok(Self {
@@ -45,7 +43,7 @@ impl Input {
 
     /// The underlying file.
     #[cfg_attr(not(any(feature = "hdf5", feature = "npy")), allow(dead_code))]
-    pub fn into_source(self) -> Box<dyn Source> {
+    pub fn into_source(self) -> Box<dyn Content> {
         self.source
     }
 

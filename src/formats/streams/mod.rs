@@ -31,10 +31,10 @@ mod sqlite;
 #[cfg(feature = "ulog")]
 mod ulog;
 
-use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
+use super::data_file::DataFile;
 use super::error::{FileError, Place};
 use bytes::{Broken, Input};
 pub(super) use rows::{Found, StreamRows, survey};
@@ -145,25 +145,13 @@ const CLOSED: [(&[u8], &str, &str); 2] = [
 ];
 
 /// Opens a log according to its content; `None` if it is not such a log, but perhaps text.
-pub fn open(path: &Path) -> Result<Option<Box<dyn Log>>, FileError> {
-    let refused = |error: std::io::Error| {
-        FileError::io(
-            path,
-            "open the file",
-            &error,
-            "Names in run.toml are relative to run.toml; correct the name or add the file.",
-        )
-    };
-    // What is no regular file, or none at all, is refused where text is read.
-    if !std::fs::metadata(path).is_ok_and(|kind| kind.is_file()) {
-        return Ok(None);
-    }
-    let mut file = File::open(path).map_err(refused)?;
+pub fn open(path: &DataFile) -> Result<Option<Box<dyn Log>>, FileError> {
+    let mut file = path.open()?;
     let mut begin = Vec::new();
-    Read::by_ref(&mut file)
+    file.by_ref()
         .take(128)
         .read_to_end(&mut begin)
-        .map_err(refused)?;
+        .map_err(|error| path.refused(&error))?;
     let closed = CLOSED.iter().find(|(bytes, ..)| begin.starts_with(bytes));
     if let Some((_, found, advice)) = closed {
         let expected = "a text log or a supported binary log";
@@ -182,7 +170,7 @@ pub fn open(path: &Path) -> Result<Option<Box<dyn Log>>, FileError> {
         ));
     };
     let file = BufReader::with_capacity(1 << 16, file);
-    let input = Input::new(Box::new(file)).map_err(refused)?;
+    let input = Input::new(Box::new(file)).map_err(|error| path.refused(&error))?;
     open(input)
         .map(Some)
         .map_err(|broken| broken.of(path, ADVICE))

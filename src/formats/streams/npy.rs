@@ -17,7 +17,8 @@ use zip::{CompressionMethod, ZipArchive};
 
 use super::Log;
 use super::arrays::{Array, Arrays, Open};
-use super::bytes::{Broken, Input, Source};
+use super::bytes::{Broken, Input};
+use crate::formats::data_file::Content;
 use header::Header;
 
 /// Maximum header length.
@@ -77,7 +78,7 @@ pub fn open_archive(input: Input) -> Result<Box<dyn Log>, Broken> {
 }
 
 /// A file shared by several readers at different offsets.
-type File = Rc<RefCell<Box<dyn Source>>>;
+type File = Rc<RefCell<Box<dyn Content>>>;
 
 struct At {
     file: File,

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::bytes::Broken;
 use super::{Log, Stream};
+use crate::formats::data_file::DataFile;
 use crate::formats::error::{FileError, Place, list, suggestion};
 use crate::formats::rows::Rows;
 
@@ -68,7 +69,7 @@ const CUT_OFF: &str = "Copy or record the file again, or set `salvage = true` to
 impl StreamRows {
     /// Opens a stream, which must have a sample; without a name, the only one.
     pub fn open(
-        file: &Path,
+        file: &DataFile,
         mut log: Box<dyn Log>,
         name: Option<&str>,
         salvage: bool,
@@ -110,7 +111,7 @@ impl StreamRows {
         let columns = columns.map(|column| (column.name.clone(), column.unit.to_owned()));
         let (names, units) = columns.unzip();
         Ok(Self {
-            file: file.to_owned(),
+            file: file.to_path_buf(),
             name: found.name.clone(),
             names,
             units,

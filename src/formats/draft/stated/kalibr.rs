@@ -215,10 +215,10 @@ update_rate:                 200.0      #Hz (for discretization of the values ab
             noise: Some(imu.noise),
             ..Stated::default()
         };
-        let draft = Draft::of_stream(&log, None, &stated)
+        let draft = Draft::of_stream(&log.as_path().into(), None, &stated)
             .unwrap()
             .to_toml("log.csv");
-        let run = Run::of_text(&log, &draft, None).unwrap();
+        let run = Run::of_text(&log, &draft, None, &[]).unwrap();
         for sensor in Sensor::ALL {
             let (found, expected) = (run.instrument.noise.get(sensor), imu.noise.get(sensor));
             let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-6, "{a} {b}");

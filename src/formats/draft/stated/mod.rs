@@ -3,17 +3,17 @@
 mod kalibr;
 
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 pub use kalibr::KalibrImu;
 
 use super::name::{self, Unit};
 use crate::earth::Site;
-use crate::formats::FileError;
 use crate::formats::error::{choice, suggestion};
 use crate::formats::quantity::{OUTPUTS, Of, units};
 use crate::formats::schema::stated_gravity_sigma;
 use crate::formats::table::Table;
+use crate::formats::{DataFile, FileError};
 use crate::imu::{Noise, PerSensor, Sensor};
 use crate::models::{Instrument, ModelError, Place};
 use crate::units::DEGREE;
@@ -22,7 +22,7 @@ use crate::units::DEGREE;
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Stated {
     /// The accelerometer file, if the log contains only the gyros.
-    pub accel_file: Option<PathBuf>,
+    pub accel_file: Option<DataFile>,
     /// Columns, by name.
     pub columns: StatedColumns,
     /// Rows a second.

@@ -1,0 +1,97 @@
+//! A file of rows: on disk, or its bytes in memory where there is no disk, as in a browser.
+
+use std::fs::{self, File};
+use std::io::{self, Cursor, Read, Seek};
+use std::ops::Deref;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::error::FileError;
+
+/// A readable file, with the path by which `run.toml` and messages name it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DataFile {
+    path: PathBuf,
+    /// `None` if it is on disk.
+    bytes: Option<Arc<[u8]>>,
+}
+
+/// The content of a file.
+pub trait Content: Read + Seek + Send {}
+impl<T: Read + Seek + Send> Content for T {}
+
+impl DataFile {
+    /// A file in memory.
+    pub fn in_memory(path: impl Into<PathBuf>, bytes: impl Into<Arc<[u8]>>) -> Self {
+        Self {
+            path: path.into(),
+            bytes: Some(bytes.into()),
+        }
+    }
+
+    /// The bytes of a file in memory.
+    pub fn bytes(&self) -> Option<&[u8]> {
+        self.bytes.as_deref()
+    }
+
+    /// The file of this path: one of those in memory, which have a name but no directory, otherwise on disk.
+    pub(super) fn find(path: PathBuf, in_memory: &[Self]) -> Self {
+        let found = in_memory
+            .iter()
+            .find(|file| file.file_name() == path.file_name());
+        found.cloned().unwrap_or_else(|| path.into())
+    }
+
+    /// Opens a regular file, which can be read more than once.
+    pub(super) fn open(&self) -> Result<Box<dyn Content>, FileError> {
+        if let Some(bytes) = &self.bytes {
+            return Ok(Box::new(Cursor::new(bytes.clone())));
+        }
+        // To open a pipe would wait for whoever writes into it.
+        let kind = fs::metadata(self).map_err(|error| self.refused(&error))?;
+        if !kind.is_file() {
+            let found = match kind.is_dir() {
+                true => "a directory",
+                false => "a device or pipe",
+            };
+            let expected = "a regular file that can be read more than once";
+            let advice = "Save its output to a file and give that file.";
+            return Err(FileError::of(self, found, expected, advice));
+        }
+        let file = File::open(self).map_err(|error| self.refused(&error))?;
+        Ok(Box::new(file))
+    }
+
+    /// Error for a file that the system does not open.
+    pub(super) fn refused(&self, error: &io::Error) -> FileError {
+        let advice =
+            "Names in run.toml are relative to run.toml; correct the name or add the file.";
+        FileError::io(self, "open the file", error, advice)
+    }
+}
+
+impl From<PathBuf> for DataFile {
+    fn from(path: PathBuf) -> Self {
+        Self { path, bytes: None }
+    }
+}
+
+impl From<&Path> for DataFile {
+    fn from(path: &Path) -> Self {
+        path.to_owned().into()
+    }
+}
+
+impl Deref for DataFile {
+    type Target = Path;
+
+    fn deref(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl AsRef<Path> for DataFile {
+    fn as_ref(&self) -> &Path {
+        self
+    }
+}
