@@ -10,6 +10,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::{Context, bail};
 
+use super::lines::Lines;
 use crate::calibration::Options;
 use crate::cli::arguments::OfLog;
 use crate::cli::terminal::{columns, end_gently, is_ended, print};
@@ -77,6 +78,7 @@ impl Follow<'_> {
                 due = begun + APART.max(processor_time().saturating_sub(spent) * SHARE);
             }
         };
+        rows.end()?;
         if rows.received.bytes > known {
             followed.evaluate(rows.received.bytes, &mut screen)?;
         }
@@ -84,6 +86,9 @@ impl Follow<'_> {
             "stopped following: {end}; the rows are in {}",
             rows.log.display()
         );
+        if let Some(incomplete @ 1..) = rows.incomplete() {
+            tell!("incomplete lines left out: {incomplete}");
+        }
         Ok(followed.read)
     }
 
@@ -117,6 +122,7 @@ impl Follow<'_> {
             },
             kind: Kind::Kept {
                 file,
+                lines: Lines::new(is_serial(self.source)),
                 chunks: read_in_background(self.source.to_owned())?,
             },
             log,
@@ -214,10 +220,12 @@ struct Incoming {
 enum Kind {
     /// Another program writes the log.
     Growing { grew: Instant, patience: Duration },
-    /// Bytes that are read are written to the log.
+    /// Lines that are read are written to the log.
     Kept {
         file: File,
-        chunks: Receiver<io::Result<Vec<u8>>>,
+        lines: Lines,
+        /// Bytes; `None` if the device is gone.
+        chunks: Receiver<Option<Vec<u8>>>,
     },
 }
 
@@ -238,22 +246,51 @@ impl Incoming {
                 }
                 Ok(grew.elapsed() < *patience)
             }
-            Kind::Kept { file, chunks } => {
+            Kind::Kept { lines, chunks, .. } => {
                 let begun = Instant::now();
-                while let Some(left) = most.checked_sub(begun.elapsed()) {
+                let mut complete = Vec::new();
+                let more = loop {
+                    let Some(left) = most.checked_sub(begun.elapsed()) else {
+                        break true;
+                    };
                     match chunks.recv_timeout(left) {
-                        Ok(bytes) => {
-                            let bytes = bytes.with_context(|| self.log.display().to_string())?;
-                            file.write_all(&bytes)
-                                .with_context(|| self.log.display().to_string())?;
-                            self.received.write_all(&bytes)?;
-                        }
-                        Err(RecvTimeoutError::Timeout) => break,
-                        Err(RecvTimeoutError::Disconnected) => return Ok(false),
+                        Ok(Some(bytes)) => complete.extend(lines.push(&bytes)),
+                        Ok(None) => lines.interrupt(),
+                        Err(RecvTimeoutError::Timeout) => break true,
+                        Err(RecvTimeoutError::Disconnected) => break false,
                     }
-                }
-                Ok(true)
+                };
+                self.keep(&complete)?;
+                Ok(more)
             }
+        }
+    }
+
+    /// Keeps the last line, complete or not.
+    fn end(&mut self) -> anyhow::Result<()> {
+        match &mut self.kind {
+            Kind::Growing { .. } => Ok(()),
+            Kind::Kept { lines, .. } => {
+                let rest = lines.end();
+                self.keep(&rest)
+            }
+        }
+    }
+
+    fn keep(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
+        if let Kind::Kept { file, .. } = &mut self.kind {
+            let written = file.write_all(bytes);
+            written.with_context(|| self.log.display().to_string())?;
+            self.received.write_all(bytes)?;
+        }
+        Ok(())
+    }
+
+    /// Number of incomplete lines; `None` for a file that another program writes.
+    fn incomplete(&self) -> Option<usize> {
+        match &self.kind {
+            Kind::Growing { .. } => None,
+            Kind::Kept { lines, .. } => Some(lines.incomplete),
         }
     }
 }
@@ -277,8 +314,23 @@ impl Write for Received {
     }
 }
 
-/// Reads standard input or a device. A device that disappears is reopened when it returns; a truncated row is ended.
-fn read_in_background(source: PathBuf) -> anyhow::Result<Receiver<io::Result<Vec<u8>>>> {
+/// Whether this is a serial device, which does not wait for a reader.
+#[cfg(unix)]
+fn is_serial(source: &Path) -> bool {
+    use std::os::unix::fs::FileTypeExt;
+    source
+        .metadata()
+        .is_ok_and(|of| of.file_type().is_char_device())
+}
+
+/// Anything but standard input, where the system does not tell.
+#[cfg(not(unix))]
+fn is_serial(source: &Path) -> bool {
+    source != Path::new("-")
+}
+
+/// Reads standard input or a device, which is reopened when it returns after it was gone.
+fn read_in_background(source: PathBuf) -> anyhow::Result<Receiver<Option<Vec<u8>>>> {
     let (chunks, received) = mpsc::channel();
     let is_stdin = source == Path::new("-");
     let read = move || {
@@ -289,17 +341,12 @@ fn read_in_background(source: PathBuf) -> anyhow::Result<Receiver<io::Result<Vec
                 false => File::open(&source).map(|file| Box::new(file) as Box<dyn Read>),
             };
             if let Ok(mut input) = opened {
-                let mut in_row = false;
                 while let Ok(count @ 1..) = input.read(&mut buffer) {
-                    in_row = buffer[count - 1] != b'\n';
-                    if chunks.send(Ok(buffer[..count].to_vec())).is_err() {
+                    if chunks.send(Some(buffer[..count].to_vec())).is_err() {
                         return;
                     }
                 }
-                if is_stdin {
-                    return;
-                }
-                if in_row && chunks.send(Ok(b"\n".to_vec())).is_err() {
+                if is_stdin || chunks.send(None).is_err() {
                     return;
                 }
                 tell!(

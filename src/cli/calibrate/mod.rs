@@ -1,6 +1,7 @@
 //! `turncal calibrate`
 
 mod follow;
+mod lines;
 mod lot;
 mod merge;
 

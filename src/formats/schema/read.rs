@@ -74,15 +74,13 @@ impl Run {
         let mut notes = fields.notes;
 
         // The small files' fields are checked before the large files are read.
-        let mut files: Vec<PathBuf> = source.map(Path::to_owned).into_iter().collect();
-        files.extend(
-            table
-                .is_none()
-                .then(|| instrument.log.source.file.to_path_buf()),
-        );
-        files.extend(other_file(&instrument.log));
-        files.extend(table_log.as_ref().map(|log| log.source.file.to_path_buf()));
-        files.extend(segments_file.as_deref().map(Path::to_owned));
+        let files = [
+            source.map(Path::to_owned),
+            (table.is_none()).then(|| instrument.log.source.file.to_path_buf()),
+            other_file(&instrument.log),
+            table_log.as_ref().map(|log| log.source.file.to_path_buf()),
+            segments_file.as_deref().map(Path::to_owned),
+        ];
         let imu = instrument.samples(&mut notes)?;
         let known = instrument.with_noise(&imu, &mut notes);
         let table = (table_log.as_ref()).map(|log| log.read(&imu, &mut notes));
@@ -99,7 +97,7 @@ impl Run {
                 imu,
                 table,
                 segments,
-                files,
+                files: files.into_iter().flatten().collect(),
                 notes,
                 doubts: Vec::new(),
             },
