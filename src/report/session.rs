@@ -57,11 +57,7 @@ pub fn screen(run: &Run, status: &Status, specification: Option<&Specification>)
     lines.push(String::new());
     lines.extend(coverage(status));
     lines.push(String::new());
-    let first = |finding: &String| {
-        let sentence = finding.split_inclusive(". ").next().unwrap_or_default();
-        format!("note: {}", sentence.trim_end())
-    };
-    lines.extend(findings(run, status).iter().take(SHOWN).map(first));
+    lines.extend(notes(run, status).into_iter().take(SHOWN));
     if let Ok(Some(left)) = status
         .expected
         .as_ref()
@@ -173,17 +169,20 @@ fn calibrated(last: &Calibrated) -> String {
     format!("calibration of the first {time} s: {word}{codes}")
 }
 
-/// Findings about the rows, then those that restrict the use of the last calibration.
-fn findings(run: &Run, status: &Status) -> Vec<String> {
+/// Findings about the rows, then those that restrict the use of the last calibration: the first sentence of each.
+pub fn notes(run: &Run, status: &Status) -> Vec<String> {
     let mut findings = run.recording.doubts.clone();
     findings.extend(check::of_survey(&status.survey));
-    let Some(last) = &status.calibrated else {
-        return findings;
+    if let Some(last) = &status.calibrated {
+        let is_reason = |of: &&Finding| last.verdict.reasons.contains(&of.code);
+        let reasons = last.findings.iter().filter(is_reason);
+        findings.extend(reasons.map(|of| format!("{}: {}", of.code, of.text)));
+    }
+    let first = |finding: &String| {
+        let sentence = finding.split_inclusive(". ").next().unwrap_or_default();
+        format!("note: {}", sentence.trim_end())
     };
-    let is_reason = |of: &&Finding| last.verdict.reasons.contains(&of.code);
-    let reasons = last.findings.iter().filter(is_reason);
-    findings.extend(reasons.map(|of| format!("{}: {}", of.code, of.text)));
-    findings
+    findings.iter().map(first).collect()
 }
 
 /// Upward directions seen from above the sensor: three layers of nine directions, those with z up, level, down; then the

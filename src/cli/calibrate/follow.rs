@@ -1,5 +1,6 @@
 //! `turncal calibrate --follow`: evaluates rows as they arrive, until they suffice or no more arrive.
 
+use std::collections::BTreeSet;
 use std::fs::{File, OpenOptions};
 use std::io::{self, IsTerminal, Read, Seek, SeekFrom, Write};
 use std::ops::ControlFlow;
@@ -370,6 +371,8 @@ struct Screen {
     /// Number of dwells already reported.
     told: usize,
     trouble: String,
+    /// Notes already reported, without their figures.
+    noted: BTreeSet<String>,
     /// Content of the screen below the number of lines received.
     content: Vec<String>,
     received: usize,
@@ -383,6 +386,7 @@ impl Screen {
             drawn: 0,
             told: 0,
             trouble: String::new(),
+            noted: BTreeSet::new(),
             content: Vec::new(),
             received: 0,
         }
@@ -397,6 +401,14 @@ impl Screen {
         self.trouble.clear();
         if self.is_terminal && !self.silent {
             return self.draw(session::screen(run, status, specification));
+        }
+        for note in session::notes(run, status) {
+            let is_new = self
+                .noted
+                .insert(note.replace(|c: char| c.is_ascii_digit(), ""));
+            if is_new {
+                self.tell(&note)?;
+            }
         }
         // The last dwell is not complete while the instrument is at rest.
         let whole = status.survey.rests.len() - usize::from(status.still > 0.0);
