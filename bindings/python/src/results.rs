@@ -97,10 +97,6 @@ pub fn certificate(
 }
 
 #[pyfunction]
-#[expect(
-    clippy::too_many_arguments,
-    reason = "called from one place, by keyword"
-)]
 pub fn navigate(
     py: Python,
     calibration: &Calibration,
