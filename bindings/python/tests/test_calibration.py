@@ -7,12 +7,12 @@ import numpy as np
 import pandas
 import polars
 import pytest
-from conftest import command
+from conftest import BY_HAND, command
 
 import turncal
 
-KNOWN = {"rate": 100.0, "latitude": 34.0, "height": 0.0}
-OPTIONS = ["--rate", 100, "--latitude", 34.0, "--height", 0]
+KNOWN = {"rate": 100.0, "latitude": 48.1, "height": 520.0}
+OPTIONS = ["--rate", 100, "--latitude", 48.1, "--height", 520.0]
 GYRO, ACCEL = ("gx", "gy", "gz", "rad/s"), ("ax", "ay", "az", "m/s^2")
 
 
@@ -88,8 +88,8 @@ def test_a_verdict_is_explained(calibration):
     assert calibration.verdict.upper() in page and "svg" in page
 
 
-def test_values_agree_with_the_truth(tmp_path):
-    run = turncal.simulate("mems", seed=7)
+def test_values_agree_with_the_truth():
+    run = turncal.simulate(str(BY_HAND), seed=7)
     report = turncal.compare(run.calibrate(noise="stated"), truth=run.truth)
     of_run = report.data["calibrations"][0]
     low, high = of_run["nees_interval"]
