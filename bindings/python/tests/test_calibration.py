@@ -155,8 +155,9 @@ def test_an_error_names_row_and_column(frame):
 
 def test_times_of_pandas_are_times(frame, calibration):
     dated = frame.assign(t=pandas.Timestamp("2026-01-01") + pandas.to_timedelta(frame["t"], unit="s"))
-    run = turncal.run(dated, gyro=GYRO, accel=ACCEL, time="t", **KNOWN)
-    assert run.calibrate()["gyro.bias.x"] == pytest.approx(calibration["gyro.bias.x"], rel=1e-6)
+    known = {"gyro": GYRO, "accel": ACCEL, "latitude": 48.1, "height": 520.0}
+    for run in [turncal.run(dated, time="t", **known), turncal.run(dated.set_index("t"), **known)]:
+        assert run.calibrate()["gyro.bias.x"] == pytest.approx(calibration["gyro.bias.x"], rel=1e-6)
 
 
 def test_a_certificate_is_written(calibration, tmp_path):
