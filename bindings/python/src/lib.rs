@@ -50,7 +50,7 @@ mod _turncal {
     use super::study::{evaluate, simulate, study, study_merged, study_options, study_part};
 
     #[pymodule_init]
-    fn init(module: &Bound<PyModule>) -> PyResult<()> {
+    fn declare_attributes(module: &Bound<PyModule>) -> PyResult<()> {
         let error = module.py().get_type::<Error>();
         let mut names = super::errors::ATTRIBUTES.into_iter();
         names.try_for_each(|name| error.setattr(name, module.py().None()))
