@@ -23,6 +23,21 @@ pub fn raised(error: impl Display) -> PyErr {
     Error::new_err(error.to_string())
 }
 
+/// A text that names options of the command, with the arguments of Python in their place.
+fn in_python(text: &str) -> String {
+    let words = text.split(' ').map(|word| {
+        let (open, option) = match word.strip_prefix('(') {
+            Some(inside) => ("(", inside),
+            None => ("", word),
+        };
+        match option.strip_prefix("--") {
+            Some(name) => format!("{open}{}", name.replace('-', "_")),
+            None => word.to_owned(),
+        }
+    });
+    words.collect::<Vec<_>>().join(" ")
+}
+
 /// An error of the library, with its place in a file or a table.
 pub fn raise<E: std::error::Error + 'static>(error: E) -> PyErr {
     let mut text = error.to_string();
@@ -36,7 +51,7 @@ pub fn raise<E: std::error::Error + 'static>(error: E) -> PyErr {
             text = format!("{text}: {further}");
         }
     }
-    let raised = Error::new_err(text);
+    let raised = Error::new_err(in_python(&text));
     if let Some(file) = file {
         // An exception takes any attribute, so that none of these fails.
         let _ = Python::attach(|py| put_place(raised.value(py), file));

@@ -153,6 +153,13 @@ def test_an_error_names_row_and_column(frame):
     assert (raised.value.row, raised.value.column) == (17, "gy")
 
 
+def test_an_error_names_arguments_of_python(frame):
+    still = frame.drop(columns="t").iloc[:400]
+    with pytest.raises(turncal.Error, match="Set it with gyro_unit"):
+        turncal.run(still, rate=100.0)
+    turncal.run(still, rate=100.0, gyro_unit="rad/s", accel_unit="m/s^2")
+
+
 def test_times_of_pandas_are_times(frame, calibration):
     dated = frame.assign(t=pandas.Timestamp("2026-01-01") + pandas.to_timedelta(frame["t"], unit="s"))
     known = {"gyro": GYRO, "accel": ACCEL, "latitude": 48.1, "height": 520.0}

@@ -30,6 +30,8 @@ def run(
     accel: Columns | None = None,
     time: str | int | None = None,
     temperature: str | int | None = None,
+    gyro_unit: str | None = None,
+    accel_unit: str | None = None,
     rate: float | None = None,
     latitude: float | None = None,
     height: float | None = None,
@@ -53,6 +55,8 @@ def run(
         data, also an index of datetime64.
     temperature : str or int, optional
         Column of the instrument's temperature, °C.
+    gyro_unit, accel_unit : str, optional
+        The same units, for columns that are found by their names.
     rate : float, optional
         Rows per second, Hz.
     latitude, height : float, optional
@@ -79,8 +83,8 @@ def run(
         latitude=latitude,
         height=height,
         gravity=gravity,
-        gyro_unit=_unit("gyro", gyro),
-        accel_unit=_unit("accel", accel),
+        gyro_unit=_unit("gyro", gyro) or gyro_unit,
+        accel_unit=_unit("accel", accel) or accel_unit,
         sensor=sensor,
         noise_file=noise_file,
     )
