@@ -186,9 +186,10 @@ fn trials<S: Makes<Trial: Serialize>>(
 
 /// The study of all its parts, in order.
 #[pyfunction]
-pub fn study_merged(options: &str, parts: Vec<Vec<u8>>) -> PyResult<Report> {
+pub fn study_merged(py: Python, options: &str, parts: Vec<Vec<u8>>) -> PyResult<Report> {
     let of = Study::of_json(options)?;
-    with_study!(&of, merged(&parts)).map(Report).map_err(raised)
+    let document = finish(py, move || with_study!(&of, merged(&parts)))?;
+    document.map(Report).map_err(raised)
 }
 
 fn merged<S: Makes<Trial: DeserializeOwned>>(
