@@ -11,6 +11,7 @@ mod check;
 mod cli;
 mod clocks;
 mod closed_form;
+mod columns;
 mod compare;
 mod contradictions;
 mod door;

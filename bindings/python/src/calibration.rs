@@ -5,14 +5,14 @@ use std::sync::{Arc, OnceLock};
 
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
-use turncal::calibration::{self, AtRest, CalibrationError, Progress as Passes, Solution, Verdict};
+use turncal::calibration::{self, AtRest, Progress as Passes, Solution, Verdict};
 use turncal::recording::LogFacts;
 use turncal::report::calibration::Calibrated;
 use turncal::report::{Document, at_rest, terminal, write};
 
 use crate::errors::{raise, raised};
 use crate::report::{brief, framed};
-use crate::run::{Recorded, Request};
+use crate::run::{Recorded, Refusal, Request};
 use crate::wait::finish;
 
 /// What a report needs beside the calibration.
@@ -24,7 +24,7 @@ struct Solved {
 }
 
 impl Solved {
-    fn document(&self) -> Result<Document, CalibrationError> {
+    fn document(&self) -> Result<Document, Refusal> {
         let problem = self.of.problem(&self.request)?;
         let (name, method) = (&*self.of.name, self.request.method);
         Ok(self
@@ -51,7 +51,7 @@ pub fn calibrated(
     of: Arc<Recorded>,
     request: Request,
     progress: Passes,
-) -> Result<Calibration, CalibrationError> {
+) -> Result<Calibration, Refusal> {
     let problem = of.problem(&request)?;
     // Without a turn, only the output at rest against temperature can be determined.
     if request.temperature

@@ -5,6 +5,7 @@ use std::fmt::Display;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use turncal::formats::{FileError, Place};
+use turncal::models::ModelError;
 
 pyo3::create_exception!(
     turncal,
@@ -14,50 +15,72 @@ pyo3::create_exception!(
      and `column` give the place in a file, `row` and `column` that in a table; each is None if it does not apply."
 );
 
+/// Attributes of [`Error`], which are None if they do not apply.
+pub const ATTRIBUTES: [&str; 4] = ["file", "line", "row", "column"];
+
 /// An error without a place in a file.
 pub fn raised(error: impl Display) -> PyErr {
     Error::new_err(error.to_string())
 }
 
-/// An error of the library; the place is taken from the [`FileError`] that it is or contains.
+/// A text that names options of the command, with the arguments of Python in their place.
+fn in_python(text: &str) -> String {
+    let words = text.split(' ').map(|word| {
+        let (open, option) = match word.strip_prefix('(') {
+            Some(inside) => ("(", inside),
+            None => ("", word),
+        };
+        match option.strip_prefix("--") {
+            Some(name) => format!("{open}{}", name.replace('-', "_")),
+            None => word.to_owned(),
+        }
+    });
+    words.collect::<Vec<_>>().join(" ")
+}
+
+/// An error of the library, with its place in a file or a table.
 pub fn raise<E: std::error::Error + 'static>(error: E) -> PyErr {
     let mut text = error.to_string();
-    let mut place = None;
+    let mut file = None;
     let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(&error);
     while let Some(of) = cause {
-        place = place.or(of.downcast_ref::<FileError>());
+        file = file.or_else(|| file_error(of));
         cause = of.source();
-        text = match &cause {
-            Some(of) if !text.contains(&of.to_string()) => format!("{text}: {of}"),
-            _ => text,
-        };
-    }
-    let raised = Error::new_err(text);
-    Python::attach(|py| {
-        let value = raised.value(py);
-        let (mut line, mut row, mut column) = (None, None, None);
-        match place.map(|of| &of.place) {
-            Some(Place::Line(of)) => line = Some(*of),
-            Some(Place::Character { line: of, .. }) => line = Some(*of),
-            Some(Place::Column {
-                line: of,
-                column: name,
-            }) => {
-                (line, column) = (Some(*of), Some(name.clone()));
-            }
-            Some(Place::Row {
-                row: of,
-                column: name,
-            }) => (row, column) = (Some(*of), name.clone()),
-            _ => {}
+        let further = cause.map(ToString::to_string);
+        if let Some(further) = further.filter(|further| !text.contains(further)) {
+            text = format!("{text}: {further}");
         }
-        // An exception takes any attribute.
-        let _ = value.setattr("file", place.map(|of| of.file.clone()));
-        let _ = value.setattr("line", line);
-        let _ = value.setattr("row", row);
-        let _ = value.setattr("column", column);
-    });
+    }
+    let raised = Error::new_err(in_python(&text));
+    if let Some(file) = file {
+        // An exception takes any attribute, so that none of these fails.
+        let _ = Python::attach(|py| put_place(raised.value(py), file));
+    }
     raised
+}
+
+fn file_error<'a>(error: &'a (dyn std::error::Error + 'static)) -> Option<&'a FileError> {
+    let of_model = || match error.downcast_ref()? {
+        ModelError::File(file) => Some(file),
+        ModelError::Unknown { .. } => None,
+    };
+    error.downcast_ref().or_else(of_model)
+}
+
+fn put_place(raised: &Bound<PyAny>, error: &FileError) -> PyResult<()> {
+    raised.setattr("file", error.file.clone())?;
+    match &error.place {
+        Place::Line(line) | Place::Character { line, .. } => raised.setattr("line", line),
+        Place::Column { line, column } => {
+            raised.setattr("line", line)?;
+            raised.setattr("column", column)
+        }
+        Place::Row { row, column } => {
+            raised.setattr("row", row)?;
+            raised.setattr("column", column)
+        }
+        Place::File | Place::Byte(_) | Place::Sample { .. } => Ok(()),
+    }
 }
 
 /// An argument outside its range.

@@ -26,6 +26,8 @@ fn command(py: Python, arguments: Vec<OsString>) -> u8 {
 
 #[pymodule]
 mod _turncal {
+    use pyo3::prelude::*;
+
     #[pymodule_export]
     use super::apply::{correct, inputs, samples};
     #[pymodule_export]
@@ -46,4 +48,11 @@ mod _turncal {
     use super::session::Session;
     #[pymodule_export]
     use super::study::{evaluate, simulate, study, study_merged, study_options, study_part};
+
+    #[pymodule_init]
+    fn declare_attributes(module: &Bound<PyModule>) -> PyResult<()> {
+        let error = module.py().get_type::<Error>();
+        let mut names = super::errors::ATTRIBUTES.into_iter();
+        names.try_for_each(|name| error.setattr(name, module.py().None()))
+    }
 }

@@ -10,6 +10,8 @@ use crate::errors::raise;
 
 /// Width of text in characters.
 const WIDTH: usize = 100;
+/// Style of the frame of a page in a notebook.
+const FRAME: &str = "width: 100%; height: 40em; box-sizing: border-box; border: 1px solid #ccc";
 
 /// Figures, tables and a page about a result.
 ///
@@ -55,9 +57,7 @@ pub fn framed(document: &Document) -> String {
     let page = files.into_iter().find(|(name, _)| name == "index.html");
     let page = page.map_or_else(String::new, |(_, page)| page);
     let page = page.replace('&', "&amp;").replace('"', "&quot;");
-    format!(
-        "<iframe srcdoc=\"{page}\" style=\"width: 100%; height: 40em; border: 1px solid #ccc\"></iframe>"
-    )
+    format!("<iframe srcdoc=\"{page}\" style=\"{FRAME}\"></iframe>")
 }
 
 /// A document with its summary and its first figure only.

@@ -97,10 +97,6 @@ pub fn certificate(
 }
 
 #[pyfunction]
-#[expect(
-    clippy::too_many_arguments,
-    reason = "called from one place, by keyword"
-)]
 pub fn navigate(
     py: Python,
     calibration: &Calibration,
@@ -113,20 +109,7 @@ pub fn navigate(
     let latitude = within("latitude", latitude, [-90.0, 90.0])?.map(|of| of * DEGREE);
     let height = within("height", height, [-12e3, 1e5])?;
     within("hours", Some(hours), [INTERVAL / HOUR, 1000.0])?;
-    let provenance = calibration.record.provenance.as_ref();
-    let (motion, name) = match (trajectory, latitude, provenance) {
-        (Some(name), ..) => Motion::along(name, latitude, height)
-            .map(|(motion, name)| (motion, Some(name)))
-            .map_err(raise)?,
-        (None, Some(latitude), _) => (at_rest(latitude, height), None),
-        (None, None, Some(of)) => (at_rest(of.latitude_deg * DEGREE, height), None),
-        (None, None, None) => {
-            return Err(raised(
-                "latitude: found none, expected degrees, or a calibration that states its site. Give latitude or \
-                 trajectory.",
-            ));
-        }
-    };
+    let (motion, name) = motion(calibration, latitude, height, trajectory)?;
     let names = ["calibration", "truth"];
     let [own, true_one] = [(names[0], calibration), (names[1], truth)].map(|(name, of)| Named {
         name,
@@ -163,6 +146,27 @@ pub fn navigate(
     report?.map_err(raise)
 }
 
-fn at_rest(latitude: f64, height: Option<f64>) -> Motion {
-    Motion::at_rest(latitude, height.unwrap_or(0.0), [0.0; 3])
+/// Along a trajectory, or at rest where it is stated or where the instrument was calibrated.
+fn motion(
+    calibration: &Calibration,
+    latitude: Option<f64>,
+    height: Option<f64>,
+    trajectory: Option<&str>,
+) -> PyResult<(Motion, Option<String>)> {
+    if let Some(name) = trajectory {
+        let (motion, name) = Motion::along(name, latitude, height).map_err(raise)?;
+        return Ok((motion, Some(name)));
+    }
+    let of_run = calibration.record.provenance.as_ref();
+    let latitude = latitude.or(of_run.map(|of| of.latitude_deg * DEGREE));
+    let latitude = latitude.ok_or_else(|| {
+        raised(
+            "latitude: found none, expected degrees, or a calibration that states its site. Give latitude or \
+             trajectory.",
+        )
+    })?;
+    Ok((
+        Motion::at_rest(latitude, height.unwrap_or(0.0), [0.0; 3]),
+        None,
+    ))
 }

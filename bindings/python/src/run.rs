@@ -20,7 +20,7 @@ use crate::calibration::{Calibration, calibrated};
 use crate::errors::{named, raise, raised};
 use crate::known::Known;
 use crate::report::Report;
-use crate::wait::{Progress, finish, wait};
+use crate::wait::{Progress, Watch, finish, wait};
 
 /// Recordings of one instrument with what is known of it.
 pub struct Recorded {
@@ -43,19 +43,35 @@ impl Recorded {
     }
 
     /// The problem of a request.
-    pub fn problem(&self, request: &Request) -> Result<Problem<'_>, CalibrationError> {
+    pub fn problem(&self, request: &Request) -> Result<Problem<'_>, Refusal> {
         let runs: Vec<&Recording> = self.runs.iter().collect();
         let usual = request.temperature.then(Together::default);
         let mut problem = match self.together.or(usual) {
             Some(together) => Problem::together(&runs, &request.options, &together)?,
             None => Problem::new(runs[0], &request.options),
         };
-        request
-            .terms
-            .iter()
-            .for_each(|&term| problem.model.switch_on(term));
+        for &term in &request.terms {
+            if !problem.model.can_have(term) {
+                return Err(Refusal::Term(term));
+            }
+            problem.model.switch_on(term);
+        }
         Ok(problem)
     }
+}
+
+/// Why a run cannot be calibrated as requested.
+#[derive(Debug, thiserror::Error)]
+pub enum Refusal {
+    /// The data do not suffice.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
+    /// An error term that the run cannot have.
+    #[error(
+        "with_: {} needs a table log, and the axis errors of a table its angles. Omit it, or add them to the run",
+        .0.name()
+    )]
+    Term(ErrorTerm),
 }
 
 /// A request for a calibration.
@@ -176,7 +192,7 @@ impl Run {
         self.refuse(&request)?;
         let progress = Progress::new(py, progress, None)?;
         let of = self.of.clone();
-        let work = move |watch: &crate::wait::Watch| calibrated(of, request, &|_| watch.step());
+        let work = move |watch: &Watch| calibrated(of, request, &|_| watch.step());
         wait(py, &progress, work)?.map_err(raise)
     }
 
@@ -192,7 +208,7 @@ impl Run {
 }
 
 impl Run {
-    /// Refuses requests that no run of this kind can meet.
+    /// Refuses requests that no data can meet.
     fn refuse(&self, request: &Request) -> PyResult<()> {
         let is_joint = request.temperature || self.of.together.is_some();
         match (request.method, request.terms.first()) {
@@ -203,20 +219,7 @@ impl Run {
             (Method::SixPosition, None) if is_joint => Err(raised(
                 "method \"six-position\" handles one recording at one temperature. Use method \"ekf\".",
             )),
-            _ => {
-                let problem = self.of.problem(request).map_err(raise)?;
-                let lacking = request
-                    .terms
-                    .iter()
-                    .find(|&&term| !problem.model.can_have(term));
-                lacking.map_or(Ok(()), |term| {
-                    Err(raised(format_args!(
-                        "with_: {} needs a table log, and the axis errors of a table its angles. Omit it, or add them \
-                         to the run.",
-                        term.name()
-                    )))
-                })
-            }
+            _ => Ok(()),
         }
     }
 }

@@ -7,7 +7,7 @@ use pyo3::types::PyBytes;
 use rayon::ThreadPoolBuilder;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use turncal::calibration::NoisePolicy;
+use turncal::calibration::{ErrorTerm, NoisePolicy};
 use turncal::imu::InstallationForm;
 use turncal::models::{self, Place, specification};
 use turncal::report::path::{Report as OfPath, in_words, moves_in_words};
@@ -58,6 +58,40 @@ macro_rules! with_study {
 }
 
 impl Study {
+    fn accuracy(
+        mut scenario: Scenario,
+        runs: u64,
+        seed: u64,
+        modelled: &[ErrorTerm],
+        unmodelled: Vec<ErrorTerm>,
+    ) -> Self {
+        scenario.body_frame = Aiding::Table.body_frame();
+        for &term in modelled.iter().chain(&unmodelled) {
+            scenario = scenario.with_error_term(term);
+        }
+        Self::Accuracy(AccuracyStudy {
+            scenario,
+            form: InstallationForm::default(),
+            unmodelled,
+            noise: NoisePolicy::Stated,
+            runs,
+            seed,
+        })
+    }
+
+    fn experiment(scenario: Scenario, samples: u64, seed: u64) -> PyResult<Self> {
+        let (trajectory, trajectory_name) =
+            models::trajectory("flight", &Place::CommandLine).map_err(raise)?;
+        Ok(Self::Experiment(ExperimentStudy {
+            scenario,
+            trajectory,
+            trajectory_name,
+            intervals: FORTY_HOURS,
+            samples,
+            seed,
+        }))
+    }
+
     fn of_json(json: &str) -> PyResult<Self> {
         serde_json::from_str(json).map_err(raise)
     }
@@ -102,36 +136,15 @@ pub fn study_options(
             expected,
         ));
     }
-    let mut scenario = Scenario::load(name).map_err(raise)?;
+    let scenario = Scenario::load(name).map_err(raise)?;
     let seed = seed.unwrap_or(scenario.seed);
     let study = match of {
         true => {
-            scenario.body_frame = Aiding::Table.body_frame();
+            let modelled = error_terms("with_", &with_)?;
             let unmodelled = error_terms("unmodelled", &unmodelled)?;
-            for &term in error_terms("with_", &with_)?.iter().chain(&unmodelled) {
-                scenario = scenario.with_error_term(term);
-            }
-            Study::Accuracy(AccuracyStudy {
-                scenario,
-                form: InstallationForm::default(),
-                unmodelled,
-                noise: NoisePolicy::Stated,
-                runs,
-                seed,
-            })
+            Study::accuracy(scenario, runs, seed, &modelled, unmodelled)
         }
-        false => {
-            let (trajectory, trajectory_name) =
-                models::trajectory("flight", &Place::CommandLine).map_err(raise)?;
-            Study::Experiment(ExperimentStudy {
-                scenario,
-                trajectory,
-                trajectory_name,
-                intervals: FORTY_HOURS,
-                samples: runs,
-                seed,
-            })
-        }
+        false => Study::experiment(scenario, runs, seed)?,
     };
     serde_json::to_string(&study).map_err(raise)
 }
@@ -186,9 +199,10 @@ fn trials<S: Makes<Trial: Serialize>>(
 
 /// The study of all its parts, in order.
 #[pyfunction]
-pub fn study_merged(options: &str, parts: Vec<Vec<u8>>) -> PyResult<Report> {
+pub fn study_merged(py: Python, options: &str, parts: Vec<Vec<u8>>) -> PyResult<Report> {
     let of = Study::of_json(options)?;
-    with_study!(&of, merged(&parts)).map(Report).map_err(raised)
+    let document = finish(py, move || with_study!(&of, merged(&parts)))?;
+    document.map(Report).map_err(raised)
 }
 
 fn merged<S: Makes<Trial: DeserializeOwned>>(

@@ -7,6 +7,7 @@ from pathlib import Path
 import pandas
 import pytest
 
+BY_HAND = Path(__file__).with_name("data") / "by-hand.toml"
 COMMAND = str(Path(sys.executable).with_name("turncal"))
 
 
@@ -19,9 +20,9 @@ def command(*arguments, **options):
 
 @pytest.fixture(scope="session")
 def log(tmp_path_factory):
-    """Path of a log of a MEMS sensor."""
+    """Path of a log of a MEMS sensor turned by hand, with a run.toml beside it."""
     directory = tmp_path_factory.mktemp("mems") / "run"
-    command("simulate", "mems", "-o", directory, "--seed", 7)
+    command("simulate", BY_HAND, "-o", directory)
     frame = pandas.read_csv(directory / "imu.csv.gz")
     path = directory / "plain.csv"
     frame.to_csv(path, index=False)

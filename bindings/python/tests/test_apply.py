@@ -77,3 +77,13 @@ def test_rows_do_not_depend_on_how_many_are_converted_at_once(calibration, frame
     whole = calibration.apply(frame)
     monkeypatch.setattr("turncal._frames.ROWS", 1000)
     assert np.array_equal(calibration.apply(frame), whole)
+
+
+@pytest.mark.parametrize("scenario, terms", [("mems", ["time-offset", "size-effect"]), ("demo", None)])
+def test_a_table_and_a_run_give_the_same_with_error_terms_and_from_pulses(scenario, terms, tmp_path):
+    command("simulate", scenario, "-o", tmp_path / "run")
+    run = turncal.read(tmp_path / "run" / "run.toml")
+    calibration = run.calibrate(noise="stated", with_=terms)
+    table = pandas.read_csv(tmp_path / "run" / "imu.csv.gz")
+    of_table, of_run = calibration.apply(table), calibration.apply(run).iloc[:, 2:]
+    assert np.allclose(of_table, of_run, rtol=1e-9, atol=1e-9)

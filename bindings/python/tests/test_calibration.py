@@ -7,12 +7,12 @@ import numpy as np
 import pandas
 import polars
 import pytest
-from conftest import command
+from conftest import BY_HAND, command
 
 import turncal
 
-KNOWN = {"rate": 100.0, "latitude": 34.0, "height": 0.0}
-OPTIONS = ["--rate", 100, "--latitude", 34.0, "--height", 0]
+KNOWN = {"rate": 100.0, "latitude": 48.1, "height": 520.0}
+OPTIONS = ["--rate", 100, "--latitude", 48.1, "--height", 520.0]
 GYRO, ACCEL = ("gx", "gy", "gz", "rad/s"), ("ax", "ay", "az", "m/s^2")
 
 
@@ -88,8 +88,8 @@ def test_a_verdict_is_explained(calibration):
     assert calibration.verdict.upper() in page and "svg" in page
 
 
-def test_values_agree_with_the_truth(tmp_path):
-    run = turncal.simulate("mems", seed=7)
+def test_values_agree_with_the_truth():
+    run = turncal.simulate(str(BY_HAND), seed=7)
     report = turncal.compare(run.calibrate(noise="stated"), truth=run.truth)
     of_run = report.data["calibrations"][0]
     low, high = of_run["nees_interval"]
@@ -153,10 +153,18 @@ def test_an_error_names_row_and_column(frame):
     assert (raised.value.row, raised.value.column) == (17, "gy")
 
 
+def test_an_error_names_arguments_of_python(frame):
+    still = frame.drop(columns="t").iloc[:400]
+    with pytest.raises(turncal.Error, match="Set it with gyro_unit"):
+        turncal.run(still, rate=100.0)
+    turncal.run(still, rate=100.0, gyro_unit="rad/s", accel_unit="m/s^2")
+
+
 def test_times_of_pandas_are_times(frame, calibration):
     dated = frame.assign(t=pandas.Timestamp("2026-01-01") + pandas.to_timedelta(frame["t"], unit="s"))
-    run = turncal.run(dated, gyro=GYRO, accel=ACCEL, time="t", **KNOWN)
-    assert run.calibrate()["gyro.bias.x"] == pytest.approx(calibration["gyro.bias.x"], rel=1e-6)
+    known = {"gyro": GYRO, "accel": ACCEL, "latitude": 48.1, "height": 520.0}
+    for run in [turncal.run(dated, time="t", **known), turncal.run(dated.set_index("t"), **known)]:
+        assert run.calibrate()["gyro.bias.x"] == pytest.approx(calibration["gyro.bias.x"], rel=1e-6)
 
 
 def test_a_certificate_is_written(calibration, tmp_path):

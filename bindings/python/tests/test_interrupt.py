@@ -16,7 +16,7 @@ LONG = {
 
 
 @pytest.mark.parametrize("what", LONG)
-def test_ctrl_c_ends_a_call_within_a_second(what):
+def test_ctrl_c_ends_a_call_within_a_second(what, tmp_path):
     program = f"""
         import threading, time, turncal
         ticks = []
@@ -29,7 +29,8 @@ def test_ctrl_c_ends_a_call_within_a_second(what):
             import os
             os._exit(0)
     """
-    process = subprocess.Popen([sys.executable, "-c", textwrap.dedent(program)], stdout=subprocess.PIPE, text=True)
+    program = [sys.executable, "-c", textwrap.dedent(program)]
+    process = subprocess.Popen(program, stdout=subprocess.PIPE, text=True, cwd=tmp_path)
     assert process.stdout.readline() == "begun\n"
     time.sleep(3.0)
     begun = time.monotonic()

@@ -52,7 +52,7 @@ def test_a_path_is_evaluated_as_by_the_command():
 
 
 def test_a_session_asks_for_moves_and_gives_a_run(frame):
-    session = turncal.Session(100.0, "bmi088", latitude=34.0, specification="mems-by-hand")
+    session = turncal.Session(100.0, "bmi088", latitude=48.1, specification="mems-by-hand")
     gyro, accel = frame[["gx", "gy", "gz"]].to_numpy(), frame[["ax", "ay", "az"]].to_numpy()
     for first in range(0, 6000, 1000):
         status = session.push(gyro[first : first + 1000], accel[first : first + 1000])

@@ -26,7 +26,7 @@ except turncal.Error as error:
 
 
 def mypy(path):
-    return subprocess.run([sys.executable, "-m", "mypy", "--strict", path], capture_output=True, text=True)
+    return subprocess.run([sys.executable, "-m", "mypy", "--strict", path], capture_output=True, text=True, cwd=path.parent)
 
 
 def test_a_program_of_a_user_passes_mypy_strict(tmp_path):

@@ -26,7 +26,7 @@ def rows():
 
 @pytest.fixture(scope="module")
 def calibration(frame):
-    return turncal.run(frame, rate=100.0, latitude=34.0).calibrate(noise="stated")
+    return turncal.run(frame, rate=100.0, latitude=48.1).calibrate(noise="stated")
 
 
 def wrong_tables(rows):

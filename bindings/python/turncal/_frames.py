@@ -30,6 +30,8 @@ def run(
     accel: Columns | None = None,
     time: str | int | None = None,
     temperature: str | int | None = None,
+    gyro_unit: str | None = None,
+    accel_unit: str | None = None,
     rate: float | None = None,
     latitude: float | None = None,
     height: float | None = None,
@@ -49,9 +51,12 @@ def run(
         Columns along right, front and up. Units: "rad/s", "deg/s", "m/s^2", "g", the size of one count such as
         "1/131 deg/s", or of increments "rad", "deg", "m/s".
     time : str or int, optional
-        Column of time; its unit is found from `rate` or from its steps. datetime64 is possible.
+        Column of time; its unit is found from `rate` or from its steps. datetime64 is possible. Default: found in the
+        data, also an index of datetime64.
     temperature : str or int, optional
         Column of the instrument's temperature, °C.
+    gyro_unit, accel_unit : str, optional
+        The same units, for columns that are found by their names.
     rate : float, optional
         Rows per second, Hz.
     latitude, height : float, optional
@@ -78,8 +83,8 @@ def run(
         latitude=latitude,
         height=height,
         gravity=gravity,
-        gyro_unit=_unit("gyro", gyro),
-        accel_unit=_unit("accel", accel),
+        gyro_unit=_unit("gyro", gyro) or gyro_unit,
+        accel_unit=_unit("accel", accel) or accel_unit,
         sensor=sensor,
         noise_file=noise_file,
     )
@@ -95,6 +100,9 @@ def run_of(
 ) -> Run:
     """A run from a table; columns of None are found."""
     table = dict(_columns(data))
+    index = getattr(data, "index", None)
+    if getattr(getattr(index, "dtype", None), "kind", "") == "M":
+        table.setdefault("time", index)
     single = [None if column is None else str(column) for column in (time, temperature)]
     numbers = {name: _numbers(column) for name, column in table.items()}
     stated = [*(triads[0] or ()), *(triads[1] or ()), *(column for column in single if column is not None)]
@@ -183,18 +191,18 @@ def applied(
     if isinstance(data, Run):
         import pandas
 
-        samples = _turncal.samples(calibration, data)
-        return pandas.DataFrame(samples, columns=["start_s", "end_s", *OUTPUT], copy=False)
+        rows = _turncal.samples(calibration, data)
+        return pandas.DataFrame(rows, columns=["start_s", "end_s", *OUTPUT], copy=False)
     columns, per_row, rate = _turncal.inputs(
         calibration, triad("gyro", gyro), _unit("gyro", gyro), triad("accel", accel), _unit("accel", accel), rate
     )
     taken = _taken(data, columns)
-    rows = len(taken[0][0])
-    out = _Output(data, rows)
-    for first in range(0, rows, ROWS):
-        last = min(first + ROWS, rows)
+    count = len(taken[0][0])
+    out = _Output(data, count)
+    for first in range(0, count, ROWS):
+        last = min(first + ROWS, count)
         # Neighbours give the angular acceleration.
-        begin, end = max(first - 1, 0), min(last + 1, rows)
+        begin, end = max(first - 1, 0), min(last + 1, count)
         part = [_part(column, sign, begin, end) for column, sign in taken]
         _turncal.correct(calibration, part, first - begin, out.part(first, last), per_row, rate)
     return out.table()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from importlib import import_module
 from typing import Any, Callable, Optional
 
@@ -33,7 +34,10 @@ def shown(progress: bool | Shown) -> Shown | None:
     if not progress:
         return None
     try:
-        bars = import_module("tqdm.auto").tqdm
+        with warnings.catch_warnings():
+            # Of a notebook without widgets, where the bar is text.
+            warnings.simplefilter("ignore")
+            bars = import_module("tqdm.auto").tqdm
     except ImportError:
         return None
     return Bar(bars)

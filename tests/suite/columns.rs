@@ -1,0 +1,105 @@
+//! Columns in memory give the run that a file of the same numbers gives.
+
+use std::fmt::Write;
+
+use turncal::formats::draft::{Stated, StatedColumns};
+use turncal::formats::{Opened, Place, Table};
+use turncal::imu::PerSensor;
+use turncal::simulation::Scenario;
+
+const NAMES: [&str; 6] = ["gx", "gy", "gz", "ax", "ay", "az"];
+
+/// Rates and forces of a MEMS sensor, a column each.
+fn columns() -> Vec<Vec<f64>> {
+    let run = Scenario::load("mems").unwrap().simulate(1, 0).unwrap().run;
+    let imu = run.recording.imu;
+    let column = |k: usize| {
+        let series = if k < 3 { &imu.gyro } else { &imu.accel };
+        let rates = series.iter().map(|sample| sample[k % 3] / imu.period);
+        rates.collect()
+    };
+    (0..6).map(column).collect()
+}
+
+fn table(names: [&str; 6], columns: &[Vec<f64>]) -> Table {
+    let names = names.map(str::to_owned);
+    let columns = names.into_iter().zip(columns.iter().cloned());
+    Table::new("data", columns.collect()).unwrap()
+}
+
+fn stated() -> Stated {
+    Stated {
+        rate_hz: Some(100.0),
+        ..Stated::default()
+    }
+}
+
+#[test]
+fn a_table_is_read_as_a_file_of_its_numbers() {
+    let columns = columns();
+    let mut text = NAMES.join(",") + "\n";
+    for row in 0..columns[0].len() {
+        let row: Vec<String> = columns.iter().map(|of| of[row].to_string()).collect();
+        writeln!(text, "{}", row.join(",")).unwrap();
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("data.csv");
+    std::fs::write(&path, text).unwrap();
+    let file = Opened::new(&path, None, &stated(), |_| ()).unwrap().run;
+    let run = Opened::of_table(&table(NAMES, &columns), &stated())
+        .unwrap()
+        .run;
+    assert_eq!(run.recording.imu, file.recording.imu);
+    assert_eq!(run.instrument, file.instrument);
+    assert!(run.recording.files.is_empty());
+}
+
+#[test]
+fn stated_columns_prevail_over_names_and_missing_ones_are_refused() {
+    let columns = columns();
+    let names = ["a", "b", "c", "gx", "gy", "gz"];
+    let triads = |gyro: [&str; 3], accel: [&str; 3]| Stated {
+        columns: StatedColumns {
+            triads: PerSensor {
+                gyro: Some(gyro.map(str::to_owned)),
+                accel: Some(accel.map(str::to_owned)),
+            },
+            ..StatedColumns::default()
+        },
+        ..stated()
+    };
+    let swapped = triads(["a", "b", "c"], ["gx", "gy", "gz"]);
+    let run = Opened::of_table(&table(names, &columns), &swapped)
+        .unwrap()
+        .run;
+    let plain = Opened::of_table(&table(NAMES, &columns), &stated())
+        .unwrap()
+        .run;
+    assert_eq!(run.recording.imu.accel, plain.recording.imu.accel);
+    let error = Opened::of_table(
+        &table(names, &columns),
+        &triads(["a", "b", "x"], ["gx", "gy", "gz"]),
+    );
+    assert!(
+        error
+            .unwrap_err()
+            .to_string()
+            .contains("expected a column `x`")
+    );
+}
+
+#[test]
+fn an_error_names_row_and_column() {
+    let mut columns = columns();
+    columns[4][7] = f64::INFINITY;
+    let error = Opened::of_table(&table(NAMES, &columns), &stated()).unwrap_err();
+    let column = Some("ay".to_owned());
+    assert_eq!(error.place, Place::Row { row: 7, column });
+    let unequal = Table::new("data", vec![("a".into(), vec![1.0]), ("b".into(), vec![])]);
+    assert!(
+        unequal
+            .unwrap_err()
+            .to_string()
+            .contains("1 values in `a` and 0 in `b`")
+    );
+}
