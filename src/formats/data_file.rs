@@ -1,4 +1,4 @@
-//! A file of rows: on disk, or its bytes in memory where there is no disk, as in a browser.
+//! A file of rows: on disk; its bytes in memory where there is no disk, as in a browser; or columns in memory.
 
 use std::fs::{self, File};
 use std::io::{self, Cursor, Read, Seek};
@@ -7,13 +7,20 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::error::FileError;
+use super::table::Table;
 
 /// A readable file, with the path by which `run.toml` and messages name it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct DataFile {
     path: PathBuf,
-    /// `None` if it is on disk.
-    bytes: Option<Arc<[u8]>>,
+    kind: Kind,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Kind {
+    OnDisk,
+    Bytes(Arc<[u8]>),
+    Table(Table),
 }
 
 /// The content of a file.
@@ -25,13 +32,24 @@ impl DataFile {
     pub fn in_memory(path: impl Into<PathBuf>, bytes: impl Into<Arc<[u8]>>) -> Self {
         Self {
             path: path.into(),
-            bytes: Some(bytes.into()),
+            kind: Kind::Bytes(bytes.into()),
         }
     }
 
     /// The bytes of a file in memory.
     pub fn bytes(&self) -> Option<&[u8]> {
-        self.bytes.as_deref()
+        match &self.kind {
+            Kind::Bytes(bytes) => Some(bytes),
+            Kind::OnDisk | Kind::Table(_) => None,
+        }
+    }
+
+    /// The columns, if they are in memory.
+    pub(super) fn table(&self) -> Option<&Table> {
+        match &self.kind {
+            Kind::Table(table) => Some(table),
+            Kind::OnDisk | Kind::Bytes(_) => None,
+        }
     }
 
     /// The file of this path: one of those in memory, which have a name but no directory, otherwise on disk.
@@ -44,7 +62,7 @@ impl DataFile {
 
     /// Opens a regular file, which can be read more than once.
     pub(super) fn open(&self) -> Result<Box<dyn Content>, FileError> {
-        if let Some(bytes) = &self.bytes {
+        if let Kind::Bytes(bytes) = &self.kind {
             return Ok(Box::new(Cursor::new(bytes.clone())));
         }
         // To open a pipe would wait for whoever writes into it.
@@ -72,7 +90,17 @@ impl DataFile {
 
 impl From<PathBuf> for DataFile {
     fn from(path: PathBuf) -> Self {
-        Self { path, bytes: None }
+        let kind = Kind::OnDisk;
+        Self { path, kind }
+    }
+}
+
+impl From<Table> for DataFile {
+    fn from(table: Table) -> Self {
+        Self {
+            path: table.name().to_owned(),
+            kind: Kind::Table(table),
+        }
     }
 }
 

@@ -10,7 +10,6 @@ use tempfile::TempDir;
 use super::data_file::DataFile;
 use super::draft::{Draft, Stated};
 use super::error::FileError;
-use super::table::Table;
 use crate::run::Run;
 
 /// The log on standard input.
@@ -114,18 +113,6 @@ impl Opened {
             self.run = Run::of_text(path, &draft.to_toml(&name), None, &[])?;
         }
         Ok(())
-    }
-
-    /// The same for a table in memory.
-    ///
-    /// # Errors
-    /// [`FileError`] if required fields are neither detected nor stated.
-    pub fn of_table(table: &Table, stated: &Stated) -> Result<Self, FileError> {
-        let draft = Draft::of_table(table, stated)?;
-        draft.check(table.name())?;
-        let name = table.name().to_string_lossy();
-        let run = Run::of_table(table, &draft.to_toml(&name))?;
-        Ok(Self { run, log: None })
     }
 
     /// Whether there was no `run.toml`.

@@ -7,7 +7,7 @@ use super::error::{FileError, Place};
 use super::rows::Rows;
 
 /// Columns of equal length. Copies share the numbers.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Table {
     name: PathBuf,
     names: Arc<[String]>,

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use turncal::formats::draft::{Stated, StatedColumns};
-use turncal::formats::{Opened, Place, Table};
+use turncal::formats::{FileError, Opened, Place, Table};
 use turncal::imu::PerSensor;
 use turncal::simulation::Scenario;
 
@@ -19,6 +19,10 @@ fn columns() -> Vec<Vec<f64>> {
         rates.collect()
     };
     (0..6).map(column).collect()
+}
+
+fn opened(table: Table, stated: &Stated) -> Result<Opened, FileError> {
+    Opened::in_memory(&[table.into()], None, stated, |_| ())
 }
 
 fn table(names: [&str; 6], columns: &[Vec<f64>]) -> Table {
@@ -46,9 +50,7 @@ fn a_table_is_read_as_a_file_of_its_numbers() {
     let path = directory.path().join("data.csv");
     std::fs::write(&path, text).unwrap();
     let file = Opened::new(&path, None, &stated(), |_| ()).unwrap().run;
-    let run = Opened::of_table(&table(NAMES, &columns), &stated())
-        .unwrap()
-        .run;
+    let run = opened(table(NAMES, &columns), &stated()).unwrap().run;
     assert_eq!(run.recording.imu, file.recording.imu);
     assert_eq!(run.instrument, file.instrument);
     assert!(run.recording.files.is_empty());
@@ -69,15 +71,11 @@ fn stated_columns_prevail_over_names_and_missing_ones_are_refused() {
         ..stated()
     };
     let swapped = triads(["a", "b", "c"], ["gx", "gy", "gz"]);
-    let run = Opened::of_table(&table(names, &columns), &swapped)
-        .unwrap()
-        .run;
-    let plain = Opened::of_table(&table(NAMES, &columns), &stated())
-        .unwrap()
-        .run;
+    let run = opened(table(names, &columns), &swapped).unwrap().run;
+    let plain = opened(table(NAMES, &columns), &stated()).unwrap().run;
     assert_eq!(run.recording.imu.accel, plain.recording.imu.accel);
-    let error = Opened::of_table(
-        &table(names, &columns),
+    let error = opened(
+        table(names, &columns),
         &triads(["a", "b", "x"], ["gx", "gy", "gz"]),
     );
     assert!(
@@ -92,7 +90,7 @@ fn stated_columns_prevail_over_names_and_missing_ones_are_refused() {
 fn an_error_names_row_and_column() {
     let mut columns = columns();
     columns[4][7] = f64::INFINITY;
-    let error = Opened::of_table(&table(NAMES, &columns), &stated()).unwrap_err();
+    let error = opened(table(NAMES, &columns), &stated()).unwrap_err();
     let column = Some("ay".to_owned());
     assert_eq!(error.place, Place::Row { row: 7, column });
     let unequal = Table::new("data", vec![("a".into(), vec![1.0]), ("b".into(), vec![])]);

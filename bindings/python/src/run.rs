@@ -277,7 +277,9 @@ pub fn run(
         .into_iter()
         .map(|(name, of)| (name, of.as_array().to_vec()));
     let table = Table::new(name, columns.collect()).map_err(raise)?;
-    let opened = finish(py, move || Opened::of_table(&table, &stated))?;
+    let opened = finish(py, move || {
+        Opened::in_memory(&[table.into()], None, &stated, |_| ())
+    })?;
     Ok(Run::new(
         Recorded::of_run(opened.map_err(raise)?.run, None),
         None,

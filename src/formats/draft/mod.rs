@@ -20,8 +20,6 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use crate::formats::instrument::USUAL_PERIOD;
-use crate::formats::rows::LogRows;
-use crate::formats::table::Table;
 use crate::formats::{DataFile, FileError, Sheet};
 use crate::imu::{PerSensor, Sensor};
 use crate::noise::{Clusters, TriadNoise};
@@ -92,7 +90,14 @@ impl Draft {
             let whole = accel.canonicalize().unwrap_or_else(|_| accel.to_path_buf());
             return Self::of_two_files(file, accel, &whole.to_string_lossy(), stated);
         }
-        if let Some((streams, sheet)) = Streams::of_file(file, stream)? {
+        let streams = match file.table() {
+            Some(table) => {
+                stated.columns.check(table)?;
+                None
+            }
+            None => Streams::of_file(file, stream)?,
+        };
+        if let Some((streams, sheet)) = streams {
             return Ok(Self::of_sheet(sheet, Some(streams), stated));
         }
         let sheet = Sheet::read(file, FEWEST_ROWS)?;
@@ -100,16 +105,6 @@ impl Draft {
             let (streams, sheet) = Streams::of_two_files(file, file, None)?;
             return Ok(Self::of_sheet(sheet, Some(streams), stated));
         }
-        Ok(Self::of_sheet(sheet, None, stated))
-    }
-
-    /// Examines a table in memory.
-    ///
-    /// # Errors
-    /// [`FileError`] if it has too few rows or lacks a stated column.
-    pub fn of_table(table: &Table, stated: &Stated) -> Result<Self, FileError> {
-        stated.columns.check(table)?;
-        let sheet = Sheet::of(LogRows::new(table.rows()), FEWEST_ROWS)?;
         Ok(Self::of_sheet(sheet, None, stated))
     }
 

@@ -8,7 +8,6 @@ use crate::formats::rows::LogRows;
 use crate::formats::schema::instrument::Fields;
 use crate::formats::schema::{Positive, TimeColumn};
 use crate::formats::streams::{self, StreamRows};
-use crate::formats::table::Table;
 
 /// Source of rows.
 #[derive(Debug, Clone)]
@@ -18,8 +17,6 @@ pub struct Source<'a> {
     pub stream: Option<&'a str>,
     /// Whether the intact part of a damaged file is used.
     pub salvage: bool,
-    /// Rows in memory, in place of those of the file.
-    pub table: Option<&'a Table>,
 }
 
 impl Source<'_> {
@@ -29,13 +26,12 @@ impl Source<'_> {
             file: file.into(),
             stream: None,
             salvage: false,
-            table: None,
         }
     }
 
     /// Opens it according to its content.
     pub fn open(&self) -> Result<LogRows, FileError> {
-        if let Some(table) = self.table {
+        if let Some(table) = self.file.table() {
             return Ok(LogRows::new(table.rows()));
         }
         let Some(log) = streams::open(&self.file)? else {
@@ -63,7 +59,6 @@ impl<'a> Fields<'a> {
             file: self.file(file),
             stream: stream.as_deref(),
             salvage: salvage.unwrap_or(false),
-            table: None,
         }
     }
 
@@ -114,7 +109,6 @@ impl<'a> Fields<'a> {
             file: file.map_or_else(|| gyro.file.clone(), |file| self.file(file)),
             stream: fields.stream.as_deref().or(gyro.stream),
             salvage: fields.salvage.unwrap_or(gyro.salvage),
-            table: None,
         };
         let stated = (fields.time_unit, fields.sample_period_s);
         let mut clock = self.clock("imu.accel_from", fields.time.as_ref(), stated)?;

@@ -11,8 +11,6 @@ use crate::formats::error::{FileError, list, suggestion};
 use crate::formats::imu_log::ImuLog;
 use crate::formats::inputs::temperature::{TemperatureColumns, TemperatureUnit};
 use crate::formats::quantity::units;
-use crate::formats::source::Source;
-use crate::formats::table::Table;
 use crate::imu::NoiseKeys;
 use crate::imu::{
     AxisOrder, GaussMarkov, Instrument, MotionNoise, Noise, Nominal, Output, PerSensor, Prior,
@@ -42,8 +40,6 @@ pub struct Fields<'a> {
     pub document: Document<'a>,
     pub run: &'a RunFile,
     pub directory: &'a Path,
-    /// Rows of the instrument in memory, in place of its log.
-    pub table: Option<&'a Table>,
     /// Files of this directory that are in memory.
     pub in_memory: &'a [DataFile],
     pub notes: Vec<String>,
@@ -63,10 +59,7 @@ impl<'a> Fields<'a> {
         let known = self.knowledge()?;
         let stated = (imu.time_unit, imu.sample_period_s);
         let mut of_gyro = self.clock("imu", imu.columns.time.as_ref(), stated)?;
-        let source = Source {
-            table: self.table,
-            ..self.source(&imu.file, &imu.stream, imu.salvage)
-        };
+        let source = self.source(&imu.file, &imu.stream, imu.salvage);
         let accel_from = self.accel_from(&source, of_gyro)?;
         if let (Some(of), Some(_)) = (&imu.instance, &accel_from) {
             let meaning = format!(

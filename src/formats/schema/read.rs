@@ -16,7 +16,6 @@ use crate::formats::error::FileError;
 use crate::formats::imu_log::ImuLog;
 use crate::formats::inputs::segments;
 use crate::formats::small_file;
-use crate::formats::table::Table;
 use crate::imu::{Instrument, NoiseKeys, Output, PerSensor, Sensor};
 use crate::noise;
 use crate::recording::{ImuSamples, Recording, faults, nanoseconds};
@@ -41,21 +40,6 @@ impl Run {
         source: Option<&Path>,
         in_memory: &[DataFile],
     ) -> Result<Self, FileError> {
-        Self::of_parts(path, text, source, in_memory, None)
-    }
-
-    /// The same with the samples of a table in place of a log.
-    pub fn of_table(table: &Table, text: &str) -> Result<Self, FileError> {
-        Self::of_parts(table.name(), text, None, &[], Some(table))
-    }
-
-    fn of_parts(
-        path: &Path,
-        text: &str,
-        source: Option<&Path>,
-        in_memory: &[DataFile],
-        table: Option<&Table>,
-    ) -> Result<Self, FileError> {
         let document = Document::of(path, text);
         let file = run_file(document)?;
         let directory = path.parent().unwrap_or(Path::new(""));
@@ -63,7 +47,6 @@ impl Run {
             document,
             run: &file,
             directory,
-            table,
             in_memory,
             notes: Vec::new(),
         };
@@ -76,7 +59,7 @@ impl Run {
         // The small files' fields are checked before the large files are read.
         let files = [
             source.map(Path::to_owned),
-            (table.is_none()).then(|| instrument.log.source.file.to_path_buf()),
+            Some(instrument.log.source.file.to_path_buf()),
             other_file(&instrument.log),
             table_log.as_ref().map(|log| log.source.file.to_path_buf()),
             segments_file.as_deref().map(Path::to_owned),
@@ -143,7 +126,6 @@ pub fn check(document: Document) -> Result<(), FileError> {
         document,
         run: &run,
         directory: Path::new(""),
-        table: None,
         in_memory: &[],
         notes: Vec::new(),
     };

@@ -146,6 +146,9 @@ const CLOSED: [(&[u8], &str, &str); 2] = [
 
 /// Opens a log according to its content; `None` if it is not such a log, but perhaps text.
 pub fn open(path: &DataFile) -> Result<Option<Box<dyn Log>>, FileError> {
+    if path.table().is_some() {
+        return Ok(None);
+    }
     let mut file = path.open()?;
     let mut begin = Vec::new();
     file.by_ref()
