@@ -9,7 +9,8 @@ use nalgebra::{DMatrix, Matrix3, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::{Attained, Survey};
+use super::Survey;
+use super::attained::Attained;
 use crate::attitude::level;
 use crate::calibration::{Bound, Options, Problem, bound};
 use crate::imu::{InstallationForm, MotionNoise, NoiseSource, Sensor, TermVector};

@@ -3,12 +3,13 @@
 use nalgebra::Vector3;
 
 use super::advice::{Advisor, Move};
-use super::{GroupSigma, Survey, bound_of_record, by_group, unobserved};
+use super::attained::{Attained, decided};
+use super::{Survey, bound_of_record, by_group, unobserved};
 use crate::calibration::{
-    Bound, CalibrationError, Estimate, Finding, Group, Method, OBSERVED_BELOW, Options,
-    ParameterVector, Problem, Progress, Verdict, Word,
+    Bound, CalibrationError, Estimate, Finding, Method, Options, ParameterVector, Problem,
+    Progress, Verdict, Word,
 };
-use crate::lot::{self, Check, Limit, Sample, Specification, checks};
+use crate::lot::{self, Specification};
 use crate::run::Run;
 
 /// Growth of a recording after which it is calibrated again: all calibrations together take at most three times as long
@@ -32,21 +33,6 @@ pub struct Status {
     pub calibrated: Option<Calibrated>,
     /// The next move; `None` if nothing is missing.
     pub next: Option<Move>,
-}
-
-/// Accuracy of the rows so far.
-#[derive(Debug, Clone)]
-pub struct Attained {
-    /// Expected covariance with the stated noise, and its history.
-    pub bound: Bound,
-    /// Expected σ relative to those of the bound.
-    pub inflation: ParameterVector,
-    /// For each dwell: the time of its end in s, and the expected σ at that time.
-    pub history: Vec<(f64, GroupSigma)>,
-    /// Parameters that keep more than half of their prior σ.
-    pub unobserved: Vec<String>,
-    /// Every limit of the specification, for a unit at its nominal values.
-    pub checks: Vec<Check>,
 }
 
 /// A calibration of the rows so far. Only a calibration finds the actual noise, unmodelled errors and their σ.
@@ -195,57 +181,4 @@ impl Status {
     pub fn is_met(&self) -> bool {
         self.expected.as_ref().is_ok_and(Attained::is_met)
     }
-}
-
-impl Attained {
-    /// Whether a specification is given and every limit can be decided.
-    pub fn is_met(&self) -> bool {
-        let decided = |check: &Check| check.verdict == lot::Verdict::Pass;
-        !self.checks.is_empty() && self.checks.iter().all(decided)
-    }
-
-    /// Time until every limit can be decided, s, if the rest of the record adds information as the rows so far; `None`
-    /// without a specification, or if the rows so far do not show a parameter.
-    pub fn time_left(&self, specification: Option<&Specification>) -> Option<f64> {
-        let specification = specification?;
-        let duration = self.bound.history.last()?.time;
-        let is_open = |check: &&Check| check.verdict != lot::Verdict::Pass;
-        let times = self.checks.iter().filter(is_open).map(|check| {
-            let Limit {
-                parameter, within, ..
-            } = check.limit;
-            let (_, sigma) = check.off?;
-            let is_shown = sigma < OBSERVED_BELOW * self.bound.prior_sigma[parameter];
-            let ratio = sigma / specification.deciding_sigma(within);
-            is_shown.then_some(duration * (ratio.powi(2) - 1.0).max(0.0))
-        });
-        times.reduce(|a, b| Some(a?.max(b?)))?
-    }
-}
-
-/// A unit at its nominal values against every limit of an estimated parameter: it passes if the σ of an estimate are
-/// small enough to decide the limit.
-pub fn decided(specification: &Specification, estimate: &Estimate) -> Vec<Check> {
-    let sigma = estimate.in_general_form().sigma();
-    let mut specification = specification.clone();
-    // Parameters that the body frame fixes have no error.
-    specification
-        .limits
-        .retain(|limit| sigma[limit.parameter] > 0.0);
-    checks(&specification, |parameter| {
-        let mut limits = specification.limits.iter();
-        let limit = limits.find(|limit| limit.parameter == parameter)?;
-        Some(Sample {
-            value: limit.nominal,
-            sigma: sigma[parameter],
-        })
-    })
-}
-
-/// σ of a group's parameters that decides its tightest limit for a unit at its nominal values; `None` without a limit.
-pub fn needed(specification: &Specification, group: Group) -> Option<f64> {
-    let of_group = |limit: &&Limit| Group::of(limit.parameter) == group;
-    let limits = specification.limits.iter().filter(of_group);
-    let tightest = limits.map(|limit| limit.within).reduce(f64::min)?;
-    Some(specification.deciding_sigma(tightest))
 }

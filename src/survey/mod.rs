@@ -2,11 +2,13 @@
 //! prior biases are used.
 
 mod advice;
+mod attained;
 mod evaluator;
 mod session;
 
 pub use advice::{Move, TURNED_BY_HAND};
-pub use evaluator::{Attained, Calibrated, Evaluator, GROWTH, Status, decided, needed};
+pub use attained::{Attained, decided, needed};
+pub use evaluator::{Calibrated, Evaluator, GROWTH, Status};
 pub use session::Session;
 
 use crate::calibration::{

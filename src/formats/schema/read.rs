@@ -57,9 +57,10 @@ impl Run {
         let mut notes = fields.notes;
 
         // The small files' fields are checked before the large files are read.
+        let log = &instrument.log.source.file;
         let files = [
             source.map(Path::to_owned),
-            Some(instrument.log.source.file.to_path_buf()),
+            (log.table().is_none()).then(|| log.to_path_buf()),
             other_file(&instrument.log),
             table_log.as_ref().map(|log| log.source.file.to_path_buf()),
             segments_file.as_deref().map(Path::to_owned),
