@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
+use turncal::formats::DataFile;
 use turncal::formats::draft::{Stated, StatedUnit};
 use turncal::imu::Sensor;
 
@@ -36,7 +37,7 @@ impl Known {
         stream: Option<String>,
     ) -> PyResult<Self> {
         let stated = Stated {
-            accel_file,
+            accel_file: accel_file.map(DataFile::from),
             rate_hz: positive("rate", rate)?,
             latitude_deg: within("latitude", latitude, [-90.0, 90.0])?,
             height_m: within("height", height, [-12e3, 1e5])?,

@@ -295,7 +295,7 @@ pub fn init(py: Python, path: PathBuf, known: &Known) -> PyResult<String> {
             .unwrap_or_default()
             .to_string_lossy()
             .into_owned();
-        Draft::of_stream(&path, stream.as_deref(), &stated).map(|draft| draft.to_toml(&name))
+        Draft::of_stream(&path.into(), stream.as_deref(), &stated).map(|draft| draft.to_toml(&name))
     });
     draft?.map_err(raise)
 }
