@@ -1,6 +1,6 @@
 //! Status of a calibration in progress, as a screen that is redrawn or as lines.
 
-use nalgebra::Vector3;
+use std::collections::BTreeSet;
 
 use super::check;
 use super::prelude::*;
@@ -8,7 +8,9 @@ use crate::calibration::{Finding, Verdict};
 use crate::imu::AXES;
 use crate::lot::{self, Specification};
 use crate::run::Run;
-use crate::survey::{Attained, Calibrated, Move, Status, needed};
+use crate::survey::{
+    Attained, Attitude, InterimCalibration, Move, Status, nearest_attitude, needed,
+};
 
 /// Minimum turn about a body axis that counts, rad.
 const TURNED: f64 = 60.0 * DEGREE;
@@ -158,7 +160,7 @@ fn groups(attained: &Attained, specification: Option<&Specification>) -> Vec<Str
 }
 
 /// The last calibration in one line.
-fn calibrated(last: &Calibrated) -> String {
+fn calibrated(last: &InterimCalibration) -> String {
     let Verdict { word, reasons } = &last.verdict;
     let codes = if reasons.is_empty() {
         String::new()
@@ -189,28 +191,16 @@ pub fn notes(run: &Run, status: &Status) -> Vec<String> {
 /// turns about both directions of each axis.
 fn coverage(status: &Status) -> Vec<String> {
     let mark = |done: bool| if done { '●' } else { '○' };
-    let direction = |x: i32, y: i32, z: i32| Vector3::new(x, y, z).map(f64::from).normalize();
-    let all = (0..27)
-        .filter(|k| *k != 13)
-        .map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]);
-    let nearest = |force: &Vector3<f64>| {
-        let apart = |&[x, y, z]: &[i32; 3]| force.angle(&direction(x, y, z));
-        all.clone().min_by(|a, b| apart(a).total_cmp(&apart(b)))
-    };
-    let tried: Vec<_> = status
-        .survey
-        .rests
-        .iter()
-        .map(|rest| nearest(&rest.force))
-        .collect();
-    let layer = |y: i32, z: i32| {
-        let cell = |x: i32| match [x, y, z] {
+    let rests = status.survey.rests.iter();
+    let tried: BTreeSet<Attitude> = rests.map(|rest| nearest_attitude(&rest.force)).collect();
+    let layer = |y, z| {
+        let cell = |x| match [x, y, z] {
             [0, 0, 0] => ' ',
-            of => mark(tried.contains(&Some(of))),
+            of => mark(tried.contains(&of)),
         };
         format!("{} {} {}", cell(-1), cell(0), cell(1))
     };
-    let row = |(y, name): (i32, &str)| {
+    let row = |(y, name): (i8, &str)| {
         format!(
             "{name:<8}{}    {}    {}",
             layer(y, 1),

@@ -57,7 +57,8 @@ pub trait Study: Sync {
     /// Makes some of the runs on all cores; `done` is called after each and may stop the study.
     ///
     /// # Errors
-    /// [`StudyError`] if runs cannot be made, or if the study was stopped. A run without a calibration is not an error: it is counted.
+    /// [`StudyError`] if runs cannot be made, or if the study was stopped. A run without a calibration is not an error:
+    /// it is counted.
     fn trials(&self, runs: &[u64], done: Done) -> Result<Vec<Self::Trial>, StudyError> {
         let make = self.maker()?;
         let all = runs.par_iter().with_max_len(1).map(|&run| {

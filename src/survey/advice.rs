@@ -58,7 +58,7 @@ impl Move {
             axis: k / 2,
             is_negative: k % 2 == 1,
         });
-        ups().map(Self::Up).chain(turns)
+        attitudes().map(up_in).map(Self::Up).chain(turns)
     }
 
     fn rotation(self) -> Rotation {
@@ -75,27 +75,39 @@ impl Move {
     }
 }
 
-/// Directions from the centre of a cube to its six faces, then twelve edges, then eight corners.
-fn ups() -> impl Iterator<Item = Vector3<f64>> {
+/// An attitude: −1, 0 or 1 along each body axis give the direction that points up, that from the centre of a cube to a
+/// face, an edge or a corner.
+pub type Attitude = [i8; 3];
+
+/// The six faces, then twelve edges, then eight corners.
+fn attitudes() -> impl Iterator<Item = Attitude> {
     (1..=3).flat_map(|parts| {
-        let all = (0..27)
-            .map(|k| Vector3::new(k % 3, k / 3 % 3, k / 9).map(|part| f64::from(part) - 1.0));
-        let of_parts =
-            move |up: &Vector3<f64>| up.iter().filter(|part| **part != 0.0).count() == parts;
-        all.filter(of_parts).map(|up| up.normalize())
+        let all = (0..27).map(|k| [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1]);
+        all.filter(move |of: &Attitude| of.iter().filter(|part| **part != 0).count() == parts)
     })
+}
+
+fn up_in(attitude: Attitude) -> Vector3<f64> {
+    Vector3::from(attitude).map(f64::from).normalize()
+}
+
+/// The attitude in which up is closest to this direction along body axes.
+pub fn nearest_attitude(up: &Vector3<f64>) -> Attitude {
+    let apart = |of: &Attitude| up_in(*of).angle(up);
+    let nearest = attitudes().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+    nearest.unwrap_or([0, 0, 1])
 }
 
 /// Chooses moves. The information of moves is cached for each attitude at which they begin.
 #[derive(Debug, Clone, Default)]
 pub struct Advisor {
-    from: BTreeMap<usize, Vec<(Move, DMatrix<f64>)>>,
+    from: BTreeMap<Attitude, Vec<(Move, DMatrix<f64>)>>,
 }
 
 impl Advisor {
     /// Move before any calibration is possible: the axis whose upward position is farthest from all dwells.
     pub fn first(&self, survey: &Survey) -> Move {
-        let faces = ups().take(6);
+        let faces = attitudes().take(6).map(up_in);
         let apart = |up: &Vector3<f64>| {
             let angles = survey.rests.iter().map(|rest| rest.force.angle(up));
             angles.fold(f64::INFINITY, f64::min)
@@ -114,11 +126,11 @@ impl Advisor {
         specification: Option<&Specification>,
     ) -> Option<Move> {
         let known = information(&attained.bound)?;
-        let place = ups()
-            .enumerate()
-            .min_by(|(_, a), (_, b)| a.angle(up).total_cmp(&b.angle(up)));
-        let (place, from) = place?;
-        let moves = self.from.entry(place).or_insert_with(|| worth(run, &from));
+        let from = nearest_attitude(up);
+        let moves = self
+            .from
+            .entry(from)
+            .or_insert_with(|| worth(run, &up_in(from)));
         let missing = |(_, gained): &(Move, DMatrix<f64>)| -> f64 {
             let all = &known + gained;
             let Some(covariance) = all.cholesky().map(|root| root.inverse()) else {

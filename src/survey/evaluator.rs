@@ -29,15 +29,15 @@ pub struct Status {
     pub still: f64,
     /// Expected σ, or the reason why there is none yet.
     pub expected: Result<Attained, CalibrationError>,
-    /// The last calibration, of the rows at that time.
-    pub calibrated: Option<Calibrated>,
+    /// The last calibration, of the rows at that time; `None` if it failed.
+    pub calibrated: Option<InterimCalibration>,
     /// The next move; `None` if nothing is missing.
     pub next: Option<Move>,
 }
 
 /// A calibration of the rows so far. Only a calibration finds the actual noise, unmodelled errors and their σ.
 #[derive(Debug, Clone)]
-pub struct Calibrated {
+pub struct InterimCalibration {
     /// Duration of the record at that time, s.
     pub duration: f64,
     /// Its verdict.
@@ -54,7 +54,9 @@ pub struct Evaluator {
     options: Options,
     specification: Option<Specification>,
     advisor: Advisor,
-    calibrated: Option<Calibrated>,
+    calibrated: Option<InterimCalibration>,
+    /// Duration of the record at the last attempt to calibrate it, s.
+    attempted: f64,
 }
 
 impl Evaluator {
@@ -107,17 +109,18 @@ impl Evaluator {
         bound: Bound,
         progress: Progress,
     ) -> Attained {
+        let attained = self.of_bound(run, survey, bound);
         let duration = run.recording.imu.duration();
-        let last = self.calibrated.as_ref().map_or(0.0, |of| of.duration);
-        let is_due = duration >= GROWTH * last;
-        let seems_met = |it: &Self| it.of_bound(run, survey, &bound).is_met();
-        if is_due || (duration > last && seems_met(self)) {
-            self.calibrated = Calibrated::of(run, &self.options, &bound, progress);
+        let seems_met = duration > self.attempted && attained.is_met();
+        if duration < GROWTH * self.attempted && !seems_met {
+            return attained;
         }
-        self.of_bound(run, survey, &bound)
+        self.attempted = duration;
+        self.calibrated = InterimCalibration::of(run, &self.options, &attained.bound, progress);
+        self.of_bound(run, survey, attained.bound)
     }
 
-    fn of_bound(&self, run: &Run, survey: &Survey, bound: &Bound) -> Attained {
+    fn of_bound(&self, run: &Run, survey: &Survey, bound: Bound) -> Attained {
         let estimate = &bound.estimate;
         let inflation = match &self.calibrated {
             Some(of) => of.inflation,
@@ -140,7 +143,7 @@ impl Evaluator {
             .specification
             .as_ref()
             .map_or_else(Vec::new, |of| decided(of, &inflated));
-        let is_usable = |of: &Calibrated| of.verdict.word != Word::Failed;
+        let is_usable = |of: &InterimCalibration| of.verdict.word != Word::Failed;
         if !self.calibrated.as_ref().is_some_and(is_usable) {
             checks
                 .iter_mut()
@@ -151,12 +154,12 @@ impl Evaluator {
             unobserved: unobserved(&inflated.sigma(), &bound.prior_sigma, estimate),
             checks,
             inflation,
-            bound: bound.clone(),
+            bound,
         }
     }
 }
 
-impl Calibrated {
+impl InterimCalibration {
     /// `None` if the rows cannot be calibrated, or progress is stopped.
     fn of(run: &Run, options: &Options, bound: &Bound, progress: Progress) -> Option<Self> {
         let problem = Problem::new(run, options);

@@ -6,9 +6,9 @@ mod attained;
 mod evaluator;
 mod session;
 
-pub use advice::{Move, TURNED_BY_HAND};
+pub use advice::{Attitude, Move, TURNED_BY_HAND, nearest_attitude};
 pub use attained::{Attained, decided, needed};
-pub use evaluator::{Calibrated, Evaluator, GROWTH, Status};
+pub use evaluator::{Evaluator, GROWTH, InterimCalibration, Status};
 pub use session::Session;
 
 use crate::calibration::{

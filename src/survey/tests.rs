@@ -151,7 +151,8 @@ mod by_hand {
 
     use super::*;
     use crate::attitude::exp;
-    use crate::calibration::UNWATCHED;
+    use crate::calibration::{Method, UNWATCHED, parameter};
+    use crate::imu::Sensor;
     use crate::models;
     use crate::turntable::{BodyStep, Moves, Path, Rotation};
 
@@ -288,6 +289,34 @@ mod by_hand {
         assert_eq!(live.survey.rests.len(), whole.survey.rests.len());
         let [live, whole] = [live, whole].map(|of| of.expected.unwrap().bound.estimate.sigma());
         assert!((live - whole).amax() <= 1e-6 * whole.amax());
+    }
+
+    #[test]
+    fn sigma_shown_are_those_of_a_calibration_also_where_noise_is_larger_than_stated() {
+        let mut person = Person::new(4);
+        for next in Move::all().take(9).chain(Move::all().skip(26)) {
+            person.does(next);
+        }
+        let mut run = person.run();
+        run.instrument.noise.gyro.random_walk /= 5.0;
+        let status = Evaluator::default().status(&run, UNWATCHED);
+        let (_, shown) = status.expected.unwrap().history.pop().unwrap();
+
+        let problem = Problem::new(&run, &Options::default());
+        let mut solution = problem.solve(Method::Ekf, UNWATCHED).unwrap();
+        solution.assess(&problem).unwrap();
+        let found = by_group(&solution.estimate().sigma(), solution.estimate());
+        for ((group, shown), (_, found)) in shown.into_iter().zip(found) {
+            let (shown, found) = (shown.unwrap(), found.unwrap());
+            // The last epoch is that of the last dwell's end.
+            assert!(
+                (shown / found - 1.0).abs() < 0.02,
+                "{group:?}: {shown} {found}"
+            );
+        }
+        let expected = bound_of_record(&run, &Options::default()).unwrap();
+        let by_stated = expected.estimate.sigma()[parameter(Sensor::Gyro, 0)];
+        assert!(solution.estimate().sigma()[parameter(Sensor::Gyro, 0)] > 2.0 * by_stated);
     }
 
     #[test]

@@ -1,9 +1,11 @@
 //! `turncal calibrate`
 
 mod follow;
+mod incoming;
 mod lines;
 mod lot;
 mod merge;
+mod screen;
 
 pub use lot::NotMet;
 pub use merge::Merge;

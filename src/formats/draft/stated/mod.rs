@@ -81,15 +81,10 @@ impl Stated {
         let sensor = sensor.map(|name| Instrument::load(name, &Place::CommandLine));
         let sensor = sensor.transpose()?;
         let of_sensor = sensor.as_ref().map(|of| of.noise);
-        let tolerances = |of: Instrument| Tolerances {
-            scale: PerSensor::from_fn(|sensor| of.variation.get(sensor).scale.sigma()),
-            bias: PerSensor::from_fn(|sensor| of.variation.get(sensor).bias.sigma()),
-            of: of.name,
-        };
         Ok(Self {
             rate_hz: self.rate_hz.or(kalibr.and_then(|imu| imu.rate_hz)),
             noise: kalibr.map(|imu| imu.noise).or(of_sensor),
-            tolerances: sensor.map(tolerances),
+            tolerances: sensor.as_ref().map(Instrument::tolerances),
             ..self
         })
     }
