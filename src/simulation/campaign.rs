@@ -8,14 +8,10 @@ use serde::{Deserialize, Serialize};
 
 use super::scenario::ChamberFile;
 use super::{Chamber, Draws, Scenario, Simulated};
-use crate::calibration::result::{Calibration, FORMAT_WITH_TEMPERATURE};
-use crate::calibration::{
-    DayToDay, Difference, ParameterVector, TemperatureOptions, ThermalRecord, Together,
-    truth_record,
-};
+use crate::calibration::result::Calibration;
+use crate::calibration::{DayToDay, Difference, ParameterVector, TemperatureOptions, Together};
 use crate::formats::{NonNegative, day_to_day};
 use crate::models::{self, ModelError, Place, Room};
-use crate::recording::Temperature;
 use crate::turntable::TableError;
 
 /// Simulated recordings of one instrument.
@@ -112,20 +108,7 @@ impl SimulatedCampaign {
     /// temperature range.
     pub fn truth(simulated: &[Simulated]) -> Option<Calibration> {
         let first = simulated.first()?;
-        let run = &first.run;
-        let Some(thermal) = &first.thermal else {
-            return Some(truth_record(&first.common, run));
-        };
-        let known = simulated.iter();
-        let known = known.filter_map(|one| one.run.recording.imu.temperature.as_ref());
-        let range = Temperature::seen(known);
-        let at = thermal.at(&first.common, range.gyro.reference, 0.0);
-        let coefficients = thermal.coefficients(&range);
-        Some(Calibration {
-            format: FORMAT_WITH_TEMPERATURE.to_owned(),
-            temperature: Some(ThermalRecord::of_truth(&range, &coefficients, run)),
-            ..truth_record(&at, run)
-        })
+        Some(first.truth_over(simulated, &first.common))
     }
 
     /// Common and individual properties of its recordings, as an engineer would state them.

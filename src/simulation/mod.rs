@@ -25,14 +25,14 @@ use thermal::Warming;
 pub use thermal::{Chamber, ThermalTruth};
 
 use crate::attitude::{exp, quaternion};
-use crate::calibration::result::TermRecord;
-use crate::calibration::{Calibration, Difference, truth_record};
+use crate::calibration::result::{FORMAT_WITH_TEMPERATURE, TermRecord};
+use crate::calibration::{Calibration, Difference, ThermalRecord, truth_record};
 use crate::imu::{
     Instrument, NoiseSource, Nominal, Output, PerSensor, Pulses, Sensor, TERM_PARAMETERS, Term,
     TermVector, Triad,
 };
 use crate::navigation::samples_of;
-use crate::recording::{ImuSamples, Recording, TableLog};
+use crate::recording::{ImuSamples, Recording, TableLog, Temperature};
 use crate::run::{Run, SET_BY_HAND, Standstill};
 use crate::turntable::{AxisError, TABLE_GEOMETRY, TableAccuracy, TableGeometry, across};
 use crate::turntable::{Imperfection, Moves, TableError};
@@ -58,7 +58,7 @@ pub struct Simulated {
 }
 
 impl Simulated {
-    /// The truth as a record: triads at the mean temperature of the recording, and error terms that are on.
+    /// The truth as a record, with the error terms that are on and the dependence on temperature over the recording.
     pub fn truth_record(&self) -> Calibration {
         let on = (0..TERM_PARAMETERS).filter(|&k| self.run.instrument.term_sigma[k] > 0.0);
         let term = |k: usize| {
@@ -67,20 +67,24 @@ impl Simulated {
         };
         Calibration {
             terms: on.filter_map(term).collect(),
-            ..truth_record(&self.truth_here(), &self.run)
+            ..self.truth_over(std::slice::from_ref(self), &self.truth)
         }
     }
 
-    /// The true triads at the mean temperature of the recording.
-    pub fn truth_here(&self) -> PerSensor<Triad> {
-        let imu = &self.run.recording.imu;
-        match (&self.thermal, &imu.temperature) {
-            (Some(thermal), Some(temperature)) => {
-                let middle = 0.5 * (imu.start() + imu.end());
-                let at = temperature.at(middle).gyro[0];
-                thermal.at(&self.truth, at, 0.0)
-            }
-            _ => self.truth,
+    /// These triads as truth, with their dependence on temperature over the range of some recordings.
+    fn truth_over(&self, recordings: &[Self], triads: &PerSensor<Triad>) -> Calibration {
+        let Some(thermal) = &self.thermal else {
+            return truth_record(triads, &self.run);
+        };
+        let known = recordings.iter();
+        let known = known.filter_map(|one| one.run.recording.imu.temperature.as_ref());
+        let range = Temperature::seen(known);
+        let at = thermal.at(triads, range.gyro.reference, 0.0);
+        let coefficients = thermal.coefficients(&range);
+        Calibration {
+            format: FORMAT_WITH_TEMPERATURE.to_owned(),
+            temperature: Some(ThermalRecord::of_truth(&range, &coefficients, &self.run)),
+            ..truth_record(&at, &self.run)
         }
     }
 }

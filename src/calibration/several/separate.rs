@@ -1,5 +1,7 @@
 //! Each recording of a problem calibrated alone.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector, SVector};
 use rayon::prelude::*;
 
@@ -26,7 +28,7 @@ pub fn each(problem: &Problem) -> Result<Vec<SeparateEstimate>, CalibrationError
     let runs = problem.runs().count();
     let plain = |number: usize| plain(&problem.recordings(|of| of == number), &problem.model);
     let all = (0..runs).into_par_iter();
-    let all = all.map(|number| of(&plain(number), problem.model.thermal.as_deref()));
+    let all = all.map(|number| of(&plain(number), problem.model.thermal.as_ref()));
     let (mut all, contradicted): (Vec<SeparateEstimate>, Vec<bool>) =
         all.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
     if contradicted.contains(&true)
@@ -84,7 +86,7 @@ fn noise_of_all(problem: &Problem, alone: &[SeparateEstimate]) -> Option<Model> 
 /// noise.
 fn of(
     plain: &Problem,
-    thermal: Option<&ThermalModel>,
+    thermal: Option<&Arc<ThermalModel>>,
 ) -> Result<(SeparateEstimate, bool), CalibrationError> {
     let run = plain.run();
     let temperature = run.recording.imu.temperature.as_ref();
@@ -114,7 +116,7 @@ fn of(
     let (at, priors) = match solved {
         Some(solved) => (solved.iterated.estimate, solved.priors),
         None => {
-            let start = coarse_start(plain)?;
+            let start = coarse_start(&plain.with(|model| model.thermal = thermal.cloned()))?;
             (start.at, start.attitudes)
         }
     };

@@ -59,8 +59,12 @@ pub fn coarse_start(problem: &Problem) -> Result<CoarseStart, CalibrationError> 
     if let Some(attitudes) = attitudes_of_table(problem) {
         let mut first = from_vector(problem.model.form, &problem.model.prior_mean);
         first.gyro.bias = gyro_bias_at_rest(&dwells);
+        // Equations of constants lead astray what warms: a bias that drifts for an hour turns by radians.
         let smallest = ParameterVector::repeat(SMALL);
-        let triads = gauss_newton(first, &smallest, |triads| table::carried(problem, triads))?;
+        let triads = match problem.model.thermal {
+            Some(_) => first,
+            None => gauss_newton(first, &smallest, |triads| table::carried(problem, triads))?,
+        };
         let means = attitudes.iter().map(|attitude| attitude.mean).collect();
         return Ok(CoarseStart {
             at: Linearisation::new(triads, TermVector::zeros(), means),
