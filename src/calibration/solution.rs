@@ -87,7 +87,7 @@ impl Problem<'_> {
             program: concat!("turncal ", env!("CARGO_PKG_VERSION")).to_owned(),
             inputs: Vec::new(),
             nominal: PerSensor::from_fn(|sensor| run.instrument.nominal.get(sensor).0.into()),
-            latitude_deg: run.site.latitude / DEGREE,
+            latitude_deg: (run.site.is_known).then_some(run.site.latitude / DEGREE),
             height_m: run.site.height,
             duration_s: self.runs().map(|run| run.recording.imu.duration()).sum(),
             rate_hz: 1.0 / imu.period,

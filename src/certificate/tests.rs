@@ -21,7 +21,7 @@ fn calibration() -> Calibration {
             gyro: [2.0626e6; 3],
             accel: [1e5; 3],
         },
-        latitude_deg: 45.0,
+        latitude_deg: Some(45.0),
         height_m: 100.0,
         duration_s: 600.0,
         rate_hz: 100.0,

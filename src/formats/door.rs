@@ -81,6 +81,16 @@ impl Opened {
         show: impl FnOnce(&Draft),
     ) -> Result<Self, FileError> {
         if file.extension() == Some(OsStr::new("toml")) {
+            if stream.is_some() || *stated != Stated::default() {
+                let found = "statements about the log beside a run.toml (rate, units, site, sensor, stream)";
+                let advice = "Write them into run.toml, or omit them.";
+                return Err(FileError::of(
+                    file,
+                    found,
+                    "all statements in run.toml",
+                    advice,
+                ));
+            }
             let run = match file.bytes().map(String::from_utf8_lossy) {
                 Some(text) => Run::of_text(file, &text, Some(file), in_memory)?,
                 None => Run::read(file)?,

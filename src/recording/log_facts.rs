@@ -49,6 +49,22 @@ pub struct FileColumn {
 }
 
 impl NamedColumns {
+    /// The columns of both triads along right, front and up of the body, with a minus if the sign is reversed; `None` if
+    /// a triad was not recorded.
+    pub fn along_body(&self) -> Option<PerSensor<[String; 3]>> {
+        let of = |sensor: Sensor| {
+            [0, 1, 2].map(|axis| {
+                let FileColumn { name, reversed } =
+                    &self.triads.get(sensor)[self.axes.source[axis]];
+                let minus = *reversed != self.axes.reversed[axis];
+                format!("{}{name}", if minus { "-" } else { "" })
+            })
+        };
+        let is_named = |columns: &[FileColumn; 3]| columns.iter().all(|of| !of.name.is_empty());
+        let both = is_named(&self.triads.gyro) && is_named(&self.triads.accel);
+        both.then(|| PerSensor::from_fn(of))
+    }
+
     /// The line of `run.toml` that reads the samples of each triad in another order, given along
     /// right-front-up.
     pub fn line(&self, orders: &PerSensor<AxisOrder>) -> String {
@@ -242,6 +258,9 @@ mod tests {
         let expected =
             r#"columns = { time = "t", gyro = ["wx", "wy", "-wz"], accel = ["fx", "fy", "fz"] }"#;
         assert_eq!(as_it_is, expected);
+        let along_body = named.along_body().unwrap();
+        assert_eq!(along_body.gyro, ["wy", "wx", "wz"]);
+        assert_eq!(along_body.accel, ["fy", "fx", "-fz"]);
         // Right is to be what comes in as up: y of the file is what it gives as −z.
         let turned = named.line(&PerSensor {
             gyro: AxisOrder {

@@ -158,7 +158,7 @@ fn motion(
         return Ok((motion, Some(name)));
     }
     let of_run = calibration.record.provenance.as_ref();
-    let latitude = latitude.or(of_run.map(|of| of.latitude_deg * DEGREE));
+    let latitude = latitude.or(of_run.and_then(|of| Some(of.latitude_deg? * DEGREE)));
     let latitude = latitude.ok_or_else(|| {
         raised(
             "latitude: found none, expected degrees, or a calibration that states its site. Give latitude or \

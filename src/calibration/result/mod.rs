@@ -65,6 +65,9 @@ pub struct Calibration {
     /// Quantity of the file, such as `count`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<PerSensor<String>>,
+    /// Columns of the log along x, y and z of each triad, with a minus if the sign is reversed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub columns: Option<PerSensor<[String; 3]>>,
     /// 1σ of every value, zero if fixed.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma: Option<PerSensor<TriadRecord>>,
@@ -154,8 +157,9 @@ pub struct Provenance {
     pub inputs: Vec<InputFile>,
     /// Nominal scales: the file's quantity per second for one rad/s or m/s².
     pub nominal: PerSensor<[f64; 3]>,
-    /// Latitude of the site, degrees.
-    pub latitude_deg: f64,
+    /// Latitude of the site, degrees; `None` if it is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub latitude_deg: Option<f64>,
     /// Height of the site, m.
     pub height_m: f64,
     /// Recorded time, s.

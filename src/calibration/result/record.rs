@@ -218,10 +218,12 @@ impl Estimate {
 
 /// The record of a known truth.
 pub fn truth_record(truth: &PerSensor<Triad>, run: &Run) -> Calibration {
-    let nominal = &run.instrument.nominal;
+    let (nominal, log) = (&run.instrument.nominal, &run.recording.imu.log);
+    let log = log.as_ref();
     Calibration {
         installation_form: Some(truth.gyro.form),
         unit: Some(run.instrument.unit.clone()),
+        columns: log.and_then(|log| log.named.along_body()),
         ..Calibration::new(
             TriadRecord::new(&truth.gyro, &nominal.gyro),
             TriadRecord::new(&truth.accel, &nominal.accel),

@@ -183,7 +183,7 @@ impl Navigate {
             return Ok((motion, Some(name)));
         }
         let of_run = calibration.provenance.as_ref();
-        let of_run = of_run.map(|of| of.latitude_deg * DEGREE);
+        let of_run = of_run.and_then(|of| Some(of.latitude_deg? * DEGREE));
         let Some(latitude) = latitude.or(of_run) else {
             bail!("no latitude: give --latitude-deg, or --trajectory");
         };

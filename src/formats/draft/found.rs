@@ -58,9 +58,9 @@ impl Draft {
     /// Fails for a damaged log, and for a field that the log does not show but a run needs.
     pub(in crate::formats) fn check(&self, file: &Path) -> Result<(), FileError> {
         let damage = self.streams.as_ref().and_then(|of| of.damage.clone());
-        let open = self
-            .open_question()
-            .map(|[found, expected, advice]| FileError::of(file, found, expected, advice));
+        let question = self.contradiction.clone().or_else(|| self.open_question());
+        let open =
+            question.map(|[found, expected, advice]| FileError::of(file, found, expected, advice));
         damage.or(open).map_or(Ok(()), Err)
     }
 
@@ -100,9 +100,8 @@ impl Draft {
         let name = self.columns.time.map(|k| self.columns.names[k].as_str());
         let hertz = |rate: f64| format!("{} Hz", short(rate));
         let (value, certainty) = match (name, clock.period.map(f64::recip)) {
-            _ if self.stated.rate_hz.is_some() => {
-                let rate = self.stated.rate_hz.map_or(String::new(), hertz);
-                return Found::new("time", rate, Certainty::Certain, "as stated");
+            (None, Some(rate)) if self.stated.rate_hz.is_some() => {
+                return Found::new("time", hertz(rate), Certainty::Certain, "as stated");
             }
             (Some(name), Some(rate)) => (
                 format!("{name}, {}, {}", clock.unit, hertz(rate)),

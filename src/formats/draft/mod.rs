@@ -64,8 +64,10 @@ pub struct Draft {
     down: Option<usize>,
     /// Number of rows examined, if the log has more.
     only: Option<usize>,
-    /// Statements of the user.
+    /// Statements of the user …
     stated: Stated,
+    /// … and the first that the rows contradict: evidence, statement, remedy.
+    contradiction: Option<[String; 3]>,
 }
 
 impl Draft {
@@ -133,6 +135,7 @@ impl Draft {
         columns.state(&stated.columns);
         retain_samples(&mut sheet, &columns);
         let clock = Clock::find(&sheet, &mut columns);
+        let contradiction = stated.rate_hz.and_then(|rate| clock.contradiction(rate));
         let rows = columns.samples(&sheet).map(|(numbers, triads)| {
             let period = clock.period.unwrap_or(USUAL_PERIOD);
             let breaks = clock.breaks(&numbers, period, FOLLOWED);
@@ -152,6 +155,7 @@ impl Draft {
             random_walk: PerSensor::default(),
             motion: None,
             only,
+            contradiction,
             stated: stated.clone(),
         };
         match rows {
@@ -177,6 +181,9 @@ impl Draft {
         if self.quantities.has_counts() || is_open {
             motion = self.look_behind(&mut rows, &motion, sheet);
         }
+        let period = self.clock.period.unwrap_or(f64::NAN);
+        let of_units = || self.quantities.contradiction(&self.stated, &motion, period);
+        self.contradiction = self.contradiction.take().or_else(of_units);
         self.quantities.state(&self.stated);
         let random_walk = white_noise(&rows, &motion, &self.quantities, self.clock.period);
         self.random_walk = random_walk.unwrap_or_default();

@@ -7,7 +7,7 @@ use super::text::{quoted, word_or_number};
 use super::time;
 use crate::formats::clock::{Breaks, Clock, TimeUnit};
 use crate::formats::csv_file::CsvFile;
-use crate::formats::error::list;
+use crate::formats::error::{choice, list, suggestion};
 use crate::formats::joined::{Joined, Part};
 use crate::formats::rows::LogRows;
 use crate::formats::schema::page::Page;
@@ -67,7 +67,7 @@ impl Streams {
         file: &DataFile,
         wanted: Option<&str>,
     ) -> Result<Option<(Self, Sheet)>, FileError> {
-        let (members, damage) = match streams::open(file)? {
+        let (members, mut damage) = match streams::open(file)? {
             Some(log) => {
                 let (found, damage) = streams::survey(file, log);
                 let members = found
@@ -77,8 +77,25 @@ impl Streams {
             }
             None => (tagged(file)?, None),
         };
+        let all = || members.iter().map(|member| &*member.found.stream.name);
+        if let Some(damage) = damage.take_if(|_| members.is_empty()) {
+            return Err(damage);
+        }
+        if let Some(wanted) = wanted.filter(|wanted| !all().any(|name| name == *wanted)) {
+            let found = match members.is_empty() {
+                true => "one stream without a name".to_owned(),
+                false => format!("the streams {}", choice(wanted, all())),
+            };
+            let advice = suggestion(wanted, all(), "Correct or omit --stream.");
+            return Err(FileError::of(
+                file,
+                found,
+                format_args!("a stream `{wanted}`"),
+                advice,
+            ));
+        }
         if members.is_empty() {
-            return damage.map_or(Ok(None), Err);
+            return Ok(None);
         }
         let Some((gyro, accel)) = chosen(&members, wanted) else {
             let advice = "Record the file again.";

@@ -61,11 +61,13 @@ impl Clock {
             (named, "stated in the file".to_owned())
         } else if (steps.is_count || name.is_counter()) && name.is_time() < 2 {
             (None, "steps of one, as in a sample counter".to_owned())
-        } else if let Some(period) = known {
+        } else if let Some((second, period)) = known.and_then(|period| {
             let is_near = |second: &f64| (steps.mean * second / period).ln().abs() < STATED.ln();
             // Ticks of a clock of its own.
-            let tick = name.tick().filter(is_near).unwrap_or(period / steps.mean);
-            let second = seconds().find(is_near).unwrap_or(tick);
+            let own = || steps.is_whole.then(|| period / steps.mean);
+            let tick = name.tick().filter(is_near).or_else(own);
+            Some((seconds().find(is_near).or(tick)?, period))
+        }) {
             let rate = short(period.recip());
             (Some(second), format!("steps of {usual} at {rate} Hz"))
         } else {
@@ -98,6 +100,23 @@ impl Clock {
         self.gaps.iter().filter(long).map(first).collect()
     }
 
+    /// Evidence, statement and remedy if the steps of a time contradict a stated rate.
+    pub fn contradiction(&self, rate: f64) -> Option<[String; 3]> {
+        let found = self.period?.recip();
+        ((found / rate).ln().abs() > STATED.ln()).then(|| {
+            [
+                format!(
+                    "time stamps at {} Hz ({}; {})",
+                    short(found),
+                    self.unit,
+                    self.why
+                ),
+                format!("{rate} Hz, as stated"),
+                "Correct or omit --rate, or update_rate in --noise-file.".to_owned(),
+            ]
+        })
+    }
+
     fn without(period: Option<f64>, why: &str) -> Self {
         Self {
             unit: "s".to_owned(),
@@ -124,7 +143,9 @@ pub struct Gap {
 struct Steps {
     /// Mean step per sample, with missing rows counted.
     mean: f64,
-    /// Whether steps are whole numbers, mostly one.
+    /// Whether steps are whole numbers …
+    is_whole: bool,
+    /// … mostly one.
     is_count: bool,
     gaps: Vec<Gap>,
     repeated: usize,
@@ -162,6 +183,7 @@ impl Steps {
         Self {
             mean: clock.as_ref().map_or(usual, |clock| clock.period),
             is_count: usual == 1.0 && is_whole,
+            is_whole,
             gaps: numbers.windows(2).enumerate().filter_map(gap).collect(),
             repeated,
         }

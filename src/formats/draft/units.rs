@@ -319,13 +319,47 @@ impl Quantities {
         }
     }
 
+    /// The first stated unit that motion contradicts, if motion confirms another: evidence, statement, remedy.
+    pub fn contradiction(
+        &self,
+        stated: &Stated,
+        motion: &Motion,
+        period: f64,
+    ) -> Option<[String; 3]> {
+        let rows = Rows {
+            motion,
+            period,
+            named: None,
+            whole: false,
+        };
+        stated.units().find_map(|(sensor, StatedUnit(of))| {
+            let Of::Rows(_, output) = of.of else {
+                return None;
+            };
+            let per_si = unit_scale(sensor, of.word)? / of.times;
+            let unit = (of.word, per_si);
+            let found = self.units.get(sensor);
+            let shown = found.word.filter(|_| found.is_shown)?;
+            let is_contradicted = Hypothesis::new(sensor, unit, output, &rows).is_contradicted();
+            let (name, times) = (sensor.name(), of.times);
+            let multiple = if times == 1.0 {
+                String::new()
+            } else {
+                format!("{} ", short(times))
+            };
+            is_contradicted.then(|| {
+                [
+                    format!("{name} rows in {shown} ({})", found.why),
+                    format!("{multiple}{}, as stated", of.word),
+                    format!("Correct or omit --{name}-unit, or check --rate."),
+                ]
+            })
+        })
+    }
+
     /// Applies the units stated by the user.
     pub fn state(&mut self, stated: &Stated) {
-        let of_triads = [
-            (Sensor::Gyro, stated.gyro_unit),
-            (Sensor::Accel, stated.accel_unit),
-        ];
-        for (sensor, StatedUnit(of)) in of_triads.into_iter().filter_map(|(k, of)| Some((k, of?))) {
+        for (sensor, StatedUnit(of)) in stated.units() {
             if let Of::Rows(_, output) = of.of {
                 self.output = output;
                 "follows from the stated unit".clone_into(&mut self.output_why);

@@ -153,14 +153,17 @@ pub(super) fn run(report: &Report) -> Facts {
     let run = report.run;
     let (imu, site) = (&run.recording.imu, &run.site);
     let mut facts = Facts::new("Run", [("run", run.recording.name.clone())]);
-    let place = format!(
-        "latitude {}°, longitude {}°, height {} m, gravity {} m/s²",
-        value(site.latitude / DEGREE, 1e-4),
-        value(site.longitude / DEGREE, 1e-4),
-        value(site.height, 1.0),
-        value(site.gravity, 1e-5),
-    );
-    facts.push("site", place);
+    let place = match site.is_known {
+        true => format!(
+            "latitude {}°, longitude {}°, height {} m",
+            value(site.latitude / DEGREE, 1e-4),
+            value(site.longitude / DEGREE, 1e-4),
+            value(site.height, 1.0),
+        ),
+        false => "not stated".to_owned(),
+    };
+    let gravity = value(site.gravity, 1e-5);
+    facts.push("site", format!("{place}, gravity {gravity} m/s²"));
     let (rate, duration) = (three_digits(1.0 / imu.period), value(imu.duration(), 1.0));
     facts.push(
         "samples",

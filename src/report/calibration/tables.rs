@@ -4,6 +4,7 @@ use super::super::terms;
 use super::super::terms::improvement;
 use super::report::Report;
 use crate::calibration::{Estimate, Measures, Nis, Outcome, Quality, Spread, parameter_name};
+use crate::imu::PerSensor;
 use crate::recording::TableLog;
 use crate::report::prelude::*;
 
@@ -45,7 +46,15 @@ impl Report<'_> {
             ));
         }
         table.optional = optional;
-        table
+        let log = self.run.recording.imu.log.as_ref();
+        match log.and_then(|log| log.named.along_body()) {
+            Some(PerSensor { gyro, accel }) => table.note(format!(
+                "Axes x, y, z: columns {} (gyros) and {} (accelerometers).",
+                gyro.join(", "),
+                accel.join(", ")
+            )),
+            None => table,
+        }
     }
 }
 

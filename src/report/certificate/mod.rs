@@ -148,14 +148,15 @@ fn method(certificate: &Certificate) -> Facts {
     );
     let how = evaluation(calibration.aiding);
     facts.push("evaluation", format!("{}: {how}", provenance.program));
+    let latitude = provenance.latitude_deg;
     facts.push(
         "data",
         format!(
-            "{} s at {} Hz, {} dwells; latitude {}°, height {} m",
+            "{} s at {} Hz, {} dwells; latitude {}, height {} m",
             value(provenance.duration_s, 10.0),
             value(provenance.rate_hz, 10.0),
             count(provenance.dwells),
-            value(provenance.latitude_deg, 0.1),
+            latitude.map_or("not stated".to_owned(), |of| format!("{}°", value(of, 0.1))),
             value(provenance.height_m, 10.0),
         ),
     );

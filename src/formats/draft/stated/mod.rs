@@ -55,6 +55,17 @@ pub enum DataSheetError {
 }
 
 impl Stated {
+    /// The stated units.
+    pub(super) fn units(&self) -> impl Iterator<Item = (Sensor, StatedUnit)> {
+        let of_triads = [
+            (Sensor::Gyro, self.gyro_unit),
+            (Sensor::Accel, self.accel_unit),
+        ];
+        of_triads
+            .into_iter()
+            .filter_map(|(sensor, of)| Some((sensor, of?)))
+    }
+
     /// The site, with wide σ of what is not stated.
     pub fn site(&self) -> Site {
         let latitude = self.latitude_deg.map(|degrees| degrees * DEGREE);
