@@ -2,9 +2,9 @@
 
 use std::fmt::Write;
 
-use turncal::formats::draft::{Stated, StatedColumns};
+use turncal::formats::draft::{Stated, StatedColumns, StatedUnit};
 use turncal::formats::{FileError, Opened, Place, Table};
-use turncal::imu::PerSensor;
+use turncal::imu::{PerSensor, Sensor};
 use turncal::simulation::Scenario;
 
 const NAMES: [&str; 6] = ["gx", "gy", "gz", "ax", "ay", "az"];
@@ -100,4 +100,52 @@ fn an_error_names_row_and_column() {
             .to_string()
             .contains("1 values in `a` and 0 in `b`")
     );
+}
+
+#[test]
+fn a_statement_that_rows_contradict_is_refused_and_a_right_one_is_not() {
+    let mut columns = columns();
+    let times = (0..columns[0].len()).map(|k| k as f64 * 0.01);
+    columns.push(times.collect());
+    let named = || NAMES.iter().copied().chain(["t"]).map(str::to_owned);
+    let table = || Table::new("data", named().zip(columns.iter().cloned()).collect()).unwrap();
+    let with = |rate: f64, unit: &str| Stated {
+        rate_hz: Some(rate),
+        gyro_unit: Some(StatedUnit::parse(Sensor::Gyro, unit).unwrap()),
+        ..Stated::default()
+    };
+    let refused = |stated: &Stated| opened(table(), stated).unwrap_err().to_string();
+    // A nominal rate tells the unit of time only.
+    let run = opened(table(), &with(98.0, "rad/s")).unwrap().run;
+    assert!((run.recording.imu.period - 0.01).abs() < 1e-6);
+    for rate in [50.0, 200.0, 1000.0] {
+        let text = refused(&with(rate, "rad/s"));
+        assert!(
+            text.contains("100") && text.contains(&format!("{rate} Hz, as stated")),
+            "{text}"
+        );
+    }
+    let text = refused(&with(100.0, "deg/s"));
+    assert!(
+        text.contains("gyro rows in rad/s") && text.contains("--gyro-unit"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_temperature_that_rises_is_not_a_time() {
+    let mut columns = columns();
+    let temperatures = (0..columns[0].len()).map(|k| 20.0 + k as f64 * 1e-4);
+    columns.push(temperatures.collect());
+    for (name, temperature) in [("T", Some("T".to_owned())), ("imu_temp", None)] {
+        let named = NAMES.iter().copied().chain([name]).map(str::to_owned);
+        let table = Table::new("data", named.zip(columns.iter().cloned()).collect()).unwrap();
+        let mut stated = stated();
+        stated.columns.temperature = temperature;
+        let imu = opened(table, &stated).unwrap().run.recording.imu;
+        assert!(
+            imu.temperature.is_some() && (imu.period - 0.01).abs() < 1e-12,
+            "{name}"
+        );
+    }
 }

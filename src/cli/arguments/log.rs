@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{latitude, positive};
+use super::{gravity, height, latitude, positive};
 use crate::formats::draft::{Found, Stated, StatedUnit};
 use crate::formats::{DataFile, Opened};
 use crate::imu::Sensor;
@@ -22,10 +22,10 @@ pub struct OfLog {
     #[arg(long, value_name = "DEG", value_parser = latitude, allow_negative_numbers = true)]
     latitude: Option<f64>,
     /// Height of the site above the ellipsoid, m
-    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    #[arg(long, value_name = "M", value_parser = height, allow_negative_numbers = true)]
     height: Option<f64>,
     /// Gravity at the site, m/s²
-    #[arg(long, value_name = "M/S2", value_parser = positive)]
+    #[arg(long, value_name = "M/S2", value_parser = gravity)]
     gravity: Option<f64>,
     /// Unit of the gyros: rad/s, deg/s, deg/h, or the size of one count, such as '1/131 deg/s'; for increments rad,
     /// deg, arcsec

@@ -13,5 +13,6 @@ pub use estimation::Estimation;
 pub use log::{OfLog, run_file, run_or_log, show_found};
 pub use sharding::Sharding;
 pub use values::{
-    at_least_two, at_temperature, hours, latitude, number, positive, seconds, seed, shard,
+    at_least_two, at_temperature, gravity, height, hours, latitude, number, positive, seconds,
+    seed, shard,
 };

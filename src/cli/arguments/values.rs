@@ -42,6 +42,16 @@ pub fn latitude(text: &str) -> Result<f64, String> {
     number(text, -90.0, 90.0)
 }
 
+/// Height above the ellipsoid, m.
+pub fn height(text: &str) -> Result<f64, String> {
+    number(text, -500.0, 9000.0)
+}
+
+/// m/s²
+pub fn gravity(text: &str) -> Result<f64, String> {
+    number(text, 9.7, 9.9)
+}
+
 /// Navigation time, h.
 pub fn hours(text: &str) -> Result<f64, String> {
     between(text, INTERVAL / HOUR, 1000.0)

@@ -121,6 +121,7 @@ impl Columns {
             (self.time, self.nanoseconds) = (time, None);
         }
         self.temperature = temperature.or(self.temperature);
+        self.time = self.time.filter(|time| Some(*time) != temperature);
     }
 
     /// The times of all rows, in the unit of the column.
@@ -276,8 +277,9 @@ fn time(sheet: &Sheet, names: &[Name], forward: impl Fn(usize) -> (f64, f64)) ->
         (named, names[*k].is_of_time() && !is_text, names.len() - k)
     };
     let best = (0..names.len()).filter(goes_on).max_by_key(rank)?;
-    // The angle of an integrating sensor goes forward, too.
-    let named_otherwise = names[best].is_time() == 0 && names[best].sensor().is_some();
+    // The angle of an integrating sensor goes forward, too, and a temperature that rises.
+    let name = &names[best];
+    let named_otherwise = name.is_time() == 0 && (name.sensor().is_some() || name.is_temperature());
     (!named_otherwise).then_some(best)
 }
 

@@ -6,8 +6,6 @@ use crate::run::motion::{LabelCheck, Turn};
 use crate::run::{LONG_ENOUGH, Run};
 use crate::survey::{APART, Survey};
 
-/// Smallest turn about a body axis that determines the scale factor of its gyro, rad.
-const WORTH: f64 = 60.0 * DEGREE;
 /// Number of accelerometer parameters without a table, and of upward directions needed.
 const DIRECTIONS: usize = 9;
 /// Temperature span below which an instrument counts as soaked, K.
@@ -153,16 +151,6 @@ fn of_motion(survey: &Survey) -> Vec<String> {
             missing.join(", "),
             survey.directions,
             degrees(APART)
-        ));
-    }
-    let turns = |axis: usize| survey.turns.iter().any(|turn| turn.sum[axis].abs() > WORTH);
-    let unturned = (0..3).filter(|&axis| !turns(axis));
-    let unturned: Vec<String> = unturned.map(|axis| AXES[axis].to_string()).collect();
-    if !unturned.is_empty() {
-        findings.push(format!(
-            "No turn exceeds {}° about {}, so the scale factor of that gyro cannot be determined. Add such a turn.",
-            degrees(WORTH),
-            unturned.join(" and ")
         ));
     }
     findings
