@@ -23,7 +23,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use super::budget::BudgetRecord;
 use super::noise::NoiseReport;
 use crate::calibration::result::thermal_record::{RecordingRecord, ThermalRecord};
-use crate::calibration::{Direction, DwellScatter, Finding, Quality, Verdict};
+use crate::calibration::{Direction, DwellScatter, Finding, Quality, Verdict, Word};
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
 
@@ -313,6 +313,12 @@ impl Index<&str> for Calibration {
 }
 
 impl Calibration {
+    /// Whether its values must not be used.
+    pub fn is_failed(&self) -> bool {
+        let verdict = self.verdict.as_ref();
+        verdict.is_some_and(|verdict| verdict.word == Word::Failed) || self.converged == Some(false)
+    }
+
     /// A record of the two triads only, such as a truth.
     pub fn new(gyro: TriadRecord, accel: TriadRecord) -> Self {
         Self {

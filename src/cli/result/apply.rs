@@ -110,8 +110,8 @@ impl Apply {
 
 fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String> {
     let mut notes = Vec::new();
-    if record.converged == Some(false) {
-        notes.push("the calibration did not converge".to_owned());
+    if record.is_failed() {
+        notes.push("the verdict of the calibration is FAILED: do not use these values".to_owned());
     }
     if record.unit.is_none() {
         notes.push(

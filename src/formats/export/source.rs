@@ -79,8 +79,8 @@ impl<'a> Source<'a> {
                 .iter()
                 .map(|(name, value)| format!("{name}: {value}")),
         );
-        if record.converged == Some(false) {
-            lines.push("WARNING: the calibration did not converge".to_owned());
+        if record.is_failed() {
+            lines.push("WARNING: verdict FAILED: do not use these values".to_owned());
         }
         lines.extend(record.warnings.iter().map(|w| format!("warning: {w}")));
         lines.extend([
@@ -96,11 +96,23 @@ impl<'a> Source<'a> {
                 "u: angular rate in rad/s, specific force in m/s^2, along: {}",
                 record.body_frame.words()
             ),
-            "axes of N and u: right, front, up; (y, x, -z) converts a log along front, right, down and (y, -x, z) \
-             one along front, left, up"
-                .to_owned(),
+            self.axes(),
         ]);
         lines
+    }
+
+    /// What the axes of N and u are in the log.
+    fn axes(&self) -> String {
+        match &self.record.columns {
+            Some(PerSensor { gyro, accel }) => format!(
+                "axes x, y, z of N and u (right, front, up): columns {} and {} of the log",
+                gyro.join(", "),
+                accel.join(", ")
+            ),
+            None => "axes of N and u: right, front, up; (y, x, -z) converts a log along front, right, down and \
+                     (y, -x, z) one along front, left, up"
+                .to_owned(),
+        }
     }
 
     /// σ of the parameters of a triad.
