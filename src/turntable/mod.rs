@@ -56,7 +56,7 @@ pub enum TableError {
     },
     /// A rotation that cannot be completed in its time.
     #[error(
-        "step {step}: {angle_deg:.3}° in {duration} s exceeds the acceleration of the axis; allow {needed:.2} s or more"
+        "step {step}: {angle_deg:.3}° in {duration:.2} s exceeds the acceleration of the axis; allow {needed:.2} s or more"
     )]
     Hurried {
         /// Step, counted from one.

@@ -1,7 +1,5 @@
 //! Attitude of the table at any time.
 
-use std::f64::consts::PI;
-
 use super::chain::{Chain, Kinematics};
 use super::{AxesStep, Axis, BodyStep, Imperfection, Moves, Path, Profile, Table, TableError};
 use crate::attitude::exp;
@@ -169,7 +167,7 @@ fn body_profile(
             step: number,
             angle_deg: angle / DEGREE,
             duration: step.duration,
-            needed: (2.0 * PI * angle / step.acceleration).sqrt(),
+            needed: step.shortest(angle),
         }
     })?;
     for axis in &table.axes {

@@ -1,7 +1,11 @@
 //! Commanded positions and moves of a table.
 
+use std::f64::consts::PI;
+
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
+
+use crate::attitude::exp;
 
 /// A sequence of positions with its initial attitude.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -85,16 +89,32 @@ impl Moves {
         self.len() == 0
     }
 
-    /// The same without one of them and the dwell after it; unchanged if there is no such move.
+    /// The same without one of them and the dwell after it; unchanged if there is no such move. A rotation that then is
+    /// longer takes the time that it needs.
     pub fn without(&self, number: usize) -> Self {
         let mut moves = self.clone();
         if number < moves.len() {
             match &mut moves {
                 Self::Axes { steps, .. } => drop(steps.remove(number)),
-                Self::Body { steps, .. } => drop(steps.remove(number)),
+                Self::Body { start, steps } => {
+                    steps.remove(number);
+                    let mut attitude = *start;
+                    for step in steps {
+                        let vector = step.rotation.vector(&attitude);
+                        attitude *= exp(vector);
+                        step.duration = step.duration.max(step.shortest(vector.norm()));
+                    }
+                }
             }
         }
         moves
+    }
+}
+
+impl BodyStep {
+    /// The shortest duration of a rotation by this angle with its acceleration, s, beyond rounding.
+    pub fn shortest(&self, angle: f64) -> f64 {
+        (2.0 * PI * angle / self.acceleration).sqrt() * (1.0 + 1e-12)
     }
 }
 

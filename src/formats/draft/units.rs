@@ -306,7 +306,7 @@ impl Quantities {
         let measured = measured.filter(|scale| scale.is_finite());
         Unit {
             word: Some("count"),
-            is_shown: measured.is_some(),
+            is_shown: measured.is_some() && by_name.is_none(),
             scale: measured.map(|value| {
                 let axes = Axes {
                     scale: Vector3::repeat(value),

@@ -1,3 +1,5 @@
+use std::f64::consts::PI;
+
 use approx::assert_relative_eq;
 use nalgebra::{Matrix3, Vector3};
 
