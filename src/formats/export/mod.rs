@@ -68,7 +68,7 @@ static FORMATS: [Format; 20] = [
     row("open-vins-rpng", "yaml", "IMU intrinsics for OpenVINS, model rpng", kalibr::open_vins_rpng),
     row("ikalibr", "yaml", "IMU intrinsics for iKalibr", ikalibr::write),
     row("imu-calib", "yaml", "Accelerometer calibration for the ROS package imu_calib", ros::imu_calib),
-    row("ros-covariance", "yaml", "Covariances for ROS sensor_msgs/Imu; needs --run", ros::covariance),
+    row("ros-covariance", "yaml", "Covariances for ROS sensor_msgs/Imu, from the noise of a run", ros::covariance),
     row("dlio", "yaml", "IMU intrinsics for DLIO (direct LiDAR-inertial odometry)", ros::dlio),
     row("gazebo", "sdf", "IMU noise for Gazebo", gazebo::write),
     row("mat", "mat", "A MATLAB structure (MAT file)", mat::write),

@@ -182,17 +182,17 @@ pub(super) fn run(report: &Report) -> Facts {
         let noise = noise(sensor, instrument.noise.get(sensor));
         facts.push(&format!("{name} noise"), noise);
     }
-    facts.push(
-        "turntable",
-        report.table().map_or("log not used".to_owned(), |table| {
-            format!(
-                "{} readings; position {} ″ (1σ, independent at each position), reading {} ″ (1σ, white)",
-                count(table.time.len()),
-                sigma(run.table.position_sigma / ARCSEC),
-                sigma(run.table.reading_sigma / ARCSEC)
-            )
-        }),
-    );
+    if let Some(table) = report.table() {
+        let readings = format!(
+            "{} readings; position {} ″ (1σ, independent at each position), reading {} ″ (1σ, white)",
+            count(table.time.len()),
+            sigma(run.table.position_sigma / ARCSEC),
+            sigma(run.table.reading_sigma / ARCSEC)
+        );
+        facts.push("turntable", readings);
+    } else if run.recording.table.is_some() {
+        facts.push("turntable", "log not used");
+    }
     facts
 }
 
