@@ -41,7 +41,10 @@ async function calibrate() {
     if (kind === "caution") return at("caution").append(text);
     if (kind === "panic") return void (panic = text);
     end();
-    if (kind === "done") return showReport(outputs);
+    if (kind === "done") {
+      showReport(outputs);
+      return markStale();
+    }
     fail(kind === "error" ? text : crashed(panic || text));
   };
   mine.onerror = (event) => {
@@ -76,9 +79,12 @@ function tell(activity) {
 function fail(message) {
   const text = worded(message);
   const [main, ...notes] = text.split("\nnote: ");
-  const paragraphs = notes.map((note) => element("p", note));
-  const folded = element("details", element("summary", "Notes on the recording"), ...paragraphs);
-  at("error").replaceChildren(main, ...(notes.length ? [folded] : []));
+  at("error").replaceChildren(main);
+  if (text.includes("`turncal ")) at("error").append(quiet(COMMANDS));
+  if (notes.length) {
+    const paragraphs = notes.map((note) => element("p", note));
+    at("error").append(element("details", element("summary", "Notes on the recording"), ...paragraphs));
+  }
   at("error").hidden = false;
   at("statements").open ||= text !== message || filled().length > 0;
   at("error").scrollIntoView({ block: "center" });
@@ -86,6 +92,11 @@ function fail(message) {
 
 function names() {
   return chosen.map((file) => file.name).join(", ");
+}
+
+/** Marks a result whose options are no longer those of the form. */
+function markStale() {
+  at("stale").hidden = at("verdict").hidden || JSON.stringify(statements()) === used;
 }
 
 function choose(files) {
@@ -99,9 +110,7 @@ at("files").onchange = ({ target }) => {
   target.value = "";
 };
 form.onchange = check;
-form.oninput = () => {
-  at("stale").hidden = at("verdict").hidden || JSON.stringify(statements()) === used;
-};
+form.oninput = markStale;
 form.onsubmit = (event) => {
   event.preventDefault();
   calibrate();

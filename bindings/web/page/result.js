@@ -1,5 +1,8 @@
 // The result: what was found in the log, verdict, files to download, report.
 
+/** Meaning of names in texts of the engine. */
+const COMMANDS = "Commands are those of the program turncal; names in [brackets] are sections of run.toml.";
+
 let links = [];
 
 /** Removes the previous result. */
@@ -27,8 +30,8 @@ function showDraft({ fields, run }, log) {
 /** Shows the verdict, the files to download, and the other parts of the report. */
 function showReport([report, calibration, ...exports]) {
   const text = worded(new TextDecoder().decode(report.bytes));
-  // A number and its unit stay on one line.
-  const joined = text.replace(/(\d) (?=[°″µ%σ]|ppm|mm|m\/s|Hz|s\b)/g, "$1\u00a0");
+  // A number, its σ and its unit stay on one line.
+  const joined = text.replace(/(\d) (?=[±°″µ%σ]|ppm|mm|m\/s|Hz|s\b)|± /g, (found) => found.trim() + "\u00a0");
   const page = new DOMParser().parseFromString(joined, "text/html");
   const [header, ...sections] = page.body.children;
   at("verdict").append(header);
@@ -41,7 +44,7 @@ function showReport([report, calibration, ...exports]) {
   at("result").scrollIntoView({ behavior: "smooth" });
 }
 
-/** Opens the values below the table of their accuracy, and says how they and the findings are meant. */
+/** Opens the values below the table of their accuracy, and says how to read them and the findings. */
 function explain(calibration) {
   const details = at("details");
   const accuracy = details.querySelector("table").closest("section");
@@ -49,13 +52,13 @@ function explain(calibration) {
   const values = details.querySelector(":scope > details");
   values.open = true;
   values.firstChild.after(
-    element("p", `u = correction · (N − bias), with the sensor's output N; correction and bias are in ${calibration}.`),
+    element(
+      "p",
+      `u = correction · (N − bias): N is the sensor's output, u the true value; ${calibration} has correction and bias.`,
+    ),
   );
   accuracy.after(values);
-  const words = "Commands are those of the program turncal; names in [brackets] are sections of run.toml.";
-  const note = element("p", words);
-  note.className = "quiet";
-  details.querySelector(".findings > h2")?.after(note);
+  details.querySelector(".findings > h2")?.after(quiet(COMMANDS));
 }
 
 function download({ name, about, bytes }) {
@@ -69,6 +72,12 @@ function download({ name, about, bytes }) {
 function link(content) {
   links.push(URL.createObjectURL(new Blob([content])));
   return links.at(-1);
+}
+
+function quiet(text) {
+  const made = element("p", text);
+  made.className = "quiet";
+  return made;
 }
 
 function element(kind, ...content) {

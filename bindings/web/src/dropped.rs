@@ -22,7 +22,7 @@ pub fn sort(files: &mut [DataFile]) -> Result<Option<DataFile>, String> {
         0 => logs(files),
         1 => missing(&files[0], files).map_or(Ok(None), Err),
         n => Err(format!(
-            "found {}, expected one run.toml. Drop one of them with the files that it names.",
+            "Found {}, expected one run.toml. Drop one of them with the files that it names.",
             list(&files[..n])
         )),
     }
@@ -69,7 +69,7 @@ fn triad(file: &DataFile) -> Option<&'static str> {
 
 fn several(files: &[DataFile]) -> String {
     format!(
-        "found {} logs: {}. Drop one log; or one of the gyros and one of the accelerometers, with `gyr` and `acc` in \
+        "Found {} logs: {}. Drop one log; or one of the gyros and one of the accelerometers, with `gyr` and `acc` in \
          their names; or a run.toml with the files that it names.",
         files.len(),
         list(files)
@@ -92,7 +92,7 @@ fn missing(run: &DataFile, files: &[DataFile]) -> Option<String> {
         .collect();
     (!absent.is_empty()).then(|| {
         format!(
-            "{} names {}; you dropped {}. Drop all files that it names together with it.",
+            "{} names files that you did not drop: {}. Drop it together with all of them (you dropped {}).",
             run.display(),
             list(absent),
             list(files)
