@@ -125,11 +125,14 @@ test("exports carry the name of the log, but for a function that has the name of
 });
 
 test("a failed calibration offers no exports", async () => {
-  // Scale factors of gyros whose output is not that of the motion.
-  const failing = fs.readFileSync(path.join(lot, "imu.log"), "utf8").replace(/-/g, "");
-  await choose([{ name: "failing.log", mimeType: "", buffer: Buffer.from(failing) }], { rate: "100", "gyro-unit": "rad/s" });
+  const run = fs.readFileSync(path.join(lot, "run.toml"), "utf8");
+  const wrong = run.replace(/(prior\.accel\]\nscale = )1\.0(\nscale_sigma_ppm = )30000/, "$11.2$21000");
+  const file = { name: "run.toml", mimeType: "", buffer: Buffer.from(wrong) };
+  const log = { name: "imu.log", mimeType: "", buffer: fs.readFileSync(path.join(lot, "imu.log")) };
+  await choose([file, log]);
   assert.match(await page.locator("#result .verdict").textContent(), /^FAILED/);
   assert.equal(await page.locator("#downloads details a").count(), 0);
+  assert.match(await page.locator("#caution").textContent(), /None, because the calibration failed/);
 });
 
 test("a decimal comma is a point, and a wrong number is refused beside its field", async () => {
@@ -152,6 +155,7 @@ test("a decimal comma is a point, and a wrong number is refused beside its field
 });
 
 test("a wrong option in closed options opens them with a message, and the log is kept", async () => {
+  await page.locator("form").evaluate((form) => form.reset());
   await page.fill("[name=rate]", "fast");
   await page.locator("#statements").evaluate((details) => (details.open = false));
   await page.setInputFiles("#files", [path.join(lot, "imu.log")]);
