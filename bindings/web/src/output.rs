@@ -50,16 +50,14 @@ pub fn stamp(calibration: &mut Calibration, run: &Run, files: &[DataFile]) {
 /// What a user should know before using the exports.
 pub fn caution(calibration: &Calibration, unobserved: usize) -> Option<String> {
     let of = match unobserved {
-        _ if is_failed(calibration) => {
-            return Some("None, because the calibration failed.".to_owned());
-        }
+        _ if is_failed(calibration) => return Some("None, because the calibration failed.".into()),
         0 => return None,
-        1 => "One parameter is".to_owned(),
-        n => format!("{n} parameters are"),
+        1 => "One parameter is not determined by this recording: its value is assumed".to_owned(),
+        n => {
+            format!("{n} parameters are not determined by this recording: their values are assumed")
+        }
     };
-    Some(format!(
-        "{of} not determined by this recording; in these files, the values are assumed and not measured."
-    ))
+    Some(format!("{of} in these files, not measured."))
 }
 
 fn is_failed(calibration: &Calibration) -> bool {
@@ -88,7 +86,9 @@ pub fn all(
             "octave" => "turncal_calibrate.m".to_owned(),
             name => format!("{log}-{name}.{}", format.extension),
         };
-        Some(Output::new(&name, format.about, exported.bytes))
+        // Here the run is always there.
+        let about = format.about.trim_end_matches("; needs --run");
+        Some(Output::new(&name, about, exported.bytes))
     };
     let formats = export::Format::all()
         .iter()

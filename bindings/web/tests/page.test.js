@@ -119,7 +119,7 @@ test("values are open below their accuracy, and findings name the fields of the 
   assert.match(await page.locator(".findings").innerText(), /“Latitude”, “Height”/);
 });
 
-test("exports carry the name of the log, but for a function that has the name of its file", async () => {
+test("exports carry the name of the log, except a function, which has that of its file", async () => {
   assert.match(await download("imu-kalibr.yaml"), /gyroscopes:/);
   assert.match(await download("turncal_calibrate.m"), /^function u = turncal_calibrate/m);
 });
@@ -133,6 +133,14 @@ test("a failed calibration offers no exports", async () => {
   assert.match(await page.locator("#result .verdict").textContent(), /^FAILED/);
   assert.equal(await page.locator("#downloads details a").count(), 0);
   assert.match(await page.locator("#caution").textContent(), /None, because the calibration failed/);
+});
+
+test("exports say how many parameters are not determined", async () => {
+  const folder = path.join(lot, "../real-mems-static");
+  await choose(["run.toml", "imu.csv.gz", "segments.csv"].map((name) => path.join(folder, name)));
+  const counts = (await page.locator("#result .verdict").textContent()).match(/(\d+) of (\d+)/);
+  const caution = await page.locator("#caution").textContent();
+  assert.match(caution, new RegExp(`^${counts[2] - counts[1]} parameters are not determined`));
 });
 
 test("a decimal comma is a point, and a wrong number is refused beside its field", async () => {
@@ -189,7 +197,7 @@ test("files that would not be used are refused, and files that are missing are n
   const run = (text) => ({ name: "run.toml", mimeType: "", buffer: Buffer.from(text) });
   const files = '[imu]\nfile = "logs/imu.csv"\n[segments]\nfile = "segments.csv"\n';
   await choose([run(files), file("other.csv")]);
-  assert.match(await message(), /run\.toml names files that you did not drop: .*imu\.csv, segments\.csv.*\(you dropped run\.toml, other\.csv\)/);
+  assert.match(await message(), /names files that you did not drop: .*imu\.csv, segments\.csv\./);
   await choose([file("run.toml", "run.toml"), file("imu.log"), file("reference.json", "reference.json")], { rate: "100" });
   const notes = await page.locator("#notes").innerText();
   assert.match(notes, /Not used.*: reference\.json/);
