@@ -51,12 +51,9 @@ function explain(calibration) {
   // The first part that the report folds.
   const values = details.querySelector(":scope > details");
   values.open = true;
-  values.firstChild.after(
-    element(
-      "p",
-      `u = correction · (N − bias): N is the sensor's output, u the true value; ${calibration} has correction and bias.`,
-    ),
-  );
+  const where = `correction and bias are in ${calibration}`;
+  const equation = `u = correction · (N − bias): N is the sensor's output, u the true value; ${where}.`;
+  values.firstChild.after(element("p", equation));
   accuracy.after(values);
   details.querySelector(".findings > h2")?.after(quiet(COMMANDS));
 }

@@ -56,11 +56,14 @@ fn instrument(name: &str) -> Result<Instrument, Box<dyn Error>> {
         letters.flat_map(char::to_lowercase).collect()
     };
     let known = models::names(Room::Imu).find(|known| letters(known) == letters(name));
-    Instrument::load(known.unwrap_or(name), &Place::Embedded).map_err(|error| match error {
-        ModelError::Unknown { nearest, .. } => {
-            let nearest = nearest.map_or_else(String::new, |nearest| format!(" Did you mean {nearest}?"));
-            format!("Sensor: found {name}, expected one of the list.{nearest} If it is not in the list, leave the field empty.").into()
+    match Instrument::load(known.unwrap_or(name), &Place::Embedded) {
+        Err(ModelError::Unknown { nearest, .. }) => Err(match nearest {
+            Some(nearest) => format!("Sensor: found no {name}. Did you mean {nearest}?"),
+            None => format!(
+                "Sensor: found no {name}. Choose one of the list, or leave the field empty."
+            ),
         }
-        other => other.into(),
-    })
+        .into()),
+        loaded => Ok(loaded?),
+    }
 }

@@ -198,7 +198,8 @@ test("files that would not be used are refused, and files that are missing are n
   const files = '[imu]\nfile = "logs/imu.csv"\n[segments]\nfile = "segments.csv"\n';
   await choose([run(files), file("other.csv")]);
   assert.match(await message(), /names files that you did not drop: .*imu\.csv, segments\.csv\./);
-  await choose([file("run.toml", "run.toml"), file("imu.log"), file("reference.json", "reference.json")], { rate: "100" });
+  const folder = ["run.toml", "imu.log", "reference.json"];
+  await choose(folder.map((name) => file(name, name)), { rate: "100" });
   const notes = await page.locator("#notes").innerText();
   assert.match(notes, /Not used.*: reference\.json/);
   assert.match(notes, /options had no effect/);
