@@ -26,8 +26,8 @@ use statements::Statements;
 
 #[wasm_bindgen]
 extern "C" {
-    /// Shows a text of this kind: the current `activity`, the `draft` for a log, a `note` on the result, a `caution` about
-    /// the exports, or the message of a `panic`.
+    /// Shows a text of this kind: the current `activity`, the `draft` for a log, a `note` on the result, a `caution`
+    /// about the exports, or the message of a `panic`.
     fn show(kind: &str, text: &str);
 }
 
