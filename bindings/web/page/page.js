@@ -1,14 +1,12 @@
-"use strict";
-
-const at = (id) => document.getElementById(id);
-const form = at("form");
+// Files in, a calibration in a worker, result out.
 
 /** Size of a log that takes minutes, bytes. */
 const LARGE = 5e7;
 
 let chosen = [];
 let worker = null;
-let links = [];
+/** The statements of the result that is shown. */
+let used = "";
 
 /** The engine, unpacked. */
 async function unpacked() {
@@ -17,18 +15,19 @@ async function unpacked() {
   return new Response(plain).arrayBuffer();
 }
 
-/** The fields of the form that are not empty. */
-function statements() {
-  const filled = [...form.elements].filter((field) => field.name && field.value.trim());
-  const value = (field) => (field.type === "number" ? field.valueAsNumber : field.value.trim());
-  return Object.fromEntries(filled.map((field) => [field.name, value(field)]));
-}
-
 /** Calibrates the chosen files in a new worker. */
 async function calibrate() {
-  if (!chosen.length || !form.reportValidity()) return;
+  if (!chosen.length) return;
   end();
   clear();
+  at("again").hidden = false;
+  const wrong = check();
+  if (wrong.length) {
+    const labels = wrong.map((field) => `“${label(field)}”`).join(", ");
+    fail(`Correct ${labels}, then press “Calibrate again”. The page keeps ${names()}.`);
+    return wrong[0].focus();
+  }
+  used = JSON.stringify(statements());
   tell("starting");
   at("activity").scrollIntoView({ block: "center" });
   const source = URL.createObjectURL(new Blob([at("worker").textContent], { type: "text/javascript" }));
@@ -37,10 +36,15 @@ async function calibrate() {
   let panic = "";
   mine.onmessage = ({ data: { kind, text, outputs } }) => {
     if (kind === "activity") return tell(text);
-    if (kind === "draft") return showDraft(JSON.parse(text));
+    if (kind === "draft") return showDraft(JSON.parse(text), names());
+    if (kind === "note") return at("notes").append(element("p", text));
+    if (kind === "caution") return at("caution").append(text);
     if (kind === "panic") return void (panic = text);
     end();
-    if (kind === "done") return showReport(outputs);
+    if (kind === "done") {
+      showReport(outputs);
+      return markStale();
+    }
     fail(kind === "error" ? text : crashed(panic || text));
   };
   mine.onerror = (event) => {
@@ -49,7 +53,7 @@ async function calibrate() {
     fail(crashed(event.message));
   };
   const engine = await unpacked();
-  mine.postMessage({ engine, files: chosen, statements: statements() });
+  mine.postMessage({ engine, files: chosen, statements: used });
 }
 
 function crashed(reason) {
@@ -65,25 +69,24 @@ function end() {
   at("activity").hidden = true;
 }
 
-/** Removes the previous result. */
-function clear() {
-  for (const id of ["error", "found", "report"]) at(id).hidden = true;
-  links.forEach(URL.revokeObjectURL);
-  links = [];
-  at("again").disabled = false;
-}
-
 function tell(activity) {
   at("activity").hidden = false;
   at("activity").querySelector("p").hidden = chosen.every((file) => file.size < LARGE);
   at("activity").querySelector("span").textContent = `${names()}: ${activity} …`;
 }
 
+/** Shows a message; its notes are folded. The options are opened if it may be about one. */
 function fail(message) {
+  const text = worded(message);
+  const [main, ...notes] = text.split("\nnote: ");
+  at("error").replaceChildren(main);
+  if (text.includes("`turncal ")) at("error").append(quiet(COMMANDS));
+  if (notes.length) {
+    const paragraphs = notes.map((note) => element("p", note));
+    at("error").append(element("details", element("summary", "Notes on the recording"), ...paragraphs));
+  }
   at("error").hidden = false;
-  at("error").textContent = message;
-  // The message may name an option that is missing.
-  at("statements").open ||= message.includes(" --");
+  at("statements").open ||= text !== message || filled().length > 0;
   at("error").scrollIntoView({ block: "center" });
 }
 
@@ -91,52 +94,9 @@ function names() {
   return chosen.map((file) => file.name).join(", ");
 }
 
-/** Shows what was found in a log, by field, value, certainty and reason, and the run.toml that says so. */
-function showDraft({ fields, run }) {
-  at("found").hidden = false;
-  at("found").querySelector("h2").textContent = `Found in ${names()}`;
-  at("found").querySelector("a").href = link(run);
-  const rows = fields.map(([what, value, certainty, why]) => {
-    const row = document.createElement("tr");
-    row.append(cell("th", what), cell("td", value), cell("td", `${certainty}: ${why}`));
-    return row;
-  });
-  at("found").querySelector("tbody").replaceChildren(...rows);
-}
-
-/** Shows the verdict, the files to download, and the other parts of the report. */
-function showReport([report, calibration, ...exports]) {
-  const page = new DOMParser().parseFromString(new TextDecoder().decode(report.bytes), "text/html");
-  const [header, ...sections] = page.body.children;
-  at("verdict").replaceChildren(header);
-  at("details").replaceChildren(...sections.filter((section) => section.tagName !== "FOOTER"));
-  const [own, others] = at("downloads").querySelectorAll("dl");
-  own.replaceChildren(download(report), download(calibration));
-  others.replaceChildren(...exports.map(download));
-  at("report").hidden = false;
-  at("report").scrollIntoView({ behavior: "smooth" });
-}
-
-function download({ name, about, bytes }) {
-  const anchor = document.createElement("a");
-  anchor.href = link(bytes);
-  anchor.download = anchor.textContent = name;
-  const [row, term] = ["div", "dt"].map((kind) => document.createElement(kind));
-  term.append(anchor);
-  row.append(term, cell("dd", about));
-  return row;
-}
-
-/** The address of a file with this content. */
-function link(content) {
-  links.push(URL.createObjectURL(new Blob([content])));
-  return links.at(-1);
-}
-
-function cell(kind, text) {
-  const cell = document.createElement(kind);
-  cell.textContent = text;
-  return cell;
+/** Marks a result whose options are no longer those of the form. */
+function markStale() {
+  at("stale").hidden = at("verdict").hidden || JSON.stringify(statements()) === used;
 }
 
 function choose(files) {
@@ -149,6 +109,8 @@ at("files").onchange = ({ target }) => {
   // The same file can be chosen again after it has changed.
   target.value = "";
 };
+form.onchange = check;
+form.oninput = markStale;
 form.onsubmit = (event) => {
   event.preventDefault();
   calibrate();

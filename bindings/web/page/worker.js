@@ -9,7 +9,7 @@ onmessage = async ({ data: { engine, files, statements } }) => {
     for (const file of files) {
       recording.add(file.name, new Uint8Array(await file.arrayBuffer()));
     }
-    const outputs = recording.calibrate(JSON.stringify(statements));
+    const outputs = recording.calibrate(statements);
     const copies = outputs.map(({ name, about, bytes }) => ({ name, about, bytes }));
     postMessage({ kind: "done", outputs: copies });
   } catch (error) {

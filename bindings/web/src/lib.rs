@@ -4,6 +4,7 @@
 
 #![cfg(target_arch = "wasm32")]
 
+mod dropped;
 mod output;
 mod statements;
 
@@ -13,7 +14,7 @@ use std::panic;
 
 use serde_json::json;
 use turncal::calibration::{Calibration, Method, Options, Problem};
-use turncal::formats::draft::{Draft, Found, Stated};
+use turncal::formats::draft::{Draft, Found};
 use turncal::formats::{DataFile, Opened};
 use turncal::report::Document;
 use turncal::report::calibration::Calibrated;
@@ -25,7 +26,8 @@ use statements::Statements;
 
 #[wasm_bindgen]
 extern "C" {
-    /// Shows a text of this kind: the current `activity`, the `draft` for a log, or the message of a `panic`.
+    /// Shows a text of this kind: the current `activity`, the `draft` for a log, a `note` on the result, a `caution`
+    /// about the exports, or the message of a `panic`.
     fn show(kind: &str, text: &str);
 }
 
@@ -68,29 +70,28 @@ impl Files {
     fn outputs(mut self, statements: &str) -> Result<Vec<Output>, Box<dyn Error>> {
         let statements: Statements = serde_json::from_str(statements)?;
         let mut stated = statements.stated()?;
-        self.sort(&mut stated);
+        stated.accel_file = dropped::sort(&mut self.0)?;
+        if self.0.first().is_some_and(dropped::is_run) && statements != Statements::default() {
+            show(
+                "note",
+                "The options had no effect, because a run.toml was dropped.",
+            );
+        }
         show("activity", "reading");
         let first = self.0.first().map(|file| file.display().to_string());
         let show_draft = |draft: &Draft| show_draft(&first.unwrap_or_default(), draft);
         let opened = Opened::in_memory(&self.0, statements.stream(), &stated, show_draft)?;
         let run = &opened.run;
+        if let Some(unused) = dropped::unused(&self.0, run) {
+            show(
+                "note",
+                &format!("Not used, because run.toml does not name them: {unused}."),
+            );
+        }
         let (mut calibration, document) =
             calibrated(run).map_err(|error| with_notes(run, error))?;
         output::stamp(&mut calibration, run, &self.0);
         output::all(run, &calibration, &document)
-    }
-
-    /// Moves the run.toml, or the log of the gyros, to the front.
-    fn sort(&mut self, stated: &mut Stated) {
-        let is_run = |file: &DataFile| file.extension().is_some_and(|end| end == "toml");
-        // Phones name their files so.
-        let is_accel = |file: &DataFile| file.to_string_lossy().to_lowercase().contains("acc");
-        self.0.sort_by_key(|file| (!is_run(file), is_accel(file)));
-        if let [gyro, accel] = &self.0[..]
-            && !is_run(gyro)
-        {
-            stated.accel_file = Some(accel.clone());
-        }
     }
 }
 
@@ -120,6 +121,12 @@ fn calibrated(run: &Run) -> Result<(Calibration, Document), Box<dyn Error>> {
     show("activity", "checking the result");
     let calibrated = Calibrated::new(&problem, &mut solution)?;
     show("activity", "drawing the report");
+    let unobserved = solution
+        .outcome()
+        .map_or(0, |outcome| outcome.unobserved().len());
+    if let Some(caution) = output::caution(&calibrated.calibration, unobserved) {
+        show("caution", &caution);
+    }
     let named = (&problem, run.recording.name.as_str());
     let document = calibrated.document(named, &solution, Method::Ekf, None);
     Ok((calibrated.calibration, document))

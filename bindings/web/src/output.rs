@@ -1,10 +1,10 @@
 //! Files to download.
 
 use std::error::Error;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use turncal::calibration::Calibration;
 use turncal::calibration::result::InputFile;
+use turncal::calibration::{Calibration, Word};
 use turncal::formats::{DataFile, digest_of_bytes, export};
 use turncal::report::{self, Document};
 use turncal::run::Run;
@@ -47,23 +47,66 @@ pub fn stamp(calibration: &mut Calibration, run: &Run, files: &[DataFile]) {
     }
 }
 
-/// The report, the calibration, and all exports that the calibration allows.
+/// What a user should know before using the exports.
+pub fn caution(calibration: &Calibration, unobserved: usize) -> Option<String> {
+    let of = match unobserved {
+        _ if is_failed(calibration) => return Some("None, because the calibration failed.".into()),
+        0 => return None,
+        1 => "One parameter is not determined by this recording: its value is assumed".to_owned(),
+        n => {
+            format!("{n} parameters are not determined by this recording: their values are assumed")
+        }
+    };
+    Some(format!("{of} in these files, not measured."))
+}
+
+fn is_failed(calibration: &Calibration) -> bool {
+    let verdict = calibration.verdict.as_ref();
+    verdict.is_some_and(|verdict| verdict.word == Word::Failed)
+}
+
+/// The report, the calibration, and all exports that the calibration allows, with the name of the log.
 pub fn all(
     run: &Run,
     calibration: &Calibration,
     document: &Document,
 ) -> Result<Vec<Output>, Box<dyn Error>> {
+    let log = log(run);
     let pages = report::files(document).into_iter();
     let page = pages.filter(|(name, _)| name == "index.html");
-    let page = page.map(|(_, page)| Output::new("report.html", "Report with all figures", page));
-    let json = calibration.to_json(Path::new("calibration.json"))?;
+    let name = format!("{log}-report.html");
+    let page = page.map(|(_, page)| Output::new(&name, "Report with all figures", page));
+    let name = format!("{log}-calibration.json");
+    let json = calibration.to_json(Path::new(&name))?;
     let about = "Values, σ and covariance, for turncal apply, export and certificate";
     let exported = |format: &export::Format| {
         let exported = export::write(calibration, format, Some(run)).ok()?;
-        let name = format!("{}.{}", format.name, format.extension);
-        Some(Output::new(&name, format.about, exported.bytes))
+        let name = match format.name {
+            // Octave and MATLAB find a function by the name of its file.
+            "octave" => "turncal_calibrate.m".to_owned(),
+            name => format!("{log}-{name}.{}", format.extension),
+        };
+        // Here the run is always there.
+        let about = format.about.trim_end_matches("; needs --run");
+        Some(Output::new(&name, about, exported.bytes))
     };
-    let exports = export::Format::all().iter().filter_map(exported);
-    let own = page.chain([Output::new("calibration.json", about, json)]);
-    Ok(own.chain(exports).collect())
+    let formats = export::Format::all()
+        .iter()
+        .filter(|_| !is_failed(calibration));
+    let own = page.chain([Output::new(&name, about, json)]);
+    Ok(own.chain(formats.filter_map(exported)).collect())
+}
+
+/// The name of the log without its extensions.
+fn log(run: &Run) -> String {
+    let files = &run.recording.files;
+    let log = files
+        .iter()
+        .find(|file| file.extension().is_none_or(|end| end != "toml"));
+    let stem = |path: &Path| path.file_stem().map(PathBuf::from).unwrap_or_default();
+    let log = log.map_or_else(PathBuf::new, |log| match log.extension() {
+        Some(end) if end == "gz" => stem(&stem(log)),
+        _ => stem(log),
+    });
+    log.display().to_string()
 }

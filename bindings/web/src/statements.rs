@@ -5,10 +5,10 @@ use std::error::Error;
 use serde::Deserialize;
 use turncal::formats::draft::{Stated, StatedUnit};
 use turncal::imu::Sensor;
-use turncal::models::{Instrument, Place};
+use turncal::models::{self, Instrument, ModelError, Place, Room};
 
 /// The fields of the form, with the names of the options of `turncal calibrate`; `None` for empty fields.
-#[derive(Deserialize)]
+#[derive(Deserialize, Default, PartialEq)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Statements {
     rate: Option<f64>,
@@ -28,8 +28,7 @@ impl Statements {
     }
 
     pub fn stated(&self) -> Result<Stated, Box<dyn Error>> {
-        let load = |name: &str| Instrument::load(name, &Place::Embedded);
-        let sensor = self.sensor.as_deref().map(load).transpose()?;
+        let sensor = self.sensor.as_deref().map(instrument).transpose()?;
         let unit = |sensor: Sensor, text: &Option<String>| match text {
             Some(text) => StatedUnit::parse(sensor, text)
                 .map(Some)
@@ -47,5 +46,24 @@ impl Statements {
             tolerances: sensor.as_ref().map(Instrument::tolerances),
             ..Stated::default()
         })
+    }
+}
+
+/// The embedded instrument of this name, in which case, spaces and hyphens do not matter.
+fn instrument(name: &str) -> Result<Instrument, Box<dyn Error>> {
+    let letters = |name: &str| -> String {
+        let letters = name.chars().filter(|letter| letter.is_alphanumeric());
+        letters.flat_map(char::to_lowercase).collect()
+    };
+    let known = models::names(Room::Imu).find(|known| letters(known) == letters(name));
+    match Instrument::load(known.unwrap_or(name), &Place::Embedded) {
+        Err(ModelError::Unknown { nearest, .. }) => Err(match nearest {
+            Some(nearest) => format!("Sensor: found no {name}. Did you mean {nearest}?"),
+            None => format!(
+                "Sensor: found no {name}. Choose one of the list, or leave the field empty."
+            ),
+        }
+        .into()),
+        loaded => Ok(loaded?),
     }
 }

@@ -29,11 +29,17 @@ fn main() -> anyhow::Result<()> {
     let read =
         |path: PathBuf| fs::read_to_string(&path).with_context(|| path.display().to_string());
     let style = read(root.join("src/report/style.css"))? + &read(crate_root.join("page/page.css"))?;
+    let scripts = ["form.js", "result.js", "page.js"];
+    let program = scripts.map(|name| read(crate_root.join("page").join(name)));
+    let program = program
+        .into_iter()
+        .collect::<Result<Vec<_>, _>>()?
+        .join("\n");
     // The last part is the longest and not searched for the names of the others.
     let parts = [
         ("style", style),
         ("sensors", sensors(&root.join("models/imu"))?),
-        ("program", read(crate_root.join("page/page.js"))?),
+        ("program", program),
         ("worker", glue + &read(crate_root.join("page/worker.js"))?),
         ("version", env!("CARGO_PKG_VERSION").to_owned()),
         ("wasm", BASE64_STANDARD.encode(compressed(&wasm)?)),
