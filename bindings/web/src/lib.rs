@@ -14,7 +14,7 @@ use std::panic;
 
 use serde_json::json;
 use turncal::calibration::{Calibration, Method, Options, Problem};
-use turncal::formats::draft::{Draft, Found};
+use turncal::formats::draft::{Draft, Found, Stated};
 use turncal::formats::{DataFile, Opened};
 use turncal::report::Document;
 use turncal::report::calibration::Calibrated;
@@ -68,15 +68,17 @@ impl Files {
 
 impl Files {
     fn outputs(mut self, statements: &str) -> Result<Vec<Output>, Box<dyn Error>> {
-        let statements: Statements = serde_json::from_str(statements)?;
-        let mut stated = statements.stated()?;
-        stated.accel_file = dropped::sort(&mut self.0)?;
+        let mut statements: Statements = serde_json::from_str(statements)?;
+        let accel_file = dropped::sort(&mut self.0)?;
         if self.0.first().is_some_and(dropped::is_run) && statements != Statements::default() {
-            show(
-                "note",
-                "The options had no effect, because a run.toml was dropped.",
-            );
+            statements = Statements::default();
+            let note = "The options had no effect, because a run.toml was dropped.";
+            show("note", note);
         }
+        let stated = Stated {
+            accel_file,
+            ..statements.stated()?
+        };
         show("activity", "reading");
         let first = self.0.first().map(|file| file.display().to_string());
         let show_draft = |draft: &Draft| show_draft(&first.unwrap_or_default(), draft);
