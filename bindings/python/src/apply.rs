@@ -5,17 +5,15 @@ use numpy::{PyArray2, PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use turncal::calibration::Correction;
-use turncal::imu::{Output, PerSensor, Sensor};
-use turncal::recording::NamedColumns;
+use turncal::imu::{PerSensor, Sensor};
+use turncal::recording::{FileColumn, NamedColumns};
 
 use crate::calibration::Calibration;
-use crate::errors::{positive, raise, raised, wrong};
+use crate::errors::{Given, positive, raise, raised, wrong};
 use crate::run::Run;
 
 /// Rows that a thread takes at once.
 const ROWS: usize = 1 << 14;
-/// Units of the gyros in which a row is a sum over its sample.
-const SUMS: [&str; 4] = ["count", "rad", "deg", "arcsec"];
 
 /// What rows are beside their columns.
 struct Rows<'a> {
@@ -53,10 +51,11 @@ impl Rows<'_> {
     }
 }
 
-/// Columns of six values with their signs, outputs per row value, and rows per second.
-type Inputs = (Option<Vec<(String, f64)>>, f64, f64);
+/// Names of six columns, outputs per row value, and rows per second.
+type Inputs = (Option<Vec<String>>, f64, f64);
 
-/// How rows are read: as stated, otherwise as in the run that was calibrated. The columns are None if neither tells.
+/// How rows are read: as stated, otherwise as in the run that was calibrated. A minus before a name reverses a column.
+/// The columns are None if neither tells.
 #[pyfunction]
 pub fn inputs(
     calibration: &Calibration,
@@ -64,9 +63,9 @@ pub fn inputs(
     gyro_unit: Option<&str>,
     accel: Option<[String; 3]>,
     accel_unit: Option<&str>,
-    rate: Option<f64>,
+    rate: Given,
 ) -> PyResult<Inputs> {
-    let (record, log) = (&calibration.record, calibration.log());
+    let record = &calibration.record;
     let units = record.unit.as_ref();
     for (sensor, unit) in [(Sensor::Gyro, gyro_unit), (Sensor::Accel, accel_unit)] {
         if let Some((unit, own)) = unit
@@ -80,31 +79,32 @@ pub fn inputs(
             return Err(wrong(name, format_args!("the unit {unit:?}"), &expected));
         }
     }
-    let of_run = |sensor| log.map(|log| columns(&log.named, sensor));
-    let stated = |names: [String; 3]| names.map(|name| (name, 1.0));
-    let gyro = gyro.map(stated).or_else(|| of_run(Sensor::Gyro));
-    let accel = accel.map(stated).or_else(|| of_run(Sensor::Accel));
-    let columns = gyro
-        .zip(accel)
-        .map(|(gyro, accel)| gyro.into_iter().chain(accel).collect());
-    let is_sum = match log {
-        Some(log) => log.output != Output::Rate,
-        None => rate.is_some() && units.is_some_and(|of| SUMS.contains(&&*of.gyro)),
-    };
+    let gyro = gyro.or_else(|| columns(calibration, Sensor::Gyro));
+    let accel = accel.or_else(|| columns(calibration, Sensor::Accel));
+    let columns = gyro.zip(accel);
+    let columns = columns.map(|(gyro, accel)| gyro.into_iter().chain(accel).collect());
+    let is_of_sums = calibration.is_of_sums().unwrap_or(rate.is_some());
     let of_record = record.provenance.as_ref().map(|of| of.rate_hz);
     let rate = positive("rate", rate)?.or(of_record).unwrap_or(1.0);
-    Ok((columns, if is_sum { rate } else { 1.0 }, rate))
+    Ok((columns, if is_of_sums { rate } else { 1.0 }, rate))
 }
 
-/// The columns of a triad along right, front and up, with their signs.
-fn columns(named: &NamedColumns, sensor: Sensor) -> [(String, f64); 3] {
-    let columns = named.triads.get(sensor);
-    std::array::from_fn(|axis| {
-        let along = |k: usize| named.axes.apply(&Vector3::ith(k, 1.0))[axis];
-        let k = (0..3).find(|&k| along(k) != 0.0).unwrap_or(axis);
-        let sign = if columns[k].reversed { -1.0 } else { 1.0 };
-        (columns[k].name.clone(), sign * along(k))
-    })
+/// The columns of a triad along right, front and up in the run that was calibrated. A number is the place of a column in
+/// a file from one, in a table from zero, so that those of a file have no meaning in a table.
+fn columns(calibration: &Calibration, sensor: Sensor) -> Option<[String; 3]> {
+    let NamedColumns { triads, axes, .. } = &calibration.log()?.named;
+    let names = [0, 1, 2].map(|axis| {
+        let FileColumn { name, reversed } = &triads.get(sensor)[axes.source[axis]];
+        let minus = if *reversed != axes.reversed[axis] {
+            "-"
+        } else {
+            ""
+        };
+        format!("{minus}{name}")
+    });
+    let is_number = |name: &String| name.parse::<i64>().is_ok();
+    let is_meaningful = calibration.is_of_table() || !names.iter().any(is_number);
+    is_meaningful.then_some(names)
 }
 
 /// Writes the calibrated values of some rows into six columns `out`. The first `before` rows and those beyond the

@@ -5,13 +5,17 @@ use std::sync::{Arc, OnceLock};
 
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
-use turncal::calibration::{self, AtRest, Progress as Passes, Solution, Verdict};
+use pyo3::types::PyIterator;
+use turncal::calibration::{self, AtRest, Finding, FindingKind, Progress as Passes, Solution};
+use turncal::imu::{Output, Sensor, Term};
+use turncal::lot::{self, Lot, Specification, Unit};
 use turncal::recording::LogFacts;
 use turncal::report::calibration::Calibrated;
-use turncal::report::{Document, at_rest, terminal, write};
+use turncal::report::document::Table;
+use turncal::report::{Document, at_rest, lot as of_lot, write};
 
-use crate::errors::{raise, raised};
-use crate::report::{brief, framed};
+use crate::errors::{in_python, raise, raised};
+use crate::report::{Report, brief, framed};
 use crate::run::{Recorded, Refusal, Request};
 use crate::wait::finish;
 
@@ -38,13 +42,20 @@ impl Solved {
 /// ``calibration["gyro.bias.x"]`` is a parameter: ``gyro.scale.x``, ``gyro.installation.xy``, ``gyro.bias.x``, the same
 /// for ``accel``, then error terms. Scale factors are the output for 1 rad/s or 1 m/s², biases are in the unit of the
 /// output (rates as logged; pulses and increments per second), misalignments are pure numbers, and error terms are in
-/// SI. The calibrated value is ``u = correction · (N − bias)`` in rad/s and m/s².
+/// SI; ``calibration.parameters`` has the units. The calibrated value is ``u = correction · (N − bias)`` in rad/s and
+/// m/s².
 #[pyclass(frozen, module = "turncal")]
 pub struct Calibration {
     pub record: calibration::Calibration,
     solved: Option<Arc<Solved>>,
     document: OnceLock<Document>,
+    specification: Option<Specification>,
 }
+
+/// Units of gyros whose rows are sums over their samples.
+const INCREMENTS: [&str; 3] = ["rad", "deg", "arcsec"];
+const EQUATION: &str = "u = correction · (N − bias): N is the output, with correction the inverse of scale · \
+                        installation, and u in rad/s and m/s².";
 
 /// Calibrates a run as requested; the progress may stop it.
 pub fn calibrated(
@@ -62,9 +73,9 @@ pub fn calibrated(
         let record = found.record(run);
         let document = at_rest::document(&found, run, &record);
         return Ok(Calibration {
-            record,
-            solved: None,
             document: OnceLock::from(document),
+            specification: request.specification,
+            ..Calibration::of_record(record)
         });
     }
     let mut solution = problem.solve(request.method, progress)?;
@@ -74,6 +85,7 @@ pub fn calibrated(
     }
     drop(problem);
     let record = calibrated.calibration.clone();
+    let specification = request.specification.clone();
     let solved = Arc::new(Solved {
         of,
         request,
@@ -82,6 +94,7 @@ pub fn calibrated(
     });
     Ok(Calibration {
         solved: Some(solved),
+        specification,
         ..Calibration::of_record(record)
     })
 }
@@ -93,7 +106,115 @@ impl Calibration {
             record,
             solved: None,
             document: OnceLock::new(),
+            specification: None,
         }
+    }
+
+    /// Whether the run is from a table in memory.
+    pub fn is_of_table(&self) -> bool {
+        self.solved
+            .as_ref()
+            .is_some_and(|solved| solved.of.path.is_none())
+    }
+
+    /// Whether a row is a sum over its sample; None for counts that a file does not explain.
+    pub fn is_of_sums(&self) -> Option<bool> {
+        if let Some(log) = self.log() {
+            return Some(log.output != Output::Rate);
+        }
+        match &*self.record.unit.as_ref()?.gyro {
+            "count" => {
+                let solved = self.solved.as_ref()?;
+                Some(solved.of.runs[0].recording.imu.pulse.gyro > 0.0)
+            }
+            unit => Some(INCREMENTS.contains(&unit)),
+        }
+    }
+
+    /// The unit of a parameter and its σ.
+    fn unit(&self, name: &str) -> String {
+        let has = |term: &Term| {
+            let mut names = term.parameters().filter_map(Term::parameter_name);
+            names.any(|of| of == name)
+        };
+        let term = Term::ALL.into_iter().find(has);
+        let (sensor, input) = match name.starts_with(Sensor::Gyro.name()) {
+            true => (Sensor::Gyro, "rad/s"),
+            false => (Sensor::Accel, "m/s²"),
+        };
+        let unit = self.record.unit.as_ref().map(|unit| unit.get(sensor));
+        let unit = unit.map_or("output", String::as_str);
+        let per_second = match self.is_of_sums() {
+            Some(true) => "/s",
+            _ => "",
+        };
+        match (term, name.split('.').nth(1)) {
+            (Some(term), _) => term.entry().si_unit.to_owned(),
+            (_, Some("scale")) => format!("{unit}{per_second} per {input}"),
+            (_, Some("bias")) => format!("{unit}{per_second}"),
+            (_, Some("installation")) => "1".to_owned(),
+            // Errors of the table are angles.
+            _ => "rad".to_owned(),
+        }
+    }
+
+    /// Every parameter with value, σ and unit.
+    fn values(&self) -> Vec<(String, f64, f64, String)> {
+        let row = |name: String| {
+            let [value, sigma] = [self.record.get(&name), self.record.sigma_of(&name)];
+            let (value, sigma) = (value.copied(), sigma.copied().unwrap_or_default());
+            Some((name.clone(), value?, sigma, self.unit(&name)))
+        };
+        self.record.names().into_iter().filter_map(row).collect()
+    }
+
+    /// How many parameters were determined, and how many findings there are.
+    fn summary(&self) -> String {
+        let (record, all) = (&self.record, self.record.parameters.len());
+        if record.verdict.is_none() {
+            return format!("{} values, not estimated", record.names().len());
+        }
+        let not_observed = record
+            .findings
+            .iter()
+            .filter(|of| of.is(FindingKind::NotObserved));
+        let hidden = not_observed
+            .filter_map(|of| of.figures["parameters"].as_array())
+            .flatten();
+        let hidden = hidden.filter_map(|name| name.as_str());
+        let hidden = hidden
+            .filter(|name| record.parameters.iter().any(|of| of == name))
+            .count();
+        let findings = match record.findings.len() {
+            0 => "no findings".to_owned(),
+            1 => "one finding".to_owned(),
+            n => format!("{n} findings"),
+        };
+        format!(
+            "{} of {all} parameters determined, {findings}",
+            all - hidden
+        )
+    }
+
+    /// Verdict, findings and, if the run is known, accuracy; then all values.
+    fn page(&self, py: Python) -> PyResult<Document> {
+        let mut document = match self.solved.is_some() || self.document.get().is_some() {
+            true => brief(self.document(py)?),
+            false => Document {
+                verdict: self
+                    .record
+                    .verdict
+                    .as_ref()
+                    .map(|of| (of.word, self.summary())),
+                findings: self.record.findings.clone(),
+                ..Document::new("Calibration")
+            },
+        };
+        let values = self.values().into_iter();
+        let row = |(name, value, sigma, unit)| vec![name, digits(value, 7), digits(sigma, 3), unit];
+        let table = Table::new("Values", ["", "value", "1σ", "unit"]).section(values.map(row));
+        document.page(table.note(EQUATION));
+        Ok(document)
     }
 
     /// The log of the run that it was estimated from.
@@ -116,14 +237,16 @@ impl Calibration {
         Ok(self.document.get_or_init(|| document))
     }
 
-    /// The value of a parameter.
-    fn value<'a>(&self, name: &str, value: Option<&'a f64>) -> PyResult<&'a f64> {
-        value.ok_or_else(|| {
-            PyKeyError::new_err(format!(
-                "found {name:?}, expected a parameter of this calibration. `calibration.parameters` lists them."
-            ))
-        })
+    fn verdict_word(&self) -> Option<String> {
+        let verdict = self.record.verdict.as_ref();
+        verdict.map(|verdict| verdict.word.to_string().to_lowercase())
     }
+}
+
+/// A number of so many significant digits.
+fn digits(value: f64, digits: usize) -> String {
+    let rounded = format!("{value:.*e}", digits - 1).parse();
+    rounded.unwrap_or(value).to_string()
 }
 
 #[pymethods]
@@ -144,31 +267,55 @@ impl Calibration {
             .map_err(raise)
     }
 
+    /// The calibration in the text of ``to_json``, for pickle.
+    #[staticmethod]
+    fn _of_json(text: &str) -> PyResult<Self> {
+        serde_json::from_str(text)
+            .map(Self::of_record)
+            .map_err(raise)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, (String,))> {
+        Ok((slf.get_type().getattr("_of_json")?, (slf.get().to_json()?,)))
+    }
+
     fn __getitem__(&self, name: &str) -> PyResult<f64> {
-        self.value(name, self.record.get(name)).copied()
+        self.record.get(name).copied().ok_or_else(|| {
+            PyKeyError::new_err(format!(
+                "found {name:?}, expected a parameter of this calibration. `calibration.parameters` lists them."
+            ))
+        })
+    }
+
+    fn __contains__(&self, name: &str) -> bool {
+        self.record.get(name).is_some()
+    }
+
+    fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyIterator>> {
+        self.record.names().into_pyobject(py)?.try_iter()
+    }
+
+    fn __len__(&self) -> usize {
+        self.record.names().len()
     }
 
     /// 1σ of a parameter in its own unit, zero if it was not estimated.
     fn sigma(&self, name: &str) -> PyResult<f64> {
         self.__getitem__(name)?;
-        self.value(name, self.record.sigma_of(name)).copied()
+        Ok(self.record.sigma_of(name).copied().unwrap_or_default())
     }
 
-    /// Value and 1σ of every parameter.
+    /// Value, 1σ and their unit of every parameter.
     ///
     /// Returns
     /// -------
     /// pandas.DataFrame
-    ///     Columns ``value`` and ``sigma``, a row for each parameter by name.
+    ///     Columns ``value``, ``sigma`` (zero if not estimated) and ``unit``, a row for each parameter by name.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let names = self.record.names();
-        let value = |name: &String| self.record.get(name).copied();
-        let sigma = |name: &String| self.record.sigma_of(name).copied();
-        let values: Vec<Option<f64>> = names.iter().map(value).collect();
-        let sigmas: Vec<Option<f64>> = names.iter().map(sigma).collect();
+        let columns = ("parameter", "value", "sigma", "unit");
         let frames = py.import("turncal._frames")?;
-        frames.call_method1("parameters", (names, values, sigmas))
+        frames.call_method1("table", (columns, self.values()))
     }
 
     /// Covariance of the estimated parameters, in their units.
@@ -190,14 +337,37 @@ impl Calibration {
     /// "good", "use with care" or "failed"; None for values that were not estimated.
     #[getter]
     fn verdict(&self) -> Option<String> {
-        let word = |verdict: &Verdict| verdict.word.to_string().to_lowercase();
-        self.record.verdict.as_ref().map(word)
+        self.verdict_word()
+    }
+
+    /// Whether the values are within the limits of the specification given to :meth:`Run.calibrate`; otherwise None.
+    ///
+    /// Returns
+    /// -------
+    /// Report or None
+    #[getter]
+    fn conformity(&self) -> Option<Report> {
+        let calibrated = lot::Calibrated {
+            nominal: self.record.provenance.as_ref()?.nominal,
+            calibration: self.record.clone(),
+            noise: None,
+        };
+        let unit = Unit {
+            name: "calibration".to_owned(),
+            meta: self.record.meta.clone(),
+            calibrated: Ok(calibrated),
+        };
+        let specification = self.specification.clone()?;
+        Some(Report(of_lot::document(&Lot::new(
+            vec![unit],
+            Some(specification),
+        ))))
     }
 
     /// What to know before using the values: problem, meaning and remedy, the most severe first.
     #[getter]
     fn findings(&self) -> Vec<String> {
-        let text = |finding: &calibration::Finding| format!("{} {}", finding.code, finding.text);
+        let text = |finding: &Finding| in_python(&format!("{} {}", finding.code, finding.text));
         self.record.findings.iter().map(text).collect()
     }
 
@@ -205,10 +375,11 @@ impl Calibration {
     ///
     /// Parameters
     /// ----------
-    /// data : DataFrame, array of shape (n, 6), mapping of arrays, or Run
-    ///     Samples as logged: gyros, then accelerometers.
+    /// data : DataFrame, array of shape (rows, columns), mapping of arrays, or Run
+    ///     Samples as logged.
     /// gyro, accel : (x, y, z) or (x, y, z, unit), optional
-    ///     Columns along right, front and up. Default: those of the run that was calibrated.
+    ///     Columns along right, front and up; a minus before a name reverses a column. Default: those of the run that
+    ///     was calibrated, by name.
     /// rate : float, optional
     ///     Rows per second, for increments and pulses. Default: that of the run that was calibrated.
     ///
@@ -223,7 +394,7 @@ impl Calibration {
         data: Bound<'py, PyAny>,
         gyro: Option<Bound<'py, PyAny>>,
         accel: Option<Bound<'py, PyAny>>,
-        rate: Option<f64>,
+        rate: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let frames = slf.py().import("turncal._frames")?;
         frames.call_method1("applied", (slf, data, gyro, accel, rate))
@@ -249,25 +420,14 @@ impl Calibration {
         String::from_utf8(bytes).map_err(raise)
     }
 
-    fn __str__(&self, py: Python) -> PyResult<String> {
-        match self.solved.is_some() || self.document.get().is_some() {
-            true => Ok(terminal::brief(self.document(py)?, Some(100))),
-            false => self.to_json(),
-        }
-    }
-
     fn __repr__(&self) -> String {
-        let verdict = self.verdict();
-        format!(
-            "<turncal.Calibration: {}>",
-            verdict.as_deref().unwrap_or("not estimated")
-        )
+        let verdict = self
+            .verdict_word()
+            .map_or(String::new(), |word| word + ", ");
+        format!("<turncal.Calibration: {verdict}{}>", self.summary())
     }
 
     fn _repr_html_(&self, py: Python) -> PyResult<String> {
-        match self.solved.is_some() || self.document.get().is_some() {
-            true => Ok(framed(&brief(self.document(py)?))),
-            false => self.parameters(py)?.call_method0("to_html")?.extract(),
-        }
+        Ok(framed(&self.page(py)?))
     }
 }

@@ -4,6 +4,7 @@ use std::fmt::Display;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use turncal::calibration::{ErrorTerm, NoisePolicy};
 use turncal::formats::{FileError, Place};
 use turncal::models::ModelError;
 
@@ -23,19 +24,44 @@ pub fn raised(error: impl Display) -> PyErr {
     Error::new_err(error.to_string())
 }
 
-/// A text that names options of the command, with the arguments of Python in their place.
-fn in_python(text: &str) -> String {
-    let words = text.split(' ').map(|word| {
-        let (open, option) = match word.strip_prefix('(') {
-            Some(inside) => ("(", inside),
-            None => ("", word),
-        };
-        match option.strip_prefix("--") {
-            Some(name) => format!("{open}{}", name.replace('-', "_")),
-            None => word.to_owned(),
+/// A text that names options of the command, with the arguments of Python in their place: `--noise stated` is
+/// `noise="stated"`. Commands in backticks stay.
+pub fn in_python(text: &str) -> String {
+    let mut parts = text.split("--");
+    let first = parts.next().unwrap_or_default().to_owned();
+    parts.fold(first, |before, part| {
+        let begins = before.is_empty() || before.ends_with([' ', '\n', '(', '>']);
+        let is_command = before.matches('`').count() % 2 == 1;
+        let end = part.find(|letter: char| !letter.is_ascii_lowercase() && letter != '-');
+        let (name, rest) = part.split_at(end.unwrap_or(part.len()));
+        match name {
+            "" => before + "--" + part,
+            _ if !begins || is_command => before + "--" + part,
+            "with" => before + "with_=" + &value_first(rest),
+            name => before + &name.replace('-', "_") + "=" + &value_first(rest),
         }
-    });
-    words.collect::<Vec<_>>().join(" ")
+    })
+}
+
+/// The text after an option, with its value, if it begins with one, as Python writes it.
+fn value_first(text: &str) -> String {
+    let Some(of) = text.strip_prefix(' ') else {
+        return text.to_owned();
+    };
+    let terms = ErrorTerm::ALL.map(ErrorTerm::name);
+    let policies = NoisePolicy::ALL.map(NoisePolicy::name);
+    let known =
+        terms
+            .into_iter()
+            .chain(policies)
+            .chain(["ekf", "six-position", "table", "velocity"]);
+    let end = of.find(|letter: char| !letter.is_ascii_alphanumeric() && letter != '-');
+    let (word, rest) = of.split_at(end.unwrap_or(of.len()));
+    match known.into_iter().any(|known| known == word) {
+        true => format!("\"{word}\"{rest}"),
+        false if of.starts_with('\'') => of.to_owned(),
+        false => text.to_owned(),
+    }
 }
 
 /// An error of the library, with its place in a file or a table.
@@ -51,7 +77,18 @@ pub fn raise<E: std::error::Error + 'static>(error: E) -> PyErr {
             text = format!("{text}: {further}");
         }
     }
-    let raised = Error::new_err(in_python(&text));
+    let name = file.map(|file| file.file.display().to_string());
+    let name = name.filter(|name| !name.is_empty());
+    // The name of a file stays.
+    let text = match &name {
+        Some(name) => text
+            .split(&**name)
+            .map(in_python)
+            .collect::<Vec<_>>()
+            .join(name),
+        None => in_python(&text),
+    };
+    let raised = Error::new_err(text);
     if let Some(file) = file {
         // An exception takes any attribute, so that none of these fails.
         let _ = Python::attach(|py| put_place(raised.value(py), file));
@@ -89,25 +126,48 @@ pub fn wrong(name: &str, found: impl Display, expected: &str) -> PyErr {
 }
 
 /// A number from `low` to `high`, if one is given.
-pub fn within(name: &str, value: Option<f64>, [low, high]: [f64; 2]) -> PyResult<Option<f64>> {
-    match value {
-        Some(value) if !(low..=high).contains(&value) => Err(wrong(
-            name,
-            value,
-            &format!("a number from {low} to {high}"),
-        )),
-        value => Ok(value),
-    }
+pub fn within(name: &str, value: Given, [low, high]: [f64; 2]) -> PyResult<Option<f64>> {
+    let expected = format!("a number from {low} to {high}");
+    number(name, value, &expected, |value| {
+        (low..=high).contains(&value)
+    })
 }
 
 /// A finite number above zero, if one is given.
-pub fn positive(name: &str, value: Option<f64>) -> PyResult<Option<f64>> {
-    match value {
-        Some(value) if !(value > 0.0 && value.is_finite()) => {
-            Err(wrong(name, value, "a finite number above zero"))
-        }
-        value => Ok(value),
+pub fn positive(name: &str, value: Given) -> PyResult<Option<f64>> {
+    let expected = "a finite number above zero";
+    number(name, value, expected, |value| {
+        value > 0.0 && value.is_finite()
+    })
+}
+
+/// An argument, if it is given.
+pub type Given<'a, 'py> = Option<&'a Bound<'py, PyAny>>;
+
+fn number(
+    name: &str,
+    value: Given,
+    expected: &str,
+    is_expected: impl Fn(f64) -> bool,
+) -> PyResult<Option<f64>> {
+    let Some(value) = value else {
+        return Ok(None);
+    };
+    match value.extract() {
+        Ok(number) if is_expected(number) => Ok(Some(number)),
+        _ => Err(wrong(name, value.repr()?, expected)),
     }
+}
+
+/// A name, or a sequence of names.
+pub fn names(argument: &str, value: Given) -> PyResult<Vec<String>> {
+    let Some(value) = value else {
+        return Ok(Vec::new());
+    };
+    let one = value.extract().map(|name| vec![name]);
+    let expected = "a name or a sequence of names";
+    one.or_else(|_| value.extract())
+        .or_else(|_: PyErr| Err(wrong(argument, value.repr()?, expected)))
 }
 
 /// The value with a name.

@@ -7,7 +7,7 @@ use turncal::formats::DataFile;
 use turncal::formats::draft::{Stated, StatedUnit};
 use turncal::imu::Sensor;
 
-use crate::errors::{positive, raise, within, wrong};
+use crate::errors::{Given, positive, raise, within, wrong};
 
 /// What is known of a log without a run.toml.
 #[pyclass(frozen, module = "turncal._turncal")]
@@ -25,10 +25,10 @@ impl Known {
     ))]
     #[expect(clippy::too_many_arguments, reason = "each is a keyword")]
     fn new(
-        rate: Option<f64>,
-        latitude: Option<f64>,
-        height: Option<f64>,
-        gravity: Option<f64>,
+        rate: Given,
+        latitude: Given,
+        height: Given,
+        gravity: Given,
         gyro_unit: Option<&str>,
         accel_unit: Option<&str>,
         sensor: Option<&str>,
@@ -58,9 +58,9 @@ impl Known {
     /// A sensor at a site.
     pub fn of_sensor(
         sensor: &str,
-        latitude: Option<f64>,
-        height: Option<f64>,
-        gravity: Option<f64>,
+        latitude: Given,
+        height: Given,
+        gravity: Given,
     ) -> PyResult<Self> {
         let (none, name) = (None, Some(sensor));
         Self::new(

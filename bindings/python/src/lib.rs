@@ -51,6 +51,7 @@ mod _turncal {
 
     #[pymodule_init]
     fn declare_attributes(module: &Bound<PyModule>) -> PyResult<()> {
+        module.setattr("__version__", env!("CARGO_PKG_VERSION"))?;
         let error = module.py().get_type::<Error>();
         let mut names = super::errors::ATTRIBUTES.into_iter();
         names.try_for_each(|name| error.setattr(name, module.py().None()))

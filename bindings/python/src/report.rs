@@ -6,12 +6,13 @@ use pyo3::prelude::*;
 use turncal::report::document::Block;
 use turncal::report::{Document, json, terminal, write};
 
-use crate::errors::raise;
+use crate::errors::{in_python, raise};
 
 /// Width of text in characters.
 const WIDTH: usize = 100;
-/// Style of the frame of a page in a notebook.
-const FRAME: &str = "width: 100%; height: 40em; box-sizing: border-box; border: 1px solid #ccc";
+/// The frame of a page in a notebook, as high as the page.
+const FRAME: &str = "style=\"width: 100%; height: 40em; border: 0\" onload=\"const page = this.contentDocument.body; new \
+                     ResizeObserver(() => this.style.height = `${page.offsetHeight + 2}px`).observe(page)\"";
 
 /// Figures, tables and a page about a result.
 ///
@@ -39,7 +40,7 @@ impl Report {
     }
 
     fn __str__(&self) -> String {
-        terminal::text(&self.0, Some(WIDTH))
+        in_python(&terminal::text(&self.0, Some(WIDTH)))
     }
 
     fn __repr__(&self) -> String {
@@ -56,8 +57,13 @@ pub fn framed(document: &Document) -> String {
     let files = turncal::report::files(document);
     let page = files.into_iter().find(|(name, _)| name == "index.html");
     let page = page.map_or_else(String::new, |(_, page)| page);
+    // Names in a style are no options.
+    let page = match page.split_once("</style>") {
+        Some((head, body)) => format!("{head}</style>{}", in_python(body)),
+        None => page,
+    };
     let page = page.replace('&', "&amp;").replace('"', "&quot;");
-    format!("<iframe srcdoc=\"{page}\" style=\"{FRAME}\"></iframe>")
+    format!("<iframe srcdoc=\"{page}\" {FRAME}></iframe>")
 }
 
 /// A document with its summary and its first figure only.

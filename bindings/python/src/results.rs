@@ -7,16 +7,15 @@ use turncal::calibration::result::Calibration as Record;
 use turncal::calibration::{Named, compare as compared};
 use turncal::certificate::{Certificate, Laboratory};
 use turncal::formats::{digest_of_bytes, export as formats};
-use turncal::models::specification;
 use turncal::report::navigation::{Navigated, Navigation};
 use turncal::report::{certificate as of_certificate, comparison};
 use turncal::study::navigation::{INTERVAL, Mission, Motion, NavigationStudyError, Pair};
 use turncal::units::DEGREE;
 
 use crate::calibration::Calibration;
-use crate::errors::{raise, raised, within};
+use crate::errors::{Given, raise, raised, within};
 use crate::report::Report;
-use crate::run::Run;
+use crate::run::{Run, limits};
 use crate::wait::finish;
 
 const HOUR: f64 = 3600.0;
@@ -60,7 +59,7 @@ pub fn certificate(
     calibration: &Calibration,
     laboratory: PathBuf,
     directory: PathBuf,
-    limits: Option<PathBuf>,
+    specification: Option<PathBuf>,
     as_found: Option<PathBuf>,
 ) -> PyResult<()> {
     let record = &calibration.record;
@@ -69,11 +68,7 @@ pub fn certificate(
         .map_err(raise)?;
     let laboratory = Laboratory::read(&laboratory, |key| record.meta.get(key).cloned());
     let laboratory = laboratory.map_err(raise)?;
-    let limits = limits
-        .as_deref()
-        .map(specification)
-        .transpose()
-        .map_err(raise)?;
+    let limits = specification.as_deref().map(limits).transpose()?;
     let earlier = as_found
         .as_deref()
         .map(|path| -> PyResult<(String, Record)> {
@@ -101,14 +96,14 @@ pub fn navigate(
     py: Python,
     calibration: &Calibration,
     truth: &Calibration,
-    latitude: Option<f64>,
-    height: Option<f64>,
-    hours: f64,
+    latitude: Given,
+    height: Given,
+    hours: &Bound<PyAny>,
     trajectory: Option<&str>,
 ) -> PyResult<Report> {
     let latitude = within("latitude", latitude, [-90.0, 90.0])?.map(|of| of * DEGREE);
     let height = within("height", height, [-12e3, 1e5])?;
-    within("hours", Some(hours), [INTERVAL / HOUR, 1000.0])?;
+    let hours = within("hours", Some(hours), [INTERVAL / HOUR, 1000.0])?.unwrap_or_default();
     let (motion, name) = motion(calibration, latitude, height, trajectory)?;
     let names = ["calibration", "truth"];
     let [own, true_one] = [(names[0], calibration), (names[1], truth)].map(|(name, of)| Named {

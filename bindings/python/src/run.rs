@@ -1,6 +1,6 @@
 //! Runs: recordings with what is known of instrument and site.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use numpy::PyReadonlyArray1;
@@ -8,18 +8,21 @@ use pyo3::prelude::*;
 use turncal::calibration::{
     CalibrationError, ErrorTerm, Method, NoisePolicy, Options, Problem, Together,
 };
-use turncal::formats::draft::{Draft, StatedColumns};
-use turncal::formats::{Campaign, Opened, Table};
+use turncal::formats::draft::{Draft, Found, StatedColumns};
+use turncal::formats::{Campaign, FileError, Opened, Table as Columns};
 use turncal::imu::PerSensor;
+use turncal::lot::Specification;
+use turncal::models::specification;
 use turncal::noise::{NoiseAnalysis, Stretch};
-use turncal::report::{allan as of_noise, check};
+use turncal::report::document::Table;
+use turncal::report::{Document, allan as of_noise, check};
 use turncal::run::Run as Recording;
 use turncal::survey::Survey;
 
 use crate::calibration::{Calibration, calibrated};
-use crate::errors::{named, raise, raised};
+use crate::errors::{Given, in_python, named, names, raise, raised};
 use crate::known::Known;
-use crate::report::Report;
+use crate::report::{Report, framed};
 use crate::wait::{Progress, Watch, finish, wait};
 
 /// Recordings of one instrument with what is known of it.
@@ -30,6 +33,8 @@ pub struct Recorded {
     together: Option<Together>,
     /// The file that it was read from.
     pub path: Option<PathBuf>,
+    /// What was found in a log or a table.
+    found: Vec<Found>,
 }
 
 impl Recorded {
@@ -39,7 +44,36 @@ impl Recorded {
             runs: vec![run],
             together: None,
             path,
+            found: Vec::new(),
         }
+    }
+
+    pub fn of_campaign(name: String, runs: Vec<Recording>, together: Together) -> Self {
+        Self {
+            name,
+            runs,
+            together: Some(together),
+            path: None,
+            found: Vec::new(),
+        }
+    }
+
+    /// The recording in files or a table, by a function that opens it and shows the draft.
+    fn opened(
+        path: Option<PathBuf>,
+        open: impl FnOnce(&mut dyn FnMut(&Draft)) -> Result<Opened, FileError>,
+    ) -> Result<Self, FileError> {
+        let mut found = Vec::new();
+        let run = open(&mut |draft| found = draft.found())?.run;
+        Ok(Self {
+            found,
+            ..Self::of_run(run, path)
+        })
+    }
+
+    fn seconds(&self) -> f64 {
+        let seconds = self.runs.iter().map(|run| run.recording.imu.duration());
+        seconds.sum()
     }
 
     /// The problem of a request.
@@ -80,6 +114,7 @@ pub struct Request {
     pub temperature: bool,
     terms: Vec<ErrorTerm>,
     options: Options,
+    pub specification: Option<Specification>,
 }
 
 /// A recording with what is known of instrument and site, from :func:`read`, :func:`run` or :func:`simulate`.
@@ -115,6 +150,31 @@ impl Run {
         }
     }
 
+    /// What was found, or the recordings of a campaign.
+    fn page(&self) -> Document {
+        let of = &*self.of;
+        let mut document = Document::new(of.name.clone());
+        document.lead = vec![format!("{:.1} s", of.seconds())];
+        let row = |found: &Found| {
+            let (value, certainty) = (found.value.clone(), found.certainty.word().to_owned());
+            vec![found.what.to_owned(), value, certainty, found.why.clone()]
+        };
+        let found = Table::new("Found", ["", "value", "certainty", "why"]);
+        document.both(found.section(of.found.iter().map(row)));
+        let row = |run: &Recording| {
+            let imu = &run.recording.imu;
+            let rate = format!("{:.6}", imu.period.recip());
+            vec![
+                run.recording.name.clone(),
+                format!("{:.1} s", imu.duration()),
+                rate + " Hz",
+            ]
+        };
+        let recordings = Table::new("Recordings", ["", "duration", "rate"]);
+        document.both(recordings.section(of.runs.iter().map(row)));
+        document
+    }
+
     /// Makes a report of the run.
     fn report<E: std::error::Error + Send + 'static>(
         &self,
@@ -129,6 +189,31 @@ impl Run {
 
 #[pymethods]
 impl Run {
+    /// What was found in a log or a table: columns, units, time, axes, place; empty for a run.toml.
+    ///
+    /// Returns
+    /// -------
+    /// pandas.DataFrame
+    ///     Columns ``value``, ``certainty`` ("certain", "guess" or "unknown") and ``why``, a row for each ``what``.
+    #[getter]
+    fn found<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let row = |of: &Found| {
+            let texts = [&of.value, of.certainty.word(), &of.why];
+            let [value, certainty, why] = texts.map(in_python);
+            (of.what, value, certainty, why)
+        };
+        let rows: Vec<_> = self.of.found.iter().map(row).collect();
+        let frames = py.import("turncal._frames")?;
+        frames.call_method1("table", (("what", "value", "certainty", "why"), rows))
+    }
+
+    /// The recordings of a campaign, each as a run.
+    #[getter]
+    fn recordings(&self) -> Vec<Self> {
+        let of_run = |run: &Recording| Self::new(Recorded::of_run(run.clone(), None), None);
+        self.of.runs.iter().map(of_run).collect()
+    }
+
     /// Dwells, turns, faults of the log, and the accuracy to expect, without a calibration.
     ///
     /// Returns
@@ -147,7 +232,7 @@ impl Run {
     /// ----------
     /// method : {"ekf", "six-position"}
     ///     The filter over the whole run, or the closed form from dwells.
-    /// with_ : sequence of str
+    /// with_ : str or sequence of str, optional
     ///     Error terms to estimate, such as "accel-second-order". Default: those that the data support.
     /// noise : {"auto", "stated", "learnt"}
     ///     Stated noise unless the data contradict it, stated noise, or noise estimated from the run.
@@ -156,6 +241,8 @@ impl Run {
     /// progress : callable or bool, optional
     ///     Called as ``progress(iterations, None)`` after each iteration; True shows a bar if tqdm is installed. An
     ///     exception in it ends the calibration.
+    /// specification : path-like, optional
+    ///     Limits, by name or as a TOML file, for :attr:`Calibration.conformity`.
     ///
     /// Returns
     /// -------
@@ -165,29 +252,33 @@ impl Run {
     /// ------
     /// Error
     ///     If the run cannot be calibrated. Read `verdict` before using the values of one that could.
-    #[pyo3(signature = (method="ekf", with_=None, noise="auto", temperature=false, progress=None))]
+    #[pyo3(signature = (
+        method="ekf", with_=None, noise="auto", temperature=false, progress=None, specification=None,
+    ))]
+    #[expect(clippy::too_many_arguments, reason = "each is a keyword")]
     fn calibrate(
         &self,
         py: Python,
         method: &str,
-        with_: Option<Vec<String>>,
+        with_: Given,
         noise: &str,
         temperature: bool,
         progress: Option<Py<PyAny>>,
+        specification: Option<PathBuf>,
     ) -> PyResult<Calibration> {
-        let with_ = with_.unwrap_or_default();
         let methods = [("ekf", Method::Ekf), ("six-position", Method::SixPosition)];
         let mut options = Options::default().noise(named(
             "noise",
             noise,
             &NoisePolicy::ALL.map(|policy| (policy.name(), policy)),
         )?);
-        options.auto_terms = with_.is_empty();
+        options.auto_terms = with_.is_none();
         let request = Request {
             method: named("method", method, &methods)?,
             temperature,
-            terms: error_terms("with_", &with_)?,
+            terms: error_terms("with_", with_)?,
             options,
+            specification: specification.as_deref().map(limits).transpose()?,
         };
         self.refuse(&request)?;
         let progress = Progress::new(py, progress, None)?;
@@ -197,13 +288,15 @@ impl Run {
     }
 
     fn __repr__(&self) -> String {
-        let seconds: f64 = self
-            .of
-            .runs
-            .iter()
-            .map(|run| run.recording.imu.duration())
-            .sum();
-        format!("<turncal.Run: {}, {seconds:.1} s>", self.of.name)
+        format!(
+            "<turncal.Run: {}, {:.1} s>",
+            self.of.name,
+            self.of.seconds()
+        )
+    }
+
+    fn _repr_html_(&self) -> String {
+        framed(&self.page())
     }
 }
 
@@ -225,26 +318,28 @@ impl Run {
 }
 
 /// Error terms by name.
-pub fn error_terms(argument: &str, names: &[String]) -> PyResult<Vec<ErrorTerm>> {
+pub fn error_terms(argument: &str, of: Given) -> PyResult<Vec<ErrorTerm>> {
     let all = ErrorTerm::ALL.map(|term| (term.name(), term));
-    names
-        .iter()
-        .map(|name| named(argument, name, &all))
-        .collect()
+    let of = names(argument, of)?;
+    of.iter().map(|name| named(argument, name, &all)).collect()
+}
+
+/// A specification by name or path.
+pub fn limits(path: &Path) -> PyResult<Specification> {
+    specification(path).map_err(raise)
 }
 
 #[pyfunction]
 pub fn read(py: Python, path: PathBuf, known: &Known) -> PyResult<Run> {
     let (stated, stream) = (known.stated.clone(), known.stream.clone());
     let recorded = finish(py, move || match Campaign::is_at(&path) {
-        true => Campaign::read(&path).map(|campaign| Recorded {
-            name: campaign.name,
-            runs: campaign.runs,
-            together: Some(campaign.together),
+        true => Campaign::read(&path).map(|of| Recorded {
             path: Some(path),
+            ..Recorded::of_campaign(of.name, of.runs, of.together)
         }),
-        false => Opened::new(&path, stream.as_deref(), &stated, |_| ())
-            .map(|opened| Recorded::of_run(opened.run, Some(path))),
+        false => Recorded::opened(Some(path.clone()), |show| {
+            Opened::new(&path, stream.as_deref(), &stated, show)
+        }),
     });
     Ok(Run::new(recorded?.map_err(raise)?, None))
 }
@@ -276,14 +371,13 @@ pub fn run(
     let columns = columns
         .into_iter()
         .map(|(name, of)| (name, of.as_array().to_vec()));
-    let table = Table::new(name, columns.collect()).map_err(raise)?;
-    let opened = finish(py, move || {
-        Opened::in_memory(&[table.into()], None, &stated, |_| ())
-    })?;
-    Ok(Run::new(
-        Recorded::of_run(opened.map_err(raise)?.run, None),
-        None,
-    ))
+    let table = Columns::new(name, columns.collect()).map_err(raise)?;
+    let recorded = finish(py, move || {
+        Recorded::opened(None, |show| {
+            Opened::in_memory(&[table.into()], None, &stated, show)
+        })
+    });
+    Ok(Run::new(recorded?.map_err(raise)?, None))
 }
 
 #[pyfunction]

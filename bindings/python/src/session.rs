@@ -7,14 +7,13 @@ use nalgebra::Vector3;
 use numpy::PyReadonlyArray2;
 use numpy::ndarray::ArrayView1;
 use pyo3::prelude::*;
-use turncal::models::specification;
 use turncal::recording::SampleError;
 use turncal::report::session::data;
 use turncal::survey::{self, Status};
 
-use crate::errors::{positive, raise, raised};
+use crate::errors::{Given, positive, raise, raised};
 use crate::known::Known;
-use crate::run::{Recorded, Run};
+use crate::run::{Recorded, Run, limits};
 use crate::wait::finish;
 
 /// A calibration in progress: rows are pushed as they arrive, and the next move is recommended.
@@ -39,11 +38,11 @@ impl Session {
     #[new]
     #[pyo3(signature = (rate, sensor, *, latitude=None, height=None, gravity=None, specification=None))]
     fn new(
-        rate: f64,
+        rate: &Bound<PyAny>,
         sensor: &str,
-        latitude: Option<f64>,
-        height: Option<f64>,
-        gravity: Option<f64>,
+        latitude: Given,
+        height: Given,
+        gravity: Given,
         specification: Option<PathBuf>,
     ) -> PyResult<Self> {
         let known = Known::of_sensor(sensor, latitude, height, gravity)?.stated;
@@ -65,7 +64,7 @@ impl Session {
     ///
     /// Parameters
     /// ----------
-    /// gyro, accel : array of shape (n, 3)
+    /// gyro, accel : array of shape (n, 3) or (3,)
     ///     Angular rates in rad/s and specific forces in m/s² along right, front and up.
     ///
     /// Returns
@@ -115,10 +114,6 @@ impl Session {
         });
         answer?.map_err(raise)
     }
-}
-
-fn limits(path: &std::path::Path) -> PyResult<turncal::lot::Specification> {
-    specification(path).map_err(raise)
 }
 
 fn as_dict<'py>(py: Python<'py>, status: &Status) -> PyResult<Bound<'py, PyAny>> {

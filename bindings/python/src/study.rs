@@ -8,8 +8,9 @@ use rayon::ThreadPoolBuilder;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use turncal::calibration::{ErrorTerm, NoisePolicy};
+use turncal::formats::write_run;
 use turncal::imu::InstallationForm;
-use turncal::models::{self, Place, specification};
+use turncal::models::{self, Place};
 use turncal::report::path::{Report as OfPath, in_words, moves_in_words};
 use turncal::report::{Document, accuracy, experiment};
 use turncal::run::Aiding;
@@ -21,23 +22,63 @@ use turncal::study::{
 };
 
 use crate::calibration::Calibration;
-use crate::errors::{named, raise, raised, wrong};
+use crate::errors::{Given, named, raise, raised, wrong};
 use crate::report::Report;
-use crate::run::{Recorded, Run, error_terms};
+use crate::run::{Recorded, Run, error_terms, limits};
 use crate::wait::{Progress, Watch, finish, wait};
 
 /// Fewest and most runs of a study.
 const RUNS: [u64; 2] = [2, 1_000_000];
 
 #[pyfunction]
-pub fn simulate(py: Python, scenario: &str, seed: Option<u64>) -> PyResult<Run> {
+pub fn simulate(
+    py: Python,
+    scenario: &str,
+    seed: Option<u64>,
+    directory: Option<PathBuf>,
+) -> PyResult<Run> {
+    if SimulatedCampaign::is_named(scenario) {
+        return campaign(py, scenario, seed, directory);
+    }
     let scenario = Scenario::load(scenario).map_err(raise)?;
     let simulated = finish(py, move || {
         scenario.simulate(seed.unwrap_or(scenario.seed), 0)
     });
     let simulated = simulated?.map_err(raise)?;
-    let truth = Py::new(py, Calibration::of_record(simulated.truth_record()))?;
+    let truth = simulated.truth_record();
+    if let Some(directory) = directory {
+        std::fs::create_dir_all(&directory)?;
+        write_run(&directory, &simulated.run, simulated.output, Some(&truth)).map_err(raise)?;
+    }
+    let truth = Py::new(py, Calibration::of_record(truth))?;
     Ok(Run::new(Recorded::of_run(simulated.run, None), Some(truth)))
+}
+
+fn campaign(
+    py: Python,
+    name: &str,
+    seed: Option<u64>,
+    directory: Option<PathBuf>,
+) -> PyResult<Run> {
+    if directory.is_some() {
+        let expected =
+            "a scenario of one recording. Use the command turncal simulate for a campaign.";
+        return Err(wrong(
+            "directory",
+            format_args!("the campaign {name:?}"),
+            expected,
+        ));
+    }
+    let campaign = SimulatedCampaign::load(name).map_err(raise)?;
+    let (name, together) = (campaign.name.clone(), campaign.together());
+    let simulated = finish(py, move || {
+        campaign.simulate(seed.unwrap_or(campaign.scenario.seed), 0)
+    });
+    let simulated = simulated?.map_err(raise)?;
+    let truth = SimulatedCampaign::truth(&simulated).map(Calibration::of_record);
+    let truth = truth.map(|truth| Py::new(py, truth)).transpose()?;
+    let runs = simulated.into_iter().map(|of| of.run).collect();
+    Ok(Run::new(Recorded::of_campaign(name, runs, together), truth))
 }
 
 /// A study with its options, which JSON preserves.
@@ -111,15 +152,17 @@ pub fn study_options(
     scenario: Option<&str>,
     runs: u64,
     seed: Option<u64>,
-    with_: Vec<String>,
-    unmodelled: Vec<String>,
+    with_: Given,
+    unmodelled: Given,
 ) -> PyResult<String> {
     if !(RUNS[0]..=RUNS[1]).contains(&runs) {
         let expected = format!("a whole number from {} to {}", RUNS[0], RUNS[1]);
         return Err(wrong("runs", runs, &expected));
     }
     let of = named("name", name, &[("accuracy", true), ("experiment", false)])?;
-    if !of && (scenario.is_some() || !with_.is_empty() || !unmodelled.is_empty()) {
+    let modelled = error_terms("with_", with_)?;
+    let unmodelled = error_terms("unmodelled", unmodelled)?;
+    if !of && (scenario.is_some() || !modelled.is_empty() || !unmodelled.is_empty()) {
         return Err(raised(
             "study \"experiment\": found scenario, with_ or unmodelled, expected none of them. Omit them, or use study \
              \"accuracy\".",
@@ -139,11 +182,7 @@ pub fn study_options(
     let scenario = Scenario::load(name).map_err(raise)?;
     let seed = seed.unwrap_or(scenario.seed);
     let study = match of {
-        true => {
-            let modelled = error_terms("with_", &with_)?;
-            let unmodelled = error_terms("unmodelled", &unmodelled)?;
-            Study::accuracy(scenario, runs, seed, &modelled, unmodelled)
-        }
+        true => Study::accuracy(scenario, runs, seed, &modelled, unmodelled),
         false => Study::experiment(scenario, runs, seed)?,
     };
     serde_json::to_string(&study).map_err(raise)
@@ -237,17 +276,13 @@ pub fn evaluate(
     imu: Option<String>,
     table: Option<String>,
     aiding: Option<&str>,
-    with_: Vec<String>,
-    limits: Option<PathBuf>,
+    with_: Given,
+    specification: Option<PathBuf>,
 ) -> PyResult<Report> {
     let all = [("table", Aiding::Table), ("velocity", Aiding::Velocity)];
     let aiding = aiding.map(|name| named("aiding", name, &all)).transpose()?;
-    let terms = error_terms("with_", &with_)?;
-    let limits = limits
-        .as_deref()
-        .map(specification)
-        .transpose()
-        .map_err(raise)?;
+    let terms = error_terms("with_", with_)?;
+    let limits = specification.as_deref().map(limits).transpose()?;
     let report = finish(py, move || {
         let study = PathStudy::load(&Named {
             path: &path,

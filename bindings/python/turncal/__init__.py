@@ -9,7 +9,7 @@ from turncal import path
 from turncal._frames import run
 from turncal._functions import allan, certificate, compare, export, init, navigate, read, simulate
 from turncal._study import study
-from turncal._turncal import Calibration, Error, Report, Run, Session, command
+from turncal._turncal import Calibration, Error, Report, Run, Session, __version__, command
 
 __all__ = [
     "Calibration",
@@ -17,6 +17,7 @@ __all__ = [
     "Report",
     "Run",
     "Session",
+    "__version__",
     "allan",
     "certificate",
     "compare",

@@ -38,6 +38,7 @@ def run(
     gravity: float | None = None,
     sensor: str | None = None,
     noise_file: str | "os.PathLike[str]" | None = None,
+    name: str = "data",
 ) -> Run:
     """A run from a table.
 
@@ -48,7 +49,7 @@ def run(
     data : DataFrame, array or mapping of arrays
         A row per sample. Columns of an array are numbered from 0. NaN marks a missing value.
     gyro, accel : (x, y, z) or (x, y, z, unit), optional
-        Columns along right, front and up. Units: "rad/s", "deg/s", "m/s^2", "g", the size of one count such as
+        Columns along right, front and up; a minus before a name, such as "-gy", reverses a column. Units: "rad/s", "deg/s", "m/s^2", "g", the size of one count such as
         "1/131 deg/s", or of increments "rad", "deg", "m/s".
     time : str or int, optional
         Column of time; its unit is found from `rate` or from its steps. datetime64 is possible. Default: found in the
@@ -67,10 +68,13 @@ def run(
         Sensor whose data sheet gives noise and tolerances, such as "bmi088", or a TOML file.
     noise_file : path-like, optional
         Kalibr imu.yaml with noise figures.
+    name : str
+        Name of the run, for reports.
 
     Returns
     -------
     Run
+        Its `found` is what was found in the data.
 
     Raises
     ------
@@ -88,29 +92,26 @@ def run(
         sensor=sensor,
         noise_file=noise_file,
     )
-    return run_of(data, [triad("gyro", gyro), triad("accel", accel)], time, temperature, known)
-
-
-def run_of(
-    data: Data,
-    triads: list[list[str] | None],
-    time: str | int | None,
-    temperature: str | int | None,
-    known: Known,
-) -> Run:
-    """A run from a table; columns of None are found."""
     table = dict(_columns(data))
     index = getattr(data, "index", None)
     if getattr(getattr(index, "dtype", None), "kind", "") == "M":
         table.setdefault("time", index)
+    numbers = {column: _numbers(values) for column, values in table.items()}
+    triads = [triad("gyro", gyro), triad("accel", accel)]
     single = [None if column is None else str(column) for column in (time, temperature)]
-    numbers = {name: _numbers(column) for name, column in table.items()}
-    stated = [*(triads[0] or ()), *(triads[1] or ()), *(column for column in single if column is not None)]
-    for name in stated:
-        if name in table and numbers[name] is None:
-            raise Error(f"column {name!r}: found {_kind(table[name])}, expected numbers. Convert the column.")
-    columns = [(name, column) for name, column in numbers.items() if column is not None]
-    return _turncal.run("data", columns, triads[0], triads[1], single[0], single[1], known)
+    for column in [*(triads[0] or ()), *(triads[1] or ()), *(column for column in single if column is not None)]:
+        bare, sign = _signed(column, table)
+        if bare in table and numbers[bare] is None:
+            raise _not_numbers(bare, table[bare])
+        if sign < 0:
+            numbers[column] = -numbers[bare]
+    columns = [(column, values) for column, values in numbers.items() if values is not None]
+    return _turncal.run(name, columns, triads[0], triads[1], single[0], single[1], known)
+
+
+def _signed(name: str, table: Mapping[str, Any]) -> tuple[str, float]:
+    """The column that a name means, and its sign: a minus before the name of a column reverses it."""
+    return (name[1:], -1.0) if name not in table and name.startswith("-") and name[1:] in table else (name, 1.0)
 
 
 def triad(name: str, columns: Columns | None) -> list[str] | None:
@@ -119,6 +120,8 @@ def triad(name: str, columns: Columns | None) -> list[str] | None:
         return None
     if isinstance(columns, str) or not isinstance(columns, Sequence) or len(columns) not in (3, 4):
         raise Error(f"{name}: found {columns!r}, expected three columns, or three columns and a unit")
+    if any(isinstance(column, int) and column < 0 for column in columns[:3]):
+        raise Error(f"{name}: found {columns!r}, expected numbers of columns from 0; '-1' is column 1 reversed")
     return [str(column) for column in columns[:3]]
 
 
@@ -156,6 +159,19 @@ def _kind(column: Any) -> str:
     return f"{getattr(column, 'dtype', type(column).__name__)}" + (f" of shape {shape}" if len(shape) != 1 else "")
 
 
+def _not_numbers(name: str, column: Any) -> Error:
+    """What is no number in a column, with its row."""
+    error = Error(f"column {name!r}: found {_kind(column)}, expected numbers. Convert the column.")
+    for row, value in enumerate(column if len(np.shape(column)) == 1 else ()):
+        try:
+            float(value)
+        except (TypeError, ValueError):
+            error = Error(f"column {name!r}, row {row}: found {value!r}, expected a number. Correct it, or set it to NaN.")
+            error.row, error.column = row, name
+            break
+    return error
+
+
 def _numbers(column: Any) -> npt.NDArray[np.float64] | None:
     """A column as numbers; times in seconds from the first, whole numbers too large for a float from the first."""
     values = column.to_numpy() if hasattr(column, "to_numpy") else np.asarray(column)
@@ -177,10 +193,10 @@ def _numbers(column: Any) -> npt.NDArray[np.float64] | None:
 
 
 def samples(name: str, of: Any) -> npt.NDArray[np.float64]:
-    """Rows of three numbers."""
-    rows = np.asarray(of)
+    """Rows of three numbers, also one row."""
+    rows = np.atleast_2d(np.asarray(of))
     if rows.dtype.kind not in "iuf" or rows.shape[1:] != (3,):
-        raise Error(f"{name}: found {_kind(rows)}, expected an array of shape (n, 3) of numbers")
+        raise Error(f"{name}: found {_kind(rows)}, expected an array of shape (n, 3) or (3,) of numbers")
     return np.ascontiguousarray(rows, dtype=np.float64)
 
 
@@ -234,21 +250,19 @@ class _Output:
         return self.block.T
 
 
-def _taken(data: Data, columns: list[tuple[str, float]] | None) -> list[tuple[npt.NDArray[Any], float]]:
+def _taken(data: Data, names: list[str] | None) -> list[tuple[npt.NDArray[Any], float]]:
     """The six columns of a table, each with its sign."""
     table = dict(_columns(data))
-    is_bare = isinstance(data, np.ndarray) and data.ndim == 2
-    if columns is None or (is_bare and columns[0][0] not in table):
-        columns = [(name, 1.0) for name in table]
+    columns = [_signed(name, table) for name in names or ()]
     missing = [name for name, _ in columns if name not in table]
-    if missing or len(columns) != 6:
-        what = f"a column {missing[0]!r}" if missing else "six columns"
-        raise Error(f"data: found the columns {', '.join(table)}, expected {what}. Name the columns with gyro and accel.")
+    if missing or not columns:
+        expected = f"a column {missing[0]!r} as in the calibrated run" if missing else "to know the gyros and accelerometers"
+        raise Error(f"data: found the columns {', '.join(table)}, expected {expected}. Name the columns with gyro= and accel=.")
     taken: list[tuple[npt.NDArray[Any], float]] = []
     for name, sign in columns:
         column = _plain(table[name])
         if column is None:
-            raise Error(f"column {name!r}: found {_kind(table[name])}, expected numbers. Convert the column.")
+            raise _not_numbers(name, table[name])
         if taken and len(column) != len(taken[0][0]):
             raise Error(f"column {name!r}: found {len(column)} values, expected {len(taken[0][0])} as in the others")
         taken.append((column, sign))
@@ -266,12 +280,11 @@ def _part(column: npt.NDArray[Any], sign: float, begin: int, end: int) -> npt.ND
     return part if sign > 0 else -part
 
 
-def parameters(names: list[str], values: list[float], sigma: list[float | None]) -> Any:
-    """`Calibration.parameters`."""
+def table(columns: tuple[str, ...], rows: list[tuple[Any, ...]]) -> Any:
+    """Rows by their first column."""
     import pandas
 
-    index = pandas.Index(names, name="parameter")
-    return pandas.DataFrame({"value": values, "sigma": np.array(sigma, dtype=float)}, index=index)
+    return pandas.DataFrame(rows, columns=list(columns)).set_index(columns[0])
 
 
 def covariance(names: list[str], rows: list[list[float]]) -> Any:

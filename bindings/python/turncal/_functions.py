@@ -6,11 +6,9 @@ import os
 from pathlib import Path
 from typing import Union
 
-import numpy as np
-
 from turncal import _turncal
-from turncal._frames import Columns, Data, run_of, triad
-from turncal._turncal import Calibration, Error, Known, Report, Run
+from turncal._frames import Columns, Data, run
+from turncal._turncal import Calibration, Known, Report, Run
 
 PathLike = Union[str, "os.PathLike[str]"]
 AnyCalibration = Union[Calibration, PathLike]
@@ -57,6 +55,7 @@ def read(
     Returns
     -------
     Run
+        Its `found` is what was found in a log.
 
     Raises
     ------
@@ -78,33 +77,57 @@ def read(
     return _turncal.read(path, known)
 
 
-def init(path: PathLike, *, stream: str | None = None, sensor: str | None = None) -> str:
+def init(
+    path: PathLike,
+    *,
+    rate: float | None = None,
+    latitude: float | None = None,
+    height: float | None = None,
+    gravity: float | None = None,
+    gyro_unit: str | None = None,
+    accel_unit: str | None = None,
+    sensor: str | None = None,
+    noise_file: PathLike | None = None,
+    accel_file: PathLike | None = None,
+    stream: str | None = None,
+) -> str:
     """Draft a run.toml for a log.
 
     Parameters
     ----------
     path : path-like
         The log.
-    stream : str, optional
-        Stream of the instrument. Default: the one with the most samples.
-    sensor : str, optional
-        Sensor whose data sheet gives noise and tolerances.
+    rate, latitude, height, gravity, gyro_unit, accel_unit, sensor, noise_file, accel_file, stream : optional
+        What is known of it, as in :func:`read`.
 
     Returns
     -------
     str
         The text of the run.toml, with a reason for each guess. Lines with TODO are to be completed.
     """
-    return _turncal.init(path, Known(stream=stream, sensor=sensor))
+    known = Known(
+        rate=rate,
+        latitude=latitude,
+        height=height,
+        gravity=gravity,
+        gyro_unit=gyro_unit,
+        accel_unit=accel_unit,
+        sensor=sensor,
+        noise_file=noise_file,
+        accel_file=accel_file,
+        stream=stream,
+    )
+    return _turncal.init(path, known)
 
 
 def allan(
     data: Data | Run,
-    rate: float | None = None,
-    unit: str | tuple[str, str] | None = None,
     *,
     gyro: Columns | None = None,
     accel: Columns | None = None,
+    gyro_unit: str | None = None,
+    accel_unit: str | None = None,
+    rate: float | None = None,
 ) -> Report:
     """Allan deviation and noise figures of a stationary recording.
 
@@ -112,12 +135,8 @@ def allan(
     ----------
     data : DataFrame, array, mapping of arrays, or Run
         Samples at rest.
-    rate : float, optional
-        Rows per second, Hz.
-    unit : str or (str, str), optional
-        Unit of the triad, such as "deg/s" or "g", or those of gyros and accelerometers.
-    gyro, accel : (x, y, z), optional
-        Columns along right, front and up. Default: found by their names; an array of three columns is one triad.
+    gyro, accel, gyro_unit, accel_unit, rate : optional
+        Columns, units and rows per second, as in :func:`run`. One triad is enough.
 
     Returns
     -------
@@ -127,45 +146,29 @@ def allan(
     """
     if isinstance(data, Run):
         return _turncal.allan(data)
-    units = _units(unit)
-    known = Known(rate=rate, gyro_unit=units[0], accel_unit=units[1])
-    triads = [triad(name, columns) for name, columns in (("gyro", gyro), ("accel", accel))]
-    if triads == [None, None] and isinstance(data, np.ndarray) and data.shape[1:] == (3,):
-        triads = [["0", "1", "2"], None] if units[1] is None else [None, ["0", "1", "2"]]
-    return _turncal.allan(run_of(data, triads, None, None, known))
+    known = {"gyro_unit": gyro_unit, "accel_unit": accel_unit, "rate": rate}
+    return _turncal.allan(run(data, gyro=gyro, accel=accel, **known))
 
 
-def _units(unit: str | tuple[str, str] | None) -> tuple[str | None, str | None]:
-    """The units of gyros and accelerometers."""
-    if unit is None:
-        return None, None
-    if not isinstance(unit, str):
-        if len(unit) != 2:
-            raise Error(f"unit: found {unit!r}, expected one unit, or those of gyros and accelerometers")
-        return unit
-    try:
-        Known(accel_unit=unit)
-    except Error:
-        return unit, None
-    return None, unit
-
-
-def simulate(scenario: str = "demo", seed: int | None = None) -> Run:
-    """Simulate a recording whose true parameters are known.
+def simulate(scenario: str = "demo", seed: int | None = None, directory: PathLike | None = None) -> Run:
+    """Simulate a recording, or the recordings of a campaign, whose true parameters are known.
 
     Parameters
     ----------
     scenario : str
-        Name of an embedded scenario, such as "demo", "mems" or "three-axis", or a TOML file.
+        Name of an embedded scenario or campaign, such as "demo", "mems" or "five-soaks", or a TOML file; an unknown
+        name lists all scenarios.
     seed : int, optional
         Seed of all random numbers. Default: that of the scenario.
+    directory : path-like, optional
+        Directory for run.toml, imu.csv.gz and the other files of a recording, which is created if needed.
 
     Returns
     -------
     Run
         With its `truth`.
     """
-    return _turncal.simulate(scenario, seed)
+    return _turncal.simulate(scenario, seed, directory)
 
 
 def compare(*calibrations: AnyCalibration, truth: AnyCalibration | None = None) -> Report:

@@ -19,8 +19,8 @@ def study(
     *,
     runs: int = 100,
     seed: int | None = None,
-    with_: Sequence[str] = (),
-    unmodelled: Sequence[str] = (),
+    with_: str | Sequence[str] = (),
+    unmodelled: str | Sequence[str] = (),
     client: Any = None,
     progress: bool | Shown = False,
 ) -> Report:
@@ -36,7 +36,7 @@ def study(
         Number of runs.
     seed : int, optional
         Seed of all random numbers. Default: that of the scenario.
-    with_, unmodelled : sequence of str
+    with_, unmodelled : str or sequence of str
         Error terms to simulate and to estimate; to simulate only.
     client : dask.distributed.Client, optional
         Cluster that makes the runs; a worker that is lost is replaced. The result is the same to the bit on processors
@@ -49,7 +49,7 @@ def study(
     Report
         As printed by ``turncal study``.
     """
-    options = _turncal.study_options(name, scenario, runs, seed, list(with_), list(unmodelled))
+    options = _turncal.study_options(name, scenario, runs, seed, with_, unmodelled)
     if client is None:
         return _turncal.study(options, progress)
     parts = -(-runs // RUNS)

@@ -17,7 +17,7 @@ def evaluate(
     imu: str | None = None,
     table: str | None = None,
     aiding: str | None = None,
-    with_: Sequence[str] = (),
+    with_: Union[str, Sequence[str]] = (),
     specification: Union[str, "os.PathLike[str]", None] = None,
 ) -> Report:
     """Predict the accuracy of a calibration: σ, the value of each move, and errors that the path cannot reveal.
@@ -33,7 +33,7 @@ def evaluate(
         Instrument and table in place of the scenario's: an embedded name or a TOML file.
     aiding : {"table", "velocity"}, optional
         Observations of the filter. Default: table; by hand velocity.
-    with_ : sequence of str
+    with_ : str or sequence of str
         Error terms to estimate.
     specification : path-like, optional
         Limits that the calibration must decide.
@@ -42,4 +42,4 @@ def evaluate(
     -------
     Report
     """
-    return _turncal.evaluate(path, scenario, imu, table, aiding, list(with_), specification)
+    return _turncal.evaluate(path, scenario, imu, table, aiding, with_, specification)
