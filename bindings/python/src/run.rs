@@ -9,13 +9,12 @@ use turncal::calibration::{
     CalibrationError, ErrorTerm, Method, NoisePolicy, Options, Problem, Together,
 };
 use turncal::formats::draft::{Draft, Found, StatedColumns};
-use turncal::formats::{Campaign, FileError, Opened, Table as Columns};
+use turncal::formats::{Campaign, FileError, Opened, Table};
 use turncal::imu::PerSensor;
 use turncal::lot::Specification;
 use turncal::models::specification;
 use turncal::noise::{NoiseAnalysis, Stretch};
-use turncal::report::document::Table;
-use turncal::report::{Document, allan as of_noise, check};
+use turncal::report::{Document, Facts, allan as of_noise, check};
 use turncal::run::Run as Recording;
 use turncal::survey::Survey;
 
@@ -150,28 +149,23 @@ impl Run {
         }
     }
 
-    /// What was found, or the recordings of a campaign.
+    /// Recordings, and what was found in a log or a table.
     fn page(&self) -> Document {
-        let of = &*self.of;
-        let mut document = Document::new(of.name.clone());
-        document.lead = vec![format!("{:.1} s", of.seconds())];
-        let row = |found: &Found| {
-            let (value, certainty) = (found.value.clone(), found.certainty.word().to_owned());
-            vec![found.what.to_owned(), value, certainty, found.why.clone()]
+        let mut document = Document::new(self.of.name.clone());
+        let recording = |run: &Recording| {
+            let (name, imu) = (&run.recording.name, &run.recording.imu);
+            let rate = imu.period.recip();
+            (
+                name.clone(),
+                format!("{:.1} s at {rate:.1} Hz", imu.duration()),
+            )
         };
-        let found = Table::new("Found", ["", "value", "certainty", "why"]);
-        document.both(found.section(of.found.iter().map(row)));
-        let row = |run: &Recording| {
-            let imu = &run.recording.imu;
-            let rate = format!("{:.6}", imu.period.recip());
-            vec![
-                run.recording.name.clone(),
-                format!("{:.1} s", imu.duration()),
-                rate + " Hz",
-            ]
+        document.both(Facts::new("Recordings", self.of.runs.iter().map(recording)));
+        let found = |of: &Found| {
+            let (value, certainty, why) = (&of.value, of.certainty.word(), &of.why);
+            (of.what, format!("{value} – {certainty}: {why}"))
         };
-        let recordings = Table::new("Recordings", ["", "duration", "rate"]);
-        document.both(recordings.section(of.runs.iter().map(row)));
+        document.both(Facts::new("Found", self.of.found.iter().map(found)));
         document
     }
 
@@ -371,7 +365,7 @@ pub fn run(
     let columns = columns
         .into_iter()
         .map(|(name, of)| (name, of.as_array().to_vec()));
-    let table = Columns::new(name, columns.collect()).map_err(raise)?;
+    let table = Table::new(name, columns.collect()).map_err(raise)?;
     let recorded = finish(py, move || {
         Recorded::opened(None, |show| {
             Opened::in_memory(&[table.into()], None, &stated, show)

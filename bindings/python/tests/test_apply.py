@@ -52,7 +52,7 @@ def test_a_table_is_calibrated_to_a_table_of_its_kind(calibration, frame):
     assert np.allclose(applied, expected, rtol=1e-12, atol=1e-12)
     of_polars = calibration.apply(polars.from_pandas(frame))
     assert isinstance(of_polars, polars.DataFrame) and np.array_equal(of_polars.to_numpy(), applied.to_numpy())
-    of_array = calibration.apply(frame[COLUMNS].to_numpy())
+    of_array = calibration.apply(frame[COLUMNS].to_numpy(), gyro=(0, 1, 2), accel=(3, 4, 5))
     assert of_array.shape == (len(frame), 6) and np.array_equal(of_array, applied.to_numpy())
 
 
@@ -64,6 +64,38 @@ def test_columns_may_be_named(calibration, frame):
         calibration.apply(renamed)
     with pytest.raises(turncal.Error, match="deg/s.*rad/s"):
         calibration.apply(renamed, gyro=("a", "b", "c", "deg/s"), accel=("d", "e", "f"))
+
+
+def test_columns_are_taken_by_name_and_never_by_place(calibration, frame, tmp_path):
+    reordered = frame[COLUMNS[::-1]]
+    assert np.array_equal(calibration.apply(reordered), calibration.apply(frame))
+    (tmp_path / "calibration.json").write_text(calibration.to_json())
+    read = turncal.Calibration.read(tmp_path / "calibration.json")
+    nobody_knows = [lambda: calibration.apply(frame[COLUMNS].to_numpy()), lambda: read.apply(frame.rename(columns=str.upper))]
+    for apply in nobody_knows:
+        with pytest.raises(turncal.Error, match="gyro= and accel="):
+            apply()
+    stated = read.apply(reordered, gyro=COLUMNS[:3], accel=COLUMNS[3:])
+    assert np.array_equal(stated, calibration.apply(frame))
+
+
+def test_a_calibration_from_an_array_is_applied_to_an_array(frame):
+    array = frame[COLUMNS[3:] + COLUMNS[:3]].to_numpy()
+    run = turncal.run(array, gyro=(3, 4, 5, "rad/s"), accel=(0, 1, 2, "m/s^2"), rate=100, latitude=48.1)
+    calibration = run.calibrate(noise="stated")
+    assert np.array_equal(calibration.apply(array), calibration.apply(array, gyro=(3, 4, 5), accel=(0, 1, 2)))
+
+
+def test_a_minus_reverses_a_column(frame):
+    reversed_frame = frame.assign(gy=-frame["gy"], ax=-frame["ax"])
+    known = {"rate": 100, "latitude": 48.1}
+    units = {"gyro_unit": "rad/s", "accel_unit": "m/s^2"}
+    gyro, accel = ("gx", "-gy", "gz"), ("-ax", "ay", "az")
+    expected = turncal.run(frame, **units, **known).calibrate(noise="stated")
+    found = turncal.run(reversed_frame, gyro=gyro, accel=accel, **units, **known).calibrate(noise="stated")
+    assert found.parameters.equals(expected.parameters)
+    assert np.array_equal(found.apply(reversed_frame), expected.apply(frame))
+    assert np.array_equal(expected.apply(reversed_frame, gyro=gyro, accel=accel), expected.apply(frame))
 
 
 def test_missing_values_stay_missing(calibration, frame):

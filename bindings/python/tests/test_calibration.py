@@ -1,6 +1,7 @@
 """Calibrations from tables and files are those of the command."""
 
 import json
+import pickle
 import re
 
 import numpy as np
@@ -72,7 +73,9 @@ def test_a_file_gives_the_bytes_of_the_command(log, tmp_path):
 
 def test_a_parameter_has_a_value_a_sigma_and_a_covariance(calibration):
     table, covariance = calibration.parameters, calibration.covariance
-    value, sigma = table.loc["gyro.bias.x"]
+    value, sigma, unit = table.loc["gyro.bias.x"]
+    assert unit == "rad/s" and table.unit["accel.scale.x"] == "m/s^2 per m/s²"
+    assert list(calibration) == list(table.index) and "gyro.bias.x" in calibration and "x" not in calibration
     assert (value, sigma) == (calibration["gyro.bias.x"], calibration.sigma("gyro.bias.x"))
     assert covariance.loc["gyro.bias.x", "gyro.bias.x"] == pytest.approx(sigma**2, rel=1e-9)
     assert np.allclose(covariance, covariance.T)
@@ -85,7 +88,33 @@ def test_a_verdict_is_explained(calibration):
     words = {finding["text"] for finding in json.loads(calibration.to_json())["findings"]}
     assert {finding.split(" ", 1)[1] for finding in calibration.findings} == words
     page = calibration._repr_html_()
-    assert calibration.verdict.upper() in page and "svg" in page
+    assert calibration.verdict.upper() in page and "svg" in page and all(name in page for name in calibration)
+    assert f"{calibration.verdict}, 21 of 21 parameters determined, " in repr(calibration)
+
+
+def test_a_calibration_from_a_file_or_a_truth_is_shown_too(calibration):
+    copy = pickle.loads(pickle.dumps(calibration))
+    assert repr(copy) == repr(calibration) and copy.to_json() == calibration.to_json()
+    assert calibration.verdict.upper() in copy._repr_html_()
+    truth = turncal.simulate("mems").truth
+    assert "not estimated" in repr(truth) and truth.sigma("gyro.bias.x") == 0.0 and "gyro.bias.x" in truth._repr_html_()
+
+
+def test_a_specification_is_decided(run):
+    report = run.calibrate(specification="mems-by-hand").conformity
+    assert len(report.data["units"]) == 1 and "Limits" in str(report)
+
+
+def test_what_was_found_is_shown(run, log):
+    assert run.found.loc["gyros", "value"] == "gx gy gz, rad/s"
+    found = turncal.read(log, rate=100.0)
+    assert "set latitude= and height=" in found.found.loc["place", "why"]
+    assert "set latitude= and height=" in found._repr_html_()
+
+
+def test_help_of_simulate_names_what_exists():
+    for name in re.findall(r'"([\w-]+)"', turncal.simulate.__doc__):
+        assert turncal.simulate(name).truth is not None
 
 
 def test_values_agree_with_the_truth():
@@ -158,6 +187,26 @@ def test_an_error_names_arguments_of_python(frame):
     with pytest.raises(turncal.Error, match="Set it with gyro_unit"):
         turncal.run(still, rate=100.0)
     turncal.run(still, rate=100.0, gyro_unit="rad/s", accel_unit="m/s^2")
+    with pytest.raises(turncal.Error, match="^latitude: found '61.8', expected a number"):
+        turncal.run(frame, latitude="61.8")
+    # A file has the name that it has.
+    with pytest.raises(turncal.Error, match="my --rate.csv"):
+        turncal.read("my --rate.csv")
+
+
+def test_findings_and_reports_name_arguments_of_python(frame):
+    noisy = turncal.run(frame, sensor="bmi088", gyro=GYRO, accel=ACCEL, **KNOWN)
+    calibration = noisy.calibrate()
+    shown = [*calibration.findings, str(noisy.check())]
+    assert calibration.findings and not any(" --" in text for text in shown)
+    assert 'method="six-position"' in shown[-1]
+
+
+def test_a_text_in_a_column_of_numbers_is_named_with_its_row(frame):
+    broken = frame.astype({"gy": object})
+    broken.loc[17, "gy"] = "n/a"
+    with pytest.raises(turncal.Error, match="'gy', row 17: found 'n/a'"):
+        turncal.run(broken, gyro=GYRO, accel=ACCEL, **KNOWN)
 
 
 def test_times_of_pandas_are_times(frame, calibration):

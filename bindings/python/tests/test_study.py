@@ -58,13 +58,15 @@ def test_a_session_asks_for_moves_and_gives_a_run(frame):
         status = session.push(gyro[first : first + 1000], accel[first : first + 1000])
         assert status["next"]
     assert session.status()["duration_s"] == pytest.approx(60.0)
+    session.push(gyro[6000], accel[6000])
+    assert session.status()["duration_s"] == pytest.approx(60.01)
     assert "60.0 s" in repr(session.run())
 
 
 def test_allan_deviations_agree_with_the_definition():
     rate = 100.0
     noise = np.random.default_rng(1).normal(0.0, 1e-3, (20_000, 3))
-    report = turncal.allan(noise, rate=rate, unit="rad/s")
+    report = turncal.allan(noise, gyro=(0, 1, 2, "rad/s"), rate=rate)
     of_x = report.data["gyro"]["x"]
     angle = np.concatenate([[0.0], np.cumsum(noise[:, 0])]) / rate
     to_deg_h = np.degrees(3600.0)
@@ -73,3 +75,14 @@ def test_allan_deviations_agree_with_the_definition():
         second = angle[2 * m :] - 2 * angle[m:-m] + angle[: -2 * m]
         expected = np.sqrt(0.5 * np.mean(second**2)) / tau * to_deg_h
         assert deviation == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "sensor, units, ratio", [("gyro", ["deg/s", "rad/s"], np.degrees(1.0)), ("accel", ["m/s^2", "g"], 9.80665)]
+)
+def test_allan_deviations_have_the_unit_after_the_columns(sensor, units, ratio):
+    names = [f"{sensor}_{axis}" for axis in "xyz"]
+    noise = dict(zip(names, np.random.default_rng(1).normal(0.0, 1e-3, (3, 20_000))))
+    reports = [turncal.allan(noise, **{sensor: (*names, unit)}, rate=100) for unit in units]
+    small, large = (np.array(report.data[sensor]["x"]["deviation"]) for report in reports)
+    assert np.allclose(large, ratio * small)

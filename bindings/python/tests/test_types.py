@@ -10,7 +10,7 @@ import turncal
 run: turncal.Run = turncal.run(
     {"gx": np.zeros(1000)}, gyro=("gx", "gy", "gz", "deg/s"), accel=("ax", "ay", "az", "g"), rate=100
 )
-calibration = run.calibrate(with_=["accel-second-order"], progress=lambda done, total: None)
+calibration = run.calibrate(with_="accel-second-order", progress=lambda done, total: None)
 bias: float = calibration["gyro.bias.x"] + calibration.sigma("gyro.bias.x")
 verdict: str | None = calibration.verdict
 report: turncal.Report = turncal.study("accuracy", runs=10)

@@ -49,8 +49,8 @@ def run(
     data : DataFrame, array or mapping of arrays
         A row per sample. Columns of an array are numbered from 0. NaN marks a missing value.
     gyro, accel : (x, y, z) or (x, y, z, unit), optional
-        Columns along right, front and up; a minus before a name, such as "-gy", reverses a column. Units: "rad/s", "deg/s", "m/s^2", "g", the size of one count such as
-        "1/131 deg/s", or of increments "rad", "deg", "m/s".
+        Columns along right, front and up; a minus before a name, such as "-gy", reverses a column. Units: "rad/s",
+        "deg/s", "m/s^2", "g", the size of one count such as "1/131 deg/s", or of increments "rad", "deg", "m/s".
     time : str or int, optional
         Column of time; its unit is found from `rate` or from its steps. datetime64 is possible. Default: found in the
         data, also an index of datetime64.
@@ -160,16 +160,15 @@ def _kind(column: Any) -> str:
 
 
 def _not_numbers(name: str, column: Any) -> Error:
-    """What is no number in a column, with its row."""
-    error = Error(f"column {name!r}: found {_kind(column)}, expected numbers. Convert the column.")
-    for row, value in enumerate(column if len(np.shape(column)) == 1 else ()):
+    """The error for a column without numbers, or for its first value that is none."""
+    for row, value in enumerate(column if np.asarray(column).dtype.kind in "OUT" else ()):
         try:
             float(value)
         except (TypeError, ValueError):
             error = Error(f"column {name!r}, row {row}: found {value!r}, expected a number. Correct it, or set it to NaN.")
             error.row, error.column = row, name
-            break
-    return error
+            return error
+    return Error(f"column {name!r}: found {_kind(column)}, expected numbers. Convert the column.")
 
 
 def _numbers(column: Any) -> npt.NDArray[np.float64] | None:
