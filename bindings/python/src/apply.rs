@@ -6,7 +6,6 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 use turncal::calibration::Correction;
 use turncal::imu::{PerSensor, Sensor};
-use turncal::recording::{FileColumn, NamedColumns};
 
 use crate::calibration::Calibration;
 use crate::errors::{Given, positive, raise, raised, wrong};
@@ -89,22 +88,13 @@ pub fn inputs(
     Ok((columns, if is_of_sums { rate } else { 1.0 }, rate))
 }
 
-/// The columns of a triad along right, front and up in the run that was calibrated. A number is the place of a column in
-/// a file from one, in a table from zero, so that those of a file have no meaning in a table.
+/// The columns of a triad in the log that was calibrated. A number is the place of a column in a file from one, in a
+/// table from zero, so that those of a file have no meaning in a table.
 fn columns(calibration: &Calibration, sensor: Sensor) -> Option<[String; 3]> {
-    let NamedColumns { triads, axes, .. } = &calibration.log()?.named;
-    let names = [0, 1, 2].map(|axis| {
-        let FileColumn { name, reversed } = &triads.get(sensor)[axes.source[axis]];
-        let minus = if *reversed != axes.reversed[axis] {
-            "-"
-        } else {
-            ""
-        };
-        format!("{minus}{name}")
-    });
+    let names = calibration.record.columns.as_ref()?.get(sensor);
     let is_number = |name: &String| name.parse::<i64>().is_ok();
     let is_meaningful = calibration.is_of_table() || !names.iter().any(is_number);
-    is_meaningful.then_some(names)
+    is_meaningful.then(|| names.clone())
 }
 
 /// Writes the calibrated values of some rows into six columns `out`. The first `before` rows and those beyond the

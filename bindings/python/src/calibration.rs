@@ -9,7 +9,6 @@ use pyo3::types::PyIterator;
 use turncal::calibration::{self, AtRest, Finding, FindingKind, Progress as Passes, Solution};
 use turncal::imu::{Output, Sensor, Term};
 use turncal::lot::{self, Lot, Specification, Unit};
-use turncal::recording::LogFacts;
 use turncal::report::calibration::Calibrated;
 use turncal::report::document::Table;
 use turncal::report::{Document, at_rest, lot as of_lot, write};
@@ -119,14 +118,13 @@ impl Calibration {
 
     /// Whether a row is a sum over its sample; None for counts that a file does not explain.
     pub fn is_of_sums(&self) -> Option<bool> {
-        if let Some(log) = self.log() {
+        let imu = self.solved.as_ref();
+        let imu = imu.map(|solved| &solved.of.runs[0].recording.imu);
+        if let Some(log) = imu.and_then(|imu| imu.log.as_ref()) {
             return Some(log.output != Output::Rate);
         }
         match &*self.record.unit.as_ref()?.gyro {
-            "count" => {
-                let solved = self.solved.as_ref()?;
-                Some(solved.of.runs[0].recording.imu.pulse.gyro > 0.0)
-            }
+            "count" => imu.map(|imu| imu.pulse.gyro > 0.0),
             unit => Some(INCREMENTS.contains(&unit)),
         }
     }
@@ -215,11 +213,6 @@ impl Calibration {
         let table = Table::new("Values", ["", "value", "1σ", "unit"]).section(values.map(row));
         document.page(table.note(EQUATION));
         Ok(document)
-    }
-
-    /// The log of the run that it was estimated from.
-    pub fn log(&self) -> Option<&LogFacts> {
-        self.solved.as_ref()?.of.runs[0].recording.imu.log.as_ref()
     }
 
     /// The complete report, made at its first use.

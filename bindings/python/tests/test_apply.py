@@ -75,8 +75,16 @@ def test_columns_are_taken_by_name_and_never_by_place(calibration, frame, tmp_pa
     for apply in nobody_knows:
         with pytest.raises(turncal.Error, match="gyro= and accel="):
             apply()
-    stated = read.apply(reordered, gyro=COLUMNS[:3], accel=COLUMNS[3:])
-    assert np.array_equal(stated, calibration.apply(frame))
+    for applied in [read.apply(reordered), read.apply(frame.to_numpy(), gyro=(1, 2, 3), accel=(4, 5, 6))]:
+        assert np.array_equal(applied, calibration.apply(frame))
+
+
+def test_numbers_of_a_file_are_no_numbers_of_a_table(frame, tmp_path):
+    frame.to_csv(tmp_path / "imu.csv", index=False, header=False)
+    units = {"gyro_unit": "rad/s", "accel_unit": "m/s^2"}
+    calibration = turncal.read(tmp_path / "imu.csv", rate=100, latitude=48.1, **units).calibrate(noise="stated")
+    with pytest.raises(turncal.Error, match="gyro= and accel="):
+        calibration.apply(frame.to_numpy())
 
 
 def test_a_calibration_from_an_array_is_applied_to_an_array(frame):

@@ -45,7 +45,7 @@ def test_a_table_gives_the_bytes_of_the_command_except_the_names_of_files(of_com
 
 @pytest.mark.parametrize("kind", ["polars", "mapping", "array", "structured"])
 def test_every_kind_of_table_gives_the_same(kind, frame, of_command):
-    columns = {"gyro": GYRO, "accel": ACCEL, "time": "t"}
+    columns, expected = {"gyro": GYRO, "accel": ACCEL, "time": "t"}, without_files(of_command)
     if kind == "polars":
         data = polars.from_pandas(frame)
     elif kind == "mapping":
@@ -55,8 +55,10 @@ def test_every_kind_of_table_gives_the_same(kind, frame, of_command):
     else:
         data = frame[["t", "gx", "gy", "gz", "ax", "ay", "az"]].to_numpy()
         columns = {"gyro": (1, 2, 3, "rad/s"), "accel": (4, 5, 6, "m/s^2"), "time": 0}
+        for number, name in enumerate(GYRO[:3] + ACCEL[:3], 1):
+            expected = expected.replace(f'"{name}"', f'"{number}"')
     made = turncal.run(data, **columns, **KNOWN).calibrate()
-    assert made.to_json() == without_files(of_command)
+    assert made.to_json() == expected
 
 
 def test_what_is_not_said_is_found(frame, calibration):

@@ -101,10 +101,11 @@ def run(
     single = [None if column is None else str(column) for column in (time, temperature)]
     for column in [*(triads[0] or ()), *(triads[1] or ()), *(column for column in single if column is not None)]:
         bare, sign = _signed(column, table)
-        if bare in table and numbers[bare] is None:
-            raise _not_numbers(bare, table[bare])
-        if sign < 0:
-            numbers[column] = -numbers[bare]
+        if bare in table:
+            values = numbers[bare]
+            if values is None:
+                raise _not_numbers(bare, table[bare])
+            numbers[column] = sign * values
     columns = [(column, values) for column, values in numbers.items() if values is not None]
     return _turncal.run(name, columns, triads[0], triads[1], single[0], single[1], known)
 

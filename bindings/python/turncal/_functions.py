@@ -144,10 +144,9 @@ def allan(
         ``data["gyro"]["x"]`` has ``tau_s`` in s and ``deviation`` in the unit of ``data["gyro"]["unit"]``; and the
         coefficients that were found, each with its σ.
     """
-    if isinstance(data, Run):
-        return _turncal.allan(data)
-    known = {"gyro_unit": gyro_unit, "accel_unit": accel_unit, "rate": rate}
-    return _turncal.allan(run(data, gyro=gyro, accel=accel, **known))
+    if not isinstance(data, Run):
+        data = run(data, gyro=gyro, accel=accel, gyro_unit=gyro_unit, accel_unit=accel_unit, rate=rate)
+    return _turncal.allan(data)
 
 
 def simulate(scenario: str = "demo", seed: int | None = None, directory: PathLike | None = None) -> Run:
