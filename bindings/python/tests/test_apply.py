@@ -71,10 +71,10 @@ def test_columns_are_taken_by_name_and_never_by_place(calibration, frame, tmp_pa
     assert np.array_equal(calibration.apply(reordered), calibration.apply(frame))
     (tmp_path / "calibration.json").write_text(calibration.to_json())
     read = turncal.Calibration.read(tmp_path / "calibration.json")
-    nobody_knows = [lambda: calibration.apply(frame[COLUMNS].to_numpy()), lambda: read.apply(frame.rename(columns=str.upper))]
-    for apply in nobody_knows:
-        with pytest.raises(turncal.Error, match="gyro= and accel="):
-            apply()
+    for unnamed in [frame[COLUMNS].to_numpy(), frame.rename(columns=str.upper)]:
+        for of in [calibration, read, turncal.simulate("mems").truth]:
+            with pytest.raises(turncal.Error, match="gyro= and accel="):
+                of.apply(unnamed)
     for applied in [read.apply(reordered), read.apply(frame.to_numpy(), gyro=(1, 2, 3), accel=(4, 5, 6))]:
         assert np.array_equal(applied, calibration.apply(frame))
 

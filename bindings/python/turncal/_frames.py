@@ -166,7 +166,8 @@ def _not_numbers(name: str, column: Any) -> Error:
         try:
             float(value)
         except (TypeError, ValueError):
-            error = Error(f"column {name!r}, row {row}: found {value!r}, expected a number. Correct it, or set it to NaN.")
+            found = f"column {name!r}, row {row}: found {value!r}"
+            error = Error(f"{found}, expected a number. Correct it, or set it to NaN.")
             error.row, error.column = row, name
             return error
     return Error(f"column {name!r}: found {_kind(column)}, expected numbers. Convert the column.")
@@ -255,9 +256,12 @@ def _taken(data: Data, names: list[str] | None) -> list[tuple[npt.NDArray[Any], 
     table = dict(_columns(data))
     columns = [_signed(name, table) for name in names or ()]
     missing = [name for name, _ in columns if name not in table]
-    if missing or not columns:
-        expected = f"a column {missing[0]!r} as in the calibrated run" if missing else "to know the gyros and accelerometers"
-        raise Error(f"data: found the columns {', '.join(table)}, expected {expected}. Name the columns with gyro= and accel=.")
+    if not columns:
+        found = "found a calibration that names no columns of a table, expected those of gyros and accelerometers"
+        raise Error(f"data: {found}. Name the columns with gyro= and accel=.")
+    if missing:
+        found = f"found the columns {', '.join(table)}, expected {missing[0]!r} as in the calibrated log"
+        raise Error(f"data: {found}. Name the columns with gyro= and accel=.")
     taken: list[tuple[npt.NDArray[Any], float]] = []
     for name, sign in columns:
         column = _plain(table[name])
