@@ -172,17 +172,15 @@ impl Calibration {
         if record.verdict.is_none() {
             return format!("{} values, not estimated", record.names().len());
         }
-        let not_observed = record
-            .findings
-            .iter()
-            .filter(|of| of.is(FindingKind::NotObserved));
-        let hidden = not_observed
-            .filter_map(|of| of.figures["parameters"].as_array())
-            .flatten();
-        let hidden = hidden.filter_map(|name| name.as_str());
-        let hidden = hidden
-            .filter(|name| record.parameters.iter().any(|of| of == name))
-            .count();
+        let names = |of: &Finding, name: &str| {
+            let parameters = of.figures["parameters"].as_array();
+            parameters.is_some_and(|all| all.iter().any(|of| of == name))
+        };
+        let is_hidden = |name: &&String| {
+            let mut findings = record.findings.iter();
+            findings.any(|of| of.is(FindingKind::NotObserved) && names(of, name))
+        };
+        let hidden = record.parameters.iter().filter(is_hidden).count();
         let findings = match record.findings.len() {
             0 => "no findings".to_owned(),
             1 => "one finding".to_owned(),
@@ -196,14 +194,11 @@ impl Calibration {
 
     /// Verdict, findings and, if the run is known, accuracy; then all values.
     fn page(&self, py: Python) -> PyResult<Document> {
+        let verdict = self.record.verdict.as_ref();
         let mut document = match self.solved.is_some() || self.document.get().is_some() {
             true => brief(self.document(py)?),
             false => Document {
-                verdict: self
-                    .record
-                    .verdict
-                    .as_ref()
-                    .map(|of| (of.word, self.summary())),
+                verdict: verdict.map(|of| (of.word, self.summary())),
                 findings: self.record.findings.clone(),
                 ..Document::new("Calibration")
             },

@@ -102,6 +102,12 @@ def test_a_calibration_from_a_file_or_a_truth_is_shown_too(calibration):
     assert "not estimated" in repr(truth) and truth.sigma("gyro.bias.x") == 0.0 and "gyro.bias.x" in truth._repr_html_()
 
 
+def test_a_line_counts_what_is_determined_as_the_report_does():
+    calibration = turncal.simulate("single-axis").calibrate()
+    line = repr(calibration).removeprefix("<turncal.Calibration: use with care, ").removesuffix(">")
+    assert line.startswith("9 of 24 parameters determined") and line in calibration._repr_html_()
+
+
 def test_a_specification_is_decided(run):
     report = run.calibrate(specification="mems-by-hand").conformity
     assert len(report.data["units"]) == 1 and "Limits" in str(report)
