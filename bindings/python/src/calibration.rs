@@ -118,15 +118,12 @@ impl Calibration {
 
     /// Whether a row is a sum over its sample; None for counts that a file does not explain.
     pub fn is_of_sums(&self) -> Option<bool> {
-        let imu = self.solved.as_ref();
-        let imu = imu.map(|solved| &solved.of.runs[0].recording.imu);
-        if let Some(log) = imu.and_then(|imu| imu.log.as_ref()) {
-            return Some(log.output != Output::Rate);
-        }
-        match &*self.record.unit.as_ref()?.gyro {
-            "count" => imu.map(|imu| imu.pulse.gyro > 0.0),
+        let stated = self.record.output.map(|output| output != Output::Rate);
+        let of_unit = || match &*self.record.unit.as_ref()?.gyro {
+            "count" => None,
             unit => Some(INCREMENTS.contains(&unit)),
-        }
+        };
+        stated.or_else(of_unit)
     }
 
     /// The unit of a parameter and its σ.

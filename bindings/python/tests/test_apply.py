@@ -127,3 +127,6 @@ def test_a_table_and_a_run_give_the_same_with_error_terms_and_from_pulses(scenar
     table = pandas.read_csv(tmp_path / "run" / "imu.csv.gz")
     of_table, of_run = calibration.apply(table), calibration.apply(run).iloc[:, 2:]
     assert np.allclose(of_table, of_run, rtol=1e-9, atol=1e-9)
+    path = tmp_path / "calibration.json"
+    path.write_text(calibration.to_json())
+    assert turncal.Calibration.read(path).apply(table).equals(of_table)

@@ -24,7 +24,7 @@ use super::budget::BudgetRecord;
 use super::noise::NoiseReport;
 use crate::calibration::result::thermal_record::{RecordingRecord, ThermalRecord};
 use crate::calibration::{Direction, DwellScatter, Finding, Quality, Verdict, Word};
-use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
+use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, Output, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
 
 /// The version of the format.
@@ -65,6 +65,9 @@ pub struct Calibration {
     /// Quantity of the file, such as `count`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit: Option<PerSensor<String>>,
+    /// Quantity of a row of the file: for rates N is the row, otherwise the row divided by the sample period.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub output: Option<Output>,
     /// Columns of the log along x, y and z of each triad, with a minus if the sign is reversed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub columns: Option<PerSensor<[String; 3]>>,

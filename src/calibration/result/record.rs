@@ -17,7 +17,7 @@ use crate::calibration::{
     ParameterMatrix, ParameterVector, Problem, Quality, Verdict, auxiliary_name, from_vector,
     parameter_name,
 };
-use crate::imu::{BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
+use crate::imu::{BodyFrame, InstallationForm, Nominal, Output, PerSensor, Sensor, Triad};
 use crate::run::Run;
 
 /// Inputs of the test vectors: rad/s, then m/s².
@@ -218,11 +218,13 @@ impl Estimate {
 
 /// The record of a known truth.
 pub fn truth_record(truth: &PerSensor<Triad>, run: &Run) -> Calibration {
-    let (nominal, log) = (&run.instrument.nominal, &run.recording.imu.log);
-    let log = log.as_ref();
+    let (nominal, imu) = (&run.instrument.nominal, &run.recording.imu);
+    let log = imu.log.as_ref();
+    let pulses = (imu.pulse.gyro > 0.0).then_some(Output::Pulse);
     Calibration {
         installation_form: Some(truth.gyro.form),
         unit: Some(run.instrument.unit.clone()),
+        output: log.map(|log| log.output).or(pulses),
         columns: log.and_then(|log| log.named.along_body()),
         ..Calibration::new(
             TriadRecord::new(&truth.gyro, &nominal.gyro),

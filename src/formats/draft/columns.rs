@@ -111,6 +111,10 @@ impl Columns {
         let time = stated.time.as_ref().and_then(place);
         let temperature = stated.temperature.as_ref().and_then(place);
         for sensor in Sensor::ALL {
+            let stated = of_triads.gyro.iter().chain(&of_triads.accel).flatten();
+            let is_taken = |of: [usize; 3]| stated.clone().any(|k| of.contains(k));
+            let found = self.triads.get_mut(sensor);
+            *found = found.filter(|of| !is_taken(*of));
             if let Some(triad) = of_triads.get(sensor) {
                 *self.triads.get_mut(sensor) = Some(*triad);
                 self.others.get_mut(sensor).clear();

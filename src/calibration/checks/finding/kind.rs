@@ -94,7 +94,7 @@ kinds! {
     ErrorTermEstimated = "W12" "error-term-estimated" Care:
         "The recording shows a significant error term, so turncal estimated it together with K, E and D. The values \
          are valid only together with this term: `turncal apply` removes it, while export formats without error \
-         terms leave it in and report this. To switch it off, list the terms you want, or use --with none."
+         terms leave it in and report this. To switch it off, list the terms that you want with --with."
     DwellsScatter = "W13" "dwells-scatter" Care:
         "The dwells disagree by more than their σ allow, and neither the estimated noise nor the estimated terms \
          explain it. turncal widened σ by the observed scatter. Check the error terms in the report; one of them may \
