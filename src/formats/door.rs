@@ -101,7 +101,8 @@ impl Opened {
         show(&draft);
         draft.check(file)?;
         let name = file.file_name().unwrap_or_default().to_string_lossy();
-        let run = Run::of_text(file, &draft.to_toml(&name), None, in_memory)?;
+        let mut run = Run::of_text(file, &draft.to_toml(&name), None, in_memory)?;
+        run.recording.doubts.extend(draft.doubts());
         let log = Log {
             path: file.to_path_buf(),
             draft,

@@ -133,6 +133,25 @@ fn a_statement_that_rows_contradict_is_refused_and_a_right_one_is_not() {
 }
 
 #[test]
+fn a_rate_at_which_no_unit_fits_is_doubted() {
+    let columns = columns();
+    let doubts = |rate: f64| {
+        let stated = Stated {
+            rate_hz: Some(rate),
+            ..Stated::default()
+        };
+        let opened = opened(table(NAMES, &columns), &stated).unwrap();
+        opened.run.recording.doubts.join("\n")
+    };
+    assert_eq!(doubts(100.0), "");
+    let text = doubts(50.0);
+    assert!(
+        text.contains("no known unit") && text.contains("--rate"),
+        "{text}"
+    );
+}
+
+#[test]
 fn a_temperature_that_rises_is_not_a_time() {
     let mut columns = columns();
     let temperatures = (0..columns[0].len()).map(|k| 20.0 + k as f64 * 1e-4);

@@ -95,6 +95,19 @@ impl Draft {
         Some([found, expected.to_owned(), advice.to_owned()])
     }
 
+    /// Units that are neither known nor whole counts: a rate or a unit may be wrong that only turns and gravity show.
+    pub(in crate::formats) fn doubts(&self) -> impl Iterator<Item = String> + '_ {
+        Sensor::ALL.into_iter().filter_map(|sensor| {
+            let unit = self.quantities.units.get(sensor);
+            let scale = unit.scale.as_ref().filter(|_| unit.is_unfit)?;
+            let (name, why, found) = (sensor.name(), &unit.why, &scale.why);
+            Some(format!(
+                "The {name} rows are in no known unit ({why}); turncal estimated {found}. Check --rate, and state \
+                 --{name}-unit."
+            ))
+        })
+    }
+
     fn time_found(&self) -> Found {
         let clock = &self.clock;
         let name = self.columns.time.map(|k| self.columns.names[k].as_str());

@@ -32,6 +32,8 @@ pub struct Unit {
     pub why: String,
     /// Whether it is confirmed by motion or stated by the user.
     pub is_shown: bool,
+    /// Whether rows that are not whole numbers fit no known unit.
+    pub is_unfit: bool,
     /// Scale of counts, if determined …
     pub scale: Option<Scale>,
     /// … and typical values otherwise.
@@ -256,6 +258,7 @@ impl Quantities {
                 rows,
                 &format!("no known unit gives {} at rest", short(gravity)),
             ),
+            is_unfit: !rows.whole,
             likely: per_g.is_finite().then(|| likely_for_g(per_g)),
             ..Unit::default()
         }
@@ -306,7 +309,8 @@ impl Quantities {
         let measured = measured.filter(|scale| scale.is_finite());
         Unit {
             word: Some("count"),
-            is_shown: measured.is_some() && by_name.is_none(),
+            is_shown: measured.is_some() && rows.whole,
+            is_unfit: measured.is_some() && !rows.whole,
             scale: measured.map(|value| {
                 let axes = Axes {
                     scale: Vector3::repeat(value),
@@ -368,7 +372,7 @@ impl Quantities {
             let found = unit.scale.take().filter(|_| of.word == "count");
             unit.scale = Scale::of_unit(sensor, of).or(found);
             unit.word = Some(unit.scale.as_ref().map_or(of.word, |_| "count"));
-            unit.is_shown = true;
+            (unit.is_shown, unit.is_unfit) = (true, false);
             unit.why = "as stated".to_owned();
         }
     }
@@ -399,6 +403,7 @@ impl Quantities {
         if gyro.word.is_none_or(|word| word == "count") && is_open(gyro) {
             if gyro.word.is_none() {
                 gyro.word = Some("count");
+                gyro.is_unfit = true;
                 gyro.why = "no known unit fits the change of gravity direction".to_owned();
             }
             gyro.scale = Some(Scale::of_turns(
@@ -442,6 +447,7 @@ fn scaled(sensor: Sensor, rows: &Rows) -> Option<Unit> {
         word: Some("count"),
         why: "stated in the file".to_owned(),
         is_shown: true,
+        is_unfit: false,
         scale: Some(scale),
         likely: None,
     })
