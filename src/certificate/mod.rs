@@ -9,7 +9,6 @@ mod results;
 
 use crate::calibration::result::{Calibration, Provenance};
 use crate::calibration::{ComparisonError, Correction, CorrectionError};
-use crate::calibration::{Verdict, Word};
 use crate::imu::BodyFrame;
 use crate::lot::Specification;
 
@@ -86,7 +85,7 @@ impl Certificate {
         if calibration.converged == Some(false) {
             return not_usable("did not converge");
         }
-        if Verdict::of(&calibration.findings).word == Word::Failed {
+        if calibration.is_failed() {
             return not_usable("failed its checks");
         }
         Correction::of_record(&calibration)?;

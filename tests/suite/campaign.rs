@@ -190,6 +190,48 @@ fn autopilots_take_off_the_bias_at_a_temperature() {
     }
 }
 
+/// A MEMS sensor that warms by 35 K in an hour, on a table.
+const WARMING: &str = "seed = 1
+[site]
+latitude_deg = 34.0
+[imu]
+model = \"industrial-mems-warming\"
+installation = \"general\"
+output = \"pulse\"
+sample_rate_hz = 100.0
+[turntable]
+model = \"three-axis\"
+path = \"three-axis-hour\"
+[chamber]
+profile = [[300.0, 10.0], [3300.0, 45.0]]
+time_constant_s = 120.0
+sensor_noise_k = 0.01
+";
+
+#[test]
+fn a_sensor_whose_bias_drifts_by_more_than_a_turn_is_calibrated_at_each_temperature() {
+    let here = tempfile::tempdir().unwrap();
+    let here = here.path();
+    fs::write(here.join("warming.toml"), WARMING).unwrap();
+    let done = turncal(here, &["simulate", "warming.toml", "-o", "run"]);
+    assert!(done.status.success(), "{}", words(&done));
+    let arguments = ["calibrate", "run/run.toml", "--temperature", "-o", "result"];
+    let done = turncal(here, &arguments);
+    assert!(done.status.success(), "{}", words(&done));
+    let [found, truth] = ["result/calibration.json", "run/truth.json"]
+        .map(|file| Calibration::read(&here.join(file)).unwrap());
+    for temperature in [20.0, 30.0] {
+        let there = |record: &Calibration| record.at_temperature(temperature).unwrap();
+        let (found, truth) = (there(&found), there(&truth));
+        let off = |name: &&String| {
+            let off = found[*name] - truth[*name];
+            off.abs() > 4.0 * found.sigma_of(name).unwrap()
+        };
+        let beyond: Vec<_> = found.parameters.iter().filter(off).collect();
+        assert!(beyond.is_empty(), "{temperature}: {beyond:?}");
+    }
+}
+
 const MOUNTINGS: &str = "scenario = \"scenario.toml\"
 [day_to_day]
 mounting_arcsec = 300.0

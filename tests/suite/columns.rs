@@ -146,7 +146,7 @@ fn a_rate_at_which_no_unit_fits_is_doubted() {
     assert_eq!(doubts(100.0), "");
     let text = doubts(50.0);
     assert!(
-        text.contains("no known unit") && text.contains("--rate"),
+        text.contains("is not clear") && text.contains("--rate"),
         "{text}"
     );
 }

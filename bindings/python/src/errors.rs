@@ -1,6 +1,7 @@
 //! Errors of the library as exceptions.
 
 use std::fmt::Display;
+use std::ops::RangeInclusive;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -125,12 +126,10 @@ pub fn wrong(name: &str, found: impl Display, expected: &str) -> PyErr {
     raised(format!("{name}: found {found}, expected {expected}"))
 }
 
-/// A number from `low` to `high`, if one is given.
-pub fn within(name: &str, value: Given, [low, high]: [f64; 2]) -> PyResult<Option<f64>> {
-    let expected = format!("a number from {low} to {high}");
-    number(name, value, &expected, |value| {
-        (low..=high).contains(&value)
-    })
+/// A number of a range, if one is given.
+pub fn within(name: &str, value: Given, range: RangeInclusive<f64>) -> PyResult<Option<f64>> {
+    let expected = format!("a number from {} to {}", range.start(), range.end());
+    number(name, value, &expected, |value| range.contains(&value))
 }
 
 /// A finite number above zero, if one is given.

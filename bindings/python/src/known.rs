@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
+use turncal::earth::{GRAVITIES, HEIGHTS};
 use turncal::formats::DataFile;
 use turncal::formats::draft::{Stated, StatedUnit};
 use turncal::imu::Sensor;
@@ -39,9 +40,9 @@ impl Known {
         let stated = Stated {
             accel_file: accel_file.map(DataFile::from),
             rate_hz: positive("rate", rate)?,
-            latitude_deg: within("latitude", latitude, [-90.0, 90.0])?,
-            height_m: within("height", height, [-12e3, 1e5])?,
-            gravity_m_s2: positive("gravity", gravity)?,
+            latitude_deg: within("latitude", latitude, -90.0..=90.0)?,
+            height_m: within("height", height, HEIGHTS)?,
+            gravity_m_s2: within("gravity", gravity, GRAVITIES)?,
             gyro_unit: unit(Sensor::Gyro, gyro_unit)?,
             accel_unit: unit(Sensor::Accel, accel_unit)?,
             ..Stated::default()

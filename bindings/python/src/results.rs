@@ -101,9 +101,9 @@ pub fn navigate(
     hours: &Bound<PyAny>,
     trajectory: Option<&str>,
 ) -> PyResult<Report> {
-    let latitude = within("latitude", latitude, [-90.0, 90.0])?.map(|of| of * DEGREE);
-    let height = within("height", height, [-12e3, 1e5])?;
-    let hours = within("hours", Some(hours), [INTERVAL / HOUR, 1000.0])?.unwrap_or_default();
+    let latitude = within("latitude", latitude, -90.0..=90.0)?.map(|of| of * DEGREE);
+    let height = within("height", height, -12e3..=1e5)?;
+    let hours = within("hours", Some(hours), INTERVAL / HOUR..=1000.0)?.unwrap_or_default();
     let (motion, name) = motion(calibration, latitude, height, trajectory)?;
     let names = ["calibration", "truth"];
     let [own, true_one] = [(names[0], calibration), (names[1], truth)].map(|(name, of)| Named {

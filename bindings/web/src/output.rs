@@ -3,8 +3,8 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
+use turncal::calibration::Calibration;
 use turncal::calibration::result::InputFile;
-use turncal::calibration::{Calibration, Word};
 use turncal::formats::{DataFile, digest_of_bytes, export};
 use turncal::report::{self, Document};
 use turncal::run::Run;
@@ -50,7 +50,9 @@ pub fn stamp(calibration: &mut Calibration, run: &Run, files: &[DataFile]) {
 /// What a user should know before using the exports.
 pub fn caution(calibration: &Calibration, unobserved: usize) -> Option<String> {
     let of = match unobserved {
-        _ if is_failed(calibration) => return Some("None, because the calibration failed.".into()),
+        _ if calibration.is_failed() => {
+            return Some("None, because the calibration failed.".into());
+        }
         0 => return None,
         1 => "One parameter is not determined by this recording: its value is assumed".to_owned(),
         n => {
@@ -58,11 +60,6 @@ pub fn caution(calibration: &Calibration, unobserved: usize) -> Option<String> {
         }
     };
     Some(format!("{of} in these files, not measured."))
-}
-
-fn is_failed(calibration: &Calibration) -> bool {
-    let verdict = calibration.verdict.as_ref();
-    verdict.is_some_and(|verdict| verdict.word == Word::Failed)
 }
 
 /// The report, the calibration, and all exports that the calibration allows, with the name of the log.
@@ -92,7 +89,7 @@ pub fn all(
     };
     let formats = export::Format::all()
         .iter()
-        .filter(|_| !is_failed(calibration));
+        .filter(|_| !calibration.is_failed());
     let own = page.chain([Output::new(&name, about, json)]);
     Ok(own.chain(formats.filter_map(exported)).collect())
 }

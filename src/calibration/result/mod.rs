@@ -318,8 +318,7 @@ impl Index<&str> for Calibration {
 impl Calibration {
     /// Whether its values must not be used.
     pub fn is_failed(&self) -> bool {
-        let verdict = self.verdict.as_ref();
-        verdict.is_some_and(|verdict| verdict.word == Word::Failed) || self.converged == Some(false)
+        Verdict::of(&self.findings).word == Word::Failed || self.converged == Some(false)
     }
 
     /// A record of the two triads only, such as a truth.

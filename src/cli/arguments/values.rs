@@ -6,6 +6,7 @@ use std::time::Duration;
 use anyhow::Context;
 
 use crate::calibration::result::Calibration;
+use crate::earth::{GRAVITIES, HEIGHTS};
 use crate::study::navigation::INTERVAL;
 use crate::study::{Shard, ShardError};
 
@@ -44,12 +45,12 @@ pub fn latitude(text: &str) -> Result<f64, String> {
 
 /// Height above the ellipsoid, m.
 pub fn height(text: &str) -> Result<f64, String> {
-    number(text, -500.0, 9000.0)
+    number(text, *HEIGHTS.start(), *HEIGHTS.end())
 }
 
 /// m/s²
 pub fn gravity(text: &str) -> Result<f64, String> {
-    number(text, 9.7, 9.9)
+    number(text, *GRAVITIES.start(), *GRAVITIES.end())
 }
 
 /// Navigation time, h.

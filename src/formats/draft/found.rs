@@ -102,7 +102,7 @@ impl Draft {
             let scale = unit.scale.as_ref().filter(|_| unit.is_unfit)?;
             let (name, why, found) = (sensor.name(), &unit.why, &scale.why);
             Some(format!(
-                "The {name} rows are in no known unit ({why}); turncal estimated {found}. Check --rate, and state \
+                "The unit of the {name} rows is not clear: {why}. turncal estimated {found}. Check --rate, and state \
                  --{name}-unit."
             ))
         })

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 use serde::de::{Deserializer, Error};
 
+use crate::earth::{GRAVITIES, HEIGHTS};
 use crate::formats::clock::TimeUnit;
 use crate::formats::error::list;
 use crate::formats::imu_log::TimeStamp;
@@ -56,10 +57,10 @@ checked!(
     Latitude, "a latitude from -90 to 90", |v| v.abs() <= 90.0;
     /// °
     Longitude, "a longitude from -180 to 360", |v| (-180.0..=360.0).contains(&v);
-    /// Height from the shore of the Dead Sea to above any laboratory, m.
-    Height, "a height from -500 to 9000", |v| (-500.0..=9000.0).contains(&v);
+    /// m
+    Height, "a height from -500 to 9000", |v| HEIGHTS.contains(&v);
     /// m/s²
-    Gravity, "a number from 9.7 to 9.9", |v| (9.7..=9.9).contains(&v);
+    Gravity, "a number from 9.7 to 9.9", |v| GRAVITIES.contains(&v);
     /// 1σ of gravity, mGal.
     Milligals, "a number from 0 to 100000", |v| (0.0..=1e5).contains(&v);
     /// A plausible instrument temperature, °C.
