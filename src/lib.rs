@@ -72,7 +72,6 @@ pub mod recording;
 pub mod report;
 pub(crate) mod room;
 pub mod run;
-pub(crate) mod shown;
 pub mod simulation;
 pub(crate) mod statistics;
 pub mod study;

@@ -19,6 +19,7 @@ mod rows;
 mod schema;
 mod sheet;
 mod small_file;
+mod source;
 mod streams;
 mod table;
 
@@ -33,15 +34,15 @@ pub use directories::{
 pub use door::Opened;
 pub use error::{FileError, Place};
 // By these names the readers of rows know them.
-use inputs::{course, joined, source, temperature};
+use inputs::{course, joined, temperature};
 pub(crate) use quantity::unit_scale;
+pub use rows::FileColumn;
 use schema::instrument;
 #[cfg(feature = "cli")]
 pub use schema::json_schema as run_schema;
 pub use schema::{Campaign, campaign_text, write_run};
 pub(crate) use schema::{
-    Document, Finite, Latitude, NonNegative, OneOrThree, Positive, TermFile, day_to_day,
-    term_sigma, write_rows,
+    Document, Finite, Latitude, NonNegative, OneOrThree, Positive, write_rows,
 };
 pub(crate) use sheet::Sheet;
 pub use table::Table;

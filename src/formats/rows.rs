@@ -6,7 +6,6 @@ use std::path::Path;
 
 use super::error::{FileError, Place};
 use super::names;
-use crate::recording::FileColumn;
 
 /// A file that provides rows of numbers in sequence.
 pub trait Rows {
@@ -76,6 +75,15 @@ pub trait Rows {
 
     /// Assumes less memory per row, because rows are packed while reading.
     fn pack(&mut self) {}
+}
+
+/// A column as `run.toml` names it.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct FileColumn {
+    /// Its name in the file; empty if the triad was not recorded.
+    pub name: String,
+    /// Whether its values are read with the sign reversed.
+    pub reversed: bool,
 }
 
 /// A file at one of its rows, with the columns in use.

@@ -7,10 +7,10 @@
 use std::path::{Path, PathBuf};
 
 use super::course::{Course, Resampled};
-use super::source::Source;
 use crate::formats::clock::{Breaks, Clock, Stamp, TimeUnit, Uniform};
 use crate::formats::error::{FileError, Place};
 use crate::formats::rows::Rows;
+use crate::formats::source::Source;
 use crate::imu::{Output, PerSensor};
 
 /// The time column, in s.
