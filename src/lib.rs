@@ -62,6 +62,7 @@ mod cli;
 pub mod earth;
 pub mod formats;
 pub mod imu;
+pub mod laboratory;
 pub mod lot;
 pub mod models;
 pub mod navigation;
