@@ -70,10 +70,10 @@ pub mod number;
 pub mod recording;
 #[cfg(feature = "report")]
 pub mod report;
-pub(crate) mod room;
 pub mod run;
 pub(crate) mod shown;
 pub mod simulation;
+pub(crate) mod small_file;
 pub(crate) mod statistics;
 pub mod study;
 pub mod survey;

@@ -73,9 +73,6 @@ pub trait Rows {
     fn cut_off(&self, _done: &str) -> Option<String> {
         None
     }
-
-    /// Assumes less memory per row, because rows are packed while reading.
-    fn pack(&mut self) {}
 }
 
 /// A file at one of its rows, with the columns in use.
@@ -124,11 +121,6 @@ impl LogRows {
     /// Advances to the next row; false at the end.
     pub fn advance(&mut self) -> Result<bool, FileError> {
         self.rows.advance(&self.used)
-    }
-
-    /// Assumes less memory per row, because rows are packed while reading.
-    pub fn pack(&mut self) {
-        self.rows.pack();
     }
 
     /// The finite number in a column of the row.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::clock_text::ClockText;
 use super::lines::{Line, Stop};
-use super::row::{MOST_COLUMNS, Malformed, Row};
+use super::row::{Malformed, Row};
 
 /// Number of rows at the end of the first lines that define the row format.
 const ROWS: usize = 64;
@@ -542,10 +542,6 @@ impl Delimiter {
             let text = String::from_utf8_lossy(field);
             text.trim().trim_matches('"').trim().to_owned()
         };
-        // Most lines have no quotes, and need no parser.
-        if !text.contains(&b'"') && text.len() < MOST_COLUMNS {
-            return Ok(text.split(|byte| *byte == self.byte()).map(name).collect());
-        }
         let mut row = Row::new(self.byte());
         row.split(&text)?;
         Ok(row.fields().map(name).collect())

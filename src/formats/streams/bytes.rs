@@ -23,6 +23,12 @@ impl Broken {
     }
 }
 
+/// Maximum number of bytes unpacked at once from a log of this length (a chunk, a row of an array). Real chunks have a
+/// few megabytes; larger claims are damage or decompression bombs.
+pub fn most_at_once(length: u64) -> u64 {
+    length.max(1 << 27)
+}
+
 /// A file read from its start.
 pub struct Input {
     source: Box<dyn Content>,
@@ -42,9 +48,13 @@ impl Input {
     }
 
     /// The underlying file.
-    #[cfg_attr(not(any(feature = "hdf5", feature = "npy")), allow(dead_code))]
     pub fn into_source(self) -> Box<dyn Content> {
         self.source
+    }
+
+    /// Length of the file.
+    pub fn length(&self) -> u64 {
+        self.length
     }
 
     /// Bytes read or skipped so far.
