@@ -7,7 +7,6 @@ use crate::formats::streams::bytes::{Broken, Slice};
 
 /// Messages within messages.
 const DEEPEST: usize = 8;
-const MOST_COLUMNS: usize = 4096;
 /// Maximum number of fields that are examined: a type may contain itself several times.
 const MOST_FIELDS: usize = 4096;
 /// Maximum length of a set of descriptors, bytes; usually some thousand.
@@ -108,7 +107,7 @@ impl<'a> Parser<'a> {
         declared.sort_by_key(|field| field.number);
         let mut fields = Vec::new();
         for field in declared {
-            if self.columns.len() >= MOST_COLUMNS || self.count > MOST_FIELDS || depth > DEEPEST {
+            if self.count > MOST_FIELDS || depth > DEEPEST {
                 break;
             }
             let name = format!("{prefix}{}", field.name);
