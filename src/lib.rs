@@ -62,6 +62,7 @@ mod cli;
 pub mod earth;
 pub mod formats;
 pub mod imu;
+pub mod laboratory;
 pub mod lot;
 pub mod models;
 pub mod navigation;
@@ -71,7 +72,6 @@ pub mod recording;
 #[cfg(feature = "report")]
 pub mod report;
 pub mod run;
-pub(crate) mod shown;
 pub mod simulation;
 pub(crate) mod small_file;
 pub(crate) mod statistics;

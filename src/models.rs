@@ -7,6 +7,7 @@ mod by_hand;
 mod catalogue;
 mod instrument;
 mod machine;
+mod terms;
 mod thermal;
 mod trajectory;
 
@@ -21,8 +22,9 @@ use crate::small_file;
 
 pub use by_hand::path_by_hand;
 pub use catalogue::Embedded;
-pub use instrument::{InstallationModel, Instrument, Spread, Variation};
+pub use instrument::{InstallationModel, Instrument, Spread, Tolerances, Variation};
 pub use machine::{path, turntable};
+pub(crate) use terms::{TermFile, term_sigma};
 pub use thermal::ThermalVariation;
 pub use trajectory::trajectory;
 

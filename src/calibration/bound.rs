@@ -50,6 +50,20 @@ pub fn bound(
     truth: &PerSensor<Triad>,
     terms: &TermVector,
 ) -> Result<Bound, CalibrationError> {
+    let (bound, _) = bound_with_parts(problem, truth, terms, &[])?;
+    Ok(bound)
+}
+
+/// The same, with the 1σ of the parameters without the rows between each of these increasing times in s and the next.
+///
+/// # Errors
+/// [`CalibrationError`] as for [`super::estimate`].
+pub fn bound_with_parts(
+    problem: &Problem,
+    truth: &PerSensor<Triad>,
+    terms: &TermVector,
+    times: &[f64],
+) -> Result<(Bound, Vec<ParameterVector>), CalibrationError> {
     let problem = problem.with(|model| *model = model.in_form(problem.run(), truth.gyro.form));
     let at = Linearisation::new(*truth, *terms, Vec::new());
     let at_truth = pass_at(&problem, at)?;
@@ -60,13 +74,15 @@ pub fn bound(
         covariance: at_truth.posterior.parameter_covariance,
     };
     let (_, across) = at_truth.last_attitude();
-    Ok(Bound {
+    let without = at_truth.reduction.sigma_without(&prior, times);
+    let bound = Bound {
         observability: Observability::new(&estimate, &prior_sigma, &across),
         prior_sigma,
         estimate,
         auxiliary: at_truth.auxiliary(&problem.model),
         history: at_truth.reduction.history(&prior, &at_truth.at),
-    })
+    };
+    Ok((bound, without))
 }
 
 /// The constant error terms that a problem does not estimate, at a truth as for [`bound`].

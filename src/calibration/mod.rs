@@ -31,7 +31,7 @@ mod solution;
 mod solved;
 
 // Most files of this module import their common types from here.
-pub use bound::{Bound, TermLeftOff, bound, terms_left_off, thermal_bound};
+pub use bound::{Bound, TermLeftOff, bound, bound_with_parts, terms_left_off, thermal_bound};
 pub use budget::{Budget, BudgetPart, BudgetPartRecord, BudgetRecord, BudgetSource, LeftOffRecord};
 pub use checks::cause::{Cause, FoundCause};
 pub use checks::dwell_scatter::DwellScatter;

@@ -84,17 +84,19 @@ impl Evaluate {
             .collect();
         let begun = self.delivery.begin(&inputs)?;
         let activity = Activity::new("evaluating the path");
-        let (name, with, moves, evaluation) = match is_run(file) {
-            true => self.of_run(file)?,
-            false => self.of_path()?,
+        let (name, with, moves, evaluation) = if is_run(file) {
+            self.of_run(file)?
+        } else {
+            self.of_path()?
         };
         drop(activity);
+        let checks = specification.map(|of| evaluation.decided(&of));
         let report = Report {
             name: &name,
             with: &with,
             moves: &moves,
             evaluation: &evaluation,
-            specification: specification.as_ref(),
+            checks: checks.as_deref(),
         };
         let document = report.document();
         begun.deliver(&document)?;

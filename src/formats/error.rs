@@ -3,11 +3,35 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use crate::shown::{self, LONGEST, excerpt};
+/// Most characters of an input that a message shows.
+const LONGEST: usize = 200;
+/// Longest file name of any file system.
+const LONGEST_NAME: usize = 255;
+
+/// An input short enough for a message.
+pub fn excerpt(text: &str) -> String {
+    match text.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{} …", &text[..end]),
+        None => text.to_owned(),
+    }
+}
+
+/// A path as given, except that names too long for a file are cut.
+fn shown(path: &Path) -> String {
+    let names = || {
+        path.components()
+            .map(|name| name.as_os_str().to_string_lossy())
+    };
+    if names().all(|name| name.chars().count() <= LONGEST_NAME) {
+        return path.display().to_string();
+    }
+    let names: PathBuf = names().map(|name| excerpt(&name)).collect();
+    names.display().to_string()
+}
 
 /// Error in reading or writing a file.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{}{place}: {message}", shown::path(file))]
+#[error("{}{place}: {message}", shown(file))]
 pub struct FileError {
     /// The file at fault.
     pub file: PathBuf,
@@ -204,4 +228,25 @@ pub fn list<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
         .map(|name| format!("`{}`", excerpt(name)))
         .collect();
     quoted.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_is_shown_as_it_is_except_names_that_no_file_has() {
+        for short in ["/a/b c/run.toml", "../run.toml", "./run.toml", "run.toml"] {
+            assert_eq!(shown(Path::new(short)), short);
+        }
+        let long = format!("/a/{}/run.toml", "x".repeat(5_000));
+        assert!(shown(Path::new(&long)).chars().count() < LONGEST + 20);
+    }
+
+    #[test]
+    fn an_excerpt_ends_between_two_characters() {
+        assert_eq!(excerpt("µg"), "µg");
+        let long = excerpt(&"µ".repeat(1_000_000));
+        assert_eq!(long.chars().filter(|&c| c == 'µ').count(), LONGEST);
+    }
 }

@@ -4,6 +4,7 @@ mod parts;
 mod reading;
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use super::clock::Clock;
 use super::error::FileError;
@@ -17,21 +18,16 @@ use parts::Sizes;
 use reading::Reading;
 
 /// The moment of a sample that its time stamp marks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
+#[serde(rename_all = "lowercase")]
 pub enum TimeStamp {
+    End,
     Start,
     Middle,
-    End,
 }
 
 impl TimeStamp {
-    /// Its names in `run.toml`.
-    pub const WORDS: [(&'static str, Self); 3] = [
-        ("end", Self::End),
-        ("start", Self::Start),
-        ("middle", Self::Middle),
-    ];
-
     /// Time from the start of a sample to its stamp, in samples.
     pub fn lag(self) -> f64 {
         match self {

@@ -19,6 +19,7 @@ mod rows;
 mod schema;
 mod sheet;
 mod small_file;
+mod source;
 mod streams;
 mod table;
 
@@ -27,21 +28,23 @@ pub use data_file::DataFile;
 pub(crate) use directories::write_whole_with;
 pub use directories::{
     JOB_FILE, Job, JobKind, LotDirectory, Part, Parts, WholeDirectory, abandon_unfinished,
-    digest_of_bytes, input_digests, part_is_there, read_part_unit, unit_key, write_part,
-    write_whole,
+    digest_of_bytes, input_digests, part_is_there, read_part_unit, record_inputs, unit_key,
+    write_part, write_whole,
 };
 pub use door::Opened;
 pub use error::{FileError, Place};
 // By these names the readers of rows know them.
-use inputs::{course, joined, source, temperature};
+use inputs::{course, joined, temperature};
 pub(crate) use quantity::unit_scale;
+pub use rows::FileColumn;
 use schema::instrument;
 #[cfg(feature = "cli")]
 pub use schema::json_schema as run_schema;
+#[cfg(feature = "certificate")]
+pub use schema::read_laboratory;
 pub use schema::{Campaign, campaign_text, write_run};
 pub(crate) use schema::{
-    Document, Finite, Latitude, NonNegative, OneOrThree, Positive, TermFile, day_to_day,
-    term_sigma, write_rows,
+    Document, Finite, Latitude, NonNegative, OneOrThree, Positive, write_rows,
 };
 pub(crate) use sheet::Sheet;
 pub use table::Table;

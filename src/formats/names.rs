@@ -1,7 +1,6 @@
 //! Column names, each for one quantity.
 
-use super::error::{choice, nearest};
-use crate::shown::excerpt;
+use super::error::{choice, excerpt, nearest};
 
 /// Index of an unused column by name or, if no column has this name, by number. Otherwise the content found, the
 /// content expected and the remedy.

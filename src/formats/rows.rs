@@ -6,7 +6,6 @@ use std::path::Path;
 
 use super::error::{FileError, Place};
 use super::names;
-use crate::recording::FileColumn;
 
 /// A file that provides rows of numbers in sequence.
 pub trait Rows {
@@ -73,6 +72,15 @@ pub trait Rows {
     fn cut_off(&self, _done: &str) -> Option<String> {
         None
     }
+}
+
+/// A column as `run.toml` names it.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct FileColumn {
+    /// Its name in the file; empty if the triad was not recorded.
+    pub name: String,
+    /// Whether its values are read with the sign reversed.
+    pub reversed: bool,
 }
 
 /// A file at one of its rows, with the columns in use.

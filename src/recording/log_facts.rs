@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::formats::FileColumn;
 use crate::imu::{AxisOrder, Output, PerSensor, Sensor};
 
 /// Statistics of the instrument's file, in its own units.
@@ -37,15 +38,6 @@ pub struct NamedColumns {
     pub temperature: Option<String>,
     /// From the file's axes to right-front-up.
     pub axes: AxisOrder,
-}
-
-/// A column of a triad.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct FileColumn {
-    /// Its name in the file; empty if the triad was not recorded.
-    pub name: String,
-    /// Whether its values are read with the sign reversed.
-    pub reversed: bool,
 }
 
 impl NamedColumns {

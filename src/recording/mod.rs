@@ -11,7 +11,7 @@ mod series;
 mod temperature;
 
 pub use faults::{Bridge, Fault, FaultKind, Slower};
-pub use log_facts::{ColumnFacts, FileColumn, LogFacts, NamedColumns, TemperatureFacts};
+pub use log_facts::{ColumnFacts, LogFacts, NamedColumns, TemperatureFacts};
 pub(crate) use near::Near;
 pub(crate) use samples::stretches_between;
 pub use samples::{ImuSamples, SampleError, Stretch};
@@ -25,6 +25,7 @@ use std::path::PathBuf;
 
 use nalgebra::UnitQuaternion;
 
+pub use crate::formats::FileColumn;
 use crate::turntable::AxisAngles;
 
 /// One recording of one instrument.

@@ -2,6 +2,7 @@
 
 pub mod accuracy;
 pub mod campaign;
+mod checked;
 pub mod experiment;
 pub mod navigation;
 pub mod path;
@@ -20,6 +21,7 @@ use crate::turntable::TableError;
 
 pub use accuracy::{Accuracy, AccuracyStudy, Figures, NavigationAccuracy};
 pub use campaign::{CampaignAccuracy, CampaignStudy};
+pub use checked::{CheckedCalibration, Consequences};
 pub use experiment::{Experiment, ExperimentStudy};
 pub use ratio::Ratio;
 pub use shard::{Shard, ShardError};

@@ -1,6 +1,7 @@
 //! Navigation accuracy of a calibration: the navigation error due to its errors, by the nonlinear equations of
 //! navigation, and the σ of this error predicted from its covariance, by the linear model.
 
+mod methods;
 mod outlook;
 mod quantity;
 mod warming;
@@ -22,6 +23,7 @@ use crate::navigation::{
     within_reach,
 };
 
+pub use methods::{MethodOutlook, navigate_with_each};
 pub use outlook::Outlook;
 pub use quantity::Quantity;
 pub use warming::{Warming, WarmingError, WarmingPair};

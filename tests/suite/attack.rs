@@ -2,6 +2,7 @@
 
 use std::io::Write;
 use std::path::Path;
+use std::time::Instant;
 
 use assert_cmd::Command;
 use serde_json::Value;
@@ -82,6 +83,25 @@ fn a_matrix_of_zeros_is_certified_for_nobody() {
     if let Some((status, _, message, _)) = outcome("certificate-long-word", certificate) {
         assert_eq!(status, 0, "{message}");
     }
+}
+
+/// Each move once had an evaluation of its own: 100 words took 69 s.
+#[test]
+fn a_path_of_many_moves_takes_as_long_as_its_recording() {
+    let time = |moves: usize| {
+        let words = vec!["z_up,x_up"; moves / 2].join(",");
+        let begun = Instant::now();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_turncal"));
+        let arguments = ["path", "evaluate", &words, "--imu", "bmi088", "--json"];
+        let output = command.args(arguments).output().unwrap();
+        assert!(output.status.success());
+        let result: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(result["without"].as_array().unwrap().len(), moves - 1);
+        begun.elapsed()
+    };
+    let (few, many) = (time(40), time(200));
+    println!("40 words {few:?}, 200 words {many:?}");
+    assert!(many < 12 * few, "{few:?} {many:?}");
 }
 
 #[test]

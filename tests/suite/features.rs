@@ -14,7 +14,7 @@ fn without_default_features_no_crate_of_a_user_interface_is_compiled() {
         "signal-hook",
         "terminal_size",
     ];
-    let of_certificates = ["krilla", "ttf-parser"];
+    let of_certificates = ["krilla", "skrifa"];
     let tree = |features: &[&str]| {
         let output = Command::new(env!("CARGO"))
             .args(["tree", "--offline", "--edges", "normal", "--prefix", "none"])

@@ -6,12 +6,14 @@ use std::sync::{Arc, OnceLock};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyIterator;
-use turncal::calibration::{self, AtRest, Finding, FindingKind, Progress as Passes, Solution};
+use turncal::calibration::{self, AtRest, Finding, FindingKind, Progress as Passes};
+use turncal::formats::record_inputs;
 use turncal::imu::{Output, Sensor, Term};
 use turncal::lot::{self, Lot, Specification, Unit};
-use turncal::report::calibration::Calibrated;
+use turncal::report::calibration as of_calibration;
 use turncal::report::document::Table;
 use turncal::report::{Document, at_rest, lot as of_lot, write};
+use turncal::study::CheckedCalibration;
 
 use crate::errors::{in_python, raise, raised};
 use crate::report::{Report, brief, framed};
@@ -22,17 +24,18 @@ use crate::wait::finish;
 struct Solved {
     of: Arc<Recorded>,
     request: Request,
-    solution: Solution,
-    calibrated: Calibrated,
+    checked: CheckedCalibration,
 }
 
 impl Solved {
     fn document(&self) -> Result<Document, Refusal> {
         let problem = self.of.problem(&self.request)?;
-        let (name, method) = (&*self.of.name, self.request.method);
-        Ok(self
-            .calibrated
-            .document((&problem, name), &self.solution, method, None))
+        let of = (&self.checked, &self.checked.consequences(&problem, None));
+        Ok(of_calibration::document(
+            (&problem, &self.of.name),
+            of,
+            None,
+        ))
     }
 }
 
@@ -77,19 +80,18 @@ pub fn calibrated(
             ..Calibration::of_record(record)
         });
     }
-    let mut solution = problem.solve(request.method, progress)?;
-    let mut calibrated = Calibrated::new(&problem, &mut solution)?;
+    let solution = problem.solve(request.method, progress)?;
+    let mut checked = CheckedCalibration::new(&problem, solution)?;
     if let Some(path) = &of.path {
-        calibrated = calibrated.of_files(path, problem.run());
+        record_inputs(&mut checked.calibration, path, problem.run());
     }
     drop(problem);
-    let record = calibrated.calibration.clone();
+    let record = checked.calibration.clone();
     let specification = request.specification.clone();
     let solved = Arc::new(Solved {
         of,
         request,
-        solution,
-        calibrated,
+        checked,
     });
     Ok(Calibration {
         solved: Some(solved),

@@ -5,11 +5,13 @@ use std::path::{Path, PathBuf};
 use pyo3::prelude::*;
 use turncal::calibration::result::Calibration as Record;
 use turncal::calibration::{Named, compare as compared};
-use turncal::certificate::{Certificate, Laboratory};
-use turncal::formats::{digest_of_bytes, export as formats};
-use turncal::report::navigation::{Navigated, Navigation};
+use turncal::certificate::Certificate;
+use turncal::formats::{digest_of_bytes, export as formats, read_laboratory};
+use turncal::report::navigation::Navigation;
 use turncal::report::{certificate as of_certificate, comparison};
-use turncal::study::navigation::{INTERVAL, Mission, Motion, NavigationStudyError, Pair};
+use turncal::study::navigation::{
+    INTERVAL, MethodOutlook, Mission, Motion, NavigationStudyError, Pair,
+};
 use turncal::units::DEGREE;
 
 use crate::calibration::Calibration;
@@ -66,7 +68,7 @@ pub fn certificate(
     let bytes = record
         .to_json(Path::new("calibration.json"))
         .map_err(raise)?;
-    let laboratory = Laboratory::read(&laboratory, |key| record.meta.get(key).cloned());
+    let laboratory = read_laboratory(&laboratory, |key| record.meta.get(key).cloned());
     let laboratory = laboratory.map_err(raise)?;
     let limits = specification.as_deref().map(limits).transpose()?;
     let earlier = as_found
@@ -120,7 +122,7 @@ pub fn navigate(
     let terms = has_terms(calibration) || has_terms(truth);
     let converged = calibration.record.converged != Some(false);
     let report = finish(py, move || {
-        let navigated = Navigated {
+        let navigated = MethodOutlook {
             method: "error",
             outlook: mission.navigate(&pair)?,
         };

@@ -293,12 +293,13 @@ pub fn evaluate(
             terms,
         })?;
         let evaluation = study.evaluate()?;
+        let checks = limits.map(|limits| evaluation.decided(&limits));
         let report = OfPath {
             name: &study.scenario.path_name,
             with: &in_words(&study),
             moves: &moves_in_words(&study.scenario),
             evaluation: &evaluation,
-            specification: limits.as_ref(),
+            checks: checks.as_deref(),
         };
         Ok::<_, PathError>(Report(report.document()))
     });

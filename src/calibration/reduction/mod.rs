@@ -121,6 +121,43 @@ impl Reduction {
         parts.collect()
     }
 
+    /// 1σ of the parameters of both triads without the rows between each of these increasing times in s and the next.
+    ///
+    /// The rows before and after are combined as triangles, so the cost is that of a few times all rows, and no row is
+    /// subtracted from a sum that contains it.
+    pub fn sigma_without(&self, prior: &Prior, times: &[f64]) -> Vec<ParameterVector> {
+        let end = |&time: &f64| self.parts.partition_point(|part| part.time <= time);
+        let ends: Vec<usize> = times.iter().map(end).collect();
+        let (Some(&first), Some(&last)) = (ends.first(), ends.last()) else {
+            return Vec::new();
+        };
+        let left_out = ends.windows(2);
+        let left_out = left_out.map(|pair| self.parts.get(pair[0]..pair[1]).unwrap_or_default());
+        let mut known = Known::new(prior.clone());
+        folded(&self.parts[..first])
+            .iter()
+            .for_each(|part| known.learn(&part.rows));
+        let before = left_out.clone().map(|parts| {
+            let before = known.clone();
+            parts.iter().for_each(|part| known.learn(&part.rows));
+            before
+        });
+        let before: Vec<Known> = before.collect();
+        let mut after = folded(&self.parts[last..]);
+        let backward = before.into_iter().zip(left_out).rev();
+        let mut sigma: Vec<ParameterVector> = backward
+            .map(|(mut known, parts)| {
+                after.iter().for_each(|part| known.learn(&part.rows));
+                let rows: Vec<Part> = parts.iter().chain(&after).cloned().collect();
+                after = folded(&rows);
+                let variance = known.posterior().parameter_covariance.diagonal();
+                variance.map(f64::sqrt)
+            })
+            .collect();
+        sigma.reverse();
+        sigma
+    }
+
     /// Squares and products of all columns, summed over the rows.
     pub fn squares(&self) -> DMatrix<f64> {
         let n = self.constants.len();

@@ -9,17 +9,17 @@ use super::write_report;
 use crate::calibration::{UNWATCHED, Word};
 use crate::cli::arguments::{Estimation, OfLog};
 use crate::cli::terminal::{Runs, piece_by_piece, show};
-use crate::formats::{Job, JobKind, LotDirectory, Part, unit_key};
+use crate::formats::{Job, JobKind, LotDirectory, Part, record_inputs, unit_key};
 use crate::imu::PerSensor;
 use crate::lot::{self, Lot, Unit};
 use crate::models;
 use crate::noise::RestNoise;
 use crate::report;
 use crate::report::Document;
-use crate::report::calibration::Calibrated;
+use crate::report::calibration;
 use crate::report::terminal::printable;
 use crate::run::Run;
-use crate::study::Shard;
+use crate::study::{CheckedCalibration, Shard};
 
 /// Default output directory.
 pub const DIRECTORY: &str = "lot-calibration";
@@ -134,12 +134,12 @@ impl Request<'_> {
     fn calibrated(&self, path: &Path) -> anyhow::Result<(Meta, lot::Calibrated, Document)> {
         let run = self.of_log.open(path)?.run;
         let problem = self.estimation.problem(&run, path)?;
-        let method = self.estimation.method;
-        let mut solution = problem.solve(method, UNWATCHED)?;
-        let calibrated = Calibrated::new(&problem, &mut solution)?.of_files(path, &run);
-        let document =
-            calibrated.document((&problem, &run.recording.name), &solution, method, None);
-        let calibration = calibrated.calibration;
+        let solution = problem.solve(self.estimation.method, UNWATCHED)?;
+        let mut checked = CheckedCalibration::new(&problem, solution)?;
+        record_inputs(&mut checked.calibration, path, &run);
+        let of = (&checked, &checked.consequences(&problem, None));
+        let document = calibration::document((&problem, &run.recording.name), of, None);
+        let calibration = checked.calibration;
         // What cannot be written is no calibration.
         calibration.to_json(path)?;
         let dwells: Vec<_> = problem

@@ -22,15 +22,15 @@ use crate::calibration::{
 };
 use crate::cli::arguments::{Estimation, OfLog, Overwrite, run_file, run_or_log, seconds, shard};
 use crate::cli::terminal::{Activity, print, show, show_brief};
-use crate::formats::{Campaign, Opened};
+use crate::formats::{Campaign, Opened, record_inputs};
 use crate::imu::{BodyFrame, InstallationForm};
 use crate::models;
 use crate::recording::Recording;
-use crate::report::calibration::{Calibrated, Truth};
+use crate::report::calibration::{self as of_calibration, Truth};
 use crate::report::terminal::printable;
 use crate::report::{self, Document, Facts};
 use crate::run::Run;
-use crate::study::Shard;
+use crate::study::{CheckedCalibration, Shard};
 
 use follow::Follow;
 
@@ -261,16 +261,22 @@ impl Calibrate {
         let directory = target.as_ref().map(begin).transpose()?;
 
         // Problems found in the files may be the cause.
-        let mut solution = solve(problem, self.estimation.method, &activity)
+        let solution = solve(problem, self.estimation.method, &activity)
             .inspect_err(|_| say(&run.recording))?;
-        let calibrated = Calibrated::new(problem, &mut solution)?.of_files(path, run);
+        let mut checked = CheckedCalibration::new(problem, solution)?;
+        record_inputs(&mut checked.calibration, path, run);
         activity.next("writing");
         // JSON on standard output has no report.
         let document = (directory.is_some() || !self.json).then(|| {
-            let method = self.estimation.method;
-            calibrated.document((problem, name), &solution, method, truth.as_ref())
+            let triads = truth.as_ref().map(|truth| &truth.triads);
+            let of = (&checked, &checked.consequences(problem, triads));
+            of_calibration::document((problem, name), of, truth.as_ref())
         });
-        let calibration = calibrated.calibration;
+        let CheckedCalibration {
+            calibration,
+            solution,
+            ..
+        } = checked;
         if let (Some(directory), Some(document)) = (directory, &document) {
             calibration.write(&directory.path().join("calibration.json"), false)?;
             write_report(document, &directory.path().join("report"))?;

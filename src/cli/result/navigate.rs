@@ -9,8 +9,10 @@ use crate::calibration::{Calibration, Named};
 use crate::cli::arguments::{Delivery, at_temperature, hours, latitude, number};
 use crate::cli::terminal::{Activity, short_names};
 use crate::imu::Sensor;
-use crate::report::navigation::{Navigated, Navigation};
-use crate::study::navigation::{INTERVAL, Mission, Motion, Pair, Warming, WarmingPair};
+use crate::report::navigation::Navigation;
+use crate::study::navigation::{
+    INTERVAL, MethodOutlook, Mission, Motion, Pair, Warming, WarmingPair,
+};
 use crate::units::DEGREE;
 
 const HOUR: f64 = 3600.0;
@@ -154,7 +156,7 @@ impl Navigate {
         };
         let moments = moments.with_context(|| self.calibration.display().to_string())?;
         drop(activity);
-        let navigated = Navigated {
+        let navigated = MethodOutlook {
             method: "error",
             outlook: moments,
         };

@@ -27,7 +27,7 @@ use columns::Columns;
 pub use found::{Certainty, Found};
 use motion::{FOLLOWED, Motion};
 use registers::{Registers, Rows};
-pub use stated::{DataSheetError, KalibrImu, Stated, StatedColumns, StatedUnit, Tolerances};
+pub use stated::{DataSheetError, KalibrImu, Stated, StatedColumns, StatedUnit};
 use streams::Streams;
 use time::Clock;
 use units::Quantities;

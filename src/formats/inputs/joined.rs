@@ -7,9 +7,9 @@
 use std::path::Path;
 
 use super::course::{Course, Resampled};
-use super::source::Source;
 use crate::formats::clock::{Breaks, Clock, Stamp, TimeUnit, Uniform};
 use crate::formats::error::FileError;
+use crate::formats::source::Source;
 use crate::formats::table::{Table, TableRows};
 use crate::imu::{Output, PerSensor};
 

@@ -1,8 +1,8 @@
 //! The file of labelled sections.
 
-use super::source::Source;
 use crate::formats::data_file::DataFile;
 use crate::formats::error::FileError;
+use crate::formats::source::Source;
 use crate::imu::AxisOrder;
 use crate::recording::{ImuSamples, LabelledMotion, Segment};
 

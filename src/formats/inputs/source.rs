@@ -1,46 +1,11 @@
-//! Sources of rows, as described in `run.toml`.
+//! Sources of rows and their clocks, as described in `run.toml`.
 
 use crate::formats::clock::{Breaks, Clock, TimeUnit};
-use crate::formats::csv_file::CsvFile;
 use crate::formats::data_file::DataFile;
 use crate::formats::error::FileError;
-use crate::formats::rows::LogRows;
 use crate::formats::schema::instrument::Fields;
-use crate::formats::schema::{Positive, TimeColumn};
-use crate::formats::streams::{self, StreamRows};
-
-/// Source of rows.
-#[derive(Debug, Clone)]
-pub struct Source<'a> {
-    pub file: DataFile,
-    /// The selected stream, if the file has several.
-    pub stream: Option<&'a str>,
-    /// Whether the intact part of a damaged file is used.
-    pub salvage: bool,
-}
-
-impl Source<'_> {
-    /// A file without further settings.
-    pub fn of_file(file: impl Into<DataFile>) -> Self {
-        Self {
-            file: file.into(),
-            stream: None,
-            salvage: false,
-        }
-    }
-
-    /// Opens it according to its content.
-    pub fn open(&self) -> Result<LogRows, FileError> {
-        if let Some(table) = self.file.table() {
-            return Ok(LogRows::new(table.rows()));
-        }
-        let Some(log) = streams::open(&self.file)? else {
-            return CsvFile::open(&self.file, self.stream).map(LogRows::new);
-        };
-        let rows = StreamRows::open(&self.file, log, self.stream, self.salvage)?;
-        Ok(LogRows::new(rows))
-    }
-}
+use crate::formats::schema::{Positive, TimeColumn, TimeUnitField};
+use crate::formats::source::Source;
 
 impl<'a> Fields<'a> {
     /// The file of this name in `run.toml`.
@@ -67,8 +32,9 @@ impl<'a> Fields<'a> {
         &self,
         table: &str,
         column: Option<&'a TimeColumn>,
-        (unit, period): (Option<TimeUnit>, Option<Positive>),
+        (unit, period): (Option<TimeUnitField>, Option<Positive>),
     ) -> Result<Clock<'a>, FileError> {
+        let unit = unit.map(TimeUnit::from);
         if unit == Some(TimeUnit::Count) && period.is_none() {
             let path = format!("{table}.sample_period_s");
             return Err(self.document.missing(&path, "the duration of one count"));

@@ -2,13 +2,13 @@
 
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
-use super::source::Source;
 use crate::attitude;
 use crate::formats::clock::{Clock, Stamp};
 use crate::formats::error::FileError;
 use crate::formats::rows::LogRows;
 use crate::formats::schema::instrument::Fields;
 use crate::formats::schema::{AXIS_ERRORS, Angle, TurntableFile};
+use crate::formats::source::Source;
 use crate::recording::{ImuSamples, TableLog};
 use crate::turntable::{AxisAngles, AxisError, TableAccuracy, TableGeometry, axis_angles};
 use crate::units::{ARCSEC, DEGREE};

@@ -1,5 +1,7 @@
 //! Temperature columns of a log.
 
+use serde::{Deserialize, Serialize};
+
 use crate::formats::error::FileError;
 use crate::formats::rows::LogRows;
 use crate::formats::schema::{OneOrThree, TemperatureColumn};
@@ -12,28 +14,25 @@ const LARGEST: f64 = 100.0;
 const MOST_SPANS: f64 = 366.0 * 86_400.0;
 
 /// Unit of a temperature column.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TemperatureUnit {
-    /// K per unit.
-    kelvin: f64,
-    /// 0 °C in this unit.
-    zero: f64,
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
+pub enum TemperatureUnit {
+    #[default]
+    #[serde(rename = "degC")]
+    Celsius,
+    #[serde(rename = "K")]
+    Kelvin,
+    #[serde(rename = "degF")]
+    Fahrenheit,
 }
 
 impl TemperatureUnit {
-    /// Its names in `run.toml`.
-    pub const WORDS: [(&'static str, Self); 3] = [
-        ("degC", Self::new(1.0, 0.0)),
-        ("K", Self::new(1.0, 273.15)),
-        ("degF", Self::new(5.0 / 9.0, 32.0)),
-    ];
-
-    const fn new(kelvin: f64, zero: f64) -> Self {
-        Self { kelvin, zero }
-    }
-
     fn celsius(self, value: f64) -> f64 {
-        (value - self.zero) * self.kelvin
+        match self {
+            Self::Celsius => value,
+            Self::Kelvin => value - 273.15,
+            Self::Fahrenheit => (value - 32.0) * (5.0 / 9.0),
+        }
     }
 }
 

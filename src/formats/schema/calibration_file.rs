@@ -10,10 +10,9 @@ use nalgebra::DMatrix;
 
 use crate::calibration::result::{Calibration, FORMAT, FORMAT_WITH_TEMPERATURE, TriadRecord};
 use crate::formats::directories::write_whole;
-use crate::formats::error::{FileError, Place, suggestion};
+use crate::formats::error::{FileError, Place, excerpt, suggestion};
 use crate::formats::small_file;
 use crate::imu::{AXES, PARAMETERS, PerSensor, Sensor, Term, ThermalRange, Triad};
-use crate::shown::excerpt;
 use crate::units::{DEGREE, STANDARD_GRAVITY};
 
 /// A larger entry of an installation matrix belongs to an axis perpendicular to its name.

@@ -14,7 +14,6 @@ use crate::formats::small_file;
 use crate::imu::{HIGHEST_ORDER, InstallationForm, ParameterKind};
 use crate::recording::Temperature;
 use crate::run::Run;
-use crate::units::ARCSEC;
 
 /// The version of the format.
 const FORMAT: &str = "turncal-campaign/1";
@@ -112,7 +111,10 @@ impl Campaign {
             Ok(run)
         });
         let runs: Vec<Run> = runs.collect::<Result<_, FileError>>()?;
-        let mut day_to_day = day_to_day(document, &file.day_to_day)?;
+        let stated = &file.day_to_day;
+        document.only("day_to_day", stated.keys(), &DayToDay::keys())?;
+        let value = |key: &str| stated.get(key).map_or(0.0, |sigma| sigma.0);
+        let mut day_to_day = DayToDay::of_values(value);
         own_parameters(document, &file.own, &runs, &mut day_to_day)?;
         let temperature = match temperature {
             Some(stated) => stated,
@@ -139,14 +141,7 @@ pub fn campaign_text(paths: &[String], day_to_day: &DayToDay) -> String {
         page.text += "\n[[recording]]\n";
         page.field("run", path.as_str());
     }
-    let of_groups = Group::all().filter_map(|group| {
-        let (key, unit) = DayToDay::key(group);
-        let first = *group.parameters(InstallationForm::General).first()?;
-        Some((key, day_to_day.parameters[first] / unit))
-    });
-    let mounting = (MOUNTING.to_owned(), day_to_day.mounting / ARCSEC);
-    let lines = of_groups.chain([mounting]).filter(|of| of.1 > 0.0);
-    let lines: BTreeMap<String, f64> = lines.collect();
+    let lines: BTreeMap<String, f64> = day_to_day.values().filter(|of| of.1 > 0.0).collect();
     if !lines.is_empty() {
         page.table("day_to_day", "1σ from one recording to the next");
     }
@@ -184,9 +179,6 @@ fn temperature(
     }
 }
 
-/// The key of the mounting in `[day_to_day]`.
-const MOUNTING: &str = "mounting_arcsec";
-
 /// The name of a group in `own`.
 fn own_name(group: Group) -> String {
     let kind = match group.kind() {
@@ -195,25 +187,6 @@ fn own_name(group: Group) -> String {
         ParameterKind::Bias => "bias",
     };
     format!("{}.{kind}", group.sensor().name())
-}
-
-/// 1σ between recordings, from a table `[day_to_day]`.
-pub fn day_to_day(
-    document: Document,
-    stated: &BTreeMap<String, NonNegative>,
-) -> Result<DayToDay, FileError> {
-    let keys: Vec<(String, f64)> = Group::all().map(DayToDay::key).collect();
-    let known = keys.iter().map(|(key, _)| key.as_str());
-    let known: Vec<&str> = known.chain([MOUNTING]).collect();
-    document.only("day_to_day", stated.keys(), &known)?;
-    let mut differ = DayToDay::default();
-    for (group, (key, unit)) in Group::all().zip(&keys) {
-        for i in group.parameters(InstallationForm::General) {
-            differ.parameters[i] = stated.get(key).map_or(0.0, |sigma| sigma.0 * unit);
-        }
-    }
-    differ.mounting = stated.get(MOUNTING).map_or(0.0, |sigma| sigma.0 * ARCSEC);
-    Ok(differ)
 }
 
 /// Lets groups differ freely between recordings: by the 1σ by which instruments differ.

@@ -127,14 +127,15 @@ impl<'a> Document<'a> {
         self,
         path: &str,
         names: impl IntoIterator<Item: AsRef<str>>,
-        known: &[&str],
+        known: &[impl AsRef<str>],
     ) -> Result<(), FileError> {
+        let known: Vec<&str> = known.iter().map(AsRef::as_ref).collect();
         let mut names = names.into_iter();
         match names.find(|name| !known.contains(&name.as_ref())) {
             Some(name) => {
                 let name = name.as_ref();
                 let span = self.span_of(&format!("{path}.{name}"));
-                Err(self.unknown(span, path, name, known))
+                Err(self.unknown(span, path, name, &known))
             }
             None => Ok(()),
         }

@@ -4,18 +4,18 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 
-use super::{Document, Names, OneOrThree, RunFile, TermFile};
+use super::{Document, Names, OneOrThree, RunFile};
 use crate::formats::clock::{Breaks, Clock};
 use crate::formats::data_file::DataFile;
 use crate::formats::error::{FileError, list, suggestion};
 use crate::formats::imu_log::ImuLog;
-use crate::formats::inputs::temperature::{TemperatureColumns, TemperatureUnit};
+use crate::formats::inputs::temperature::TemperatureColumns;
 use crate::formats::quantity::units;
-use crate::imu::NoiseKeys;
 use crate::imu::{
-    AxisOrder, GaussMarkov, Instrument, MotionNoise, Noise, Nominal, Output, PerSensor, Prior,
-    Sensor, Term, TermVector,
+    GaussMarkov, Instrument, MotionNoise, Noise, NoiseKeys, Nominal, Output, PerSensor, Prior,
+    Sensor,
 };
+use crate::models::term_sigma;
 use crate::units::{ARCSEC, DEGREE, PPM};
 
 /// Default 1σ of scale factors, misalignments and biases, typical of consumer MEMS.
@@ -85,11 +85,11 @@ impl<'a> Fields<'a> {
             instance: (imu.instance.as_ref()).map(|of| (of.column.as_str(), of.number.0)),
             triads: PerSensor::from_fn(names),
             temperature: imu.columns.temperature.as_ref().map(|column| {
-                let unit = imu.temperature_unit.unwrap_or(TemperatureUnit::WORDS[0].1);
+                let unit = imu.temperature_unit.unwrap_or_default();
                 TemperatureColumns::of_fields(column, unit)
             }),
             output: imu.output,
-            axes: imu.body_axes.unwrap_or(AxisOrder::IDENTITY),
+            axes: imu.axes(),
             stamp: imu.time_stamp,
             continuous: imu.continuous.unwrap_or(true),
             nominal: known.nominal,
@@ -119,7 +119,7 @@ impl<'a> Fields<'a> {
     /// Units, nominal scales, priors, noise and error terms.
     fn knowledge(&mut self) -> Result<Instrument, FileError> {
         let imu = &self.run.imu;
-        let axes = imu.body_axes.unwrap_or(AxisOrder::IDENTITY);
+        let axes = imu.axes();
         let unit = PerSensor::try_from_fn(|sensor| self.unit(sensor))?;
         let nominal = PerSensor::try_from_fn(|sensor| self.nominal(sensor, unit.get(sensor)))?;
         let names = Sensor::ALL.map(|sensor| NoiseKeys::of(sensor).names());
@@ -245,10 +245,7 @@ impl<'a> Fields<'a> {
 
     /// The prior of a triad with this nominal scale, along right-front-up; wide defaults if not stated.
     fn prior(&mut self, sensor: Sensor, nominal: Vector3<f64>) -> Result<Prior, FileError> {
-        let (of, axes) = (
-            self.run.imu.of(sensor),
-            self.run.imu.body_axes.unwrap_or(AxisOrder::IDENTITY),
-        );
+        let (of, axes) = (self.run.imu.of(sensor), self.run.imu.axes());
         let bias_words = sensor.pick("bias ± 2 °/s", "bias ± 1 m/s²");
         let mut assumed = Vec::new();
         let mut sigma = |key: &str, stated: Option<OneOrThree>, most: f64, usual, words| {
@@ -297,30 +294,4 @@ impl<'a> Fields<'a> {
             bias_sigma: axes.each(bias_sigma.component_div(&nominal.abs())),
         })
     }
-}
-
-/// 1σ of the parameters of enabled error terms, in SI; zero for the others.
-pub fn term_sigma(
-    document: Document,
-    table: &str,
-    terms: &std::collections::BTreeMap<String, TermFile>,
-) -> Result<TermVector, FileError> {
-    document.only(table, terms.keys(), &Term::NAMES)?;
-    let mut sigma = TermVector::zeros();
-    for term in Term::ALL {
-        let Some(TermFile { sigma: stated }) = terms.get(term.name()) else {
-            continue;
-        };
-        let unit = term.entry().unit.1;
-        let most = (term.entry().largest / unit).round();
-        if stated.0 > most {
-            let path = format!("{table}.{}.sigma", term.name());
-            let expected = format_args!("a number above zero and at most {most}");
-            return Err(document.wrong(&path, expected, "Correct this value."));
-        }
-        for parameter in term.parameters() {
-            sigma[parameter] = stated.0 * unit;
-        }
-    }
-    Ok(sigma)
 }

@@ -12,12 +12,15 @@ mod read;
 mod run;
 mod specification;
 mod values;
+mod words;
 mod write;
 
-pub use campaign::{Campaign, campaign_text, day_to_day};
+pub use campaign::{Campaign, campaign_text};
 pub use document::Document;
-pub use instrument::term_sigma;
+#[cfg(feature = "certificate")]
+pub use laboratory::read_laboratory;
 pub use read::stated_gravity_sigma;
 pub use run::*;
-pub use values::{Angle, Celsius, Finite, Latitude, Names, NonNegative, OneOrThree, Positive};
+pub use values::{Angle, Celsius, Finite, Latitude, NonNegative, OneOrThree, Positive};
+pub use words::{BodyAxes, Names, TimeUnitField};
 pub use write::{write_rows, write_run};

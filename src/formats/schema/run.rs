@@ -6,13 +6,14 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::values::{
-    Angle, Finite, Gravity, Height, Latitude, Longitude, Milligals, Names, NonNegative, OneOrThree,
+    Angle, Finite, Gravity, Height, Latitude, Longitude, Milligals, NonNegative, OneOrThree,
     Positive,
 };
-use crate::formats::clock::TimeUnit;
+use super::words::{BodyAxes, Names, TimeUnitField};
 use crate::formats::imu_log::TimeStamp;
 use crate::formats::inputs::temperature::TemperatureUnit;
 use crate::imu::{AxisOrder, Output, Sensor};
+use crate::models::TermFile;
 
 /// The version of the format.
 pub const FORMAT: &str = "turncal-run/1";
@@ -93,7 +94,7 @@ pub struct ImuFile {
     /// End of the range of the accelerometers, in the unit of a row; samples there are saturated
     pub accel_full_scale: Option<Positive>,
     /// Unit of the time column: s (default), ms, us, ns, a tick in s, or count for a sample counter
-    pub time_unit: Option<TimeUnit>,
+    pub time_unit: Option<TimeUnitField>,
     /// Time from row to row, s; default from the time stamps
     pub sample_period_s: Option<Positive>,
     /// Whether a stamp marks the end, the start or the middle of its sample
@@ -105,7 +106,7 @@ pub struct ImuFile {
     /// Unit of the temperature columns: degC (default), K or degF
     pub temperature_unit: Option<TemperatureUnit>,
     /// Axes of the log: rfu right-front-up (default), frd or flu
-    pub body_axes: Option<AxisOrder>,
+    pub body_axes: Option<BodyAxes>,
     /// Names or numbers of the columns; a minus before a name reverses its sign
     pub columns: ImuColumns,
     /// Noise figures by name, such as angle_random_walk_deg_per_sqrt_h
@@ -128,6 +129,11 @@ pub struct TriadFields<'a> {
 }
 
 impl ImuFile {
+    /// From the axes of the log to right, front, up.
+    pub fn axes(&self) -> AxisOrder {
+        self.body_axes.map_or(AxisOrder::IDENTITY, BodyAxes::order)
+    }
+
     pub fn of(&self, sensor: Sensor) -> TriadFields<'_> {
         let (columns, prior) = (&self.columns, &self.prior);
         let full_scale = sensor.pick(self.gyro_full_scale, self.accel_full_scale);
@@ -154,7 +160,7 @@ pub struct AccelFromFile {
     /// Time column of the accelerometers
     pub time: Option<TimeColumn>,
     /// Unit of that column
-    pub time_unit: Option<TimeUnit>,
+    pub time_unit: Option<TimeUnitField>,
     /// Time from row to row, s
     pub sample_period_s: Option<Positive>,
 }
@@ -238,15 +244,6 @@ pub struct PriorFile {
     pub bias_sigma: Option<OneOrThree>,
 }
 
-/// 1σ of each parameter of an error term, around zero.
-#[derive(Clone, Copy, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(deny_unknown_fields)]
-pub struct TermFile {
-    /// 1σ of each parameter of the error term, around zero
-    pub sigma: Positive,
-}
-
 #[derive(Default, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
@@ -272,7 +269,7 @@ pub struct TurntableFile {
     /// Use a damaged log up to the damage; default false
     pub salvage: Option<bool>,
     /// Unit of the time column
-    pub time_unit: Option<TimeUnit>,
+    pub time_unit: Option<TimeUnitField>,
     /// Time from row to row, s
     pub sample_period_s: Option<Positive>,
     /// Columns of time and attitude

@@ -62,8 +62,7 @@ impl Specification {
         for (sensor, stated) in [(Sensor::Gyro, &file.gyro), (Sensor::Accel, &file.accel)] {
             let groups = || Group::all().filter(|group| group.sensor() == sensor);
             let keys: Vec<String> = groups().map(|group| key(group).0).collect();
-            let known: Vec<&str> = keys.iter().map(String::as_str).collect();
-            document.only(sensor.name(), stated.keys(), &known)?;
+            document.only(sensor.name(), stated.keys(), &keys)?;
             for group in groups() {
                 if let Some(of_group) = stated.get(&key(group).0) {
                     limits.extend(limits_of(document, group, of_group)?);

@@ -10,9 +10,11 @@ use std::fmt::Write;
 use crate::attitude::to_pitch_roll_heading;
 use crate::imu::{BodyFrame, Sensor};
 use crate::report::prelude::*;
-use crate::study::navigation::{INTERVAL, Mission, Motion, Outlook, Quantity, Warming};
+use crate::study::navigation::{
+    INTERVAL, MethodOutlook, Mission, Motion, Outlook, Quantity, Warming,
+};
 
-pub use outlook::{Flown, Navigated, add_missions};
+pub use outlook::{Flown, add_missions};
 pub(super) use outlook::{add, line};
 
 /// Hours over which the paper states the position drift.
@@ -40,7 +42,7 @@ pub struct Navigation<'a> {
     /// Name of the trajectory, if it moved.
     pub trajectory: Option<&'a str>,
     /// The errors.
-    pub navigated: &'a Navigated,
+    pub navigated: &'a MethodOutlook,
 }
 
 impl Navigation<'_> {

@@ -38,7 +38,7 @@ fn moments(sigma: bool) -> Vec<Outlook> {
 }
 
 fn document(moments: &[Outlook]) -> Document {
-    let navigated = Navigated {
+    let navigated = MethodOutlook {
         method: "error",
         outlook: moments.to_vec(),
     };

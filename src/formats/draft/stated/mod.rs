@@ -15,7 +15,7 @@ use crate::formats::schema::stated_gravity_sigma;
 use crate::formats::table::Table;
 use crate::formats::{DataFile, FileError};
 use crate::imu::{Noise, PerSensor, Sensor};
-use crate::models::{Instrument, ModelError, Place};
+use crate::models::{Instrument, ModelError, Place, Tolerances};
 use crate::units::DEGREE;
 
 /// User statements about a log without a `run.toml`; other fields are detected or have a wide prior.
@@ -132,17 +132,6 @@ impl StatedColumns {
             advice,
         ))
     }
-}
-
-/// 1σ tolerances of an instrument before calibration.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Tolerances {
-    /// Its kind.
-    pub of: String,
-    /// Scale factor, relative.
-    pub scale: PerSensor<f64>,
-    /// Bias, rad/s and m/s².
-    pub bias: PerSensor<f64>,
 }
 
 /// A unit spelt as in `run.toml` or in log files, or a multiple of it: `deg/s`, `1/131 deg/s`, `0.061 mg`.

@@ -1,6 +1,5 @@
 //! What small files of every format give, whole, cut and damaged.
 
-mod mat_7_3;
 mod ulog;
 mod write;
 

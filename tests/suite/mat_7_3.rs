@@ -4,12 +4,12 @@ use std::f64::consts::FRAC_PI_2;
 use std::fs;
 use std::path::Path;
 
-use crate::attitude;
-use crate::formats::Opened;
-use crate::formats::draft::{Draft, Stated};
 use hdf5_pure::LibVer;
 use hdf5_pure::mat::{Compression, MatBuilder, MatError, Options, StructWriter};
 use nalgebra::Vector3;
+use turncal::attitude;
+use turncal::formats::Opened;
+use turncal::formats::draft::{Draft, Stated};
 
 /// A quarter turn about each axis in turn, with rests between, at 100 Hz: time, angular rate, specific force.
 fn rows() -> Vec<[f64; 7]> {
