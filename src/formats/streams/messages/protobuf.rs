@@ -99,20 +99,21 @@ struct Parser<'a> {
 impl<'a> Parser<'a> {
     /// The fields of a type in the order of their numbers; lists, texts and bytes do not become columns.
     fn fields(&mut self, name: &str, prefix: &str, depth: usize) -> Option<Vec<Field>> {
-        let declared = parts(self.find(name)?, 2)?;
+        let mut declared = parts(self.find(name)?, 2)?;
         self.count += declared.len();
-        let declared = declared.into_iter().map(Declared::of);
-        let mut declared: Vec<Declared> = declared.collect::<Option<_>>()?;
-        declared.retain(|field| field.label != REPEATED && !NO_NUMBERS.contains(&field.kind));
-        declared.sort_by_key(|field| field.number);
+        declared.sort_by_key(|field| whole(field, 3));
         let mut fields = Vec::new();
         for field in declared {
+            let (number, label, kind) = (whole(field, 3)?, whole(field, 4)?, whole(field, 5)?);
+            if label == REPEATED || NO_NUMBERS.contains(&kind) {
+                continue;
+            }
             if self.count > MOST_FIELDS || depth > DEEPEST {
                 break;
             }
-            let name = format!("{prefix}{}", field.name);
+            let name = format!("{prefix}{}", text(field, 1)?);
             let column = self.columns.len();
-            let kind = match (field.kind, field.type_name.trim_start_matches('.')) {
+            let kind = match (kind, text(field, 6)?.trim_start_matches('.')) {
                 (MESSAGE, "google.protobuf.Timestamp" | "google.protobuf.Duration") => {
                     self.columns.push(Column::new(name, "s"));
                     let part = |number: u64, kind: u64| Field {
@@ -125,10 +126,9 @@ impl<'a> Parser<'a> {
                 (MESSAGE, of) => Kind::Message(self.fields(of, &format!("{name}."), depth + 1)?),
                 (kind, _) => {
                     self.columns.push(Column::new(name, ""));
-                    Kind::Number(kind, field.default)
+                    Kind::Number(kind, text(field, 7)?.parse().unwrap_or_default())
                 }
             };
-            let number = field.number;
             fields.push(Field {
                 number,
                 kind,
@@ -162,37 +162,6 @@ impl<'a> Parser<'a> {
     }
 }
 
-/// A field of a type in its descriptor.
-#[derive(Default)]
-struct Declared<'a> {
-    name: &'a str,
-    number: u64,
-    label: u64,
-    kind: u64,
-    type_name: &'a str,
-    default: f64,
-}
-
-impl<'a> Declared<'a> {
-    fn of(bytes: &'a [u8]) -> Option<Self> {
-        let mut field = Self {
-            name: text(bytes, 1)?,
-            type_name: text(bytes, 6)?,
-            default: text(bytes, 7)?.parse().unwrap_or_default(),
-            ..Self::default()
-        };
-        for value in values(bytes, 0).ok()? {
-            match value.field {
-                3 => field.number = value.bits,
-                4 => field.label = value.bits,
-                5 => field.kind = value.bits,
-                _ => {}
-            }
-        }
-        Some(field)
-    }
-}
-
 /// The messages and texts in a field.
 fn parts(bytes: &[u8], field: u64) -> Option<Vec<&[u8]>> {
     let all = values(bytes, 0).ok()?.into_iter();
@@ -204,6 +173,13 @@ fn parts(bytes: &[u8], field: u64) -> Option<Vec<&[u8]>> {
 fn text(bytes: &[u8], field: u64) -> Option<&str> {
     let last = parts(bytes, field)?.pop().unwrap_or_default();
     std::str::from_utf8(last).ok()
+}
+
+/// The whole number in a field; zero if it is omitted.
+fn whole(bytes: &[u8], field: u64) -> Option<u64> {
+    let all = values(bytes, 0).ok()?;
+    let last = all.iter().rfind(|value| value.field == field);
+    Some(last.map_or(0, |value| value.bits))
 }
 
 /// A value of a message.
