@@ -230,12 +230,13 @@ fn source(file: &DataFile) -> Result<Box<dyn BufRead>, FileError> {
     let begin = plain
         .fill_buf()
         .map_err(|error| stopped(file, &Stop::System(error)))?;
-    Ok(match begin.starts_with(&GZIP) {
-        true => Box::new(BufReader::with_capacity(
+    Ok(if begin.starts_with(&GZIP) {
+        Box::new(BufReader::with_capacity(
             1 << 16,
             MultiGzDecoder::new(plain),
-        )),
-        false => Box::new(plain),
+        ))
+    } else {
+        Box::new(plain)
     })
 }
 

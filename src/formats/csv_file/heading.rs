@@ -481,9 +481,10 @@ impl Delimiter {
     fn of_row(row: &str) -> Self {
         let blanks = Self::Blanks.fields(row).unwrap_or_default();
         if blanks.len() > 1 && blanks.iter().all(|field| is_number(field)) {
-            return match row.contains('\t') && !row.contains(' ') {
-                true => Self::Byte(b'\t'),
-                false => Self::Blanks,
+            return if row.contains('\t') && !row.contains(' ') {
+                Self::Byte(b'\t')
+            } else {
+                Self::Blanks
             };
         }
         // A comma with a tab behind it is a comma.

@@ -31,9 +31,12 @@ pub fn distinct(triads: &PerSensor<[&str; 3]>) -> PerSensor<[String; 3]> {
     let clash = |name: &str| triads.gyro.iter().any(|other| bare(other) == bare(name));
     PerSensor {
         gyro: triads.gyro.map(str::to_owned),
-        accel: triads.accel.map(|name| match clash(name) {
-            true => format!("{name} of accelerometers"),
-            false => name.to_owned(),
+        accel: triads.accel.map(|name| {
+            if clash(name) {
+                format!("{name} of accelerometers")
+            } else {
+                name.to_owned()
+            }
         }),
     }
 }

@@ -168,9 +168,10 @@ impl<'a> Slice<'a> {
 
     /// Offset of the next byte in the file.
     pub fn offset(&self) -> u64 {
-        match self.is_packed {
-            true => self.base,
-            false => self.base + self.at as u64,
+        if self.is_packed {
+            self.base
+        } else {
+            self.base + self.at as u64
         }
     }
 
@@ -201,9 +202,10 @@ impl<'a> Slice<'a> {
     pub fn whole(&mut self, size: usize, what: &str) -> Result<u64, Broken> {
         let bytes = self.take(size, what)?;
         let add = |whole: u64, &byte: &u8| whole << 8 | u64::from(byte);
-        Ok(match self.big_endian {
-            true => bytes.iter().fold(0, add),
-            false => bytes.iter().rev().fold(0, add),
+        Ok(if self.big_endian {
+            bytes.iter().fold(0, add)
+        } else {
+            bytes.iter().rev().fold(0, add)
         })
     }
 
