@@ -71,9 +71,9 @@ pub mod number;
 pub mod recording;
 #[cfg(feature = "report")]
 pub mod report;
-pub(crate) mod room;
 pub mod run;
 pub mod simulation;
+pub(crate) mod small_file;
 pub(crate) mod statistics;
 pub mod study;
 pub mod survey;

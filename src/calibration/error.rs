@@ -26,17 +26,6 @@ pub enum CalibrationError {
         /// The missing triad.
         sensor: Sensor,
     },
-    /// Not enough memory for a calibration.
-    #[error(
-        "not enough memory to calibrate {samples} samples (about {megabytes} MB needed). Free some memory, or split \
-         the recording"
-    )]
-    NoMemory {
-        /// Number of samples of all runs.
-        samples: usize,
-        /// Required memory, MB.
-        megabytes: usize,
-    },
     /// Temperature-dependent parameters with a recording that has no temperature.
     #[error(
         "recording {number}, {recording}, has no usable temperature, which the temperature model needs. Name the \

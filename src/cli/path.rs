@@ -13,6 +13,7 @@ use crate::formats::Opened;
 use crate::models::specification;
 use crate::report::path::{Report, in_words, moves_in_words};
 use crate::run::Aiding;
+use crate::small_file;
 use crate::study::path::{Evaluation, Named, PathStudy};
 
 /// Predicts calibration accuracy for a path of a table or by hand, before any data exist
@@ -141,5 +142,5 @@ impl Evaluate {
 
 /// Whether a file describes a run.
 fn is_run(file: &Path) -> bool {
-    file.is_file() && std::fs::read_to_string(file).is_ok_and(|text| text.contains("turncal-run/"))
+    file.is_file() && small_file::text(file).is_ok_and(|text| text.contains("turncal-run/"))
 }

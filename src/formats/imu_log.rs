@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::clock::Clock;
 use super::error::FileError;
-use super::joined::{self, Joined, Part};
+use super::joined::{self, Part};
 use super::rows::LogRows;
 use super::source::Source;
 use super::temperature::TemperatureColumns;
@@ -189,7 +189,7 @@ impl ImuLog<'_> {
                 further: &[],
             },
         };
-        Joined::read(&parts, self.output, self.stamp.lag()).map(LogRows::new)
+        joined::read(&parts, self.output, self.stamp.lag()).map(LogRows::new)
     }
 
     fn clock_of_rows(&self) -> Clock<'_> {

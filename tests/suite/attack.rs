@@ -1,5 +1,6 @@
 //! What an attack on the command line found: each case ends as it should, with the message that helps.
 
+use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
@@ -245,6 +246,91 @@ fn an_archive_of_a_gigabyte_unpacked_is_drafted_in_half_of_it() {
     assert!(output.status.success(), "{message}");
     let text = String::from_utf8_lossy(&output.stdout);
     assert!(text.contains("20000000 samples"), "{text}");
+}
+
+/// A MAT file of two arrays of zeros with these rows and three columns each, compressed.
+fn mat_of_zeros(rows: u32) -> Vec<u8> {
+    let element = |kind: u32, content: &[u8]| {
+        let mut bytes = [kind, content.len() as u32].map(u32::to_le_bytes).concat();
+        bytes.extend(content);
+        bytes.resize(bytes.len().next_multiple_of(8), 0);
+        bytes
+    };
+    let mut file = b"MATLAB 5.0 MAT-file".to_vec();
+    file.resize(124, 0);
+    file.extend([0, 1, b'I', b'M']);
+    for name in ["gyro", "acc"] {
+        let size = [rows, 3].map(u32::to_le_bytes).concat();
+        let flags = [6, 0].map(u32::to_le_bytes).concat();
+        let head = [
+            element(6, &flags),
+            element(5, &size),
+            element(1, name.as_bytes()),
+        ]
+        .concat();
+        let numbers = 24 * rows;
+        let whole = head.len() as u32 + 8 + numbers;
+        let mut packer = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+        packer
+            .write_all(&[14, whole].map(u32::to_le_bytes).concat())
+            .unwrap();
+        packer.write_all(&head).unwrap();
+        packer
+            .write_all(&[9, numbers].map(u32::to_le_bytes).concat())
+            .unwrap();
+        for _ in 0..rows / 1000 {
+            packer.write_all(&[0; 24_000]).unwrap();
+        }
+        let packed = packer.finish().unwrap();
+        file.extend([15, packed.len() as u32].map(u32::to_le_bytes).concat());
+        file.extend(packed);
+    }
+    file
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_mat_file_is_read_in_parts_and_one_of_zeros_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    std::fs::write(here.join("m.mat"), mat_of_zeros(8_000_000)).unwrap();
+    // 384 MB unpacked.
+    let program = env!("CARGO_BIN_EXE_turncal");
+    let command = format!("ulimit -v 300000; exec {program} init m.mat");
+    let mut shell = std::process::Command::new("sh");
+    let output = shell.args(["-c", &command]).current_dir(here).output();
+    let output = output.unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{message}");
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("8000000 samples"), "{text}");
+    let zeros = mat_of_zeros(0);
+    let file = std::fs::File::create(here.join("s.mat")).unwrap();
+    (&file).write_all(&zeros[..128]).unwrap();
+    file.set_len(2 << 30).unwrap();
+    let (status, _, message) = turncal(here, "init s.mat");
+    assert!(
+        status == 1 && message.contains("an element of type 0"),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_time_that_stands_still_is_named() {
+    let directory = tempfile::tempdir().unwrap();
+    let row = |k: u32| {
+        let part = f64::from(k).sin();
+        format!("5.00,{part},0,0,0,{part},9.8\n")
+    };
+    let rows: String = (0..50_000).map(row).collect();
+    std::fs::write(
+        directory.path().join("d.csv"),
+        format!("t,gx,gy,gz,ax,ay,az\n{rows}"),
+    )
+    .unwrap();
+    let (status, _, message) = turncal(directory.path(), "calibrate d.csv --json");
+    let found = "found 5 in all rows of the column `t`, expected times that increase";
+    assert!(status == 1 && message.contains(found), "{message}");
 }
 
 #[test]

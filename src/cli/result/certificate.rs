@@ -12,6 +12,7 @@ use crate::cli::terminal::print;
 use crate::formats::{digest_of_bytes, read_laboratory};
 use crate::models;
 use crate::report::certificate;
+use crate::small_file;
 
 /// Writes a calibration certificate as PDF/A-3 with an embedded Digital Calibration Certificate
 ///
@@ -57,7 +58,7 @@ impl Certificate {
             return print(include_bytes!("../../certificate/draft.toml"));
         };
         let read = |path: &Path| -> anyhow::Result<Vec<u8>> {
-            std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))
+            small_file::bytes(path).with_context(|| format!("cannot read {}", path.display()))
         };
         let calibration = Calibration::read(path)?;
         let bytes = read(path)?;

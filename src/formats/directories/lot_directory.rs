@@ -231,7 +231,8 @@ fn read_unit(directory: &Path, key: Option<&str>) -> Result<(Unit, String), File
         return wrong("a different key");
     }
     let path = directory.join(CALIBRATION_FILE);
-    let digest = fs::read(&path).ok().map(|bytes| digest_of_bytes(&bytes));
+    let bytes = crate::small_file::bytes(&path);
+    let digest = bytes.ok().map(|bytes| digest_of_bytes(&bytes));
     if record.failure.is_none() && record.calibration_sha256 != digest {
         return wrong("a calibration.json that does not belong to it");
     }
