@@ -21,8 +21,6 @@ use super::bytes::{Broken, Input};
 use crate::formats::data_file::Content;
 use header::Header;
 
-/// Maximum header length.
-const LONGEST_HEADER: u64 = 1 << 20;
 /// Bytes read at once per separate column.
 const AT_ONCE: usize = 1 << 14;
 

@@ -8,13 +8,29 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use super::{FileError, taken, unwritable};
+use crate::formats::error::FileError;
 
 const PREFIX: &str = ".turncal-";
 /// Locked during the lifetime of the process that created the stage.
 const LOCK: &str = "turncal.lock";
 const NEW: &str = "new";
 const OLD: &str = "old";
+
+/// Error: an output must not replace what is at `target`.
+pub fn taken(target: &Path) -> FileError {
+    FileError::of(
+        target,
+        "an existing file or directory of this name",
+        "an unused name",
+        "Choose another name, or add --force to replace it.",
+    )
+}
+
+/// Error: the system does not allow writing at `target`.
+pub fn unwritable(target: &Path, doing: &str, error: &io::Error) -> FileError {
+    let advice = "Choose a directory that can be written.";
+    FileError::io(target, doing, error, advice)
+}
 
 /// The stages of this process, each with the directories created for it, innermost first.
 static UNFINISHED: Mutex<BTreeMap<PathBuf, Vec<PathBuf>>> = Mutex::new(BTreeMap::new());
