@@ -8,18 +8,8 @@ use crate::imu::{Output, Sensor};
 use crate::noise::normalised;
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, STANDARD_GRAVITY};
 
-/// Names of row quantities.
-pub const OUTPUTS: [(&str, Output); 3] = [
-    ("pulse", Output::Pulse),
-    ("increment", Output::Increment),
-    ("rate", Output::Rate),
-];
-
-/// Name of a row quantity.
-pub fn output_word(output: Output) -> &'static str {
-    let known = OUTPUTS.iter().find(|(_, known)| *known == output);
-    known.map_or("", |(word, _)| word)
-}
+/// Quantities of a row.
+pub const OUTPUTS: [Output; 3] = [Output::Pulse, Output::Increment, Output::Rate];
 
 /// Quantity of a unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -97,8 +87,6 @@ pub fn spelled(text: &str) -> Option<(&'static str, f64, Of)> {
 /// Nominal scale of a triad implied by a row unit: quantity of the file per second for one rad/s or m/s²; `None` for
 /// counts and unknown units.
 pub fn unit_scale(sensor: Sensor, unit: &str) -> Option<f64> {
-    let mut all = OUTPUTS
-        .iter()
-        .flat_map(|&(_, output)| units(sensor, output));
+    let mut all = OUTPUTS.iter().flat_map(|&output| units(sensor, output));
     all.find(|&(name, _)| name == unit)?.1
 }

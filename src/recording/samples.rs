@@ -277,3 +277,24 @@ pub fn stretches_between(count: usize, start: f64, period: f64, faults: &[Fault]
     }
     stretches
 }
+
+impl ImuSamples {
+    /// The bridges that overlap these samples, each with the overlapping fraction of the bridge.
+    pub fn bridged(&self, samples: &Range<usize>) -> impl Iterator<Item = (&Bridge, f64)> {
+        let mut rest = self.bridges.as_slice();
+        let touched = std::iter::from_fn(move || {
+            let first = rest.first()?;
+            let of_axes = |bridge: &Bridge| bridge.axes == first.axes;
+            let (alike, others) = rest.split_at(rest.partition_point(of_axes));
+            rest = others;
+            let begin = alike.partition_point(|b| b.samples.end <= samples.start);
+            let touched = alike[begin..].partition_point(|b| b.samples.start < samples.end);
+            Some(&alike[begin..begin + touched])
+        });
+        touched.flatten().map(|bridge| {
+            let Range { start, end } = bridge.samples;
+            let common = end.min(samples.end) - start.max(samples.start);
+            (bridge, common as f64 / (end - start) as f64)
+        })
+    }
+}

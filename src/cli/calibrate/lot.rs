@@ -10,7 +10,6 @@ use crate::calibration::{UNWATCHED, Word};
 use crate::cli::arguments::{Estimation, OfLog};
 use crate::cli::terminal::{Runs, piece_by_piece, show};
 use crate::formats::{Job, JobKind, LotDirectory, Part, is_toml, record_inputs, unit_key};
-use crate::imu::PerSensor;
 use crate::lot::{self, Lot, Unit};
 use crate::models;
 use crate::noise::RestNoise;

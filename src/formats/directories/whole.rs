@@ -14,23 +14,8 @@ use std::path::{Path, PathBuf};
 
 use crate::formats::error::FileError;
 pub use manifest::FILE as LIST;
-use stage::Stage;
 pub use stage::Unfinished;
-
-fn taken(target: &Path) -> FileError {
-    FileError::of(
-        target,
-        "an existing file or directory of this name",
-        "an unused name",
-        "Choose another name, or add --force to replace it.",
-    )
-}
-
-/// Error: the system does not allow writing at `target`.
-fn unwritable(target: &Path, doing: &str, error: &io::Error) -> FileError {
-    let advice = "Choose a directory that can be written.";
-    FileError::io(target, doing, error, advice)
-}
+use stage::{Stage, taken, unwritable};
 
 /// A directory under construction. Dropped without [`Self::commit`], it leaves nothing behind.
 pub struct WholeDirectory {

@@ -3,8 +3,8 @@
 use nalgebra::Vector3;
 
 use super::name::Name;
+use super::raw_samples::offset;
 use super::stated::StatedColumns;
-use super::units::offset;
 use crate::formats::Sheet;
 use crate::imu::{PerSensor, Sensor};
 use crate::statistics::median;

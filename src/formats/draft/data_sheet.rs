@@ -5,9 +5,9 @@ use nalgebra::Vector3;
 use super::motion::TOLERANCE;
 use super::name::Unit;
 use super::raw_run::{Axes, Gravity};
-use super::units::short;
 use crate::formats::unit_scale;
 use crate::imu::{Output, Sensor};
+use crate::number::rounded;
 use crate::units::{DEGREE, STANDARD_GRAVITY};
 
 /// Data-sheet values for counts per degree per second …
@@ -40,7 +40,11 @@ impl Scale {
             value: Vector3::repeat(of_one / unit.times),
             off: 0.0,
             is_named: true,
-            why: format!("1 unit of the file is {} {}", short(unit.times), unit.word),
+            why: format!(
+                "1 unit of the file is {} {}",
+                rounded(unit.times, 4),
+                unit.word
+            ),
         })
     }
 
@@ -101,9 +105,13 @@ impl Scale {
         };
         let stated = sizes.map(|size| nearest(&sheet(size), size).unwrap_or(f64::NAN));
         let is_stated = !stated.iter().any(|stated| stated.is_nan());
-        let value = if is_stated { stated } else { sizes.map(short) };
+        let value = if is_stated {
+            stated
+        } else {
+            sizes.map(|size| rounded(size, 4))
+        };
         let off = value.component_div(&sizes).add_scalar(-1.0).amax();
-        let measured = axes.words(&sizes.map(short));
+        let measured = axes.words(&sizes.map(|size| rounded(size, 4)));
         Self {
             off: if is_stated {
                 off
@@ -137,7 +145,7 @@ impl Axes {
 }
 
 fn percent(part: f64) -> f64 {
-    format!("{:.1e}", 100.0 * part).parse().unwrap_or(part)
+    rounded(100.0 * part, 2)
 }
 
 /// The data-sheet value nearest to a measured figure, if within tolerance.

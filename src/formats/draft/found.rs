@@ -2,33 +2,12 @@
 
 use std::path::Path;
 
+use super::certainty::Certainty;
 use super::motion::Motion;
-use super::units::short;
 use super::{AXES_OF_PROGRAM, Draft, NO_COLUMNS};
 use crate::formats::FileError;
 use crate::imu::Sensor;
-
-/// Certainty of a field.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Certainty {
-    /// Stated in the log and confirmed by motion, determined by motion alone, or stated by the user.
-    Certain,
-    /// Stated in the log or typical, but not confirmed by motion.
-    Guess,
-    /// Neither.
-    Unknown,
-}
-
-impl Certainty {
-    /// Its word.
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Certain => "certain",
-            Self::Guess => "guess",
-            Self::Unknown => "unknown",
-        }
-    }
-}
+use crate::number::rounded;
 
 /// A detected field.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,7 +45,8 @@ impl Draft {
 
     /// The first open field that prevents a run: evidence in the log, requirement, remedy.
     fn open_question(&self) -> Option<[String; 3]> {
-        let (field, why) = self.page("log").open.into_iter().next()?;
+        let (_, remarks) = self.run_file("log");
+        let (field, why) = remarks.open.into_iter().next()?;
         let is_zero = |motion: &Motion| motion.gravity == 0.0;
         let has_accels =
             self.columns.triads.accel.is_some() && !self.motion.as_ref().is_some_and(is_zero);
@@ -111,7 +91,7 @@ impl Draft {
     fn time_found(&self) -> Found {
         let clock = &self.clock;
         let name = self.columns.time.map(|k| self.columns.names[k].as_str());
-        let hertz = |rate: f64| format!("{} Hz", short(rate));
+        let hertz = |rate: f64| format!("{} Hz", rounded(rate, 4));
         let (value, certainty) = match (name, clock.period.map(f64::recip)) {
             (None, Some(rate)) if self.stated.rate_hz.is_some() => {
                 return Found::new("time", hertz(rate), Certainty::Certain, "as stated");

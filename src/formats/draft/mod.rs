@@ -1,5 +1,6 @@
 //! A draft of `run.toml` for a log without one: detected fields with reasons, and open fields for the user.
 
+mod certainty;
 mod columns;
 mod convert;
 mod data_sheet;
@@ -8,6 +9,7 @@ mod motion;
 mod name;
 mod priors;
 mod raw_run;
+mod raw_samples;
 mod registers;
 mod stated;
 mod streams;
@@ -23,17 +25,17 @@ use crate::formats::instrument::USUAL_PERIOD;
 use crate::formats::{DataFile, FileError, Sheet};
 use crate::imu::{PerSensor, Sensor};
 use crate::noise::{Clusters, TriadNoise};
+pub use certainty::Certainty;
 use columns::Columns;
-pub use found::{Certainty, Found};
+pub use found::Found;
 use motion::{FOLLOWED, Motion};
-use registers::{Registers, Rows};
+use raw_samples::RawSamples;
+use registers::Registers;
 pub use stated::{DataSheetError, KalibrImu, Stated, StatedColumns, StatedUnit};
-use streams::Streams;
+use streams::{FEWEST_ROWS, Streams};
 use time::Clock;
 use units::Quantities;
 
-/// Minimum number of rows of a run.
-const FEWEST_ROWS: usize = 100;
 /// Minimum number of samples at rest for a noise estimate.
 const FEWEST_AT_REST: usize = 64;
 
@@ -149,9 +151,9 @@ impl Draft {
         let rows = columns.samples(&sheet).map(|(numbers, triads)| {
             let period = clock.period.unwrap_or(USUAL_PERIOD);
             let breaks = clock.breaks(&numbers, period, FOLLOWED);
-            Rows::new(triads, breaks, period)
+            RawSamples::new(triads, breaks, period)
         });
-        let down = rows.as_ref().and_then(Rows::points_down);
+        let down = rows.as_ref().and_then(RawSamples::points_down);
         let mut draft = Self {
             down: down.and_then(|axis| Some(columns.triads.accel?[axis])),
             quantities: Quantities::unknown(),
@@ -184,7 +186,7 @@ impl Draft {
     }
 
     /// Detects units, registers and noise.
-    fn take_rows(&mut self, mut rows: Rows, sheet: &Sheet) {
+    fn take_rows(&mut self, mut rows: RawSamples, sheet: &Sheet) {
         let mut motion = rows.motion();
         self.quantities = Quantities::find(sheet, &self.columns, &self.clock, rows.whole, &motion);
         let is_open = motion.angle.is_none() && motion.is_turned;
@@ -202,7 +204,7 @@ impl Draft {
     }
 
     /// Detects the registers behind the rows, and returns the motion without their zero.
-    fn look_behind(&mut self, rows: &mut Rows, motion: &Motion, sheet: &Sheet) -> Motion {
+    fn look_behind(&mut self, rows: &mut RawSamples, motion: &Motion, sheet: &Sheet) -> Motion {
         let found = Registers::find(rows, motion);
         let is_count = PerSensor::from_fn(|sensor| self.quantities.is_count(sensor));
         found.apply(&mut rows.triads, &mut self.columns, &is_count);
@@ -221,18 +223,17 @@ impl Draft {
         motion
     }
 
-    /// The triads in the log; both if none was identified.
-    fn present(&self) -> impl Iterator<Item = Sensor> {
+    /// Whether the log has this triad; both if none was identified.
+    fn is_present(&self, sensor: Sensor) -> bool {
         let triads = &self.columns.triads;
         let none = triads.gyro.is_none() && triads.accel.is_none();
-        let is_present = move |sensor: &Sensor| none || triads.get(*sensor).is_some();
-        Sensor::ALL.into_iter().filter(is_present)
+        none || triads.get(sensor).is_some()
     }
 }
 
 /// Angle in rad per gyro unit in one row, from the rotation of gravity; negative if the triads have opposite signs.
 pub(super) fn turned_angle(triads: PerSensor<Vec<Vector3<f64>>>, period: f64) -> Option<f64> {
-    let rows = Rows::new(triads, Vec::new(), period);
+    let rows = RawSamples::new(triads, Vec::new(), period);
     let motion = rows.motion();
     motion
         .angle
@@ -265,7 +266,7 @@ fn retain_samples(sheet: &mut Sheet, columns: &Columns) {
 
 /// White noise of both triads in the longest dwell, as from `turncal allan`.
 fn white_noise(
-    rows: &Rows,
+    rows: &RawSamples,
     motion: &Motion,
     quantities: &Quantities,
     period: Option<f64>,

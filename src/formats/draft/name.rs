@@ -41,13 +41,10 @@ pub struct Name {
     pub unit: Option<Unit>,
 }
 
-/// Body axes of the program that uses such column names; `None` if unknown.
-pub fn axes_of_program(columns: &[String]) -> Option<&'static str> {
+/// Whether the columns are those of PX4's sensor_combined or ArduPilot's IMU, whose axes are front, right, down.
+pub fn is_of_autopilot(columns: &[String]) -> bool {
     let has = |name: &str| columns.iter().any(|column| column == name);
-    // PX4's sensor_combined and ArduPilot's IMU: front, right, down.
-    let is_autopilot =
-        has("accelerometer_m_s2[0]") || has("TimeUS") && (has("GyrX") || has("AccX"));
-    is_autopilot.then_some("frd")
+    has("accelerometer_m_s2[0]") || has("TimeUS") && (has("GyrX") || has("AccX"))
 }
 
 /// The unit in a text, with an optional preceding factor.

@@ -2,12 +2,12 @@
 
 use nalgebra::Vector3;
 
-use super::text::seven;
-use super::units::short;
 use super::{Draft, Stated};
 use crate::formats::instrument::{USUAL_BIAS, USUAL_INSTALLATION, USUAL_SCALE};
-use crate::formats::schema::page::Page;
+use crate::formats::schema::page::Remarks;
+use crate::formats::schema::{Finite, OneOrThree, PriorFile};
 use crate::imu::{Instrument, PerSensor, Prior, Sensor};
+use crate::number::rounded;
 use crate::units::{ARCSEC, DEG_PER_SQRT_H, DEGREE, MICRO_G_PER_SQRT_HZ, PPM};
 
 /// Typical prior of a class of instruments, 1σ.
@@ -86,34 +86,39 @@ impl Stated {
 }
 
 impl Draft {
-    pub(super) fn prior(&self, page: &mut Page, sensor: Sensor) {
+    pub(super) fn prior(&self, sensor: Sensor, remarks: &mut Remarks) -> PriorFile {
         let class = Class::of(|sensor| self.white_noise(sensor));
         let unit = self.quantities.units.get(sensor);
         let stated = self.stated.tolerances.as_ref();
         let scale_sigma = stated.map_or(class.scale_ppm, |of| of.scale.get(sensor) / PPM);
         let bias_sigma = stated.map_or(class.bias(sensor), |of| *of.bias.get(sensor));
-        let from = stated.map_or_else(
-            || {
-                format!(
-                    "typical for {} instrument; check against the data sheet",
-                    class.name
-                )
-            },
-            |of| format!("from the data sheet of {}", of.of),
-        );
-        let remark = format!("{from}; N = scale * installation * u + bias");
-        page.table(&format!("imu.prior.{}", sensor.name()), &remark);
+        let from = match stated {
+            Some(of) => format!("from the data sheet of {}", of.of),
+            None => format!(
+                "typical for {} instrument; check against the data sheet",
+                class.name
+            ),
+        };
+        let table = format!("imu.prior.{}", sensor.name());
+        let remark = format_args!("{from}; N = scale * installation * u + bias");
+        remarks.before(&table, remark);
+        let path = format!("{table}.scale");
         if let Some(scale) = &unit.scale {
-            page.line("scale", three(&scale.value), &scale.why);
+            remarks.reason(&path, &scale.why);
         } else if unit.word.is_none_or(|word| word == "count") {
-            page.open("scale =", self.open_scale(sensor));
+            remarks.open(&path, self.open_scale(sensor));
         }
         let off = unit.scale.as_ref().map_or(0.0, |scale| 1e6 * scale.off);
-        let sigma = seven(scale_sigma).max(short(off));
-        page.plain("scale_sigma_ppm", format_args!("{sigma:?}"));
-        let sigma = class.installation / ARCSEC;
-        page.plain("installation_sigma_arcsec", format_args!("{sigma:?}"));
-        self.bias(page, sensor, bias_sigma);
+        let scale_sigma = rounded(scale_sigma, 7).max(rounded(off, 4));
+        let one = |value: f64| Some(OneOrThree::One(Finite(value)));
+        let (bias, bias_sigma) = self.bias(sensor, bias_sigma, &table, remarks);
+        PriorFile {
+            scale: unit.scale.as_ref().map(|scale| seven_digits(&scale.value)),
+            scale_sigma_ppm: one(scale_sigma),
+            installation_sigma_arcsec: one(class.installation / ARCSEC),
+            bias: bias.map(|bias| seven_digits(&bias)),
+            bias_sigma: bias_sigma.and_then(one),
+        }
     }
 
     fn open_scale(&self, sensor: Sensor) -> String {
@@ -135,39 +140,41 @@ impl Draft {
         format!("{plain}{why}{likely}")
     }
 
-    fn bias(&self, page: &mut Page, sensor: Sensor, usual: f64) {
+    /// Bias and its σ, in the quantity of the file per second.
+    fn bias(
+        &self,
+        sensor: Sensor,
+        usual: f64,
+        table: &str,
+        remarks: &mut Remarks,
+    ) -> (Option<Vector3<f64>>, Option<f64>) {
         let offset = *self.offset.get(sensor);
         let per_second = self.quantities.per_second(self.clock.period.unwrap_or(1.0));
         let usual = self
             .quantities
             .scale(sensor)
             .map(|scale| usual * scale.abs());
+        let path = format!("{table}.bias");
         let own = self.own_zero(sensor, usual.map(|usual| usual / per_second));
-        let off = match own {
+        let (bias, off) = match own {
             Some((zero, off, why)) => {
-                page.line("bias", three(&(zero.add_scalar(offset) * per_second)), why);
-                off
+                remarks.reason(&path, why);
+                (Some(zero.add_scalar(offset)), off)
             }
             None => {
-                if offset != 0.0 {
-                    let bias = three(&Vector3::repeat(offset * per_second));
-                    page.line("bias", bias, "output of an unsigned register at zero input");
-                }
                 let rest = self.rest().filter(|_| sensor == Sensor::Gyro);
-                rest.map_or(0.0, |rest| rest.amax())
+                remarks.reason(&path, "output of an unsigned register at zero input");
+                let register = Some(Vector3::repeat(offset)).filter(|_| offset != 0.0);
+                (register, rest.map_or(0.0, |rest| rest.amax()))
             }
         };
-        if let Some(usual) = usual {
-            let sigma = short(usual.max(2.0 * off * per_second));
-            page.line(
-                "bias_sigma",
-                format_args!("{sigma:?}"),
-                match per_second {
-                    1.0 => "in the unit of the file",
-                    _ => "in the unit of the file, per second",
-                },
-            );
-        }
+        let unit = match per_second {
+            1.0 => "in the unit of the file",
+            _ => "in the unit of the file, per second",
+        };
+        remarks.reason(&format!("{table}.bias_sigma"), unit);
+        let sigma = usual.map(|usual| rounded(usual.max(2.0 * off * per_second), 4));
+        (bias.map(|bias| bias * per_second), sigma)
     }
 
     /// Gyro output at rest, in the quantity of the file per row.
@@ -200,12 +207,6 @@ impl Draft {
     }
 }
 
-/// One number for three equal ones.
-fn three(values: &Vector3<f64>) -> String {
-    let [x, y, z] = <[f64; 3]>::from(*values).map(seven);
-    if x == y && y == z {
-        format!("{x:?}")
-    } else {
-        format!("[{x:?}, {y:?}, {z:?}]")
-    }
+fn seven_digits(values: &Vector3<f64>) -> OneOrThree {
+    values.map(|value| rounded(value, 7)).into()
 }

@@ -4,7 +4,7 @@
 use nalgebra::{SMatrix, SVector, Vector3};
 
 use super::motion::{Motion, TOLERANCE, mean, means};
-use super::registers::Rows;
+use super::raw_samples::RawSamples;
 use crate::calibration::{
     Estimate, NoisePolicy, Options, Problem, orders_of_gyros, parameter, six_position,
 };
@@ -119,7 +119,7 @@ pub struct RawRun {
 
 impl RawRun {
     /// From the rows of a log, with `breaks` before some of them.
-    pub fn new(of_log: &Rows, breaks: &[usize], motion: &Motion) -> Self {
+    pub fn new(of_log: &RawSamples, breaks: &[usize], motion: &Motion) -> Self {
         let length = ((ROW / of_log.period).round() as usize).max(1);
         let period = SLOWED * of_log.period;
         let rows = PerSensor::from_fn(|sensor| means(of_log.triads.get(sensor), length));

@@ -1,16 +1,15 @@
 //! Selection of the streams or files of the instrument.
 
-use super::FEWEST_ROWS;
 use super::columns::{self, Columns, by_stem};
 use super::name::Name;
-use super::text::{quoted, word_or_number};
 use super::time;
 use crate::formats::clock::{Breaks, Clock, TimeUnit};
 use crate::formats::csv_file::CsvFile;
 use crate::formats::error::{choice, list, suggestion};
 use crate::formats::joined::{self, Part};
 use crate::formats::rows::LogRows;
-use crate::formats::schema::page::Page;
+use crate::formats::schema::page::Remarks;
+use crate::formats::schema::{AccelFromFile, ImuFile, TimeColumn, TimeUnitField};
 use crate::formats::source::Source;
 use crate::formats::streams::{self, Column, Found, Stream};
 use crate::formats::{DataFile, FileError, Sheet};
@@ -43,6 +42,8 @@ pub struct Written {
     pub accel: Option<String>,
 }
 
+/// Minimum number of rows of a run.
+pub const FEWEST_ROWS: usize = 100;
 /// Maximum number of columns listed per stream.
 const MOST_SHOWN: usize = 12;
 
@@ -144,14 +145,12 @@ impl Streams {
         let time = PerSensor::try_from_fn(|sensor| pair.get(sensor).time_by(sources.get(sensor)))?;
         let part = |sensor: Sensor| {
             let (name, unit) = time.get(sensor);
-            let word = TimeUnit::WORDS.iter().find(|(word, _)| word == unit);
-            let tick = unit.parse().map_or(1.0, f64::recip);
             Part {
                 source: sources.get(sensor),
                 clock: Clock {
                     column: Some(name),
                     nanoseconds: None,
-                    unit: word.map_or(TimeUnit::PerSecond(tick), |&(_, unit)| unit),
+                    unit: (TimeUnitField::of_text(unit).unit()).unwrap_or(TimeUnit::PerSecond(1.0)),
                     period: None,
                     breaks: Breaks::None,
                 },
@@ -193,30 +192,36 @@ impl Streams {
         }
     }
 
-    /// Content of the log, and the keys for the selected streams.
-    pub fn write(&self, page: &mut Page) {
+    /// States the selected streams in `[imu]`, after the content of the log.
+    pub fn describe(&self, imu: &mut ImuFile, remarks: &mut Remarks) {
         if self.written.is_none() {
-            self.listed.iter().for_each(|line| page.remark(line));
-            page.field("stream", self.gyro.as_str());
+            for line in &self.listed {
+                remarks.before("imu.stream", line);
+            }
+            imu.stream = Some(self.gyro.clone());
         }
         if let Some((accel, time)) = self.accel.as_ref().zip(self.time.as_ref()) {
             let (time, unit) = &time.accel;
-            let place = match &self.written {
-                None => format!("stream = {}, ", quoted(accel)),
-                Some(Written { accel: Some(file) }) => format!("file = {}, ", quoted(file)),
-                Some(Written { accel: None }) => String::new(),
-            };
-            let (time, unit) = (quoted(time), word_or_number(unit));
-            let keys = format!("{{ {place}time = {time}, time_unit = {unit} }}");
+            let is_stream = self.written.is_none();
+            imu.accel_from = Some(AccelFromFile {
+                file: self.written.as_ref().and_then(|of| of.accel.clone()),
+                stream: is_stream.then(|| accel.clone()),
+                time: Some(TimeColumn::One(time.clone())),
+                time_unit: Some(TimeUnitField::of_text(unit)),
+                ..AccelFromFile::default()
+            });
             let why =
                 "accelerometers use their own clock; --with time-offset estimates the difference";
-            page.line("accel_from", keys, why);
+            remarks.reason("imu.accel_from", why);
         }
-        self.remarks.iter().for_each(|remark| page.remark(remark));
+        for remark in &self.remarks {
+            remarks.before("imu.salvage", remark);
+        }
         if let Some(damage) = self.damage.as_ref().filter(|_| self.written.is_none()) {
             let damage = one_line(&damage.to_string());
+            imu.salvage = Some(true);
             let why = format_args!("uncomment to use the intact part. {damage}");
-            page.open("salvage = true", why);
+            remarks.open("imu.salvage", why);
         }
     }
 }

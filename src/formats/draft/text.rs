@@ -1,127 +1,172 @@
-//! The draft as TOML: lines with reasons, and open fields.
+//! The draft as the fields of `run.toml`, with reasons and open fields.
 
-use super::name::axes_of_program;
-use super::units::short;
+use std::collections::BTreeMap;
+
+use super::name::is_of_autopilot;
 use super::{AXES_OF_PROGRAM, Draft, NO_COLUMNS};
-use crate::formats::quantity::output_word;
-use crate::formats::schema::FORMAT;
-use crate::formats::schema::page::Page;
+use crate::formats::schema::page::{self, Remarks};
+use crate::formats::schema::{
+    BodyAxes, FORMAT, Finite, Gravity, Height, ImuColumns, ImuFile, InstanceFile, Latitude, Names,
+    NonNegative, Positive, PriorFile, PriorsFile, RunFile, SiteFile, TemperatureColumn, TimeColumn,
+    TimeStamp, TimeUnitField,
+};
 use crate::imu::{Noise, NoiseKeys, Output, Sensor};
+use crate::number::rounded;
+
+/// `[imu.noise]` of `run.toml`.
+type NoiseFields = BTreeMap<String, Option<NonNegative>>;
 
 impl Draft {
     /// The draft as a `run.toml` with this name for the log. Lines with `TODO` must be completed before it can be read;
     /// the others are guesses, each with its reason.
     pub fn to_toml(&self, file: &str) -> String {
-        self.page(file).text
+        let (run, remarks) = self.run_file(file);
+        page::text(FORMAT, &run, &remarks)
     }
 
-    pub(super) fn page(&self, file: &str) -> Page {
+    /// The fields of the draft, with their reasons.
+    pub(super) fn run_file(&self, file: &str) -> (RunFile, Remarks) {
+        let mut remarks = Remarks::default();
         let of_it = match self.only {
             Some(rows) => format!("the first {rows} rows of the log"),
             None => "the log alone".to_owned(),
         };
-        let remark = format!(
-            "Draft made from {of_it}. Check the guesses and complete the open fields, then run `turncal check`."
+        remarks.before(
+            "format",
+            format_args!(
+                "Draft made from {of_it}. Check the guesses and complete the open fields, then run `turncal check`."
+            ),
         );
-        let mut page = Page::of(FORMAT, &remark);
-        self.site(&mut page);
-        page.table("imu", "");
-        page.field("file", file);
-        if let Some(streams) = &self.streams {
-            streams.write(&mut page);
+        let run = RunFile {
+            site: self.site(&mut remarks),
+            imu: self.imu(file, &mut remarks),
+            ..RunFile::default()
+        };
+        match &self.columns.quaternion {
+            Some(four) => remarks.before(
+                "turntable",
+                format_args!(
+                    "{} form a quaternion. If it comes from a turntable (body right-front-up to East-North-Up, order \
+                     w, x, y, z), add a [turntable] that reads this file. Do not use an attitude computed by the \
+                     instrument itself.",
+                    self.list(four)
+                ),
+            ),
+            None => remarks.before(
+                "turntable",
+                "If you have a turntable log, add [turntable] with file, columns, position_sigma_arcsec and \
+                 reading_sigma_arcsec.",
+            ),
         }
-        self.output_and_units(&mut page);
-        self.clock(&mut page);
-        self.body_axes(&mut page);
-        if let Some((column, number)) = self.instance {
-            let of = format!("{{ column = {}, number = {number} }}", self.name(column));
-            let why = "the log contains several instruments; this selects the first";
-            page.line("instance", of, why);
-        }
-        self.columns(&mut page);
-        self.noise_table(&mut page);
-        for sensor in self.present() {
-            self.prior(&mut page, sensor);
-        }
-        self.table(&mut page);
-        page
+        (run, remarks)
     }
 
-    fn site(&self, page: &mut Page) {
-        page.table(
-            "site",
-            "location of the instrument; missing fields get a wide σ",
-        );
-        let stated = &self.stated;
-        for (key, value, why) in [
-            (
-                "latitude_deg",
-                stated.latitude_deg,
-                "north positive; 0.1° is accurate enough",
-            ),
-            ("height_m", stated.height_m, "above the ellipsoid"),
-            (
-                "gravity_m_s2",
-                stated.gravity_m_s2,
-                "if measured; otherwise normal gravity is used",
-            ),
-        ] {
+    fn site(&self, remarks: &mut Remarks) -> SiteFile {
+        let remark = "location of the instrument; missing fields get a wide σ";
+        remarks.before("site", remark);
+        let mut field = |key: &str, value: Option<f64>, why: &str| {
+            let path = format!("site.{key}");
             match value {
-                Some(value) => page.line(key, format_args!("{value:?}"), "as stated"),
-                None => page.optional(key, why),
+                Some(_) => remarks.reason(&path, "as stated"),
+                None => remarks.suggestion(&path, why),
             }
+            value
+        };
+        let (of, latitude) = (&self.stated, "north positive; 0.1° is accurate enough");
+        let gravity = "if measured; otherwise normal gravity is used";
+        SiteFile {
+            latitude_deg: field("latitude_deg", of.latitude_deg, latitude).map(Latitude),
+            height_m: field("height_m", of.height_m, "above the ellipsoid").map(Height),
+            gravity_m_s2: field("gravity_m_s2", of.gravity_m_s2, gravity).map(Gravity),
+            ..SiteFile::default()
         }
     }
 
-    fn output_and_units(&self, page: &mut Page) {
-        let found = &self.quantities;
-        let output = quoted(output_word(found.output));
-        page.line("output", output, &found.output_why);
-        for sensor in self.present() {
-            let (key, unit) = (format!("{}_unit", sensor.name()), found.units.get(sensor));
-            match unit.word {
-                Some(word) => page.line(&key, quoted(word), &unit.why),
-                None => {
-                    let why = format!("{}; see the data sheet or the logger", unit.why);
-                    page.open(&format!("{key} ="), why);
-                }
-            }
+    fn imu(&self, file: &str, remarks: &mut Remarks) -> ImuFile {
+        let (found, clock) = (&self.quantities, &self.clock);
+        let mut imu = ImuFile {
+            file: file.to_owned(),
+            output: found.output,
+            gyro_unit: self.unit(Sensor::Gyro, remarks),
+            accel_unit: self.unit(Sensor::Accel, remarks),
+            time_unit: (clock.unit != "s").then(|| TimeUnitField::of_text(&clock.unit)),
+            sample_period_s: self.period(remarks),
+            time_stamp: TimeStamp::End,
+            continuous: Some(self.cuts() == 0),
+            body_axes: Some(self.body_axes(remarks)),
+            instance: self.instance.map(|(column, number)| InstanceFile {
+                column: self.name(column),
+                number: Finite(number),
+            }),
+            columns: self.columns(remarks),
+            noise: self.noise_fields(remarks),
+            prior: self.priors(remarks),
+            ..ImuFile::default()
+        };
+        if let Some(streams) = &self.streams {
+            streams.describe(&mut imu, remarks);
         }
+        remarks.reason("imu.output", &found.output_why);
         if found.opposed {
-            page.remark(
+            remarks.before(
+                "imu.time_unit",
                 "Gravity rotates opposite to the gyro output, so one triad has the wrong sign. Negate its columns or \
                  give it a negative scale.",
             );
         }
+        remarks.reason("imu.time_unit", &clock.why);
+        let why = "guess: a row covers the interval that ends at its time stamp; otherwise \"start\" or \"middle\"";
+        remarks.reason("imu.time_stamp", why);
+        remarks.reason("imu.continuous", self.why_continuous());
+        let why = "the log contains several instruments; this selects the first";
+        remarks.reason("imu.instance", why);
+        imu
     }
 
-    fn clock(&self, page: &mut Page) {
-        let clock = &self.clock;
-        if clock.unit != "s" {
-            page.line("time_unit", word_or_number(&clock.unit), &clock.why);
+    /// The unit of a triad; open if it is unknown.
+    fn unit(&self, sensor: Sensor, remarks: &mut Remarks) -> Option<String> {
+        let unit = self.quantities.units.get(sensor);
+        if !self.is_present(sensor) {
+            return None;
         }
-        let rate = clock.period.map_or(0.0, |period| short(period.recip()));
-        match clock.period.map(seven) {
-            Some(period) if clock.is_stated => {
-                page.line(
-                    "sample_period_s",
-                    period,
-                    format_args!("{rate} Hz, stated in the file"),
-                );
-            }
-            Some(period) => page.remark(format_args!(
-                "sample_period_s = {period}  # {rate} Hz; estimated from the time column if omitted"
-            )),
-            None if self.rows_show_period() => {}
+        let path = format!("imu.{}_unit", sensor.name());
+        match unit.word {
+            Some(_) => remarks.reason(&path, &unit.why),
             None => {
-                let why = "seconds between rows, which a counter does not give";
-                page.open("sample_period_s =", why);
+                let why = format!("{}; see the data sheet or the logger", unit.why);
+                remarks.open(&path, why);
             }
         }
-        let why = "guess: a row covers the interval that ends at its time stamp; otherwise \"start\" or \"middle\"";
-        page.line("time_stamp", quoted("end"), why);
-        let cuts = self.motion.as_ref().map_or(0, |motion| motion.cuts.len());
-        let why = match (cuts, clock.gaps.len(), clock.repeated) {
+        unit.word.map(str::to_owned)
+    }
+
+    fn period(&self, remarks: &mut Remarks) -> Option<Positive> {
+        let (path, clock) = ("imu.sample_period_s", &self.clock);
+        let Some(period) = clock.period else {
+            if !self.rows_show_period() {
+                let why = "seconds between rows, which a counter does not give";
+                remarks.open(path, why);
+            }
+            return None;
+        };
+        let rate = rounded(period.recip(), 4);
+        if clock.is_stated {
+            remarks.reason(path, format_args!("{rate} Hz, stated in the file"));
+        } else {
+            let why = format!("{rate} Hz; estimated from the time column if omitted");
+            remarks.suggestion(path, why);
+        }
+        Some(Positive(rounded(period, 7)))
+    }
+
+    /// Number of jumps of the gravity direction.
+    fn cuts(&self) -> usize {
+        self.motion.as_ref().map_or(0, |motion| motion.cuts.len())
+    }
+
+    fn why_continuous(&self) -> String {
+        let clock = &self.clock;
+        match (self.cuts(), clock.gaps.len(), clock.repeated) {
             (0, 0, 0) => "no gaps".to_owned(),
             (0, 0, repeated) => {
                 format!(
@@ -134,8 +179,7 @@ impl Draft {
                 "gravity direction jumps in {}, as in concatenated sections; otherwise set true",
                 places(cuts)
             ),
-        };
-        page.line("continuous", cuts == 0, why);
+        }
     }
 
     /// Whether rows without a time show how long they last: rates, whose sums are angles.
@@ -146,107 +190,113 @@ impl Draft {
             && gyro.word.is_some_and(|word| word != "count")
     }
 
-    fn body_axes(&self, page: &mut Page) {
-        if let Some(axes) = self.streams.as_ref().and_then(|streams| streams.axes) {
-            page.line("body_axes", quoted(axes), AXES_OF_PROGRAM);
-            return;
+    fn body_axes(&self, remarks: &mut Remarks) -> BodyAxes {
+        let path = "imu.body_axes";
+        let of_program = self.streams.as_ref().and_then(|streams| streams.axes);
+        if let Some(axes) = of_program.and_then(|axes| toml::Value::from(axes).try_into().ok()) {
+            remarks.reason(path, AXES_OF_PROGRAM);
+            return axes;
         }
         let mut why = "guess: x right, y front, z up; otherwise \"frd\" or \"flu\"".to_owned();
-        if let Some(axes) = axes_of_program(&self.columns.names) {
-            why +=
-                &format!("; the column names are those of PX4 or ArduPilot, which use \"{axes}\"");
+        if is_of_autopilot(&self.columns.names) {
+            why += "; the column names are those of PX4 or ArduPilot, which use \"frd\"";
         }
-        page.line("body_axes", quoted("rfu"), why);
+        remarks.reason(path, why);
+        BodyAxes::Rfu
     }
 
-    /// The name of a column in quotes.
+    /// The name of a column.
     fn name(&self, column: usize) -> String {
-        quoted(&self.columns.names[column])
+        self.columns.names[column].clone()
     }
 
-    /// The names of some columns.
-    fn names(&self, columns: &[usize]) -> String {
+    /// The names of some columns, for a remark.
+    fn list(&self, columns: &[usize]) -> String {
         let names: Vec<String> = columns.iter().map(|&k| self.name(k)).collect();
-        names.join(", ")
+        toml::Value::from(names).to_string()
     }
 
-    fn columns(&self, page: &mut Page) {
-        self.doubts_of_triads(page);
-        let columns = &self.columns;
-        let mut fields: Vec<String> = match (columns.time, columns.nanoseconds) {
-            (Some(time), Some(further)) => {
-                vec![format!("time = [{}]", self.names(&[time, further]))]
+    fn columns(&self, remarks: &mut Remarks) -> ImuColumns {
+        self.doubts_of_triads(remarks);
+        let (path, columns) = ("imu.columns", &self.columns);
+        let time = columns.time.map(|time| match columns.nanoseconds {
+            Some(further) => {
+                TimeColumn::SecondsAndNanoseconds([time, further].map(|k| self.name(k)))
             }
-            (Some(time), None) => vec![format!("time = {}", self.name(time))],
-            (None, _) => {
-                self.without_time(page);
-                Vec::new()
-            }
-        };
+            None => TimeColumn::One(self.name(time)),
+        });
+        if time.is_none() {
+            self.without_time(remarks);
+        }
         let known = columns.triads.gyro.or(columns.triads.accel);
         for sensor in Sensor::ALL {
-            let name = sensor.name();
-            if let Some(triad) = columns.triads.get(sensor) {
-                fields.push(format!("{name} = [{}]", self.names(triad)));
-                continue;
-            }
             let all: Vec<usize> = (0..columns.names.len()).collect();
-            let why = format!("three of {}; {NO_COLUMNS}", self.names(&all));
-            match known {
-                None => page.open("", format_args!("{name} = {why}")),
-                Some(_) => page.remark(format_args!(
-                    "{name} = {why}; without them only `turncal allan` can use the log"
-                )),
+            let why = || {
+                let (name, all) = (sensor.name(), self.list(&all));
+                format!("{name} = three of {all}; {NO_COLUMNS}")
+            };
+            match (columns.triads.get(sensor), known) {
+                (Some(_), _) => {}
+                (None, None) => remarks.open_before(path, why()),
+                (None, Some(_)) => {
+                    let without = "without them only `turncal allan` can use the log";
+                    remarks.before(path, format_args!("{}; {without}", why()));
+                }
             }
         }
-        let temperature = columns.temperature;
-        fields.extend(temperature.map(|k| format!("temperature = {}", self.name(k))));
-        self.turned_axes(page);
-        let fields = format!("{{ {} }}", fields.join(", "));
-        match self.blocked.is_empty() {
-            true => page.plain("columns", fields),
-            false => page.open(&format!("columns = {fields}"), self.blocked.join("; ")),
+        self.turned_axes(remarks);
+        if !self.blocked.is_empty() {
+            remarks.open(path, self.blocked.join("; "));
+        }
+        let names = |triad: Option<[usize; 3]>| Some(Names(triad?.map(|k| self.name(k))));
+        ImuColumns {
+            time,
+            gyro: names(columns.triads.gyro),
+            accel: names(columns.triads.accel),
+            temperature: (columns.temperature).map(|k| TemperatureColumn::One(self.name(k))),
         }
     }
 
     /// Remarks on alternative triad columns and on identification by value.
-    fn doubts_of_triads(&self, page: &mut Page) {
+    fn doubts_of_triads(&self, remarks: &mut Remarks) {
         let columns = &self.columns;
         for sensor in Sensor::ALL {
             for other in columns.others.get(sensor) {
-                let names = self.names(other);
-                page.remark(format_args!("{} could also be [{names}]", sensor.name()));
+                let (name, other) = (sensor.name(), self.list(other));
+                remarks.before("imu.columns", format_args!("{name} could also be {other}"));
             }
         }
         if columns.by_size && columns.triads.gyro.is_some() {
-            page.remark(
+            remarks.before(
+                "imu.columns",
                 "The triads were identified by their values: gravity keeps the magnitude of the accelerometers constant.",
             );
         }
         if let Some((down, accel)) = self.down.zip(columns.triads.accel) {
-            let reversed = accel.map(|k| quoted(&format!("-{}", columns.names[k])));
-            page.remark(format_args!(
-                "At the start {}. If that axis pointed up, write accel = [{}].",
+            let reversed = accel.map(|k| format!("-{}", columns.names[k]));
+            let remark = format!(
+                "At the start {}. If that axis pointed up, write accel = {}.",
                 self.down_words(down),
-                reversed.join(", ")
-            ));
+                toml::Value::from(reversed.to_vec())
+            );
+            remarks.before("imu.columns", remark);
         }
     }
 
     /// Substitute for a time column.
-    fn without_time(&self, page: &mut Page) {
-        let why = &self.clock.why;
+    fn without_time(&self, remarks: &mut Remarks) {
+        let (path, why) = ("imu.columns", &self.clock.why);
         if self.clock.is_stated {
-            page.remark(format_args!("{why}; rows are taken as consecutive."));
+            let words = format_args!("{why}; rows are taken as consecutive.");
+            remarks.before(path, words);
         } else if self.rows_show_period() {
-            page.remark(format_args!(
+            let words = format_args!(
                 "{why}; the sample period is estimated from the turns unless sample_period_s is set."
-            ));
-        } else {
-            page.open(
-                "",
-                format_args!("{why}; name a time column or set sample_period_s."),
             );
+            remarks.before(path, words);
+        } else {
+            let words = format_args!("{why}; name a time column or set sample_period_s.");
+            remarks.open_before(path, words);
         }
     }
 
@@ -260,7 +310,7 @@ impl Draft {
     }
 
     /// Remark on gyro columns that do not match the accelerometer axes.
-    fn turned_axes(&self, page: &mut Page) {
+    fn turned_axes(&self, remarks: &mut Remarks) {
         let turns = self
             .registers
             .as_ref()
@@ -273,32 +323,47 @@ impl Draft {
             let sign = if turns.axes.scale[k] < 0.0 { "−" } else { "" };
             format!("{sign}{}", self.columns.names[triad[k]])
         });
-        page.remark(format_args!(
+        remarks.before("imu.columns", format_args!(
             "From the gravity directions in {} moves, the gyros about the accelerometer axes x, y and z are {x}, {y} \
              and {z}.",
             turns.moves
         ));
-        page.remark("The gyro column order and scale signs follow from this.");
+        let follows = "The gyro column order and scale signs follow from this.";
+        remarks.before("imu.columns", follows);
     }
 
-    fn noise_table(&self, page: &mut Page) {
-        page.table(
+    fn noise_fields(&self, remarks: &mut Remarks) -> NoiseFields {
+        remarks.before(
             "imu.noise",
             "white noise; turncal estimates it from the recording unless it is stated",
         );
-        for sensor in self.present() {
+        let mut fields = NoiseFields::new();
+        for sensor in Sensor::ALL.into_iter().filter(|&of| self.is_present(of)) {
             if let Some(noise) = &self.stated.noise {
-                stated_noise(page, sensor, noise.get(sensor));
+                stated_noise(&mut fields, remarks, sensor, noise.get(sensor));
                 continue;
             }
             let (key, unit) = NoiseKeys::of(sensor).random_walk;
-            match self.white_noise(sensor) {
-                Some(walk) => page.remark(format_args!(
-                    "{key} = {:?}  # measured at rest in this log; prefer a data sheet or turncal allan",
-                    short(walk / unit)
-                )),
-                None => page.optional(key, "value from the data sheet"),
-            }
+            let walk = self.white_noise(sensor);
+            let why = match walk {
+                Some(_) => "measured at rest in this log; prefer a data sheet or turncal allan",
+                None => "value from the data sheet",
+            };
+            remarks.suggestion(&format!("imu.noise.{key}"), why);
+            let walk = walk.map(|walk| NonNegative(rounded(walk / unit, 4)));
+            fields.insert(key.to_owned(), walk);
+        }
+        fields
+    }
+
+    fn priors(&self, remarks: &mut Remarks) -> PriorsFile {
+        let mut prior = |sensor| match self.is_present(sensor) {
+            true => self.prior(sensor, remarks),
+            false => PriorFile::default(),
+        };
+        PriorsFile {
+            gyro: prior(Sensor::Gyro),
+            accel: prior(Sensor::Accel),
         }
     }
 
@@ -310,34 +375,22 @@ impl Draft {
         let scale = self.quantities.scale(sensor)?;
         Some((*self.random_walk.get(sensor))? / scale.abs())
     }
-
-    fn table(&self, page: &mut Page) {
-        page.text.push('\n');
-        match &self.columns.quaternion {
-            Some(four) => page.remark(format_args!(
-                "{} form a quaternion. If it comes from a turntable (body right-front-up to East-North-Up, order w, \
-                 x, y, z), add a [turntable] that reads this file. Do not use an attitude computed by the instrument \
-                 itself.",
-                self.names(four)
-            )),
-            None => page.remark(
-                "If you have a turntable log, add [turntable] with file, columns, position_sigma_arcsec and \
-                 reading_sigma_arcsec.",
-            ),
-        }
-    }
 }
 
-fn stated_noise(page: &mut Page, sensor: Sensor, noise: &Noise) {
+fn stated_noise(fields: &mut NoiseFields, remarks: &mut Remarks, sensor: Sensor, noise: &Noise) {
     let keys = NoiseKeys::of(sensor);
-    let mut line = |key, value, why| page.line(key, format_args!("{:?}", seven(value)), why);
+    let mut state = |key: &str, value: f64, why| {
+        let value = Some(NonNegative(rounded(value, 7)));
+        fields.insert(key.to_owned(), value);
+        remarks.reason(&format!("imu.noise.{key}"), why);
+    };
     let (key, unit) = keys.random_walk;
-    line(key, noise.random_walk / unit, "as stated");
+    state(key, noise.random_walk / unit, "as stated");
     if let Some(bias) = noise.gauss_markov {
         let (key, unit) = keys.gauss_markov;
-        line(key, bias.sigma / unit, "as stated");
+        state(key, bias.sigma / unit, "as stated");
         let why = "chosen here, because a random walk has no correlation time";
-        line(keys.correlation_time, bias.correlation_time, why);
+        state(keys.correlation_time, bias.correlation_time, why);
     }
 }
 
@@ -346,21 +399,4 @@ fn places(count: usize) -> String {
         1 => "one place".to_owned(),
         count => format!("{count} places"),
     }
-}
-
-/// A number to seven digits.
-pub fn seven(value: f64) -> f64 {
-    format!("{value:.6e}").parse().unwrap_or(value)
-}
-
-/// A word in quotes, or a number unchanged.
-pub fn word_or_number(text: &str) -> String {
-    match text.parse::<f64>() {
-        Ok(_) => text.to_owned(),
-        Err(_) => quoted(text),
-    }
-}
-
-pub fn quoted(text: &str) -> String {
-    toml::Value::String(text.to_owned()).to_string()
 }

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use super::Certainty;
+use super::certainty::Certainty;
 use super::columns::Columns;
 use super::name::Name;
-use super::text::seven;
 use crate::formats::Sheet;
 use crate::formats::clock::Uniform;
 use crate::formats::quantity::units_of_time;
+use crate::number::rounded;
 use crate::statistics::median;
 
 /// Plausible sample periods, s (5 kHz to 5 Hz): units that differ by 1000 cannot both be plausible.
@@ -54,7 +54,7 @@ impl Clock {
         let tick = name.tick().map(|tick| tick * steps.mean);
         let known = stated.or(tick.filter(|period| PERIODS.contains(period)));
         let seconds = || units_of_time().map(|(_, second)| second);
-        let usual = short(steps.mean);
+        let usual = rounded(steps.mean, 6);
         let (second, why) = if columns.nanoseconds.is_some() {
             (Some(1.0), "seconds and nanoseconds".to_owned())
         } else if named.is_some() {
@@ -68,7 +68,7 @@ impl Clock {
             let tick = name.tick().filter(is_near).or_else(own);
             Some((seconds().find(is_near).or(tick)?, period))
         }) {
-            let rate = short(period.recip());
+            let rate = rounded(period.recip(), 6);
             (Some(second), format!("steps of {usual} at {rate} Hz"))
         } else {
             let is_usual = |second: &f64| PERIODS.contains(&(steps.mean * second));
@@ -79,7 +79,7 @@ impl Clock {
         Self {
             unit: second.map_or("count".to_owned(), |second| match word(second) {
                 Some((word, _)) => word.to_owned(),
-                None => format!("{:?}", seven(second)),
+                None => format!("{:?}", rounded(second, 7)),
             }),
             certainty: match named {
                 Some(_) if columns.nanoseconds.is_none() => Certainty::Certain,
@@ -107,7 +107,7 @@ impl Clock {
             [
                 format!(
                     "time stamps at {} Hz ({}; {})",
-                    short(found),
+                    rounded(found, 6),
                     self.unit,
                     self.why
                 ),
@@ -188,9 +188,4 @@ impl Steps {
             repeated,
         }
     }
-}
-
-/// A number to six digits.
-fn short(value: f64) -> f64 {
-    format!("{value:.5e}").parse().unwrap_or(value)
 }

@@ -4,12 +4,12 @@ mod hypothesis;
 
 use nalgebra::Vector3;
 
-use hypothesis::Hypothesis;
+use hypothesis::{Hypothesis, TriadRows};
 
 use super::columns::Columns;
 use super::data_sheet::{Scale, likely_for_g};
 use super::motion::{Motion, TOLERANCE};
-use super::name::{self, Name};
+use super::name::Name;
 use super::raw_run::Axes;
 use super::registers::Registers;
 use super::stated::{Stated, StatedUnit};
@@ -17,6 +17,7 @@ use super::time::{Clock, PERIODS};
 use crate::formats::quantity::{Of, units};
 use crate::formats::{Sheet, unit_scale};
 use crate::imu::{Output, PerSensor, Sensor};
+use crate::number::rounded;
 
 /// Sums of pulses vary less than sums of readings by more than this factor.
 const PULSE_SUMS: f64 = 0.5;
@@ -56,17 +57,6 @@ pub struct Quantities {
     pub opposed: bool,
 }
 
-/// The rows of a triad.
-struct Rows<'a> {
-    motion: &'a Motion,
-    /// Period in s; NaN if unknown.
-    period: f64,
-    /// Unit named in the file.
-    named: Option<name::Unit>,
-    /// Whether they are whole numbers.
-    whole: bool,
-}
-
 impl Quantities {
     /// If there are too few numeric rows.
     pub fn unknown() -> Self {
@@ -91,7 +81,7 @@ impl Quantities {
         for sensor in [Sensor::Accel, Sensor::Gyro] {
             let first = columns.triads.get(sensor).map(|triad| triad[0]);
             let named = |k: usize| Name::of_column(&sheet.names[k], &sheet.units[k]).unit;
-            let rows = Rows {
+            let rows = TriadRows {
                 motion,
                 period: clock.period.unwrap_or(f64::NAN),
                 named: first.and_then(named),
@@ -106,7 +96,7 @@ impl Quantities {
         found
     }
 
-    fn unit(&mut self, sensor: Sensor, rows: &Rows) -> Unit {
+    fn unit(&mut self, sensor: Sensor, rows: &TriadRows) -> Unit {
         if let Some(unit) = scaled(sensor, rows) {
             return unit;
         }
@@ -154,7 +144,7 @@ impl Quantities {
     }
 
     /// Sets the row quantity from the accelerometers.
-    fn hold(&mut self, output: Output, rows: &Rows) {
+    fn hold(&mut self, output: Output, rows: &TriadRows) {
         self.output = output;
         self.output_why = match output {
             Output::Pulse => {
@@ -162,7 +152,7 @@ impl Quantities {
             }
             Output::Increment => format!(
                 "specific force at rest is g times {} s per row",
-                short(rows.period)
+                rounded(rows.period, 4)
             ),
             Output::Rate => {
                 "specific force at rest is g itself, not g times the sample period".to_owned()
@@ -170,7 +160,7 @@ impl Quantities {
         };
     }
 
-    fn counts_of_accelerometers(&mut self, rows: &Rows) -> Unit {
+    fn counts_of_accelerometers(&mut self, rows: &TriadRows) -> Unit {
         let gravity = rows.motion.gravity;
         let is_carried = |ratio: f64| rows.whole && ratio < PULSE_SUMS;
         let output = match rows.motion.sum_variance.is_some_and(is_carried) {
@@ -183,7 +173,7 @@ impl Quantities {
             word: Some("count"),
             why: why_count(
                 rows,
-                &format!("no known unit gives {} at rest", short(gravity)),
+                &format!("no known unit gives {} at rest", rounded(gravity, 4)),
             ),
             is_unfit: !rows.whole,
             likely: per_g.is_finite().then(|| likely_for_g(per_g)),
@@ -193,7 +183,7 @@ impl Quantities {
 
     fn counts_of_gyros(
         &self,
-        rows: &Rows,
+        rows: &TriadRows,
         by_name: Option<&Hypothesis>,
         all: &[Hypothesis],
     ) -> Unit {
@@ -206,7 +196,7 @@ impl Quantities {
                 let Some((word, period)) = usual_period(all, angle) else {
                     return Unit::open("cannot be estimated from turns without time stamps");
                 };
-                let rate = short(period.recip());
+                let rate = rounded(period.recip(), 4);
                 return Unit {
                     word: Some(word),
                     ..Unit::open(&format!(
@@ -257,7 +247,7 @@ impl Quantities {
         motion: &Motion,
         period: f64,
     ) -> Option<[String; 3]> {
-        let rows = Rows {
+        let rows = TriadRows {
             motion,
             period,
             named: None,
@@ -276,7 +266,7 @@ impl Quantities {
             let multiple = if times == 1.0 {
                 String::new()
             } else {
-                format!("{} ", short(times))
+                format!("{} ", rounded(times, 4))
             };
             is_contradicted.then(|| {
                 [
@@ -365,7 +355,7 @@ impl Quantities {
 }
 
 /// A unit that the file states as a multiple of one in `run.toml`, unless motion contradicts it.
-fn scaled(sensor: Sensor, rows: &Rows) -> Option<Unit> {
+fn scaled(sensor: Sensor, rows: &TriadRows) -> Option<Unit> {
     let unit = rows.named?;
     let scale = Scale::of_unit(sensor, unit)?;
     let per_si = scale.value.x;
@@ -381,7 +371,7 @@ fn scaled(sensor: Sensor, rows: &Rows) -> Option<Unit> {
 }
 
 /// Reason for treating a triad as counts.
-fn why_count(rows: &Rows, unfit: &str) -> String {
+fn why_count(rows: &TriadRows, unfit: &str) -> String {
     match rows.named {
         _ if rows.whole => "whole numbers".to_owned(),
         Some(unit) => format!(
@@ -397,26 +387,4 @@ fn usual_period(all: &[Hypothesis], angle: f64) -> Option<(&'static str, f64)> {
     let periods = all.iter().map(|of| (of.word, of.per_si * angle));
     let mut usual = periods.filter(|(_, period)| PERIODS.contains(period));
     usual.next().filter(|_| usual.next().is_none())
-}
-
-/// Half the range of a register of whole numbers whose zero is in its middle, where all values lie about that.
-pub fn offset(samples: &[Vector3<f64>]) -> Option<f64> {
-    let values = || samples.iter().flat_map(|sample| sample.iter().copied());
-    if values().any(|value| value.fract() != 0.0) {
-        return None;
-    }
-    let (low, high) = values().fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), v| {
-        (low.min(v), high.max(v))
-    });
-    // Of 12, 14, 16, 20, 24 and 32 bits.
-    let halves = [11, 13, 15, 19, 23, 31].map(|bits| 2f64.powi(bits));
-    let lies_about = |half: &f64| low >= 0.0 && low < *half && high > *half && high < 2.0 * half;
-    let half = halves.into_iter().find(lies_about)?;
-    let mean = values().sum::<f64>() / (3 * samples.len()) as f64;
-    ((mean / half - 1.0).abs() < 0.5).then_some(half)
-}
-
-/// A number to four digits.
-pub fn short(value: f64) -> f64 {
-    format!("{value:.3e}").parse().unwrap_or(value)
 }

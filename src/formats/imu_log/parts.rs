@@ -4,8 +4,8 @@ use std::ops::Range;
 
 use nalgebra::Vector3;
 
-use super::reading::Held;
-use super::{ImuLog, Layout, sensor};
+use super::held::Held;
+use super::settings::{ImuLog, Layout, sensor};
 use crate::formats::clock::{Line, REACH, Stamps, Uniform, Wander};
 use crate::formats::course::{Even, place, reached};
 use crate::formats::error::FileError;
@@ -15,24 +15,6 @@ use crate::recording::{
     Bridge, ColumnFacts, Fault, FaultKind, ImuSamples, LogFacts, Packer, SeriesWriter, finest_step,
     stretches_between,
 };
-
-/// Limits for the number of rows in memory.
-#[derive(Debug, Clone, Copy)]
-pub struct Sizes {
-    /// Longer logs are packed; up to this length they take at most 50 MB.
-    pub long: usize,
-    /// Number of rows searched for faults at once.
-    pub part: usize,
-}
-
-impl Default for Sizes {
-    fn default() -> Self {
-        Self {
-            long: 1 << 20,
-            part: 1 << 18,
-        }
-    }
-}
 
 /// Additional rows searched on either side of a part; more than the reach of a bridge and its evidence.
 const BESIDE: usize = 1 << 13;

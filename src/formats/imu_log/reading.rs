@@ -1,55 +1,17 @@
 //! The sample rows of a file in order of time, all in memory or packed while reading.
 
-use super::parts::{Parts, Sizes};
-use super::{ImuLog, Layout};
-use crate::formats::clock::{REACH, Stamp, Stamps, Wander};
+use super::held::{Held, Sizes};
+use super::parts::Parts;
+use super::settings::{ImuLog, Layout};
+use crate::formats::clock::{Stamp, Stamps, Wander};
 use crate::formats::error::FileError;
 use crate::formats::rows::LogRows;
 use crate::formats::temperature::Temperatures;
 use crate::imu::Output;
+use crate::recording::ImuSamples;
 
 /// Minimum number of samples; with fewer, dwells and turns cannot be distinguished.
 const FEWEST_SAMPLES: usize = 100;
-
-/// Rows in memory, without duplicates.
-#[derive(Default)]
-pub struct Held {
-    pub columns: [Vec<f64>; 6],
-    /// Rows before each duplicate, and its line.
-    pub duplicates: Vec<(usize, u64)>,
-}
-
-impl Held {
-    pub fn len(&self) -> usize {
-        self.columns[0].len()
-    }
-
-    fn row(&self, row: usize) -> [f64; 6] {
-        self.columns.each_ref().map(|column| column[row])
-    }
-
-    fn insert(&mut self, place: usize, row: [f64; 6]) {
-        // Rows that come late belong behind one of the last.
-        let last = self.len().saturating_sub(REACH);
-        let behind = self.duplicates.iter_mut().rev();
-        for (row, _) in behind.take_while(|(row, _)| *row > last) {
-            *row += usize::from(*row > place);
-        }
-        for (column, value) in self.columns.iter_mut().zip(row) {
-            column.insert(place, value);
-        }
-    }
-
-    /// Releases the first rows.
-    pub fn let_go(&mut self, rows: usize) {
-        for column in &mut self.columns {
-            column.drain(..rows);
-            column.shrink_to(2 * column.len());
-        }
-        self.duplicates.retain(|&(row, _)| row > rows);
-        self.duplicates.iter_mut().for_each(|(row, _)| *row -= rows);
-    }
-}
 
 /// A partly read file.
 pub struct Reading<'a> {
@@ -210,6 +172,46 @@ impl<'a> Reading<'a> {
 }
 
 impl ImuLog<'_> {
+    /// Reads the samples, finds and bridges faults; `notes` receives remarks about the file.
+    pub fn read(&self, notes: &mut Vec<String>) -> Result<ImuSamples, FileError> {
+        self.read_by(Sizes::default(), notes)
+    }
+
+    /// The same with other limits for the rows in memory.
+    pub fn read_by(&self, sizes: Sizes, notes: &mut Vec<String>) -> Result<ImuSamples, FileError> {
+        let mut known = None;
+        loop {
+            let mut csv = self.open()?;
+            let layout = self.layout(&mut csv)?;
+            let mut reading = Reading::begin(self, &mut csv, layout.places)?;
+            let parts = reading.all(&mut csv, &layout, sizes, known.as_ref())?;
+            let clock = parts.clock().map_err(|error| csv.placed(error))?;
+            if parts.are_packed() && known.is_none() && clock.wander.is_some() {
+                // Too long to be held: it is read again with the clock that it was found to have.
+                known = clock.wander;
+                continue;
+            }
+            notes.extend(clock.uneven());
+            notes.extend(csv.cut_off("turncal ignored it"));
+            notes.extend_from_slice(csv.remarks());
+            notes.extend(reading.notes());
+            notes.extend(reading.stamps.notes(&self.source.file, parts.missing()));
+            let mut imu = parts.finish(clock, reading.duplicates, csv.integral_error());
+            for stretch in &mut imu.stretches {
+                stretch.start = reading.stamps.told(stretch.start);
+            }
+            if let Some(temperature) = reading.temperature {
+                let read = temperature.read(&self.source.file.display().to_string());
+                notes.extend(read.notes);
+                imu.temperature = read.temperature;
+                if let Some(log) = &mut imu.log {
+                    log.temperature = read.facts;
+                }
+            }
+            return Ok(imu);
+        }
+    }
+
     /// A number in a row, unchanged.
     fn value(&self, csv: &LogRows, column: usize) -> Result<f64, FileError> {
         let value = csv.number(column)?;

@@ -1,9 +1,16 @@
 use std::fmt::Write;
 use std::fs;
 
+use nalgebra::Vector3;
+
+use super::held::Sizes;
 use super::*;
-use crate::formats::clock::{Breaks, TimeUnit};
+use crate::formats::clock::{Breaks, Clock, TimeUnit};
+use crate::formats::schema::TimeStamp;
+use crate::formats::source::Source;
+use crate::imu::{AxisOrder, Nominal, Output, PerSensor, Sensor};
 use crate::recording::FaultKind;
+use crate::recording::ImuSamples;
 
 const ROWS: usize = 50_000;
 const PERIOD: f64 = 0.01;

@@ -2,7 +2,7 @@
 
 use crate::formats::clock::{Breaks, Clock, TimeUnit};
 use crate::formats::data_file::DataFile;
-use crate::formats::error::FileError;
+use crate::formats::error::{FileError, list, suggestion};
 use crate::formats::schema::instrument::Fields;
 use crate::formats::schema::{Positive, TimeColumn, TimeUnitField};
 use crate::formats::source::Source;
@@ -32,9 +32,17 @@ impl<'a> Fields<'a> {
         &self,
         table: &str,
         column: Option<&'a TimeColumn>,
-        (unit, period): (Option<TimeUnitField>, Option<Positive>),
+        (unit, period): (Option<&TimeUnitField>, Option<Positive>),
     ) -> Result<Clock<'a>, FileError> {
-        let unit = unit.map(TimeUnit::from);
+        let unknown = |name: &str| {
+            let known = || TimeUnit::WORDS.iter().map(|(word, _)| *word);
+            self.document.wrong(
+                &format!("{table}.time_unit"),
+                format_args!("one of {}, or the duration of a tick in s", list(known())),
+                suggestion(name, known(), "Choose one of them."),
+            )
+        };
+        let unit = unit.map(TimeUnitField::unit).transpose().map_err(unknown)?;
         if unit == Some(TimeUnit::Count) && period.is_none() {
             let path = format!("{table}.sample_period_s");
             return Err(self.document.missing(&path, "the duration of one count"));
@@ -76,7 +84,7 @@ impl<'a> Fields<'a> {
             stream: fields.stream.as_deref().or(gyro.stream),
             salvage: fields.salvage.unwrap_or(gyro.salvage),
         };
-        let stated = (fields.time_unit, fields.sample_period_s);
+        let stated = (fields.time_unit.as_ref(), fields.sample_period_s);
         let mut clock = self.clock("imu.accel_from", fields.time.as_ref(), stated)?;
         if clock.column.is_none() {
             (clock.column, clock.nanoseconds) = (of_gyro.column, of_gyro.nanoseconds);

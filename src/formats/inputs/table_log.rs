@@ -7,10 +7,10 @@ use crate::formats::clock::{Clock, Stamp};
 use crate::formats::error::FileError;
 use crate::formats::rows::LogRows;
 use crate::formats::schema::instrument::Fields;
-use crate::formats::schema::{AXIS_ERRORS, Angle, TurntableFile};
+use crate::formats::schema::{Angle, TurntableFile};
 use crate::formats::source::Source;
 use crate::recording::{ImuSamples, TableLog};
-use crate::turntable::{AxisAngles, AxisError, TableAccuracy, TableGeometry, axis_angles};
+use crate::turntable::{AxisAngles, TableAccuracy, TableGeometry, axis_angles};
 use crate::units::{ARCSEC, DEGREE};
 
 /// Tolerance of the norm, met by four components with four decimals; larger deviations are not quaternions.
@@ -74,7 +74,7 @@ impl<'a> Fields<'a> {
         let Some(fields) = &self.run.turntable else {
             return Ok(None);
         };
-        let stated = (fields.time_unit, fields.sample_period_s);
+        let stated = (fields.time_unit.as_ref(), fields.sample_period_s);
         let attitude = self.attitude(fields)?;
         if fields.time_sigma_ms.is_some() {
             let note = "turntable.time_sigma_ms currently has no effect.";
@@ -147,8 +147,7 @@ impl<'a> Fields<'a> {
     fn geometry(&self, fields: &TurntableFile, angles: usize) -> Result<TableGeometry, FileError> {
         let sigma = |stated: Option<Angle>| stated.map_or(0.0, |sigma| sigma.0 * ARCSEC);
         let mut axes = TableGeometry::default().axes;
-        let stated = AXIS_ERRORS.into_iter().zip(fields.axis_errors());
-        for (kind, (key, stated)) in AxisError::ALL.into_iter().zip(stated) {
+        for (kind, key, stated) in fields.axis_errors() {
             if stated.is_some() && angles == 0 {
                 return Err(self.document.wrong(
                     &format!("turntable.{key}"),

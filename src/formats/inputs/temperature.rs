@@ -1,10 +1,8 @@
 //! Temperature columns of a log.
 
-use serde::{Deserialize, Serialize};
-
 use crate::formats::error::FileError;
 use crate::formats::rows::LogRows;
-use crate::formats::schema::{OneOrThree, TemperatureColumn};
+use crate::formats::schema::{OneOrThree, TemperatureColumn, TemperatureUnit};
 use crate::imu::PerSensor;
 use crate::recording::{TEMPERATURE_SPACING, Temperature, TemperatureFacts};
 
@@ -12,29 +10,6 @@ use crate::recording::{TEMPERATURE_SPACING, Temperature, TemperatureFacts};
 const LARGEST: f64 = 100.0;
 /// Maximum number of spans of [`TEMPERATURE_SPACING`]: one year.
 const MOST_SPANS: f64 = 366.0 * 86_400.0;
-
-/// Unit of a temperature column.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-pub enum TemperatureUnit {
-    #[default]
-    #[serde(rename = "degC")]
-    Celsius,
-    #[serde(rename = "K")]
-    Kelvin,
-    #[serde(rename = "degF")]
-    Fahrenheit,
-}
-
-impl TemperatureUnit {
-    fn celsius(self, value: f64) -> f64 {
-        match self {
-            Self::Celsius => value,
-            Self::Kelvin => value - 273.15,
-            Self::Fahrenheit => (value - 32.0) * (5.0 / 9.0),
-        }
-    }
-}
 
 /// Settings in `run.toml`.
 pub struct TemperatureColumns<'a> {

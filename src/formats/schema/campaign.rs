@@ -4,14 +4,15 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
-use super::page::Page;
+use super::page::{self, Remarks};
 use super::{Celsius, Document, NonNegative};
 use crate::calibration::{DayToDay, Group, TemperatureOptions, Together};
 use crate::formats::error::FileError;
 use crate::formats::{is_toml, small_file};
 use crate::imu::{HIGHEST_ORDER, InstallationForm, ParameterKind};
+use crate::number::rounded;
 use crate::recording::Temperature;
 use crate::run::Run;
 
@@ -28,11 +29,11 @@ pub struct Campaign {
     pub together: Together,
 }
 
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CampaignFile {
     /// Parameter groups that are independent in each recording.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     own: Vec<String>,
     temperature: Option<TemperatureFile>,
     recording: Vec<RecordingFile>,
@@ -41,7 +42,7 @@ struct CampaignFile {
     day_to_day: BTreeMap<String, NonNegative>,
 }
 
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RecordingFile {
     run: PathBuf,
@@ -49,7 +50,7 @@ struct RecordingFile {
 }
 
 /// Temperature dependence of parameters.
-#[derive(Clone, Copy, Deserialize)]
+#[derive(Clone, Copy, Serialize, Deserialize)]
 #[serde(
     untagged,
     deny_unknown_fields,
@@ -139,19 +140,22 @@ impl Campaign {
 
 /// The `campaign.toml` for recordings with these relative paths and this 1σ between recordings.
 pub fn campaign_text(paths: &[String], day_to_day: &DayToDay) -> String {
-    let mut page = Page::of(FORMAT, "");
-    for path in paths {
-        page.text += "\n[[recording]]\n";
-        page.field("run", path.as_str());
-    }
-    let lines: BTreeMap<String, f64> = day_to_day.values().filter(|of| of.1 > 0.0).collect();
-    if !lines.is_empty() {
-        page.table("day_to_day", "1σ from one recording to the next");
-    }
-    for (key, sigma) in lines {
-        page.field(&key, format!("{sigma:.2e}").parse().unwrap_or(sigma));
-    }
-    page.text
+    let recording = |path: &String| RecordingFile {
+        run: path.into(),
+        temperature_degc: None,
+    };
+    let differing = day_to_day.values().filter(|(_, sigma)| *sigma > 0.0);
+    let file = CampaignFile {
+        own: Vec::new(),
+        temperature: None,
+        recording: paths.iter().map(recording).collect(),
+        day_to_day: differing
+            .map(|(key, sigma)| (key, NonNegative(rounded(sigma, 3))))
+            .collect(),
+    };
+    let mut remarks = Remarks::default();
+    remarks.before("day_to_day", "1σ from one recording to the next");
+    page::text(FORMAT, &file, &remarks)
 }
 
 /// Temperature dependence of parameters; `None` if constant.

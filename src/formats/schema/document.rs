@@ -107,11 +107,16 @@ impl<'a> Document<'a> {
         text.unwrap_or("a value")
     }
 
+    /// The text of a field, `table.name`.
+    pub fn written_at(self, path: &str) -> &'a str {
+        let span = self.span_of(path);
+        span.map_or("nothing", |span| self.written(span))
+    }
+
     /// The error for an existing field, `table.name`.
     pub fn wrong(self, path: &str, expected: impl Display, advice: impl Display) -> FileError {
-        let span = self.span_of(path);
-        let source = span.clone().map_or("nothing", |span| self.written(span));
-        self.error(span, format_args!("{path} = {source}"), expected, advice)
+        let found = format_args!("{path} = {}", self.written_at(path));
+        self.error(self.span_of(path), found, expected, advice)
     }
 
     /// The error for a missing field, `table.name`; `meaning` describes its content.

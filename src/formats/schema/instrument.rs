@@ -57,7 +57,7 @@ impl<'a> Fields<'a> {
     pub fn instrument(&mut self) -> Result<InstrumentFields<'a>, FileError> {
         let imu = &self.run.imu;
         let known = self.knowledge()?;
-        let stated = (imu.time_unit, imu.sample_period_s);
+        let stated = (imu.time_unit.as_ref(), imu.sample_period_s);
         let mut of_gyro = self.clock("imu", imu.columns.time.as_ref(), stated)?;
         let source = self.source(&imu.file, &imu.stream, imu.salvage);
         let accel_from = self.accel_from(&source, of_gyro)?;
@@ -142,7 +142,7 @@ impl<'a> Fields<'a> {
     /// Noise of a triad at rest and in moves; zero if not stated.
     fn noise(&self, sensor: Sensor) -> Result<(Noise, MotionNoise), FileError> {
         let keys = NoiseKeys::of(sensor);
-        let get = |name: &str| self.run.imu.noise.get(name).map(|value| value.0);
+        let get = |name: &str| (*self.run.imu.noise.get(name)?).map(|value| value.0);
         let ((key, sigma_unit), time) = (keys.gauss_markov, keys.correlation_time);
         let key = get(keys.former).map_or(key, |_| keys.former);
         let path = |name: &str| format!("imu.noise.{name}");

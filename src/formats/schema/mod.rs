@@ -19,8 +19,10 @@ pub use campaign::{Campaign, campaign_text};
 pub use document::Document;
 #[cfg(feature = "certificate")]
 pub use laboratory::read_laboratory;
-pub use read::stated_gravity_sigma;
 pub use run::*;
-pub use values::{Angle, Celsius, Finite, Latitude, NonNegative, OneOrThree, Positive};
-pub use words::{BodyAxes, Names, TimeUnitField};
+pub use values::{
+    Angle, Celsius, Finite, Gravity, Height, Latitude, NonNegative, OneOrThree, Positive,
+    stated_gravity_sigma,
+};
+pub use words::{BodyAxes, Names, TemperatureUnit, TimeStamp, TimeUnitField};
 pub use write::{write_rows, write_run};

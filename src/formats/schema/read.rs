@@ -8,6 +8,7 @@ use toml::Spanned;
 use toml::de::DeTable;
 
 use super::instrument::{Fields, InstrumentFields};
+use super::values::stated_gravity_sigma;
 use super::{Document, FORMAT, META, RunFile, StandstillFile};
 use crate::earth::Site;
 use crate::formats::data_file::DataFile;
@@ -285,8 +286,8 @@ impl Fields<'_> {
         let latitude = file.latitude_deg.map(|degrees| degrees.0 * DEGREE);
         let mut site = Site::of_knowledge(latitude, longitude, height);
         if let Some(gravity) = &file.gravity_m_s2 {
-            let sigma = stated_gravity_sigma(self.document.written(gravity.span()));
-            site = site.with_gravity(gravity.get_ref().0, sigma);
+            let written = self.document.written_at("site.gravity_m_s2");
+            site = site.with_gravity(gravity.0, stated_gravity_sigma(written));
         }
         if let Some(sigma) = file.gravity_sigma_mgal {
             site.gravity_sigma = sigma.0 * MILLIGAL;
@@ -327,15 +328,6 @@ fn place_note(site: &Site, has_gravity: bool, has_height: bool) -> Option<String
     (!costs.is_empty()).then(|| {
         format!("You stated no {missing}. turncal {costs}. Set {fields} in [site]{or_gravity}.")
     })
-}
-
-/// 1σ of a gravity stated without σ, m/s²: from its last digit, at least one milligal.
-pub fn stated_gravity_sigma(written: &str) -> f64 {
-    let digits = written
-        .split_once('.')
-        .map_or(0, |(_, digits)| digits.len());
-    let last = 10f64.powi(-i32::try_from(digits).unwrap_or(i32::MAX));
-    MILLIGAL.max(last / 12f64.sqrt())
 }
 
 fn standstill(file: &StandstillFile) -> Standstill {

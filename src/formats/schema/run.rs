@@ -2,18 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use serde::Deserialize;
-use toml::Spanned;
+use serde::{Deserialize, Serialize, Serializer};
 
 use super::values::{
     Angle, Finite, Gravity, Height, Latitude, Longitude, Milligals, NonNegative, OneOrThree,
     Positive,
 };
-use super::words::{BodyAxes, Names, TimeUnitField};
-use crate::formats::imu_log::TimeStamp;
-use crate::formats::inputs::temperature::TemperatureUnit;
+use super::words::{BodyAxes, Names, TemperatureUnit, TimeStamp, TimeUnitField};
 use crate::imu::{AxisOrder, Output, Sensor};
 use crate::models::TermFile;
+use crate::turntable::AxisError;
 
 /// The version of the format.
 pub const FORMAT: &str = "turncal-run/1";
@@ -31,7 +29,7 @@ pub const META: [&str; 8] = [
 ];
 
 /// A recording of an instrument on a turntable or turned by hand
-#[derive(Deserialize)]
+#[derive(Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct RunFile {
@@ -53,7 +51,7 @@ pub struct RunFile {
     pub segments: Option<SegmentsFile>,
 }
 
-#[derive(Default, Deserialize)]
+#[derive(Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct SiteFile {
@@ -64,13 +62,12 @@ pub struct SiteFile {
     /// Height above the ellipsoid, m; default 0 ± 500
     pub height_m: Option<Height>,
     /// Measured gravity, m/s²; without gravity_sigma_mgal its last digit gives its σ. Default: normal gravity
-    #[cfg_attr(feature = "cli", schemars(with = "Option<Gravity>"))]
-    pub gravity_m_s2: Option<Spanned<Gravity>>,
+    pub gravity_m_s2: Option<Gravity>,
     /// 1σ of gravity, mGal
     pub gravity_sigma_mgal: Option<Milligals>,
 }
 
-#[derive(Deserialize)]
+#[derive(Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ImuFile {
@@ -78,10 +75,10 @@ pub struct ImuFile {
     pub file: String,
     /// Stream that holds the gyros, in a file with several
     pub stream: Option<String>,
-    /// Use a damaged log up to the damage; default false
-    pub salvage: Option<bool>,
     /// Accelerometers that are not in the rows of the gyros
     pub accel_from: Option<AccelFromFile>,
+    /// Use a damaged log up to the damage; default false
+    pub salvage: Option<bool>,
     /// What a row holds: whole counts in the sample (pulse), the integral over it (increment) or the mean over it
     /// (rate)
     pub output: Output,
@@ -101,17 +98,18 @@ pub struct ImuFile {
     pub time_stamp: TimeStamp,
     /// False if the file holds sections laid end to end; default true
     pub continuous: Option<bool>,
-    /// Use only the rows of one instrument of several
-    pub instance: Option<InstanceFile>,
     /// Unit of the temperature columns: degC (default), K or degF
     pub temperature_unit: Option<TemperatureUnit>,
     /// Axes of the log: rfu right-front-up (default), frd or flu
     pub body_axes: Option<BodyAxes>,
+    /// Use only the rows of one instrument of several
+    pub instance: Option<InstanceFile>,
     /// Names or numbers of the columns; a minus before a name reverses its sign
     pub columns: ImuColumns,
     /// Noise figures by name, such as angle_random_walk_deg_per_sqrt_h
     #[serde(default)]
-    pub noise: BTreeMap<String, NonNegative>,
+    #[cfg_attr(feature = "cli", schemars(with = "BTreeMap<String, NonNegative>"))]
+    pub noise: BTreeMap<String, Option<NonNegative>>,
     /// Knowledge of the triads before the calibration
     #[serde(default)]
     pub prior: PriorsFile,
@@ -147,7 +145,7 @@ impl ImuFile {
 }
 
 /// Defaults are those of `[imu]`.
-#[derive(Deserialize)]
+#[derive(Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct AccelFromFile {
@@ -166,17 +164,28 @@ pub struct AccelFromFile {
 }
 
 /// The column that distinguishes instruments, and its value for the selected one.
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct InstanceFile {
     /// Column that distinguishes the instruments
     pub column: String,
     /// Number of the instrument to use
+    #[serde(serialize_with = "whole")]
     pub number: Finite,
 }
 
-#[derive(Deserialize)]
+/// A number without decimals if it has none.
+fn whole<S: Serializer>(number: &Finite, serializer: S) -> Result<S::Ok, S::Error> {
+    let whole = number.0 as i64;
+    if whole as f64 == number.0 {
+        serializer.serialize_i64(whole)
+    } else {
+        number.serialize(serializer)
+    }
+}
+
+#[derive(Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct ImuColumns {
@@ -190,7 +199,7 @@ pub struct ImuColumns {
     pub temperature: Option<TemperatureColumn>,
 }
 
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(
     untagged,
@@ -201,7 +210,7 @@ pub enum TimeColumn {
     SecondsAndNanoseconds([String; 2]),
 }
 
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(
     untagged,
@@ -218,7 +227,7 @@ pub enum TemperatureColumn {
     },
 }
 
-#[derive(Default, Deserialize)]
+#[derive(Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct PriorsFile {
@@ -228,7 +237,7 @@ pub struct PriorsFile {
     pub accel: PriorFile,
 }
 
-#[derive(Default, Deserialize)]
+#[derive(Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct PriorFile {
@@ -244,7 +253,7 @@ pub struct PriorFile {
     pub bias_sigma: Option<OneOrThree>,
 }
 
-#[derive(Default, Deserialize)]
+#[derive(Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct StandstillFile {
@@ -258,7 +267,7 @@ pub struct StandstillFile {
     pub position_sigma_m: Option<Positive>,
 }
 
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct TurntableFile {
@@ -294,26 +303,25 @@ pub struct TurntableFile {
     pub time_sigma_ms: Option<Positive>,
 }
 
-/// Keys of axis errors, in the order of [`crate::turntable::AxisError::ALL`].
-pub const AXIS_ERRORS: [&str; 3] = [
-    "nonorthogonality_sigma_arcsec",
-    "wobble_sigma_arcsec",
-    "encoder_sigma_arcsec",
-];
-
 impl TurntableFile {
-    /// 1σ of axis errors, in the same order.
-    pub fn axis_errors(&self) -> [Option<Angle>; 3] {
+    /// Errors of the axes with their keys and 1σ.
+    pub fn axis_errors(&self) -> [(AxisError, &'static str, Option<Angle>); 3] {
+        let nonorthogonality = self.nonorthogonality_sigma_arcsec;
+        let (wobble, encoder) = (self.wobble_sigma_arcsec, self.encoder_sigma_arcsec);
         [
-            self.nonorthogonality_sigma_arcsec,
-            self.wobble_sigma_arcsec,
-            self.encoder_sigma_arcsec,
+            (
+                AxisError::Tilt,
+                "nonorthogonality_sigma_arcsec",
+                nonorthogonality,
+            ),
+            (AxisError::Wobble, "wobble_sigma_arcsec", wobble),
+            (AxisError::Encoder, "encoder_sigma_arcsec", encoder),
         ]
     }
 }
 
 /// A quaternion `[w, x, y, z]`, or angles about axes, outermost first, or both.
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct TableColumns {
@@ -327,7 +335,7 @@ pub struct TableColumns {
     pub axes: Option<Vec<String>>,
 }
 
-#[derive(Deserialize)]
+#[derive(Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct SegmentsFile {

@@ -1,9 +1,10 @@
 //! Values checked while reading, so that errors name their line.
 
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 
 use crate::earth::{GRAVITIES, HEIGHTS};
+use crate::units::MILLIGAL;
 
 /// Squares and quotients of such numbers are finite.
 fn with_size(value: f64) -> Result<f64, &'static str> {
@@ -14,13 +15,22 @@ fn with_size(value: f64) -> Result<f64, &'static str> {
     }
 }
 
+/// A number; as a text if it is none that a file can hold, which reading refuses.
+fn number<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    if value.is_finite() {
+        serializer.serialize_f64(*value)
+    } else {
+        serializer.collect_str(value)
+    }
+}
+
 macro_rules! checked {
     ($($(#[$meta:meta])* $name:ident, $says:literal, $holds:expr;)+) => {$(
         $(#[$meta])*
         #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
         #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
         #[serde(try_from = "f64")]
-        pub struct $name(pub f64);
+        pub struct $name(#[serde(serialize_with = "number")] pub f64);
 
         impl TryFrom<f64> for $name {
             type Error = &'static str;
@@ -61,6 +71,15 @@ checked!(
     Celsius, "a number from -100 to 100", |v| v.abs() <= 100.0;
 );
 
+/// 1σ of a gravity stated without σ, m/s²: from its last digit, at least one milligal.
+pub fn stated_gravity_sigma(written: &str) -> f64 {
+    let digits = written
+        .split_once('.')
+        .map_or(0, |(_, digits)| digits.len());
+    let last = 10f64.powi(-i32::try_from(digits).unwrap_or(i32::MAX));
+    MILLIGAL.max(last / 12f64.sqrt())
+}
+
 /// One value per axis, or one for all three.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
@@ -68,6 +87,15 @@ checked!(
 pub enum OneOrThree<T = Finite> {
     One(T),
     Three([T; 3]),
+}
+
+impl From<Vector3<f64>> for OneOrThree {
+    fn from(values: Vector3<f64>) -> Self {
+        match <[f64; 3]>::from(values) {
+            [x, y, z] if x == y && y == z => Self::One(Finite(x)),
+            values => Self::Three(values.map(Finite)),
+        }
+    }
 }
 
 impl OneOrThree {

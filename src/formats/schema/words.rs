@@ -27,51 +27,95 @@ impl BodyAxes {
     }
 }
 
-/// A unit of time by name, or the duration of a clock tick, s.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(
-    untagged,
-    expecting = "`s`, `ms`, `us`, `ns`, `count`, or the duration of a tick in s"
-)]
-pub enum TimeUnitField {
-    Named(TimeUnitName),
-    Tick(Positive),
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// The moment of a sample that its time stamp marks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
-pub enum TimeUnitName {
-    S,
-    Ms,
-    Us,
-    Ns,
-    Count,
+pub enum TimeStamp {
+    #[default]
+    End,
+    Start,
+    Middle,
 }
 
-impl From<TimeUnitField> for TimeUnit {
-    fn from(field: TimeUnitField) -> Self {
-        let name = match field {
-            TimeUnitField::Tick(tick) => return Self::PerSecond(tick.0.recip()),
-            TimeUnitField::Named(name) => name,
-        };
-        match name {
-            TimeUnitName::S => Self::PerSecond(1.0),
-            TimeUnitName::Ms => Self::PerSecond(1e3),
-            TimeUnitName::Us => Self::PerSecond(1e6),
-            TimeUnitName::Ns => Self::PerSecond(1e9),
-            TimeUnitName::Count => Self::Count,
+impl TimeStamp {
+    /// Time from the start of a sample to its stamp, in samples.
+    pub fn lag(self) -> f64 {
+        match self {
+            Self::Start => 0.0,
+            Self::Middle => 0.5,
+            Self::End => 1.0,
         }
     }
 }
 
-/// This number of column names.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+/// Unit of a temperature column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
-#[serde(try_from = "Vec<String>")]
+pub enum TemperatureUnit {
+    #[default]
+    #[serde(rename = "degC")]
+    Celsius,
+    #[serde(rename = "K")]
+    Kelvin,
+    #[serde(rename = "degF")]
+    Fahrenheit,
+}
+
+impl TemperatureUnit {
+    /// A temperature in °C.
+    pub fn celsius(self, value: f64) -> f64 {
+        match self {
+            Self::Celsius => value,
+            Self::Kelvin => value - 273.15,
+            Self::Fahrenheit => (value - 32.0) * (5.0 / 9.0),
+        }
+    }
+}
+
+/// A unit of time by name, or the duration of a clock tick, s.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
+#[serde(untagged, expecting = "a unit of time, or the duration of a tick in s")]
+pub enum TimeUnitField {
+    Tick(Positive),
+    Named(String),
+}
+
+impl TimeUnitField {
+    /// As in a file.
+    pub fn of_text(text: &str) -> Self {
+        match text.parse() {
+            Ok(tick) => Self::Tick(Positive(tick)),
+            Err(_) => Self::Named(text.to_owned()),
+        }
+    }
+
+    /// The unit.
+    ///
+    /// # Errors The name, if it is none of [`TimeUnit::WORDS`].
+    pub fn unit(&self) -> Result<TimeUnit, &str> {
+        let name = match self {
+            Self::Tick(tick) => return Ok(TimeUnit::PerSecond(tick.0.recip())),
+            Self::Named(name) => name,
+        };
+        let known = TimeUnit::WORDS.iter().find(|(word, _)| word == name);
+        known.map(|&(_, unit)| unit).ok_or(name)
+    }
+}
+
+/// This number of column names.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
+#[serde(try_from = "Vec<String>", into = "Vec<String>")]
 #[cfg_attr(feature = "cli", schemars(with = "Vec<String>"))]
 pub struct Names<const N: usize>(pub [String; N]);
+
+impl<const N: usize> From<Names<N>> for Vec<String> {
+    fn from(names: Names<N>) -> Self {
+        names.0.into()
+    }
+}
 
 impl<const N: usize> TryFrom<Vec<String>> for Names<N> {
     type Error = &'static str;

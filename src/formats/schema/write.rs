@@ -1,21 +1,30 @@
 //! A [`Run`] as a run directory.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use flate2::{Compression, GzBuilder};
 use nalgebra::Vector3;
-use toml::Value;
 
-use super::page::Page;
+use super::page::{self, Remarks};
 use super::read::check;
-use super::{AXIS_ERRORS, Document, FORMAT};
+use super::run::{
+    ImuColumns, ImuFile, PriorFile, PriorsFile, SegmentsFile, SiteFile, StandstillFile,
+    TableColumns, TemperatureColumn, TimeColumn, TurntableFile,
+};
+use super::values::{
+    Angle, Gravity, Height, Latitude, Longitude, Milligals, NonNegative, Positive,
+};
+use super::words::{Names, TimeStamp};
+use super::{Document, FORMAT, RunFile};
 use crate::calibration::Calibration;
 use crate::formats::error::FileError;
 use crate::formats::inputs::table_log::LETTERS;
-use crate::formats::quantity::output_word;
-use crate::imu::{NoiseKeys, Output, Sensor, Term};
+use crate::imu::{Instrument, NoiseKeys, Output, Sensor, Term};
+use crate::models::TermFile;
+use crate::number::rounded;
 use crate::recording::{ImuSamples, Segment, TableLog, nanoseconds};
 use crate::run::Run;
 use crate::turntable::AxisError;
@@ -40,7 +49,7 @@ pub fn write_run(
         let written = File::create(&path).and_then(|file| write_rows(&path, file, content));
         written.map_err(|error| FileError::unwritten(&path, &error))
     };
-    let toml = configuration_text(run, output);
+    let toml = page::text(FORMAT, &run_file(run, output), &remarks(run));
     check(Document::of(&configuration, &toml))?;
     write("run.toml", &|file| file.write_all(toml.as_bytes()))?;
     write("imu.csv.gz", &|file| imu_rows(file, run, output))?;
@@ -173,131 +182,162 @@ fn segment_rows(file: &mut dyn Write, segments: &[Segment]) -> io::Result<()> {
     csv.flush()
 }
 
-/// A number to fifteen digits, the accuracy of a unit conversion.
-fn short(value: f64) -> f64 {
-    format!("{value:.14e}").parse().unwrap_or(value)
+/// A value in the unit of the file, to fifteen digits: the accuracy of a conversion.
+fn in_unit(value: f64, unit: f64) -> f64 {
+    rounded(value / unit, 15)
 }
 
 /// A value in the unit of the file; `None` if it is not above zero.
 fn above_zero(value: f64, unit: f64) -> Option<f64> {
-    Some(short(value / unit)).filter(|&value| value > 0.0)
+    Some(in_unit(value, unit)).filter(|&value| value > 0.0)
 }
 
-fn configuration_text(run: &Run, output: Output) -> String {
-    let mut page = Page::of(FORMAT, "");
-    let site = &run.site;
-    page.table("site", "location of the turntable");
+fn run_file(run: &Run, output: Output) -> RunFile {
+    let (site, standstill) = (&run.site, &run.standstill);
     let known = |value: f64| Some(value).filter(|_| site.is_known);
-    page.known("latitude_deg", known(short(site.latitude / DEGREE)));
-    page.known("longitude_deg", known(short(site.longitude / DEGREE)));
-    page.known("height_m", known(site.height));
-    page.field("gravity_m_s2", site.gravity);
-    page.field("gravity_sigma_mgal", short(site.gravity_sigma / MILLIGAL));
-    if !run.recording.meta.is_empty() {
-        page.table("meta", "copied into calibration and report");
+    let segments = || SegmentsFile {
+        file: "segments.csv".to_owned(),
+        position_sigma_deg: Some(Positive(in_unit(run.segment_sigma, DEGREE))),
+    };
+    RunFile {
+        site: SiteFile {
+            latitude_deg: known(in_unit(site.latitude, DEGREE)).map(Latitude),
+            longitude_deg: known(in_unit(site.longitude, DEGREE)).map(Longitude),
+            height_m: known(site.height).map(Height),
+            gravity_m_s2: Some(Gravity(site.gravity)),
+            gravity_sigma_mgal: Some(Milligals(in_unit(site.gravity_sigma, MILLIGAL))),
+        },
+        meta: run.recording.meta.clone(),
+        imu: imu_file(run, output),
+        standstill: StandstillFile {
+            velocity_sigma_m_s: standstill.sigma.accel.map(Positive),
+            attitude_sigma_arcsec: (standstill.sigma.gyro)
+                .map(|sigma| Positive(in_unit(sigma, ARCSEC))),
+            turning_deg_per_sqrt_s: above_zero(standstill.turning, DEGREE).map(NonNegative),
+            position_sigma_m: Some(Positive(standstill.position_sigma)),
+        },
+        turntable: run.recording.table.as_ref().map(|_| turntable_file(run)),
+        segments: (!run.recording.segments.is_empty()).then(segments),
     }
-    for (key, value) in &run.recording.meta {
-        page.field(key, value.as_str());
-    }
-    imu(&mut page, run, output);
-    page.table("standstill", "motion of the IMU while the table is at rest");
-    let of = &run.standstill;
-    let attitude = of.sigma.gyro.map(|sigma| short(sigma / ARCSEC));
-    page.known("velocity_sigma_m_s", of.sigma.accel);
-    page.known("attitude_sigma_arcsec", attitude);
-    page.known("turning_deg_per_sqrt_s", above_zero(of.turning, DEGREE));
-    page.field("position_sigma_m", of.position_sigma);
-    if run.recording.table.is_some() {
-        turntable(&mut page, run);
-    }
-    if !run.recording.segments.is_empty() {
-        page.table("segments", "labelled sections of the recording, in s");
-        page.field("file", "segments.csv");
-        page.field("position_sigma_deg", short(run.segment_sigma / DEGREE));
-    }
-    page.text
 }
 
-fn imu(page: &mut Page, run: &Run, output: Output) {
+fn imu_file(run: &Run, output: Output) -> ImuFile {
     let (imu, instrument) = (&run.recording.imu, &run.instrument);
-    page.table("imu", "instrument samples along body right-front-up");
-    page.field("file", "imu.csv.gz");
-    page.field("output", output_word(output));
-    page.field("gyro_unit", instrument.unit.gyro.as_str());
-    page.field("accel_unit", instrument.unit.accel.as_str());
-    page.field("sample_period_s", imu.period);
-    page.field("time_stamp", "start");
-    page.field("continuous", imu.continuous);
-    let temperature = match &imu.temperature {
-        Some(_) => ", temperature = \"temperature\"",
-        None => "",
-    };
-    let triads = r#"gyro = ["gx", "gy", "gz"], accel = ["ax", "ay", "az"]"#;
-    let columns = format_args!("{{ time = \"t\", {triads}{temperature} }}");
-    page.plain("columns", columns);
-    page.table("imu.noise", "");
+    let names = |names: [&str; 3]| Some(Names(names.map(str::to_owned)));
+    let temperature = || TemperatureColumn::One("temperature".to_owned());
+    let terms = Term::ALL.into_iter().filter_map(|term| {
+        let sigma = instrument.term_sigma[term.parameters().start];
+        let sigma = Positive(above_zero(sigma, term.entry().unit.1)?);
+        Some((term.name().to_owned(), TermFile { sigma }))
+    });
+    ImuFile {
+        file: "imu.csv.gz".to_owned(),
+        output,
+        gyro_unit: Some(instrument.unit.gyro.clone()),
+        accel_unit: Some(instrument.unit.accel.clone()),
+        sample_period_s: Some(Positive(imu.period)),
+        time_stamp: TimeStamp::Start,
+        continuous: Some(imu.continuous),
+        columns: ImuColumns {
+            time: Some(TimeColumn::One("t".to_owned())),
+            gyro: names(["gx", "gy", "gz"]),
+            accel: names(["ax", "ay", "az"]),
+            temperature: imu.temperature.as_ref().map(|_| temperature()),
+        },
+        noise: noise_fields(instrument),
+        prior: PriorsFile {
+            gyro: prior_file(instrument, Sensor::Gyro),
+            accel: prior_file(instrument, Sensor::Accel),
+        },
+        terms: terms.collect(),
+        ..ImuFile::default()
+    }
+}
+
+fn noise_fields(instrument: &Instrument) -> BTreeMap<String, Option<NonNegative>> {
+    let mut fields = BTreeMap::new();
     for sensor in Sensor::ALL {
         let (keys, noise) = (NoiseKeys::of(sensor), instrument.noise.get(sensor));
-        let (varying, moves) = (noise.gauss_markov, instrument.motion_noise.get(sensor));
-        let time = varying.map(|of| of.correlation_time);
+        let moves = instrument.motion_noise.get(sensor);
         let ((walk, of_walk), (sigma, of_sigma)) = (keys.random_walk, keys.gauss_markov);
-        page.field(walk, short(noise.random_walk / of_walk));
-        page.known(sigma, varying.map(|of| short(of.sigma / of_sigma)));
-        page.known(keys.correlation_time, time);
-        page.known(keys.by_motion, above_zero(moves.by_motion, 1.0));
-        let (by_duration, unit) = keys.by_duration;
-        page.known(by_duration, above_zero(moves.by_duration, unit));
-    }
-    let known = "known before calibration: N = scale * installation * u + bias, with N in the file's quantity per \
-        second";
-    for (sensor, remark) in [(Sensor::Gyro, known), (Sensor::Accel, "")] {
-        let prior = instrument.prior.get(sensor);
-        let nominal = instrument.nominal.get(sensor).0;
-        let three = |v: Vector3<f64>| Value::from(v.map(short).as_slice().to_vec());
-        page.table(&format!("imu.prior.{}", sensor.name()), remark);
-        // All digits, so that pulses stay whole.
-        page.field("scale", nominal.as_slice().to_vec());
-        page.field("scale_sigma_ppm", three(prior.scale_sigma / PPM));
-        let installation = three(prior.installation_sigma / ARCSEC);
-        page.field("installation_sigma_arcsec", installation);
-        page.field("bias", three(prior.bias.component_mul(&nominal)));
-        let sigma = prior.bias_sigma.component_mul(&nominal.abs());
-        page.field("bias_sigma", three(sigma));
-    }
-    let mut remark = "error terms, 1σ around zero";
-    for term in Term::ALL {
-        let sigma = instrument.term_sigma[term.parameters().start];
-        if let Some(sigma) = above_zero(sigma, term.entry().unit.1) {
-            page.table(&format!("imu.terms.{}", term.name()), remark);
-            page.field("sigma", sigma);
-            remark = "";
+        let (by_duration, of_duration) = keys.by_duration;
+        let bias = noise.gauss_markov;
+        for (key, value) in [
+            (walk, Some(in_unit(noise.random_walk, of_walk))),
+            (sigma, bias.map(|bias| in_unit(bias.sigma, of_sigma))),
+            (
+                keys.correlation_time,
+                bias.map(|bias| bias.correlation_time),
+            ),
+            (keys.by_motion, above_zero(moves.by_motion, 1.0)),
+            (by_duration, above_zero(moves.by_duration, of_duration)),
+        ] {
+            fields.insert(key.to_owned(), value.map(NonNegative));
         }
+    }
+    fields
+}
+
+fn prior_file(instrument: &Instrument, sensor: Sensor) -> PriorFile {
+    let prior = instrument.prior.get(sensor);
+    let nominal = instrument.nominal.get(sensor).0;
+    let in_unit = |values: Vector3<f64>, unit: f64| Some(values.map(|v| in_unit(v, unit)).into());
+    PriorFile {
+        // All digits, so that pulses stay whole.
+        scale: Some(nominal.into()),
+        scale_sigma_ppm: in_unit(prior.scale_sigma, PPM),
+        installation_sigma_arcsec: in_unit(prior.installation_sigma, ARCSEC),
+        bias: in_unit(prior.bias.component_mul(&nominal), 1.0),
+        bias_sigma: in_unit(prior.bias_sigma.component_mul(&nominal.abs()), 1.0),
     }
 }
 
-fn turntable(page: &mut Page, run: &Run) {
+fn turntable_file(run: &Run) -> TurntableFile {
     let (table, geometry) = (&run.table, &run.table.geometry);
-    page.table(
-        "turntable",
-        "attitude of the table's mounting face, body right-front-up to East-North-Up; position errors are constant \
-         in a dwell and independent between dwells, reading errors are white",
-    );
-    let sigma = |sigma: f64| above_zero(sigma, ARCSEC);
-    page.field("file", "table.csv.gz");
-    page.field(
-        "position_sigma_arcsec",
-        short(table.position_sigma / ARCSEC),
-    );
-    page.field("reading_sigma_arcsec", short(table.reading_sigma / ARCSEC));
-    page.known("level_sigma_arcsec", sigma(geometry.base.x));
-    page.known("north_sigma_arcsec", sigma(geometry.base.z));
-    let mut columns = r#"time = "t", quaternion = ["qw", "qx", "qy", "qz"]"#.to_owned();
-    if let Some(letters) = axis_letters(run) {
-        for (kind, key) in AxisError::ALL.into_iter().zip(AXIS_ERRORS) {
-            page.known(key, sigma(geometry.axes.rows_range(kind.range()).max()));
-        }
-        let angles = Value::from(ANGLES[..letters.len()].to_vec());
-        columns += &format!(", angles = {angles}, axes = {}", Value::from(letters));
+    let letters = axis_letters(run);
+    let owned = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect();
+    let angle = |sigma: f64| above_zero(sigma, ARCSEC).map(Angle);
+    let of_axes = |kind: AxisError| {
+        letters.as_ref()?;
+        angle(geometry.axes.rows_range(kind.range()).max())
+    };
+    TurntableFile {
+        file: "table.csv.gz".to_owned(),
+        stream: None,
+        salvage: None,
+        time_unit: None,
+        sample_period_s: None,
+        columns: TableColumns {
+            time: TimeColumn::One("t".to_owned()),
+            quaternion: Some(Names(["qw", "qx", "qy", "qz"].map(str::to_owned))),
+            angles: (letters.as_ref()).map(|letters| owned(&ANGLES[..letters.len()])),
+            axes: letters.as_deref().map(owned),
+        },
+        axes: None,
+        position_sigma_arcsec: Angle(in_unit(table.position_sigma, ARCSEC)),
+        reading_sigma_arcsec: Angle(in_unit(table.reading_sigma, ARCSEC)),
+        level_sigma_arcsec: angle(geometry.base.x),
+        north_sigma_arcsec: angle(geometry.base.z),
+        nonorthogonality_sigma_arcsec: of_axes(AxisError::Tilt),
+        wobble_sigma_arcsec: of_axes(AxisError::Wobble),
+        encoder_sigma_arcsec: of_axes(AxisError::Encoder),
+        time_sigma_ms: None,
     }
-    page.plain("columns", format_args!("{{ {columns} }}"));
+}
+
+fn remarks(run: &Run) -> Remarks {
+    let mut remarks = Remarks::default();
+    remarks.before("imu", "instrument samples along body right-front-up");
+    remarks.before(
+        "imu.prior.gyro",
+        "known before calibration: N = scale * installation * u + bias, with N in the file's quantity per second",
+    );
+    if run.recording.table.is_some() {
+        remarks.before(
+            "turntable",
+            "attitude of the table's mounting face, body right-front-up to East-North-Up; position errors are \
+             constant in a dwell and independent between dwells, reading errors are white",
+        );
+    }
+    remarks
 }

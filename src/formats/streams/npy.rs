@@ -18,8 +18,6 @@ use super::bytes::{Broken, Input};
 use super::part::{Packing, Part, Shared, pass};
 use header::Header;
 
-/// Maximum header length.
-const LONGEST_HEADER: u64 = 1 << 20;
 
 pub fn open_array(input: Input) -> Result<Box<dyn Log>, Broken> {
     let size = input.left();

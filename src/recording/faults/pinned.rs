@@ -12,7 +12,7 @@ use nalgebra::{SMatrix, SVector};
 use statrs::function::erf::erf;
 
 use super::chance::Limit;
-use super::{mean, mean_and_slope};
+use super::line::{mean, mean_and_slope};
 use crate::recording::ColumnFacts;
 use crate::statistics::median;
 pub use ends::saturated;

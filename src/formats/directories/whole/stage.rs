@@ -8,7 +8,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
 use std::time::Duration;
 
-use super::{FileError, taken, unwritable};
+use crate::formats::error::FileError;
 
 const PREFIX: &str = ".turncal-";
 /// Locked during the lifetime of the process that created the stage.
@@ -20,6 +20,22 @@ const DEAD: &str = "dead";
 
 /// Announces every stage to the thread that ends the process on a signal; not set in a library.
 static ANNOUNCED: OnceLock<Sender<Beside>> = OnceLock::new();
+
+/// Error: an output must not replace what is at `target`.
+pub fn taken(target: &Path) -> FileError {
+    FileError::of(
+        target,
+        "an existing file or directory of this name",
+        "an unused name",
+        "Choose another name, or add --force to replace it.",
+    )
+}
+
+/// Error: the system does not allow writing at `target`.
+pub fn unwritable(target: &Path, doing: &str, error: &io::Error) -> FileError {
+    let advice = "Choose a directory that can be written.";
+    FileError::io(target, doing, error, advice)
+}
 
 /// Unfinished outputs of this process, for the thread that ends the process on a signal.
 pub struct Unfinished(Receiver<Beside>);

@@ -150,9 +150,7 @@ impl StatedUnit {
         };
         let unit = name::unit(text).filter(is_of_it);
         unit.map(Self).ok_or_else(|| {
-            let all = OUTPUTS
-                .into_iter()
-                .flat_map(|(_, output)| units(sensor, output));
+            let all = OUTPUTS.into_iter().flat_map(|output| units(sensor, output));
             let words: BTreeSet<&str> = all.map(|(word, _)| word).collect();
             let words: Vec<&str> = words.into_iter().collect();
             let example = sensor.pick("1/131 deg/s", "1/16384 g");

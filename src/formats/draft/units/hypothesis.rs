@@ -1,8 +1,9 @@
 //! A possible unit of rows, and what gravity at rest and turns say of it.
 
-use super::super::motion::Motion;
-use super::{Rows, short};
+use crate::formats::draft::motion::Motion;
+use crate::formats::draft::name::Unit;
 use crate::imu::{Output, PerSensor, Sensor};
+use crate::number::rounded;
 use crate::units::STANDARD_GRAVITY;
 
 /// Gravity at rest and turns distinguish units that differ by more than this factor, because raw sensors may be off by
@@ -11,6 +12,18 @@ const TOLD_APART: PerSensor<f64> = PerSensor {
     gyro: 1.3,
     accel: 1.25,
 };
+
+/// The rows of a triad.
+pub struct TriadRows<'a> {
+    pub motion: &'a Motion,
+    /// Period in s; NaN if unknown.
+    pub period: f64,
+    /// Unit named in the file.
+    pub named: Option<Unit>,
+    /// Whether they are whole numbers.
+    pub whole: bool,
+}
+
 /// A possible unit of the rows.
 pub struct Hypothesis {
     pub word: &'static str,
@@ -27,7 +40,7 @@ impl Hypothesis {
         sensor: Sensor,
         (word, per_si): (&'static str, f64),
         output: Output,
-        of: &Rows,
+        of: &TriadRows,
     ) -> Self {
         let (gravity, angle) = (of.motion.gravity / STANDARD_GRAVITY, of.motion.angle);
         let factor = match (sensor, output) {
@@ -58,9 +71,9 @@ impl Hypothesis {
     pub fn evidence(&self, sensor: Sensor, motion: &Motion) -> String {
         match (sensor, self.factor) {
             (_, None) => String::new(),
-            (Sensor::Accel, _) if self.fits() => format!("{} at rest", short(motion.gravity)),
+            (Sensor::Accel, _) if self.fits() => format!("{} at rest", rounded(motion.gravity, 4)),
             (Sensor::Accel, Some(factor)) => {
-                format!("magnitude at rest is {} times gravity", short(factor))
+                format!("magnitude at rest is {} times gravity", rounded(factor, 4))
             }
             (Sensor::Gyro, _) if self.fits() => {
                 "integrated gyro angles match the change of gravity \
@@ -70,7 +83,7 @@ impl Hypothesis {
             (Sensor::Gyro, Some(factor)) => format!(
                 "gravity direction changes by {} times the integrated gyro \
                 angle",
-                short(factor)
+                rounded(factor, 4)
             ),
         }
     }

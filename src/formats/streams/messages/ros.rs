@@ -10,56 +10,14 @@ mod definition;
 
 use crate::formats::streams::Column;
 use crate::formats::streams::bytes::{Broken, Kind, Slice};
-use definition::Parser;
-
-/// Maximum length of an array that becomes columns.
-const LONGEST: usize = 64;
-
-/// Serialisation of numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Encoding {
-    Ros1,
-    Cdr,
-}
+pub use definition::Encoding;
+use definition::{Field, FieldKind, Many, Parser};
 
 /// A type of messages.
 pub struct Message {
     fields: Vec<Field>,
     pub columns: Vec<Column>,
     encoding: Encoding,
-}
-
-struct Field {
-    kind: FieldKind,
-    many: Many,
-}
-
-enum FieldKind {
-    Number(Kind),
-    Text,
-    /// Seconds and nanoseconds.
-    Time(Kind),
-    Message(Vec<Field>),
-}
-
-#[derive(Clone, Copy, PartialEq)]
-enum Many {
-    One,
-    /// A fixed number.
-    Fixed(usize),
-    /// Number stated in the message.
-    Any,
-}
-
-impl Many {
-    /// Whether its numbers become columns.
-    fn is_column(self) -> bool {
-        match self {
-            Self::One => true,
-            Self::Fixed(size) => (1..=LONGEST).contains(&size),
-            Self::Any => false,
-        }
-    }
 }
 
 impl Message {

@@ -6,7 +6,9 @@ use serde::Deserialize;
 
 use super::super::arrays::Field;
 use super::super::bytes::{Broken, Kind, Slice};
-use super::LONGEST_HEADER;
+
+/// Maximum header length.
+const LONGEST_HEADER: u64 = 1 << 20;
 
 /// Maximum length of an array within an item that becomes columns.
 const MOST_NUMBERS: usize = 64;

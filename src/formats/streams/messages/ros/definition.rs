@@ -1,13 +1,58 @@
 //! Message types from the text of their definitions.
 
-use super::{Encoding, Field, FieldKind, Many};
 use crate::formats::streams::Column;
 use crate::formats::streams::bytes::Kind;
+
+/// Maximum length of an array that becomes columns.
+const LONGEST: usize = 64;
 
 /// Types within types.
 const DEEPEST: usize = 16;
 /// Maximum number of fields of an instrument message.
 const MOST_FIELDS: usize = 4096;
+
+/// Serialisation of numbers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Encoding {
+    Ros1,
+    Cdr,
+}
+
+/// A field of a message.
+pub struct Field {
+    pub kind: FieldKind,
+    pub many: Many,
+}
+
+/// Kinds of fields.
+pub enum FieldKind {
+    Number(Kind),
+    Text,
+    /// Seconds and nanoseconds.
+    Time(Kind),
+    Message(Vec<Field>),
+}
+
+/// Number of values of a field.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Many {
+    One,
+    /// A fixed number.
+    Fixed(usize),
+    /// Number stated in the message.
+    Any,
+}
+
+impl Many {
+    /// Whether its numbers become columns.
+    pub fn is_column(self) -> bool {
+        match self {
+            Self::One => true,
+            Self::Fixed(size) => (1..=LONGEST).contains(&size),
+            Self::Any => false,
+        }
+    }
+}
 
 /// Definitions while a type is built.
 pub struct Parser {
