@@ -104,11 +104,6 @@ fn quoted(labels: &[String]) -> String {
 /// Errors of a comparison of calibrations.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum ComparisonError {
-    /// Only one calibration.
-    #[error(
-        "one calibration without a truth cannot be compared. Give a second calibration or a truth"
-    )]
-    Single,
     /// Outputs of different quantities.
     #[error(
         "{other} has the {} unit `{found}` and {name} has `{expected}`, so they cannot be compared. Give \

@@ -74,12 +74,10 @@ pub use reduction::{Epoch, Own};
 use reduction::{Reduction, Script};
 pub use result::at_rest::{AtRest, AxisAtRest, Second};
 pub use result::at_temperature::TemperatureError;
-pub use result::comparison::{Comparison, Named, Side, compare};
 pub use result::correction::{Calibrated, Correction, CorrectionError};
-pub use result::frame::{Canonical, in_body_frame};
+pub use result::frame::{Canonical, Named, in_body_frame};
 pub use result::nees::{Nees, nees};
 pub use result::record::truth_record;
-pub use result::scatter::{ChiSquare, ParameterScatter, Scatter};
 pub use result::thermal_record::{
     CoefficientRecord, RecordingRecord, TOLERANCE as TEMPERATURE_TOLERANCE, ThermalRecord,
     ValueRecord,

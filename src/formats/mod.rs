@@ -27,11 +27,10 @@ pub use crate::imu::NoiseKeys;
 pub use data_file::DataFile;
 pub(crate) use directories::write_whole_with;
 pub use directories::{
-    JOB_FILE, Job, JobKind, LotDirectory, Part, Parts, WholeDirectory, abandon_unfinished,
-    digest_of_bytes, input_digests, part_is_there, read_part_unit, record_inputs, unit_key,
-    write_part, write_whole,
+    JOB_FILE, Job, JobKind, LotDirectory, Part, Parts, Unfinished, WholeDirectory, digest_of_bytes,
+    input_digests, part_is_there, read_part_unit, record_inputs, unit_key, write_part, write_whole,
 };
-pub use door::Opened;
+pub use door::{Opened, is_toml};
 pub use error::{FileError, Place};
 // By these names the readers of rows know them.
 use inputs::{course, joined, temperature};

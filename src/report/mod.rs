@@ -37,7 +37,6 @@ pub mod campaign;
 #[cfg(feature = "certificate")]
 pub mod certificate;
 pub mod check;
-pub mod comparison;
 pub mod conversion;
 pub mod experiment;
 mod group;

@@ -10,9 +10,8 @@ use nalgebra::{Matrix3, SMatrix, Vector3};
 use thiserror::Error;
 
 use crate::attitude::from_pitch_roll_heading;
-use crate::calibration::{
-    Comparison, ComparisonError, Named, PARAMETERS, ParameterMatrix, compare, parameter,
-};
+use crate::calibration::result::frame::{in_common_form, own_nominal};
+use crate::calibration::{ComparisonError, Named, PARAMETERS, ParameterMatrix, parameter};
 use crate::earth::Site;
 use crate::imu::{BodyFrame, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::models::{self, ModelError, Place};
@@ -136,22 +135,15 @@ impl Pair {
         calibration: Named,
         truth: Named,
     ) -> Result<(Self, BodyFrame), ComparisonError> {
-        let Comparison {
-            body_frame,
-            reference,
-            sides,
-            ..
-        } = compare(&[calibration], Some(truth))?;
-        let Some(side) = sides.into_iter().next() else {
-            return Err(ComparisonError::Single);
-        };
-        let of_truth = reference.covariance.unwrap_or_default();
+        let nominal = own_nominal(truth.record);
+        let [truth, calibration] = in_common_form(truth, calibration, &nominal)?;
+        let of_truth = truth.covariance.unwrap_or_default();
         let pair = Self {
-            truth: reference.triads,
-            covariance: side.calibration.covariance.map(|own| own + of_truth),
-            calibration: side.calibration.triads,
+            truth: truth.triads,
+            covariance: calibration.covariance.map(|own| own + of_truth),
+            calibration: calibration.triads,
         };
-        Ok((pair, body_frame))
+        Ok((pair, calibration.body_frame))
     }
 
     /// The same with the errors of one triad only; the other is calibrated perfectly.

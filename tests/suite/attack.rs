@@ -76,6 +76,36 @@ fn a_unit_that_was_edited_after_its_part_was_written_is_not_merged() {
     );
 }
 
+/// The case claims 10^15 runs; the others are parts that repeat without end and a whole lot of that many units.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_part_that_claims_more_runs_than_it_holds_is_refused_in_little_memory() {
+    let Some(directory) = shared("attack/merge-runs-1e15") else {
+        return;
+    };
+    let job = std::fs::read_to_string(directory.join("job.json")).unwrap();
+    let shard = |index: u32, of: u64| format!("\"index\": {index},\n    \"of\": {of}");
+    let unending = job.replace(&shard(2, 2), &shard(2, 0));
+    let none = job.replace(&shard(2, 2), &shard(0, 2));
+    let whole = job
+        .replace("\"shard\"", "\"unknown\"")
+        .replace("study-accuracy", "lot");
+    for text in [&job, &unending, &none, &whole] {
+        let part = tempfile::tempdir().unwrap();
+        std::fs::write(part.path().join("job.json"), text).unwrap();
+        let results = part.path().join("runs.msgpack");
+        std::fs::copy(directory.join("runs.msgpack"), results).unwrap();
+        let program = env!("CARGO_BIN_EXE_turncal");
+        let command = format!("ulimit -v 512000; exec {program} merge . -o out");
+        let mut shell = std::process::Command::new("sh");
+        let output = shell.args(["-c", &command]).current_dir(&part).output();
+        let output = output.unwrap();
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{message}");
+        assert!(message.contains("run list does not match"), "{message}");
+    }
+}
+
 #[test]
 fn a_matrix_of_zeros_is_certified_for_nobody() {
     let certificate = "certificate calibration.json --laboratory lab.toml -o c";

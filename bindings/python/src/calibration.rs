@@ -9,7 +9,7 @@ use pyo3::types::PyIterator;
 use turncal::calibration::{self, AtRest, Finding, FindingKind, Progress as Passes};
 use turncal::formats::record_inputs;
 use turncal::imu::{Output, Sensor, Term};
-use turncal::lot::{self, Lot, Specification, Unit};
+use turncal::lot::{Lot, Specification, Unit};
 use turncal::report::calibration as of_calibration;
 use turncal::report::document::Table;
 use turncal::report::{Document, at_rest, lot as of_lot, write};
@@ -334,21 +334,10 @@ impl Calibration {
     /// Report or None
     #[getter]
     fn conformity(&self) -> Option<Report> {
-        let calibrated = lot::Calibrated {
-            nominal: self.record.provenance.as_ref()?.nominal,
-            calibration: self.record.clone(),
-            noise: None,
-        };
-        let unit = Unit {
-            name: "calibration".to_owned(),
-            meta: self.record.meta.clone(),
-            calibrated: Ok(calibrated),
-        };
+        let unit = Unit::of_record("calibration", self.record.clone());
         let specification = self.specification.clone()?;
-        Some(Report(of_lot::document(&Lot::new(
-            vec![unit],
-            Some(specification),
-        ))))
+        let lot = Lot::new(vec![unit], None, Some(specification));
+        Some(Report(of_lot::document(&lot)))
     }
 
     /// What to know before using the values: problem, meaning and remedy, the most severe first.

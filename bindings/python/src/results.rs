@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
+use turncal::calibration::Named;
 use turncal::calibration::result::Calibration as Record;
-use turncal::calibration::{Named, compare as compared};
 use turncal::certificate::Certificate;
 use turncal::formats::{digest_of_bytes, export as formats, read_laboratory};
+use turncal::lot::{Lot, Unit};
 use turncal::report::navigation::Navigation;
-use turncal::report::{certificate as of_certificate, comparison};
+use turncal::report::{certificate as of_certificate, lot as of_lot};
 use turncal::study::navigation::{
     INTERVAL, MethodOutlook, Mission, Motion, NavigationStudyError, Pair,
 };
@@ -28,18 +29,19 @@ pub fn compare(
     calibrations: Vec<PyRef<Calibration>>,
     truth: Option<PyRef<Calibration>>,
 ) -> PyResult<Report> {
-    let named = names.iter().zip(&calibrations);
-    let named = named.map(|(name, of)| Named {
-        name,
-        record: &of.record,
-    });
-    let named: Vec<Named> = named.collect();
-    let truth = truth.as_ref().map(|of| Named {
-        name: "truth",
-        record: &of.record,
-    });
-    let comparison = compared(&named, truth).map_err(raise)?;
-    Ok(Report(comparison::document(&comparison)))
+    if calibrations.len() < 2 && truth.is_none() {
+        return Err(raised(
+            "one calibration without a truth cannot be compared. Give a second calibration or a truth",
+        ));
+    }
+    let named = names.into_iter().zip(&calibrations);
+    let units = named.map(|(name, of)| Unit::of_record(name, of.record.clone()));
+    let truth = truth.map(|of| Unit::of_record("truth", of.record.clone()));
+    let lot = Lot::new(units.collect(), truth, None);
+    if let Some((unit, reason)) = lot.failures().next() {
+        return Err(raised(format_args!("{}: {reason}", unit.name)));
+    }
+    Ok(Report(of_lot::document(&lot)))
 }
 
 #[pyfunction]

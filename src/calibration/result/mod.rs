@@ -5,12 +5,10 @@
 
 pub(super) mod at_rest;
 pub(super) mod at_temperature;
-pub(super) mod comparison;
 pub(super) mod correction;
 pub(crate) mod frame;
-pub(super) mod nees;
+pub(crate) mod nees;
 pub(super) mod record;
-pub(super) mod scatter;
 pub(super) mod thermal_record;
 
 use std::collections::BTreeMap;

@@ -9,7 +9,7 @@ use super::write_report;
 use crate::calibration::{UNWATCHED, Word};
 use crate::cli::arguments::{Estimation, OfLog};
 use crate::cli::terminal::{Runs, piece_by_piece, show};
-use crate::formats::{Job, JobKind, LotDirectory, Part, record_inputs, unit_key};
+use crate::formats::{Job, JobKind, LotDirectory, Part, is_toml, record_inputs, unit_key};
 use crate::imu::PerSensor;
 use crate::lot::{self, Lot, Unit};
 use crate::models;
@@ -76,7 +76,7 @@ impl Request<'_> {
             );
             return Ok(());
         }
-        let lot = Lot::new(units, specification);
+        let lot = Lot::new(units, None, specification);
         deliver(&lot, directory.as_ref().zip(self.output), self.json)
     }
 
@@ -125,8 +125,11 @@ impl Request<'_> {
         match calibrated {
             Ok((meta, calibrated, document)) => (unit(meta, Ok(calibrated)), Some(document)),
             Err(error) => {
-                let meta = Run::read_meta(path).unwrap_or_default();
-                (unit(meta, Err(format!("{error:#}"))), None)
+                let meta = is_toml(path).then(|| Run::read_meta(path).unwrap_or_default());
+                (
+                    unit(meta.unwrap_or_default(), Err(format!("{error:#}"))),
+                    None,
+                )
             }
         }
     }
@@ -146,10 +149,8 @@ impl Request<'_> {
             .dwells()
             .map(|dwell| dwell.samples.clone())
             .collect();
-        let nominal = &run.instrument.nominal;
         let of_unit = lot::Calibrated {
             calibration,
-            nominal: PerSensor::from_fn(|sensor| nominal.get(sensor).0.into()),
             noise: RestNoise::of(&run.recording.imu, &dwells),
         };
         Ok((run.recording.meta.clone(), of_unit, document))

@@ -81,7 +81,7 @@ impl Merge {
                 None => read_part_unit(part, name),
             });
         let units = units.collect::<Result<Vec<Unit>, _>>()?;
-        let lot = Lot::new(units, parts.job.specification.clone());
+        let lot = Lot::new(units, None, parts.job.specification.clone());
         lot::deliver(&lot, directory.as_ref().zip(target), self.delivery.json())
     }
 }

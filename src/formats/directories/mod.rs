@@ -12,4 +12,4 @@ pub use job::{JOB_FILE, Job, JobKind, Part};
 pub use lot_directory::{LotDirectory, read_part_unit, unit_key};
 pub use parts::{Parts, part_is_there, write_part};
 pub use provenance::record_inputs;
-pub use whole::{WholeDirectory, abandon_unfinished, write_whole, write_whole_with};
+pub use whole::{Unfinished, WholeDirectory, write_whole, write_whole_with};
