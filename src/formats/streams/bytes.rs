@@ -156,16 +156,6 @@ impl<'a> Slice<'a> {
         Self { big_endian, ..self }
     }
 
-    /// A part of these bytes, at this offset.
-    pub fn of(&self, bytes: &'a [u8], place: u64) -> Self {
-        Self {
-            bytes,
-            at: 0,
-            base: place,
-            ..*self
-        }
-    }
-
     /// Offset of the next byte in the file.
     pub fn offset(&self) -> u64 {
         if self.is_packed {

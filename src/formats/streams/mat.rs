@@ -20,6 +20,8 @@ const DEEPEST: usize = 8;
 const TYPES: std::ops::RangeInclusive<u64> = 1..=18;
 /// Nothing deflated is shorter by more.
 const DEFLATE: u64 = 1040;
+/// Arrays of at most this many times their compressed size are kept in memory; longer ones are unpacked for each column.
+const KEPT: u64 = 16;
 /// Maximum length of names and dimensions, bytes.
 const LONGEST: u64 = 1 << 20;
 
@@ -55,8 +57,13 @@ pub fn open(mut input: Input) -> Result<Box<dyn Log>, Broken> {
             packing,
         };
         let mut reader = Reader::new(part, offset, big_endian)?;
-        if packing == Packing::Zlib && !reader.is_array()? {
-            continue;
+        if packing == Packing::Zlib {
+            if !reader.is_array()? {
+                continue;
+            }
+            if reader.end <= KEPT * length {
+                reader = reader.kept()?;
+            }
         }
         let end = reader.end;
         reader.matrix(end, "", 0, &mut arrays)?;
@@ -127,6 +134,25 @@ impl Reader {
         }
         self.end += size;
         Ok(kind == MATRIX)
+    }
+
+    /// The same with the rest of its bytes in memory.
+    fn kept(mut self) -> Result<Self, Broken> {
+        let (mut bytes, length) = (Vec::new(), self.end - self.at);
+        let read = (&mut self.bytes).take(length).read_to_end(&mut bytes);
+        read.map_err(|error| Broken::new(self.offset, error, "a zlib-compressed element"))?;
+        if (bytes.len() as u64) < length {
+            let found = format_args!("{} bytes", bytes.len());
+            let expected = format_args!("{length} bytes for the array");
+            return Err(Broken::new(self.offset, found, expected));
+        }
+        let part = Part {
+            file: Shared::of(Box::new(io::Cursor::new(bytes))),
+            begin: 0,
+            length,
+            packing: Packing::Stored,
+        };
+        Self::new(part, self.offset, self.big_endian)
     }
 
     fn take(&mut self, count: u64, what: &str) -> Result<Vec<u8>, Broken> {

@@ -8,9 +8,9 @@ use crate::formats::streams::bytes::{Broken, Slice};
 /// Messages within messages.
 const DEEPEST: usize = 8;
 /// Maximum number of fields that are examined: a type may contain itself several times.
-const MOST_FIELDS: usize = 4096;
+const MOST_FIELDS: usize = 2048;
 /// Maximum length of a set of descriptors, bytes; usually some thousand.
-const LONGEST: usize = 1 << 20;
+const LONGEST: usize = 1 << 19;
 
 /// Label of lists and maps in `FieldDescriptorProto`.
 const REPEATED: u64 = 3;
@@ -70,7 +70,8 @@ fn fill(fields: &[Field], bytes: &[u8], offset: u64, row: &mut [f64]) -> Result<
             row[field.column] = default;
         }
     }
-    for value in values(bytes, offset)? {
+    for value in Values(Slice::packed(bytes, offset)) {
+        let value = value?;
         let place = fields.binary_search_by_key(&value.field, |field| field.number);
         let Some(field) = place.ok().and_then(|place| fields.get(place)) else {
             continue;
@@ -164,9 +165,9 @@ impl<'a> Parser<'a> {
 
 /// The messages and texts in a field.
 fn parts(bytes: &[u8], field: u64) -> Option<Vec<&[u8]>> {
-    let all = values(bytes, 0).ok()?.into_iter();
-    let of_field = all.filter(|value| value.field == field && value.way == 2);
-    Some(of_field.map(|value| value.bytes).collect())
+    let mut all = values(bytes)?;
+    all.retain(|value| value.field == field && value.way == 2);
+    Some(all.into_iter().map(|value| value.bytes).collect())
 }
 
 /// The text in a field; empty if it is omitted.
@@ -177,7 +178,7 @@ fn text(bytes: &[u8], field: u64) -> Option<&str> {
 
 /// The whole number in a field; zero if it is omitted.
 fn whole(bytes: &[u8], field: u64) -> Option<u64> {
-    let all = values(bytes, 0).ok()?;
+    let all = values(bytes)?;
     let last = all.iter().rfind(|value| value.field == field);
     Some(last.map_or(0, |value| value.bits))
 }
@@ -226,34 +227,46 @@ fn signed(value: u64) -> i64 {
     (value >> 1) as i64 ^ -((value & 1) as i64)
 }
 
-/// The values of a message in order.
-fn values(bytes: &[u8], offset: u64) -> Result<Vec<Value<'_>>, Broken> {
-    let mut left = Slice::packed(bytes, offset);
-    let mut values = Vec::new();
-    while left.left() > 0 {
-        let key = varint(&mut left)?;
-        let mut value = Value {
-            field: key >> 3,
-            way: key & 7,
-            bits: 0,
-            bytes: &[],
-        };
-        match value.way {
-            0 => value.bits = varint(&mut left)?,
-            1 => value.bits = left.whole(8, "a number")?,
-            5 => value.bits = left.whole(4, "a number")?,
-            2 => {
-                let length = usize::try_from(varint(&mut left)?).unwrap_or(usize::MAX);
-                value.bytes = left.take(length, "a field of a message")?;
-            }
-            way => {
-                let found = format_args!("a field with wire type {way}");
-                return Err(Broken::new(offset, found, "wire type 0, 1, 2 or 5"));
-            }
-        }
-        values.push(value);
+/// The values of a message in order; more than memory may hold at once.
+struct Values<'a>(Slice<'a>);
+
+/// All values of a descriptor.
+fn values(bytes: &[u8]) -> Option<Vec<Value<'_>>> {
+    Values(Slice::packed(bytes, 0))
+        .collect::<Result<_, _>>()
+        .ok()
+}
+
+impl<'a> Iterator for Values<'a> {
+    type Item = Result<Value<'a>, Broken>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        (self.0.left() > 0).then(|| value(&mut self.0))
     }
-    Ok(values)
+}
+
+fn value<'a>(bytes: &mut Slice<'a>) -> Result<Value<'a>, Broken> {
+    let key = varint(bytes)?;
+    let mut value = Value {
+        field: key >> 3,
+        way: key & 7,
+        bits: 0,
+        bytes: &[],
+    };
+    match value.way {
+        0 => value.bits = varint(bytes)?,
+        1 => value.bits = bytes.whole(8, "a number")?,
+        5 => value.bits = bytes.whole(4, "a number")?,
+        2 => {
+            let length = usize::try_from(varint(bytes)?).unwrap_or(usize::MAX);
+            value.bytes = bytes.take(length, "a field of a message")?;
+        }
+        way => {
+            let found = format_args!("a field with wire type {way}");
+            return Err(Broken::new(bytes.offset(), found, "wire type 0, 1, 2 or 5"));
+        }
+    }
+    Ok(value)
 }
 
 /// A number of variable length: seven bits per byte, least significant first.
