@@ -278,10 +278,11 @@ fn a_lot_of_one_unit_or_none_has_rows_and_no_statistics() {
 }
 
 fn side_by_side(records: &[&Calibration], truth: Option<&Calibration>) -> Lot {
-    let unit =
-        |(k, record): (usize, &&Calibration)| Unit::of_record(k.to_string(), (*record).clone());
+    let unit = |(k, record): (usize, &&Calibration)| {
+        Unit::of_record(k.to_string(), (*record).clone(), None)
+    };
     let units = records.iter().enumerate().map(unit).collect();
-    let truth = truth.map(|truth| Unit::of_record("truth", truth.clone()));
+    let truth = truth.map(|truth| Unit::of_record("truth", truth.clone(), None));
     Lot::new(units, truth, None)
 }
 

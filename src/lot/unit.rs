@@ -22,15 +22,16 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// A calibration from a file, or a truth.
-    pub fn of_record(name: impl Into<String>, calibration: Calibration) -> Self {
+    /// A calibration or a truth, with the noise of its run at rest if a recording shows it.
+    pub fn of_record(
+        name: impl Into<String>,
+        calibration: Calibration,
+        noise: Option<RestNoise>,
+    ) -> Self {
         Self {
             name: name.into(),
             meta: calibration.meta.clone(),
-            calibrated: Ok(Calibrated {
-                calibration,
-                noise: None,
-            }),
+            calibrated: Ok(Calibrated { calibration, noise }),
         }
     }
 }

@@ -334,7 +334,7 @@ impl Calibration {
     /// Report or None
     #[getter]
     fn conformity(&self) -> Option<Report> {
-        let unit = Unit::of_record("calibration", self.record.clone());
+        let unit = Unit::of_record("calibration", self.record.clone(), None);
         let specification = self.specification.clone()?;
         let lot = Lot::new(vec![unit], None, Some(specification));
         Some(Report(of_lot::document(&lot)))

@@ -35,8 +35,8 @@ pub fn compare(
         ));
     }
     let named = names.into_iter().zip(&calibrations);
-    let units = named.map(|(name, of)| Unit::of_record(name, of.record.clone()));
-    let truth = truth.map(|of| Unit::of_record("truth", of.record.clone()));
+    let units = named.map(|(name, of)| Unit::of_record(name, of.record.clone(), None));
+    let truth = truth.map(|of| Unit::of_record("truth", of.record.clone(), None));
     let lot = Lot::new(units.collect(), truth, None);
     if let Some((unit, reason)) = lot.failures().next() {
         return Err(raised(format_args!("{}: {reason}", unit.name)));

@@ -127,6 +127,11 @@ impl Calibrate {
                     false => self.one(file),
                 }
             }
+            _ if self.truth.is_some() => {
+                let message = "--truth applies to one run; to compare units of a lot with their truths, use turncal \
+                    compare\n";
+                clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
+            }
             _ => self.lot(),
         }
     }
@@ -150,26 +155,6 @@ impl Calibrate {
             silent: self.json,
         };
         self.one(&follow.run()?)
-    }
-
-    fn lot(&self) -> anyhow::Result<()> {
-        if self.truth.is_some() {
-            let message = "--truth applies to one run; to compare units of a lot with their truths, use turncal \
-                compare\n";
-            clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
-        }
-        let directory = Some(Path::new(lot::DIRECTORY)).filter(|_| !self.json);
-        let request = lot::Request {
-            runs: &self.runs,
-            of_log: &self.of_log,
-            estimation: &self.estimation,
-            specification: self.specification.as_deref(),
-            shard: self.shard,
-            output: self.output.as_deref().or(directory),
-            json: self.json,
-            force: self.overwrite.force,
-        };
-        request.run()
     }
 
     fn one(&self, path: &Path) -> anyhow::Result<()> {

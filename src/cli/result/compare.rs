@@ -42,7 +42,7 @@ impl Compare {
         let named = short_names(&paths).into_iter().zip(&paths);
         let units = named.map(|(name, path)| {
             let calibration = at_temperature(path, self.temperature_degc)?;
-            anyhow::Ok(Unit::of_record(name, calibration))
+            anyhow::Ok(Unit::of_record(name, calibration, None))
         });
         let mut units = units.collect::<anyhow::Result<Vec<Unit>>>()?;
         let calibrations = units.split_off(usize::from(self.truth.is_some()));

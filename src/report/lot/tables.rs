@@ -53,13 +53,7 @@ pub fn units(lot: &Lot) -> Table {
             });
         };
         push("NEES/n", |of| value(of.mean, 0.1));
-        push(
-            "95 % interval",
-            |Nees {
-                 interval: (low, high),
-                 ..
-             }| { format!("{}…{}", value(low, 0.1), value(high, 0.1)) },
-        );
+        push("95 % interval", |of| interval(of.interval));
         push("n", |of| count(of.count));
     }
     columns.push("NIS", |(_, row)| nis(row));
@@ -269,7 +263,7 @@ fn notes(lot: &Lot, mut table: Table) -> Table {
             ))
             .note("Spread: 1σ between units after subtracting their σ, or its 95 % limit if not significant.");
     }
-    if let Some(gravity) = lot.shared_gravity {
+    if let Some(gravity) = lot.shared_gravity.filter(|_| lot.rows.len() > 1) {
         table = table.note(format!(
             "The error of gravity, the same for all (1σ {} ppm), is part of every σ of accelerometer K and of their \
              mean, but not of scatter and differences between calibrations.",

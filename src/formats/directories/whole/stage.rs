@@ -279,12 +279,11 @@ fn remove(stage: &Path) -> io::Result<()> {
             Err(_) => {}
         }
     }
-    let missing = |error: io::Error| match error.kind() {
-        io::ErrorKind::NotFound => Ok(()),
-        _ => Err(error),
-    };
-    fs::remove_file(stage.join(LOCK)).or_else(missing)?;
-    fs::remove_dir(stage).or_else(missing)
+    let _ = fs::remove_file(stage.join(LOCK));
+    match fs::remove_dir(stage) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
 }
 
 /// Exchanges two paths atomically.
