@@ -1,7 +1,6 @@
 //! Studies: statistics over many simulated runs.
 
 pub mod accuracy;
-pub mod campaign;
 pub mod experiment;
 pub mod navigation;
 pub mod path;
@@ -19,7 +18,6 @@ use crate::models::ModelError;
 use crate::turntable::TableError;
 
 pub use accuracy::{Accuracy, AccuracyStudy, Figures, NavigationAccuracy};
-pub use campaign::{CampaignAccuracy, CampaignStudy};
 pub use experiment::{Experiment, ExperimentStudy};
 pub use ratio::Ratio;
 pub use shard::{Shard, ShardError};

@@ -7,7 +7,7 @@ pub(super) mod figures;
 mod report;
 mod residuals;
 mod tables;
-mod temperature;
+pub(super) mod temperature;
 #[cfg(test)]
 mod tests;
 
