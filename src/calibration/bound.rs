@@ -1,14 +1,12 @@
 //! The Bayesian Cramér–Rao bound of a run.
 
-use nalgebra::DVector;
-
 use crate::calibration::checks::error_term_test::{TermsOn, with_everything};
 use crate::calibration::start::coarse::initial_attitudes;
 use crate::calibration::{
     Auxiliary, CalibrationError, Epoch, ErrorTerm, Estimate, Gate, Linearisation, Observability,
-    PARAMETERS, ParameterVector, PassResult, Prior, Problem, Script, pass,
+    ParameterVector, PassResult, Prior, Problem, Script, pass,
 };
-use crate::imu::{PerSensor, TermVector, ThermalCoefficients, Triad};
+use crate::imu::{PerSensor, TermVector, Triad};
 
 /// The bound of a run: the smallest covariance that any estimator can reach.
 #[derive(Debug, Clone)]
@@ -117,31 +115,4 @@ fn pass_at(problem: &Problem, truth: Linearisation) -> Result<PassResult, Calibr
         ..truth
     };
     pass(problem, &Script::new(problem, &attitudes, &at)?, Gate::Open)
-}
-
-/// Bound for the variances of any joint estimator of several recordings, at a truth with these temperature
-/// coefficients: first the parameters of both triads at the reference, then the enabled coefficients.
-///
-/// # Errors
-/// [`CalibrationError`] as for [`super::estimate`].
-pub fn thermal_bound(
-    problem: &Problem,
-    truth: &PerSensor<Triad>,
-    coefficients: &PerSensor<ThermalCoefficients>,
-) -> Result<DVector<f64>, CalibrationError> {
-    let at_truth = pass_at(
-        problem,
-        Linearisation {
-            thermal: *coefficients,
-            ..Linearisation::new(*truth, TermVector::zeros(), Vec::new())
-        },
-    )?;
-    let of_parameters = at_truth.posterior.parameter_covariance.diagonal();
-    let of_coefficients = at_truth.thermal(&problem.model);
-    let of_coefficients = of_coefficients.map(|thermal| thermal.covariance.diagonal());
-    let all = of_parameters.iter().chain(of_coefficients.iter().flatten());
-    Ok(DVector::from_iterator(
-        PARAMETERS + of_coefficients.as_ref().map_or(0, DVector::len),
-        all.copied(),
-    ))
 }

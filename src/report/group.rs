@@ -27,15 +27,14 @@ pub fn axis_name(form: InstallationForm, index: usize) -> String {
         .unwrap_or_default()
 }
 
-/// The temperature function of a coefficient; `None` for a parameter at the reference.
-pub fn function_name(function: Option<usize>) -> String {
+/// The temperature function of a coefficient.
+pub fn function_name(function: usize) -> String {
     match function {
-        None => "at the reference".to_owned(),
-        Some(RATE) => "by rate".to_owned(),
-        Some(0) => "linear".to_owned(),
-        Some(1) => "square".to_owned(),
-        Some(2) => "cubic".to_owned(),
-        Some(function) => format!("order {}", function + 1),
+        RATE => "by rate".to_owned(),
+        0 => "linear".to_owned(),
+        1 => "square".to_owned(),
+        2 => "cubic".to_owned(),
+        _ => format!("order {}", function + 1),
     }
 }
 

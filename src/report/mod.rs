@@ -33,7 +33,6 @@ pub mod accuracy;
 pub mod allan;
 pub mod at_rest;
 pub mod calibration;
-pub mod campaign;
 #[cfg(feature = "certificate")]
 pub mod certificate;
 pub mod check;

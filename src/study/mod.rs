@@ -1,7 +1,6 @@
 //! Studies: statistics over many simulated runs.
 
 pub mod accuracy;
-pub mod campaign;
 mod checked;
 pub mod experiment;
 pub mod navigation;
@@ -20,7 +19,6 @@ use crate::models::ModelError;
 use crate::turntable::TableError;
 
 pub use accuracy::{Accuracy, AccuracyStudy, Figures, NavigationAccuracy};
-pub use campaign::{CampaignAccuracy, CampaignStudy};
 pub use checked::{CheckedCalibration, Consequences};
 pub use experiment::{Experiment, ExperimentStudy};
 pub use ratio::Ratio;

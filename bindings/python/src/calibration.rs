@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyIterator;
-use turncal::calibration::{self, AtRest, Finding, FindingKind, Progress as Passes};
+use turncal::calibration::{self, Finding, FindingKind, Progress as Passes};
 use turncal::formats::record_inputs;
 use turncal::imu::{Output, Sensor, Term};
 use turncal::lot::{Lot, Specification, Unit};
@@ -66,14 +66,12 @@ pub fn calibrated(
     progress: Passes,
 ) -> Result<Calibration, Refusal> {
     let problem = of.problem(&request)?;
-    // Without a turn, only the output at rest against temperature can be determined.
+    // Without a turn, only the biases against temperature can be determined.
     if request.temperature
-        && problem.dwells().nth(1).is_none()
-        && let Some(found) = AtRest::new(&of.runs[0], AtRest::HIGHEST_ORDER)
+        && let Some(found) = problem.at_rest()
     {
-        let run = &of.runs[0];
-        let record = found.record(run);
-        let document = at_rest::document(&found, run, &record);
+        let record = found.record(&problem);
+        let document = at_rest::document(&found, problem.run(), &record);
         return Ok(Calibration {
             document: OnceLock::from(document),
             specification: request.specification,

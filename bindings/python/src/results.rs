@@ -136,7 +136,6 @@ pub fn navigate(
             body_frame,
             only: None,
             mission: &mission,
-            warming: None,
             trajectory: name.as_deref(),
             navigated: &navigated,
         };

@@ -13,8 +13,8 @@ use crate::calibration::constants::triangle;
 use crate::calibration::filter::Filter;
 use crate::calibration::several::day_to_day::OwnState;
 use crate::calibration::{
-    Coefficient, Constant, Difference, Known, Linearisation, ParameterVector, Posterior, Prior,
-    from_vector, to_vector,
+    Constant, Difference, Known, Linearisation, ParameterVector, Posterior, Prior, from_vector,
+    to_vector,
 };
 pub use script::{Keeping, Moves, Script};
 
@@ -206,15 +206,6 @@ impl Reduction {
             }
         }
         estimate
-    }
-
-    /// The temperature coefficients among the constants, with their indices.
-    pub fn coefficients(&self) -> impl Iterator<Item = (usize, Coefficient)> + '_ {
-        let places = self.constants.iter().enumerate();
-        places.filter_map(|(place, constant)| match constant {
-            Constant::Thermal(coefficient) => Some((place, *coefficient)),
-            _ => None,
-        })
     }
 }
 

@@ -3,7 +3,6 @@
 //! Values are in the file's quantity (see [`crate::imu::Nominal`]): `N = scale ⊙ (installation · u)
 //! + bias`, with `u` in rad/s or m/s² along right-front-up.
 
-pub(super) mod at_rest;
 pub(super) mod at_temperature;
 pub(super) mod correction;
 pub(crate) mod frame;

@@ -166,11 +166,9 @@ impl Calibrate {
                 let together = Together::default();
                 let problem = self.estimation.together(&[run], &together);
                 let problem = problem.inspect_err(|_| say(&run.recording))?;
-                // Without a turn, only the output at rest against temperature can be determined.
-                if problem.dwells().nth(1).is_none()
-                    && let Some(at_rest) = AtRest::new(run, AtRest::HIGHEST_ORDER)
-                {
-                    return self.at_rest(&at_rest, &opened, path);
+                // Without a turn, only the biases against temperature can be determined.
+                if let Some(at_rest) = problem.at_rest() {
+                    return self.at_rest(&at_rest, &problem, (&opened, path));
                 }
                 problem
             }
@@ -184,10 +182,15 @@ impl Calibrate {
         )
     }
 
-    /// Output of a stationary instrument against its temperature.
-    fn at_rest(&self, at_rest: &AtRest, opened: &Opened, path: &Path) -> anyhow::Result<()> {
-        let run = &opened.run;
-        let calibration = at_rest.record(run);
+    /// Biases of a stationary instrument against temperature.
+    fn at_rest(
+        &self,
+        at_rest: &AtRest,
+        problem: &Problem,
+        (opened, path): (&Opened, &Path),
+    ) -> anyhow::Result<()> {
+        let run = problem.run();
+        let calibration = at_rest.record(problem);
         let document = report::at_rest::document(at_rest, run, &calibration);
         let target = self.target(|| format!("{}-calibration", run.recording.name));
         if let Some(target) = &target {

@@ -7,7 +7,7 @@ mod report;
 mod residuals;
 mod solved;
 mod tables;
-mod temperature;
+pub(super) mod temperature;
 #[cfg(test)]
 mod tests;
 

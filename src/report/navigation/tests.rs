@@ -50,7 +50,6 @@ fn document(moments: &[Outlook]) -> Document {
         body_frame: BodyFrame::Table,
         only: None,
         mission: &mission(),
-        warming: None,
         trajectory: None,
         navigated: &navigated,
     };
