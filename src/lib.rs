@@ -62,6 +62,7 @@ mod cli;
 pub mod earth;
 pub mod formats;
 pub mod imu;
+pub mod laboratory;
 pub mod lot;
 pub mod models;
 pub mod navigation;
@@ -70,9 +71,9 @@ pub mod number;
 pub mod recording;
 #[cfg(feature = "report")]
 pub mod report;
-pub(crate) mod room;
 pub mod run;
 pub mod simulation;
+pub(crate) mod small_file;
 pub(crate) mod statistics;
 pub mod study;
 pub mod survey;

@@ -18,6 +18,7 @@ use serde::de::DeserializeOwned;
 
 use crate::formats::{Document, FileError, Place as At};
 use crate::lot::Specification;
+use crate::small_file;
 
 pub use by_hand::path_by_hand;
 pub use catalogue::Embedded;
@@ -185,7 +186,7 @@ pub fn text(room: Room, name_or_path: &str, named_in: &Place) -> Result<Text, Mo
     };
     if let Some(path) = path.filter(|path| path.is_file()) {
         let file = path.display().to_string();
-        let text = std::fs::read_to_string(&path);
+        let text = small_file::text(&path);
         let text = text.map_err(|error| inconsistent(&file, format!("cannot be read: {error}")))?;
         return Ok(Text {
             text,

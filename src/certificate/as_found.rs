@@ -1,9 +1,9 @@
 //! As-found state of the instrument: its deviation from the earlier calibration.
 
 use super::results::{Quantity, nominal};
-use crate::calibration::result::frame::{Canonical, free_parameters};
+use crate::calibration::result::frame::{free_parameters, in_common_form};
 use crate::calibration::result::{Calibration, Provenance};
-use crate::calibration::{ComparisonError, Group, parameter_name};
+use crate::calibration::{ComparisonError, Group, Named, parameter_name};
 use crate::imu::{BodyFrame, InstallationForm, ParameterKind};
 
 /// Comparison of an earlier calibration with this one.
@@ -39,17 +39,20 @@ pub fn as_found(
     provenance: &Provenance,
 ) -> Result<AsFound, ComparisonError> {
     let nominal = nominal(provenance);
-    let frames = [earlier.body_frame, now.body_frame];
-    let body_frame = match frames.contains(&BodyFrame::Accelerometer) {
-        true => BodyFrame::Accelerometer,
-        false => BodyFrame::Table,
-    };
-    let canonical = |name, record| Canonical::new(name, record, &nominal, body_frame);
-    let found = canonical(name, earlier)?;
-    let left = canonical("this calibration", now)?;
+    let [found, left] = in_common_form(
+        Named {
+            name,
+            record: earlier,
+        },
+        Named {
+            name: "this calibration",
+            record: now,
+        },
+        &nominal,
+    )?;
     let covariance = found.covariance.zip(left.covariance).map(|(a, b)| a + b);
     let (values_found, values_left) = (found.vector(), left.vector());
-    let changes = free_parameters(body_frame).into_iter().map(|i| {
+    let changes = free_parameters(left.body_frame).into_iter().map(|i| {
         let group = Group::of(i);
         let base = match group.kind() {
             ParameterKind::Scale => 1.0,
@@ -65,7 +68,7 @@ pub fn as_found(
     });
     Ok(AsFound {
         earlier: name.to_owned(),
-        body_frame,
+        body_frame: left.body_frame,
         changes: changes.collect(),
     })
 }

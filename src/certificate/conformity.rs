@@ -2,12 +2,12 @@
 //!
 //! Source: JCGM 106:2012, 8.3 (guard bands), 9.3 (specific consumer's risk); ILAC-G8:09/2019, 4.2.
 
-use super::laboratory::DecisionRule;
 use super::results::nominal;
 use crate::calibration::result::frame::Canonical;
 use crate::calibration::result::{Calibration, Provenance};
 use crate::calibration::{ComparisonError, parameter_name};
 use crate::imu::InstallationForm;
+use crate::laboratory::DecisionRule;
 use crate::lot::{Limit, Specification, probability_outside};
 
 /// Guard band divided by σ: the expanded uncertainty with k = 2.

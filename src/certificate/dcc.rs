@@ -7,10 +7,8 @@ use std::fmt::Write;
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::{
-    Certificate, Condition, Contact, Decided, Equipment, Item, Measured, in_words,
-    temperature_words,
-};
+use super::{Certificate, Decided, Measured, in_words, temperature_words};
+use crate::laboratory::{Condition, Contact, Equipment, Item};
 use crate::number::to_twelve_digits;
 
 /// Coverage probability of every uncertainty.

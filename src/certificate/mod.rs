@@ -4,17 +4,16 @@
 mod as_found;
 mod conformity;
 pub mod dcc;
-mod laboratory;
 mod results;
 
 use crate::calibration::result::{Calibration, Provenance};
 use crate::calibration::{ComparisonError, Correction, CorrectionError};
 use crate::imu::BodyFrame;
+use crate::laboratory::Laboratory;
 use crate::lot::Specification;
 
 pub use as_found::{AsFound, Change};
 pub use conformity::{Conformity, Decided, Decision};
-pub use laboratory::*;
 pub use results::{Measured, Quantity, in_words, temperature_words};
 
 /// Errors of a certificate.

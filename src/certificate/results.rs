@@ -4,7 +4,6 @@ use crate::calibration::Group;
 use crate::calibration::result::{Calibration, Provenance};
 use crate::calibration::{PARAMETERS, ThermalRecord, parameter_name, sensor_and_parameter};
 use crate::imu::{Nominal, ParameterKind, PerSensor, Sensor, TERM_PARAMETERS, Term};
-use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
 
 /// Default coverage factor for 95.45 %.
 const COVERAGE_FACTOR: f64 = 2.0;
@@ -23,12 +22,7 @@ impl Quantity {
     pub fn unit(self) -> (&'static str, f64) {
         match self {
             Self::Term(term) => term.entry().unit,
-            Self::Parameters(group) => match (group.kind(), group.sensor()) {
-                (ParameterKind::Scale, _) => ("ppm", PPM),
-                (ParameterKind::Installation, _) => ("″", ARCSEC),
-                (ParameterKind::Bias, Sensor::Gyro) => ("°/h", DEG_PER_H),
-                (ParameterKind::Bias, Sensor::Accel) => ("µg", MICRO_G),
-            },
+            Self::Parameters(group) => (group.unit(), group.unit_value()),
         }
     }
 

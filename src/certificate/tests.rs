@@ -3,8 +3,9 @@ use super::*;
 use crate::calibration::result::frame::tests::{record, with_covariance};
 use crate::calibration::result::{EQUATION_WITH_TERMS, InputFile, TermRecord};
 use crate::calibration::{BudgetRecord, ThermalRecord};
-use crate::formats::digest_of_bytes;
+use crate::formats::{digest_of_bytes, read_laboratory};
 use crate::imu::{InstallationForm, PerSensor, ThermalRange};
+use crate::laboratory::DecisionRule;
 use crate::lot::Limit;
 use crate::report::certificate::files;
 use crate::units::{ARCSEC, PPM};
@@ -32,7 +33,7 @@ fn calibration() -> Calibration {
 
 fn laboratory() -> Laboratory {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/lab.toml");
-    Laboratory::read(&path, |_| None).unwrap()
+    read_laboratory(&path, |_| None).unwrap()
 }
 
 fn specification(within: f64) -> Specification {

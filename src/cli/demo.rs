@@ -1,16 +1,9 @@
 //! `turncal demo`
 
 use std::collections::BTreeMap;
-use std::ffi::{OsStr, OsString};
-use std::fs::File;
-use std::io::Write;
 use std::path::PathBuf;
-use std::thread;
-use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-use clap::Parser;
-use flate2::read::GzDecoder;
 use rayon::prelude::*;
 
 use super::calibrate::{solve, write_report};
@@ -18,21 +11,17 @@ use super::simulate::{simulated, write};
 use crate::calibration::{
     self, Assessment, ClosedForm, Estimate, Method, Options, Problem, Solution,
 };
-use crate::cli::Cli;
-use crate::cli::arguments::{Overwrite, number, seed};
+use crate::cli::arguments::{Overwrite, seed};
 use crate::cli::terminal::{Activity, show_brief};
+use crate::formats::record_inputs;
 use crate::imu::{PerSensor, Triad};
-use crate::models::{self, Place, path_by_hand};
-use crate::report::calibration::{
-    self as of_calibration, Report, dwell_times, navigate, note, stamp,
-};
+use crate::models::{self, Place};
+use crate::report::calibration::{self as of_calibration, Report, dwell_times, note};
 use crate::report::navigation::{Flown, add_missions};
 use crate::report::{Document, Facts};
 use crate::run::{Dwell, Run};
 use crate::simulation::{Scenario, Simulated};
-use crate::study::navigation::{FORTY_HOURS, Mission, Motion};
-use crate::turntable::Moves;
-use crate::units::DEGREE;
+use crate::study::navigation::{FORTY_HOURS, Mission, Motion, navigate_with_each};
 
 /// Simulates a calibration and compares it with the truth
 ///
@@ -41,9 +30,7 @@ use crate::units::DEGREE;
 /// navigates for 40 h with each and writes a report. DIR is the run directory of the filter. It contains ekf/ with the
 /// filter calibration, six-position/ with the static run and its calibration, and report/.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:
-  turncal demo -o my-demo --seed 3
-  turncal demo --follow --speed 10")]
+#[command(after_help = "Example:  turncal demo -o my-demo --seed 3")]
 pub struct Demo {
     /// Directory to write
     #[arg(short, long, value_name = "DIR", default_value = "turncal-demo")]
@@ -51,31 +38,12 @@ pub struct Demo {
     /// Seed of all random numbers [default: the scenario's]
     #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
     seed: Option<u64>,
-    /// Simulate a sensor turned by hand, and follow its rows as they arrive
-    #[arg(long)]
-    follow: bool,
-    /// With --follow: playback speed, as a multiple of real time
-    #[arg(long, value_name = "N", value_parser = speed, default_value = "5", requires = "follow")]
-    speed: f64,
     #[command(flatten)]
     overwrite: Overwrite,
 }
 
-/// Path of the sensor turned by hand; its third dwell is too short to count.
-const BY_HAND: &str = "z_up, turn x 180, turn y 20, x_up, x_down, turn z 90, y_up, y_down, turn y 180, turn z 180, \
-                       turn x 90, turn x 180, turn y 90, z_up, turn z 180";
-const TOO_SHORT: usize = 1;
-
-/// How many times as fast as the sensor.
-fn speed(text: &str) -> Result<f64, String> {
-    number(text, 0.1, 1000.0)
-}
-
 impl Demo {
     pub fn run(&self) -> anyhow::Result<()> {
-        if self.follow {
-            return self.followed();
-        }
         let directory = self.overwrite.directory(&self.output, &[])?;
         let activity = Activity::new("simulating both runs");
         // The same seed gives both runs the same instrument.
@@ -110,11 +78,11 @@ impl Demo {
         write(&standing, &closed)?;
         let of_filter = solution.calibration(&problem, &assessment);
         let of_closed_form = whole.record(&still, &whole.quality(&still)?);
-        for (mut record, of, path) in [
-            (of_filter, &root, filtered),
-            (of_closed_form, &closed, closed.clone()),
+        for (mut record, of, run, path) in [
+            (of_filter, &root, &turning.run, filtered),
+            (of_closed_form, &closed, &standing.run, closed.clone()),
         ] {
-            stamp(&mut record, &of.join("run.toml"));
+            record_inputs(&mut record, &of.join("run.toml"), run);
             record.write(&path.join("calibration.json"), false)?;
         }
         write_report(&document, &root.join("report"))?;
@@ -127,56 +95,6 @@ impl Demo {
         files.push("with a log of your own", "turncal calibrate LOG");
         document.brief.push(files.into());
         show_brief(&document)
-    }
-}
-
-impl Demo {
-    /// Writes the rows of a sensor turned by hand into a growing log, and follows it.
-    fn followed(&self) -> anyhow::Result<()> {
-        let mut scenario = Scenario::load("mems")?;
-        scenario.path = path_by_hand(BY_HAND).map_err(anyhow::Error::msg)?;
-        if let Moves::Body { steps, .. } = &mut scenario.path.moves {
-            steps[TOO_SHORT].dwell = 0.5;
-        }
-        let folder = tempfile::tempdir()?;
-        let (whole, log) = (folder.path().join("sensor"), folder.path().join("imu.csv"));
-        std::fs::create_dir(&whole)?;
-        write(&simulated(&scenario, self.seed)?, &whole)?;
-        let rows = GzDecoder::new(File::open(whole.join("imu.csv.gz"))?);
-        let rows = std::io::read_to_string(rows)?;
-        let latitude = (scenario.site.latitude / DEGREE).to_string();
-        let arguments = [
-            "turncal",
-            "calibrate",
-            "--follow",
-            "--patience",
-            "3",
-            "--latitude",
-        ];
-        let mut arguments: Vec<OsString> = arguments.map(OsString::from).into();
-        let output: [&OsStr; 4] = [
-            latitude.as_ref(),
-            log.as_ref(),
-            "-o".as_ref(),
-            self.output.as_ref(),
-        ];
-        arguments.extend(output.map(OsStr::to_owned));
-        if self.overwrite.force {
-            arguments.push("--force".into());
-        }
-        let mut file = File::create(&log)?;
-        let pause = Duration::from_secs_f64(scenario.integrator.period / self.speed);
-        let begun = Instant::now();
-        let play = move || {
-            for (number, row) in (0..).zip(rows.split_inclusive('\n')) {
-                thread::sleep((pause * number).saturating_sub(begun.elapsed()));
-                if file.write_all(row.as_bytes()).is_err() {
-                    return;
-                }
-            }
-        };
-        thread::Builder::new().name("sensor".into()).spawn(play)?;
-        Cli::try_parse_from(arguments)?.run()
     }
 }
 
@@ -198,7 +116,7 @@ fn document(
         ("closed form", &closed_form.estimate),
         ("EKF", solution.estimate()),
     ];
-    let navigation = navigate(run, &methods, Some(&turning.truth));
+    let navigation = navigate_with_each(&run.site, &methods, Some(&turning.truth));
     let report = Report {
         title: "turncal demo",
         run,

@@ -13,6 +13,7 @@ use crate::formats::Opened;
 use crate::models::specification;
 use crate::report::path::{Report, in_words, moves_in_words};
 use crate::run::Aiding;
+use crate::small_file;
 use crate::study::path::{Evaluation, Named, PathStudy};
 
 /// Predicts calibration accuracy for a path of a table or by hand, before any data exist
@@ -83,17 +84,19 @@ impl Evaluate {
             .collect();
         let begun = self.delivery.begin(&inputs)?;
         let activity = Activity::new("evaluating the path");
-        let (name, with, moves, evaluation) = match is_run(file) {
-            true => self.of_run(file)?,
-            false => self.of_path()?,
+        let (name, with, moves, evaluation) = if is_run(file) {
+            self.of_run(file)?
+        } else {
+            self.of_path()?
         };
         drop(activity);
+        let checks = specification.map(|of| evaluation.decided(&of));
         let report = Report {
             name: &name,
             with: &with,
             moves: &moves,
             evaluation: &evaluation,
-            specification: specification.as_ref(),
+            checks: checks.as_deref(),
         };
         let document = report.document();
         begun.deliver(&document)?;
@@ -139,5 +142,5 @@ impl Evaluate {
 
 /// Whether a file describes a run.
 fn is_run(file: &Path) -> bool {
-    file.is_file() && std::fs::read_to_string(file).is_ok_and(|text| text.contains("turncal-run/"))
+    file.is_file() && small_file::text(file).is_ok_and(|text| text.contains("turncal-run/"))
 }

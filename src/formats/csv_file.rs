@@ -15,22 +15,12 @@ use flate2::read::MultiGzDecoder;
 use super::data_file::DataFile;
 use super::error::{FileError, Place};
 use super::rows::Rows;
-use crate::room;
 use heading::{Heading, Looks};
 use lines::{LONGEST, Lines, Stop};
 use row::{LONGEST_FIELD, MOST_COLUMNS, Malformed, Row};
 
-/// Bytes per value while a recording is read: as read, repaired and in SI. Checking for the memory of a whole
-/// calibration would refuse logs that may fit.
-const BYTES_A_VALUE: usize = 32;
-/// The same if columns are only examined.
-const BYTES_LOOKED_AT: usize = 16;
-/// The same if rows are packed while reading.
-const BYTES_PACKED: usize = 4;
 /// First bytes of a gzipped file.
 const GZIP: [u8; 2] = [0x1f, 0x8b];
-/// Number of rows that always fit.
-const FEW_ROWS: usize = 1 << 12;
 
 /// A file of rows, positioned at one row.
 ///
@@ -45,8 +35,6 @@ pub struct CsvFile {
     /// For rows of several kinds, the tag of the selected ones and its column.
     tag: Option<(usize, String)>,
     row: Row,
-    rows: usize,
-    packed: bool,
     line: u64,
     cut: Option<Cut>,
 }
@@ -91,8 +79,6 @@ impl CsvFile {
             tag: tags
                 .zip(tag)
                 .map(|(tags, tag)| (tags.column, tag.to_owned())),
-            rows: 0,
-            packed: false,
             line: heading.line,
             heading,
             cut: None,
@@ -105,29 +91,6 @@ impl CsvFile {
         Ok(Looks::of(lines.ahead())
             .tags()
             .map_or_else(Vec::new, |tags| tags.names))
-    }
-
-    /// Checks, as the number of rows grows, that there is enough memory.
-    fn reserve(&self, used: usize) -> Result<(), FileError> {
-        if self.rows < FEW_ROWS || !self.rows.is_power_of_two() {
-            return Ok(());
-        }
-        let a_row = match used {
-            0 => self.header().len() * BYTES_LOOKED_AT,
-            used if self.packed => used * BYTES_PACKED,
-            used => used * BYTES_A_VALUE,
-        };
-        if room::is_there((2 * self.rows).saturating_mul(a_row)) {
-            return Ok(());
-        }
-        Err(self.error_here(
-            format_args!(
-                "{} rows so far and not enough memory for as many again",
-                self.rows
-            ),
-            "a recording that fits into memory",
-            "Use a computer with more memory, or split the recording.",
-        ))
     }
 
     fn bytes(&self, column: usize) -> &[u8] {
@@ -176,8 +139,6 @@ impl Rows for CsvFile {
                 _ => break split,
             }
         };
-        self.rows += 1;
-        self.reserve(used.len())?;
         let (found, expected) = (self.row.len(), self.header().len());
         let is_cut = split == Err(Malformed::Quote) || found < expected;
         if is_cut && !self.lines.is_ended() {
@@ -250,10 +211,6 @@ impl Rows for CsvFile {
             "The last row of {file} (line {line}) {what}. Check that the file is complete."
         ))
     }
-
-    fn pack(&mut self) {
-        self.packed = true;
-    }
 }
 
 /// Error for a tag in a file without tagged rows.
@@ -273,12 +230,13 @@ fn source(file: &DataFile) -> Result<Box<dyn BufRead>, FileError> {
     let begin = plain
         .fill_buf()
         .map_err(|error| stopped(file, &Stop::System(error)))?;
-    Ok(match begin.starts_with(&GZIP) {
-        true => Box::new(BufReader::with_capacity(
+    Ok(if begin.starts_with(&GZIP) {
+        Box::new(BufReader::with_capacity(
             1 << 16,
             MultiGzDecoder::new(plain),
-        )),
-        false => Box::new(plain),
+        ))
+    } else {
+        Box::new(plain)
     })
 }
 

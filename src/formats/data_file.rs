@@ -68,9 +68,10 @@ impl DataFile {
         // To open a pipe would wait for whoever writes into it.
         let kind = fs::metadata(self).map_err(|error| self.refused(&error))?;
         if !kind.is_file() {
-            let found = match kind.is_dir() {
-                true => "a directory",
-                false => "a device or pipe",
+            let found = if kind.is_dir() {
+                "a directory"
+            } else {
+                "a device or pipe"
             };
             let expected = "a regular file that can be read more than once";
             let advice = "Save its output to a file and give that file.";

@@ -80,7 +80,7 @@ impl Opened {
         (stream, stated): (Option<&str>, &Stated),
         show: impl FnOnce(&Draft),
     ) -> Result<Self, FileError> {
-        if file.extension() == Some(OsStr::new("toml")) {
+        if is_toml(file) {
             if stream.is_some() || *stated != Stated::default() {
                 let found = "statements about the log beside a run.toml (rate, units, site, sensor, stream)";
                 let advice = "Write them into run.toml, or omit them.";
@@ -148,6 +148,11 @@ impl Opened {
             .and_then(|file: PathBuf| fs::write(&path, log.draft.to_toml(&file.to_string_lossy())));
         written.map_err(|error| FileError::unwritten(&path, &error))
     }
+}
+
+/// Whether a file is a `run.toml` or `campaign.toml`, which names others, and not a log: by its extension.
+pub fn is_toml(path: &Path) -> bool {
+    path.extension() == Some(OsStr::new("toml"))
 }
 
 /// All rows of standard input as a file.

@@ -27,11 +27,10 @@ pub use crate::imu::NoiseKeys;
 pub use data_file::DataFile;
 pub(crate) use directories::write_whole_with;
 pub use directories::{
-    JOB_FILE, Job, JobKind, LotDirectory, Part, Parts, WholeDirectory, abandon_unfinished,
-    digest_of_bytes, input_digests, part_is_there, read_part_unit, unit_key, write_part,
-    write_whole,
+    JOB_FILE, Job, JobKind, LotDirectory, Part, Parts, Unfinished, WholeDirectory, digest_of_bytes,
+    input_digests, part_is_there, read_part_unit, record_inputs, unit_key, write_part, write_whole,
 };
-pub use door::Opened;
+pub use door::{Opened, is_toml};
 pub use error::{FileError, Place};
 // By these names the readers of rows know them.
 use inputs::{course, joined, temperature};
@@ -40,6 +39,8 @@ pub use rows::FileColumn;
 use schema::instrument;
 #[cfg(feature = "cli")]
 pub use schema::json_schema as run_schema;
+#[cfg(feature = "certificate")]
+pub use schema::read_laboratory;
 pub use schema::{Campaign, campaign_text, write_run};
 pub(crate) use schema::{
     Document, Finite, Latitude, NonNegative, OneOrThree, Positive, write_rows,

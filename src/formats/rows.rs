@@ -72,9 +72,6 @@ pub trait Rows {
     fn cut_off(&self, _done: &str) -> Option<String> {
         None
     }
-
-    /// Assumes less memory per row, because rows are packed while reading.
-    fn pack(&mut self) {}
 }
 
 /// A column as `run.toml` names it.
@@ -134,35 +131,33 @@ impl LogRows {
         self.rows.advance(&self.used)
     }
 
-    /// Assumes less memory per row, because rows are packed while reading.
-    pub fn pack(&mut self) {
-        self.rows.pack();
-    }
-
     /// The finite number in a column of the row.
     pub fn number(&self, column: usize) -> Result<f64, FileError> {
         let value = self.value(column);
-        match value.is_finite() {
-            true => Ok(value),
-            false => Err(self.not(column, "a finite number")),
+        if value.is_finite() {
+            Ok(value)
+        } else {
+            Err(self.not(column, "a finite number"))
         }
     }
 
     /// The text in a column of the row, not empty.
     pub fn text(&self, column: usize) -> Result<Cow<'_, str>, FileError> {
         let text = self.shown(column);
-        match text.is_empty() {
-            false => Ok(text),
-            true => Err(self.not(column, "a text")),
+        if text.is_empty() {
+            Err(self.not(column, "a text"))
+        } else {
+            Ok(text)
         }
     }
 
     /// The error for an invalid value in a row.
     pub fn not(&self, column: usize, expected: &str) -> FileError {
         let shown = self.shown(column);
-        let found = match shown.is_empty() {
-            true => "an empty field".to_owned(),
-            false => format!("`{shown}`"),
+        let found = if shown.is_empty() {
+            "an empty field".to_owned()
+        } else {
+            format!("`{shown}`")
         };
         let advice = "Correct the value, or repeat the recording.";
         FileError::new(

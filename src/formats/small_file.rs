@@ -1,39 +1,23 @@
-//! Files read as a whole: descriptions and results, never recordings.
+//! Descriptions and results, read as a whole.
 
-use std::fs::File;
-use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::error::FileError;
+use crate::small_file;
 
-/// Length limit, because any file or an endless device may be named.
-const MOST_BYTES: u64 = 1 << 24;
-
-/// All bytes of a file that contains `what`.
+/// All bytes of a small file that contains `what`.
 pub fn bytes(path: &Path, what: &str, advice: &str) -> Result<Vec<u8>, FileError> {
-    let read = || {
-        let mut bytes = Vec::new();
-        let file = File::open(path)?;
-        file.take(MOST_BYTES + 1).read_to_end(&mut bytes)?;
-        if bytes.len() as u64 > MOST_BYTES {
-            let most = MOST_BYTES >> 20;
-            let why = format!("it is longer than {most} MiB, the limit for such files");
-            return Err(io::Error::new(ErrorKind::FileTooLarge, why));
-        }
-        Ok(bytes)
-    };
-    read().map_err(|error| FileError::io(path, &format!("read {what}"), &error, advice))
+    let bytes = small_file::bytes(path);
+    bytes.map_err(|error| FileError::io(path, &format!("read {what}"), &error, advice))
 }
 
 /// The text of such a file.
 pub fn text(path: &Path, what: &str, advice: &str) -> Result<String, FileError> {
-    String::from_utf8(bytes(path, what, advice)?).map_err(|_| {
-        let error = io::Error::new(ErrorKind::InvalidData, "it is not UTF-8 text");
-        FileError::io(path, &format!("read {what}"), &error, advice)
-    })
+    let text = small_file::text(path);
+    text.map_err(|error| FileError::io(path, &format!("read {what}"), &error, advice))
 }
 
 /// Such a file of this JSON format.

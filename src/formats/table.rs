@@ -19,8 +19,11 @@ impl Table {
     ///
     /// # Errors
     /// [`FileError`] if the columns differ in length.
-    pub fn new(name: &str, columns: Vec<(String, Vec<f64>)>) -> Result<Self, FileError> {
-        let name = PathBuf::from(name);
+    pub fn new(
+        name: impl AsRef<Path>,
+        columns: Vec<(String, Vec<f64>)>,
+    ) -> Result<Self, FileError> {
+        let name = name.as_ref().to_path_buf();
         let (names, columns): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
         let rows = columns.first().map_or(0, Vec::len);
         if let Some(other) = columns.iter().position(|of| of.len() != rows) {
@@ -53,6 +56,9 @@ impl Table {
     pub(super) fn rows(&self) -> TableRows {
         TableRows {
             table: self.clone(),
+            units: Vec::new(),
+            remarks: Vec::new(),
+            integral_error: [0.0; 3],
             begun: 0,
         }
     }
@@ -61,6 +67,9 @@ impl Table {
 /// A table at one of its rows.
 pub(super) struct TableRows {
     table: Table,
+    pub units: Vec<String>,
+    pub remarks: Vec<String>,
+    pub integral_error: [f64; 3],
     /// Number of rows up to and including this one.
     begun: usize,
 }
@@ -75,11 +84,15 @@ impl Rows for TableRows {
     }
 
     fn units(&self) -> &[String] {
-        &[]
+        &self.units
     }
 
     fn remarks(&self) -> &[String] {
-        &[]
+        &self.remarks
+    }
+
+    fn integral_error(&self) -> [f64; 3] {
+        self.integral_error
     }
 
     fn advance(&mut self, _used: &[usize]) -> Result<bool, FileError> {

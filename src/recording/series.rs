@@ -71,9 +71,10 @@ impl Series {
 
     /// Iterates over a range of increments.
     pub fn within(&self, samples: Range<usize>) -> impl Iterator<Item = Vector3<f64>> {
-        let length = match self.is_packed() {
-            true => AT_ONCE,
-            false => samples.len(),
+        let length = if self.is_packed() {
+            AT_ONCE
+        } else {
+            samples.len()
         };
         self.parts(samples, length).flat_map(|part| {
             let (borrowed, owned) = match part {

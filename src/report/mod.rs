@@ -33,11 +33,9 @@ pub mod accuracy;
 pub mod allan;
 pub mod at_rest;
 pub mod calibration;
-pub mod campaign;
 #[cfg(feature = "certificate")]
 pub mod certificate;
 pub mod check;
-pub mod comparison;
 pub mod conversion;
 pub mod experiment;
 mod group;

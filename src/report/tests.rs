@@ -8,7 +8,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::calibration::{ClosedForm, Navigated, Report};
+use super::calibration::{ClosedForm, Report};
 use crate::calibration::result::TermRecord;
 use crate::calibration::*;
 use crate::calibration::{
@@ -18,7 +18,7 @@ use crate::calibration::{
 use crate::imu::*;
 use crate::run::Run;
 use crate::simulation::{Scenario, Simulated};
-use crate::study::navigation::Mission;
+use crate::study::navigation::{MethodOutlook, Mission};
 use crate::units::ARCSEC;
 
 static NO_TERMS: BTreeMap<String, TermRecord> = BTreeMap::new();
@@ -29,7 +29,7 @@ pub struct Synthetic {
     pub(super) closed: Estimate,
     pub(super) truth: PerSensor<Triad>,
     pub(super) dwells: Vec<Range<f64>>,
-    pub(super) navigation: Vec<Navigated>,
+    pub(super) navigation: Vec<MethodOutlook>,
 }
 
 impl Synthetic {
@@ -264,7 +264,7 @@ pub fn synthetic(form: InstallationForm) -> Synthetic {
     let closed = estimate(&truth, &(final_sigma * 40.0), &vector(rng));
     let mission = Mission::standing_level(&run.site, 600);
     let navigation = [("closed form", &closed), ("EKF", &outcome.estimate)]
-        .map(|(method, estimate)| Navigated {
+        .map(|(method, estimate)| MethodOutlook {
             method,
             outlook: mission.outlook(estimate, Some(&truth)).unwrap(),
         })

@@ -198,13 +198,20 @@ impl Scenario {
         ROOM_TEMPERATURE
     }
 
+    /// Motion of a perfect table along the path.
+    ///
+    /// # Errors
+    /// If the table cannot follow the path.
+    pub fn motion(&self) -> Result<Motion, TableError> {
+        Motion::new(&self.table, &self.path, &Imperfection::none(&self.table))
+    }
+
     /// Duration of a run, s.
     ///
     /// # Errors
     /// If the table cannot follow the path.
     pub fn duration(&self) -> Result<f64, TableError> {
-        let perfect = Imperfection::none(&self.table);
-        Ok(Motion::new(&self.table, &self.path, &perfect)?.duration())
+        Ok(self.motion()?.duration())
     }
 
     /// Total time of the dwells in it, s.
@@ -212,8 +219,7 @@ impl Scenario {
     /// # Errors
     /// If the table cannot follow the path.
     pub fn standing_time(&self) -> Result<f64, TableError> {
-        let perfect = Imperfection::none(&self.table);
-        let motion = Motion::new(&self.table, &self.path, &perfect)?;
+        let motion = self.motion()?;
         Ok(motion.dwells().map(|(start, end)| end - start).sum())
     }
 

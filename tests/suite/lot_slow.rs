@@ -148,11 +148,10 @@ fn three_wrong_units_of_fifty_are_named_and_a_killed_lot_comes_to_the_same_bytes
         let true_spread =
             (squares / (values.len() - 1) as f64).sqrt() / Group::of(index).unit_value();
         let of = |key: &str| found[key].as_f64().unwrap();
+        let [low, high] = [0, 1].map(|k| found["spread_interval"][k].as_f64().unwrap());
+        let width = high - low;
         // Both are of the same units: they differ by the units' own σ alone, a part of the spread's σ.
-        assert!(
-            (of("spread") - true_spread).abs() < 0.1 * of("spread_sigma"),
-            "{name}"
-        );
+        assert!((of("spread") - true_spread).abs() < 0.025 * width, "{name}");
         assert!(found["spread_is_real"].as_bool().unwrap(), "{name}");
         pull.push(of("spread") / true_spread - 1.0);
     }

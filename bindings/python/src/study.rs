@@ -170,15 +170,6 @@ pub fn study_options(
     }
     let usual = if of { "demo" } else { "experiment" };
     let name = scenario.unwrap_or(usual);
-    if SimulatedCampaign::is_named(name) {
-        let expected =
-            "a scenario of one recording. Use the command turncal study accuracy for a campaign.";
-        return Err(wrong(
-            "scenario",
-            format_args!("the campaign {name:?}"),
-            expected,
-        ));
-    }
     let scenario = Scenario::load(name).map_err(raise)?;
     let seed = seed.unwrap_or(scenario.seed);
     let study = match of {
@@ -293,12 +284,13 @@ pub fn evaluate(
             terms,
         })?;
         let evaluation = study.evaluate()?;
+        let checks = limits.map(|limits| evaluation.decided(&limits));
         let report = OfPath {
             name: &study.scenario.path_name,
             with: &in_words(&study),
             moves: &moves_in_words(&study.scenario),
             evaluation: &evaluation,
-            specification: limits.as_ref(),
+            checks: checks.as_deref(),
         };
         Ok::<_, PathError>(Report(report.document()))
     });

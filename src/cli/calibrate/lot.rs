@@ -1,55 +1,48 @@
 //! `turncal calibrate RUN.toml RUN.toml …`: a lot.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 
-use super::write_report;
-use crate::calibration::{UNWATCHED, Word};
-use crate::cli::arguments::{Estimation, OfLog};
+use super::{Calibrate, write_report};
+use crate::calibration::{Calibration, UNWATCHED, Word};
+use crate::cli::arguments::OfLog;
 use crate::cli::terminal::{Runs, piece_by_piece, show};
-use crate::formats::{Job, JobKind, LotDirectory, Part, unit_key};
-use crate::imu::PerSensor;
-use crate::lot::{self, Lot, Unit};
+use crate::formats::{
+    FileError, Job, JobKind, LotDirectory, Part, is_toml, record_inputs, unit_key,
+};
+use crate::lot::{Lot, Unit};
 use crate::models;
 use crate::noise::RestNoise;
 use crate::report;
 use crate::report::Document;
-use crate::report::calibration::Calibrated;
+use crate::report::calibration;
 use crate::report::terminal::printable;
 use crate::run::Run;
-use crate::study::Shard;
+use crate::study::CheckedCalibration;
 
 /// Default output directory.
-pub const DIRECTORY: &str = "lot-calibration";
+const DIRECTORY: &str = "lot-calibration";
 
-/// Request for a lot.
-pub struct Request<'a> {
-    pub runs: &'a [PathBuf],
-    pub of_log: &'a OfLog,
-    pub estimation: &'a Estimation,
-    pub specification: Option<&'a Path>,
-    pub shard: Option<Shard>,
-    pub output: Option<&'a Path>,
-    pub json: bool,
-    pub force: bool,
-}
-
-impl Request<'_> {
-    pub fn run(&self) -> anyhow::Result<()> {
-        let names = unit_names(self.runs)?;
-        let specification = self.specification.map(models::specification).transpose()?;
-        let mut words = serde_json::to_value(self.estimation)?;
-        if *self.of_log != OfLog::default() {
+impl Calibrate {
+    /// Calibrates every run and compares them.
+    pub fn lot(&self) -> anyhow::Result<()> {
+        let names = unit_names(&self.runs)?;
+        let specification = self.specification.as_deref();
+        let specification = specification.map(models::specification).transpose()?;
+        let mut words = serde_json::to_value(&self.estimation)?;
+        if self.of_log != OfLog::default() {
             words["of_log"] = format!("{:?}", self.of_log).into();
         }
         let mut job = Job::new(JobKind::Lot, words, self.runs.len() as u64);
         job.names.clone_from(&names);
         job.specification.clone_from(&specification);
         let part = Part::new(job, self.shard);
-        let directory = self.output.map(|target| self.directory(target, &part));
-        let directory = directory.transpose()?;
+        let target = self.target(|| DIRECTORY.to_owned());
+        let inputs: Vec<&Path> = self.runs.iter().map(PathBuf::as_path).collect();
+        let open = |target| open_directory(target, &part, self.overwrite.force, &inputs);
+        let directory = target.as_deref().map(open).transpose()?;
 
         let held = part.held();
         let progress = Runs::new(held.len() as u64);
@@ -76,22 +69,11 @@ impl Request<'_> {
             );
             return Ok(());
         }
-        let lot = Lot::new(units, specification);
-        deliver(&lot, directory.as_ref().zip(self.output), self.json)
+        let lot = Lot::new(units, None, specification);
+        deliver(&lot, directory.as_ref().zip(target.as_deref()), self.json)
     }
 
-    fn directory(&self, target: &Path, part: &Part) -> anyhow::Result<LotDirectory> {
-        let inputs: Vec<&Path> = self.runs.iter().map(PathBuf::as_path).collect();
-        let waiting = || {
-            let name = printable(&target.display().to_string());
-            tell!("note: another turncal process is using {name}; waiting for it to finish");
-        };
-        Ok(LotDirectory::open(
-            target, part, self.force, &inputs, &waiting,
-        )?)
-    }
-
-    /// A stored unit, or else a newly calibrated one.
+    /// A stored unit, or else a newly calibrated one; a failure is also a result.
     fn unit(
         &self,
         run: &Path,
@@ -103,7 +85,21 @@ impl Request<'_> {
         if let Some(kept) = directory.and_then(|directory| directory.kept(name, &key)) {
             return Ok(kept);
         }
-        let (unit, document) = self.calibrate(run, name);
+        let (unit, document) = match self.calibrated(run) {
+            Ok((calibration, noise, document)) => {
+                let unit = Unit::of_record(name, calibration, noise);
+                (unit, Some(document))
+            }
+            Err(error) => {
+                let meta = is_toml(run).then(|| Run::read_meta(run).unwrap_or_default());
+                let unit = Unit {
+                    name: name.to_owned(),
+                    meta: meta.unwrap_or_default(),
+                    calibrated: Err(format!("{error:#}")),
+                };
+                (unit, None)
+            }
+        };
         if let Some(directory) = directory {
             let report = |path: &Path| match &document {
                 Some(document) => write_report(document, &path.join("report")),
@@ -114,49 +110,39 @@ impl Request<'_> {
         Ok(unit)
     }
 
-    /// The unit with its report; a failure is also a result.
-    fn calibrate(&self, path: &Path, name: &str) -> (Unit, Option<Document>) {
-        let calibrated = self.calibrated(path);
-        let unit = |meta, calibrated| Unit {
-            name: name.to_owned(),
-            meta,
-            calibrated,
-        };
-        match calibrated {
-            Ok((meta, calibrated, document)) => (unit(meta, Ok(calibrated)), Some(document)),
-            Err(error) => {
-                let meta = Run::read_meta(path).unwrap_or_default();
-                (unit(meta, Err(format!("{error:#}"))), None)
-            }
-        }
-    }
-
-    fn calibrated(&self, path: &Path) -> anyhow::Result<(Meta, lot::Calibrated, Document)> {
+    fn calibrated(
+        &self,
+        path: &Path,
+    ) -> anyhow::Result<(Calibration, Option<RestNoise>, Document)> {
         let run = self.of_log.open(path)?.run;
         let problem = self.estimation.problem(&run, path)?;
-        let method = self.estimation.method;
-        let mut solution = problem.solve(method, UNWATCHED)?;
-        let calibrated = Calibrated::new(&problem, &mut solution)?.of_files(path, &run);
-        let document =
-            calibrated.document((&problem, &run.recording.name), &solution, method, None);
-        let calibration = calibrated.calibration;
+        let solution = problem.solve(self.estimation.method, UNWATCHED)?;
+        let mut checked = CheckedCalibration::new(&problem, solution)?;
+        record_inputs(&mut checked.calibration, path, &run);
+        let of = (&checked, &checked.consequences(&problem, None));
+        let document = calibration::document((&problem, &run.recording.name), of, None);
+        let calibration = checked.calibration;
         // What cannot be written is no calibration.
         calibration.to_json(path)?;
-        let dwells: Vec<_> = problem
-            .dwells()
-            .map(|dwell| dwell.samples.clone())
-            .collect();
-        let nominal = &run.instrument.nominal;
-        let of_unit = lot::Calibrated {
-            calibration,
-            nominal: PerSensor::from_fn(|sensor| nominal.get(sensor).0.into()),
-            noise: RestNoise::of(&run.recording.imu, &dwells),
-        };
-        Ok((run.recording.meta.clone(), of_unit, document))
+        let dwells = problem.dwells().map(|dwell| dwell.samples.clone());
+        let noise = RestNoise::of(&run.recording.imu, &dwells.collect::<Vec<_>>());
+        Ok((calibration, noise, document))
     }
 }
 
-type Meta = BTreeMap<String, String>;
+/// Opens the directory of a lot, and says so if another process must finish first.
+pub fn open_directory(
+    target: &Path,
+    part: &Part,
+    force: bool,
+    inputs: &[&Path],
+) -> Result<LotDirectory, FileError> {
+    let waiting = || {
+        let name = printable(&target.display().to_string());
+        tell!("note: another turncal process is using {name}; waiting for it to finish");
+    };
+    LotDirectory::open(target, part, force, inputs, &waiting)
+}
 
 /// Writes and prints the report of a lot; fails if a unit was not calibrated.
 pub fn deliver(

@@ -7,11 +7,10 @@ use serde::de::DeserializeOwned;
 
 use super::lot;
 use crate::cli::arguments::Delivery;
-use crate::formats::{JobKind, LotDirectory, Part, Parts, read_part_unit};
+use crate::formats::{JobKind, Part, Parts, read_part_unit};
 use crate::lot::{Lot, Unit};
 use crate::report;
 use crate::report::Document;
-use crate::report::terminal::printable;
 use crate::study::{AccuracyStudy, ExperimentStudy, Study};
 
 /// Merges the parts of a sharded job; the result is identical to a single run
@@ -66,12 +65,7 @@ impl Merge {
     fn lot(&self, parts: &Parts, inputs: &[&Path]) -> anyhow::Result<()> {
         let target = self.delivery.output();
         let part = Part::new(parts.job.clone(), None);
-        let waiting = || {
-            let name = printable(&target.unwrap_or(Path::new("")).display().to_string());
-            tell!("note: another turncal process is using {name}; waiting for it to finish");
-        };
-        let open =
-            |target| LotDirectory::open(target, &part, self.delivery.force(), inputs, &waiting);
+        let open = |target| lot::open_directory(target, &part, self.delivery.force(), inputs);
         let directory = target.map(open).transpose()?;
         let units = parts
             .units()
@@ -81,7 +75,7 @@ impl Merge {
                 None => read_part_unit(part, name),
             });
         let units = units.collect::<Result<Vec<Unit>, _>>()?;
-        let lot = Lot::new(units, parts.job.specification.clone());
+        let lot = Lot::new(units, None, parts.job.specification.clone());
         lot::deliver(&lot, directory.as_ref().zip(target), self.delivery.json())
     }
 }

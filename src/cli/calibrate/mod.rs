@@ -22,15 +22,15 @@ use crate::calibration::{
 };
 use crate::cli::arguments::{Estimation, OfLog, Overwrite, run_file, run_or_log, seconds, shard};
 use crate::cli::terminal::{Activity, print, show, show_brief};
-use crate::formats::{Campaign, Opened};
+use crate::formats::{Campaign, Opened, record_inputs};
 use crate::imu::{BodyFrame, InstallationForm};
 use crate::models;
 use crate::recording::Recording;
-use crate::report::calibration::{Calibrated, Truth};
+use crate::report::calibration::{self as of_calibration, Truth};
 use crate::report::terminal::printable;
 use crate::report::{self, Document, Facts};
 use crate::run::Run;
-use crate::study::Shard;
+use crate::study::{CheckedCalibration, Shard};
 
 use follow::Follow;
 
@@ -127,6 +127,11 @@ impl Calibrate {
                     false => self.one(file),
                 }
             }
+            _ if self.truth.is_some() => {
+                let message = "--truth applies to one run; to compare units of a lot with their truths, use turncal \
+                    compare\n";
+                clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
+            }
             _ => self.lot(),
         }
     }
@@ -152,26 +157,6 @@ impl Calibrate {
         self.one(&follow.run()?)
     }
 
-    fn lot(&self) -> anyhow::Result<()> {
-        if self.truth.is_some() {
-            let message = "--truth applies to one run; to compare units of a lot with their truths, use turncal \
-                compare\n";
-            clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
-        }
-        let directory = Some(Path::new(lot::DIRECTORY)).filter(|_| !self.json);
-        let request = lot::Request {
-            runs: &self.runs,
-            of_log: &self.of_log,
-            estimation: &self.estimation,
-            specification: self.specification.as_deref(),
-            shard: self.shard,
-            output: self.output.as_deref().or(directory),
-            json: self.json,
-            force: self.overwrite.force,
-        };
-        request.run()
-    }
-
     fn one(&self, path: &Path) -> anyhow::Result<()> {
         let activity = Activity::new(format!("reading {}", path.display()));
         let opened = self.of_log.open(path)?;
@@ -181,11 +166,9 @@ impl Calibrate {
                 let together = Together::default();
                 let problem = self.estimation.together(&[run], &together);
                 let problem = problem.inspect_err(|_| say(&run.recording))?;
-                // Without a turn, only the output at rest against temperature can be determined.
-                if problem.dwells().nth(1).is_none()
-                    && let Some(at_rest) = AtRest::new(run, AtRest::HIGHEST_ORDER)
-                {
-                    return self.at_rest(&at_rest, &opened, path);
+                // Without a turn, only the biases against temperature can be determined.
+                if let Some(at_rest) = problem.at_rest() {
+                    return self.at_rest(&at_rest, &problem, (&opened, path));
                 }
                 problem
             }
@@ -199,10 +182,15 @@ impl Calibrate {
         )
     }
 
-    /// Output of a stationary instrument against its temperature.
-    fn at_rest(&self, at_rest: &AtRest, opened: &Opened, path: &Path) -> anyhow::Result<()> {
-        let run = &opened.run;
-        let calibration = at_rest.record(run);
+    /// Biases of a stationary instrument against temperature.
+    fn at_rest(
+        &self,
+        at_rest: &AtRest,
+        problem: &Problem,
+        (opened, path): (&Opened, &Path),
+    ) -> anyhow::Result<()> {
+        let run = problem.run();
+        let calibration = at_rest.record(problem);
         let document = report::at_rest::document(at_rest, run, &calibration);
         let target = self.target(|| format!("{}-calibration", run.recording.name));
         if let Some(target) = &target {
@@ -261,16 +249,22 @@ impl Calibrate {
         let directory = target.as_ref().map(begin).transpose()?;
 
         // Problems found in the files may be the cause.
-        let mut solution = solve(problem, self.estimation.method, &activity)
+        let solution = solve(problem, self.estimation.method, &activity)
             .inspect_err(|_| say(&run.recording))?;
-        let calibrated = Calibrated::new(problem, &mut solution)?.of_files(path, run);
+        let mut checked = CheckedCalibration::new(problem, solution)?;
+        record_inputs(&mut checked.calibration, path, run);
         activity.next("writing");
         // JSON on standard output has no report.
         let document = (directory.is_some() || !self.json).then(|| {
-            let method = self.estimation.method;
-            calibrated.document((problem, name), &solution, method, truth.as_ref())
+            let triads = truth.as_ref().map(|truth| &truth.triads);
+            let of = (&checked, &checked.consequences(problem, triads));
+            of_calibration::document((problem, name), of, truth.as_ref())
         });
-        let calibration = calibrated.calibration;
+        let CheckedCalibration {
+            calibration,
+            solution,
+            ..
+        } = checked;
         if let (Some(directory), Some(document)) = (directory, &document) {
             calibration.write(&directory.path().join("calibration.json"), false)?;
             write_report(document, &directory.path().join("report"))?;

@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 
 use crate::calibration::result::Calibration;
-use crate::certificate::{Certificate as Content, Conformity, Decision, Laboratory};
+use crate::certificate::{Certificate as Content, Conformity, Decision};
 use crate::cli::NotMet;
 use crate::cli::arguments::Overwrite;
 use crate::cli::terminal::print;
-use crate::formats::digest_of_bytes;
+use crate::formats::{digest_of_bytes, read_laboratory};
 use crate::models;
 use crate::report::certificate;
+use crate::small_file;
 
 /// Writes a calibration certificate as PDF/A-3 with an embedded Digital Calibration Certificate
 ///
@@ -57,11 +58,11 @@ impl Certificate {
             return print(include_bytes!("../../certificate/draft.toml"));
         };
         let read = |path: &Path| -> anyhow::Result<Vec<u8>> {
-            std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))
+            small_file::bytes(path).with_context(|| format!("cannot read {}", path.display()))
         };
         let calibration = Calibration::read(path)?;
         let bytes = read(path)?;
-        let laboratory = Laboratory::read(laboratory, |key| calibration.meta.get(key).cloned())?;
+        let laboratory = read_laboratory(laboratory, |key| calibration.meta.get(key).cloned())?;
         let specification = self.specification.as_deref();
         let specification = specification.map(models::specification).transpose()?;
         let earlier = self.as_found.as_deref();

@@ -2,18 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
+use anyhow::bail;
 use clap::error::ErrorKind;
 
-use crate::calibration::{Named, compare};
 use crate::cli::arguments::{Delivery, at_temperature};
 use crate::cli::terminal::short_names;
-use crate::report::comparison;
+use crate::lot::{Lot, Unit};
+use crate::report;
 
 /// Compares calibrations, parameter by parameter, with their σ
 ///
-/// All calibrations are first converted to the general installation form and one body frame. Without a truth, the first
-/// is the reference. For three or more, the mean, scatter and χ² of the scatter relative to the stated σ are also
-/// shown.
+/// All calibrations are first converted to the general installation form and one body frame. Differences are from the
+/// truth or, for two calibrations without a truth, from the first. For three or more, the mean, scatter and χ² of the
+/// scatter relative to the stated σ are also shown, and outliers are named.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  turncal compare monday.json friday.json --truth truth.json")]
 pub struct Compare {
@@ -36,25 +37,20 @@ impl Compare {
             let message = "one calibration can be compared only with a truth; give --truth or a second calibration\n";
             clap::Error::raw(ErrorKind::TooFewValues, message).exit();
         }
-        let paths: Vec<&Path> = self
-            .truth
-            .iter()
-            .chain(&self.calibrations)
-            .map(PathBuf::as_path)
-            .collect();
-        let records = paths
-            .iter()
-            .map(|path| at_temperature(path, self.temperature_degc))
-            .collect::<anyhow::Result<Vec<_>>>()?;
-        let names = short_names(&paths);
-        let named: Vec<Named> = names
-            .iter()
-            .zip(&records)
-            .map(|(name, record)| Named { name, record })
-            .collect();
-        let (truth, calibrations) = named.split_at(usize::from(self.truth.is_some()));
-        let comparison = compare(calibrations, truth.first().copied())?;
+        let paths = self.truth.iter().chain(&self.calibrations);
+        let paths: Vec<&Path> = paths.map(PathBuf::as_path).collect();
+        let named = short_names(&paths).into_iter().zip(&paths);
+        let units = named.map(|(name, path)| {
+            let calibration = at_temperature(path, self.temperature_degc)?;
+            anyhow::Ok(Unit::of_record(name, calibration, None))
+        });
+        let mut units = units.collect::<anyhow::Result<Vec<Unit>>>()?;
+        let calibrations = units.split_off(usize::from(self.truth.is_some()));
+        let lot = Lot::new(calibrations, units.pop(), None);
+        if let Some((unit, reason)) = lot.failures().next() {
+            bail!("{}: {reason}", unit.name);
+        }
         let begun = self.delivery.begin(&paths)?;
-        begun.deliver(&comparison::document(&comparison))
+        begun.deliver(&report::lot::document(&lot))
     }
 }

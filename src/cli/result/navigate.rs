@@ -9,8 +9,8 @@ use crate::calibration::{Calibration, Named};
 use crate::cli::arguments::{Delivery, at_temperature, hours, latitude, number};
 use crate::cli::terminal::{Activity, short_names};
 use crate::imu::Sensor;
-use crate::report::navigation::{Navigated, Navigation};
-use crate::study::navigation::{INTERVAL, Mission, Motion, Pair, Warming, WarmingPair};
+use crate::report::navigation::Navigation;
+use crate::study::navigation::{INTERVAL, MethodOutlook, Mission, Motion, Pair};
 use crate::units::DEGREE;
 
 const HOUR: f64 = 3600.0;
@@ -29,8 +29,6 @@ const LARGEST_PITCH: f64 = 89.0;
       --latitude-deg 45
   turncal navigate calibration.json --truth truth.json \\
       --trajectory flight --hours 3 -o flight
-  turncal navigate calibration.json --truth truth.json \\
-      --latitude-deg 45 --hours 10 --warming-degc 20,40
   turncal navigate monday.json --truth friday.json \\
       --latitude-deg -33.9 --errors gyro --json")]
 pub struct Navigate {
@@ -71,22 +69,12 @@ pub struct Navigate {
     /// Trajectory to follow instead of rest: a TOML file or an embedded name (flight, vehicle)
     #[arg(long, value_name = "FILE.toml")]
     trajectory: Option<String>,
-    /// Warm up from one temperature to another during navigation, °C
-    #[arg(long, value_name = "FROM,TO", allow_hyphen_values = true, conflicts_with_all = ["temperature_degc", "errors"], value_parser = two)]
-    warming_degc: Option<Two>,
-    /// Time constant of warming up, h
-    #[arg(long, value_name = "H", default_value_t = 1.0, value_parser = time_constant)]
-    warming_time_constant_h: f64,
     /// Temperature, °C [default: reference temperature of each calibration]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     temperature_degc: Option<f64>,
     #[command(flatten)]
     delivery: Delivery,
 }
-
-/// Two temperatures, °C.
-#[derive(Debug, Clone, Copy)]
-struct Two([f64; 2]);
 
 /// Pitch, roll and heading in degrees.
 #[derive(Debug, Clone, Copy)]
@@ -140,21 +128,10 @@ impl Navigate {
         let begun = self.delivery.begin(&inputs)?;
 
         let activity = Activity::new(format!("navigating {} h", self.hours));
-        let warming = self.warming_degc.map(|Two([from, to])| Warming {
-            from,
-            to,
-            time_constant: self.warming_time_constant_h * HOUR,
-        });
-        let moments = match &warming {
-            None => mission.navigate(&pair),
-            Some(warming) => {
-                let pair = WarmingPair::of_records(&calibration, &truth)?;
-                mission.navigate_warming(&pair, warming)
-            }
-        };
+        let moments = mission.navigate(&pair);
         let moments = moments.with_context(|| self.calibration.display().to_string())?;
         drop(activity);
-        let navigated = Navigated {
+        let navigated = MethodOutlook {
             method: "error",
             outlook: moments,
         };
@@ -166,9 +143,6 @@ impl Navigate {
             body_frame,
             only,
             mission: &mission,
-            warming: warming
-                .as_ref()
-                .map(|warming| (warming, calibration.temperature.is_some())),
             trajectory: trajectory.as_deref(),
             navigated: &navigated,
         };
@@ -191,22 +165,6 @@ impl Navigate {
         let height = self.height_m.unwrap_or(0.0);
         Ok((Motion::at_rest(latitude, height, attitude), None))
     }
-}
-
-fn two(text: &str) -> Result<Two, String> {
-    let temperatures: Vec<&str> = text.split(',').collect();
-    let [from, to] = temperatures[..] else {
-        return Err(format!(
-            "expected two temperatures with a comma between, found {} number(s)",
-            temperatures.len()
-        ));
-    };
-    let within = |text| number(text, -100.0, 100.0);
-    Ok(Two([within(from)?, within(to)?]))
-}
-
-fn time_constant(text: &str) -> Result<f64, String> {
-    number(text, 1e-3, 1e3)
 }
 
 fn height(text: &str) -> Result<f64, String> {

@@ -10,28 +10,26 @@ use crate::imu::InstallationForm;
 use crate::models::{InstallationModel, Place};
 use crate::report;
 use crate::run::Aiding;
-use crate::simulation::{Scenario, SimulatedCampaign};
-use crate::study::{AccuracyStudy, CampaignStudy};
+use crate::simulation::Scenario;
+use crate::study::AccuracyStudy;
 
 /// Tests the accuracy of the filter and the consistency of its σ
 ///
 /// Simulates many runs, each with a different instrument, different noise and different table errors, and calibrates
 /// each with the filter and, on the static positions of the paper, with the closed form. Shows the RMS error of each
 /// group, and of the position after 40 h of navigation, compared with the Cramér–Rao bound and with the closed form,
-/// and the consistency of the filter σ (NEES, NIS, position errors within their predicted σ). For a campaign, it shows
-/// parameters at the reference temperature, coefficients and selected orders. Runs in which the filter fails are
-/// included.
+/// and the consistency of the filter σ (NEES, NIS, position errors within their predicted σ). Runs in which the filter
+/// fails are included.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal study accuracy --runs 500
   turncal study accuracy nineteen-position --runs 200 -o nineteen
-  turncal study accuracy five-soaks --runs 200
   turncal study accuracy --installation three-angle \\
       --truth-installation three-angle
   turncal study accuracy real-table --unmodelled table-base,table-axes
   turncal study accuracy --with accel-second-order,size-effect")]
 pub struct Accuracy {
-    /// Scenario or campaign: a TOML file or an embedded name
+    /// Scenario: a TOML file or an embedded name
     #[arg(default_value = "demo")]
     scenario: String,
     /// Different path: a TOML file or an embedded name
@@ -55,9 +53,6 @@ pub struct Accuracy {
     /// Noise used by the filter; the noise stated in a scenario is correct
     #[arg(long, value_enum, default_value_t = NoisePolicy::Stated)]
     noise: NoisePolicy,
-    /// In a campaign, do not let biases depend on the temperature rate
-    #[arg(long)]
-    without_rate: bool,
     /// Number of runs
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = at_least_two)]
     runs: u64,
@@ -72,9 +67,6 @@ pub struct Accuracy {
 
 impl Accuracy {
     pub fn run(&self) -> anyhow::Result<()> {
-        if SimulatedCampaign::is_named(&self.scenario) {
-            return self.campaign();
-        }
         let mut scenario = Scenario::load(&self.scenario)?;
         scenario.body_frame = self.aiding.body_frame();
         if let Some(path) = &self.path {
@@ -101,19 +93,5 @@ impl Accuracy {
             return Ok(());
         }
         carry_out(&study, &self.delivery, &inputs, report::accuracy::document)
-    }
-
-    fn campaign(&self) -> anyhow::Result<()> {
-        let campaign = SimulatedCampaign::load(&self.scenario)?;
-        let study = CampaignStudy {
-            form: self.installation,
-            noise: self.noise,
-            runs: self.runs,
-            seed: self.seed.unwrap_or(campaign.scenario.seed),
-            rate: !self.without_rate,
-            campaign,
-        };
-        let inputs = [Path::new(&self.scenario)];
-        carry_out(&study, &self.delivery, &inputs, report::campaign::document)
     }
 }

@@ -25,7 +25,7 @@ pub fn leave_nothing_behind() {
     use std::sync::Arc;
     use std::thread;
 
-    use crate::formats::abandon_unfinished;
+    use crate::formats::Unfinished;
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
     use signal_hook::flag::register_conditional_default;
     use signal_hook::iterator::Signals;
@@ -42,12 +42,15 @@ pub fn leave_nothing_behind() {
     let thread = thread::Builder::new()
         .name("signals".into())
         .spawn(move || {
+            let unfinished = Unfinished::of_this_process();
             for signal in signals.forever() {
                 if signal != SIGHUP && ENDS_GENTLY.swap(false, Ordering::SeqCst) {
                     ENDED.store(true, Ordering::SeqCst);
                     continue;
                 }
-                abandon_unfinished();
+                if let Some(unfinished) = unfinished {
+                    unfinished.abandon();
+                }
                 // Ended by the signal itself, so that a shell's loop over many runs ends, too.
                 let _ = emulate_default_handler(signal);
                 process::exit(128 + signal);

@@ -176,9 +176,10 @@ impl Line {
         let counted = |counting| -> Result<(Self, Vec<usize>), usize> {
             let (line, numbers) = Self::through(stamps, about, fixed, counting)?;
             // A period that jitter and gaps falsified may have lost count once or twice.
-            match fixed {
-                true => Ok((line, numbers)),
-                false => Self::through(stamps, line.free_period(), false, counting),
+            if fixed {
+                Ok((line, numbers))
+            } else {
+                Self::through(stamps, line.free_period(), false, counting)
             }
         };
         let jitter = |line: &Self| line.knots.clone().finish().jitter().0;

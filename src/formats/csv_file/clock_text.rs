@@ -33,9 +33,10 @@ fn date(text: &str) -> i64 {
         _ => return 0,
     };
     let [year, month, day] = numbers.map(|digits| digits.parse().unwrap_or(0));
-    match (1..=12).contains(&month) && (1..=31).contains(&day) {
-        true => days(year, month, day),
-        false => 0,
+    if (1..=12).contains(&month) && (1..=31).contains(&day) {
+        days(year, month, day)
+    } else {
+        0
     }
 }
 
@@ -111,9 +112,10 @@ impl ClockText {
         let (as_written, as_counted) = (steps_back(Self { unpadded: None }), steps_back(counted));
         // Values of a sensor go back as often as forward.
         let goes_on = 4 * as_written < parts.len();
-        match goes_on && as_written > 4 * as_counted {
-            true => Some(counted),
-            false => plain,
+        if goes_on && as_written > 4 * as_counted {
+            Some(counted)
+        } else {
+            plain
         }
     }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::clock_text::ClockText;
 use super::lines::{Line, Stop};
-use super::row::{MOST_COLUMNS, Malformed, Row};
+use super::row::{Malformed, Row};
 
 /// Number of rows at the end of the first lines that define the row format.
 const ROWS: usize = 64;
@@ -481,9 +481,10 @@ impl Delimiter {
     fn of_row(row: &str) -> Self {
         let blanks = Self::Blanks.fields(row).unwrap_or_default();
         if blanks.len() > 1 && blanks.iter().all(|field| is_number(field)) {
-            return match row.contains('\t') && !row.contains(' ') {
-                true => Self::Byte(b'\t'),
-                false => Self::Blanks,
+            return if row.contains('\t') && !row.contains(' ') {
+                Self::Byte(b'\t')
+            } else {
+                Self::Blanks
             };
         }
         // A comma with a tab behind it is a comma.
@@ -542,10 +543,6 @@ impl Delimiter {
             let text = String::from_utf8_lossy(field);
             text.trim().trim_matches('"').trim().to_owned()
         };
-        // Most lines have no quotes, and need no parser.
-        if !text.contains(&b'"') && text.len() < MOST_COLUMNS {
-            return Ok(text.split(|byte| *byte == self.byte()).map(name).collect());
-        }
         let mut row = Row::new(self.byte());
         row.split(&text)?;
         Ok(row.fields().map(name).collect())

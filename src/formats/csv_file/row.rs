@@ -1,7 +1,5 @@
 //! One line as fields.
 
-use csv_core::{ReadRecordResult, Reader, ReaderBuilder, Terminator};
-
 /// Maximum number of columns, as in a spreadsheet.
 pub const MOST_COLUMNS: usize = 16_384;
 /// Maximum length of a number or name, bytes.
@@ -20,80 +18,81 @@ pub enum Malformed {
 
 /// The fields of a line, possibly quoted; no field extends beyond its line.
 pub struct Row {
-    parser: Reader,
+    delimiter: u8,
+    /// The fields without their quotes, with a delimiter behind each.
     text: Vec<u8>,
-    /// End of each field in the text, with spare capacity.
+    /// End of each field in the text.
     ends: Vec<usize>,
-    count: usize,
 }
 
 impl Row {
     /// No fields yet, with this separator.
     pub fn new(delimiter: u8) -> Self {
         Self {
-            parser: ReaderBuilder::new()
-                .delimiter(delimiter)
-                .terminator(Terminator::Any(b'\n'))
-                .build(),
+            delimiter,
             text: Vec::new(),
-            ends: vec![0; 64],
-            count: 0,
+            ends: Vec::new(),
         }
     }
 
-    /// Splits a line without its ending into fields.
+    /// Splits a line without its ending into fields. Quotes enclose a field that begins with one; two of them in it
+    /// stand for one.
     pub fn split(&mut self, line: &[u8]) -> Result<(), Malformed> {
-        self.parser.reset();
-        self.count = 0;
-        // Fields together are never longer than their line.
-        self.text.resize(line.len() + 1, 0);
-        let (mut length, mut rest, mut ended) = (0, line, false);
-        loop {
-            let (result, read, written, ends) = self.parser.read_record(
-                rest,
-                &mut self.text[length..],
-                &mut self.ends[self.count..],
-            );
-            rest = &rest[read..];
-            length += written;
-            self.count += ends;
-            match result {
-                ReadRecordResult::Record | ReadRecordResult::End => break,
-                ReadRecordResult::InputEmpty if ended => return Err(Malformed::Quote),
-                ReadRecordResult::InputEmpty => (rest, ended) = (b"\n", true),
-                ReadRecordResult::OutputFull => self.text.push(0),
-                ReadRecordResult::OutputEndsFull if self.count > MOST_COLUMNS => {
-                    return Err(Malformed::Columns);
+        self.text.clear();
+        self.ends.clear();
+        let (mut begins, mut is_quoted, mut is_closed) = (true, false, false);
+        for &byte in line {
+            let is_quote = byte == b'"';
+            if is_quoted {
+                (is_quoted, is_closed) = (!is_quote, is_quote);
+                if is_quote {
+                    continue;
                 }
-                ReadRecordResult::OutputEndsFull => self.ends.resize(2 * self.ends.len(), 0),
+            } else if is_quote && (begins || is_closed) {
+                is_quoted = true;
+                if begins {
+                    begins = false;
+                    continue;
+                }
+            } else {
+                begins = byte == self.delimiter;
+                is_closed = false;
+                if begins {
+                    self.ends.push(self.text.len());
+                }
             }
+            self.text.push(byte);
         }
-        if self.count > MOST_COLUMNS {
+        self.ends.push(self.text.len());
+        if is_quoted {
+            return Err(Malformed::Quote);
+        }
+        if self.len() > MOST_COLUMNS {
             return Err(Malformed::Columns);
         }
-        match self.fields().any(|field| field.len() > LONGEST_FIELD) {
-            true => Err(Malformed::Field),
-            false => Ok(()),
+        let is_long = |field: &[u8]| field.len() > LONGEST_FIELD;
+        if line.len() > LONGEST_FIELD && self.fields().any(is_long) {
+            return Err(Malformed::Field);
         }
+        Ok(())
     }
 
     /// Number of fields.
     pub fn len(&self) -> usize {
-        self.count
+        self.ends.len()
     }
 
     /// A field, without its quotes.
     pub fn get(&self, index: usize) -> Option<&[u8]> {
-        let end = *self.ends[..self.count].get(index)?;
-        let start = match index.checked_sub(1) {
-            Some(before) => self.ends[before],
-            None => 0,
-        };
-        self.text.get(start..end)
+        let end = *self.ends.get(index)?;
+        let before = index
+            .checked_sub(1)
+            .and_then(|before| self.ends.get(before));
+        self.text.get(before.map_or(0, |before| before + 1)..end)
     }
 
     /// All fields in order.
     pub fn fields(&self) -> impl Iterator<Item = &[u8]> {
-        (0..self.count).filter_map(|index| self.get(index))
+        (0..self.len()).filter_map(|index| self.get(index))
     }
 }

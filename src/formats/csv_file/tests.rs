@@ -210,9 +210,10 @@ fn a_preamble_is_told_from_names_and_rows() {
                     .encode_utf16()
                     .collect::<Vec<u16>>()
             };
-            let bytes = match is_wide {
-                true => wide().iter().flat_map(|unit| unit.to_be_bytes()).collect(),
-                false => text.clone().into_bytes(),
+            let bytes = if is_wide {
+                wide().iter().flat_map(|unit| unit.to_be_bytes()).collect()
+            } else {
+                text.clone().into_bytes()
             };
             fs::write(&path, bytes).unwrap();
             let mut csv = Source::of_file(path.as_path()).open().unwrap();

@@ -1,6 +1,5 @@
 //! SHA-256 of bytes and files, to identify inputs.
 
-use std::ffi::OsStr;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
@@ -9,7 +8,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 use toml::{Table, Value};
 
-use crate::formats::small_file;
+use crate::formats::{is_toml, small_file};
 
 /// SHA-256 of a value as JSON, in hexadecimal digits.
 pub fn digest_of(value: &impl Serialize) -> String {
@@ -65,8 +64,11 @@ pub fn input_digests(run: &Path) -> Vec<(String, String)> {
     all
 }
 
-/// The content of a run.toml or a campaign.toml, which may be invalid.
+/// The content of a run.toml or a campaign.toml, which may be invalid; a log names no files.
 fn table_of(path: &Path) -> Table {
+    if !is_toml(path) {
+        return Table::new();
+    }
     let text = small_file::text(path, "", "").unwrap_or_default();
     text.parse().unwrap_or_default()
 }
@@ -77,9 +79,10 @@ fn digest_or_error(path: &Path) -> String {
 }
 
 fn digests_of_run(run: &Path) -> Vec<(String, String)> {
-    let name = match run.extension() == Some(OsStr::new("toml")) {
-        true => "run.toml".into(),
-        false => run.file_name().unwrap_or_default().to_string_lossy(),
+    let name = if is_toml(run) {
+        "run.toml".into()
+    } else {
+        run.file_name().unwrap_or_default().to_string_lossy()
     };
     let mut all = vec![(name.into_owned(), digest_or_error(run))];
     let directory = run.parent().unwrap_or(Path::new(""));
@@ -127,5 +130,14 @@ mod tests {
         let second = input_digests(&run);
         assert_eq!(first[..3], second[..3]);
         assert!(first[3] != second[3]);
+    }
+
+    #[test]
+    fn a_log_names_no_files_whatever_its_text() {
+        let directory = tempfile::tempdir().unwrap();
+        let log = directory.path().join("imu.csv");
+        std::fs::write(&log, "[imu]\nfile = \"b.csv\"\n").unwrap();
+        let names = input_digests(&log).into_iter().map(|(name, _)| name);
+        assert_eq!(names.collect::<Vec<_>>(), ["imu.csv"]);
     }
 }

@@ -141,7 +141,7 @@ impl Part {
     pub fn new(job: Job, shard: Option<Shard>) -> Self {
         Self {
             digest: digest_of(&job),
-            holds: shard.map_or_else(Vec::new, |shard| shard.runs(job.runs)),
+            holds: shard.map_or_else(Vec::new, |shard| shard.runs(job.runs).collect()),
             shard,
             results: None,
             job,
@@ -152,7 +152,7 @@ impl Part {
     pub fn held(&self) -> Vec<u64> {
         match self.shard {
             Some(_) => self.holds.clone(),
-            None => Shard::WHOLE.runs(self.job.runs),
+            None => (0..self.job.runs).collect(),
         }
     }
 
@@ -161,11 +161,14 @@ impl Part {
         let path = directory.join(JOB_FILE);
         let advice = "Give a directory that turncal wrote for a lot or with --shard.";
         let part: Self = small_file::json(&path, "a job", FORMAT, advice)?;
+        // Compared one by one: the file may claim any number of runs.
+        let named = part.job.names.len() as u64 == part.job.runs;
         let is_whole = match part.shard {
-            Some(shard) => part.holds == shard.runs(part.job.runs),
-            None => true,
+            Some(shard) => shard.runs(part.job.runs).eq(part.holds.iter().copied()),
+            None => named,
         };
-        if part.digest != digest_of(&part.job) || !is_whole {
+        let is_lot = part.job.job == JobKind::Lot;
+        if part.digest != digest_of(&part.job) || !is_whole || (is_lot && !named) {
             let found = "a job whose digest or run list does not match";
             return Err(FileError::of(
                 &path,

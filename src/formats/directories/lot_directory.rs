@@ -13,7 +13,6 @@ use super::whole::{WholeDirectory, clear_abandoned, list_anew, write_whole};
 use crate::calibration::result::Calibration;
 use crate::formats::error::FileError;
 use crate::formats::small_file;
-use crate::imu::PerSensor;
 use crate::lot::{Calibrated, Unit};
 use crate::noise::RestNoise;
 
@@ -41,8 +40,6 @@ struct UnitRecord {
     key: String,
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     meta: BTreeMap<String, String>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    nominal: Option<PerSensor<[f64; 3]>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     noise_at_rest: Option<RestNoise>,
     /// SHA-256 of its calibration file.
@@ -234,18 +231,17 @@ fn read_unit(directory: &Path, key: Option<&str>) -> Result<(Unit, String), File
         return wrong("a different key");
     }
     let path = directory.join(CALIBRATION_FILE);
-    let digest = fs::read(&path).ok().map(|bytes| digest_of_bytes(&bytes));
+    let bytes = crate::small_file::bytes(&path);
+    let digest = bytes.ok().map(|bytes| digest_of_bytes(&bytes));
     if record.failure.is_none() && record.calibration_sha256 != digest {
         return wrong("a calibration.json that does not belong to it");
     }
-    let calibrated = match (record.failure, record.nominal) {
-        (Some(failure), _) => Err(failure),
-        (None, Some(nominal)) => Ok(Calibrated {
+    let calibrated = match record.failure {
+        Some(failure) => Err(failure),
+        None => Ok(Calibrated {
             calibration: Calibration::read(&path)?,
-            nominal,
             noise: record.noise_at_rest,
         }),
-        (None, None) => return wrong("neither a calibration nor a failure"),
     };
     let unit = Unit {
         name: record.name,
@@ -266,7 +262,6 @@ fn write_unit(unit: &Unit, key: &str, directory: &Path) -> Result<(), FileError>
         name: unit.name.clone(),
         key: key.to_owned(),
         meta: unit.meta.clone(),
-        nominal: calibrated.map(|of| of.nominal),
         noise_at_rest: calibrated.and_then(|of| of.noise),
         calibration_sha256: json.as_deref().map(digest_of_bytes),
         failure: unit.calibrated.as_ref().err().cloned(),

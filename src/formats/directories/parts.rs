@@ -114,15 +114,16 @@ impl Parts {
                 "Leave out one of the two.",
             ));
         }
-        let is_there = |run: &u64| held.binary_search_by_key(run, |(run, _)| *run).is_ok();
-        let missing: Vec<u64> = (0..self.job.runs).filter(|run| !is_there(run)).collect();
-        let Some(first) = self.parts.first().filter(|_| !missing.is_empty()) else {
+        let missing = self.job.runs.saturating_sub(held.len() as u64);
+        let Some(first) = self.parts.first().filter(|_| missing > 0) else {
             return Ok(());
         };
-        let named = missing.iter().take(NAMED).map(|&run| self.name(run));
-        let mut words = named.collect::<Vec<_>>().join(", ");
-        if missing.len() > NAMED {
-            words += &format!(" and {} more", missing.len() - NAMED);
+        let is_there = |run: &u64| held.binary_search_by_key(run, |(run, _)| *run).is_ok();
+        let named = (0..self.job.runs).filter(|run| !is_there(run)).take(NAMED);
+        let named: Vec<String> = named.map(|run| self.name(run)).collect();
+        let mut words = named.join(", ");
+        if missing > named.len() as u64 {
+            words += &format!(" and {} more", missing - named.len() as u64);
         }
         let given = self.parts.iter().filter_map(|(_, part)| part.shard);
         let given: Vec<String> = given.map(|shard| shard.to_string()).collect();

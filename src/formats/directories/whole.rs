@@ -1,6 +1,6 @@
 //! Output that is complete or absent: written next to its target, then renamed.
 //!
-//! A process that ends on a signal removes unfinished output ([`abandon_unfinished`]); leftovers of a killed process
+//! A process that ends on a signal removes unfinished output ([`Unfinished`]); leftovers of a killed process
 //! are removed when the next output is started there.
 
 mod manifest;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 use crate::formats::error::FileError;
 pub use manifest::FILE as LIST;
-pub use stage::abandon_unfinished;
+pub use stage::Unfinished;
 use stage::{Stage, taken, unwritable};
 
 /// A directory under construction. Dropped without [`Self::commit`], it leaves nothing behind.

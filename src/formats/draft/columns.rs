@@ -198,6 +198,17 @@ fn varies(values: &[f64]) -> bool {
     first.is_some_and(|first| values.any(|value| value != first))
 }
 
+/// Name of the first column called a time whose number never changes, and the number.
+pub fn standing_time(sheet: &Sheet) -> Option<(&str, f64)> {
+    let mut columns = sheet.names.iter().zip(&sheet.columns);
+    let stands = |(name, values): &(&String, &Vec<f64>)| {
+        let is_time = Name::of(name).is_time() > 1;
+        is_time && values.iter().all(|value| value.is_finite()) && !varies(values)
+    };
+    let (name, values) = columns.find(stands)?;
+    Some((name.as_str(), *values.first()?))
+}
+
 fn is_numeric(sheet: &Sheet, column: usize) -> bool {
     let values = &sheet.columns[column];
     let numbers = values.iter().filter(|value| value.is_finite()).count();

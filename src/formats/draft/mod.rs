@@ -137,7 +137,17 @@ impl Draft {
         columns.state(&stated.columns);
         retain_samples(&mut sheet, &columns);
         let clock = Clock::find(&sheet, &mut columns);
-        let contradiction = stated.rate_hz.and_then(|rate| clock.contradiction(rate));
+        let of_clock = || columns::standing_time(&sheet).filter(|_| clock.period.is_none());
+        let contradiction = match stated.rate_hz {
+            Some(rate) => clock.contradiction(rate),
+            None => of_clock().map(|(name, value)| {
+                [
+                    format!("{value} in all rows of the column `{name}`"),
+                    "times that increase".to_owned(),
+                    "Log the time of each row, or set --rate.".to_owned(),
+                ]
+            }),
+        };
         let rows = columns.samples(&sheet).map(|(numbers, triads)| {
             let period = clock.period.unwrap_or(USUAL_PERIOD);
             let breaks = clock.breaks(&numbers, period, FOLLOWED);

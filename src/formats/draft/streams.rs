@@ -6,7 +6,7 @@ use super::time;
 use crate::formats::clock::{Breaks, Clock, TimeUnit};
 use crate::formats::csv_file::CsvFile;
 use crate::formats::error::{choice, list, suggestion};
-use crate::formats::joined::{Joined, Part};
+use crate::formats::joined::{self, Part};
 use crate::formats::rows::LogRows;
 use crate::formats::schema::page::Remarks;
 use crate::formats::schema::{AccelFromFile, ImuFile, TimeColumn, TimeUnitField};
@@ -158,7 +158,7 @@ impl Streams {
                 further: &[],
             }
         };
-        let joined = Joined::read(&PerSensor::from_fn(part), Output::Rate, 1.0)?;
+        let joined = joined::read(&PerSensor::from_fn(part), Output::Rate, 1.0)?;
         let mut sheet = Sheet::of(LogRows::new(joined), FEWEST_ROWS)?;
         let plain =
             |sensor: Sensor| ["x", "y", "z"].map(|axis| format!("{}_{axis}", sensor.name()));

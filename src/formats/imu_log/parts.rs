@@ -135,9 +135,10 @@ impl<'a> Parts<'a> {
             0 => facts.clone(),
             taken => facts_of(&held.columns, taken..end),
         };
-        let columns = match is_last {
-            true => std::mem::take(&mut held.columns),
-            false => held.columns.each_ref().map(|rows| rows[..end].to_vec()),
+        let columns = if is_last {
+            std::mem::take(&mut held.columns)
+        } else {
+            held.columns.each_ref().map(|rows| rows[..end].to_vec())
         };
         let mut repaired = self.rows(held, stamps, columns, &facts).repair();
         for samples in repaired.samples_mut() {

@@ -152,7 +152,6 @@ impl<'a> Reading<'a> {
         while csv.advance()? && !csv.may_be_cut() {
             self.take(csv)?;
             if parts.is_none() && self.held.len() == sizes.long {
-                csv.pack();
                 parts = Some(begin(self, csv, Some(sizes.part))?);
             }
             if let Some(parts) = parts.as_mut().filter(|parts| parts.is_full(&self.held)) {

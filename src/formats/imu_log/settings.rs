@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use crate::formats::clock::Clock;
 use crate::formats::error::FileError;
-use crate::formats::joined::{self, Joined, Part};
+use crate::formats::joined::{self, Part};
 use crate::formats::rows::{FileColumn, LogRows};
 use crate::formats::schema::TimeStamp;
 use crate::formats::source::Source;
@@ -125,7 +125,7 @@ impl ImuLog<'_> {
                 further: &[],
             },
         };
-        Joined::read(&parts, self.output, self.stamp.lag()).map(LogRows::new)
+        joined::read(&parts, self.output, self.stamp.lag()).map(LogRows::new)
     }
 
     pub fn clock_of_rows(&self) -> Clock<'_> {

@@ -6,7 +6,6 @@ use nalgebra::Vector3;
 use super::held::Sizes;
 use super::*;
 use crate::formats::clock::{Breaks, Clock, TimeUnit};
-use crate::formats::error::FileError;
 use crate::formats::schema::TimeStamp;
 use crate::formats::source::Source;
 use crate::imu::{AxisOrder, Nominal, Output, PerSensor, Sensor};
@@ -311,9 +310,12 @@ fn a_clock_that_wraps_goes_on_and_one_that_was_set_begins_a_stretch() {
     }
     // A time of 19 digits is refused, wherever it stands.
     for garbage in [0, 1, 5000, 9999] {
-        let damaged = |k: usize| match k == garbage {
-            true => 10u64.pow(18),
-            false => 10 * k as u64,
+        let damaged = |k: usize| {
+            if k == garbage {
+                10u64.pow(18)
+            } else {
+                10 * k as u64
+            }
         };
         let refused = read(&damaged, 1e3, Breaks::Settings).unwrap_err();
         let said = format!(

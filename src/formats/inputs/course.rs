@@ -35,9 +35,10 @@ impl Course {
         let place = |place: f64| {
             let place = place - self.begin;
             // Times are sums of many periods, which rounding leaves beside their edges.
-            match (place - place.round()).abs() < SAME {
-                true => place.round(),
-                false => place,
+            if (place - place.round()).abs() < SAME {
+                place.round()
+            } else {
+                place
             }
         };
         let (from, to) = (place(begin), place(end));

@@ -4,13 +4,13 @@
 //! their samples and interpolated by a cubic through four of them. The sum over samples is exact, so errors do not
 //! accumulate; the remaining error of the integral at an edge is estimated from the data (see [`Course::edge_error`]).
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::course::{Course, Resampled};
 use crate::formats::clock::{Breaks, Clock, Stamp, TimeUnit, Uniform};
-use crate::formats::error::{FileError, Place};
-use crate::formats::rows::Rows;
+use crate::formats::error::FileError;
 use crate::formats::source::Source;
+use crate::formats::table::{Table, TableRows};
 use crate::imu::{Output, PerSensor};
 
 /// The time column, in s.
@@ -25,124 +25,62 @@ pub struct Part<'a> {
     pub further: &'a [&'a str],
 }
 
-/// Both streams at one row of the gyro clock.
-pub struct Joined {
-    file: PathBuf,
-    header: Vec<String>,
-    units: Vec<String>,
-    remarks: Vec<String>,
-    /// Time, gyros, accelerometers, further columns of the gyro stream.
-    rows: Vec<Vec<f64>>,
-    error: [f64; 3],
-    /// Number of rows returned, including this one.
-    at: usize,
-}
-
 /// Column names of both triads, made unique.
 pub fn distinct(triads: &PerSensor<[&str; 3]>) -> PerSensor<[String; 3]> {
     let bare = |name: &str| name.strip_prefix('-').unwrap_or(name).to_owned();
     let clash = |name: &str| triads.gyro.iter().any(|other| bare(other) == bare(name));
     PerSensor {
         gyro: triads.gyro.map(str::to_owned),
-        accel: triads.accel.map(|name| match clash(name) {
-            true => format!("{name} of accelerometers"),
-            false => name.to_owned(),
+        accel: triads.accel.map(|name| {
+            if clash(name) {
+                format!("{name} of accelerometers")
+            } else {
+                name.to_owned()
+            }
         }),
     }
 }
 
-impl Joined {
-    /// Reads both streams, with stamps `lag` samples after the start of a sample.
-    pub fn read(parts: &PerSensor<Part>, output: Output, lag: f64) -> Result<Self, FileError> {
-        let gyro = Track::read(&parts.gyro)?;
-        let accel = Track::read(&parts.accel)?;
-        let courses = accel.courses();
-        let mut resampled = Resampled::new(output);
-        courses.iter().for_each(|course| resampled.measure(course));
-        let rows = rows_of_both(&gyro, &accel, &courses, &mut resampled, lag);
-        let file = parts.gyro.source.file.to_path_buf();
-        if rows.is_empty() {
-            return Err(apart(&parts.accel.source.file, &gyro, &accel));
-        }
-        let seconds = match output {
-            Output::Rate => accel.clock.period,
-            Output::Increment | Output::Pulse => 1.0,
-        };
-        let names = distinct(&PerSensor::from_fn(|sensor| parts.get(sensor).columns));
-        let bare = |name: &String| name.strip_prefix('-').unwrap_or(name).to_owned();
-        let mut header = vec![TIME.to_owned()];
-        header.extend(names.gyro.iter().chain(&names.accel).map(bare));
-        header.extend(parts.gyro.further.iter().map(|&name| name.to_owned()));
-        let mut units = vec!["s".to_owned()];
-        units.extend(gyro.units.iter().chain(&accel.units).cloned());
-        units.resize(header.len(), String::new());
-        Ok(Self {
-            file,
-            header,
-            units,
-            remarks: remarks_of_both(gyro, accel),
-            rows,
-            error: resampled.error().map(|error| seconds * error),
-            at: 0,
-        })
+/// Reads both streams, with stamps `lag` samples after the start of a sample.
+pub fn read(parts: &PerSensor<Part>, output: Output, lag: f64) -> Result<TableRows, FileError> {
+    let gyro = Track::read(&parts.gyro)?;
+    let accel = Track::read(&parts.accel)?;
+    let courses = accel.courses();
+    let mut resampled = Resampled::new(output);
+    courses.iter().for_each(|course| resampled.measure(course));
+    let columns = columns_of_both(&gyro, &accel, &courses, &mut resampled, lag);
+    if columns.iter().all(Vec::is_empty) {
+        return Err(apart(&parts.accel.source.file, &gyro, &accel));
     }
+    let seconds = match output {
+        Output::Rate => accel.clock.period,
+        Output::Increment | Output::Pulse => 1.0,
+    };
+    let triads = distinct(&PerSensor::from_fn(|sensor| parts.get(sensor).columns));
+    let triads = triads.gyro.iter().chain(&triads.accel);
+    let triads = triads.map(|name| name.strip_prefix('-').unwrap_or(name));
+    let names = std::iter::once(TIME).chain(triads);
+    let names = names.chain(parts.gyro.further.iter().copied());
+    let mut units = vec!["s".to_owned()];
+    units.extend(gyro.units.iter().chain(&accel.units).cloned());
+    units.resize(columns.len(), String::new());
+    let names = names.map(str::to_owned);
+    let mut rows = Table::new(&parts.gyro.source.file, names.zip(columns).collect())?.rows();
+    rows.units = units;
+    rows.remarks = remarks_of_both(gyro, accel);
+    rows.integral_error = resampled.error().map(|error| seconds * error);
+    Ok(rows)
 }
 
-impl Rows for Joined {
-    fn file(&self) -> &Path {
-        &self.file
-    }
-
-    fn header(&self) -> &[String] {
-        &self.header
-    }
-
-    fn units(&self) -> &[String] {
-        &self.units
-    }
-
-    fn remarks(&self) -> &[String] {
-        &self.remarks
-    }
-
-    fn integral_error(&self) -> [f64; 3] {
-        self.error
-    }
-
-    fn advance(&mut self, _used: &[usize]) -> Result<bool, FileError> {
-        self.at += 1;
-        Ok(self.at <= self.rows.len())
-    }
-
-    fn is_blank(&self, _column: usize) -> bool {
-        false
-    }
-
-    fn line(&self) -> u64 {
-        self.at as u64
-    }
-
-    fn place(&self, _column: Option<usize>) -> Place {
-        Place::Line(self.line())
-    }
-
-    fn value(&self, column: usize) -> f64 {
-        let row = self.at.checked_sub(1).and_then(|row| self.rows.get(row));
-        row.and_then(|row| row.get(column))
-            .copied()
-            .unwrap_or(f64::NAN)
-    }
-}
-
-/// The rows at which both streams have samples.
-fn rows_of_both(
+/// Times, both triads and further columns of the gyros where both streams have samples.
+fn columns_of_both(
     gyro: &Track,
     accel: &Track,
     courses: &[Course],
     resampled: &mut Resampled,
     lag: f64,
 ) -> Vec<Vec<f64>> {
-    let mut rows = Vec::with_capacity(gyro.clock.numbers.len());
+    let mut columns = vec![Vec::new(); 7 + gyro.further.len()];
     // Against the accelerometers' first stamp: seconds since 1970 have no digits left for parts of samples.
     let ahead = gyro.clock.first - accel.clock.first;
     let place = |number: f64| accel.clock.number(ahead + gyro.clock.time(number)) + lag;
@@ -162,13 +100,14 @@ fn rows_of_both(
         let Some(sample) = course.and_then(|course| resampled.sample(course, begin, end)) else {
             continue;
         };
-        let mut row = vec![time];
-        row.extend(gyro.columns.iter().map(|column| column[k]));
-        row.extend(sample);
-        row.extend(gyro.further.iter().map(|column| column[k]));
-        rows.push(row);
+        let of_gyro = gyro.columns.iter().map(|column| column[k]);
+        let values = std::iter::once(time).chain(of_gyro).chain(sample);
+        let values = values.chain(gyro.further.iter().map(|column| column[k]));
+        for (column, value) in columns.iter_mut().zip(values) {
+            column.push(value);
+        }
     }
-    rows
+    columns
 }
 
 /// Streams whose times do not overlap.

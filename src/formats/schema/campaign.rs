@@ -10,7 +10,7 @@ use super::page::{self, Remarks};
 use super::{Celsius, Document, NonNegative};
 use crate::calibration::{DayToDay, Group, TemperatureOptions, Together};
 use crate::formats::error::FileError;
-use crate::formats::small_file;
+use crate::formats::{is_toml, small_file};
 use crate::imu::{HIGHEST_ORDER, InstallationForm, ParameterKind};
 use crate::number::rounded;
 use crate::recording::Temperature;
@@ -68,6 +68,9 @@ enum TemperatureFile {
 impl Campaign {
     /// Whether a file is a campaign.
     pub fn is_at(path: &Path) -> bool {
+        if !is_toml(path) {
+            return false;
+        }
         let text = small_file::text(path, "", "").unwrap_or_default();
         let table = Document::of(path, &text).parse().ok();
         let format = table.and_then(|table| {

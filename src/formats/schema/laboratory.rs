@@ -6,9 +6,9 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::Document;
-use crate::certificate::{Condition, Laboratory};
 use crate::formats::error::{FileError, list};
 use crate::formats::small_file;
+use crate::laboratory::{Condition, Laboratory};
 
 /// The version of the format.
 const FORMAT: &str = "turncal-laboratory/1";
@@ -28,62 +28,69 @@ const REQUIRED: [(&str, &[&str]); 8] = [
     ("authorised", &["name", "function"]),
 ];
 
-impl Laboratory {
-    /// Reads and checks a lab.toml. `meta` contains metadata of the run, which complete `[item]`.
-    ///
-    /// # Errors
-    /// [`FileError`] that names every required field that is missing, or the first invalid one.
-    pub fn read(path: &Path, meta: impl Fn(&str) -> Option<String>) -> Result<Self, FileError> {
-        let text = small_file::text(path, "the laboratory data", "Give the path of a lab.toml.")?;
-        let document = Document::of(path, &text);
-        let of_item = [("model", meta("instrument")), ("serial", meta("serial"))];
-        let mut table = document.of_format(FORMAT)?;
-        let values = table.get_mut().iter_mut();
-        for (name, value) in values.filter(|(name, _)| name.get_ref() != "conditions") {
-            document.as_written(value);
-            say_something(document, name.get_ref(), value)?;
-        }
-        let file: Result<Self, FileError> = document.fill(table.clone());
-        // All that is missing is named at once, unless another error comes first.
-        if !matches!(&file, Err(error) if !error.message.starts_with("found no ")) {
-            check_complete(path, table.get_ref(), &of_item)?;
-        }
-        let mut file = file?;
-        let fields = [&mut file.item.model, &mut file.item.serial];
-        for (field, (_, of_run)) in fields.into_iter().zip(of_item) {
-            if field.is_empty() {
-                *field = of_run.unwrap_or_default();
-            }
-        }
-        let conditions = &file.conditions;
-        for (name, of) in [
-            ("temperature_degc", Some(conditions.temperature_degc)),
-            ("humidity_percent", conditions.humidity_percent),
-        ] {
-            let is_sound = |of: &Condition| {
-                of.value.is_finite() && of.uncertainty.is_finite() && of.uncertainty >= 0.0
-            };
-            if !of.as_ref().is_none_or(is_sound) {
-                let expected = "a finite value and an uncertainty of at least zero";
-                let path = format!("conditions.{name}");
-                return Err(document.wrong(&path, expected, "Correct this value."));
-            }
-        }
-        let days = &file.certificate;
-        if days.end < days.begin || days.issued < days.end {
-            let expected = "begin, end and issued in chronological order";
-            return Err(document.wrong("certificate.end", expected, "Correct these dates."));
-        }
-        for (of, contact) in [("laboratory", &file.contact), ("customer", &file.customer)] {
-            let country = &contact.country;
-            if country.len() != 2 || !country.bytes().all(|b| b.is_ascii_uppercase()) {
-                let expected = "two capital letters of ISO 3166-1, such as \"DE\"";
-                let path = format!("{of}.country");
-                return Err(document.wrong(&path, expected, "Correct this value."));
-            }
-        }
-        Ok(file)
+/// Reads and checks a lab.toml. `meta` contains metadata of the run, which complete `[item]`.
+///
+/// # Errors
+/// [`FileError`] that names every required field that is missing, or the first invalid one.
+pub fn read_laboratory(
+    path: &Path,
+    meta: impl Fn(&str) -> Option<String>,
+) -> Result<Laboratory, FileError> {
+    let text = small_file::text(path, "the laboratory data", "Give the path of a lab.toml.")?;
+    let document = Document::of(path, &text);
+    let of_item = [("model", meta("instrument")), ("serial", meta("serial"))];
+    let mut table = document.of_format(FORMAT)?;
+    let values = table.get_mut().iter_mut();
+    for (name, value) in values.filter(|(name, _)| name.get_ref() != "conditions") {
+        document.as_written(value);
+        say_something(document, name.get_ref(), value)?;
     }
+    let file: Result<Laboratory, FileError> = document.fill(table.clone());
+    // All that is missing is named at once, unless another error comes first.
+    if !matches!(&file, Err(error) if !error.message.starts_with("found no ")) {
+        check_complete(path, table.get_ref(), &of_item)?;
+    }
+    let mut file = file?;
+    let fields = [&mut file.item.model, &mut file.item.serial];
+    for (field, (_, of_run)) in fields.into_iter().zip(of_item) {
+        if field.is_empty() {
+            *field = of_run.unwrap_or_default();
+        }
+    }
+    check_values(document, &file)?;
+    Ok(file)
+}
+
+/// Checks conditions, dates and countries.
+fn check_values(document: Document, file: &Laboratory) -> Result<(), FileError> {
+    let conditions = &file.conditions;
+    for (name, of) in [
+        ("temperature_degc", Some(conditions.temperature_degc)),
+        ("humidity_percent", conditions.humidity_percent),
+    ] {
+        let is_sound = |of: &Condition| {
+            of.value.is_finite() && of.uncertainty.is_finite() && of.uncertainty >= 0.0
+        };
+        if !of.as_ref().is_none_or(is_sound) {
+            let expected = "a finite value and an uncertainty of at least zero";
+            let path = format!("conditions.{name}");
+            return Err(document.wrong(&path, expected, "Correct this value."));
+        }
+    }
+    let days = &file.certificate;
+    if days.end < days.begin || days.issued < days.end {
+        let expected = "begin, end and issued in chronological order";
+        return Err(document.wrong("certificate.end", expected, "Correct these dates."));
+    }
+    for (of, contact) in [("laboratory", &file.contact), ("customer", &file.customer)] {
+        let country = &contact.country;
+        if country.len() != 2 || !country.bytes().all(|b| b.is_ascii_uppercase()) {
+            let expected = "two capital letters of ISO 3166-1, such as \"DE\"";
+            let path = format!("{of}.country");
+            return Err(document.wrong(&path, expected, "Correct this value."));
+        }
+    }
+    Ok(())
 }
 
 /// Names every required field that is missing.
@@ -154,7 +161,7 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("lab.toml");
         std::fs::write(&path, text).unwrap();
-        Laboratory::read(&path, |_| None)
+        read_laboratory(&path, |_| None)
     }
 
     #[test]

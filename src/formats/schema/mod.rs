@@ -17,6 +17,8 @@ mod write;
 
 pub use campaign::{Campaign, campaign_text};
 pub use document::Document;
+#[cfg(feature = "certificate")]
+pub use laboratory::read_laboratory;
 pub use run::*;
 pub use values::{
     Angle, Celsius, Finite, Gravity, Height, Latitude, NonNegative, OneOrThree, Positive,

@@ -125,9 +125,10 @@ impl Array {
         let mut strides = vec![1; self.shape.len()];
         let mut stride = 1;
         for k in 0..self.shape.len() {
-            let dimension = match self.first_is_fastest {
-                true => k,
-                false => self.shape.len() - 1 - k,
+            let dimension = if self.first_is_fastest {
+                k
+            } else {
+                self.shape.len() - 1 - k
             };
             strides[dimension] = stride;
             stride *= self.shape[dimension];

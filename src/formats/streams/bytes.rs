@@ -23,6 +23,12 @@ impl Broken {
     }
 }
 
+/// Maximum number of bytes unpacked at once from a log of this length (a chunk, a row of an array). Real chunks have a
+/// few megabytes; larger claims are damage or decompression bombs.
+pub fn most_at_once(length: u64) -> u64 {
+    length.max(1 << 27)
+}
+
 /// A file read from its start.
 pub struct Input {
     source: Box<dyn Content>,
@@ -42,9 +48,13 @@ impl Input {
     }
 
     /// The underlying file.
-    #[cfg_attr(not(any(feature = "hdf5", feature = "npy")), allow(dead_code))]
     pub fn into_source(self) -> Box<dyn Content> {
         self.source
+    }
+
+    /// Length of the file.
+    pub fn length(&self) -> u64 {
+        self.length
     }
 
     /// Bytes read or skipped so far.
@@ -146,21 +156,12 @@ impl<'a> Slice<'a> {
         Self { big_endian, ..self }
     }
 
-    /// A part of these bytes, at this offset.
-    pub fn of(&self, bytes: &'a [u8], place: u64) -> Self {
-        Self {
-            bytes,
-            at: 0,
-            base: place,
-            ..*self
-        }
-    }
-
     /// Offset of the next byte in the file.
     pub fn offset(&self) -> u64 {
-        match self.is_packed {
-            true => self.base,
-            false => self.base + self.at as u64,
+        if self.is_packed {
+            self.base
+        } else {
+            self.base + self.at as u64
         }
     }
 
@@ -191,9 +192,10 @@ impl<'a> Slice<'a> {
     pub fn whole(&mut self, size: usize, what: &str) -> Result<u64, Broken> {
         let bytes = self.take(size, what)?;
         let add = |whole: u64, &byte: &u8| whole << 8 | u64::from(byte);
-        Ok(match self.big_endian {
-            true => bytes.iter().fold(0, add),
-            false => bytes.iter().rev().fold(0, add),
+        Ok(if self.big_endian {
+            bytes.iter().fold(0, add)
+        } else {
+            bytes.iter().rev().fold(0, add)
         })
     }
 

@@ -50,22 +50,13 @@ struct Known {
     applied: Option<Applied>,
 }
 
-/// Treatment of samples of a triad with a common description.
-struct Done {
-    applied: Option<Applied>,
-    /// Number of the first such sample, from one.
-    first: u64,
-    /// Whether values changed with the same description.
-    varies: bool,
-}
-
 /// Corrections to remove from the samples of a stream.
 pub struct Undo {
     /// Who applied it.
     pub program: &'static str,
     pub corrected: PerSensor<Option<Corrected>>,
-    samples: u64,
-    done: PerSensor<Vec<Done>>,
+    /// Corrections so far, in words.
+    done: PerSensor<Vec<String>>,
     /// Applied correction, while parameters and device are unchanged.
     found: PerSensor<Option<Known>>,
 }
@@ -75,7 +66,6 @@ impl Undo {
         Self {
             program,
             corrected,
-            samples: 0,
             done: PerSensor::default(),
             found: PerSensor::default(),
         }
@@ -89,7 +79,6 @@ impl Undo {
         changes: u64,
         applied: impl Fn(Sensor, Option<f64>) -> Option<Applied>,
     ) -> bool {
-        self.samples += 1;
         let mut is_news = false;
         for sensor in Sensor::ALL {
             let Some(of) = self.corrected.get(sensor) else {
@@ -102,7 +91,12 @@ impl Undo {
                 .is_some_and(|known| known.changes == changes && known.device == device)
             {
                 let applied = applied(sensor, device);
-                is_news |= note(self.done.get_mut(sensor), applied.as_ref(), self.samples);
+                let words = words(self.program, sensor, applied.as_ref());
+                let done = self.done.get_mut(sensor);
+                if !done.contains(&words) {
+                    done.push(words);
+                    is_news = true;
+                }
                 *known = Some(Known {
                     changes,
                     device,
@@ -124,58 +118,23 @@ impl Undo {
     pub fn remarks(&self) -> Vec<String> {
         let of_triad = |&sensor: &Sensor| {
             let done = self.done.get(sensor);
-            done.iter().map(move |of| {
-                let words = words(self.program, sensor, of);
-                match done.len() {
-                    1 => words,
-                    _ => format!(
-                        "From sample {} on, for part of the samples: {words}",
-                        of.first
-                    ),
-                }
-            })
+            let part = if done.len() > 1 { "For part of the samples: " } else { "" };
+            done.iter().map(move |words| format!("{part}{words}"))
         };
         Sensor::ALL.iter().flat_map(of_triad).collect()
     }
 }
 
-/// Records the treatment of a sample; returns whether it is new.
-fn note(done: &mut Vec<Done>, applied: Option<&Applied>, sample: u64) -> bool {
-    let kind = |of: Option<&Applied>| of.map(|of| (of.name.clone(), of.is_more));
-    let same = done
-        .iter_mut()
-        .find(|of| kind(of.applied.as_ref()) == kind(applied));
-    match same {
-        Some(same) => {
-            let differs = !same.varies && same.applied.as_ref() != applied;
-            same.varies |= differs;
-            differs
-        }
-        None => {
-            done.push(Done {
-                applied: applied.cloned(),
-                first: sample,
-                varies: false,
-            });
-            true
-        }
-    }
-}
-
-fn words(program: &str, sensor: Sensor, done: &Done) -> String {
+fn words(program: &str, sensor: Sensor, applied: Option<&Applied>) -> String {
     let triad = sensor.pick("gyros", "accelerometers");
-    let varies = match done.varies {
-        true => ", which change within the log",
-        false => "",
-    };
-    match &done.applied {
+    match applied {
         Some(of) if of.is_more => format!(
-            "{program} corrected its {triad} by {}{varies} and also rotated axes or compensated temperature. turncal \
+            "{program} corrected its {triad} by {} and also rotated the axes or compensated for temperature. turncal \
                 cannot undo this, so the calibration applies to the corrected data.",
             of.name
         ),
         Some(of) => format!(
-            "{program} corrected its {triad} by {}{varies}. turncal undid this correction.",
+            "{program} corrected its {triad} by {}. turncal undid this correction.",
             of.name
         ),
         None => format!(

@@ -13,8 +13,7 @@ use hdf5_pure::{
 
 use super::Log;
 use super::arrays::{Array, Arrays, Field, Open};
-use super::bytes::{Broken, Input, Kind};
-use crate::room;
+use super::bytes::{Broken, Input, Kind, most_at_once};
 
 /// Limits of group depth and number, because a group may contain itself.
 const DEEPEST: usize = 8;
@@ -225,8 +224,9 @@ impl Stored {
         let row = self.row.max(1);
         let at_once = self.rows_at_once()?;
         let needed = at_once.saturating_mul(row).min(self.all);
-        if !room::is_there((needed as usize).saturating_mul(2)) {
-            let found = format!("{needed} bytes must be read at once and do not fit into memory");
+        let most = most_at_once(self.file);
+        if needed > most {
+            let found = format!("{needed} bytes must be read at once, more than {most} bytes");
             return Err(io::Error::other(found));
         }
         let mut rows = Rows {

@@ -10,7 +10,6 @@ pub struct Column {
     pub unit: &'static str,
 }
 
-#[cfg_attr(not(feature = "logs"), allow(dead_code))]
 impl Column {
     /// A column of this name and unit.
     pub fn new(name: impl Into<String>, unit: &'static str) -> Self {

@@ -126,7 +126,7 @@ impl Mcap {
         let sum = record.whole(4, "the checksum of a chunk")? as u32;
         let method = record.measured_text(4, "the compression of a chunk")?;
         let packed = record.measured(8, "a chunk")?;
-        self.chunk = unpack(&method, packed, size, self.offset)?;
+        self.chunk = unpack(&method, packed, size, self.offset, &self.input)?;
         self.at = 0;
         let mut found = flate2::Crc::new();
         found.update(&self.chunk);

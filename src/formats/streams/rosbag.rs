@@ -54,7 +54,7 @@ impl Messages for Bag {
                     let size = head.whole("size", 4)?;
                     let method = head.field("compression").unwrap_or_default();
                     let method = String::from_utf8_lossy(method);
-                    self.chunk = unpack(&method, &self.data, size, self.offset)?;
+                    self.chunk = unpack(&method, &self.data, size, self.offset, &self.input)?;
                     self.at = 0;
                 }
                 Some(CONNECTION) => self.connection(topics)?,

@@ -180,13 +180,12 @@ impl Database {
                 table.pages.pop();
                 continue;
             }
-            let child = match cell < page.cells {
-                true => page.cell(cell)?.whole(4, "a page number")?,
+            let child = if cell < page.cells {
+                page.cell(cell)?.whole(4, "a page number")?
+            } else {
                 // Behind all cells.
-                false => {
-                    let mut header = big_endian(&page.bytes[page.begin + 8..], page.offset);
-                    header.whole(4, "a page number")?
-                }
+                let mut header = big_endian(&page.bytes[page.begin + 8..], page.offset);
+                header.whole(4, "a page number")?
             };
             if table.pages.len() > DEEPEST || table.left == 0 {
                 let offset = self.input.offset();

@@ -1,7 +1,7 @@
 //! The report of a study of accuracy.
 
 mod figures;
-pub(super) mod tables;
+mod tables;
 #[cfg(test)]
 mod tests;
 mod verdict;

@@ -46,7 +46,7 @@ fn sections(
 }
 
 /// RMS error, σ and bound in a unit, and the ratio of the first to the last.
-pub fn against_bound(of: &Figures, unit: f64) -> Vec<String> {
+fn against_bound(of: &Figures, unit: f64) -> Vec<String> {
     let rms = [of.filter, of.claimed, of.bound].map(|rms| three_digits(rms / unit));
     rms.into_iter()
         .chain(ratio_cells(of.ratio.as_ref()))

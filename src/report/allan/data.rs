@@ -1,7 +1,6 @@
 //! The analysis as named values. Deviations are in deg/h and µg; intervals are 95 %.
 
-use crate::formats::NoiseKeys;
-use crate::imu::Sensor;
+use crate::imu::{NoiseKeys, Sensor};
 use crate::noise::{AxisNoise, NoiseAnalysis, Process, of_kind};
 use crate::report::allan::quantity::{deviation_unit, quantity};
 use crate::report::allan::words;

@@ -2,12 +2,12 @@
 
 mod brief;
 mod budget;
-mod calibrated;
 pub(super) mod figures;
 mod report;
 mod residuals;
+mod solved;
 mod tables;
-mod temperature;
+pub(super) mod temperature;
 #[cfg(test)]
 mod tests;
 
@@ -18,9 +18,8 @@ use crate::imu::{Noise, Sensor};
 use crate::report::prelude::*;
 use crate::report::{navigation, terms};
 
-pub use super::navigation::Navigated;
-pub use calibrated::{Calibrated, Truth, dwell_times, navigate, note, stamp};
 pub use report::{ClosedForm, Report};
+pub use solved::{Truth, document, dwell_times, note};
 
 /// The most severe first; of one level, the first of each kind before more of any.
 fn in_order(findings: &[Finding]) -> Vec<Finding> {

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::super::navigation::Navigated;
 use crate::calibration::result::TermRecord;
 use crate::calibration::{
     Budget, ErrorTermTest, Estimate, Finding, Outcome, ParameterVector, Quality, to_vector,
@@ -11,7 +10,7 @@ use crate::calibration::{
 use crate::imu::{BodyFrame, PerSensor, Triad};
 use crate::recording::TableLog;
 use crate::run::{Aiding, Run};
-use crate::study::navigation::NavigationStudyError;
+use crate::study::navigation::{MethodOutlook, NavigationStudyError};
 use crate::survey::Expected;
 
 /// Input of a report. All estimates and the truth have the same installation form and body frame.
@@ -46,7 +45,7 @@ pub struct Report<'a> {
     /// Dwells, s.
     pub dwells: &'a [Range<f64>],
     /// Navigation errors with each calibration, the closed form first; or the reason why there are none.
-    pub navigation: Result<&'a [Navigated], &'a NavigationStudyError>,
+    pub navigation: Result<&'a [MethodOutlook], &'a NavigationStudyError>,
 }
 
 /// The closed-form result, the baseline of the comparison.

@@ -1,10 +1,10 @@
 //! Temperature dependence and differences between recordings.
 
 use crate::calibration::{
-    Outcome, ParameterMatrix, ParameterVector, SeparateEstimate, Thermal, parameter_name,
+    Estimate, Outcome, ParameterMatrix, ParameterVector, SeparateEstimate, Thermal, parameter_name,
     sensor_and_parameter,
 };
-use crate::imu::{RATE, Sensor};
+use crate::imu::{InstallationForm, RATE, Sensor};
 use crate::report::prelude::*;
 
 /// Points of a curve.
@@ -12,15 +12,28 @@ const POINTS: usize = 81;
 
 /// Change of parameters with temperature, and any remaining effect of temperature.
 pub fn figures(outcome: &Outcome) -> Vec<Plot> {
-    let of = |thermal| vec![curves(outcome, thermal), residuals(outcome)];
-    outcome.thermal.as_ref().map_or_else(Vec::new, of)
+    let Some(thermal) = &outcome.thermal else {
+        return Vec::new();
+    };
+    let reference = outcome.estimate.vector();
+    let alone = |index: usize| {
+        let alone = alone(outcome, index);
+        let changes = alone.map(|(t, value, _)| (t, value - reference[index]));
+        changes.collect()
+    };
+    let marks = "each recording alone, with stated noise";
+    vec![
+        curves(&outcome.estimate, thermal, (marks, &alone)),
+        residuals(outcome),
+    ]
 }
 
 /// Adds tables and figures, if anything changes or differs.
 pub fn add(document: &mut Document, outcome: &Outcome) {
     if let Some(thermal) = &outcome.thermal {
-        document.both(orders(outcome, thermal));
-        document.both(hysteresis(outcome, thermal));
+        let form = outcome.estimate.form();
+        document.both(orders(form, thermal));
+        document.both(hysteresis(form, thermal));
         let known = outcome.alone.iter().filter(|a| a.estimate.is_some());
         if known.count() > 1 {
             document.page(departures(outcome, thermal));
@@ -32,23 +45,22 @@ pub fn add(document: &mut Document, outcome: &Outcome) {
 
 /// Change of all parameters from those at the reference, and σ of the resulting values.
 fn there(
-    outcome: &Outcome,
+    estimate: &Estimate,
     thermal: &Thermal,
     temperature: f64,
 ) -> (ParameterVector, ParameterMatrix) {
     let state = thermal.model.range.everywhere(temperature, 0.0);
-    thermal.at(&state, &outcome.estimate.covariance)
+    thermal.at(&state, &estimate.covariance)
 }
 
 /// Order and coefficients of each parameter.
-fn orders(outcome: &Outcome, thermal: &Thermal) -> Table {
-    let form = outcome.estimate.form();
+pub fn orders(form: InstallationForm, thermal: &Thermal) -> Table {
     let highest = thermal.coefficients.iter().filter(|c| c.function != RATE);
     let highest = highest.map(|c| c.function + 1).max().unwrap_or(0);
     let mut columns = cells!["parameter", "unit"];
     let any_rate = thermal.coefficients.iter().any(|c| c.function == RATE);
     let functions = (0..highest).chain(any_rate.then_some(RATE));
-    columns.extend(functions.clone().map(|of| function_name(Some(of))));
+    columns.extend(functions.clone().map(function_name));
     let row = |group: Group, index: usize| {
         let mut row = vec![parameter_name(form, index)?, group.unit().to_owned()];
         let cell = |function: usize| {
@@ -90,8 +102,7 @@ fn orders(outcome: &Outcome, thermal: &Thermal) -> Table {
 }
 
 /// Differences between heating and cooling.
-fn hysteresis(outcome: &Outcome, thermal: &Thermal) -> Table {
-    let form = outcome.estimate.form();
+pub fn hysteresis(form: InstallationForm, thermal: &Thermal) -> Table {
     let rows = thermal.coefficients.iter().enumerate();
     let rows = rows.filter(|(_, c)| c.function == RATE);
     let rows = rows.filter_map(|(k, c)| {
@@ -113,22 +124,24 @@ fn hysteresis(outcome: &Outcome, thermal: &Thermal) -> Table {
     .section(rows)
 }
 
-/// A panel for each group: its parameters against temperature, with a margin of this part of the range at both ends.
+/// A panel for each estimated group: its parameters against temperature, with a margin of this part of the range at both
+/// ends.
 fn against_temperature(
-    outcome: &Outcome,
+    estimate: &Estimate,
     thermal: &Thermal,
     room: f64,
     series: impl Fn(Group, &[usize]) -> Vec<Series>,
 ) -> Vec<Panel> {
     let panel = |group: Group| {
+        let indices = group.estimated(estimate);
         let range = thermal.model.range.get(group.sensor());
         let room = room * (range.highest - range.lowest);
         let x = Axis::linear("temperature, °C").between(range.lowest - room, range.highest + room);
         let y = Axis::linear("").room(0.05, 0.05);
-        let indices = group.estimated(&outcome.estimate);
-        Panel::new(group.titled(), x, y).with_all(series(group, &indices))
+        let panel = Panel::new(group.titled(), x, y).with_all(series(group, &indices));
+        (!indices.is_empty()).then_some(panel)
     };
-    Group::all().map(panel).collect()
+    Group::all().filter_map(panel).collect()
 }
 
 /// Estimate of a parameter from each recording alone: temperature at its axis, value and σ.
@@ -146,13 +159,18 @@ fn alone(outcome: &Outcome, index: usize) -> impl Iterator<Item = (f64, f64, f64
     })
 }
 
-/// Every parameter against temperature, with the estimates from each recording alone.
-fn curves(outcome: &Outcome, thermal: &Thermal) -> Plot {
-    let (form, reference) = (outcome.estimate.form(), outcome.estimate.vector());
+/// Every parameter against temperature, with marks of this meaning: temperature and change of the parameter from the
+/// reference.
+pub fn curves(
+    estimate: &Estimate,
+    thermal: &Thermal,
+    (meaning, marks): (&str, &dyn Fn(usize) -> Vec<(f64, f64)>),
+) -> Plot {
+    let form = estimate.form();
     let series = |group: Group, indices: &[usize]| {
         let (range, unit) = (thermal.model.range.get(group.sensor()), group.unit_value());
         let temperatures = steps(range.lowest, range.highest, POINTS);
-        let curve = temperatures.map(|t| (t, there(outcome, thermal, t)));
+        let curve = temperatures.map(|t| (t, there(estimate, thermal, t)));
         let curve: Vec<(f64, (ParameterVector, ParameterMatrix))> = curve.collect();
         let of_parameter = |(n, &i): (usize, &usize)| {
             let points = curve.iter().map(|(t, (change, covariance))| {
@@ -163,17 +181,17 @@ fn curves(outcome: &Outcome, thermal: &Thermal) -> Plot {
                 )
             });
             let [band, line] = Series::curve(&points.collect::<Vec<_>>());
-            let marks = alone(outcome, i).map(|(t, value, _)| (t, (value - reference[i]) / unit));
+            let marks = marks(i).into_iter().map(|(t, change)| (t, change / unit));
             let line = line.nth(n).label(axis_name(form, i));
             [band, line, Series::marks(Mark::Ring, marks).nth(n)]
         };
         indices.iter().enumerate().flat_map(of_parameter).collect()
     };
-    let panels = against_temperature(outcome, thermal, 0.03, series);
-    Plot::new("temperature.svg", "Parameters against temperature", (3, 330), panels).caption(
-        "Change of each parameter from its value at the reference temperature, with its ±1σ band. Rings: each \
-         recording alone, with stated noise.",
-    )
+    let panels = against_temperature(estimate, thermal, 0.03, series);
+    let heading = "Parameters against temperature";
+    Plot::new("temperature.svg", heading, (3, 330), panels).caption(format!(
+        "Change of each parameter from its value at the reference temperature, with its ±1σ band. Rings: {meaning}."
+    ))
 }
 
 /// Estimate of each recording alone minus the curve.
@@ -185,7 +203,7 @@ fn departures(outcome: &Outcome, thermal: &Thermal) -> Plot {
             // Side by side, so that their intervals do not hide each other.
             let shift = beside(n, indices.len(), 0.06 * (range.highest - range.lowest));
             let points = alone(outcome, i).map(|(t, value, sigma)| {
-                let (change, _) = there(outcome, thermal, t);
+                let (change, _) = there(&outcome.estimate, thermal, t);
                 (
                     t + shift,
                     (value - reference[i] - change[i]) / unit,
@@ -200,7 +218,7 @@ fn departures(outcome: &Outcome, thermal: &Thermal) -> Plot {
         std::iter::once(Series::zero()).chain(marks).collect()
     };
     let heading = "Each recording alone, minus the joint estimate";
-    let panels = against_temperature(outcome, thermal, 0.06, series);
+    let panels = against_temperature(&outcome.estimate, thermal, 0.06, series);
     Plot::new("recordings.svg", heading, (3, 330), panels).caption(
         "Estimate from each recording alone, ±1σ, minus the joint estimate at its temperature. Two thirds of the \
          intervals should include zero.",

@@ -10,10 +10,10 @@ use super::pdf::{Attached, Frame, PdfError};
 use crate::calibration::Group;
 use crate::calibration::result::{EQUATION, GravityRecord};
 use crate::certificate::{
-    AsFound, Authorised, Certificate, Condition, Conformity, Contact, Decision, Quantity, dcc,
-    in_words, temperature_words,
+    AsFound, Certificate, Conformity, Decision, Quantity, dcc, in_words, temperature_words,
 };
 use crate::imu::ParameterKind;
+use crate::laboratory::{Authorised, Condition, Contact};
 use crate::report::prelude::*;
 use crate::run::Aiding;
 

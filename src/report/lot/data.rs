@@ -1,23 +1,32 @@
-//! Named values of a lot; `unit` states the unit of each.
+//! Named values of a comparison; `unit` states the unit of each.
 
-use crate::lot::{
-    Against, Check, FALSE_ALARM, FALSE_TREND, Lot, Quantity, Row, Sample, Statistics, Verdict,
-};
-use crate::report::lot::shown::{shown, shown_spread, spread_symbol, unit_key, verdict};
+use super::shown::{in_unit, shown, unit_key, verdict};
+use crate::imu::InstallationForm;
+use crate::lot::{Check, ChiSquare, FALSE_ALARM, Lot, Quantity, Row, Statistics, Verdict};
 use crate::report::prelude::*;
 
 pub fn data(lot: &Lot) -> Value {
-    json!({
+    let data = json!({
         "format": "turncal-lot/1",
         "body_frame": lot.body_frame,
+        "installation_form": InstallationForm::General,
         "nominal_scale": { "gyro": lot.nominal.gyro.0.as_slice(), "accel": lot.nominal.accel.0.as_slice() },
         "verdict": verdict(lot).map(|(word, _)| json!({ "word": word, "reasons": reasons(lot) })),
         "false_alarm": FALSE_ALARM,
-        "false_trend": FALSE_TREND,
         "confidence": lot.specification.as_ref().map(|s| s.confidence),
         "units": lot.rows.iter().enumerate().map(|(place, row)| unit(lot, place, row)).collect::<Value>(),
         "quantities": lot.statistics.iter().map(|of| quantity(lot, of)).collect::<Value>(),
-    })
+        "all_parameters": lot.joint.map(chi2),
+    });
+    let Some(reference) = lot.reference() else {
+        return data;
+    };
+    let of_reference = json!({
+        "reference": reference.unit.name,
+        "reference_is_truth": lot.truth.is_some(),
+        "reference_values": values(lot, reference),
+    });
+    joined(data, of_reference)
 }
 
 /// Limits exceeded or undecided, by unit and parameter.
@@ -38,22 +47,12 @@ fn reasons(lot: &Lot) -> Vec<String> {
 
 fn unit(lot: &Lot, place: usize, row: &Row) -> Value {
     let calibration = row.unit.calibrated.as_ref().ok().map(|of| &of.calibration);
-    let quantities = Quantity::all(lot.body_frame).into_iter();
-    let values = quantities.filter_map(|quantity| {
-        let (value, sigma) = shown(quantity, row.sample(quantity)?);
-        let mut entry = json!({ "value": value, "sigma": sigma, "unit": unit_key(quantity) });
-        if let Some(check) = row.check_of(quantity) {
-            entry["verdict"] = json!(check.verdict);
-            entry["probability_within"] = json!(check.probability);
-        }
-        Some((quantity.name(), entry))
-    });
-    let apart: Vec<String> = lot
+    let outliers: Vec<String> = lot
         .outliers_of(place)
         .map(|of| of.quantity.name())
         .collect();
     let failing = { row.checks.iter() }.filter(|check| check.verdict == Verdict::Fail);
-    json!({
+    let unit = json!({
         "name": row.unit.name,
         "meta": row.unit.meta,
         "failure": row.canonical.as_ref().err(),
@@ -62,44 +61,66 @@ fn unit(lot: &Lot, place: usize, row: &Row) -> Value {
         "warnings": calibration.map(|c| &c.warnings),
         "verdict": row.verdict,
         "outside": failing.map(|check| check.quantity().name()).collect::<Vec<_>>(),
-        "apart": apart,
-        "values": values.collect::<Map<_, _>>(),
-    })
+        "apart": outliers,
+        "values": values(lot, row),
+    });
+    if lot.truth.is_none() {
+        return unit;
+    }
+    let of_truth = json!({
+        "nees_per_n": row.nees.map(|nees| nees.mean),
+        "n": row.nees.map(|nees| nees.count),
+        "nees_interval": row.nees.map(|nees| nees.interval),
+    });
+    joined(unit, of_truth)
+}
+
+/// Values by name, with the difference from the reference if there is one.
+fn values(lot: &Lot, row: &Row) -> Map<String, Value> {
+    let entry = |quantity: Quantity| {
+        let (value, sigma) = shown(quantity, row.sample(quantity)?);
+        let mut entry = json!({ "value": value, "sigma": sigma, "unit": unit_key(quantity) });
+        if let Some(check) = row.check_of(quantity) {
+            entry["verdict"] = json!(check.verdict);
+            entry["probability_within"] = json!(check.probability);
+        }
+        if let Some(of) = lot.difference(row, quantity) {
+            entry["difference"] = json!(in_unit(quantity, of.value));
+            entry["difference_sigma"] = json!(in_unit(quantity, of.sigma));
+            entry["z"] = json!(of.in_sigma());
+        }
+        Some((quantity.name(), entry))
+    };
+    lot.quantities().filter_map(entry).collect()
 }
 
 fn quantity(lot: &Lot, of: &Statistics) -> Value {
     let quantity = of.quantity;
-    let mean = Sample {
-        value: of.scatter.mean,
-        sigma: of.scatter.mean_sigma,
-    };
-    let (mean, mean_sigma) = shown(quantity, mean);
-    let spread = |x: f64| shown_spread(quantity, x);
-    let chi2 = of.scatter.chi_square;
+    let (mean, mean_sigma) = shown(quantity, of.mean());
+    let spread = |x: f64| in_unit(quantity, x);
     let interval = of.scatter.spread.interval;
-    json!({
+    let data = json!({
         "name": quantity.name(),
         "unit": unit_key(quantity),
-        "spread_unit": match spread_symbol(quantity) { "%" => "percent", _ => unit_key(quantity) },
         "count": of.count,
         "outliers": of.outliers.iter().map(|&k| &lot.rows[k].unit.name).collect::<Vec<_>>(),
         "mean": mean,
         "mean_sigma": mean_sigma,
         "standard_deviation": spread(of.scatter.deviation),
-        "chi2": chi2.map(|c| c.value),
-        "degrees_of_freedom": chi2.map(|c| c.freedom),
-        "p": chi2.map(|c| c.p),
         "spread": spread(of.scatter.spread.value),
-        "spread_sigma": of.scatter.spread.sigma.map(spread),
         "spread_interval": [spread(interval.0), spread(interval.1)],
         "spread_is_real": of.real,
-        "trends": of.trends.iter().map(|trend| json!({
-            "against": match trend.against { Against::Serial => "serial", Against::Date => "date" },
-            "slope": spread(trend.slope),
-            "slope_sigma": spread(trend.sigma),
-            "p": trend.p,
-        })).collect::<Value>(),
-    })
+    });
+    let chi2 = of.scatter.chi_square.map_or_else(no_chi2, chi2);
+    joined(data, chi2)
+}
+
+fn chi2(of: ChiSquare) -> Value {
+    json!({ "chi2": of.value, "degrees_of_freedom": of.freedom, "p": of.p })
+}
+
+fn no_chi2() -> Value {
+    json!({ "chi2": null, "degrees_of_freedom": null, "p": null })
 }
 
 #[rustfmt::skip]

@@ -1,14 +1,16 @@
-//! Names and units of the quantities of a lot.
+//! Names and units of the quantities of a comparison.
 
-use crate::calibration::Word;
+use crate::calibration::{AuxiliaryKind, Word};
 use crate::imu::{AXES, InstallationForm, Sensor};
-use crate::lot::{Against, Lot, Quantity, Sample, Spread, Trend, Verdict};
+use crate::lot::{Lot, Quantity, Sample, Spread, Verdict};
 use crate::report::prelude::*;
+use crate::report::terms;
 
 /// Such as `gyro K x` or `gyro noise x`.
 pub fn title(quantity: Quantity) -> String {
     match quantity {
         Quantity::Parameter(index) => short_name(InstallationForm::General, index),
+        Quantity::Auxiliary(_) => quantity.name(),
         Quantity::Noise(sensor, axis) => format!("{} noise {}", sensor.name(), AXES[axis]),
     }
 }
@@ -20,6 +22,11 @@ fn unit(quantity: Quantity) -> (&'static str, &'static str, f64) {
             let of = Group::of(index).entry();
             let (_, name) = of.key.split_once('_').unwrap_or_default();
             (of.unit, name, of.value)
+        }
+        Quantity::Auxiliary(index) => {
+            let of = AuxiliaryKind::of(index).map(|kind| terms::unit(kind.error_term()));
+            let (symbol, size) = of.unwrap_or(("", 1.0));
+            (symbol, symbol, size)
         }
         Quantity::Noise(Sensor::Gyro, _) => ("°/√h", "deg_per_sqrt_h", DEG_PER_SQRT_H),
         Quantity::Noise(Sensor::Accel, _) => ("µg/√Hz", "ug_per_sqrt_hz", MICRO_G_PER_SQRT_HZ),
@@ -36,84 +43,68 @@ pub fn unit_key(quantity: Quantity) -> &'static str {
     unit(quantity).1
 }
 
-/// Value and σ in that unit.
+/// Value and σ in that unit; scale factors as deviation from nominal.
 pub fn shown(quantity: Quantity, of: Sample) -> (f64, f64) {
-    let (.., unit) = unit(quantity);
-    match quantity {
-        Quantity::Parameter(index) => (Group::of(index).shown(of.value), of.sigma / unit),
-        Quantity::Noise(..) => {
-            let density = of.value.exp() / unit;
-            (density, density * of.sigma)
-        }
-    }
-}
-
-/// A difference of values in the unit of [`spread_symbol`].
-pub fn shown_spread(quantity: Quantity, spread: f64) -> f64 {
-    match quantity {
-        Quantity::Parameter(index) => spread / Group::of(index).unit_value(),
-        // Of a logarithm.
-        Quantity::Noise(..) => 100.0 * spread,
-    }
-}
-
-/// Unit of differences between units.
-pub fn spread_symbol(quantity: Quantity) -> &'static str {
-    match quantity {
-        Quantity::Parameter(_) => symbol(quantity),
-        Quantity::Noise(..) => "%",
-    }
-}
-
-/// A trend in a sentence.
-pub fn change(quantity: Quantity, trend: &Trend) -> String {
-    let (what, unit) = match trend.against {
-        Against::Serial => ("the serial number", "per number"),
-        Against::Date => ("the date", "a day"),
+    let value = match quantity {
+        Quantity::Parameter(index) => Group::of(index).shown(of.value),
+        _ => in_unit(quantity, of.value),
     };
-    let [slope, own] = [trend.slope, trend.sigma].map(|of| shown_spread(quantity, of));
-    format!(
-        "{} changes with {what}: {} {} {unit} (p = {}).",
-        title(quantity),
-        plus_minus(slope, own),
-        spread_symbol(quantity),
-        chance(trend.p)
-    )
+    (value, in_unit(quantity, of.sigma))
 }
 
-/// A spread with its σ, or its upper limit.
+/// A difference of values in that unit.
+pub fn in_unit(quantity: Quantity, of: f64) -> f64 {
+    of / unit(quantity).2
+}
+
+/// A difference with its σ, if it has one, in that unit.
+pub fn difference(quantity: Quantity, of: Sample) -> String {
+    plus_minus(in_unit(quantity, of.value), in_unit(quantity, of.sigma))
+}
+
+/// A spread, or its upper limit if it is not significant.
 pub fn spread(quantity: Quantity, of: &Spread) -> String {
-    let shown = |x: f64| shown_spread(quantity, x);
-    match of.sigma {
-        Some(own) if of.interval.0 > 0.0 => plus_minus(shown(of.value), shown(own)),
-        _ if of.interval.1 > 0.0 => format!("< {}", sigma(shown(of.interval.1))),
+    match of.interval {
+        (low, _) if low > 0.0 => sigma(in_unit(quantity, of.value)),
+        (_, high) if high > 0.0 => format!("< {}", sigma(in_unit(quantity, high))),
         // The scatter is less than the units' σ alone make.
         _ => "0".to_owned(),
     }
 }
 
-/// Quantities shown together: heading, names and quantities. First the parameter groups, then the noise of each triad.
-pub fn together(lot: &Lot) -> Vec<(String, Vec<String>, Vec<Quantity>)> {
-    let those = |is: &dyn Fn(Quantity) -> bool| -> Vec<Quantity> {
-        let all = lot.statistics.iter().map(|of| of.quantity);
-        all.filter(|&quantity| is(quantity)).collect()
+/// Quantities shown together.
+pub struct Together {
+    /// Heading, with the unit.
+    pub heading: String,
+    /// The name of each quantity below that heading.
+    pub names: Vec<String>,
+    /// The quantities.
+    pub quantities: Vec<Quantity>,
+}
+
+/// The parameter groups, then the noise of each triad, if any calibration has them.
+pub fn together(lot: &Lot) -> Vec<Together> {
+    let those = |heading: String, is: &dyn Fn(Quantity) -> bool| {
+        let quantities: Vec<Quantity> = lot.quantities().filter(|of| is(*of)).collect();
+        let name = |of: &Quantity| of.name().rsplit('.').next().unwrap_or_default().to_owned();
+        Together {
+            heading,
+            names: quantities.iter().map(name).collect(),
+            quantities,
+        }
     };
     let groups = Group::all().map(|group| {
-        let quantities =
-            those(&|q| matches!(q, Quantity::Parameter(index) if Group::of(index) == group));
-        let names = quantities.iter().map(|quantity| {
-            let title = title(*quantity);
-            title.rsplit(' ').next().unwrap_or_default().to_owned()
-        });
-        (group.titled(), names.collect(), quantities)
+        let is =
+            |of: Quantity| matches!(of, Quantity::Parameter(index) if Group::of(index) == group);
+        those(group.titled(), &is)
     });
     let noises = Sensor::ALL.map(|sensor| {
-        let quantities = those(&|q| matches!(q, Quantity::Noise(of, _) if of == sensor));
-        let unit = quantities.first().map_or("", |q| symbol(*q));
-        let heading = format!("{} noise at rest, {unit}", sensor.name());
-        (heading, AXES.map(String::from).to_vec(), quantities)
+        let unit = symbol(Quantity::Noise(sensor, 0));
+        let is = |of: Quantity| matches!(of, Quantity::Noise(own, _) if own == sensor);
+        those(format!("{} noise at rest, {unit}", sensor.name()), &is)
     });
-    groups.chain(noises).collect()
+    let all = groups.chain(noises);
+    all.filter(|of| !of.quantities.is_empty()).collect()
 }
 
 /// Number of limits over all units that are exceeded, met or undecided.

@@ -10,9 +10,9 @@ use std::fmt::Write;
 use crate::attitude::to_pitch_roll_heading;
 use crate::imu::{BodyFrame, Sensor};
 use crate::report::prelude::*;
-use crate::study::navigation::{INTERVAL, Mission, Motion, Outlook, Quantity, Warming};
+use crate::study::navigation::{INTERVAL, MethodOutlook, Mission, Motion, Outlook, Quantity};
 
-pub use outlook::{Flown, Navigated, add_missions};
+pub use outlook::{Flown, add_missions};
 pub(super) use outlook::{add, line};
 
 /// Hours over which the paper states the position drift.
@@ -35,12 +35,10 @@ pub struct Navigation<'a> {
     pub only: Option<Sensor>,
     /// Motion of the body and its duration.
     pub mission: &'a Mission,
-    /// Warm-up of the instrument, if any, and whether the calibration includes temperature.
-    pub warming: Option<(&'a Warming, bool)>,
     /// Name of the trajectory, if it moved.
     pub trajectory: Option<&'a str>,
     /// The errors.
-    pub navigated: &'a Navigated,
+    pub navigated: &'a MethodOutlook,
 }
 
 impl Navigation<'_> {
@@ -86,15 +84,6 @@ impl Navigation<'_> {
             Some(Sensor::Accel) => "of the accelerometers; the gyros are exact",
         };
         let start = "perfect alignment, velocity and position; height fixed to the true value";
-        let warming = self.warming.map(|(warming, _)| {
-            let words = format!(
-                "from {} to {} °C with a time constant of {} h",
-                value(warming.from, 0.1),
-                value(warming.to, 0.1),
-                three_digits(warming.time_constant / HOUR),
-            );
-            ("temperature", words)
-        });
         let rows = [
             ("motion", motion),
             ("duration", format!("{} h", three_digits(self.hours()))),
@@ -102,7 +91,7 @@ impl Navigation<'_> {
             ("body frame", self.body_frame.words().to_owned()),
             ("start", start.to_owned()),
         ];
-        Facts::new("The navigation", rows.into_iter().chain(warming))
+        Facts::new("The navigation", rows)
     }
 
     fn warnings(&self) -> Vec<String> {
@@ -111,11 +100,6 @@ impl Navigation<'_> {
         if !self.converged {
             warnings.push(format!(
                 "{name} did not converge, so its σ are meaningless."
-            ));
-        }
-        if let Some((_, false)) = self.warming {
-            warnings.push(format!(
-                "{name} does not include temperature, so its σ are valid only at its calibration temperature."
             ));
         }
         if self.navigated.outlook.iter().any(|m| m.sigma.is_none()) {

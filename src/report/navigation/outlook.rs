@@ -2,18 +2,9 @@
 //! a table of all quantities at the end, and a panel for each quantity against time.
 
 use crate::report::prelude::*;
-use crate::study::navigation::{NavigationStudyError, Outlook, Quantity};
+use crate::study::navigation::{MethodOutlook, NavigationStudyError, Outlook, Quantity};
 
 const HEADING: &str = "Navigation with this calibration";
-
-/// The navigation errors that one calibration leads to.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Navigated {
-    /// Name that distinguishes it from others, such as `EKF` or `closed form`.
-    pub method: &'static str,
-    /// The errors, if known.
-    pub outlook: Vec<Outlook>,
-}
 
 /// One mission, navigated with several calibrations.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,7 +37,7 @@ pub fn add_missions(document: &mut Document, methods: &[String], missions: &[Flo
 }
 
 /// Adds table and figure.
-pub fn add(document: &mut Document, navigation: Result<&[Navigated], &NavigationStudyError>) {
+pub fn add(document: &mut Document, navigation: Result<&[MethodOutlook], &NavigationStudyError>) {
     match navigation {
         Err(reason) => {
             let text = format!("Not navigated from the site of the run: {reason}.");
@@ -65,30 +56,30 @@ pub fn add(document: &mut Document, navigation: Result<&[Navigated], &Navigation
     }
 }
 
-fn is_known(navigated: &[Navigated]) -> bool {
+fn is_known(navigated: &[MethodOutlook]) -> bool {
     let mut moments = navigated.iter().flat_map(|of| &of.outlook);
     moments.any(|moment| moment.error.is_some())
 }
 
 /// Duration, s.
-fn duration(navigated: &[Navigated]) -> f64 {
+fn duration(navigated: &[MethodOutlook]) -> f64 {
     let ends = navigated.iter().filter_map(|of| of.outlook.last());
     ends.map(|end| end.time).fold(0.0, f64::max)
 }
 
 /// The unit of time of the report: its symbol and its length in seconds.
-fn clock(navigated: &[Navigated]) -> (&'static str, f64) {
+fn clock(navigated: &[MethodOutlook]) -> (&'static str, f64) {
     readable(&TIMES, duration(navigated))
 }
 
 /// Duration in words.
-fn long(navigated: &[Navigated]) -> String {
+fn long(navigated: &[MethodOutlook]) -> String {
     let (unit, size) = clock(navigated);
     format!("{} {unit}", value(duration(navigated) / size, 10.0))
 }
 
 /// The position at the end in one line.
-pub fn line(navigated: &[Navigated]) -> String {
+pub fn line(navigated: &[MethodOutlook]) -> String {
     let [.., horizontal] = Quantity::ALL;
     let ends = navigated.iter().filter_map(|of| {
         let end = of.outlook.last()?;
@@ -120,7 +111,7 @@ struct Figures {
 }
 
 impl Figures {
-    fn of(quantity: Quantity, navigated: &Navigated) -> Self {
+    fn of(quantity: Quantity, navigated: &MethodOutlook) -> Self {
         let moments = &navigated.outlook;
         let errors = moments
             .iter()
@@ -154,7 +145,7 @@ impl Figures {
 }
 
 /// Every quantity at the end of navigation, and its maximum if errors are known.
-pub fn table(heading: &str, navigated: &[Navigated]) -> Table {
+pub fn table(heading: &str, navigated: &[MethodOutlook]) -> Table {
     let known = is_known(navigated);
     let (unit_of_time, second) = clock(navigated);
     let mut columns = cells!["", "unit"];
@@ -213,7 +204,7 @@ pub fn table(heading: &str, navigated: &[Navigated]) -> Table {
 }
 
 /// Position error east and north against time.
-fn figure(navigated: &[Navigated], last: &str) -> Plot {
+fn figure(navigated: &[MethodOutlook], last: &str) -> Plot {
     let (heading, mut caption) = match is_known(navigated) {
         true => (
             "Position error in navigation",
@@ -237,7 +228,7 @@ fn figure(navigated: &[Navigated], last: &str) -> Plot {
 }
 
 /// Errors against time in a readable unit, over the ±σ band of the last calibration; only ±σ if no error is known.
-pub fn panel(quantity: Quantity, navigated: &[Navigated]) -> Panel {
+pub fn panel(quantity: Quantity, navigated: &[MethodOutlook]) -> Panel {
     let (unit_of_time, second) = clock(navigated);
     let time = Axis::time(unit_of_time, duration(navigated) / second);
     let curve = |moments: &[Outlook], of: &dyn Fn(&Outlook) -> Option<f64>| -> Vec<Point> {
@@ -246,7 +237,7 @@ pub fn panel(quantity: Quantity, navigated: &[Navigated]) -> Panel {
         points.collect()
     };
     let mut lines = Vec::new();
-    for Navigated {
+    for MethodOutlook {
         method: name,
         outlook: moments,
     } in navigated

@@ -38,7 +38,7 @@ fn moments(sigma: bool) -> Vec<Outlook> {
 }
 
 fn document(moments: &[Outlook]) -> Document {
-    let navigated = Navigated {
+    let navigated = MethodOutlook {
         method: "error",
         outlook: moments.to_vec(),
     };
@@ -50,7 +50,6 @@ fn document(moments: &[Outlook]) -> Document {
         body_frame: BodyFrame::Table,
         only: None,
         mission: &mission(),
-        warming: None,
         trajectory: None,
         navigated: &navigated,
     };

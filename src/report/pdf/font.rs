@@ -4,14 +4,19 @@
 //! and a few signs.
 
 use krilla::text::{Font, GlyphId, KrillaGlyph};
-use ttf_parser::Face;
+use skrifa::charmap::Charmap;
+use skrifa::metrics::GlyphMetrics;
+use skrifa::prelude::{LocationRef, Size};
+use skrifa::{FontRef, MetadataProvider};
 
 const REGULAR: &[u8] = include_bytes!("../../certificate/fonts/NotoSans-Regular.ttf");
 const BOLD: &[u8] = include_bytes!("../../certificate/fonts/NotoSans-Bold.ttf");
 
 /// A font.
 pub struct Typeface {
-    face: Face<'static>,
+    characters: Charmap<'static>,
+    metrics: GlyphMetrics<'static>,
+    units_per_em: f32,
     pub font: Font,
 }
 
@@ -31,41 +36,49 @@ impl Fonts {
     }
 
     pub fn get(&self, bold: bool) -> &Typeface {
-        match bold {
-            true => &self.bold,
-            false => &self.regular,
-        }
+        if bold { &self.bold } else { &self.regular }
     }
 }
 
 impl Typeface {
     fn new(data: &'static [u8]) -> Option<Self> {
+        let font = FontRef::new(data).ok()?;
+        let (size, location) = (Size::unscaled(), LocationRef::default());
         Some(Self {
-            face: Face::parse(data, 0).ok()?,
+            characters: font.charmap(),
+            metrics: font.glyph_metrics(size, location),
+            units_per_em: f32::from(font.metrics(size, location).units_per_em),
             font: Font::new(data.into(), 0)?,
         })
     }
 
+    fn glyph(&self, character: char) -> Option<skrifa::GlyphId> {
+        let glyph = self.characters.map(shape(character))?;
+        (glyph != skrifa::GlyphId::NOTDEF).then_some(glyph)
+    }
+
+    /// Advance of a glyph for a font size of one.
+    fn advance(&self, glyph: skrifa::GlyphId) -> f32 {
+        self.metrics.advance_width(glyph).unwrap_or(0.0) / self.units_per_em
+    }
+
     /// The characters of a text that it cannot show.
     pub fn lacks<'a>(&'a self, text: &'a str) -> impl Iterator<Item = char> + 'a {
-        let shown = |c: &char| self.face.glyph_index(shape(*c)).is_none();
-        text.chars().filter(shown)
+        text.chars()
+            .filter(|&character| self.glyph(character).is_none())
     }
 
     /// Glyphs of a text, one per character, with advances for a font size of one.
     pub fn glyphs(&self, text: &str) -> Vec<KrillaGlyph> {
-        let units = f32::from(self.face.units_per_em());
         let glyph = |(at, character): (usize, char)| {
-            let glyph = self.face.glyph_index(shape(character)).unwrap_or_default();
-            let advance = f32::from(self.face.glyph_hor_advance(glyph).unwrap_or(0)) / units;
-            let range = at..at + character.len_utf8();
+            let glyph = self.glyph(character).unwrap_or_default();
             KrillaGlyph::new(
-                GlyphId::new(glyph.0.into()),
-                advance,
+                GlyphId::new(glyph.to_u32()),
+                self.advance(glyph),
                 0.0,
                 0.0,
                 0.0,
-                range,
+                at..at + character.len_utf8(),
                 None,
             )
         };
@@ -74,11 +87,8 @@ impl Typeface {
 
     /// Width of the text, pt.
     pub fn width(&self, text: &str, size: f32) -> f32 {
-        self.glyphs(text)
-            .iter()
-            .map(|glyph| glyph.x_advance)
-            .sum::<f32>()
-            * size
+        let advance = |character| self.advance(self.glyph(character).unwrap_or_default());
+        text.chars().map(advance).sum::<f32>() * size
     }
 }
 

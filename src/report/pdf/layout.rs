@@ -149,7 +149,7 @@ impl<'a> Layout<'a> {
                 grey: NOTE,
                 ..PLAIN
             };
-            for (n, line) in self.broken(value, PLAIN, room).iter().enumerate() {
+            for (n, line) in self.broken(value, PLAIN, room).enumerate() {
                 let name = if n == 0 { name } else { "" };
                 self.line(&[(MARGIN, name, style), (MARGIN + NAMES, line, PLAIN)]);
             }
@@ -165,7 +165,7 @@ impl<'a> Layout<'a> {
 
     fn paragraph(&mut self, text: &str, style: Style) {
         for line in self.broken(text, style, WIDTH - 2.0 * MARGIN) {
-            self.line(&[(MARGIN, &line, style)]);
+            self.line(&[(MARGIN, line, style)]);
         }
         self.y += 2.0;
     }
@@ -348,48 +348,37 @@ impl<'a> Layout<'a> {
 
     /// As much of a text as fits into a line of this width.
     fn shortened(&self, text: &str, style: Style, room: f32) -> String {
-        let mut lines = self
-            .broken(text, style, room - self.width("…", style))
-            .into_iter();
+        let mut lines = self.broken(text, style, room - self.width("…", style));
         let first = lines.next().unwrap_or_default();
-        match lines.next() {
-            Some(_) => first + "…",
-            None => first,
-        }
+        let more = lines.next().map_or("", |_| "…");
+        format!("{first}{more}")
     }
 
-    /// A text in lines of at most this width; longer words are broken anywhere.
-    fn broken(&self, text: &str, style: Style, room: f32) -> Vec<String> {
-        let mut lines = vec![String::new()];
-        let (space, mut filled) = (self.width(" ", style), 0.0);
-        for word in text.split(' ') {
-            let width = self.width(word, style);
-            match lines.last_mut() {
-                Some(line) if !line.is_empty() && filled + space + width <= room => {
-                    line.push(' ');
-                    line.push_str(word);
-                    filled += space + width;
-                    continue;
+    /// A text in lines of at most this width, broken at spaces; longer words are broken anywhere.
+    fn broken<'t>(
+        &self,
+        text: &'t str,
+        style: Style,
+        room: f32,
+    ) -> impl Iterator<Item = &'t str> + use<'a, 't> {
+        let typeface = self.fonts.get(style.bold);
+        let mut rest = Some(text);
+        std::iter::from_fn(move || {
+            let text = rest.take()?;
+            let (mut filled, mut space) = (0.0, None);
+            for (at, character) in text.char_indices() {
+                filled += typeface.width(character.encode_utf8(&mut [0; 4]), style.size);
+                if character == ' ' {
+                    space = Some(at);
                 }
-                Some(line) if !line.is_empty() => {
-                    lines.push(String::new());
-                    filled = 0.0;
+                if filled > room && at > 0 {
+                    let (line, after) = text.split_at(space.unwrap_or(at));
+                    rest = Some(after.strip_prefix(' ').unwrap_or(after));
+                    return Some(line);
                 }
-                _ => {}
             }
-            for character in word.chars() {
-                let width = self.width(character.encode_utf8(&mut [0; 4]), style);
-                if filled > 0.0 && filled + width > room {
-                    lines.push(String::new());
-                    filled = 0.0;
-                }
-                if let Some(line) = lines.last_mut() {
-                    line.push(character);
-                }
-                filled += width;
-            }
-        }
-        lines
+            Some(text)
+        })
     }
 }
 

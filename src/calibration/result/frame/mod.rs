@@ -18,6 +18,45 @@ use crate::calibration::{
 };
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
 
+/// A record with its name in messages.
+#[derive(Debug, Clone, Copy)]
+pub struct Named<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// The calibration, or the truth.
+    pub record: &'a Calibration,
+}
+
+/// Converts two records to the general form, a common body frame and these nominal scales. A record without units is
+/// assumed to have those of the other.
+///
+/// # Errors
+/// [`ComparisonError`] if their units differ or one of them cannot be converted.
+pub fn in_common_form(
+    first: Named,
+    second: Named,
+    nominal: &PerSensor<Nominal>,
+) -> Result<[Canonical; 2], ComparisonError> {
+    let units = [first, second].map(|of| of.record.unit.as_ref());
+    for sensor in Sensor::ALL {
+        if let [Some(expected), Some(found)] = units.map(|unit| Some(unit?.get(sensor)))
+            && expected != found
+        {
+            return Err(ComparisonError::Unit {
+                sensor,
+                name: first.name.to_owned(),
+                expected: expected.clone(),
+                other: second.name.to_owned(),
+                found: found.clone(),
+            });
+        }
+    }
+    let frames = [first, second].map(|of| of.record.body_frame);
+    let body_frame = BodyFrame::common(frames.into_iter());
+    let canonical = |of: Named| Canonical::new(of.name, of.record, nominal, body_frame);
+    Ok([canonical(first)?, canonical(second)?])
+}
+
 /// A calibration in the general form, in a given body frame, normalised by given nominal scales.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Canonical {

@@ -6,6 +6,8 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::small_file;
+
 /// The list's name in its directory.
 pub const FILE: &str = ".turncal";
 
@@ -32,7 +34,7 @@ pub fn of_names<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
 fn listed(directory: &Path) -> Option<BTreeSet<String>> {
     let file = directory.join(FILE);
     let text = match fs::symlink_metadata(&file) {
-        Ok(found) if found.is_file() => fs::read_to_string(&file).unwrap_or_default(),
+        Ok(found) if found.is_file() => small_file::text(&file).unwrap_or_default(),
         _ => String::new(),
     };
     let mut lines = text.lines();

@@ -1,10 +1,10 @@
 //! A temporary location next to an output.
 
-use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::OnceLock;
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
 use std::time::Duration;
 
@@ -15,6 +15,11 @@ const PREFIX: &str = ".turncal-";
 const LOCK: &str = "turncal.lock";
 const NEW: &str = "new";
 const OLD: &str = "old";
+/// New output that is being removed.
+const DEAD: &str = "dead";
+
+/// Announces every stage to the thread that ends the process on a signal; not set in a library.
+static ANNOUNCED: OnceLock<Sender<Beside>> = OnceLock::new();
 
 /// Error: an output must not replace what is at `target`.
 pub fn taken(target: &Path) -> FileError {
@@ -32,45 +37,63 @@ pub fn unwritable(target: &Path, doing: &str, error: &io::Error) -> FileError {
     FileError::io(target, doing, error, advice)
 }
 
-/// The stages of this process, each with the directories created for it, innermost first.
-static UNFINISHED: Mutex<BTreeMap<PathBuf, Vec<PathBuf>>> = Mutex::new(BTreeMap::new());
+/// Unfinished outputs of this process, for the thread that ends the process on a signal.
+pub struct Unfinished(Receiver<Beside>);
 
-/// While held, a signal does not end the process.
-fn unfinished() -> MutexGuard<'static, BTreeMap<PathBuf, Vec<PathBuf>>> {
-    UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner)
-}
+impl Unfinished {
+    /// Collects them from here on; `None` if another thread already does.
+    pub fn of_this_process() -> Option<Self> {
+        let (announced, all) = channel();
+        ANNOUNCED.set(announced).ok().map(|()| Self(all))
+    }
 
-/// Removes unfinished output of this process and blocks further output, for a process that is about to end. Threads
-/// that start, finish or abandon an output wait.
-pub fn abandon_unfinished() {
-    let unfinished = unfinished();
-    for (stage, parents) in unfinished.iter() {
-        // Another thread may be writing into it.
-        for _ in 0..100 {
-            if remove(stage, parents) {
-                break;
+    /// Removes them, for a process that is about to end. Threads that start, finish or abandon an output from here on
+    /// wait for that end.
+    pub fn abandon(self) {
+        for beside in self.0.try_iter() {
+            // Another thread may be writing into it or exchanging old and new.
+            for _ in 0..100 {
+                if beside.remove().is_ok() {
+                    break;
+                }
+                thread::sleep(Duration::from_millis(10));
             }
-            thread::sleep(Duration::from_millis(10));
         }
     }
-    std::mem::forget(unfinished);
 }
 
-/// Removes a stage and the directories created for it, if empty.
-fn remove(stage: &Path, parents: &[PathBuf]) -> bool {
-    let gone = match fs::remove_dir_all(stage) {
-        Ok(()) => true,
-        Err(error) => error.kind() == io::ErrorKind::NotFound,
-    };
-    // The first that is not empty ends this; so does a target that is in place.
-    let _ = parents.iter().try_for_each(fs::remove_dir);
-    gone
+/// A stage, and the directories created for it, innermost first.
+#[derive(Clone)]
+struct Beside {
+    stage: PathBuf,
+    parents: Vec<PathBuf>,
+}
+
+impl Beside {
+    /// Announces the stage; does not return if the process is about to end.
+    fn announce(&self) {
+        let announced = ANNOUNCED.get().map(|all| all.send(self.clone()));
+        if announced.is_some_and(|sent| sent.is_err()) {
+            let _ = self.remove();
+            loop {
+                thread::park();
+            }
+        }
+    }
+
+    /// Removes the stage and the directories created for it, if empty.
+    fn remove(&self) -> io::Result<()> {
+        let removed = remove(&self.stage);
+        // The first that is not empty ends this; so does a target that is in place.
+        let _ = self.parents.iter().try_for_each(fs::remove_dir);
+        removed
+    }
 }
 
 /// A target for new output.
 pub struct Stage {
     /// Contains the new output and, during the exchange, the old one. Removed on drop.
-    beside: PathBuf,
+    beside: Beside,
     /// `None` if the file system has no locks.
     lock: Option<File>,
     target: PathBuf,
@@ -90,7 +113,6 @@ impl Stage {
             Some(parent) if parent != Path::new("") => parent,
             _ => Path::new("."),
         };
-        let mut unfinished = unfinished();
         let missing: Vec<PathBuf> = parent
             .ancestors()
             .take_while(|ancestor| *ancestor != Path::new("") && !ancestor.exists())
@@ -101,8 +123,12 @@ impl Stage {
             begin(parent)
         });
         match begun {
-            Ok((beside, lock)) => {
-                unfinished.insert(beside.clone(), missing);
+            Ok((stage, lock)) => {
+                let beside = Beside {
+                    stage,
+                    parents: missing,
+                };
+                beside.announce();
                 Ok(Self {
                     beside,
                     lock,
@@ -128,7 +154,7 @@ impl Stage {
     }
 
     pub fn new_path(&self) -> PathBuf {
-        self.beside.join(NEW)
+        self.beside.stage.join(NEW)
     }
 
     pub fn target(&self) -> &Path {
@@ -137,8 +163,7 @@ impl Stage {
 
     /// Moves the new output into place; existing output is replaced only with `force`.
     pub fn commit(self, force: bool) -> Result<(), FileError> {
-        let mut unfinished = unfinished();
-        let old = self.beside.join(OLD);
+        let old = self.beside.stage.join(OLD);
         let exists = fs::symlink_metadata(&self.target).is_ok();
         if exists && !force {
             return Err(taken(&self.target));
@@ -155,10 +180,9 @@ impl Stage {
             return Ok(());
         };
         if exists && fs::rename(&old, &self.target).is_err() {
-            unfinished.remove(&self.beside);
             let doing = format!(
                 "put the output in place (the old output is in {})",
-                self.beside.display()
+                self.beside.stage.display()
             );
             return Err(FileError::io(
                 &self.target,
@@ -174,10 +198,8 @@ impl Stage {
 impl Drop for Stage {
     fn drop(&mut self) {
         self.lock = None;
-        // What is not in the list holds the only copy of what was to be replaced.
-        if let Some(parents) = unfinished().remove(&self.beside) {
-            remove(&self.beside, &parents);
-        }
+        let _ = self.beside.remove();
+        self.beside.announce();
     }
 }
 
@@ -238,21 +260,30 @@ fn remove_if_abandoned(stage: &Path) -> io::Result<()> {
     if file.try_lock().is_err() {
         return Ok(());
     }
-    let [new, old] = [NEW, OLD].map(|name| stage.join(name));
+    // Locked until it is gone: it may be about to be taken into use.
+    remove(stage)
+}
+
+/// Removes a stage, except one with the only copy of the output that was to be replaced.
+fn remove(stage: &Path) -> io::Result<()> {
+    let [new, old, dead] = [NEW, OLD, DEAD].map(|name| stage.join(name));
     if new.exists() && old.exists() {
-        // Its process ended while they changed places: the old one has no other copy.
-        return Ok(());
+        return Err(io::ErrorKind::ResourceBusy.into());
     }
-    for thing in [new, old] {
+    // Output that has lost its name is not put in place half removed.
+    let _ = fs::rename(&new, &dead);
+    for thing in [dead, old] {
         match fs::symlink_metadata(&thing) {
             Ok(found) if found.is_dir() => fs::remove_dir_all(&thing)?,
             Ok(_) => fs::remove_file(&thing)?,
             Err(_) => {}
         }
     }
-    drop(file);
-    fs::remove_file(&lock)?;
-    fs::remove_dir(stage)
+    let _ = fs::remove_file(stage.join(LOCK));
+    match fs::remove_dir(stage) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
 }
 
 /// Exchanges two paths atomically.

@@ -21,9 +21,12 @@ fn numbers(bytes: &[u8], offset: u64) -> Result<Vec<(String, f64)>, Broken> {
 }
 
 fn flatten(value: &Value, path: &str, all: &mut Vec<(String, f64)>) {
-    let below = |name: &str| match path.is_empty() {
-        true => name.to_owned(),
-        false => format!("{path}.{name}"),
+    let below = |name: &str| {
+        if path.is_empty() {
+            name.to_owned()
+        } else {
+            format!("{path}.{name}")
+        }
     };
     match value {
         Value::Number(number) => all.push((path.to_owned(), number.as_f64().unwrap_or(f64::NAN))),

@@ -1,9 +1,7 @@
 //! Topics of a log: messages of one type each, with their log times.
 
-#[cfg(feature = "mcap")]
 pub mod json;
 pub mod packed;
-#[cfg(feature = "mcap")]
 pub mod protobuf;
 pub mod ros;
 
@@ -95,13 +93,11 @@ impl Topics {
     }
 
     /// The stream of a message; its first message may define the columns.
-    #[cfg_attr(not(feature = "mcap"), allow(unused_variables))]
     fn stream(&mut self, number: u32, data: &[u8], offset: u64) -> Result<usize, Broken> {
         let stream = self.of_number.get(&number).copied().ok_or_else(|| {
             let found = format_args!("a message on channel {number}");
             Broken::new(offset, found, "a channel described earlier in the file")
         })?;
-        #[cfg(feature = "mcap")]
         if let Reader::Json(columns) = &mut self.readers[stream]
             && columns.is_empty()
         {
@@ -118,10 +114,8 @@ const LOG_TIME: &str = "log_time";
 /// Reader of its messages.
 pub enum Reader {
     Ros(ros::Message),
-    #[cfg(feature = "mcap")]
     Protobuf(protobuf::Message),
     /// The first message defines the columns.
-    #[cfg(feature = "mcap")]
     Json(Vec<Column>),
     /// Only the message times are known, for this reason.
     Unknown(String),
@@ -142,9 +136,7 @@ impl Reader {
         let mut remarks = Vec::new();
         match self {
             Self::Ros(message) => columns.extend_from_slice(&message.columns),
-            #[cfg(feature = "mcap")]
             Self::Protobuf(message) => columns.extend_from_slice(&message.columns),
-            #[cfg(feature = "mcap")]
             Self::Json(known) => columns.extend_from_slice(known),
             Self::Unknown(why) => remarks.push(format!("`{topic}`: {why}")),
         }
@@ -169,9 +161,7 @@ impl Reader {
         row.push((time / 1_000_000_000) as f64 + 1e-9 * (time % 1_000_000_000) as f64);
         match self {
             Self::Ros(message) => message.values(bytes, offset, row),
-            #[cfg(feature = "mcap")]
             Self::Protobuf(message) => message.values(bytes, offset, row),
-            #[cfg(feature = "mcap")]
             Self::Json(columns) => json::values(columns, bytes, offset, row),
             Self::Unknown(_) => Ok(()),
         }

@@ -2,18 +2,22 @@
 
 use std::io::Read;
 
-use crate::formats::streams::bytes::Broken;
+use crate::formats::streams::bytes::{Broken, Input, most_at_once};
 
-/// Maximum chunk size: real chunks have a few megabytes, and larger claims are damage or decompression bombs.
-const LONGEST: u64 = 1 << 27;
-
-/// Unpacks a chunk into `size` bytes by the method that the file names.
-pub fn unpack(method: &str, packed: &[u8], size: u64, offset: u64) -> Result<Vec<u8>, Broken> {
-    if size > LONGEST {
+/// Unpacks a chunk at this offset of a file into `size` bytes by the method that the file names.
+pub fn unpack(
+    method: &str,
+    packed: &[u8],
+    size: u64,
+    offset: u64,
+    file: &Input,
+) -> Result<Vec<u8>, Broken> {
+    let most = most_at_once(file.length());
+    if size > most {
         return Err(Broken::new(
             offset,
             format_args!("a chunk of {size} bytes"),
-            format_args!("at most {LONGEST} bytes"),
+            format_args!("at most {most} bytes"),
         ));
     }
     let mut unpacked = Vec::new();

@@ -125,11 +125,11 @@ fn fixtures() -> Vec<Fixture> {
 
 fn open(bytes: Vec<u8>) -> Result<Option<Box<dyn Log>>, Broken> {
     let format = FORMATS.iter().find(|format| format.is_of(&bytes));
-    let Some(open) = format.and_then(|format| format.open) else {
+    let Some(format) = format else {
         return Ok(None);
     };
     let input = Input::new(Box::new(Cursor::new(bytes))).unwrap();
-    open(input).map(Some)
+    (format.open)(input).map(Some)
 }
 
 /// All samples, and why there are no more.

@@ -180,13 +180,12 @@ pub fn npz(deflated: bool) -> Vec<u8> {
     ];
     let (mut file, mut directory) = (Vec::new(), Vec::new());
     for (name, content) in &members {
-        let packed = match deflated {
-            true => {
-                let mut encoder = DeflateEncoder::new(Vec::new(), Compression::default());
-                encoder.write_all(content).unwrap();
-                encoder.finish().unwrap()
-            }
-            false => content.clone(),
+        let packed = if deflated {
+            let mut encoder = DeflateEncoder::new(Vec::new(), Compression::default());
+            encoder.write_all(content).unwrap();
+            encoder.finish().unwrap()
+        } else {
+            content.clone()
         };
         let mut sum = flate2::Crc::new();
         sum.update(content);
@@ -271,21 +270,20 @@ pub fn mat(compressed: bool) -> Vec<u8> {
     let whole = array(2, "imu", [1, 1], &rest);
     let mut file = text(124, "MATLAB 5.0 MAT-file");
     file.extend([0, 1, b'I', b'M']);
-    match compressed {
-        true => {
-            let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
-            encoder.write_all(&whole).unwrap();
-            let packed = encoder.finish().unwrap();
-            file.extend(
-                [
-                    &15u32.to_le_bytes()[..],
-                    &(packed.len() as u32).to_le_bytes(),
-                    &packed,
-                ]
-                .concat(),
-            );
-        }
-        false => file.extend(whole),
+    if compressed {
+        let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
+        encoder.write_all(&whole).unwrap();
+        let packed = encoder.finish().unwrap();
+        file.extend(
+            [
+                &15u32.to_le_bytes()[..],
+                &(packed.len() as u32).to_le_bytes(),
+                &packed,
+            ]
+            .concat(),
+        );
+    } else {
+        file.extend(whole)
     }
     file
 }
@@ -353,10 +351,7 @@ pub fn bag(lz4: bool) -> Vec<u8> {
         chunk.extend(counted(&ros1(k)));
     }
     let size = (chunk.len() as u32).to_le_bytes();
-    let packed = match lz4 {
-        true => packed(&chunk),
-        false => chunk,
-    };
+    let packed = if lz4 { packed(&chunk) } else { chunk };
     let method: &[u8] = if lz4 { b"lz4" } else { b"none" };
     let mut file = b"#ROSBAG V2.0\n".to_vec();
     file.extend(head(&[("op", &[3])]));
@@ -537,9 +532,10 @@ pub fn mcap(messages: Messages, lz4: bool) -> Vec<u8> {
     }
     let mut sum = flate2::Crc::new();
     sum.update(&chunk);
-    let (method, packed) = match lz4 {
-        true => ("lz4", packed(&chunk)),
-        false => ("", chunk.clone()),
+    let (method, packed) = if lz4 {
+        ("lz4", packed(&chunk))
+    } else {
+        ("", chunk.clone())
     };
     let content = [
         &[0; 16][..],

@@ -143,9 +143,10 @@ impl Fill {
         };
         let halves = [mean_square(0, most)?, mean_square(1, f64::INFINITY)?];
         // A larger change than any tried may have come at any moment.
-        let sudden = match is_tried {
-            true => 0.0,
-            false => (change * self.hole.len() as f64).powi(2) / 12.0,
+        let sudden = if is_tried {
+            0.0
+        } else {
+            (change * self.hole.len() as f64).powi(2) / 12.0
         };
         Some(halves.map(|half| half.max(sudden)))
     }

@@ -1,4 +1,5 @@
-//! Statements of a calibration laboratory about itself, its customer and the item, which do not follow from data.
+//! Statements of a calibration laboratory about itself, its customer and the item, which do not follow from data. A
+//! certificate shows them.
 
 use serde::Deserialize;
 
