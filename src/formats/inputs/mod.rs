@@ -3,6 +3,5 @@
 pub mod course;
 pub mod joined;
 pub mod segments;
-pub mod source;
 pub mod table_log;
 pub mod temperature;
