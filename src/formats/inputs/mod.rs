@@ -3,5 +3,6 @@
 pub mod course;
 pub mod joined;
 pub mod segments;
+pub mod source;
 pub mod table_log;
 pub mod temperature;
