@@ -1,37 +1,24 @@
 //! A noise figure in every convention.
 
-use crate::noise::conventions::{Conversion, Line};
+use crate::noise::conventions::{Conversion, Figure};
 use crate::report::prelude::*;
 
 /// Interpretation of the figure, and one line per convention.
 pub fn document(conversion: &Conversion) -> Document {
-    let (value, given) = conversion.given;
+    let Figure { value, convention } = conversion.given;
     let at = conversion
-        .rate
+        .rate_hz
         .map_or(String::new(), |rate| format!(" at {rate} Hz"));
-    let mut document = Document::new(format!("{value} {}{at}", given.unit));
-    document.lead = vec![format!(
-        "Interpreted as {}. Equivalent values:",
-        given.meaning
-    )];
-    let row = |&(value, of): &Line| {
-        let name = format!("{:>11} {}", digits(value), of.unit);
-        (name, of.meaning)
+    let mut document = Document::new(format!("{value} {}{at}", convention.unit));
+    let meaning = convention.meaning;
+    document.lead = vec![format!("Interpreted as {meaning}. Equivalent values:")];
+    let row = |&Figure { value, convention }: &Figure| {
+        let name = format!("{:>11} {}", digits(value), convention.unit);
+        (name, convention.meaning)
     };
-    let rows = conversion.lines.iter().map(row);
-    document.both(Facts::new("", rows));
-    document.data = json!({
-        "quantity": conversion.quantity.name,
-        "sensor": conversion.quantity.sensor.name(),
-        "given": data(&conversion.given),
-        "rate_hz": conversion.rate,
-        "figures": conversion.lines.iter().map(data).collect::<Value>(),
-    });
+    document.both(Facts::new("", conversion.figures.iter().map(row)));
+    document.data = json!(conversion);
     document
-}
-
-fn data(&(value, of): &Line) -> Value {
-    json!({ "value": value, "unit": of.unit, "meaning": of.meaning })
 }
 
 /// Five digits, with a power of ten if shorter.

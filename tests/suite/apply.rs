@@ -192,7 +192,10 @@ fn errors(terms: &[Term]) -> [PerSensor<f64>; 2] {
         let correction = Correction::for_run(record, run).unwrap();
         let period = run.recording.imu.period;
         let mut largest = PerSensor::from_fn(|_| 0.0_f64);
-        for (k, sample) in correction.samples(run).enumerate() {
+        for (k, sample) in correction
+            .samples(run, 0..run.recording.imu.len())
+            .enumerate()
+        {
             let rate = (sample.rate - ideal.gyro[k] / period).amax();
             let force = (sample.force - ideal.accel[k] / period).amax();
             largest.gyro = largest.gyro.max(rate);

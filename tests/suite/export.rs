@@ -184,40 +184,6 @@ int main(int argc, char **argv)
     });
 }
 
-#[test]
-fn the_octave_function_gives_the_test_vectors() {
-    let text = exported(&record(), "octave").0;
-    let values = |name: &str| {
-        let line = text
-            .lines()
-            .find(|l| l.trim_start().starts_with(&format!("{name} =")));
-        numbers(line.unwrap().split_once('=').unwrap().1)
-    };
-    assert_calibrates(|raw| {
-        let triad = |name: &str, n: Vector3<f64>| {
-            let matrix = Matrix3::from_row_slice(&values(&format!("{name}_correction")));
-            matrix * (n - Vector3::from_vec(values(&format!("{name}_bias"))))
-        };
-        let [gyro, accel] = halves(raw);
-        let [gyro, accel] = [triad("gyro", gyro), triad("accel", accel)];
-        gyro.iter().chain(&accel).copied().collect()
-    });
-    if !of_program("octave-cli") {
-        return;
-    }
-    let root = tempfile::tempdir().unwrap();
-    fs::write(root.path().join("turncal_calibrate.m"), &text).unwrap();
-    assert_calibrates(|raw| {
-        let call = format!("printf('%.17g\\n', turncal_calibrate({raw:?}))");
-        let ran = process::Command::new("octave-cli")
-            .current_dir(root.path())
-            .args(["--eval", &call])
-            .output()
-            .unwrap();
-        numbers(&String::from_utf8(ran.stdout).unwrap())
-    });
-}
-
 /// Keys of nested YAML mappings, joined by points, with the numbers below each.
 pub fn yaml(text: &str) -> BTreeMap<String, Vec<f64>> {
     let mut path: Vec<(usize, String)> = Vec::new();
@@ -540,7 +506,6 @@ fn what_a_format_does_not_hold_is_said_in_the_file_and_on_standard_error() {
         ("kalibr", &["biases", "sigma", "accel-second-order"][..]),
         ("kf-gins", &["misalignment", "sigma", "g-sensitivity"]),
         ("c", &["sigma", "accel-second-order, g-sensitivity"]),
-        ("octave", &["sigma", "accel-second-order, g-sensitivity"]),
         ("text", &["covariance"]),
     ] {
         let name = format!("{format}.out");
@@ -567,7 +532,7 @@ fn wrong_use_of_export_says_what_to_do() {
     turncal(&["c.json"], root.path()).code(2);
     let wrong = turncal(&["c.json", "--format", "matlab"], root.path()).code(2);
     let said = String::from_utf8(wrong.get_output().stderr.clone()).unwrap();
-    assert!(said.contains("octave"), "{said}");
+    assert!(said.contains("kf-gins"), "{said}");
     turncal(&["none.json", "--format", "c"], root.path()).code(1);
     let before = fs::read(&path).unwrap();
     turncal(

@@ -202,8 +202,9 @@ fn units_of_noise_are_read_as_data_sheets_and_programs_write_them() {
         (3.8, "mdps/rtHz", None, 6.63e-5, "rad/s/√Hz"),
     ] {
         let conversion = convert(value, unit, rate).unwrap_or_else(|error| panic!("{error}"));
-        let line = conversion.lines.iter().find(|(_, row)| row.unit == si);
-        let found = line.unwrap_or_else(|| panic!("no {si} of {unit}")).0;
+        let mut figures = conversion.figures.iter();
+        let figure = figures.find(|figure| figure.convention.unit == si);
+        let found = figure.unwrap_or_else(|| panic!("no {si} of {unit}")).value;
         assert!((found / expected - 1.0).abs() < 1e-3, "{unit}: {found}");
     }
 }

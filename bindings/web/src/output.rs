@@ -78,11 +78,7 @@ pub fn all(
     let about = "Values, σ and covariance, for turncal apply, export and certificate";
     let exported = |format: &export::Format| {
         let exported = export::write(calibration, format, Some(run)).ok()?;
-        let name = match format.name {
-            // Octave and MATLAB find a function by the name of its file.
-            "octave" => "turncal_calibrate.m".to_owned(),
-            name => format!("{log}-{name}.{}", format.extension),
-        };
+        let name = format!("{log}-{}.{}", format.name, format.extension);
         // Here the run is always there.
         let about = format.about.trim_end_matches("; needs --run");
         Some(Output::new(&name, about, exported.bytes))

@@ -6,53 +6,68 @@
 //!
 //! Source: gz-sensors, `GaussianNoiseModel.cc`; SDFormat 1.6 and later, `noise.sdf`.
 
-use super::Exported;
-use super::document::Document;
-use super::source::{Axes, Held, Source};
-use crate::imu::{PerSensor, Sensor};
+use super::affine::Affine;
+use super::remarks::{Exported, Remarks};
+use super::values::{Normalised, Values};
+use crate::imu::{AXES, PerSensor};
 
-pub fn write(source: &Source) -> Exported {
-    let axes = Axes::log(source);
-    let held = PerSensor::from_fn(|sensor| Held::offset(axes.triads.get(sensor).bias));
+pub fn write(values: &Values) -> Exported {
+    let PerSensor { gyro, accel } = &values.triads;
+    let program = PerSensor {
+        gyro: Affine::offset(gyro.bias),
+        accel: Affine::offset(accel.bias),
+    };
     let notes = [
         "the sign of the bias: Gazebo draws it at random for each axis, so half of the axes get the opposite sign",
     ];
     let reads = ("", "Gazebo writes rad/s and m/s^2, here");
-    let mut file = Document::correcting(source, &axes, reads, &held, &notes);
-    if source.run.is_none() {
-        file.comment("no noise: export with --run RUN.toml");
-    }
-    file.enclose("<!--", "-->");
-    file.line("<imu>");
-    for (name, sensor) in [
-        ("angular_velocity", Sensor::Gyro),
-        ("linear_acceleration", Sensor::Accel),
-    ] {
-        file.line(&format!("  <{name}>"));
-        let triad = axes.triads.get(sensor);
-        let sigma = source
-            .sigma(sensor)
-            .map(|sigma| sigma.bias)
-            .unwrap_or_default();
-        let stddev = source.run.zip(source.noise(sensor));
-        let stddev = stddev.map(|(run, noise)| noise.random_walk / run.recording.imu.period.sqrt());
-        for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
-            file.line(&format!("    <{letter}>\n      <noise type=\"gaussian\">"));
-            let mut set =
-                |key: &str, value: f64| file.line(&format!("        <{key}>{value:e}</{key}>"));
-            set("mean", 0.0);
-            set("stddev", stddev.unwrap_or(0.0));
-            set("bias_mean", triad.bias[axis]);
-            let of_record = axes.axis_of_record(axis);
-            set("bias_stddev", sigma[of_record] / triad.nominal[axis].abs());
-            if let Some(bias) = source.varying(sensor) {
-                set("dynamic_bias_stddev", bias.walk());
-                set("dynamic_bias_correlation_time", bias.correlation_time);
-            }
-            file.line(&format!("      </noise>\n    </{letter}>"));
+    let no_noise = values.period.is_none();
+    let no_noise = no_noise.then(|| "no noise: export with --run RUN.toml".to_owned());
+    let remarks = Remarks::of_program(values, reads, &program, &notes).defines(no_noise);
+    let text = format!(
+        "\
+<!--
+{}-->
+<imu>
+  <angular_velocity>
+{}  </angular_velocity>
+  <linear_acceleration>
+{}  </linear_acceleration>
+</imu>
+",
+        remarks.text().replace("--", "- -"),
+        axes(gyro, values.period),
+        axes(accel, values.period),
+    );
+    remarks.of_file(text.into_bytes())
+}
+
+fn axes(triad: &Normalised, period: Option<f64>) -> String {
+    let stddev = triad
+        .density()
+        .zip(period)
+        .map(|(density, period)| density / period.sqrt());
+    let axis = |k: usize| {
+        let mut all = vec![
+            ("mean", 0.0),
+            ("stddev", stddev.unwrap_or(0.0)),
+            ("bias_mean", triad.bias[k]),
+            (
+                "bias_stddev",
+                triad.bias_sigma.map_or(0.0, |sigma| sigma[k]),
+            ),
+        ];
+        if let Some(bias) = triad.varying() {
+            all.push(("dynamic_bias_stddev", bias.walk()));
+            all.push(("dynamic_bias_correlation_time", bias.correlation_time));
         }
-        file.line(&format!("  </{name}>"));
-    }
-    file.line("</imu>");
-    file.finish()
+        let lines = all
+            .iter()
+            .map(|(key, value)| format!("        <{key}>{value:e}</{key}>\n"));
+        let (lines, axis) = (lines.collect::<String>(), AXES[k]);
+        format!(
+            "    <{axis}>\n      <noise type=\"gaussian\">\n{lines}      </noise>\n    </{axis}>\n"
+        )
+    };
+    [0, 1, 2].map(axis).concat()
 }

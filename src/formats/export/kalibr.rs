@@ -1,159 +1,224 @@
-//! IMU intrinsics for Kalibr, model `scale-misalignment`, and for OpenVINS.
+//! IMU intrinsics for Kalibr, model `scale-misalignment`, for OpenVINS and for iKalibr.
 //!
-//! From true to measured, in rad/s and m/s²: `a = M_a C_i_b f + b_a`,
-//! `ω = M_g C_gyro_i C_i_b ω_b + A C_gyro_i C_i_b f + b_g`, with both `M` lower triangular and both `C` rotations. `C_i_b`, in `T_i_b`, rotates the body frame of the
-//! calibration into the accelerometer axes, so K and E are represented completely.
-//!
-//! Source: Rehder et al., "Extending kalibr: calibrating the extrinsics of multiple IMUs and of
-//! individual axes", ICRA 2016; the keys are those of Kalibr's IMU chain files.
+//! Source: Rehder et al., "Extending kalibr: calibrating the extrinsics of multiple IMUs and of individual axes", ICRA
+//! 2016; OpenVINS, `VioManagerOptions::print_and_load_state` and `Propagator::predict_and_compute`; iKalibr,
+//! `include/sensor/imu_intrinsic.hpp` and `config/imu-intri.yaml`.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 
-use super::Exported;
-use super::document::{Document, SIGMA, yaml_list, yaml_number};
-use super::source::{Axes, Source, upper};
+use super::notation::{list, number, rows};
+use super::remarks::{Exported, Remarks, SIGMA};
+use super::values::Values;
 use crate::calibration::result::frame::accelerometer_frame;
-use crate::imu::{PerSensor, Sensor, Term};
+use crate::imu::{AXES, PerSensor, Sensor, Term};
 use crate::units::ARCSEC;
 
 /// Quantities that Kalibr and OpenVINS estimate themselves.
 const BIASES: &str =
     "biases, which it estimates itself, so they leave no error; a comment lists them";
 
-fn begin(source: &Source) -> Document {
-    Document::holding(source, "#", [BIASES, SIGMA], |term| {
-        term == Term::GSensitivity
-    })
+/// From true to measured, in rad/s and m/s²: `a = M_a C_i_b f + b_a`,
+/// `ω = M_g C_gyro_i C_i_b ω_b + A C_gyro_i C_i_b f + b_g`, with both `M` lower triangular and both `C` rotations.
+/// `C_i_b`, in `T_i_b`, rotates the body frame of the calibration into the accelerometer axes, so K and E are
+/// represented completely.
+pub fn kalibr(values: &Values) -> Exported {
+    let PerSensor { gyro, accel } = &values.triads;
+    let (m_accel, imu_b) = lower(&accel.sensitivity);
+    let (m_gyro, gyro_imu) = lower(&(gyro.sensitivity * imu_b.transpose()));
+    let of_force = gyro.sensitivity * values.g_sensitivity * (gyro_imu * imu_b).transpose();
+    let remarks = with_biases(values, "Kalibr");
+    let text = format!(
+        "\
+# measured = M C_i_b f + bias
+# measured = M C_gyro_i C_i_b w + A C_gyro_i C_i_b f + bias
+# T_i_b rotates the body frame above into the accelerometer axes, {:.1} arcsec away; a program that assumes the \
+identity gets u along those axes
+{}imu0:
+  model: scale-misalignment
+  T_i_b:{}
+  time_offset: 0.0
+  gyroscopes:
+    M:{}
+    A:{}
+    C_gyro_i:{}
+  accelerometers:
+    M:{}
+{}",
+        crate::attitude::log(&imu_b).norm() / ARCSEC,
+        biases(values),
+        rows(2, &imu_b.to_homogeneous()),
+        rows(4, &m_gyro),
+        rows(4, &of_force),
+        rows(4, &gyro_imu),
+        rows(4, &m_accel),
+        noise(values)
+    );
+    remarks.above(&text)
 }
 
-fn biases(file: &mut Document, axes: &Axes) {
-    for (name, sensor) in [
-        ("gyroscopes", Sensor::Gyro),
-        ("accelerometers", Sensor::Accel),
-    ] {
-        let bias = yaml_list(&axes.triads.get(sensor).bias);
-        file.comment(&format!("bias of {name}: {bias}"));
-    }
+fn with_biases<'a>(values: &'a Values, program: &str) -> Remarks<'a> {
+    Remarks::new(values, "#", &[BIASES, SIGMA])
+        .including(|term| term == Term::GSensitivity)
+        .reads(&format!("{program} reads rad/s and m/s^2, here"))
 }
 
-pub fn write(source: &Source) -> Exported {
-    let axes = Axes::right_front_up(source);
-    let triads = &axes.triads;
-    let imu_b = accelerometer_frame(&triads.accel.sensitivity);
-    let gyro = triads.gyro.sensitivity * imu_b.transpose();
-    let gyro_imu = accelerometer_frame(&gyro);
-    let matrices = PerSensor {
-        gyro: lower(gyro * gyro_imu.transpose()),
-        accel: lower(triads.accel.sensitivity * imu_b.transpose()),
+fn biases(values: &Values) -> String {
+    let [gyro, accel] = Sensor::ALL.map(|sensor| list(&values.triads.get(sensor).bias));
+    format!("# bias of gyroscopes: {gyro}\n# bias of accelerometers: {accel}\n")
+}
+
+fn noise(values: &Values) -> String {
+    let key = |name: &str, value: Option<f64>, unit: &str| match value {
+        Some(value) => format!("  {name}: {}  # {unit}\n", number(value)),
+        None => format!("  # {name}:   # {unit}: {}\n", values.no_noise()),
     };
-    let of_force = triads.gyro.sensitivity * axes.g_sensitivity * (gyro_imu * imu_b).transpose();
-    let mut file = begin(source);
-    axes.introduce(&mut file, "Kalibr reads rad/s and m/s^2, here");
-    file.comment("measured = M C_i_b f + bias");
-    file.comment("measured = M C_gyro_i C_i_b w + A C_gyro_i C_i_b f + bias");
-    let turned = crate::attitude::log(&imu_b).norm() / ARCSEC;
-    file.comment(&format!(
-        "T_i_b rotates the body frame above into the accelerometer axes, {turned:.1} arcsec away; a program that \
-         assumes the identity gets u along those axes"
-    ));
-    biases(&mut file, &axes);
-    file.line("imu0:\n  model: scale-misalignment\n  T_i_b:");
-    for row in imu_b.to_homogeneous().row_iter() {
-        file.line(&format!("  - {}", yaml_list(row.iter())));
-    }
-    file.line("  time_offset: 0.0\n  gyroscopes:");
-    matrix(&mut file, "    M", &matrices.gyro);
-    matrix(&mut file, "    A", &of_force);
-    matrix(&mut file, "    C_gyro_i", &gyro_imu);
-    file.line("  accelerometers:");
-    matrix(&mut file, "    M", &matrices.accel);
-    noise(&mut file, source);
-    file.finish()
-}
-
-/// Tolerance for rounding above the diagonal.
-fn lower(mut matrix: Matrix3<f64>) -> Matrix3<f64> {
-    matrix.fill_upper_triangle(0.0, 1);
-    matrix
-}
-
-/// A matrix row by row below its indented name.
-fn matrix(file: &mut Document, name: &str, matrix: &Matrix3<f64>) {
-    let indent = " ".repeat(name.len() - name.trim_start().len());
-    file.line(&format!("{name}:"));
-    for row in matrix.row_iter() {
-        file.line(&format!("{indent}- {}", yaml_list(row.iter())));
-    }
-}
-
-fn noise(file: &mut Document, source: &Source) {
-    let missing = source.no_noise();
-    let mut key = |name: &str, value: Option<f64>, unit: &str| match value {
-        Some(value) => file.line(&format!("  {name}: {}  # {unit}", yaml_number(value))),
-        None => file.line(&format!("  # {name}:   # {unit}: {missing}")),
-    };
-    for (name, sensor, unit) in [
-        ("gyroscope", Sensor::Gyro, "rad/s"),
-        ("accelerometer", Sensor::Accel, "m/s^2"),
-    ] {
-        let walk = source.varying(sensor).map(|bias| bias.walk());
-        let density = source.noise(sensor).map(|noise| noise.random_walk);
+    let triad = |sensor, name: &str| {
+        let (triad, unit) = (values.triads.get(sensor), Values::input(sensor));
+        let walk = triad.varying().map(|bias| bias.walk());
         key(
             &format!("{name}_noise_density"),
-            density,
+            triad.density(),
             &format!("{unit}/sqrt(Hz)"),
-        );
-        key(
+        ) + &key(
             &format!("{name}_random_walk"),
             walk,
             &format!("{unit}/s/sqrt(Hz)"),
-        );
-    }
-    let rate = source.run.map(|run| run.recording.imu.period.recip());
-    key("update_rate", rate, "Hz");
-    file.line("  # rostopic: /imu0  # the topic of your recording");
+        )
+    };
+    triad(Sensor::Gyro, "gyroscope")
+        + &triad(Sensor::Accel, "accelerometer")
+        + &key("update_rate", values.period.map(f64::recip), "Hz")
+        + "  # rostopic: /imu0  # the topic of your recording\n"
 }
 
-/// A triangle and the rotation before it.
+/// A triangle and the rotation before it: `A = triangle · rotation`.
 type Split = (Matrix3<f64>, Matrix3<f64>);
 
-pub fn open_vins_kalibr(source: &Source) -> Exported {
-    open_vins(source, "kalibr", |a| {
-        let rotation = accelerometer_frame(a);
-        (lower(a * rotation.transpose()), rotation)
-    })
+/// With a lower triangle of positive diagonal.
+fn lower(a: &Matrix3<f64>) -> Split {
+    let rotation = accelerometer_frame(a);
+    let mut lower = a * rotation.transpose();
+    // Above the diagonal there is only rounding.
+    lower.fill_upper_triangle(0.0, 1);
+    (lower, rotation)
 }
 
-pub fn open_vins_rpng(source: &Source) -> Exported {
-    open_vins(source, "rpng", upper)
+/// With an upper triangle of positive diagonal.
+fn upper(a: &Matrix3<f64>) -> Split {
+    let reverse = Matrix3::new(0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0);
+    let rotation = reverse * accelerometer_frame(&(reverse * a * reverse)) * reverse;
+    let mut upper = a * rotation.transpose();
+    upper.fill_lower_triangle(0.0, 1);
+    (upper, rotation)
 }
 
-/// IMU intrinsics for OpenVINS, models `kalibr` and `rpng`.
-///
+pub fn open_vins_kalibr(values: &Values) -> Exported {
+    open_vins(values, "kalibr", lower)
+}
+
+pub fn open_vins_rpng(values: &Values) -> Exported {
+    open_vins(values, "rpng", upper)
+}
+
 /// From measured to true, in rad/s and m/s²: `a = R_IMUtoACCᵀ Ta⁻¹ (a_m − b_a)`,
 /// `ω = R_IMUtoGYROᵀ Tw⁻¹ (ω_m − Tg a − b_g)`, with `Ta`, `Tw` lower triangular (`kalibr`) or upper (`rpng`): only
 /// that triangle of their inverses is read. `Tg` acts on the corrected a along the IMU's axes, so it is what Kalibr
 /// calls `A C_gyro_i`; the comment in OpenVINS' example files says otherwise.
-///
-/// Source: OpenVINS, `VioManagerOptions::print_and_load_state` and `Propagator::predict_and_compute`.
-fn open_vins(source: &Source, name: &str, split: fn(&Matrix3<f64>) -> Split) -> Exported {
-    let axes = Axes::log(source);
-    let parts = PerSensor::from_fn(|sensor| split(&axes.triads.get(sensor).sensitivity));
-    let of_force = axes.triads.gyro.sensitivity * axes.g_sensitivity;
-    let mut file = begin(source);
-    file.begin("%YAML:1.0");
-    axes.introduce(&mut file, "OpenVINS reads rad/s and m/s^2, here");
-    file.comment(&format!(
-        "set imu_intrinsics_model: \"{name}\" in its estimator_config.yaml"
-    ));
-    biases(&mut file, &axes);
-    file.line("imu0:");
-    matrix(&mut file, "  Tw", &parts.gyro.0);
-    matrix(&mut file, "  R_IMUtoGYRO", &parts.gyro.1);
-    matrix(&mut file, "  Ta", &parts.accel.0);
-    matrix(&mut file, "  R_IMUtoACC", &parts.accel.1);
-    matrix(&mut file, "  Tg", &of_force);
-    file.line("  time_offset: 0.0");
-    noise(&mut file, source);
-    file.finish()
+fn open_vins(values: &Values, model: &str, split: fn(&Matrix3<f64>) -> Split) -> Exported {
+    let gyro = &values.triads.gyro.sensitivity;
+    let ((tw, imu_to_gyro), (ta, imu_to_acc)) =
+        (split(gyro), split(&values.triads.accel.sensitivity));
+    let remarks = with_biases(values, "OpenVINS");
+    let text = format!(
+        "\
+%YAML:1.0
+{}# set imu_intrinsics_model: \"{model}\" in its estimator_config.yaml
+{}imu0:
+  Tw:{}
+  R_IMUtoGYRO:{}
+  Ta:{}
+  R_IMUtoACC:{}
+  Tg:{}
+  time_offset: 0.0
+{}",
+        remarks.text(),
+        biases(values),
+        rows(2, &tw),
+        rows(2, &imu_to_gyro),
+        rows(2, &ta),
+        rows(2, &imu_to_acc),
+        rows(2, &(gyro * values.g_sensitivity)),
+        noise(values)
+    );
+    remarks.of_file(text.into_bytes())
+}
+
+/// From true to measured: `f_m = MAP_a f + BIAS_a`, `ω_m = MAP_g (SO3_AtoG ω) + BIAS_g`, both maps upper triangular
+/// with the coefficients (00, 11, 22, 01, 02, 12). The body frame is that of the accelerometer map.
+pub fn ikalibr(values: &Values) -> Exported {
+    let PerSensor { gyro, accel } = &values.triads;
+    let (accel_map, own) = upper(&accel.sensitivity);
+    let (gyro_map, of_gyro) = upper(&gyro.sensitivity);
+    let accel_to_gyro = Rotation3::from_matrix_unchecked(of_gyro * own.transpose());
+    let turn = crate::attitude::log(&own).norm() / ARCSEC;
+    let frame = format!(
+        "the body frame: its frame differs from that of the calibration by {turn:.1} arcsec (the rotation below)"
+    );
+    let axis = |k: usize| {
+        let row = list(own.row(k).iter());
+        format!("its {} axis along the body axes: {row}", AXES[k])
+    };
+    let remarks = Remarks::new(values, "#", &[&frame, SIGMA])
+        .reads("iKalibr reads rad/s and m/s^2, here")
+        .defines([0, 1, 2].map(axis));
+    let column = |values: &[f64]| -> String {
+        let rows = values.iter().enumerate();
+        rows.map(|(k, &value)| format!("\n          r{k}c0: {}", number(value)))
+            .collect()
+    };
+    let coefficients = |map: &Matrix3<f64>| {
+        column(&[(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].map(|at| map[at]))
+    };
+    let q = UnitQuaternion::from_rotation_matrix(&accel_to_gyro);
+    let [x, y, z, w] = [q.i, q.j, q.k, q.w].map(number);
+    // The id is that of the pointer through which iKalibr reads them.
+    let text = format!(
+        "\
+Intrinsics:
+  ptr_wrapper:
+    id: 2147483649
+    data:
+      ACCE:
+        BIAS:{}
+        MAP_COEFF:{}
+      GYRO:
+        BIAS:{}
+        MAP_COEFF:{}
+      SO3_AtoG:
+        qx: {x}
+        qy: {y}
+        qz: {z}
+        qw: {w}
+",
+        column(accel.bias.as_slice()),
+        coefficients(&accel_map),
+        column(gyro.bias.as_slice()),
+        coefficients(&gyro_map),
+    );
+    remarks.above(&text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_matrix_is_its_upper_triangle_times_a_rotation() {
+        let a = Matrix3::new(1.1, 0.2, -0.3, 0.1, 0.9, 0.05, -0.2, 0.3, 1.2);
+        let (u, r) = upper(&a);
+        assert!((u * r - a).amax() < 1e-14);
+        assert!((r * r.transpose() - Matrix3::identity()).amax() < 1e-14);
+        assert!(r.determinant() > 0.0 && u.diagonal().min() > 0.0);
+        assert_eq!([u[(1, 0)], u[(2, 0)], u[(2, 1)]], [0.0; 3]);
+    }
 }

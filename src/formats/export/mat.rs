@@ -4,8 +4,8 @@
 
 use nalgebra::Matrix3;
 
-use super::Exported;
-use super::source::Source;
+use super::remarks::{Exported, Remarks, about};
+use super::values::Values;
 use crate::calibration::result::{EQUATION, TriadRecord};
 use crate::imu::Sensor;
 
@@ -22,28 +22,27 @@ const NUMBERS: u32 = 6;
 /// Longest field name, with its terminator.
 const NAME: usize = 32;
 
-pub fn write(source: &Source) -> Exported {
-    let terms = source.terms_note(|_| false);
+pub fn write(values: &Values) -> Exported {
     let mut fields = vec![
         ("equation", text("", EQUATION)),
         ("axes", text("", "right, front, up")),
-        ("about", text("", &source.about().join("; "))),
+        ("about", text("", &about(values).join("; "))),
     ];
     for sensor in Sensor::ALL {
-        let mut of_triad = triad(source.record.triad(sensor));
-        let matrix = source.correction.matrix.get(sensor);
+        let mut of_triad = triad(values.record.triad(sensor));
+        let matrix = values.correction.matrix.get(sensor);
         of_triad.push(("correction", numbers("", 3, matrix.as_slice())));
-        of_triad.push(("unit", text("", &source.unit(sensor))));
-        if let Some(sigma) = source.sigma(sensor) {
+        of_triad.push(("unit", text("", &values.unit(sensor))));
+        if let Some(sigma) = values.sigma(sensor) {
             of_triad.push(("sigma", structure("", &triad(sigma))));
         }
         fields.push((sensor.name(), structure("", &of_triad)));
     }
-    let size = source.record.covariance.len();
-    let covariance: Vec<f64> = source.record.covariance.iter().flatten().copied().collect();
     // It is symmetric, so rows are columns.
+    let covariance = values.record.covariance.concat();
+    let size = values.record.covariance.len();
     fields.push(("covariance", numbers("", size, &covariance)));
-    fields.push(("parameters", text("", &source.record.parameters.join(" "))));
+    fields.push(("parameters", text("", &values.record.parameters.join(" "))));
     let mut file = vec![b' '; 124];
     let title = b"MATLAB 5.0 MAT-file, a calibration by turncal";
     file[..title.len()].copy_from_slice(title);
@@ -51,10 +50,7 @@ pub fn write(source: &Source) -> Exported {
     file[116..124].fill(0);
     file.extend([0x00, 0x01, b'I', b'M']);
     file.extend(structure("turncal", &fields));
-    Exported {
-        bytes: file,
-        notes: terms.into_iter().collect(),
-    }
+    Remarks::new(values, "", &[]).of_file(file)
 }
 
 fn triad(record: &TriadRecord) -> Vec<(&'static str, Vec<u8>)> {

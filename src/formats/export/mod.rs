@@ -2,27 +2,29 @@
 //!
 //! Every format defines `N` and `u` in comments and names its omissions.
 
+mod affine;
 mod autopilot;
-mod cameras;
 mod code;
-mod document;
+mod devices;
 mod gazebo;
-mod ikalibr;
 mod kalibr;
 mod kf_gins;
 mod mat;
+mod notation;
+mod remarks;
 mod ros;
 mod samples;
-mod slimevr;
-mod source;
 mod text;
+mod values;
 
+pub use remarks::Exported;
 pub use samples::{HEADER, sample_rows, write_samples};
 
 use crate::calibration::CorrectionError;
 use crate::calibration::result::Calibration;
 use crate::run::Run;
-use source::Source;
+use values::Axes::{self, FrontRightDown, Log, RightFrontUp};
+use values::Values;
 
 /// A format of a calibration.
 #[derive(Debug, Clone, Copy)]
@@ -33,51 +35,56 @@ pub struct Format {
     pub extension: &'static str,
     /// Programs that read it.
     pub about: &'static str,
-    write: fn(&Source) -> Exported,
-    /// Whether it represents temperature dependence, or states its omission.
-    holds_temperature: bool,
+    axes: Axes,
+    write: fn(&Values) -> Exported,
+    /// Temperature dependence that the format omits; `None` for a calibration at one temperature.
+    of_temperature: Option<&'static str>,
 }
 
 const fn row(
     name: &'static str,
     extension: &'static str,
     about: &'static str,
-    write: fn(&Source) -> Exported,
+    axes: Axes,
+    write: fn(&Values) -> Exported,
 ) -> Format {
     Format {
         name,
         extension,
         about,
+        axes,
         write,
-        holds_temperature: false,
+        of_temperature: None,
     }
 }
 
+/// Temperature dependence that autopilots cannot represent.
+const IN_AUTOPILOTS: &str = "change of scale factors and misalignments with temperature, change of biases with \
+    temperature rate, and orders above three; biases refer to the temperature of the sensor";
+
 /// Every format.
 #[rustfmt::skip]
-static FORMATS: [Format; 20] = [
-    row("kalibr", "yaml", "IMU intrinsics for Kalibr, model scale-misalignment", kalibr::write),
-    row("kf-gins", "yaml", "IMU section of a KF-GINS configuration", kf_gins::write),
-    row("c", "h", "A C99 header with constants and a function", code::c).with_temperature(),
-    row("octave", "m", "An Octave or MATLAB function file", code::octave),
-    row("text", "txt", "All values with name, σ and unit", text::write),
-    row("px4", "params", "PX4 parameters: CAL_GYRO0, CAL_ACC0", autopilot::px4).with_temperature(),
-    row("ardupilot", "param", "ArduPilot parameters: INS_GYROFFS, INS_ACCOFFS, INS_ACCSCAL", autopilot::ardupilot)
-        .with_temperature(),
-    row("open-vins-kalibr", "yaml", "IMU intrinsics for OpenVINS, model kalibr", kalibr::open_vins_kalibr),
-    row("open-vins-rpng", "yaml", "IMU intrinsics for OpenVINS, model rpng", kalibr::open_vins_rpng),
-    row("ikalibr", "yaml", "IMU intrinsics for iKalibr", ikalibr::write),
-    row("imu-calib", "yaml", "Accelerometer calibration for the ROS package imu_calib", ros::imu_calib),
-    row("ros-covariance", "yaml", "Covariances for ROS sensor_msgs/Imu, from the noise of a run", ros::covariance),
-    row("dlio", "yaml", "IMU intrinsics for DLIO (direct LiDAR-inertial odometry)", ros::dlio),
-    row("gazebo", "sdf", "IMU noise for Gazebo", gazebo::write),
-    row("mat", "mat", "A MATLAB structure (MAT file)", mat::write),
-    row("betaflight", "txt", "Accelerometer zeros for Betaflight", autopilot::betaflight),
-    row("inav", "txt", "Zeros and gains for INAV", autopilot::inav),
-    row("realsense", "bin", "IMU calibration table of a RealSense D400 camera, as written by rs-imu-calibration",
-        cameras::realsense),
-    row("depthai", "json", "IMU calibration for a DepthAI (OAK) camera, JSON", cameras::depthai),
-    row("slimevr", "h", "Calibration for a SlimeVR tracker", slimevr::write),
+static FORMATS: [Format; 17] = [
+    row("kalibr", "yaml", "IMU intrinsics for Kalibr, model scale-misalignment", RightFrontUp, kalibr::kalibr),
+    row("kf-gins", "yaml", "IMU section of a KF-GINS configuration", FrontRightDown, kf_gins::write),
+    row("c", "h", "A C99 header with constants and a function", RightFrontUp, code::write).with_temperature(""),
+    row("text", "txt", "All values with name, σ and unit", RightFrontUp, text::write),
+    row("px4", "params", "PX4 parameters: CAL_GYRO0, CAL_ACC0", FrontRightDown, autopilot::px4)
+        .with_temperature(IN_AUTOPILOTS),
+    row("ardupilot", "param", "ArduPilot parameters: INS_GYROFFS, INS_ACCOFFS, INS_ACCSCAL", FrontRightDown,
+        autopilot::ardupilot).with_temperature(IN_AUTOPILOTS),
+    row("open-vins-kalibr", "yaml", "IMU intrinsics for OpenVINS, model kalibr", Log, kalibr::open_vins_kalibr),
+    row("open-vins-rpng", "yaml", "IMU intrinsics for OpenVINS, model rpng", Log, kalibr::open_vins_rpng),
+    row("ikalibr", "yaml", "IMU intrinsics for iKalibr", Log, kalibr::ikalibr),
+    row("imu-calib", "yaml", "Accelerometer calibration for the ROS package imu_calib", Log, ros::imu_calib),
+    row("ros-covariance", "yaml", "Covariances for ROS sensor_msgs/Imu, from the noise of a run", Log, ros::covariance),
+    row("gazebo", "sdf", "IMU noise for Gazebo", Log, gazebo::write),
+    row("mat", "mat", "A MATLAB structure (MAT file)", RightFrontUp, mat::write),
+    row("betaflight", "txt", "Accelerometer zeros for Betaflight", Log, autopilot::betaflight),
+    row("inav", "txt", "Zeros and gains for INAV", Log, autopilot::inav),
+    row("realsense", "bin", "IMU calibration table of a RealSense D400 camera, as written by rs-imu-calibration", Log,
+        devices::realsense),
+    row("slimevr", "h", "Calibration for a SlimeVR tracker", Log, devices::slimevr),
 ];
 
 impl Format {
@@ -91,9 +98,9 @@ impl Format {
         FORMATS.iter().find(|format| format.name == name)
     }
 
-    const fn with_temperature(self) -> Self {
+    const fn with_temperature(self, omitted: &'static str) -> Self {
         Self {
-            holds_temperature: true,
+            of_temperature: Some(omitted),
             ..self
         }
     }
@@ -110,23 +117,6 @@ impl clap::ValueEnum for Format {
     }
 }
 
-/// A calibration in a format.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Exported {
-    /// The file.
-    pub bytes: Vec<u8>,
-    /// Omissions of the format, one sentence each, which are also in the file.
-    pub notes: Vec<String>,
-}
-
-impl Exported {
-    /// The same with further omissions.
-    fn without(mut self, note: impl Into<String>) -> Self {
-        self.notes.push(note.into());
-        self
-    }
-}
-
 /// Writes a calibration in a format. A run of the same instrument gives noise figures, sample rate and the nominal
 /// scales by which counts are divided, for formats in rad/s and m/s².
 ///
@@ -137,13 +127,19 @@ pub fn write(
     format: &Format,
     run: Option<&Run>,
 ) -> Result<Exported, CorrectionError> {
-    let exported = (format.write)(&Source::new(record, run)?);
-    Ok(match &record.temperature {
-        Some(thermal) if !format.holds_temperature => exported.without(format!(
-            "change with temperature; this is the calibration at {} °C (use --temperature-degc for another \
-             temperature)",
-            thermal.range.gyro.reference
-        )),
-        _ => exported,
-    })
+    let mut exported = (format.write)(&Values::new(record, run, format.axes)?);
+    if let Some(thermal) = &record.temperature {
+        let reference = thermal.range.gyro.reference;
+        let omitted = match format.of_temperature {
+            Some(omitted) => omitted.to_owned(),
+            None => format!(
+                "change with temperature; this is the calibration at {reference} °C (use --temperature-degc for \
+                 another temperature)"
+            ),
+        };
+        exported
+            .notes
+            .extend(Some(omitted).filter(|note| !note.is_empty()));
+    }
+    Ok(exported)
 }

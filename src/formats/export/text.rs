@@ -2,87 +2,96 @@
 
 use nalgebra::Vector3;
 
-use super::Exported;
-use super::document::{Document, TEST_VECTORS};
-use super::source::Source;
+use super::remarks::{Exported, Remarks, test_vectors};
+use super::values::Values;
 use crate::imu::{AXES, Sensor, Term};
+use crate::units::{DEG_PER_H, MICRO_G};
 
-pub fn write(source: &Source) -> Exported {
+pub fn write(values: &Values) -> Exported {
     let covariance = "covariance of the parameters; it is in calibration.json";
-    let mut file = Document::new(source, "#", [covariance]);
-    file.line(&format!(
+    let mut lines = vec![format!(
         "\n{:<26}{:>25}{:>12}  unit",
         "name", "value", "1 sigma"
-    ));
+    )];
     for sensor in Sensor::ALL {
-        triad(&mut file, source, sensor);
+        lines.extend(triad(values, sensor));
     }
-    for (name, term) in &source.record.terms {
+    for (name, term) in &values.record.terms {
         let of_term = Term::parameter_named(name).and_then(Term::of);
         // The others are the table's, all of them angles.
         let unit = of_term.map_or("rad", |term| term.entry().si_unit);
-        row(&mut file, name, term.value, term.sigma, unit);
+        lines.push(row(name, term.value, term.sigma, unit));
     }
     for sensor in Sensor::ALL {
-        let input = Source::input(sensor);
-        let matrix = source.correction.matrix.get(sensor);
-        for (i, j) in (0..9).map(|k| (k / 3, k % 3)) {
-            let name = format!("{}.correction.{}{}", sensor.name(), AXES[i], AXES[j]);
-            let unit = format!("{input} per {}", source.unit(sensor));
-            row(&mut file, &name, matrix[(i, j)], None, &unit);
-        }
+        let matrix = values.correction.matrix.get(sensor);
+        let unit = format!("{} per {}", Values::input(sensor), values.unit(sensor));
+        lines.extend(places().map(|(i, j, place)| {
+            let name = format!("{}.correction.{place}", sensor.name());
+            row(&name, matrix[(i, j)], None, &unit)
+        }));
     }
-    let vectors = source.test_vectors();
-    if !vectors.is_empty() {
-        file.line(&format!("\n{TEST_VECTORS}"));
-        vectors.iter().for_each(|line| file.line(line));
+    let mut vectors = test_vectors(values);
+    if let Some(title) = vectors.first_mut() {
+        title.insert(0, '\n');
     }
-    file.finish()
+    lines.extend(vectors);
+    Remarks::new(values, "#", &[covariance])
+        .including(|_| true)
+        .above(&(lines.join("\n") + "\n"))
 }
 
-fn triad(file: &mut Document, source: &Source, sensor: Sensor) {
-    let (values, sigma) = (source.record.triad(sensor), source.sigma(sensor));
-    let (name, unit) = (sensor.name(), source.unit(sensor));
-    let (input, in_words, factor) = sensor.pick(
-        ("rad/s", "deg/h", crate::units::DEG_PER_H),
-        ("m/s^2", "ug", crate::units::MICRO_G),
-    );
-    for (i, axis) in AXES.iter().enumerate() {
-        let sigma = sigma.map(|s| s.scale[i]);
-        let unit = format!("{unit} per {input}");
+/// Entries of a matrix, with their names.
+fn places() -> impl Iterator<Item = (usize, usize, String)> {
+    let places = (0..9).map(|k| (k / 3, k % 3));
+    places.map(|(i, j)| (i, j, format!("{}{}", AXES[i], AXES[j])))
+}
+
+fn triad(values: &Values, sensor: Sensor) -> Vec<String> {
+    let (of, sigma) = (values.record.triad(sensor), values.sigma(sensor));
+    let (name, unit) = (sensor.name(), values.unit(sensor));
+    let (in_words, factor) = sensor.pick(("deg/h", DEG_PER_H), ("ug", MICRO_G));
+    let in_input = Vector3::from(of.bias).component_div(&Vector3::from(of.scale)) / factor;
+    let scale = |k: usize| {
+        let unit = format!("{unit} per {}", Values::input(sensor));
+        let sigma = sigma.map(|sigma| sigma.scale[k]);
         row(
-            file,
-            &format!("{name}.scale.{axis}"),
-            values.scale[i],
+            &format!("{name}.scale.{}", AXES[k]),
+            of.scale[k],
             sigma,
             &unit,
-        );
-    }
-    for (i, j) in (0..9).map(|k| (k / 3, k % 3)) {
-        let name = format!("{name}.installation.{}{}", AXES[i], AXES[j]);
-        let sigma = sigma.map(|s| s.installation[i][j]).filter(|_| i != j);
-        row(file, &name, values.installation[i][j], sigma, "1");
-    }
-    let in_input = Vector3::from(values.bias).component_div(&Vector3::from(values.scale)) / factor;
-    for (i, axis) in AXES.iter().enumerate() {
-        let sigma = sigma.map(|s| s.bias[i]);
-        let unit = format!("{unit}, {:.6} {in_words}", in_input[i]);
+        )
+    };
+    let installation = |(i, j, place): (usize, usize, String)| {
+        let sigma = sigma
+            .map(|sigma| sigma.installation[i][j])
+            .filter(|_| i != j);
         row(
-            file,
-            &format!("{name}.bias.{axis}"),
-            values.bias[i],
+            &format!("{name}.installation.{place}"),
+            of.installation[i][j],
+            sigma,
+            "1",
+        )
+    };
+    let bias = |k: usize| {
+        let unit = format!("{unit}, {:.6} {in_words}", in_input[k]);
+        let sigma = sigma.map(|sigma| sigma.bias[k]);
+        row(
+            &format!("{name}.bias.{}", AXES[k]),
+            of.bias[k],
             sigma,
             &unit,
-        );
-    }
+        )
+    };
+    let rows = (0..3).map(scale).chain(places().map(installation));
+    rows.chain((0..3).map(bias)).collect()
 }
 
 /// A σ of zero means that the value was not estimated.
-fn row(file: &mut Document, name: &str, value: f64, sigma: Option<f64>, unit: &str) {
+fn row(name: &str, value: f64, sigma: Option<f64>, unit: &str) -> String {
     let sigma = match sigma {
         None => String::new(),
         Some(0.0) => "fixed".to_owned(),
         Some(sigma) => format!("{sigma:.2e}"),
     };
-    file.line(&format!("{name:<26}{value:>25e}{sigma:>12}  {unit}"));
+    format!("{name:<26}{value:>25e}{sigma:>12}  {unit}")
 }
