@@ -255,7 +255,7 @@ impl Convention {
 }
 
 /// The canonical spelling of a unit; seconds in the denominator are combined into one power.
-pub(crate) fn normalised(unit: &str) -> String {
+pub fn normalised(unit: &str) -> String {
     const SAME: &str = "µ=u μ=u °=deg º=deg ″=arcsec √=sqrt ²=2 ³=3 ⁵=5 ⁻=- ¹=1 –=- dps=deg/s";
     let text = unit.to_lowercase().replace(['^', '(', ')', ' '], "");
     let pairs = SAME.split(' ').filter_map(|pair| pair.split_once('='));

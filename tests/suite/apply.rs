@@ -8,12 +8,12 @@ use nalgebra::{Matrix3, Vector3};
 use turncal::calibration::result::Calibration;
 use turncal::calibration::result::{TermRecord, TriadRecord};
 use turncal::calibration::{Correction, CorrectionError, truth_record};
-use turncal::formats::export::HEADER;
 use turncal::imu::{Output, PerSensor, Sensor, Term, TermVector};
 use turncal::run::Run;
 use turncal::simulation::{Scenario, true_increments};
 use turncal::turntable::{Imperfection, Motion};
 use turncal::units::{DEGREE, STANDARD_GRAVITY};
+use turncal_files::export::HEADER;
 
 use crate::calibration_file::written;
 
@@ -275,7 +275,7 @@ fn the_calibrated_record_is_a_record_again() {
         .flatten()
         .fold(toml, |toml, (from, to)| toml.replace(from, to));
     fs::write(again.join("run.toml"), toml).unwrap();
-    let read = Run::read(&again.join("run.toml")).unwrap();
+    let read = turncal_files::read_run(&again.join("run.toml")).unwrap();
     let expected = by_hand(&record.gyro, [1.0, 2.0, 3.0]);
     assert!((read.recording.imu.gyro.at(50) / 0.01 - expected).amax() < 1e-12);
     assert_eq!(read.recording.imu.start(), 0.0);

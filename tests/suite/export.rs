@@ -8,10 +8,10 @@ use std::process;
 use assert_cmd::Command;
 use nalgebra::{Matrix3, Vector3};
 use turncal::calibration::result::{Calibration, TermRecord, TestVector, TriadRecord};
-use turncal::formats::export::{Format, write};
 use turncal::imu::{BodyFrame, GaussMarkov, Noise, Nominal, PerSensor};
 use turncal::run::Run;
 use turncal::units::{ARCSEC, DEG_PER_H};
+use turncal_files::export::{Format, write};
 
 use crate::calibration_file::written;
 use crate::door::made::made_run;
@@ -482,7 +482,7 @@ fn a_record_that_is_read_and_written_again_is_the_same_to_the_bit() {
     record.covariance = vec![vec![1.0 / 3.0]];
     record.warnings = vec!["line\nbreak \"quoted\" µ".to_owned()];
     let first = written(root.path(), "first.json", &record);
-    let read = Calibration::read(&first).unwrap();
+    let read = turncal_files::read_calibration(&first).unwrap();
     assert_eq!(read, record);
     let second = written(root.path(), "second.json", &read);
     assert_eq!(fs::read(&first).unwrap(), fs::read(&second).unwrap());

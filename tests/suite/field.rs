@@ -4,10 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
-use turncal::formats::Opened;
-use turncal::formats::draft::{Draft, Stated};
 use turncal::noise::conventions::convert;
 use turncal::run::Run;
+use turncal_files::Opened;
+use turncal_files::draft::{Draft, Stated};
 
 use crate::shared::shared;
 
@@ -291,7 +291,8 @@ fn a_fraction_of_a_second_that_lost_its_zeros_is_read_as_a_number() {
     let Some(log) = file("r06-razor9dof-unpadded-fraction", "razor.csv") else {
         return;
     };
-    let run = Run::read(&log.with_file_name("run.toml")).unwrap_or_else(|error| panic!("{error}"));
+    let run = turncal_files::read_run(&log.with_file_name("run.toml"))
+        .unwrap_or_else(|error| panic!("{error}"));
     assert!(
         (run.recording.imu.period / 0.0206 - 1.0).abs() < 5e-3,
         "{}",

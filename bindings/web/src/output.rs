@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 
 use turncal::calibration::Calibration;
 use turncal::calibration::result::InputFile;
-use turncal::formats::{DataFile, digest_of_bytes, export};
-use turncal::report::{self, Document};
 use turncal::run::Run;
+use turncal_files::{digest_of_bytes, export};
+use turncal_logs::DataFile;
+use turncal_report as report;
+use turncal_report::Document;
 use wasm_bindgen::prelude::*;
 
 /// A file to download.

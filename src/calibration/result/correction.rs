@@ -6,7 +6,9 @@ use nalgebra::{Matrix3, Vector3};
 use thiserror::Error;
 
 use crate::calibration::result::Calibration;
-use crate::imu::{AXES, PerSensor, Sensed, Sensor, TERM_PARAMETERS, Term, TermVector};
+use crate::imu::{
+    AXES, PerSensor, Sensed, Sensor, TERM_PARAMETERS, Term, TermVector, thermal_state,
+};
 use crate::recording::{Near, TEMPERATURE_SPACING};
 use crate::run::Run;
 
@@ -250,7 +252,9 @@ impl Correction {
             .and_then(|(record, temperature)| {
                 let thermal = record.temperature.as_ref()?;
                 let (t, rate) = (temperature.at(time), temperature.rate(time));
-                let there = record.in_state(&thermal.range.state(&t, &rate)).ok()?;
+                let there = record
+                    .in_state(&thermal_state(&thermal.range, &t, &rate))
+                    .ok()?;
                 Some((Self::of_record(&there).ok()?, thermal.holds(&t)))
             });
         known.unwrap_or_else(|| (self.clone(), false))
