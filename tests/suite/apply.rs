@@ -9,7 +9,6 @@ use turncal::calibration::result::Calibration;
 use turncal::calibration::result::{TermRecord, TriadRecord};
 use turncal::calibration::{Correction, CorrectionError, truth_record};
 use turncal::imu::{Output, PerSensor, Sensor, Term, TermVector};
-use turncal::run::Run;
 use turncal::simulation::{Scenario, true_increments};
 use turncal::turntable::{Imperfection, Motion};
 use turncal::units::{DEGREE, STANDARD_GRAVITY};

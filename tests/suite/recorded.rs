@@ -1,6 +1,5 @@
 //! Records that other programs made, with known truth.
 
-use turncal::calibration::result::Calibration;
 use turncal::calibration::{
     NoisePolicy, Options, Outcome, PARAMETERS, Problem, UNWATCHED, estimate, to_vector, triads_of,
 };

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix};
 use rayon::prelude::*;
-use turncal::calibration::result::{Calibration, EQUATION, EQUATION_WITH_TERMS};
+use turncal::calibration::result::{EQUATION, EQUATION_WITH_TERMS};
 use turncal::calibration::{
     ErrorTerm, NoisePolicy, Options, Outcome, Problem, UNWATCHED, estimate, mean_square_interval,
     to_vector,

@@ -4,7 +4,6 @@ use std::fs;
 
 use nalgebra::Vector3;
 use turncal::attitude;
-use turncal::calibration::result::Calibration;
 use turncal::imu::Output;
 use turncal::recording::LabelledMotion;
 use turncal::run::Run;

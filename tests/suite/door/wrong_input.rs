@@ -3,8 +3,6 @@
 use std::fs;
 use std::path::Path;
 
-use turncal::calibration::result::Calibration;
-use turncal::run::Run;
 
 const RUN: &str = r#"format = "turncal-run/1"
 [site]

@@ -6,7 +6,6 @@ use std::process::Command;
 
 use turncal::calibration::result::Calibration;
 use turncal::imu::Sensor;
-use turncal::run::Run;
 
 use crate::shared::{read, shared, skipped};
 

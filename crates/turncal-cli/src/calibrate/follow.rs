@@ -12,7 +12,6 @@ use crate::arguments::OfLog;
 use crate::terminal::{end_gently, is_ended};
 use turncal::calibration::Options;
 use turncal::lot::Specification;
-use turncal::run::Run;
 use turncal::survey::{Evaluator, GROWTH};
 use turncal_files::Opened;
 

@@ -12,7 +12,6 @@ use turncal::calibration::{Calibration, UNWATCHED, Word};
 use turncal::lot::{Lot, Unit};
 use turncal::models;
 use turncal::noise::RestNoise;
-use turncal::run::Run;
 use turncal::study::CheckedCalibration;
 use turncal_files::{Job, JobKind, LotDirectory, Part, is_toml, record_inputs, unit_key};
 use turncal_input::FileError;

@@ -21,7 +21,7 @@ use clap::error::ErrorKind;
 use crate::arguments::{Estimation, OfLog, Overwrite, run_file, run_or_log, seconds, shard};
 use crate::terminal::{Activity, print, show, show_brief};
 use turncal::calibration::{
-    AtRest, Calibration, Method, Problem, Solution, Together, Word, in_body_frame, triads_of,
+    AtRest, Method, Problem, Solution, Together, Word, in_body_frame, triads_of,
 };
 use turncal::imu::{BodyFrame, InstallationForm};
 use turncal::models;

@@ -7,7 +7,6 @@ use anyhow::Context;
 use crate::NotMet;
 use crate::arguments::Overwrite;
 use crate::terminal::print;
-use turncal::calibration::result::Calibration;
 use turncal::models;
 use turncal_files::{digest_of_bytes, read_laboratory};
 use turncal_input::small_file;

@@ -7,7 +7,6 @@ use anyhow::Context;
 
 use crate::arguments::{at_temperature, keep, run_file};
 use crate::terminal::print;
-use turncal::run::Run;
 use turncal_files::export;
 use turncal_files::write_whole;
 

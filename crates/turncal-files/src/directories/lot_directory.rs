@@ -11,7 +11,6 @@ use serde::{Deserialize, Serialize};
 use super::digest::{digest_of, digest_of_bytes, input_digests};
 use super::job::{JOB_FILE, Part};
 use super::whole::{WholeDirectory, clear_abandoned, list_anew, write_whole};
-use turncal::calibration::result::Calibration;
 use turncal::lot::{Calibrated, Unit};
 use turncal::noise::RestNoise;
 use turncal_input::FileError;

@@ -65,7 +65,7 @@ pub fn write_run(
     }
     if let Some(truth) = truth {
         let path = directory.join("truth.json");
-        let bytes = calibration_json(&truth, &path)?;
+        let bytes = calibration_json(truth, &path)?;
         write("truth.json", &|file| file.write_all(&bytes))?;
     }
     Ok(())
