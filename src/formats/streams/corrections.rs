@@ -118,7 +118,11 @@ impl Undo {
     pub fn remarks(&self) -> Vec<String> {
         let of_triad = |&sensor: &Sensor| {
             let done = self.done.get(sensor);
-            let part = if done.len() > 1 { "For part of the samples: " } else { "" };
+            let part = if done.len() > 1 {
+                "For part of the samples: "
+            } else {
+                ""
+            };
             done.iter().map(move |words| format!("{part}{words}"))
         };
         Sensor::ALL.iter().flat_map(of_triad).collect()

@@ -18,7 +18,6 @@ use super::bytes::{Broken, Input};
 use super::part::{Packing, Part, Shared, pass};
 use header::Header;
 
-
 pub fn open_array(input: Input) -> Result<Box<dyn Log>, Broken> {
     let size = input.left();
     let member = Member {
