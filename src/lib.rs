@@ -55,12 +55,7 @@
 
 pub mod attitude;
 pub mod calibration;
-#[cfg(feature = "certificate")]
-pub mod certificate;
-#[cfg(feature = "cli")]
-mod cli;
 pub mod earth;
-pub mod formats;
 pub mod imu;
 pub mod laboratory;
 pub mod lot;
@@ -69,17 +64,11 @@ pub mod navigation;
 pub mod noise;
 pub mod number;
 pub mod recording;
-#[cfg(feature = "report")]
-pub mod report;
 pub mod run;
 pub mod simulation;
-pub(crate) mod small_file;
-pub(crate) mod statistics;
+pub mod statistics;
 pub mod study;
 pub mod survey;
 pub mod turntable;
-pub mod units;
 
-#[cfg(feature = "cli")]
-#[doc(hidden)]
-pub use cli::command;
+pub use turncal_input::units;

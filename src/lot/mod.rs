@@ -7,9 +7,10 @@ mod joint;
 mod limits;
 mod quantity;
 mod scatter;
+mod specification;
 mod statistics;
 #[cfg(test)]
-pub(crate) mod tests;
+pub mod tests;
 mod unit;
 
 use nalgebra::{DMatrix, DVector, Vector3};

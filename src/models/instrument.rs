@@ -9,11 +9,11 @@ use std::collections::BTreeMap;
 use super::terms::{TermFile, term_sigma};
 use super::thermal::{ThermalFile, ThermalVariation, thermal_variation};
 use super::{ModelError, Place, Room, text};
-use crate::formats::{Finite, NonNegative, Positive};
 use crate::imu::{
     ANGLES, GaussMarkov, InstallationForm, Noise, PerSensor, Prior, Sensor, TermVector,
 };
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, PPM};
+use turncal_input::{Finite, NonNegative, Positive};
 
 /// A grade of instrument.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -4,12 +4,11 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::formats::{Document, FileError, Positive};
 use crate::imu::{Term, TermVector};
+use turncal_input::{Document, FileError, Positive};
 
 /// 1σ of each parameter of an error term, around zero.
-#[derive(Clone, Copy, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
+#[derive(Clone, Copy, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TermFile {
     /// 1σ of each parameter of the error term, around zero
@@ -17,7 +16,7 @@ pub struct TermFile {
 }
 
 /// 1σ of the parameters of enabled error terms, in SI; zero for the others.
-pub(crate) fn term_sigma(
+pub fn term_sigma(
     document: Document,
     table: &str,
     terms: &BTreeMap<String, TermFile>,

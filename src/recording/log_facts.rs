@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use crate::formats::FileColumn;
 use crate::imu::{AxisOrder, Output, PerSensor, Sensor};
+use turncal_input::FileColumn;
 
 /// Statistics of the instrument's file, in its own units.
 #[derive(Debug, Clone, PartialEq)]
@@ -119,7 +119,7 @@ pub struct TemperatureFacts {
 
 impl ColumnFacts {
     /// Statistics of a column that is not empty.
-    pub(crate) fn of(name: &str, values: &[f64], unit: f64) -> Self {
+    pub fn of(name: &str, values: &[f64], unit: f64) -> Self {
         let ends = (f64::INFINITY, f64::NEG_INFINITY);
         let ends = values
             .iter()
@@ -144,7 +144,7 @@ impl ColumnFacts {
 
 impl ColumnFacts {
     /// Combines the statistics with those of the rows that follow.
-    pub(crate) fn and(self, later: &Self) -> Self {
+    pub fn and(self, later: &Self) -> Self {
         let smallest = self.smallest.min(later.smallest);
         let largest = self.largest.max(later.largest);
         let count = |of: [(f64, usize); 2], end: f64| {

@@ -129,7 +129,7 @@ impl ImuSamples {
     }
 
     /// Samples of rates with another period, of this relative 1σ.
-    pub(crate) fn with_period(mut self, period: f64, sigma: f64) -> Self {
+    pub fn with_period(mut self, period: f64, sigma: f64) -> Self {
         let longer = period / self.period;
         for triad in [&mut self.gyro, &mut self.accel] {
             triad
@@ -148,7 +148,7 @@ impl ImuSamples {
     }
 
     /// Simulated samples, which need no checks.
-    pub(crate) fn made(
+    pub fn made(
         start: f64,
         period: f64,
         gyro: impl Into<Series>,

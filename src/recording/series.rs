@@ -8,7 +8,7 @@ use std::ops::Range;
 use nalgebra::Vector3;
 
 use packed::Packed;
-pub(crate) use packed::{Packer, finest_step};
+pub use packed::{Packer, finest_step};
 
 /// Increments of a triad along right-front-up, rad or m/s per sample.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -38,7 +38,7 @@ impl Series {
     }
 
     /// The mean packing step of the axes; zero if they are not packed.
-    pub(crate) fn step(&self) -> f64 {
+    pub fn step(&self) -> f64 {
         self.packed.as_ref().map_or(0.0, Packed::step)
     }
 

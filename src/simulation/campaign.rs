@@ -10,9 +10,9 @@ use super::scenario::ChamberFile;
 use super::{Chamber, Draws, Scenario, Simulated};
 use crate::calibration::result::Calibration;
 use crate::calibration::{DayToDay, Difference, ParameterVector, TemperatureOptions, Together};
-use crate::formats::NonNegative;
 use crate::models::{self, ModelError, Place, Room};
 use crate::turntable::TableError;
+use turncal_input::NonNegative;
 
 /// Simulated recordings of one instrument.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

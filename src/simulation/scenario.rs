@@ -9,12 +9,12 @@ use super::{Chamber, Integrator};
 use crate::calibration::ErrorTerm;
 use crate::calibration::model::{USUAL_LEVEL, USUAL_NORTH, usual_axis_error, usual_variation};
 use crate::earth::Site;
-use crate::formats::{Finite, Latitude, NonNegative, OneOrThree, Positive};
 use crate::imu::BodyFrame;
 use crate::imu::{ANGLES, InstallationForm, Output, PerSensor, Sensor, TermVector, Triad};
 use crate::models::{self, InstallationModel, Instrument, ModelError, Place, Room};
 use crate::turntable::{Imperfection, Motion, Path, Table, TableError};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, PPM};
+use turncal_input::{Finite, Latitude, NonNegative, OneOrThree, Positive};
 
 /// Temperature at which instruments match their model, °C.
 const ROOM_TEMPERATURE: f64 = 25.0;

@@ -184,11 +184,9 @@ impl Sensed {
     }
 }
 
-impl PerSensor<Sensed> {
-    fn errors(&self, at: &Instant) -> InputError {
-        let (rate, force) = (self.gyro.error(&at.rate), self.accel.error(&at.force));
-        InputError::new(rate.x, rate.y, rate.z, force.x, force.y, force.z)
-    }
+fn input_errors(sensed: &PerSensor<Sensed>, at: &Instant) -> InputError {
+    let (rate, force) = (sensed.gyro.error(&at.rate), sensed.accel.error(&at.force));
+    InputError::new(rate.x, rate.y, rate.z, force.x, force.y, force.z)
 }
 
 impl Mission {
@@ -250,7 +248,7 @@ impl Mission {
         let mut moments = vec![moment(0.0, &errors, &course.here().truth)];
         for interval in 1..=self.intervals {
             let time = f64::from(interval) * self.interval;
-            let forcing = |at: &Instant| Forcing::of(at, &sensed.errors(at));
+            let forcing = |at: &Instant| Forcing::of(at, &input_errors(&sensed, at));
             let mut start = forcing(course.here());
             course.go(time, sensed.gyro.constant.norm(), |stride| {
                 let [middle, end] = [&stride.middle, &stride.end].map(forcing);

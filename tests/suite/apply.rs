@@ -8,12 +8,12 @@ use nalgebra::{Matrix3, Vector3};
 use turncal::calibration::result::Calibration;
 use turncal::calibration::result::{TermRecord, TriadRecord};
 use turncal::calibration::{Correction, CorrectionError, truth_record};
-use turncal::formats::export::HEADER;
 use turncal::imu::{Output, PerSensor, Sensor, Term, TermVector};
 use turncal::run::Run;
 use turncal::simulation::{Scenario, true_increments};
 use turncal::turntable::{Imperfection, Motion};
 use turncal::units::{DEGREE, STANDARD_GRAVITY};
+use turncal_files::export::HEADER;
 
 use crate::calibration_file::written;
 
@@ -192,7 +192,10 @@ fn errors(terms: &[Term]) -> [PerSensor<f64>; 2] {
         let correction = Correction::for_run(record, run).unwrap();
         let period = run.recording.imu.period;
         let mut largest = PerSensor::from_fn(|_| 0.0_f64);
-        for (k, sample) in correction.samples(run).enumerate() {
+        for (k, sample) in correction
+            .samples(run, 0..run.recording.imu.len())
+            .enumerate()
+        {
             let rate = (sample.rate - ideal.gyro[k] / period).amax();
             let force = (sample.force - ideal.accel[k] / period).amax();
             largest.gyro = largest.gyro.max(rate);
@@ -272,7 +275,7 @@ fn the_calibrated_record_is_a_record_again() {
         .flatten()
         .fold(toml, |toml, (from, to)| toml.replace(from, to));
     fs::write(again.join("run.toml"), toml).unwrap();
-    let read = Run::read(&again.join("run.toml")).unwrap();
+    let read = turncal_files::read_run(&again.join("run.toml")).unwrap();
     let expected = by_hand(&record.gyro, [1.0, 2.0, 3.0]);
     assert!((read.recording.imu.gyro.at(50) / 0.01 - expected).amax() < 1e-12);
     assert_eq!(read.recording.imu.start(), 0.0);

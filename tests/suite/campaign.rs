@@ -9,11 +9,11 @@ use turncal::calibration::{
     RecordingDifference, Together, UNWATCHED, bound, estimate, mean_square_interval, nees,
     parameter, sensor_and_parameter, to_vector,
 };
-use turncal::formats::Campaign;
 use turncal::imu::{PerSensor, Sensor, TermVector};
 use turncal::run::Run;
 use turncal::simulation::{Scenario, SimulatedCampaign};
 use turncal::units::{ARCSEC, DEG_PER_H};
+use turncal_files::Campaign;
 
 use super::lot::{PATH, on_threads, turncal, words};
 use super::shared::{read, shared};
@@ -89,7 +89,7 @@ run = \"mild/run.toml\"
 
     // Between the soaks, where no recording was made, the truth lies within σ.
     let [calibration, truth] = ["once/calibration.json", "simulated/truth.json"].map(|file| {
-        let record = Calibration::read(&here.join(file)).unwrap();
+        let record = turncal_files::read_calibration(&here.join(file)).unwrap();
         record.at_temperature(30.0).unwrap()
     });
     let mut beyond = 0;
@@ -101,7 +101,7 @@ run = \"mild/run.toml\"
     // Of 24 numbers one is beyond 3 σ in 16 of 17 such runs at most.
     assert!(beyond <= 1, "{beyond} parameters beyond 3 σ");
     // Forty kelvin change them by a thousand σ.
-    let mild = Calibration::read(&here.join("once/calibration.json")).unwrap();
+    let mild = turncal_files::read_calibration(&here.join("once/calibration.json")).unwrap();
     let cold = mild.at_temperature(0.0).unwrap();
     let change = (cold["accel.bias.x"] - calibration["accel.bias.x"]).abs();
     assert!(change > 30.0 * calibration.sigma_of("accel.bias.x").unwrap());
@@ -141,8 +141,8 @@ fn autopilots_take_off_the_bias_at_a_temperature() {
     let here = here.path();
     simulated(here);
     calibrated(here, "simulated/campaign.toml", "all", "2");
-    let record = Calibration::read(&here.join("all/calibration.json")).unwrap();
-    let run = Run::read(&here.join("simulated/mild/run.toml")).unwrap();
+    let record = turncal_files::read_calibration(&here.join("all/calibration.json")).unwrap();
+    let run = turncal_files::read_run(&here.join("simulated/mild/run.toml")).unwrap();
     let formats: [(&str, Evaluated); 2] = [("px4", px4), ("ardupilot", ardupilot)];
     for (format, evaluate) in formats {
         let arguments = [
@@ -222,7 +222,7 @@ fn a_sensor_whose_bias_drifts_by_more_than_a_turn_is_calibrated_at_each_temperat
     let done = turncal(here, &arguments);
     assert!(done.status.success(), "{}", words(&done));
     let [found, truth] = ["result/calibration.json", "run/truth.json"]
-        .map(|file| Calibration::read(&here.join(file)).unwrap());
+        .map(|file| turncal_files::read_calibration(&here.join(file)).unwrap());
     for temperature in [20.0, 30.0] {
         let there = |record: &Calibration| record.at_temperature(temperature).unwrap();
         let (found, truth) = (there(&found), there(&truth));
@@ -269,7 +269,7 @@ fn an_instrument_that_is_mounted_anew_turns_as_a_whole() {
     simulated(here);
     let outcome = estimated(&made(here, "mounted", MOUNTINGS));
     assert!(outcome.converged);
-    let truth = Calibration::read(&here.join("mounted/truth.json")).unwrap();
+    let truth = turncal_files::read_calibration(&here.join("mounted/truth.json")).unwrap();
 
     // Of the turn of both triads the priors of four angles are known, 208″/√4, and the mean of three mountings,
     // 300″/√3 …
@@ -412,7 +412,7 @@ fn sigma_of_biases_at_rest_are_those_of_their_errors() {
             accel: Vector3::z() * run.site.gravity,
         };
         for temperature in [15.0, 25.0, 40.0] {
-            let state = range.everywhere(temperature, 0.0);
+            let state = turncal::imu::thermal_state_everywhere(range, temperature, 0.0);
             let (change, covariance) = thermal.at(&state, &outputs.covariance);
             let truth = of.at(&simulated.truth, temperature, 0.0);
             for (bias, _) in &at_rest.means {

@@ -19,7 +19,7 @@ fn without_default_features_no_crate_of_a_user_interface_is_compiled() {
         let output = Command::new(env!("CARGO"))
             .args(["tree", "--offline", "--edges", "normal", "--prefix", "none"])
             .args(["--format", "{p}", "--manifest-path"])
-            .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"))
+            .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/../../Cargo.toml"))
             .args(features)
             .output()
             .unwrap();

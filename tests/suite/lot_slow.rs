@@ -12,9 +12,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 use serde_json::Value;
 use turncal::calibration::{Group, in_general_form, to_vector};
-use turncal::formats::write_run;
 use turncal::simulation::Scenario;
 use turncal::units::DEG_PER_SQRT_H;
+use turncal_files::write_run;
 
 use super::lot::{on_threads, same, turncal, words};
 use super::shared::skipped;
@@ -265,7 +265,8 @@ fn a_study_on_dask_is_the_same_with_one_worker_or_two_and_one_of_them_killed() {
     let study = ["study", "accuracy", "--runs", "12", "--seed", "4"];
     let whole = turncal(here, &[&study[..], &["-o", "whole"]].concat());
     assert!(whole.status.success(), "{}", words(&whole));
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/on_dask.py");
+    let script =
+        Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("examples/on_dask.py");
     let _scheduler = cluster(
         &python,
         here,

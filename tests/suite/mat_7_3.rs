@@ -8,8 +8,8 @@ use hdf5_pure::LibVer;
 use hdf5_pure::mat::{Compression, MatBuilder, MatError, Options, StructWriter};
 use nalgebra::Vector3;
 use turncal::attitude;
-use turncal::formats::Opened;
-use turncal::formats::draft::{Draft, Stated};
+use turncal_files::Opened;
+use turncal_files::draft::{Draft, Stated};
 
 /// A quarter turn about each axis in turn, with rests between, at 100 Hz: time, angular rate, specific force.
 fn rows() -> Vec<[f64; 7]> {

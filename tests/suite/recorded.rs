@@ -18,7 +18,7 @@ fn stated() -> Options {
 fn calibrated(name: &str) -> Option<(Outcome, [f64; 6], f64)> {
     let directory = shared(name)?;
     let run = read(&directory);
-    let truth = Calibration::read(&directory.join("truth.json")).unwrap();
+    let truth = turncal_files::read_calibration(&directory.join("truth.json")).unwrap();
     let outcome = estimate(&Problem::new(&run, &stated()), UNWATCHED).unwrap();
     let truth = triads_of(&truth, &run.instrument.nominal, InstallationForm::General);
     let error = outcome.estimate.vector() - to_vector(&truth);

@@ -6,14 +6,15 @@ use std::sync::{Arc, OnceLock};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyIterator;
-use turncal::calibration::{self, Finding, FindingKind, Progress as Passes};
-use turncal::formats::record_inputs;
+use turncal::calibration;
+use turncal::calibration::{Finding, FindingKind, Progress as Passes};
 use turncal::imu::{Output, Sensor, Term};
 use turncal::lot::{Lot, Specification, Unit};
-use turncal::report::calibration as of_calibration;
-use turncal::report::document::Table;
-use turncal::report::{Document, at_rest, lot as of_lot, write};
 use turncal::study::CheckedCalibration;
+use turncal_files::record_inputs;
+use turncal_report::calibration as of_calibration;
+use turncal_report::document::Table;
+use turncal_report::{Document, at_rest, lot as of_lot, write};
 
 use crate::errors::{in_python, raise, raised};
 use crate::report::{Report, brief, framed};
@@ -247,7 +248,7 @@ impl Calibration {
     /// Calibration
     #[staticmethod]
     fn read(path: PathBuf) -> PyResult<Self> {
-        calibration::Calibration::read(&path)
+        calibration::turncal_files::read_calibration(&path)
             .map(Self::of_record)
             .map_err(raise)
     }

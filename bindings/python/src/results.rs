@@ -5,15 +5,16 @@ use std::path::{Path, PathBuf};
 use pyo3::prelude::*;
 use turncal::calibration::Named;
 use turncal::calibration::result::Calibration as Record;
-use turncal::certificate::Certificate;
-use turncal::formats::{digest_of_bytes, export as formats, read_laboratory};
 use turncal::lot::{Lot, Unit};
-use turncal::report::navigation::Navigation;
-use turncal::report::{certificate as of_certificate, lot as of_lot};
 use turncal::study::navigation::{
     INTERVAL, MethodOutlook, Mission, Motion, NavigationStudyError, Pair,
 };
 use turncal::units::DEGREE;
+use turncal_files::{digest_of_bytes, export as formats, read_laboratory};
+use turncal_report::certificate::Certificate;
+use turncal_report::certificate::document as of_certificate;
+use turncal_report::lot as of_lot;
+use turncal_report::navigation::Navigation;
 
 use crate::calibration::Calibration;
 use crate::errors::{Given, raise, raised, within};
@@ -80,7 +81,7 @@ pub fn certificate(
             let digest = digest_of_bytes(&std::fs::read(path)?);
             Ok((
                 format!("{name}, SHA-256 {digest}"),
-                Record::read(path).map_err(raise)?,
+                turncal_files::read_calibration(path).map_err(raise)?,
             ))
         });
     let earlier = earlier.transpose()?;

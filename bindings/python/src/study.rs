@@ -8,11 +8,9 @@ use rayon::ThreadPoolBuilder;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use turncal::calibration::{ErrorTerm, NoisePolicy};
-use turncal::formats::write_run;
 use turncal::imu::InstallationForm;
-use turncal::models::{self, Place};
-use turncal::report::path::{Report as OfPath, in_words, moves_in_words};
-use turncal::report::{Document, accuracy, experiment};
+use turncal::models;
+use turncal::models::Place;
 use turncal::run::Aiding;
 use turncal::simulation::{Scenario, SimulatedCampaign};
 use turncal::study::navigation::FORTY_HOURS;
@@ -20,6 +18,9 @@ use turncal::study::path::{Named, PathError, PathStudy};
 use turncal::study::{
     AccuracyStudy, ExperimentStudy, Shard, Study as Makes, StudyError, UNWATCHED,
 };
+use turncal_files::write_run;
+use turncal_report::path::{Report as OfPath, in_words, moves_in_words};
+use turncal_report::{Document, accuracy, experiment};
 
 use crate::calibration::Calibration;
 use crate::errors::{Given, named, raise, raised, wrong};

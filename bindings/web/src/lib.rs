@@ -14,12 +14,13 @@ use std::panic;
 
 use serde_json::json;
 use turncal::calibration::{Calibration, Method, Options, Problem};
-use turncal::formats::draft::{Draft, Found, Stated};
-use turncal::formats::{DataFile, Opened};
-use turncal::report::Document;
-use turncal::report::calibration;
 use turncal::run::Run;
 use turncal::study::CheckedCalibration;
+use turncal_files::Opened;
+use turncal_files::draft::{Draft, Found, Stated};
+use turncal_logs::DataFile;
+use turncal_report::Document;
+use turncal_report::calibration;
 use wasm_bindgen::prelude::*;
 
 pub use output::Output;

@@ -11,7 +11,9 @@ use crate::calibration::{
     Coefficient, PARAMETERS, ParameterMatrix, ParameterVector, Thermal, from_vector,
     parameter_index, parameter_name, to_vector,
 };
-use crate::imu::{Nominal, PerSensor, Sensor, ThermalModel, ThermalState};
+use crate::imu::{
+    Nominal, PerSensor, Sensor, ThermalModel, ThermalState, thermal_state_everywhere,
+};
 
 /// Converts triads that stay in the quantity of the file.
 const ONE: PerSensor<Nominal> = PerSensor {
@@ -65,7 +67,7 @@ impl Calibration {
                 });
             }
         }
-        self.in_state(&thermal.range.everywhere(temperature, 0.0))
+        self.in_state(&thermal_state_everywhere(&thermal.range, temperature, 0.0))
     }
 
     /// The same for these values of the functions of temperature.
@@ -109,7 +111,7 @@ impl Calibration {
 
     /// Covariance of its parameters, normalised by nominal scales: from σ alone if correlations are missing, zero if
     /// neither is stated. `None` if it does not match the named parameters.
-    pub(crate) fn covariance_by(&self, nominal: &PerSensor<Nominal>) -> Option<ParameterMatrix> {
+    pub fn covariance_by(&self, nominal: &PerSensor<Nominal>) -> Option<ParameterMatrix> {
         let form = self.installation_form.unwrap_or_default();
         let factor = |index| factor(nominal, index);
         if self.covariance.is_empty() && self.parameters.is_empty() {

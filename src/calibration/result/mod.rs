@@ -5,8 +5,8 @@
 
 pub(super) mod at_temperature;
 pub(super) mod correction;
-pub(crate) mod frame;
-pub(crate) mod nees;
+pub mod frame;
+pub mod nees;
 pub(super) mod record;
 pub(super) mod thermal_record;
 
@@ -220,7 +220,6 @@ pub struct GravityRecord {
 /// Method of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Method {
     /// Extended Kalman filter over the whole run
     Ekf,

@@ -69,13 +69,13 @@ impl DayToDay {
     }
 
     /// The keys of `[day_to_day]`.
-    pub(crate) fn keys() -> Vec<String> {
+    pub fn keys() -> Vec<String> {
         let groups = Group::all().map(|group| Self::key(group).0);
         groups.chain([MOUNTING.to_owned()]).collect()
     }
 
     /// From the values in `[day_to_day]` by key.
-    pub(crate) fn of_values(value: impl Fn(&str) -> f64) -> Self {
+    pub fn of_values(value: impl Fn(&str) -> f64) -> Self {
         let mut differ = Self::default();
         for group in Group::all() {
             let (key, unit) = Self::key(group);
@@ -88,7 +88,7 @@ impl DayToDay {
     }
 
     /// The values in `[day_to_day]` with their keys; those of a group are equal.
-    pub(crate) fn values(&self) -> impl Iterator<Item = (String, f64)> {
+    pub fn values(&self) -> impl Iterator<Item = (String, f64)> {
         let of_groups = Group::all().filter_map(|group| {
             let (key, unit) = Self::key(group);
             let first = *group.parameters(InstallationForm::General).first()?;

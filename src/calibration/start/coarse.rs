@@ -8,7 +8,8 @@ use super::gravity::{AtRest, Chain, add_magnitude, events, up};
 use super::table;
 use crate::attitude::level;
 use crate::calibration::{
-    AttitudePrior, CalibrationError, Linearisation, ParameterVector, Problem, from_vector, to_vector,
+    AttitudePrior, CalibrationError, Linearisation, ParameterVector, Problem, from_vector,
+    to_vector,
 };
 use crate::earth::Site;
 use crate::imu::{Sensor, TermVector};

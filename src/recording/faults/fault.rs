@@ -95,7 +95,7 @@ impl Bridge {
     }
 
     /// Sorts by axes, then by time.
-    pub(crate) fn sort(bridges: &mut [Self]) {
+    pub fn sort(bridges: &mut [Self]) {
         let axes = |bridge: &Self| (bridge.axes.gyro, bridge.axes.accel);
         bridges.sort_unstable_by_key(|bridge| (axes(bridge), bridge.samples.start));
     }

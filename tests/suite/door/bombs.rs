@@ -9,8 +9,8 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 
 use super::made::made_run;
-use turncal::formats::write_run;
 use turncal::imu::Output as Rows;
+use turncal_files::write_run;
 
 /// So much address space is enough for a command on one thread, and for no bomb, KiB.
 const ROOM: u32 = 200 * 1024;

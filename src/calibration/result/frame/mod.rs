@@ -80,7 +80,7 @@ pub struct Canonical {
 impl Canonical {
     /// Converts a record to a body frame and nominal scales. A record in the accelerometer frame cannot be converted to
     /// the table frame, because the table was not observed.
-    pub(crate) fn new(
+    pub fn new(
         name: &str,
         record: &Calibration,
         nominal: &PerSensor<Nominal>,
@@ -208,4 +208,4 @@ pub fn accelerometer_frame(a: &Matrix3<f64>) -> Matrix3<f64> {
 }
 
 #[cfg(test)]
-pub(crate) mod tests;
+pub mod tests;
