@@ -296,7 +296,7 @@ fn a_mat_file_is_read_in_parts_and_one_of_zeros_is_refused() {
     std::fs::write(here.join("m.mat"), mat_of_zeros(8_000_000)).unwrap();
     // 384 MB unpacked.
     let program = env!("CARGO_BIN_EXE_turncal");
-    let command = format!("ulimit -v 300000; exec {program} init m.mat");
+    let command = format!("ulimit -v 512000; exec {program} init m.mat");
     let mut shell = std::process::Command::new("sh");
     let output = shell.args(["-c", &command]).current_dir(here).output();
     let output = output.unwrap();
