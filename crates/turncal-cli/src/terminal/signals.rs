@@ -39,10 +39,10 @@ pub fn leave_nothing_behind() {
     let Ok(mut signals) = Signals::new(heeded()) else {
         return;
     };
+    let unfinished = Unfinished::of_this_process();
     let thread = thread::Builder::new()
         .name("signals".into())
         .spawn(move || {
-            let unfinished = Unfinished::of_this_process();
             for signal in signals.forever() {
                 if signal != SIGHUP && ENDS_GENTLY.swap(false, Ordering::SeqCst) {
                     ENDED.store(true, Ordering::SeqCst);

@@ -194,10 +194,12 @@ fn push_statistics<'a>(columns: &mut Columns<'a, Quantity>, lot: &'a Lot) {
         })
     });
     push("spread", |of| spread(of.quantity, &of.scatter.spread));
-    push("outliers", |of| match of.outliers.len() {
-        0 => NONE.to_owned(),
-        some => format!("{} of {}", count(some), count(of.count)),
-    });
+    if lot.statistics.iter().any(|of| !of.outliers.is_empty()) {
+        push("outliers", |of| match of.outliers.len() {
+            0 => NONE.to_owned(),
+            some => format!("{} of {}", count(some), count(of.count)),
+        });
+    }
 }
 
 /// χ²/n, whose exact size is not meaningful far beyond chance.

@@ -4,6 +4,7 @@ use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread;
 use std::time::Duration;
@@ -20,6 +21,8 @@ const DEAD: &str = "dead";
 
 /// Announces every stage to the thread that ends the process on a signal; not set in a library.
 static ANNOUNCED: OnceLock<Sender<Beside>> = OnceLock::new();
+/// Whether that thread is about to end the process.
+static ENDING: AtomicBool = AtomicBool::new(false);
 
 /// Error: an output must not replace what is at `target`.
 pub fn taken(target: &Path) -> FileError {
@@ -50,6 +53,7 @@ impl Unfinished {
     /// Removes them, for a process that is about to end. Threads that start, finish or abandon an output from here on
     /// wait for that end.
     pub fn abandon(self) {
+        ENDING.store(true, Ordering::SeqCst);
         for beside in self.0.try_iter() {
             // Another thread may be writing into it or exchanging old and new.
             for _ in 0..100 {
@@ -72,8 +76,11 @@ struct Beside {
 impl Beside {
     /// Announces the stage; does not return if the process is about to end.
     fn announce(&self) {
-        let announced = ANNOUNCED.get().map(|all| all.send(self.clone()));
-        if announced.is_some_and(|sent| sent.is_err()) {
+        if let Some(all) = ANNOUNCED.get() {
+            // Without that thread nobody receives it.
+            let _ = all.send(self.clone());
+        }
+        if ENDING.load(Ordering::SeqCst) {
             let _ = self.remove();
             loop {
                 thread::park();
