@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::motion::TOLERANCE;
-use super::name::Unit;
-use super::raw_run::{Axes, Gravity};
+use crate::formats::draft::motion::TOLERANCE;
+use crate::formats::draft::name::Unit;
+use crate::formats::draft::raw_run::{Axes, Gravity};
 use crate::formats::unit_scale;
 use crate::imu::{Output, Sensor};
 use crate::number::rounded;
