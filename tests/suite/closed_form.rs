@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use turncal::attitude::{exp, log};
@@ -339,56 +339,68 @@ fn the_closed_form_is_as_wrong_as_its_sigma_say_or_says_what_is_wrong() {
     }
 }
 
-#[test]
-fn one_position_that_is_off_costs_no_more_than_that_position() {
-    let solved = |run: &Run| {
-        let problem = Problem::new(run, &Options::default());
-        match problem.solve(Method::SixPosition, UNWATCHED).unwrap() {
-            Solution::ClosedForm(closed_form) => *closed_form,
-            Solution::Filter(_) => unreachable!("the closed form was asked for"),
+/// An instrument that is turned by a quarter or less about one axis after another, with this many dwells.
+fn turned_often(dwells: usize, seed: u64) -> Simulated {
+    let scenario = Scenario::load("mems").unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let step = |_| {
+        let angle = [90.0, -90.0, -60.0, 45.0, -75.0][rng.random_range(0..5)] * DEGREE;
+        BodyStep {
+            rotation: Rotation::By(Vector3::ith(rng.random_range(0..3), angle)),
+            duration: 3.0,
+            acceleration: 80.0 * DEGREE,
+            dwell: 2.5,
         }
     };
-    let mut made = Scenario::load("demo").unwrap().simulate(4, 0).unwrap();
-    let clean = solved(&made.run);
-    let dwells = made.run.dwells(Aiding::Table);
-    let period = made.run.recording.imu.period;
-    // Something turns the IMU by 4″ a second on its face, too slowly for a standstill to end by it.
-    for k in dwells[9].samples.clone() {
-        made.run.recording.imu.gyro.to_mut()[k].x += 4.0 * ARCSEC * period;
-    }
-    let spoilt = solved(&made.run);
-    let large = |finding: &&Finding| finding.kind == "residuals-large";
-    let named = spoilt.findings.iter().find(large);
-    let named = named.map(|finding| finding.figures["worst"].clone());
-    let named: Vec<[f64; 2]> = serde_json::from_value(named.unwrap()).unwrap();
-    let time = |sample| made.run.recording.imu.time(sample);
-    let [[begin, end]] = named[..] else {
-        panic!("{spoilt:?}")
+    let steps = (1..dwells).map(step).collect();
+    let start = exp(Vector3::new(0.02, 0.03, 0.5));
+    let mut scenario = Scenario {
+        path: Path {
+            first_dwell: 10.0,
+            moves: Moves::Body { start, steps },
+        },
+        ..scenario
     };
-    assert!(time(dwells[9].samples.start) <= begin && end <= time(dwells[9].samples.end));
-    let growth = spoilt
-        .estimate
-        .sigma()
-        .component_div(&clean.estimate.sigma());
-    assert!(growth.max() < 1.5, "{}", growth.max());
-    let (nees, count, sigmas) = squares(&spoilt, &made);
-    let mean = nees / count as f64;
-    assert!(mean < 2.0 && sigmas < 4.0, "{mean} {sigmas}");
+    scenario.integrator.period = 0.04;
+    scenario.simulate(seed, 0).unwrap()
 }
 
 #[test]
-fn a_base_that_is_off_is_not_taken_for_the_one_position_that_shows_it() {
-    // All but one dwell of this path agree on wrong biases where the base is tilted. The square of such a tilt is
-    // below what σ of scale factors see.
-    let demo = Scenario::load("demo").unwrap();
-    let wrong = Wrong::Level {
-        sigma: 0.01 * DEGREE,
-        stated: false,
-    };
-    let tried = tried(RUNS, |seed| made_wrong(&demo, wrong, seed));
-    assert_eq!((tried.rang, tried.silent), (RUNS as usize, 0), "{tried:?}");
-    let (low, high) = tried.interval;
-    assert!((low..=high).contains(&tried.nees), "{tried:?}");
+fn six_hundred_dwells_are_calibrated_with_right_sigma_by_table_and_by_hand() {
+    for by_hand in [false, true] {
+        let tried = tried(1, |seed| {
+            let mut made = turned_often(600, seed);
+            if by_hand {
+                made.run.recording.table = None;
+            }
+            made
+        });
+        let (low, high) = tried.interval;
+        assert!((low..=high).contains(&tried.nees), "{tried:?}");
+        assert_eq!((tried.refused, tried.rang), (0, 0), "{tried:?}");
+    }
+}
+
+#[test]
+fn noise_stated_too_small_widens_sigma_by_the_birge_ratio_and_is_named() {
+    for by_hand in [false, true] {
+        let tried = tried(6, |seed| {
+            let mut made = turned_often(60, seed);
+            if by_hand {
+                made.run.recording.table = None;
+            }
+            for noise in [&mut made.run.instrument.noise.gyro, &mut made.run.instrument.noise.accel] {
+                noise.random_walk /= 10.0;
+                noise.gauss_markov = noise.gauss_markov.map(|of| GaussMarkov {
+                    sigma: of.sigma / 10.0,
+                    ..of
+                });
+            }
+            made
+        });
+        assert_eq!(tried.rang, 6, "{tried:?}");
+        assert!(tried.nees < 1.5, "{tried:?}");
+    }
 }
 
 #[test]

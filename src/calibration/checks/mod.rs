@@ -1,7 +1,6 @@
 //! Checks of model, noise and record by the data: each file is a check with its messages.
 
 pub mod cause;
-pub mod drift;
 pub mod dwell_scatter;
 pub mod error_term_test;
 pub mod finding;

@@ -57,22 +57,17 @@ fn is_another_scale(model: &Model, estimate: &Estimate, index: usize) -> bool {
         && is_beyond_tolerance(factor, model.prior_sigma[index])
 }
 
-/// The finding on parameters for which the data alone contradict the prior, if the estimate includes the prior. The
-/// test uses the covariance of the distance between estimate and a correct prior.
+/// The finding on parameters for which the data alone contradict the prior, if the estimate includes the prior.
 ///
-/// Too tight a prior constrains the estimate, so the distance alone is not informative. With `P⁻¹ = S⁻¹ + V⁻¹` of prior
+/// Too tight a prior constrains the estimate, so its distance alone is not informative. With `P⁻¹ = S⁻¹ + V⁻¹` of prior
 /// and data, the distance of the estimate is `P V⁻¹` times that of the data, and its covariance for a correct prior is
-/// `P S⁻¹ P V⁻¹`: normalised, it equals the distance of data and prior over both σ.
-pub fn far_by_data(
-    model: &Model,
-    estimate: &Estimate,
-    distance: &ParameterMatrix,
-) -> Option<Finding> {
+/// `P S⁻¹ P V⁻¹ = S − P`: normalised, it equals the distance of data and prior over both σ.
+pub fn far_by_data(model: &Model, estimate: &Estimate) -> Option<Finding> {
     let mut by_data = estimate.vector();
     let mut sigma = estimate.sigma();
     for i in estimate.estimated() {
         let (off, prior) = (by_data[i] - model.prior_mean[i], model.prior_sigma[i]);
-        let share = distance[(i, i)] / prior.powi(2);
+        let share = 1.0 - (sigma[i] / prior).powi(2);
         if off == 0.0 || share.is_nan() || share <= ROUNDING {
             continue;
         }

@@ -100,11 +100,11 @@ fn of_triad(
         let partials = of(sensor, &(seen * of_parameters(triad, &input)));
         equations.add(&Rows {
             common: common.to_vec(),
+            own: Vector3::zeros(),
             ..Rows::new(partials, Vector3::zeros(), variance)
         });
     }
-    let by_steps = equations.by_units(&equations.gain()?, numbers.len());
-    Some(equations.whole(&(&by_steps * by_steps.transpose())))
+    equations.by_errors()
 }
 
 /// Resolution of rates along body axes, rad/s or m/s²; zero if not rounded, or if rows are integrals, which may carry

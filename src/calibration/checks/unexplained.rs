@@ -40,16 +40,12 @@ pub fn unexplained(all: &Nis, innovations: &[Innovation]) -> Option<Finding> {
     rejected("NIS", all.mean, worst.0)
 }
 
-/// The same for a closed form, from the findings on its residuals: neither noise, even without the worst position,
-/// nor the table's base explains them.
+/// The same for a closed form, from the findings on its residuals.
 pub fn unexplained_residuals(findings: &[Finding]) -> Option<Finding> {
-    let large = findings
-        .iter()
-        .filter(|finding| finding.is(Kind::ResidualsLarge));
-    let without_base = large.filter(|finding| finding.figures["base"].is_null());
-    without_base.into_iter().find_map(|finding| {
+    let large = |finding: &&Finding| finding.is(Kind::ResidualsLarge);
+    findings.iter().filter(large).find_map(|finding| {
         let figure = |name: &str| finding.figures[name].as_f64();
-        let nis = figure("without")? / figure("degrees")?;
+        let nis = figure("chi_square")? / figure("degrees")?;
         let begin = finding.figures["worst"][0][0].as_f64();
         rejected("χ² over its degrees of freedom", nis, begin.unwrap_or(0.0))
     })

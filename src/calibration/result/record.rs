@@ -128,7 +128,7 @@ impl GravityRecord {
 impl ClosedForm {
     /// The record of this calibration of a problem, with the residuals of gravity and turns.
     pub fn record(&self, problem: &Problem, quality: &Quality) -> Calibration {
-        let (run, noise) = (problem.run(), self.noise.clone());
+        let run = problem.run();
         let record = Calibration {
             quality: Some(quality.clone()),
             method: Some(Method::SixPosition),
@@ -137,10 +137,6 @@ impl ClosedForm {
                 run.site.gravity,
                 run.site.gravity_sigma,
             ))),
-            noise: noise.map(|report| NoiseRecord {
-                run_toml: report.run_toml(PerSensor::default()),
-                report,
-            }),
             ..self.estimate.record(run, self.reference.body_frame())
         };
         record.with_findings(self.findings.clone())

@@ -2,7 +2,7 @@
 //! printed Eq. 15 says `N_g` where the accelerometer is meant), and its substitutes without a table.
 
 use super::both_triads::both_triads;
-use super::coarse::{Turned, calibrated, calibrated_as_held, dwells, judged};
+use super::coarse::{Turned, calibrated, dwells};
 use super::gravity::AtRest;
 use super::labels::{Section, Used};
 use super::positions::{Observed, Position};
@@ -14,8 +14,8 @@ use crate::calibration::checks::rounding::{by_rounding, rounded};
 use crate::calibration::checks::unexplained::unexplained_residuals;
 use crate::calibration::linearisation::singular;
 use crate::calibration::{
-    CalibrationError, Estimate, Finding, Model, NoiseReport, OBSERVED_BELOW, Problem, checks,
-    from_vector, parameter, parameter_name,
+    CalibrationError, Estimate, Finding, Model, OBSERVED_BELOW, Problem, checks, from_vector,
+    parameter, parameter_name, to_vector,
 };
 use crate::calibration::{Verdict, Word};
 use crate::earth::Site;
@@ -60,8 +60,6 @@ pub struct ClosedForm {
     pub turns: usize,
     /// Total time of all dwells used, s.
     pub standing_time: f64,
-    /// The estimated noise; `None` if the stated noise is used.
-    pub noise: Option<NoiseReport>,
     /// Findings that a calibration engineer must know before using the results.
     pub findings: Vec<Finding>,
 }
@@ -155,7 +153,6 @@ pub fn six_position_of(
     findings.extend(hidden(&problem.model, &estimate, Reference::Table));
     let used = dwells.iter().zip(used).filter(|(_, used)| *used);
     Ok(ClosedForm {
-        noise: None,
         findings,
         estimate,
         reference: Reference::Table,
@@ -208,7 +205,6 @@ fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     let standing: Vec<&Section> = sections.iter().filter(|s| s.stands()).collect();
     let samples: usize = standing.iter().map(|section| section.samples.len()).sum();
     Ok(ClosedForm {
-        noise: None,
         findings,
         estimate,
         reference: Reference::Labels,
@@ -222,49 +218,24 @@ fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
 /// few.
 fn by_gravity(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
     let rests = dwells(problem)?;
-    let (turned, by_hand) = calibrated_as_held(problem, &rests)?;
-    let form = problem.model.form;
-    let singular = || singular(&from_vector(form, &problem.model.prior_mean));
-    let judged = judged(&turned).ok_or_else(singular)?;
-    let growth = judged.residuals.growth();
-    // Weights count against those of the prior: σ of all data grow where those of the prior shrink.
-    let turned = match growth {
-        None => turned,
-        Some(growth) => {
-            let by_hand = by_hand.as_ref().map(|by_hand| by_hand.model(problem));
-            let mut model = by_hand.unwrap_or_else(|| problem.model.clone());
-            model.prior_sigma /= growth;
-            calibrated(&problem.with_model(model), &rests)?
-        }
-    };
-    let variance = growth.unwrap_or(1.0).powi(2);
-    let Turned { at, equations, .. } = turned;
-    let gain = equations.gain().ok_or_else(singular)?;
+    let Turned { at, equations, .. } = calibrated(problem, &rests)?;
+    let solution = equations.solved().ok_or_else(|| singular(&at.triads))?;
     let estimate = Estimate {
-        triads: at.triads,
-        covariance: equations.whole(&equations.covariance(&gain)) * variance,
+        triads: from_vector(problem.model.form, &(to_vector(&at.triads) + solution.step)),
+        covariance: solution.covariance,
     };
-    // Of how far the data bring the estimate from a prior that is right.
-    let distance = equations.whole(&equations.covariance_of_distance(&gain)) * variance;
-    let noise = by_hand.as_ref().map(|by_hand| by_hand.report(problem));
-    let learnt = by_hand.zip(noise.as_ref());
-    let learnt = learnt.and_then(|(by_hand, report)| by_hand.finding(problem, report));
-    let far = far_by_data(&problem.model, &estimate, &distance).into_iter();
+    let far = far_by_data(&problem.model, &estimate).into_iter();
     let findings = far.chain(hidden(&problem.model, &estimate, Reference::Gravity));
-    let large = growth.map(|growth| judged.large("both triads", growth, None));
     let count = rests.iter().map(Vec::len).sum();
     Ok(ClosedForm {
         findings: findings
-            .chain(learnt)
-            .chain(large)
-            .chain(judged.drift())
+            .chain(solution.residuals.finding("both triads"))
             .collect(),
         estimate,
         reference: Reference::Gravity,
         positions: PerSensor::from_fn(|_| count),
         turns: count - rests.len(),
         standing_time: rests.iter().flatten().map(AtRest::duration).sum(),
-        noise,
     })
 }
 

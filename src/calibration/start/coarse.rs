@@ -5,22 +5,14 @@ use nalgebra::Matrix3;
 use super::earth_rate::{add_rates, gyro_bias_at_rest, gyrocompass};
 use super::equations::{Equations, gauss_newton};
 use super::gravity::{AtRest, Chain, add_magnitude, events, up};
-use super::judged::Judged;
 use super::table;
 use crate::attitude::level;
-use crate::calibration::noise::ByHand;
 use crate::calibration::{
-    AttitudePrior, CalibrationError, Linearisation, NoisePolicy, ParameterVector, Problem,
-    from_vector, to_vector,
+    AttitudePrior, CalibrationError, Linearisation, ParameterVector, Problem, from_vector, to_vector,
 };
 use crate::earth::Site;
-use crate::imu::{ParameterKind, Sensor, TermVector};
+use crate::imu::{Sensor, TermVector};
 
-/// With more equations (a hundred dwells), parameters cannot absorb noise. The whole covariance is factorised, with a
-/// cost that grows with the cube of their number.
-const MOST_EQUATIONS: usize = 600;
-/// Maximum number of linearisation points at which noise is estimated.
-const NOISE_ROUNDS: usize = 6;
 /// A smaller step (1 ppm, 0.2″, and the same number in rad/s or m/s²) ends an iteration.
 const SMALL: f64 = 1e-6;
 /// Attitudes, heading and gyros are estimated alternately. Scale factor errors of several percent need four rounds …
@@ -35,16 +27,6 @@ pub struct CoarseStart {
     pub at: Linearisation,
     /// Prior of the initial attitude of each stretch.
     pub attitudes: Vec<AttitudePrior>,
-    /// Noise added by hand motion, if requested.
-    pub(in crate::calibration) by_hand: Option<ByHand>,
-}
-
-impl CoarseStart {
-    /// A problem with the noise of turning and holding by hand found at the start; `None` if there is none.
-    pub fn by_hand<'a>(&self, problem: &Problem<'a>) -> Option<Problem<'a>> {
-        let by_hand = self.by_hand.as_ref()?;
-        Some(problem.with_model(by_hand.model(problem)))
-    }
 }
 
 /// Both triads and the initial attitudes by least squares over whole dwells and moves.
@@ -63,19 +45,19 @@ pub fn coarse_start(problem: &Problem) -> Result<CoarseStart, CalibrationError> 
         let smallest = ParameterVector::repeat(SMALL);
         let triads = match problem.model.thermal {
             Some(_) => first,
-            None => gauss_newton(first, &smallest, |triads| table::carried(problem, triads))?,
+            None => gauss_newton(first, &smallest, |triads| {
+                table::carried(problem, triads)?.step()
+            })?,
         };
         let means = attitudes.iter().map(|attitude| attitude.mean).collect();
         return Ok(CoarseStart {
             at: Linearisation::new(triads, TermVector::zeros(), means),
             attitudes,
-            by_hand: None,
         });
     }
-    let (turned, by_hand) = calibrated_as_held(problem, &dwells)?;
     let Turned {
         at, heading_sigma, ..
-    } = turned;
+    } = calibrated(problem, &dwells)?;
     let sites = problem.stretches().iter().map(|s| &s.run.site);
     let attitudes = at.initial_attitudes.iter().zip(&heading_sigma).zip(sites);
     let of_alignment = |((attitude, &sigma), site): ((&Matrix3<f64>, &f64), &Site)| {
@@ -84,7 +66,6 @@ pub fn coarse_start(problem: &Problem) -> Result<CoarseStart, CalibrationError> 
     Ok(CoarseStart {
         attitudes: attitudes.map(of_alignment).collect(),
         at,
-        by_hand,
     })
 }
 
@@ -112,15 +93,6 @@ pub fn dwells(problem: &Problem) -> Result<Vec<Vec<AtRest>>, CalibrationError> {
     }
 }
 
-/// Evaluation of its residuals.
-pub fn judged(turned: &Turned) -> Option<Judged> {
-    let places = [
-        (ParameterKind::Scale, [0, 1, 2]),
-        (ParameterKind::Bias, [9, 10, 11]),
-    ];
-    Judged::new(&turned.equations, &Sensor::ALL, places)
-}
-
 /// Both triads and attitudes from gravity and the rates at rest.
 pub struct Turned {
     /// The triads, and the attitude at the first sample of each stretch.
@@ -138,7 +110,7 @@ pub fn calibrated(problem: &Problem, dwells: &[Vec<AtRest>]) -> Result<Turned, C
     let triads = gauss_newton(prior, &ParameterVector::repeat(SMALL), |triads| {
         let mut equations = Equations::of_triads(model, triads, &[Sensor::Accel]);
         add_magnitude(&mut equations, problem, dwells, triads)?;
-        Ok(equations)
+        equations.step()
     })?;
     let first = dwells
         .iter()
@@ -197,51 +169,10 @@ fn turned(
         )?;
     }
     equations.events = events(problem, dwells);
+    equations.correlated = true;
     Ok(Turned {
         at: at.clone(),
         heading_sigma: headings.iter().map(|heading| heading.sigma).collect(),
         equations,
-    })
-}
-
-/// The same with the noise added by hand motion, if the data show it although the residuals do not.
-pub fn calibrated_as_held(
-    problem: &Problem,
-    dwells: &[Vec<AtRest>],
-) -> Result<(Turned, Option<ByHand>), CalibrationError> {
-    let stated = calibrated(problem, dwells)?;
-    if stated.equations.count() > MOST_EQUATIONS {
-        return Ok((stated, None));
-    }
-    // Residuals tell noise of all equations, where there are enough of them; else only the prior does.
-    let tell = judged(&stated).is_none_or(|judged| judged.residuals.growth().is_some());
-    if tell || problem.options.noise == NoisePolicy::Stated {
-        return Ok((stated, None));
-    }
-    let likeliest = |turned: &Turned, used: &ByHand| {
-        let (errors, mut covariance) = turned.equations.before_data();
-        let parts = turned.equations.by_hand();
-        used.taken_from(&mut covariance, &parts);
-        ByHand::likeliest(&errors, &covariance, &parts).filter(|found| !found.is_none())
-    };
-    let with = |by_hand: &ByHand| calibrated(&problem.with_model(by_hand.model(problem)), dwells);
-    let Some(mut by_hand) = likeliest(&stated, &ByHand::default()) else {
-        return Ok((stated, None));
-    };
-    // What equations are linearised at follows noise, and noise that.
-    for _ in 0..NOISE_ROUNDS {
-        // What noise on trial leads nowhere with is not the noise of this recording.
-        let Ok(turned) = with(&by_hand) else {
-            return Ok((stated, None));
-        };
-        match likeliest(&turned, &by_hand) {
-            None => return Ok((stated, None)),
-            Some(here) if here.is_like(&by_hand) => return Ok((turned, Some(here))),
-            Some(here) => by_hand = here,
-        }
-    }
-    Ok(match with(&by_hand) {
-        Ok(turned) => (turned, Some(by_hand)),
-        Err(_) => (stated, None),
     })
 }

@@ -1,16 +1,16 @@
-//! Linear equations for the errors of both triads about one point: least squares, covariance, residuals.
+//! Linear equations for the errors of both triads about one point.
 //!
 //! A row consists of a residual, its partial derivatives with respect to the unknowns, and its error sources. The
 //! unknowns are the parameters of a form, or the entries of `A = K C` and `D` of each triad ([`of_sensitivity`]).
+//! [`super::least_squares`] solves them.
 
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3, Vector4};
 
-use crate::calibration::noise::{BY_HAND, Parts};
 use crate::calibration::{
     CalibrationError, Model, PARAMETERS, ParameterMatrix, ParameterVector, from_vector, parameter,
     sensor_and_parameter, to_vector,
 };
-use crate::imu::{Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
+use crate::imu::{GaussMarkov, Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 
 /// Maximum number of Gauss–Newton steps; scale factor errors of several percent need three.
 const STEPS: usize = 6;
@@ -32,13 +32,48 @@ pub struct Event {
     pub noise: PerSensor<Noise>,
 }
 
+/// Gauss–Markov bias variation over an event.
+pub struct Drift {
+    /// Its stationary variance.
+    pub variance: f64,
+    /// Its mean over the event, given its value at one end, divided by this value …
+    pub mean: f64,
+    /// … its value at the other end …
+    pub decay: f64,
+    /// … and its value at the begin, given that at the end of the event before; zero without one.
+    pub since: f64,
+}
+
+impl Event {
+    /// `None` if the bias of a triad does not vary.
+    pub fn drift(&self, sensor: Sensor, before: Option<&Self>) -> Option<Drift> {
+        let GaussMarkov {
+            sigma,
+            correlation_time,
+        } = self.noise.get(sensor).gauss_markov?;
+        let duration = (self.times[1] - self.times[0]) / correlation_time;
+        let before = before.filter(|before| before.recording == self.recording);
+        let since = |before: &Self| (self.times[0] - before.times[1]).max(0.0) / correlation_time;
+        Some(Drift {
+            variance: sigma.powi(2),
+            mean: -(-duration).exp_m1() / duration,
+            decay: (-duration).exp(),
+            since: before.map_or(0.0, |before| (-since(before)).exp()),
+        })
+    }
+}
+
 /// An error vector common to several rows.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Common {
     /// Mean noise of a triad over the event with this number.
     Noise(Sensor, usize),
+    /// Bias variation of a triad at the end of the event with this number.
+    Drift(Sensor, usize),
     /// A vector with unit covariance, by number.
     Unit(usize),
+    /// A vector with unit covariance, by number, that both triads have in common: an error of the table.
+    Table(usize),
 }
 
 /// Rows of the observations in one event.
@@ -52,8 +87,6 @@ pub struct Rows<const N: usize> {
     pub own: SVector<f64, N>,
     /// Response of the residuals to errors common to several rows.
     pub common: Vec<(Common, SMatrix<f64, N, 3>)>,
-    /// Variance due to each of [`BY_HAND`] for unit σ in SI and radians.
-    pub by_hand: [f64; BY_HAND.len()],
 }
 
 impl<const N: usize> Rows<N> {
@@ -66,7 +99,6 @@ impl<const N: usize> Rows<N> {
             weighted: SVector::repeat(variance),
             own: SVector::repeat(variance),
             common: Vec::new(),
-            by_hand: Default::default(),
         }
     }
 }
@@ -76,20 +108,12 @@ pub struct Equations {
     /// The unknown parameters of both triads.
     pub unknown: Vec<usize>,
     /// Their prior: mean divided by σ, and σ (infinite without a prior).
-    mean: DVector<f64>,
-    sigma: DVector<f64>,
-    rows: Vec<Rows<1>>,
+    pub mean: DVector<f64>,
+    pub sigma: DVector<f64>,
+    pub rows: Vec<Rows<1>>,
     pub events: Vec<Event>,
-    /// Whether rows are weighted by the inverse of their full covariance instead of their variances.
+    /// Whether [`Self::solved`] weights rows by the inverse of their full covariance instead of their variances.
     pub correlated: bool,
-}
-
-/// Gain of the estimate from …
-pub struct Gain {
-    /// … the prior mean divided by its σ, …
-    of_prior: DMatrix<f64>,
-    /// … and the scaled residuals.
-    of_rows: DMatrix<f64>,
 }
 
 impl Equations {
@@ -127,13 +151,13 @@ impl Equations {
                     .iter()
                     .map(|(of, by)| (*of, by.fixed_rows::<1>(k).into_owned())),
             ),
-            by_hand: rows.by_hand,
         };
         self.rows.extend((0..N).map(row));
     }
 
-    pub fn count(&self) -> usize {
-        self.rows.len()
+    /// Partial derivatives of a row with respect to the unknowns.
+    pub fn partials<'a>(&'a self, row: &'a Rows<1>) -> impl Iterator<Item = f64> + 'a {
+        self.unknown.iter().map(|&index| row.partials[index])
     }
 
     /// Partial derivatives with respect to the unknowns, and residuals, each row divided by its weighting σ.
@@ -154,102 +178,6 @@ impl Equations {
         (design * DMatrix::from_diagonal(&self.sigma), residual)
     }
 
-    /// Covariance of the errors of the scaled rows.
-    pub fn errors(&self) -> DMatrix<f64> {
-        let (rows, events) = (&self.rows, &self.events);
-        let of_noise = PerSensor::from_fn(|sensor| {
-            DMatrix::from_fn(events.len(), events.len(), |i, j| {
-                let (one, other) = (&events[i], &events[j]);
-                let noise = one.noise.get(sensor);
-                match one.recording == other.recording {
-                    true if i == j => *one.variance.get(sensor),
-                    true => noise.covariance_of_means(one.times, other.times),
-                    false => 0.0,
-                }
-            })
-        });
-        let covariance = |one: Common, other: Common| match (one, other) {
-            (Common::Noise(of, i), Common::Noise(sensor, j)) if of == sensor => {
-                of_noise.get(sensor)[(i, j)]
-            }
-            _ => f64::from(u8::from(one == other)),
-        };
-        let mut errors = DMatrix::zeros(rows.len(), rows.len());
-        for (i, one) in rows.iter().enumerate() {
-            for (j, other) in rows[..=i].iter().enumerate() {
-                let mut sum = if i == j { one.own.x } else { 0.0 };
-                for (of_one, by_one) in &one.common {
-                    for (of_other, by_other) in &other.common {
-                        sum += covariance(*of_one, *of_other) * by_one.dot(by_other);
-                    }
-                }
-                errors[(i, j)] = sum / (one.weighted.x * other.weighted.x).sqrt();
-                errors[(j, i)] = errors[(i, j)];
-            }
-        }
-        errors
-    }
-
-    /// Least squares of rows and prior: x = R⁻¹ Qᵀ y, without normal equations.
-    pub fn gain(&self) -> Option<Gain> {
-        let (design, _) = self.scaled();
-        let (count, unknown) = design.shape();
-        let factor = match self.correlated {
-            true => Some(self.errors().cholesky()?.l()),
-            false => None,
-        };
-        let mut stacked = DMatrix::from_diagonal(&self.sigma.map(f64::recip));
-        stacked = stacked.resize_vertically(unknown + count, 0.0);
-        stacked.rows_mut(unknown, count).copy_from(&match &factor {
-            Some(factor) => factor.solve_lower_triangular(&design)?,
-            None => design,
-        });
-        let qr = stacked.qr();
-        let gain = qr.r().solve_upper_triangular(&qr.q().transpose())?;
-        let of_rows = gain.columns(unknown, count).transpose();
-        let of_rows = match &factor {
-            Some(factor) => factor.tr_solve_lower_triangular(&of_rows)?,
-            None => of_rows,
-        };
-        Some(Gain {
-            of_prior: gain.columns(0, unknown).into_owned(),
-            of_rows: of_rows.transpose(),
-        })
-    }
-
-    /// The unknowns from a gain.
-    pub fn found(&self, gain: &Gain) -> DVector<f64> {
-        &gain.of_prior * &self.mean + &gain.of_rows * self.scaled().1
-    }
-
-    /// Least-squares δθ; if it is not a number, an error that names the triad.
-    pub fn step(&self) -> Result<ParameterVector, CalibrationError> {
-        let mut step = ParameterVector::zeros();
-        let Some(&first) = self.unknown.first() else {
-            return Ok(step);
-        };
-        let singular = |index: usize| CalibrationError::Singular {
-            sensor: sensor_and_parameter(index).0,
-        };
-        let found = self.found(&self.gain().ok_or_else(|| singular(first))?);
-        for (&index, &value) in self.unknown.iter().zip(&found) {
-            step[index] = value;
-        }
-        let lost = step.iter().position(|value| !value.is_finite());
-        lost.map_or(Ok(step), |index| Err(singular(index)))
-    }
-
-    /// Covariance of the unknowns due to prior and errors.
-    pub fn covariance(&self, gain: &Gain) -> DMatrix<f64> {
-        let of_errors = &gain.of_rows * self.errors() * gain.of_rows.transpose();
-        &gain.of_prior * gain.of_prior.transpose() + of_errors
-    }
-
-    /// Covariance of the change of the unknowns from a correct prior by the data.
-    pub fn covariance_of_distance(&self, gain: &Gain) -> DMatrix<f64> {
-        &gain.of_rows * self.before_data().1 * gain.of_rows.transpose()
-    }
-
     /// Expands a matrix of the unknowns to all parameters.
     pub fn whole(&self, of_unknowns: &DMatrix<f64>) -> ParameterMatrix {
         let place = |k: usize| self.unknown.iter().position(|&index| index == k);
@@ -259,56 +187,17 @@ impl Equations {
         })
     }
 
-    /// Response of the estimate to the first unit-covariance errors, three columns each.
-    pub fn by_units(&self, gain: &Gain, count: usize) -> DMatrix<f64> {
-        let mut by_units = DMatrix::zeros(self.unknown.len(), 3 * count);
-        for unit in 0..count {
-            let by_unit = &gain.of_rows * self.by_unit(unit);
-            by_units
-                .fixed_columns_mut::<3>(3 * unit)
-                .copy_from(&by_unit);
+    /// Variance of a common error, per component.
+    pub fn variance_of(&self, of: Common) -> f64 {
+        match of {
+            Common::Noise(sensor, event) => *self.events[event].variance.get(sensor),
+            Common::Drift(..) | Common::Unit(_) | Common::Table(_) => 1.0,
         }
-        by_units
-    }
-
-    /// Response of the scaled rows to a unit-covariance error.
-    pub fn by_unit(&self, unit: usize) -> DMatrix<f64> {
-        let mut by_unit = DMatrix::zeros(self.rows.len(), 3);
-        for (row, mut place) in self.rows.iter().zip(by_unit.row_iter_mut()) {
-            for (of, by) in &row.common {
-                if *of == Common::Unit(unit) {
-                    place += by / row.weighted.x.sqrt();
-                }
-            }
-        }
-        by_unit
-    }
-
-    /// Residuals of the scaled rows before the fit, and their covariance due to prior and errors.
-    pub fn before_data(&self) -> (DVector<f64>, DMatrix<f64>) {
-        let (spread, residual) = self.in_sigmas();
-        let covariance = &spread * spread.transpose() + self.errors();
-        (residual - spread * &self.mean, covariance)
-    }
-
-    /// Contribution of each source in [`BY_HAND`] to each scaled row.
-    pub fn by_hand(&self) -> Parts {
-        std::array::from_fn(|source| {
-            let part = |k: usize, _| self.rows[k].by_hand[source] / self.rows[k].weighted.x;
-            DVector::from_fn(self.rows.len(), part)
-        })
     }
 
     /// Residual and weight of each row.
     pub fn weighted(&self) -> impl Iterator<Item = (f64, f64)> {
         self.rows.iter().map(|row| (row.residual.x, row.weighted.x))
-    }
-
-    /// The rows of each event with rows, by its number.
-    pub fn by_event(&self) -> Vec<(usize, Vec<usize>)> {
-        let of = |event| (0..self.rows.len()).filter(move |&k| self.rows[k].event == event);
-        let groups = (0..self.events.len()).map(|event| (event, Vec::from_iter(of(event))));
-        groups.filter(|(_, rows)| !rows.is_empty()).collect()
     }
 }
 
@@ -331,15 +220,15 @@ pub fn of_parameters(triad: &Triad, input: &Vector3<f64>) -> OfTriad<3> {
     OfTriad::from_columns(&triad.response().map(|response| response * input.push(1.0)))
 }
 
-/// Iterates from a first point with new equations at each step, until no parameter changes by more than this.
+/// Iterates from a first point with a step from each, until no parameter changes by more than this.
 pub fn gauss_newton(
     from: PerSensor<Triad>,
     smallest: &ParameterVector,
-    equations: impl Fn(&PerSensor<Triad>) -> Result<Equations, CalibrationError>,
+    step: impl Fn(&PerSensor<Triad>) -> Result<ParameterVector, CalibrationError>,
 ) -> Result<PerSensor<Triad>, CalibrationError> {
     let mut triads = from;
     for _ in 0..STEPS {
-        let step = equations(&triads)?.step()?;
+        let step = step(&triads)?;
         triads = from_vector(triads.gyro.form, &(to_vector(&triads) + step));
         let mut parameters = step.iter().zip(smallest);
         if parameters.all(|(step, least)| step.abs() <= *least) {

@@ -10,6 +10,7 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
+use super::equations::Common;
 use super::positions::{Known, Observed, Position};
 use crate::attitude::{exp, skew};
 use crate::earth::ROTATION_RATE;
@@ -20,6 +21,8 @@ use crate::run::{Dwell, MeanOutput, Run};
 
 /// Step of the integration of turns, s; within one step, a hand turns by a few degrees.
 const STEP: f64 = 0.02;
+/// The mean reduction of all inputs by tilts.
+const SHORTENED: Common = Common::Unit(usize::MAX);
 
 /// The used part of a labelled section.
 #[derive(Debug, Clone)]
@@ -93,7 +96,6 @@ pub fn observed(run: &Run, rests: &[Rest], sections: &[Section]) -> PerSensor<Ob
     PerSensor::from_fn(|sensor| Observed {
         sensor,
         noise: *run.instrument.noise.get(sensor),
-        base_sigma: None,
         known: match sensor {
             Sensor::Gyro => of_gyros(run, rests, sections),
             Sensor::Accel => of_accelerometers(run, sections),
@@ -107,7 +109,7 @@ fn of_gyros(run: &Run, rests: &[Rest], sections: &[Section]) -> Vec<Known> {
     let level = run.site.earth_rate_n().y;
     let directions = directions(run, rests, sections);
     // After those of the directions: the rests in which turns begin and end, or ends for themselves.
-    let first = 2 + directions.iter().map(|of| of.number + 1).max().unwrap_or(0);
+    let first = directions.iter().map(|of| of.number + 1).max().unwrap_or(0);
     let mut ends: Vec<Option<usize>> = Vec::new();
     let mut number_of_end = |sample: usize| {
         let rest = rest_at(rests, sample);
@@ -143,14 +145,16 @@ fn of_gyros(run: &Run, rests: &[Rest], sections: &[Section]) -> Vec<Known> {
                     // or end in that position, and by angles across it.
                     let of_end = axis * axis.transpose() * (sigma / section.duration());
                     let last = section.samples.end.saturating_sub(1);
-                    errors.push((number_of_end(section.samples.start), -of_end));
-                    errors.push((number_of_end(last), of_end));
+                    let begin = number_of_end(section.samples.start);
+                    errors.push((Common::Unit(begin), -of_end));
+                    errors.push((Common::Unit(number_of_end(last)), of_end));
                     let ends = across(&axis) * (2.0 * (sigma / section.duration()).powi(2));
                     (carried, set_by_hand(sigma, rate, output, noise + ends))
                 }
             };
-            errors.push((1, shortened(&position, sigma)));
-            errors.push((2 + direction.number, carried * direction.spread));
+            errors.push((SHORTENED, shortened(&position, sigma)));
+            let of_direction = Common::Unit(direction.number);
+            errors.push((of_direction, carried * direction.spread));
             Known {
                 position,
                 times: section.times,
@@ -235,9 +239,12 @@ fn shortened(position: &Position, sigma: f64) -> Matrix3<f64> {
 }
 
 /// The same, with the tilts about each axis of the position with this number.
-fn by_tilts(position: &Position, sigma: f64, number: usize) -> [(usize, Matrix3<f64>); 2] {
+fn by_tilts(position: &Position, sigma: f64, number: usize) -> [(Common, Matrix3<f64>); 2] {
     let tilts = skew(position.input) * sigma;
-    [(1, shortened(position, sigma)), (2 + number, tilts)]
+    [
+        (SHORTENED, shortened(position, sigma)),
+        (Common::Unit(number), tilts),
+    ]
 }
 
 /// Earth rate along body axes at the start of a section.
@@ -353,7 +360,7 @@ mod tests {
     use crate::units::DEGREE;
 
     /// How an input follows errors, by number.
-    type Errors = Vec<(usize, Matrix3<f64>)>;
+    type Errors = Vec<(Common, Matrix3<f64>)>;
 
     /// Squared errors over variances of scale factors, installation and biases, from this many sets of
     /// positions that are each off by random tilts.
@@ -384,7 +391,6 @@ mod tests {
             let observed = Observed {
                 sensor: Sensor::Accel,
                 noise: Noise::default(),
-                base_sigma: None,
                 known: known.collect(),
             };
             let Fit {
@@ -409,7 +415,7 @@ mod tests {
     }
 
     fn only_shortened(_: usize, position: &Position, sigma: f64) -> Errors {
-        vec![(1, shortened(position, sigma))]
+        vec![(SHORTENED, shortened(position, sigma))]
     }
 
     #[test]

@@ -1,13 +1,18 @@
 //! One triad from its mean outputs under known inputs, by generalised least squares.
 
-use nalgebra::{DMatrix, Matrix3, Matrix4x3, SMatrix, Vector3};
+use std::collections::BTreeMap;
+
+use nalgebra::{Matrix3, Matrix4x3, SMatrix, Vector3};
 
 use super::equations::{
-    Common, Equations, Event, Gain, OfTriad, Rows, gauss_newton, of, of_parameters, of_sensitivity,
+    Common, Equations, Event, OfTriad, Rows, gauss_newton, of, of_parameters, of_sensitivity,
 };
+use super::least_squares::Solution;
 use crate::calibration::checks::residuals::Residuals;
 use crate::calibration::parameters::derivatives;
-use crate::calibration::{CalibrationError, Model, ParameterVector, from_vector, parameter};
+use crate::calibration::{
+    CalibrationError, Model, ParameterVector, from_vector, parameter, to_vector,
+};
 use crate::imu::{
     InstallationForm, Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad, TriadVector,
 };
@@ -18,8 +23,6 @@ const SMALLEST_EIGENVALUE: f64 = 1e-4;
 const SMALL: f64 = 1e-6;
 /// σ of an output without stated noise, divided by the largest input.
 const NOISELESS: f64 = 1e-9;
-/// Number of the error of a table's base: of 1 rad about East, North and Up.
-pub const BASE: usize = 0;
 
 /// The mean output of a triad under a known input, at a position or over a turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,8 +43,8 @@ pub struct Known {
     pub position: Position,
     /// Begin and end, s.
     pub times: [f64; 2],
-    /// Response of the input to unit-covariance errors, by number, and to that of the [`BASE`].
-    pub errors: Vec<(usize, Matrix3<f64>)>,
+    /// Response of the input to unit-covariance errors.
+    pub errors: Vec<(Common, Matrix3<f64>)>,
 }
 
 /// Positions of a triad.
@@ -49,8 +52,6 @@ pub struct Known {
 pub struct Observed {
     pub sensor: Sensor,
     pub noise: Noise,
-    /// 1σ of the table's base, rad; `None` without a table.
-    pub base_sigma: Option<Vector3<f64>>,
     pub known: Vec<Known>,
 }
 
@@ -59,30 +60,12 @@ pub struct Observed {
 pub struct Fit {
     pub triad: Triad,
     pub covariance: SMatrix<f64, PER_TRIAD, PER_TRIAD>,
-    /// Response to the common errors of its inputs, three columns each.
-    pub by_errors: DMatrix<f64>,
+    /// Response to each error of the table, by number.
+    pub by_table: BTreeMap<usize, SMatrix<f64, PER_TRIAD, 3>>,
+    pub residuals: Residuals,
 }
 
 impl Observed {
-    /// The same with additional variance on every axis of these positions, as from an independent bias at each.
-    pub fn widened(&self, variance: f64, places: &[usize]) -> Self {
-        let mut wider = self.clone();
-        for &place in places {
-            let position = &mut wider.known[place].position;
-            position.variance.add_scalar_mut(variance);
-            position.weighted.add_scalar_mut(variance);
-        }
-        wider
-    }
-
-    /// The same with a table base known to this σ, rad.
-    pub fn on_base(&self, sigma: f64) -> Self {
-        Self {
-            base_sigma: self.base_sigma.map(|_| Vector3::repeat(sigma)),
-            ..self.clone()
-        }
-    }
-
     /// Largest input.
     fn size(&self) -> f64 {
         let inputs = self.known.iter().map(|known| known.position.input.norm());
@@ -97,7 +80,10 @@ impl Observed {
         partials: impl Fn(&Vector3<f64>) -> OfTriad<3>,
     ) -> Equations {
         let least = (NOISELESS * self.size()).powi(2);
-        let base_sigma = self.base_sigma.unwrap_or_default();
+        let drift = Noise {
+            random_walk: 0.0,
+            ..self.noise
+        };
         for (
             event,
             Known {
@@ -107,26 +93,20 @@ impl Observed {
             },
         ) in self.known.iter().enumerate()
         {
+            let drifted = drift.covariance_of_means(*times, *times);
             equations.events.push(Event {
                 recording: 0,
                 times: *times,
-                variance: PerSensor::default(),
-                noise: PerSensor::from_fn(|_| self.noise),
+                variance: PerSensor::from_fn(|_| drifted),
+                noise: PerSensor::from_fn(|_| drift),
             });
-            let mut common = vec![(Common::Noise(self.sensor, event), Matrix3::identity())];
-            for &(number, of_input) in errors {
-                let sigma = match number {
-                    BASE => base_sigma,
-                    _ => Vector3::repeat(1.0),
-                };
-                let of_output = a * of_input * Matrix3::from_diagonal(&sigma);
-                common.push((Common::Unit(number), of_output));
-            }
+            let of_noise = (Common::Noise(self.sensor, event), Matrix3::identity());
+            let of_input = errors.iter().map(|&(of, by)| (of, a * by));
             equations.add(&Rows {
                 event,
                 weighted: position.weighted.map(|v| v.max(least)),
-                own: position.variance.map(|v| v.max(least)),
-                common,
+                own: position.variance.map(|v| (v - drifted).max(least)),
+                common: std::iter::once(of_noise).chain(of_input).collect(),
                 ..Rows::new(
                     of(self.sensor, &partials(&position.input)),
                     position.output - a * position.input - bias,
@@ -149,24 +129,19 @@ impl Observed {
         self.add(equations, at, partials)
     }
 
-    /// Equations of the parameters of a triad and their prior.
-    fn of_parameters(&self, model: &Model, triads: &PerSensor<Triad>) -> Equations {
+    /// Solution for the parameters of a triad, about these values, with their prior.
+    fn with_prior(
+        &self,
+        model: &Model,
+        triads: &PerSensor<Triad>,
+    ) -> Result<Solution, CalibrationError> {
         let triad = triads.get(self.sensor);
         let equations = Equations::of_triads(model, triads, &[self.sensor]);
         let at = (triad.sensitivity(), triad.bias);
+        let sensor = self.sensor;
         self.add(equations, at, |input| of_parameters(triad, input))
-    }
-
-    /// Equations of `A` and `D` about a triad.
-    pub fn about(&self, triad: &Triad) -> Equations {
-        self.of_sensitivity((triad.sensitivity(), triad.bias))
-    }
-
-    /// Residuals of positions after the best-fit triad, with the input errors propagated through this one.
-    pub fn residuals(&self, triad: &Triad) -> Option<Residuals> {
-        let equations = self.about(triad);
-        let (design, residual) = equations.scaled();
-        Residuals::new(&design, &residual, &equations.errors())
+            .solved()
+            .ok_or(CalibrationError::Singular { sensor })
     }
 
     /// One triad from positions, with the prior if the positions do not determine every parameter better.
@@ -181,20 +156,12 @@ impl Observed {
         }
         let prior = from_vector(model.form, &model.prior_mean);
         let smallest = model.prior_sigma * SMALL;
-        let equations = |triads: &PerSensor<Triad>| Ok(self.of_parameters(model, triads));
-        let triads = gauss_newton(prior, &smallest, equations)?;
-        let equations = self.of_parameters(model, &triads);
-        let sensor = self.sensor;
-        let gain = equations
-            .gain()
-            .ok_or(CalibrationError::Singular { sensor })?;
-        let unknown: Vec<usize> = equations
-            .unknown
-            .iter()
-            .map(|index| index - first)
-            .collect();
-        let by_unknowns = DMatrix::identity(PER_TRIAD, PER_TRIAD).select_columns(&unknown);
-        Ok(self.fit(*triads.get(sensor), &equations, &gain, &by_unknowns))
+        let step = |triads: &PerSensor<Triad>| Ok(self.with_prior(model, triads)?.step);
+        let triads = gauss_newton(prior, &smallest, step)?;
+        let solution = self.with_prior(model, &triads)?;
+        let triads = from_vector(model.form, &(to_vector(&triads) + solution.step));
+        let identity = SMatrix::identity();
+        Ok(self.fit(*triads.get(self.sensor), solution, &identity))
     }
 
     /// One triad from positions alone: least squares for `A = K C` and `D` row by row, then the split of the form.
@@ -206,13 +173,11 @@ impl Observed {
             return None;
         }
         // The errors of the inputs reach the outputs through the triad itself.
-        let mut gain = None;
-        for _ in 0..2 {
-            let by_rows = equations.gain()?;
-            rows += TriadVector::from_column_slice(equations.found(&by_rows).as_slice());
-            equations = self.of_sensitivity(sensitivity_and_bias(&rows));
-            gain = Some(by_rows);
-        }
+        let first = parameter(self.sensor, 0);
+        rows += equations.solved()?.step.fixed_rows::<PER_TRIAD>(first);
+        equations = self.of_sensitivity(sensitivity_and_bias(&rows));
+        let solution = equations.solved()?;
+        rows += solution.step.fixed_rows::<PER_TRIAD>(first);
         let split = |rows: &TriadVector| {
             let (a, bias) = sensitivity_and_bias(rows);
             Triad::from_sensitivity(form, &a, bias)
@@ -220,25 +185,28 @@ impl Observed {
         let triad = split(&rows);
         triad.correction()?;
         let by_rows = derivatives(&rows, |rows| split(rows).to_vector());
-        let by_rows = DMatrix::from_fn(PER_TRIAD, PER_TRIAD, |i, j| by_rows[(i, j)]);
-        Some(self.fit(triad, &equations, &gain?, &by_rows))
+        Some(self.fit(triad, solution, &by_rows))
     }
 
-    /// A triad from a gain, given the derivatives of its parameters with respect to the unknowns.
+    /// A triad from a solution, given the derivatives of its parameters with respect to those of the solution.
     fn fit(
         &self,
         triad: Triad,
-        equations: &Equations,
-        gain: &Gain,
-        by_unknowns: &DMatrix<f64>,
+        solution: Solution,
+        by_solved: &SMatrix<f64, PER_TRIAD, PER_TRIAD>,
     ) -> Fit {
-        let covariance = by_unknowns * equations.covariance(gain) * by_unknowns.transpose();
-        let numbers = self.known.iter().flat_map(|known| &known.errors);
-        let count = numbers.map(|(number, _)| number + 1).max().unwrap_or(0);
+        let first = parameter(self.sensor, 0);
+        let covariance = solution.covariance.fixed_view::<PER_TRIAD, PER_TRIAD>(first, first);
+        let by_table = solution.by_table.into_iter();
+        let by_table = by_table.map(|(number, by)| {
+            let of_triad = by.fixed_rows::<PER_TRIAD>(first);
+            (number, by_solved * of_triad)
+        });
         Fit {
             triad,
-            covariance: SMatrix::from_fn(|i, j| covariance[(i, j)]),
-            by_errors: by_unknowns * equations.by_units(gain, count),
+            covariance: by_solved * covariance * by_solved.transpose(),
+            by_table: by_table.collect(),
+            residuals: solution.residuals,
         }
     }
 }
@@ -280,7 +248,6 @@ pub fn six_position_triad(
         // Of either triad alike.
         sensor: Sensor::Gyro,
         noise: Noise::default(),
-        base_sigma: None,
         known: known.collect(),
     };
     let fit = observed.determined(form)?;

@@ -4,9 +4,9 @@ use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::equations::{Equations, Partials, Rows, of};
+use super::equations::{Common, Equations, Partials, Rows, of};
 use super::gravity::ROUNDING;
-use super::positions::{BASE, Known, Observed, Position};
+use super::positions::{Known, Observed, Position};
 use crate::attitude::{log, skew};
 use crate::calibration::linearisation::singular;
 use crate::calibration::problem::Stretch;
@@ -39,21 +39,22 @@ pub fn positions(problem: &Problem, dwells: &[Dwell], sensor: Sensor) -> Option<
         let MeanOutput { output, variance } = dwell.mean(sensor, run);
         let variance = Vector3::repeat(variance);
         let of_input = position.attitude.tr_mul(&skew(sensed));
-        let mut errors = vec![(BASE, of_input)];
+        let of_base = Matrix3::from_diagonal(&model.geometry.base);
+        let mut errors = vec![(Common::Table(0), of_input * of_base)];
         let angles = run.recording.table.as_ref().map(|table| &table.axes);
         if let Some(angles) = angles.and_then(|of| of.get(position.readings.start)) {
             let response = axis_response(angles);
             for k in (0..axes.len()).filter(|&k| axes[k] > 0.0) {
                 let mut of_axis = Matrix3::zeros();
                 of_axis.set_column(0, &(of_input * response.column(k) * axes[k]));
-                errors.push((1 + k, of_axis));
+                errors.push((Common::Table(1 + k), of_axis));
             }
         }
         let readings = position.readings.len() as f64;
         let of_dwell = model
             .position_sigma
             .hypot(model.reading_sigma / readings.sqrt());
-        errors.push((1 + axes.len() + number, of_input * of_dwell));
+        errors.push((Common::Unit(number), of_input * of_dwell));
         Some(Known {
             position: Position {
                 input: position.attitude.tr_mul(&sensed),
@@ -68,7 +69,6 @@ pub fn positions(problem: &Problem, dwells: &[Dwell], sensor: Sensor) -> Option<
     Some(Observed {
         sensor,
         noise: *run.instrument.noise.get(sensor),
-        base_sigma: Some(Vector3::from_fn(|k, _| model.geometry.base[k])),
         known: known.collect::<Option<_>>()?,
     })
 }

@@ -128,10 +128,6 @@ kinds! {
     Rounded = "W22" "rounded" Care:
         "The log rounds values more coarsely than their noise, so averaging cannot recover the mean within a step. σ \
          include this error. Log more digits or raw counts."
-    ChangesInTime = "W23" "changes-in-time" Care:
-        "The residuals show a parameter that drifts during the recording. The calibration contains its mean. Let the \
-         instrument \
-         warm up, keep its temperature constant, or use --temperature if the log has a temperature column."
     EvenTermsInseparable = "W24" "even-terms-inseparable" Care:
         "When an axis points up or down, the second-order term and the asymmetry of its accelerometer have the same \
          effect. Add dwells with axes at about 45°, or switch off one of the two terms."
@@ -150,9 +146,10 @@ kinds! {
         "A labelled section was skipped because too many rows are missing. Record it again, or remove it from \
          [segments]."
     ResidualsLarge = "W29" "residuals-large" Care:
-        "The closed form leaves residuals that stated noise and table errors do not explain. turncal widened σ to \
-         match. The finding names the interval with the largest residual: look there for a bump, a wrong label or a \
-         wrong attitude. Otherwise check the noise figures and the level and north of the table."
+        "The closed form leaves residuals that stated noise and table errors do not explain. turncal widened all σ by \
+         √(χ²/ν), the Birge ratio. The finding names the interval with the largest residual: look there for a bump, a \
+         wrong label or a wrong attitude. Otherwise check the noise figures, drifts of bias or scale factors, and the \
+         level and north of the table."
     StatementDoubted = "W30" "statement-doubted" Care:
         "Some data in run.toml contradict the log: for example, gravity far from normal gravity at the site, a \
          constant or duplicate column, or a table log from a different time or clock. Each of these can change the \
@@ -178,8 +175,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn codes_are_numbered_through_and_names_are_distinct() {
-        for (number, kind) in (1..).zip(Kind::ALL) {
+    fn codes_rise_without_those_that_are_no_longer_given_and_names_are_distinct() {
+        const RETIRED: [usize; 1] = [23];
+        let numbers = (1..).filter(|number| !RETIRED.contains(number));
+        for (number, kind) in numbers.zip(Kind::ALL) {
             assert_eq!(kind.code(), format!("W{number:02}"));
             assert_eq!(Kind::named(kind.name()), Some(*kind));
             assert_eq!(Kind::named(&kind.code().to_lowercase()), Some(*kind));

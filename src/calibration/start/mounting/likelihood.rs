@@ -217,7 +217,7 @@ fn add_earth_rate(
 
 /// Logarithm of the likelihood of the residuals, with the unknowns integrated out.
 fn log_likelihood(equations: &Equations, too_small: TooSmall) -> f64 {
-    if equations.count() == 0 {
+    if equations.rows.is_empty() {
         return 0.0;
     }
     let (design, residual) = equations.in_sigmas();
