@@ -3,7 +3,6 @@
 mod certainty;
 mod columns;
 mod convert;
-mod data_sheet;
 mod found;
 mod motion;
 mod name;

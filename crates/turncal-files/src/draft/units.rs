@@ -1,13 +1,14 @@
 //! Quantity and units of a row: each unit of `run.toml` is compared with gravity at rest or its rotation.
 
+mod data_sheet;
 mod hypothesis;
 
 use nalgebra::Vector3;
 
+use data_sheet::{Scale, likely_for_g};
 use hypothesis::{Hypothesis, TriadRows};
 
 use super::columns::Columns;
-use super::data_sheet::{Scale, likely_for_g};
 use super::motion::{Motion, TOLERANCE};
 use super::name::Name;
 use super::raw_run::Axes;

@@ -2,9 +2,9 @@
 
 use nalgebra::Vector3;
 
-use super::motion::TOLERANCE;
-use super::name::Unit;
-use super::raw_run::{Axes, Gravity};
+use crate::draft::motion::TOLERANCE;
+use crate::draft::name::Unit;
+use crate::draft::raw_run::{Axes, Gravity};
 use crate::unit_scale;
 use turncal::imu::{Output, Sensor};
 use turncal::number::rounded;
