@@ -188,6 +188,7 @@ impl Evaluation {
     pub fn of_run(run: &Run, options: &Options) -> Result<Self, PathError> {
         let problem = Problem::new(run, options);
         let start = coarse_start(&problem)?;
+        let problem = start.by_hand(&problem).unwrap_or(problem);
         let (evaluation, _) = Self::new(&problem, (&start.at.triads, &TermVector::zeros()), &[])?;
         Ok(evaluation)
     }

@@ -173,6 +173,7 @@ impl Expected {
 pub fn bound_of_record(run: &Run, options: &Options) -> Result<Bound, CalibrationError> {
     let problem = Problem::new(run, options);
     let start = coarse_start(&problem)?;
+    let problem = start.by_hand(&problem).unwrap_or(problem);
     bound(&problem, &start.at.triads, &TermVector::zeros())
 }
 

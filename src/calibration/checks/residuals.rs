@@ -29,6 +29,16 @@ impl Residuals {
         ratio.sqrt().max(1.0)
     }
 
+    /// Limit of χ² if the stated errors are right.
+    fn limit(&self) -> f64 {
+        chi_square_limit(self.degrees as f64, FALSE_ALARM / TRIADS)
+    }
+
+    /// Whether they are beyond chance.
+    pub fn are_large(&self) -> bool {
+        self.chi_square > self.limit()
+    }
+
     /// The finding on residuals of `gyro`, `accel` or `both triads` beyond chance.
     pub fn finding(&self, of: &str) -> Option<Finding> {
         let Self {
@@ -36,8 +46,7 @@ impl Residuals {
             degrees,
             worst: [begin, end],
         } = *self;
-        let limit = chi_square_limit(degrees as f64, FALSE_ALARM / TRIADS);
-        let growth = self.growth();
+        let (limit, growth) = (self.limit(), self.growth());
         let text = format!(
             "The static fit of {of} is poor (χ² {chi_square:.0} with {degrees} degrees of freedom; limit {limit:.0}). \
              turncal widened σ {}. The worst interval is {begin:.1}–{end:.1} s. Look there for a bump, a wrong label or \
@@ -49,6 +58,6 @@ impl Residuals {
             "of": of, "chi_square": chi_square, "degrees": degrees, "limit": limit, "growth": growth,
             "worst": [[begin, end]]
         });
-        (chi_square > limit).then(|| Finding::new(Kind::ResidualsLarge, text, figures))
+        self.are_large().then(|| Finding::new(Kind::ResidualsLarge, text, figures))
     }
 }

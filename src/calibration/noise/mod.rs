@@ -5,6 +5,7 @@
 //! (Patterson and Thompson 1971, Biometrika 58(3)): no degree of freedom is lost to them. The estimated noise
 //! is stored in the [`super::Model`], so that every later pass uses it.
 
+mod by_hand;
 mod factors;
 mod fit;
 mod learn;
@@ -14,6 +15,7 @@ mod report;
 mod source;
 pub mod variances;
 
+pub use by_hand::{BY_HAND, ByHand, Parts};
 pub use fit::LOG_SIGMA;
 pub use learn::learn;
 pub use policy::NoisePolicy;

@@ -152,7 +152,7 @@ fn symbol(unit: &str) -> String {
 
 /// The finding on estimated noise: −2 ln of the likelihood ratio of stated to estimated noise, its limit, and the
 /// sources. `None` if no noise was stated.
-pub fn noise_learnt(
+fn noise_learnt(
     problem: &Problem,
     (ratio, limit): (f64, f64),
     sources: &[SourceFigures],

@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::{Model, Problem};
-use crate::imu::{GaussMarkov, NoiseKeys, Sensor};
+use crate::imu::{GaussMarkov, NoiseKeys, PerSensor, Sensor};
+use crate::navigation::ProcessNoise;
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ};
 
 const GYRO: NoiseKeys = NoiseKeys::of(Sensor::Gyro);
@@ -84,6 +85,17 @@ sources! {
 }
 
 impl Source {
+    /// Process noise of this source alone with unit σ in SI and radians, if it is gyro noise in moves.
+    pub(in crate::calibration) fn alone(self) -> PerSensor<ProcessNoise> {
+        let mut noise = PerSensor::<ProcessNoise>::default();
+        match self {
+            Self::GyroMotion => noise.gyro.by_motion = 1.0,
+            Self::GyroMoving => noise.gyro.by_duration = 1.0,
+            _ => {}
+        }
+        noise
+    }
+
     /// Whether the run states a nonzero figure for it.
     pub(in crate::calibration) fn stated(self, problem: &Problem) -> bool {
         let of_dwells = problem.run().standstill.sigma.get(self.triad());

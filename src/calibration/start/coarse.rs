@@ -7,13 +7,18 @@ use super::equations::{Equations, gauss_newton};
 use super::gravity::{AtRest, Chain, add_magnitude, events, up};
 use super::table;
 use crate::attitude::level;
+use crate::calibration::noise::ByHand;
 use crate::calibration::{
-    AttitudePrior, CalibrationError, Linearisation, ParameterVector, Problem, from_vector,
-    to_vector,
+    AttitudePrior, CalibrationError, Linearisation, NoisePolicy, ParameterVector, Problem,
+    from_vector, to_vector,
 };
 use crate::earth::Site;
 use crate::imu::{Sensor, TermVector};
 
+/// With more equations (a hundred dwells), parameters cannot absorb noise.
+const MOST_EQUATIONS: usize = 600;
+/// Maximum number of linearisation points at which noise is estimated.
+const NOISE_ROUNDS: usize = 6;
 /// A smaller step (1 ppm, 0.2″, and the same number in rad/s or m/s²) ends an iteration.
 const SMALL: f64 = 1e-6;
 /// Attitudes, heading and gyros are estimated alternately. Scale factor errors of several percent need four rounds …
@@ -28,6 +33,16 @@ pub struct CoarseStart {
     pub at: Linearisation,
     /// Prior of the initial attitude of each stretch.
     pub attitudes: Vec<AttitudePrior>,
+    /// Noise added by hand motion, if requested.
+    pub(in crate::calibration) by_hand: Option<ByHand>,
+}
+
+impl CoarseStart {
+    /// A problem with the noise of turning and holding by hand found at the start; `None` if there is none.
+    pub fn by_hand<'a>(&self, problem: &Problem<'a>) -> Option<Problem<'a>> {
+        let by_hand = self.by_hand.as_ref()?;
+        Some(problem.with_model(by_hand.model(problem)))
+    }
 }
 
 /// Both triads and the initial attitudes by least squares over whole dwells and moves.
@@ -54,11 +69,13 @@ pub fn coarse_start(problem: &Problem) -> Result<CoarseStart, CalibrationError> 
         return Ok(CoarseStart {
             at: Linearisation::new(triads, TermVector::zeros(), means),
             attitudes,
+            by_hand: None,
         });
     }
+    let (turned, by_hand) = calibrated_as_held(problem, &dwells)?;
     let Turned {
         at, heading_sigma, ..
-    } = calibrated(problem, &dwells)?;
+    } = turned;
     let sites = problem.stretches().iter().map(|s| &s.run.site);
     let attitudes = at.initial_attitudes.iter().zip(&heading_sigma).zip(sites);
     let of_alignment = |((attitude, &sigma), site): ((&Matrix3<f64>, &f64), &Site)| {
@@ -67,6 +84,7 @@ pub fn coarse_start(problem: &Problem) -> Result<CoarseStart, CalibrationError> 
     Ok(CoarseStart {
         attitudes: attitudes.map(of_alignment).collect(),
         at,
+        by_hand,
     })
 }
 
@@ -175,5 +193,48 @@ fn turned(
         at: at.clone(),
         heading_sigma: headings.iter().map(|heading| heading.sigma).collect(),
         equations,
+    })
+}
+
+/// The same with the noise added by hand motion, if the data show it although the residuals do not.
+fn calibrated_as_held(
+    problem: &Problem,
+    dwells: &[Vec<AtRest>],
+) -> Result<(Turned, Option<ByHand>), CalibrationError> {
+    let stated = calibrated(problem, dwells)?;
+    if stated.equations.rows.len() > MOST_EQUATIONS {
+        return Ok((stated, None));
+    }
+    // Residuals tell noise of all equations, where there are enough of them; else only the prior does.
+    let solution = stated.equations.solved();
+    let tell = solution.is_none_or(|solution| solution.residuals.are_large());
+    if tell || problem.options.noise == NoisePolicy::Stated {
+        return Ok((stated, None));
+    }
+    let likeliest = |turned: &Turned, used: &ByHand| {
+        let (errors, mut covariance) = turned.equations.before_data();
+        let parts = turned.equations.by_hand();
+        used.taken_from(&mut covariance, &parts);
+        ByHand::likeliest(&errors, &covariance, &parts).filter(|found| !found.is_none())
+    };
+    let with = |by_hand: &ByHand| calibrated(&problem.with_model(by_hand.model(problem)), dwells);
+    let Some(mut by_hand) = likeliest(&stated, &ByHand::default()) else {
+        return Ok((stated, None));
+    };
+    // What equations are linearised at follows noise, and noise that.
+    for _ in 0..NOISE_ROUNDS {
+        // What noise on trial leads nowhere with is not the noise of this recording.
+        let Ok(turned) = with(&by_hand) else {
+            return Ok((stated, None));
+        };
+        match likeliest(&turned, &by_hand) {
+            None => return Ok((stated, None)),
+            Some(here) if here.is_like(&by_hand) => return Ok((turned, Some(here))),
+            Some(here) => by_hand = here,
+        }
+    }
+    Ok(match with(&by_hand) {
+        Ok(turned) => (turned, Some(by_hand)),
+        Err(_) => (stated, None),
     })
 }

@@ -6,8 +6,9 @@ use super::equations::{Equations, Rows, of};
 use super::gravity::{AtRest, Chain, Heading, ROUNDING, input_errors, of_noise};
 use crate::attitude::exp;
 use crate::calibration::linearisation::singular;
+use crate::calibration::noise::BY_HAND;
 use crate::calibration::problem::Stretch;
-use crate::calibration::{CalibrationError, Model};
+use crate::calibration::{CalibrationError, Model, Source};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{PerSensor, Sensor, Triad};
 
@@ -97,7 +98,8 @@ pub fn add_rates(
         let attitude = heading.turn * attitude;
         let rate = correction * (dwell.mean.gyro.output - triad.bias);
         let partials = input_errors(triad, &correction, &rate);
-        let own = model.turning_at_rest.powi(2) / dwell.duration() + ROUNDING.powi(2);
+        let by_turning = 1.0 / dwell.duration();
+        let own = model.turning_at_rest.powi(2) * by_turning + ROUNDING.powi(2);
         let residual = rate - attitude.tr_mul(&earth_rate);
         equations.add(&Rows {
             event: dwell.event(),
@@ -106,6 +108,10 @@ pub fn add_rates(
                 of_noise(Sensor::Gyro, dwell.event(), &partials),
                 heading.error(&attitude.tr_mul(&turned)),
             ],
+            by_hand: BY_HAND.map(|source| match source {
+                Source::RotationAtRest => by_turning,
+                _ => 0.0,
+            }),
             ..Rows::new(of(Sensor::Gyro, &partials), residual, own)
         });
     }

@@ -6,6 +6,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector, Vector3, Vector4};
 
+use crate::calibration::noise::{BY_HAND, Parts};
 use crate::calibration::{
     CalibrationError, Model, PARAMETERS, ParameterMatrix, ParameterVector, from_vector, parameter,
     sensor_and_parameter, to_vector,
@@ -87,6 +88,8 @@ pub struct Rows<const N: usize> {
     pub own: SVector<f64, N>,
     /// Response of the residuals to errors common to several rows.
     pub common: Vec<(Common, SMatrix<f64, N, 3>)>,
+    /// Variance due to each of [`BY_HAND`] for unit σ in SI and radians.
+    pub by_hand: [f64; BY_HAND.len()],
 }
 
 impl<const N: usize> Rows<N> {
@@ -99,6 +102,7 @@ impl<const N: usize> Rows<N> {
             weighted: SVector::repeat(variance),
             own: SVector::repeat(variance),
             common: Vec::new(),
+            by_hand: Default::default(),
         }
     }
 }
@@ -151,6 +155,7 @@ impl Equations {
                     .iter()
                     .map(|(of, by)| (*of, by.fixed_rows::<1>(k).into_owned())),
             ),
+            by_hand: rows.by_hand,
         };
         self.rows.extend((0..N).map(row));
     }
@@ -193,6 +198,50 @@ impl Equations {
             Common::Noise(sensor, event) => *self.events[event].variance.get(sensor),
             Common::Drift(..) | Common::Unit(_) | Common::Table(_) => 1.0,
         }
+    }
+
+    /// Covariance of the errors of the scaled rows.
+    pub fn errors(&self) -> DMatrix<f64> {
+        let (rows, events) = (&self.rows, &self.events);
+        let covariance = |one: Common, other: Common| match (one, other) {
+            _ if one == other => self.variance_of(one),
+            (Common::Noise(of, i), Common::Noise(sensor, j)) if of == sensor => {
+                let [one, other] = [&events[i], &events[j]];
+                let noise = one.noise.get(sensor);
+                let both = (one.recording == other.recording).then_some((one.times, other.times));
+                both.map_or(0.0, |(one, other)| noise.covariance_of_means(one, other))
+            }
+            _ => 0.0,
+        };
+        let mut errors = DMatrix::zeros(rows.len(), rows.len());
+        for (i, one) in rows.iter().enumerate() {
+            for (j, other) in rows[..=i].iter().enumerate() {
+                let mut sum = if i == j { one.own.x } else { 0.0 };
+                for (of_one, by_one) in &one.common {
+                    for (of_other, by_other) in &other.common {
+                        sum += covariance(*of_one, *of_other) * by_one.dot(by_other);
+                    }
+                }
+                errors[(i, j)] = sum / (one.weighted.x * other.weighted.x).sqrt();
+                errors[(j, i)] = errors[(i, j)];
+            }
+        }
+        errors
+    }
+
+    /// Residuals of the scaled rows before the fit, and their covariance due to prior and errors.
+    pub fn before_data(&self) -> (DVector<f64>, DMatrix<f64>) {
+        let (spread, residual) = self.in_sigmas();
+        let covariance = &spread * spread.transpose() + self.errors();
+        (residual - spread * &self.mean, covariance)
+    }
+
+    /// Contribution of each source in [`BY_HAND`] to each scaled row.
+    pub fn by_hand(&self) -> Parts {
+        std::array::from_fn(|source| {
+            let part = |k: usize, _| self.rows[k].by_hand[source] / self.rows[k].weighted.x;
+            DVector::from_fn(self.rows.len(), part)
+        })
     }
 
     /// Residual and weight of each row.

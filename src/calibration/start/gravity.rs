@@ -7,11 +7,12 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector1, Vector2, Vector3};
 use super::equations::{Common, Equations, Event, OfTriad, Rows, of, of_parameters};
 use crate::attitude::{exp, skew, tilt};
 use crate::calibration::linearisation::singular;
+use crate::calibration::noise::BY_HAND;
 use crate::calibration::problem::Stretch;
-use crate::calibration::{CalibrationError, Model, Problem};
+use crate::calibration::{CalibrationError, Model, Problem, Source};
 use crate::earth::ROTATION_RATE;
 use crate::imu::{Noise, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
-use crate::navigation::{Navigator, State};
+use crate::navigation::{Navigator, ProcessNoise, State};
 use crate::run::{Dwell, MeanOutput};
 
 /// Minimum σ of a row, rad or m/s, for an instrument without noise.
@@ -213,6 +214,8 @@ struct Move {
     of_after: OfTriad<3>,
     /// Variance of each of its two components due to noise and interpolation of the gyros, …
     walk: f64,
+    /// … due to each of [`BY_HAND`] for unit σ, …
+    by_hand: [f64; BY_HAND.len()],
     /// … and due to the first and the noise of Up.
     variance: f64,
 }
@@ -272,6 +275,7 @@ impl Chain {
                     of_noise(Sensor::Gyro, event, &of_gyro),
                     heading.error(&(turned * -turn.duration).xy()),
                 ],
+                by_hand: turn.by_hand,
                 ..Rows::new(
                     of(Sensor::Gyro, &of_gyro) + of_accel,
                     residual,
@@ -306,11 +310,14 @@ impl Move {
         let attitude = exp(tilt) * block.state.attitude;
         let level = -skew(Vector3::z());
         // East and North: alike except for what is interpolated.
-        let drifted = block.noise.covariance(&model.process_noise());
-        let level_variance = 0.5 * (drifted[(0, 0)] + drifted[(1, 1)]);
+        let level_variance = |noise: &PerSensor<ProcessNoise>| {
+            let drifted = block.noise.covariance(noise);
+            0.5 * (drifted[(0, 0)] + drifted[(1, 1)])
+        };
+        let interpolated = level_variance(&PerSensor::default());
         // Up is that of the middle of a dwell, from whose end the gyros carry it.
         let held = (before.duration() + after.duration()) / 3.0;
-        let walk = level_variance + model.turning_at_rest.powi(2) * held;
+        let walk = level_variance(&model.process_noise()) + model.turning_at_rest.powi(2) * held;
         let of_gravity = |dwell: &AtRest| dwell.mean.accel.variance / run.site.gravity.powi(2);
         let of = Self {
             duration: block.duration,
@@ -319,6 +326,10 @@ impl Move {
             of_before: -level * start * (forces[0].error / forces[0].size),
             of_after: level * attitude * (forces[1].error / forces[1].size),
             walk,
+            by_hand: BY_HAND.map(|source| match source {
+                Source::RotationAtRest => held,
+                _ => level_variance(&source.alone()) - interpolated,
+            }),
             variance: walk + of_gravity(before) + of_gravity(after),
         };
         Ok((of, attitude))

@@ -149,7 +149,8 @@ impl Observed {
         let first = parameter(self.sensor, 0);
         let sigma = model.prior_sigma.fixed_rows::<PER_TRIAD>(first);
         let better = |fit: &Fit| {
-            (0..PER_TRIAD).all(|k| sigma[k] == 0.0 || fit.covariance[(k, k)].sqrt() < sigma[k])
+            let as_stated = fit.covariance.diagonal().map(f64::sqrt) / fit.residuals.growth();
+            (0..PER_TRIAD).all(|k| sigma[k] == 0.0 || as_stated[k] < sigma[k])
         };
         if let Some(fit) = self.determined(model.form).filter(better) {
             return Ok(fit);

@@ -67,30 +67,9 @@ fn equations(events: usize, correlated: bool) -> Equations {
 
 /// Design, residuals and covariance of the errors of all rows.
 fn dense(equations: &Equations) -> (DMatrix<f64>, DVector<f64>, DMatrix<f64>) {
-    let (rows, events) = (&equations.rows, &equations.events);
-    let covariance = |one: Common, other: Common| match (one, other) {
-        _ if one == other => equations.variance_of(one),
-        (Common::Noise(of, i), Common::Noise(sensor, j)) if of == sensor => {
-            let [one, other] = [&events[i], &events[j]];
-            match one.recording == other.recording {
-                true => one
-                    .noise
-                    .get(of)
-                    .covariance_of_means(one.times, other.times),
-                false => 0.0,
-            }
-        }
-        _ => 0.0,
-    };
-    let errors = DMatrix::from_fn(rows.len(), rows.len(), |i, j| {
-        let mut sum = if i == j { rows[i].own.x } else { 0.0 };
-        for (one, by_one) in &rows[i].common {
-            for (other, by_other) in &rows[j].common {
-                sum += covariance(*one, *other) * by_one.dot(by_other);
-            }
-        }
-        sum
-    });
+    let rows = &equations.rows;
+    let weights = DVector::from_fn(rows.len(), |k, _| rows[k].weighted.x.sqrt());
+    let errors = equations.errors().component_mul(&(&weights * weights.transpose()));
     let unknown = equations.unknown.len();
     let rows_of = rows.iter().flat_map(|row| equations.partials(row));
     let design = DMatrix::from_row_iterator(rows.len(), unknown, rows_of);
