@@ -12,6 +12,7 @@ use turncal::imu::{Output, PerSensor, Sensor, Term, TermVector};
 use turncal::simulation::{Scenario, true_increments};
 use turncal::turntable::{Imperfection, Motion};
 use turncal::units::{DEGREE, STANDARD_GRAVITY};
+use turncal_files::export::{HEADER, sample_rows};
 use turncal_files::export::HEADER;
 
 use crate::calibration_file::written;
@@ -376,4 +377,30 @@ fn the_raw_record_is_never_replaced_and_a_name_says_what_is_written() {
     assert_eq!(fs::read(&raw).unwrap(), before);
     let message = failure(turncal(&apply).arg(root.path().join("calibrated.txt")), 2);
     assert!(message.contains(".csv.gz"), "{message}");
+}
+
+#[test]
+fn rows_written_in_parts_are_the_samples_to_the_last_bit_even_as_the_temperature_changes() {
+    let mut scenario = Scenario::load("warming-mems").unwrap();
+    scenario.integrator.period = 0.05;
+    let simulated = scenario.simulate(1, 0).unwrap();
+    let run = &simulated.run;
+    let correction = Correction::for_run(&simulated.truth_record(), run).unwrap();
+    assert!(correction.changes());
+    let samples: Vec<_> = correction
+        .samples(run, 0..run.recording.imu.len())
+        .collect();
+    // More than one part, and parts that begin within a second of temperature.
+    assert!(samples.len() > 4097, "{}", samples.len());
+    let mut text = Vec::new();
+    sample_rows(&mut text, &correction, run, false).unwrap();
+    let text = String::from_utf8(text).unwrap();
+    let rows: Vec<&str> = text.lines().skip(1).collect();
+    assert_eq!(rows.len(), samples.len());
+    for (row, sample) in rows.iter().zip(&samples) {
+        let row: Vec<f64> = row.split(',').map(|n| n.parse().unwrap()).collect();
+        assert_eq!(row[2..5], *sample.rate.as_slice());
+        assert_eq!(row[5..8], *sample.force.as_slice());
+        assert_eq!(row[8], f64::from(u8::from(sample.in_range)));
+    }
 }

@@ -27,7 +27,8 @@ const TASKS: usize = 64;
 /// whether it is valid at the temperature of the row. A row contains means over its sample, so the output is a log with
 /// `output = "rate"` in `rad/s` and `m/s^2`.
 ///
-/// With `fill`, missing samples are also written, interpolated, with 1 in a last column `filled`.
+/// Numbers are the shortest that read as the same value. With `fill`, missing samples are also written, interpolated,
+/// with 1 in a last column `filled`.
 pub fn sample_rows(
     file: &mut dyn Write,
     correction: &Correction,
@@ -66,6 +67,7 @@ fn rows(
     fill: bool,
 ) -> Vec<u8> {
     let mut text = Vec::with_capacity(samples.len() * ROW_LENGTH);
+    let mut number = zmij::Buffer::new();
     let mut lost = lost[lost.partition_point(|lost| lost.end <= samples.start)..]
         .iter()
         .peekable();
@@ -75,13 +77,12 @@ fn rows(
         if is_lost && !fill {
             continue;
         }
-        push_plain(&mut text, nanoseconds(sample.start));
-        text.push(b',');
-        push_plain(&mut text, nanoseconds(sample.end));
-        for &value in sample.rate.iter().chain(&sample.force) {
+        let times = [nanoseconds(sample.start), nanoseconds(sample.end)];
+        for &value in times.iter().chain(&sample.rate).chain(&sample.force) {
+            text.extend_from_slice(number.format(value).as_bytes());
             text.push(b',');
-            push_scientific(&mut text, value);
         }
+        text.pop();
         if correction.changes() {
             text.extend([b',', b'0' + u8::from(sample.in_range)]);
         }
@@ -91,48 +92,6 @@ fn rows(
         text.push(b'\n');
     }
     text
-}
-
-/// Appends a number without exponent, as `{}` writes it.
-fn push_plain(text: &mut Vec<u8>, value: f64) {
-    let mut buffer = zmij::Buffer::new();
-    let digits = buffer.format(value);
-    if digits.contains('e') {
-        text.extend(value.to_string().bytes());
-    } else {
-        text.extend(digits.strip_suffix(".0").unwrap_or(digits).bytes());
-    }
-}
-
-/// Appends a number with one digit before the point and an exponent, as `{:e}` writes it.
-fn push_scientific(text: &mut Vec<u8>, value: f64) {
-    let mut buffer = zmij::Buffer::new();
-    let digits = buffer.format(value);
-    let (sign, digits) = digits.split_at(usize::from(digits.starts_with('-')));
-    let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
-    let significant = fraction.trim_start_matches('0');
-    let (digits, exponent) = match whole {
-        _ if fraction.is_empty() || fraction.contains('e') => {
-            text.extend(format!("{value:e}").bytes());
-            return;
-        }
-        "0" if significant.is_empty() => ([whole, ""], 0),
-        "0" => (
-            [significant, ""],
-            significant.len() as i32 - fraction.len() as i32 - 1,
-        ),
-        _ => ([whole, fraction], whole.len() as i32 - 1),
-    };
-    text.extend(sign.bytes());
-    let start = text.len();
-    text.extend(digits.into_iter().flat_map(str::bytes));
-    while text.len() > start + 1 && text.ends_with(b"0") {
-        text.pop();
-    }
-    if text.len() > start + 1 {
-        text.insert(start + 1, b'.');
-    }
-    text.extend(format!("e{exponent}").bytes());
 }
 
 /// The same into a complete file, compressed if its name ends in `.gz`; an existing file is replaced only with `force`.
@@ -146,37 +105,4 @@ pub fn write_samples(
     write_whole_with(path, force, |file| {
         write_rows(path, file, |rows| sample_rows(rows, correction, run, fill))
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn numbers_are_written_as_rust_writes_them() {
-        let mut bits = 1u64;
-        let random = std::iter::repeat_with(|| {
-            bits = bits
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            f64::from_bits(bits ^ bits >> 31)
-        });
-        let usual = (1..20_000).map(|k| f64::from(k).powi(3) * 1.1e-12);
-        let whole = [
-            0.0, 1.0, 10.0, 9.5, 12_300.0, 1e15, 1e16, 1e22, 1e23, 0.1, 1e-4, 1e-5, 1e-6, 5e-324,
-        ];
-        let special = [f64::NAN, f64::INFINITY, f64::MAX, f64::MIN_POSITIVE];
-        for value in random.take(20_000).chain(usual).chain(whole).chain(special) {
-            for value in [value, -value] {
-                let mut text = Vec::new();
-                push_scientific(&mut text, value);
-                text.push(b' ');
-                push_plain(&mut text, value);
-                assert_eq!(
-                    String::from_utf8(text).unwrap(),
-                    format!("{value:e} {value}")
-                );
-            }
-        }
-    }
 }
