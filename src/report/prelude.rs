@@ -3,7 +3,7 @@
 pub(super) use serde_json::{Map, Value, json};
 
 pub(super) use super::document::{
-    Block, ByName, Document, Facts, List, NONE, Table, capital, cells, columns, joined,
+    Block, Document, Facts, List, NONE, Table, capital, cells, columns, joined,
 };
 pub(super) use super::group::{
     Group, axis_name, function_name, group_columns, nominal_scale, short_name, triad_name,
