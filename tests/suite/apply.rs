@@ -13,7 +13,6 @@ use turncal::simulation::{Scenario, true_increments};
 use turncal::turntable::{Imperfection, Motion};
 use turncal::units::{DEGREE, STANDARD_GRAVITY};
 use turncal_files::export::{HEADER, sample_rows};
-use turncal_files::export::HEADER;
 
 use crate::calibration_file::written;
 

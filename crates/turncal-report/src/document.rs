@@ -1,10 +1,8 @@
 //! Report of a result as data: facts, tables, plots, findings. Renderers turn it into text, a page or
 //! JSON, independently of the kind of result.
 
-use serde::{Serialize, Serializer};
 use serde_json::Value;
 
-use super::group::Group;
 use super::plot::Plot;
 use turncal::calibration::{Finding, Word};
 
@@ -235,22 +233,6 @@ pub fn capital(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters.next().into_iter().flat_map(char::to_uppercase);
     first.chain(letters).collect()
-}
-
-/// Values by name in order, an object in JSON.
-pub struct ByName<T>(pub Vec<(String, T)>);
-
-impl<T> ByName<T> {
-    /// A value for each group by its key.
-    pub fn of_groups(of: impl Fn(Group) -> T) -> Self {
-        Self(Group::all().map(|group| (group.key(), of(group))).collect())
-    }
-}
-
-impl<T: Serialize> Serialize for ByName<T> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.0.iter().map(|(name, value)| (name, value)))
-    }
 }
 
 /// Two objects of JSON as one.

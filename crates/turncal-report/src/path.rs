@@ -10,10 +10,9 @@ use turncal::calibration::{
 };
 use turncal::imu::{AXES, InstallationForm};
 use turncal::lot::{Check, Verdict};
-use turncal::run::Aiding;
 use turncal::simulation::Scenario;
 use turncal::study::navigation::MethodOutlook;
-use turncal::study::path::{Evaluation, PathStudy};
+use turncal::study::path::{Evaluation, PathStudy, Without};
 use turncal::turntable::{Moves, Rotation};
 
 /// A term is not observed if more than this part of its prior σ remains.
@@ -35,127 +34,76 @@ pub struct Report<'a> {
     pub checks: Option<&'a [Check]>,
 }
 
-/// The figures of the report; those of groups are the RMS over the parameters, in the unit of the group.
-#[derive(Serialize)]
-struct Figures<'a> {
-    path: &'a str,
-    verdict: VerdictFigures,
-    aiding: Aiding,
-    duration_s: f64,
-    standing_s: f64,
-    sigma: ByName<Option<f64>>,
-    parameters: ByName<ParameterFigures>,
-    weakest: &'a [Direction],
-    without: Vec<WithoutFigures<'a>>,
-    not_shown: Vec<NotShown>,
-    terms_left_off: Vec<TermFigures>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    limits: Option<Vec<LimitFigures>>,
-}
-
-#[derive(Serialize)]
-struct VerdictFigures {
-    word: Word,
-    reasons: [String; 1],
-}
-
-#[derive(Serialize)]
-struct ParameterFigures {
-    sigma: f64,
-    prior_sigma: f64,
-    unit: &'static str,
-}
-
-#[derive(Serialize)]
-struct WithoutFigures<'a> {
-    r#move: Option<&'a String>,
-    time_s: f64,
-    sigma: ByName<Option<f64>>,
-}
-
-/// A combination of parameters or an error term that the path does not determine.
+/// A combination of parameters or an error term that the path does not show.
 #[derive(Serialize)]
 struct NotShown {
     what: String,
     /// Remaining part of the prior σ.
     remaining: f64,
-    /// Largest change of a group, relative to σ, by an error term of usual size.
-    could_change: Option<String>,
+    /// Change of a group relative to its σ by an error term of usual size, the largest of all groups.
+    change_in_sigma: Option<f64>,
     shown_by: String,
-}
-
-#[derive(Serialize)]
-struct TermFigures {
-    term: &'static str,
-    remaining: f64,
-    change: ByName<Option<f64>>,
-}
-
-#[derive(Serialize)]
-struct LimitFigures {
-    parameter: Option<String>,
-    decided: bool,
 }
 
 impl Report<'_> {
     /// The report.
     pub fn document(&self) -> Document {
-        let (word, reason) = self.verdict();
-        let figures = self.figures((word, reason.clone()));
         let navigated = [MethodOutlook {
             method: "EKF",
             outlook: self.evaluation.navigation.clone(),
         }];
+        let not_shown = self.not_shown();
+        let (word, reason) = self.verdict();
         let mut document = Document::new(format!(
             "Predicted calibration accuracy of the path {}",
             self.name
         ));
-        document.verdict = Some((word, reason));
         document.lead = vec![format!(
             "{}. σ are the Cramér–Rao bound for a recording of this path with the stated noise; no data were measured.",
             self.with
         )];
         document.both(self.groups());
         document.both(self.facts(&navigated));
-        document.both(moves(&figures));
-        document.both(not_shown(&figures.not_shown));
+        document.both(self.moves());
+        document.both(table(&not_shown));
         navigation::add(&mut document, Ok(&navigated));
-        document.data = json!(figures);
+        document.data = self.data(json!({ "word": word, "reasons": [reason] }), &not_shown);
+        document.verdict = Some((word, reason));
         document
     }
 
     fn verdict(&self) -> (Word, String) {
         let time = minutes(self.evaluation.duration);
         let unobserved = self.evaluation.bound.observability.unobserved().count();
-        match (self.checks, self.undecided().count(), unobserved) {
+        let (word, text) = match (self.checks, self.not_decided().len(), unobserved) {
             (Some(_), 0, _) => (
                 Word::Pass,
-                format!("after {time}, a unit at its nominal values passes every limit"),
+                "a unit at its nominal values passes every limit".to_owned(),
             ),
             (Some(checks), open, _) => (
                 Word::Undecided,
                 format!(
-                    "after {time}, σ are too large to decide {open} of {} limits",
+                    "σ are too large to decide {open} of {} limits",
                     checks.len()
                 ),
             ),
-            (None, _, 0) => (
-                Word::Good,
-                format!("the path determines every parameter in {time}"),
-            ),
+            (None, _, 0) => (Word::Good, "the path determines every parameter".to_owned()),
             (None, _, unobserved) => (
                 Word::UseWithCare,
                 format!(
-                    "after {time}, {unobserved} combination(s) of parameters keep more than half of their prior σ"
+                    "{unobserved} combination(s) of parameters keep more than half of their prior σ"
                 ),
             ),
-        }
+        };
+        (word, format!("after {time}, {text}"))
     }
 
-    /// Limits for which σ are too large.
-    fn undecided(&self) -> impl Iterator<Item = &Check> {
+    /// Parameters with a limit for which σ is too large.
+    fn not_decided(&self) -> Vec<String> {
         let checks = self.checks.into_iter().flatten();
-        checks.filter(|check| check.verdict != Verdict::Pass)
+        let open = checks.filter(|check| check.verdict != Verdict::Pass);
+        let name = |check: &Check| parameter_name(InstallationForm::General, check.limit.parameter);
+        open.filter_map(name).collect()
     }
 
     /// Expected σ and prior σ of each group, and the number of limits that are decided.
@@ -163,9 +111,10 @@ impl Report<'_> {
         let bound = &self.evaluation.bound;
         let sigma = bound.estimate.sigma();
         let row = |group: Group| {
-            let indices = group.estimated(&bound.estimate);
             let with_unit = |value: f64| format!("{} {}", three_digits(value), group.unit());
-            let (largest, rms) = group.spread(&sigma, &indices).unzip();
+            let (largest, rms) = group
+                .spread(&sigma, &group.estimated(&bound.estimate))
+                .unzip();
             let prior = group.rms(&bound.prior_sigma, &bound.estimate);
             let mut row = vec![group.title()];
             row.extend([rms, largest, prior].map(|of| or_dash(of, with_unit)));
@@ -183,176 +132,143 @@ impl Report<'_> {
             [self.evaluation.duration, self.evaluation.standing].map(minutes);
         let mut facts = Facts::default();
         facts.push("time", format!("{duration}, including {standing} at rest"));
-        let open = self.undecided().map(|check| {
-            let parameter = check.limit.parameter;
-            let group = Group::of(parameter);
-            let name = parameter_name(InstallationForm::General, parameter).unwrap_or_default();
-            let in_unit = |value: f64| three_digits(value / group.unit_value());
-            let sigma = or_dash(check.off.map(|(_, sigma)| sigma), in_unit);
-            let (within, unit) = (in_unit(check.limit.within), group.unit());
-            format!("{name} (limit ±{within} {unit}, expected 1σ {sigma} {unit})")
-        });
-        let open: Vec<String> = open.collect();
-        if !open.is_empty() {
-            facts.push("not decided", open.join("; "));
+        let not_decided = self.not_decided();
+        if !not_decided.is_empty() {
+            facts.push("not decided", not_decided.join(", "));
         }
         facts.push("navigation", navigation::line(navigated));
         facts
     }
 
+    /// σ of each group without each move, divided by σ with all moves.
+    fn moves(&self) -> Table {
+        let (estimate, all) = (
+            &self.evaluation.bound.estimate,
+            self.evaluation.bound.estimate.sigma(),
+        );
+        let row = |(number, without): (usize, &Without)| {
+            let name = self.moves.get(number).map_or("", String::as_str);
+            let mut row = cells![(number + 1).to_string(), name, value(without.time, 1.0)];
+            row.extend(Group::all().map(|group| {
+                let [without, all] = [&without.sigma, &all].map(|v| group.rms(v, estimate));
+                let ratio = without.zip(all).map(|(without, all)| without / all);
+                or_dash(ratio, |ratio| format!("{ratio:.2}"))
+            }));
+            row
+        };
+        let columns = cells!["", "move", "s"].into_iter();
+        let columns = columns.chain(Group::all().map(Group::short));
+        let mut table = Table::new("σ without each move, divided by σ with all moves", columns)
+            .section(self.evaluation.without.iter().enumerate().map(row))
+            .note(
+                "Without a move, the dwell after it says nothing about the parameters, and all other moves stay as \
+                 they are. 1.00: the move and the dwell after it can be left out. Of two equal moves, one can.",
+            );
+        table.optional = vec![2];
+        table
+    }
+
     /// Combinations of parameters, then error terms with the largest effect first.
     fn not_shown(&self) -> Vec<NotShown> {
-        let evaluation = self.evaluation;
-        let combinations = evaluation.bound.observability.unobserved();
+        let combinations = self.evaluation.bound.observability.unobserved();
         let combinations = combinations.map(|of| NotShown {
             what: of.words.clone(),
             remaining: of.remaining,
-            could_change: None,
+            change_in_sigma: None,
             shown_by: shown_by(of),
         });
-        let terms = evaluation.left_off.iter();
-        let mut terms: Vec<(f64, NotShown)> = terms
-            .filter(|of| of.remaining > NOT_SHOWN)
-            .filter_map(|of| {
-                let (ratio, could_change) = self.effect(of)?;
-                let not_shown = NotShown {
-                    what: of.term.name().to_owned(),
-                    remaining: of.remaining,
-                    could_change: Some(could_change),
-                    shown_by: of.term.shown_by().to_owned(),
-                };
-                Some((ratio, not_shown))
-            })
-            .collect();
-        terms.sort_by(|a, b| b.0.total_cmp(&a.0));
-        combinations
-            .chain(terms.into_iter().map(|(_, term)| term))
-            .collect()
+        let terms = self.evaluation.left_off.iter();
+        let terms = terms.filter(|of| of.remaining > NOT_SHOWN);
+        let terms = terms.map(|of| NotShown {
+            what: of.term.name().to_owned(),
+            remaining: of.remaining,
+            change_in_sigma: self.change_in_sigma(of),
+            shown_by: of.term.shown_by().to_owned(),
+        });
+        let mut terms: Vec<NotShown> = terms.collect();
+        let change = |of: &NotShown| of.change_in_sigma.unwrap_or_default();
+        terms.sort_by(|a, b| change(b).total_cmp(&change(a)));
+        combinations.chain(terms).collect()
     }
 
-    /// Largest effect of a term that is not estimated: relative to the expected σ, and in words.
-    fn effect(&self, of: &TermLeftOff) -> Option<(f64, String)> {
+    fn change_in_sigma(&self, of: &TermLeftOff) -> Option<f64> {
         let estimate = &self.evaluation.bound.estimate;
         let sigma = estimate.sigma();
-        let effects = Group::all().filter_map(|group| {
-            let change = group.rms(&of.change, estimate)?;
-            Some((change / group.rms(&sigma, estimate)?, group, change))
-        });
-        let (ratio, group, change) = effects.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let (name, change, unit) = (group.short(), three_digits(change), group.unit());
-        Some((ratio, format!("{name} by {change} {unit}")))
+        let rms = |v: &ParameterVector, group: Group| group.rms(v, estimate);
+        let changes =
+            Group::all().filter_map(|group| Some(rms(&of.change, group)? / rms(&sigma, group)?));
+        changes.reduce(f64::max)
     }
 
-    fn by_group(&self, v: &ParameterVector) -> ByName<Option<f64>> {
-        let estimate = &self.evaluation.bound.estimate;
-        ByName::of_groups(|group| group.rms(v, estimate))
-    }
-
-    /// Expected σ and prior σ of every estimated parameter by name.
-    fn parameters(&self) -> ByName<ParameterFigures> {
+    /// Name, unit, expected σ and prior σ of every estimated parameter.
+    fn parameters(&self) -> Map<String, Value> {
         let bound = &self.evaluation.bound;
         let (form, sigma) = (bound.estimate.form(), bound.estimate.sigma());
+        let figures = |name: Option<String>, unit: &str, sigma: f64, prior: f64| {
+            let figures = json!({ "sigma": sigma, "prior_sigma": prior, "unit": unit });
+            Some((name?, figures))
+        };
         let parameters = bound.estimate.estimated().filter_map(|k| {
-            let group = Group::of(k);
-            let figures = ParameterFigures {
-                sigma: sigma[k] / group.unit_value(),
-                prior_sigma: bound.prior_sigma[k] / group.unit_value(),
-                unit: group.unit(),
-            };
-            Some((parameter_name(form, k)?, figures))
+            let (name, group) = (parameter_name(form, k), Group::of(k));
+            let [sigma, prior] = [sigma[k], bound.prior_sigma[k]].map(|of| of / group.unit_value());
+            figures(name, group.unit(), sigma, prior)
         });
         let of_terms = bound.auxiliary.sigma();
         let terms = bound.auxiliary.estimated().filter_map(|k| {
-            let figures = ParameterFigures {
-                sigma: of_terms[k],
-                prior_sigma: bound.auxiliary.prior_sigma[k],
-                unit: "SI",
-            };
-            Some((auxiliary_name(k)?, figures))
+            let prior = bound.auxiliary.prior_sigma[k];
+            figures(auxiliary_name(k), "SI", of_terms[k], prior)
         });
-        ByName(parameters.chain(terms).collect())
+        parameters.chain(terms).collect()
     }
 
-    fn figures(&self, (word, reason): (Word, String)) -> Figures<'_> {
+    fn by_group(&self, v: &ParameterVector) -> Map<String, Value> {
+        let estimate = &self.evaluation.bound.estimate;
+        let rms = Group::all().map(|group| (group.key(), group.rms(v, estimate).into()));
+        rms.collect()
+    }
+
+    fn data(&self, verdict: Value, not_shown: &[NotShown]) -> Value {
         let evaluation = self.evaluation;
-        let directions = &evaluation.bound.observability.directions;
-        let without = evaluation.without.iter().enumerate();
-        let terms = evaluation.left_off.iter().map(|of| TermFigures {
-            term: of.term.name(),
-            remaining: of.remaining,
-            change: self.by_group(&of.change),
+        let directions = evaluation.bound.observability.directions.iter();
+        let without = evaluation.without.iter().enumerate().map(|(k, of)| {
+            json!({ "move": self.moves.get(k), "time_s": of.time, "sigma": self.by_group(&of.sigma) })
         });
-        let limit = |check: &Check| LimitFigures {
-            parameter: parameter_name(InstallationForm::General, check.limit.parameter),
-            decided: check.verdict == Verdict::Pass,
-        };
-        Figures {
-            path: self.name,
-            verdict: VerdictFigures {
-                word,
-                reasons: [reason],
-            },
-            aiding: evaluation.aiding,
-            duration_s: evaluation.duration,
-            standing_s: evaluation.standing,
-            sigma: self.by_group(&evaluation.bound.estimate.sigma()),
-            parameters: self.parameters(),
-            weakest: directions.get(..LISTED).unwrap_or(directions),
-            without: without
-                .map(|(k, without)| WithoutFigures {
-                    r#move: self.moves.get(k),
-                    time_s: without.time,
-                    sigma: self.by_group(&without.sigma),
-                })
-                .collect(),
-            not_shown: self.not_shown(),
-            terms_left_off: terms.collect(),
-            limits: self.checks.map(|checks| checks.iter().map(limit).collect()),
+        let mut data = json!({
+            "path": self.name,
+            "verdict": verdict,
+            "aiding": evaluation.aiding,
+            "duration_s": evaluation.duration,
+            "standing_s": evaluation.standing,
+            "sigma": self.by_group(&evaluation.bound.estimate.sigma()),
+            "parameters": self.parameters(),
+            "weakest": directions.take(LISTED).collect::<Vec<_>>(),
+            "without": without.collect::<Value>(),
+            "not_shown": not_shown,
+        });
+        if self.checks.is_some() {
+            data["not_decided"] = self.not_decided().into();
         }
+        data
     }
 }
 
-/// σ of each group without each move, divided by σ with all moves.
-fn moves(figures: &Figures) -> Table {
-    let row = |(number, of): (usize, &WithoutFigures)| {
-        let name = of.r#move.map_or("", String::as_str);
-        let mut row = cells![(number + 1).to_string(), name, value(of.time_s, 1.0)];
-        let pairs = of.sigma.0.iter().zip(&figures.sigma.0);
-        row.extend(pairs.map(|((_, without), (_, all))| {
-            let ratio = without.zip(*all).map(|(without, all)| without / all);
-            or_dash(ratio, |ratio| format!("{ratio:.2}"))
-        }));
-        row
-    };
-    let columns = cells!["", "move", "s"].into_iter();
-    let columns = columns.chain(Group::all().map(Group::short));
-    let mut table = Table::new("σ without each move, divided by σ with all moves", columns)
-        .section(figures.without.iter().enumerate().map(row))
-        .note(
-            "Without a move, the dwell after it says nothing about the parameters, and all other moves stay as they \
-             are. 1.00: the move and the dwell after it can be left out. Of two equal moves, one can.",
-        );
-    table.optional = vec![2];
-    table
-}
-
-fn not_shown(all: &[NotShown]) -> Table {
+fn table(all: &[NotShown]) -> Table {
     let row = |of: &NotShown| {
         cells![
             of.what.as_str(),
             three_digits(100.0 * of.remaining),
-            of.could_change.as_deref().unwrap_or(NONE),
+            or_dash(of.change_in_sigma, three_digits),
             of.shown_by.as_str(),
         ]
     };
     Table::new(
         "Not shown by this path",
-        columns("| prior σ left, % | could change | shown by"),
+        columns("| prior σ left, % | could change, σ | shown by"),
     )
     .section(all.iter().map(row))
     .note(
         "Combinations of parameters, and error terms that are not estimated, that keep more than half of their prior \
-         σ. Could change: RMS over the group that changes most relative to its σ, for a term of usual size.",
+         σ. Could change: RMS over the group that a term of usual size changes most, in σ of the group.",
     )
 }
 
