@@ -2,9 +2,7 @@
 
 pub use serde_json::{Map, Value, json};
 
-pub use super::document::{
-    Block, Document, Facts, List, NONE, Table, capital, columns, joined,
-};
+pub use super::document::{Block, Document, Facts, List, NONE, Table, capital, columns, joined};
 pub use super::group::{
     Group, axis_name, function_name, group_columns, nominal_scale, short_name, triad_name,
 };

@@ -3,7 +3,6 @@
 use std::fs;
 use std::path::Path;
 
-
 const RUN: &str = r#"format = "turncal-run/1"
 [site]
 latitude_deg = 34.0

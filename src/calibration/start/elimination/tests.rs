@@ -69,7 +69,9 @@ fn equations(events: usize, correlated: bool) -> Equations {
 fn dense(equations: &Equations) -> (DMatrix<f64>, DVector<f64>, DMatrix<f64>) {
     let rows = &equations.rows;
     let weights = DVector::from_fn(rows.len(), |k, _| rows[k].weighted.x.sqrt());
-    let errors = equations.errors().component_mul(&(&weights * weights.transpose()));
+    let errors = equations
+        .errors()
+        .component_mul(&(&weights * weights.transpose()));
     let unknown = equations.unknown.len();
     let rows_of = rows.iter().flat_map(|row| equations.partials(row));
     let design = DMatrix::from_row_iterator(rows.len(), unknown, rows_of);
