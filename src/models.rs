@@ -146,11 +146,16 @@ impl Text {
             .map_or_else(|| self.file.clone(), |stem| stem.to_string_lossy().into())
     }
 
+    /// The fields of the model.
+    ///
+    /// # Errors
+    /// If a field is missing, unknown or cannot be right.
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T, ModelError> {
         let document = self.document();
         Ok(document.fill(document.parse()?)?)
     }
 
+    /// The text with its name, for errors that name a line.
     pub fn document(&self) -> Document<'_> {
         Document {
             file: Path::new(&self.file),

@@ -10,7 +10,7 @@ mod scatter;
 mod specification;
 mod statistics;
 #[cfg(test)]
-pub mod tests;
+pub(crate) mod tests;
 mod unit;
 
 use nalgebra::{DMatrix, DVector, Vector3};

@@ -124,7 +124,9 @@ impl Series {
 
 /// Collects samples of the quantity that a file stores, rates or increments, plain or packed.
 pub enum SeriesWriter {
+    /// Samples as numbers.
     Whole(Vec<Vector3<f64>>),
+    /// Samples as whole numbers of the finest step.
     Packed(Packer),
 }
 
@@ -136,6 +138,7 @@ impl Default for SeriesWriter {
 
 impl SeriesWriter {
     /// Number of samples so far.
+    #[allow(clippy::len_without_is_empty)]
     pub fn len(&self) -> usize {
         match self {
             Self::Whole(samples) => samples.len(),
@@ -143,6 +146,7 @@ impl SeriesWriter {
         }
     }
 
+    /// Appends a sample.
     pub fn push(&mut self, sample: [f64; 3]) {
         match self {
             Self::Whole(samples) => samples.push(sample.into()),

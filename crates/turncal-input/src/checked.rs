@@ -91,7 +91,9 @@ pub fn stated_gravity_sigma(written: &str) -> f64 {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(untagged, expecting = "three numbers, or one for all axes")]
 pub enum OneOrThree<T = Finite> {
+    /// For all axes.
     One(T),
+    /// For x, y and z.
     Three([T; 3]),
 }
 
@@ -105,6 +107,7 @@ impl From<Vector3<f64>> for OneOrThree {
 }
 
 impl OneOrThree {
+    /// The values of the three axes.
     pub fn vector(self) -> Vector3<f64> {
         match self {
             Self::One(value) => Vector3::repeat(value.0),

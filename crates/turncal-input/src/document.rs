@@ -55,7 +55,9 @@ const KINDS: [(&str, &str); 4] = [
 /// The text that spans refer to.
 #[derive(Clone, Copy)]
 pub struct Document<'a> {
+    /// The file, as errors name it.
     pub file: &'a Path,
+    /// Its text.
     pub text: &'a str,
 }
 

@@ -50,9 +50,11 @@ pub struct Clock<'a> {
     pub column: Option<&'a str>,
     /// A nanosecond column in addition to one of whole seconds.
     pub nanoseconds: Option<&'a str>,
+    /// Unit of the column.
     pub unit: TimeUnit,
     /// s
     pub period: Option<f64>,
+    /// Interruptions that are not errors.
     pub breaks: Breaks,
 }
 

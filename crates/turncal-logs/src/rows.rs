@@ -9,6 +9,7 @@ use turncal_input::{FileColumn, FileError, Place};
 
 /// A file that provides rows of numbers in sequence.
 pub trait Rows {
+    /// The file, as errors name it.
     fn file(&self) -> &Path;
 
     /// The names of the columns.
@@ -89,6 +90,7 @@ impl std::ops::Deref for LogRows {
 }
 
 impl LogRows {
+    /// The rows of any source.
     pub fn new(rows: impl Rows + 'static) -> Self {
         Self {
             rows: Box::new(rows),

@@ -9,6 +9,7 @@ use turncal_input::FileError;
 /// Source of rows.
 #[derive(Debug, Clone)]
 pub struct Source<'a> {
+    /// The file.
     pub file: DataFile,
     /// The selected stream, if the file has several.
     pub stream: Option<&'a str>,

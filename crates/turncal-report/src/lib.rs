@@ -9,8 +9,8 @@
 //! To add a figure to a result, add a plot to its document:
 //!
 //! ```
-//! use turncal::report::plot::{Axis, Panel, Plot, Series};
-//! use turncal::report::{Document, svg};
+//! use turncal_report::plot::{Axis, Panel, Plot, Series};
+//! use turncal_report::{Document, svg};
 //!
 //! let roots = (0..50).map(|k| (f64::from(k), f64::from(k).sqrt()));
 //! let panel = Panel::new("square root", Axis::linear("number"), Axis::linear(""))

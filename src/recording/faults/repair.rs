@@ -23,7 +23,9 @@ const WORST_ANGLE: f64 = 0.2 * DEGREE;
 pub struct Repaired {
     /// As in [`Rows`], a value for each sample.
     pub columns: [Vec<f64>; 6],
+    /// Faults found.
     pub faults: Vec<Fault>,
+    /// Gaps that were bridged.
     pub bridges: Vec<Bridge>,
 }
 

@@ -9,7 +9,9 @@ use crate::recording::ColumnFacts;
 /// The rows of a file without duplicates. Columns are gyro x, y, z and accelerometer x, y, z of the
 /// file.
 pub struct Rows<'a> {
+    /// Gyro x, y, z and accelerometer x, y, z.
     pub columns: [Vec<f64>; 6],
+    /// What the reader found of each.
     pub facts: &'a [ColumnFacts; 6],
     /// Full scale of each column, in the file's quantity.
     pub full_scale: [Option<f64>; 6],

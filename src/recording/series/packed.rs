@@ -26,6 +26,8 @@ pub struct Packed {
 }
 
 impl Packed {
+    /// Number of samples so far.
+    #[allow(clippy::len_without_is_empty)]
     pub fn len(&self) -> usize {
         self.len
     }

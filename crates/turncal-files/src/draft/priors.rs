@@ -87,6 +87,7 @@ impl Stated {
 }
 
 impl Draft {
+    /// The prior of a triad: stated, from a data sheet, or typical of its class.
     pub fn prior(&self, sensor: Sensor, remarks: &mut Remarks) -> PriorFile {
         let class = Class::of(|sensor| self.white_noise(sensor));
         let unit = self.quantities.units.get(sensor);

@@ -18,6 +18,7 @@ pub struct Uniform {
     pub numbers: Vec<usize>,
     /// Stamps relative to due times, s; for drifting samples, relative to their own times.
     pub jitter_rms: f64,
+    /// Largest deviation from uniform times, s.
     pub jitter_max: f64,
     /// Period divided by the given one, minus one, if the stamps contradict it.
     pub off_given: Option<f64>,

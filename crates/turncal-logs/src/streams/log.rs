@@ -5,6 +5,7 @@ use super::bytes::Broken;
 /// A column of a stream.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Column {
+    /// Its name in the file.
     pub name: String,
     /// In the spelling of `run.toml`; empty if not stated.
     pub unit: &'static str,

@@ -96,10 +96,6 @@ pub fn open(path: &DataFile) -> Result<Option<Box<dyn Log>>, FileError> {
 const ADVICE: &str = "Record or copy the file again.";
 
 impl Format {
-    const fn new(open: Open, begins: &'static [&'static [u8]]) -> Self {
-        Self { open, begins }
-    }
-
     fn is_of(&self, begin: &[u8]) -> bool {
         self.begins.iter().any(|bytes| begin.starts_with(bytes))
     }

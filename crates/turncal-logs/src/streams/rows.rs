@@ -30,7 +30,9 @@ pub struct StreamRows {
 /// A stream with its statistics from the whole file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
+    /// The stream.
     pub stream: Stream,
+    /// Number of its samples.
     pub samples: u64,
 }
 

@@ -40,6 +40,7 @@ pub fn document(accuracy: &Accuracy) -> Document {
 /// Number of reasons for failure shown.
 const REASONS: usize = 3;
 
+/// What was studied.
 pub fn facts(accuracy: &Accuracy) -> Facts {
     let (study, scenario) = (&accuracy.study, &accuracy.study.scenario);
     let (form, truth) = accuracy.forms();
@@ -135,6 +136,7 @@ fn failures(accuracy: &Accuracy) -> String {
     }
 }
 
+/// The figures of a study as JSON.
 pub fn data(accuracy: &Accuracy) -> Value {
     let study = &accuracy.study;
     let (form, truth) = accuracy.forms();

@@ -69,6 +69,7 @@ impl Report<'_> {
         self.run.observed_table(self.aiding)
     }
 
+    /// The true parameters, if known.
     pub fn truth_vector(&self) -> Option<ParameterVector> {
         self.truth.map(to_vector)
     }

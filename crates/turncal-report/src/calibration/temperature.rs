@@ -159,12 +159,15 @@ fn alone(outcome: &Outcome, index: usize) -> impl Iterator<Item = (f64, f64, f64
     })
 }
 
+/// Points of a parameter: its index to temperature and change.
+type Marks<'a> = &'a dyn Fn(usize) -> Vec<(f64, f64)>;
+
 /// Every parameter against temperature, with marks of this meaning: temperature and change of the parameter from the
 /// reference.
 pub fn curves(
     estimate: &Estimate,
     thermal: &Thermal,
-    (meaning, marks): (&str, &dyn Fn(usize) -> Vec<(f64, f64)>),
+    (meaning, marks): (&str, Marks),
 ) -> Plot {
     let form = estimate.form();
     let series = |group: Group, indices: &[usize]| {

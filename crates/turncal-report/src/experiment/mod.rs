@@ -73,6 +73,7 @@ fn facts(experiment: &Experiment) -> Facts {
     Facts::new("The experiment", rows)
 }
 
+/// The figures of an experiment as JSON.
 pub fn data(experiment: &Experiment) -> Value {
     let study = &experiment.study;
     let mission = |situation| {

@@ -208,4 +208,4 @@ pub fn accelerometer_frame(a: &Matrix3<f64>) -> Matrix3<f64> {
 }
 
 #[cfg(test)]
-pub mod tests;
+pub(crate) mod tests;
