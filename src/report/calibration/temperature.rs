@@ -23,7 +23,7 @@ pub fn figures(outcome: &Outcome) -> Vec<Plot> {
     };
     let marks = "each recording alone, with stated noise";
     vec![
-        curves(&outcome.estimate, thermal, (marks, &alone)),
+        curves(&outcome.estimate, thermal, marks, alone),
         residuals(outcome),
     ]
 }
@@ -164,7 +164,8 @@ fn alone(outcome: &Outcome, index: usize) -> impl Iterator<Item = (f64, f64, f64
 pub fn curves(
     estimate: &Estimate,
     thermal: &Thermal,
-    (meaning, marks): (&str, &dyn Fn(usize) -> Vec<(f64, f64)>),
+    meaning: &str,
+    marks: impl Fn(usize) -> Vec<(f64, f64)>,
 ) -> Plot {
     let form = estimate.form();
     let series = |group: Group, indices: &[usize]| {
