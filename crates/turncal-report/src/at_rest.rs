@@ -27,7 +27,7 @@ pub fn document(at_rest: &AtRest, run: &Run, calibration: &Calibration) -> Docum
         let means = means.flat_map(|(_, means)| means);
         means.map(|mean| (mean.temperature, mean.change)).collect()
     };
-    document.page(curves(outputs, thermal, ("means over blocks", &changes)));
+    document.page(curves(outputs, thermal, "means over blocks", changes));
     document.page(residuals(at_rest));
     document
 }

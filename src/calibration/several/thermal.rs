@@ -2,10 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::calibration::constants::{coefficients, parameters};
-use crate::calibration::{
-    Linearisation, Model, PARAMETERS, ParameterMatrix, ParameterVector, Posterior, parameter,
-};
+use crate::calibration::{PARAMETERS, ParameterMatrix, ParameterVector, parameter};
 use crate::imu::{
     InstallationForm, PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalCoefficients, ThermalModel,
     ThermalState, Triad,
@@ -79,30 +76,6 @@ pub struct Thermal {
     pub covariance: DMatrix<f64>,
     /// Covariance of the parameters of both triads (rows) with the values.
     pub cross: DMatrix<f64>,
-}
-
-impl Posterior {
-    /// Estimates of the temperature coefficients, linearised `at` a point; `None` if nothing depends on temperature.
-    pub fn thermal(&self, at: &Linearisation, model: &Model) -> Option<Thermal> {
-        let of_model = model.thermal.as_deref()?;
-        let (places, coefficients): (Vec<usize>, Vec<_>) = coefficients(&self.constants).unzip();
-        let n = places.len();
-        let mut cross = DMatrix::zeros(PARAMETERS, n);
-        for (k, index) in parameters(&self.constants) {
-            for (column, &place) in places.iter().enumerate() {
-                cross[(index, column)] = self.covariance[(k, place)];
-            }
-        }
-        Some(Thermal {
-            model: of_model.clone(),
-            values: DVector::from_fn(n, |k, _| {
-                coefficients[k].of(&at.thermal) + self.mean[places[k]]
-            }),
-            covariance: self.covariance.select_rows(&places).select_columns(&places),
-            cross,
-            coefficients,
-        })
-    }
 }
 
 impl Thermal {

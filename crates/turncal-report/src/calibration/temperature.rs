@@ -23,7 +23,7 @@ pub fn figures(outcome: &Outcome) -> Vec<Plot> {
     };
     let marks = "each recording alone, with stated noise";
     vec![
-        curves(&outcome.estimate, thermal, (marks, &alone)),
+        curves(&outcome.estimate, thermal, marks, alone),
         residuals(outcome),
     ]
 }
@@ -159,15 +159,13 @@ fn alone(outcome: &Outcome, index: usize) -> impl Iterator<Item = (f64, f64, f64
     })
 }
 
-/// Points of a parameter: its index to temperature and change.
-type Marks<'a> = &'a dyn Fn(usize) -> Vec<(f64, f64)>;
-
 /// Every parameter against temperature, with marks of this meaning: temperature and change of the parameter from the
 /// reference.
 pub fn curves(
     estimate: &Estimate,
     thermal: &Thermal,
-    (meaning, marks): (&str, Marks),
+    meaning: &str,
+    marks: impl Fn(usize) -> Vec<(f64, f64)>,
 ) -> Plot {
     let form = estimate.form();
     let series = |group: Group, indices: &[usize]| {
