@@ -109,12 +109,6 @@ impl Group {
         }
     }
 
-    /// Selects the parameters in the group.
-    pub fn among(self, parameters: &[usize]) -> Vec<usize> {
-        let all = parameters.iter().copied();
-        all.filter(|&index| Self::of(index) == self).collect()
-    }
-
     /// Root mean square of a vector's entries that were estimated, in the group's unit.
     pub fn rms(self, v: &ParameterVector, estimate: &Estimate) -> Option<f64> {
         let (_, rms) = self.spread(v, &self.estimated(estimate))?;

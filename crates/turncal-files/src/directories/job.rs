@@ -224,7 +224,9 @@ mod tests {
     use super::*;
 
     fn job(options: Value) -> Job {
-        Job::new(JobKind::Lot, options, 5)
+        let mut job = Job::new(JobKind::Lot, options, 5);
+        job.names = (1..=5).map(|unit| format!("unit-{unit}")).collect();
+        job
     }
 
     #[test]

@@ -60,8 +60,6 @@ pub fn in_common_form(
 /// A calibration in the general form, in a given body frame, normalised by given nominal scales.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Canonical {
-    /// Its name in tables and messages.
-    pub name: String,
     /// The body frame.
     pub body_frame: BodyFrame,
     /// Both triads, in the general form.
@@ -73,8 +71,6 @@ pub struct Canonical {
     pub correlated: bool,
     /// Auxiliary constants by name, which to first order do not depend on the body frame.
     pub constants: BTreeMap<String, TermRecord>,
-    /// False only if the record says that its method did not converge.
-    pub converged: bool,
 }
 
 impl Canonical {
@@ -112,13 +108,11 @@ impl Canonical {
             j * covariance * j.transpose()
         });
         Ok(Self {
-            name: name.to_owned(),
             body_frame,
             triads,
             covariance,
             correlated: !record.covariance.is_empty(),
             constants: record.terms.clone(),
-            converged: record.converged != Some(false),
         })
     }
 
