@@ -53,6 +53,7 @@ impl Table {
         &self.names
     }
 
+    /// The rows, before the first.
     pub fn rows(&self) -> TableRows {
         TableRows {
             table: self.clone(),
@@ -67,8 +68,11 @@ impl Table {
 /// A table at one of its rows.
 pub struct TableRows {
     table: Table,
+    /// Units of the columns; empty if none are stated.
     pub units: Vec<String>,
+    /// Modifications of the values, one sentence each.
     pub remarks: Vec<String>,
+    /// Error of integrals of the accelerometer columns over any rows, in the column unit times s.
     pub integral_error: [f64; 3],
     /// Number of rows up to and including this one.
     begun: usize,
