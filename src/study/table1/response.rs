@@ -38,7 +38,7 @@ pub struct Moment {
 }
 
 impl Response {
-    pub(super) fn new(mission: &Mission) -> Result<Self, NavigationStudyError> {
+    pub fn new(mission: &Mission) -> Result<Self, NavigationStudyError> {
         let ideal = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
         let moment = |exposure: &Exposure| Moment {
             time: exposure.time,
@@ -51,7 +51,7 @@ impl Response {
     }
 
     /// Largest absolute error over the run.
-    pub(super) fn largest(&self, sensor: Sensor, sensed: &Vector3<f64>) -> ByQuantity<f64> {
+    pub fn largest(&self, sensor: Sensor, sensed: &Vector3<f64>) -> ByQuantity<f64> {
         let mut largest = [0.0; 5];
         for moment in &self.0 {
             for (largest, error) in largest.iter_mut().zip(errors(moment, sensor, sensed)) {
@@ -62,7 +62,7 @@ impl Response {
     }
 
     /// About this many moments, evenly spaced from the first on.
-    pub(super) fn thinned(&self, moments: usize) -> impl Iterator<Item = &Moment> {
+    pub fn thinned(&self, moments: usize) -> impl Iterator<Item = &Moment> {
         self.0.iter().step_by(self.0.len().div_ceil(moments.max(1)))
     }
 }

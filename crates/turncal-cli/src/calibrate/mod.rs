@@ -198,11 +198,8 @@ impl Calibrate {
         let target = self.target(|| format!("{}-calibration", run.recording.name));
         if let Some(target) = &target {
             let directory = self.overwrite.directory(target, &[path])?;
-            write_calibration(
-                &calibration,
-                &directory.path().join("calibration.json"),
-                false,
-            )?;
+            let file = directory.path().join("calibration.json");
+            write_calibration(&calibration, &file, false)?;
             write_report(&document, &directory.path().join("report"))?;
             opened.write_run(&directory.path())?;
             directory.commit()?;
@@ -276,11 +273,8 @@ impl Calibrate {
             ..
         } = checked;
         if let (Some(directory), Some(document)) = (directory, &document) {
-            write_calibration(
-                &calibration,
-                &directory.path().join("calibration.json"),
-                false,
-            )?;
+            let file = directory.path().join("calibration.json");
+            write_calibration(&calibration, &file, false)?;
             write_report(document, &directory.path().join("report"))?;
             opened.map_or(Ok(()), |opened| opened.write_run(&directory.path()))?;
             directory.commit()?;
@@ -294,10 +288,7 @@ impl Calibrate {
                 document.brief.push(files.into());
                 show_brief(&document)?;
             }
-            _ => print(&calibration_json(
-                &calibration,
-                Path::new("standard output"),
-            )?)?,
+            _ => print(&calibration_json(&calibration, "standard output".as_ref())?)?,
         }
         if !solution.converged() {
             bail!("{name}: not converged; do not use the values or σ, see the findings");
