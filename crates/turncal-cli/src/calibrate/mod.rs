@@ -242,11 +242,8 @@ impl Calibrate {
         activity: Activity,
     ) -> anyhow::Result<()> {
         let run = problem.run();
-        let truth = self
-            .truth
-            .as_deref()
-            .map(|path| read_truth(path, run, problem.model.aiding.body_frame()))
-            .transpose()?;
+        let read = |path| read_truth(path, run, problem.model.aiding.body_frame());
+        let truth = self.truth.as_deref().map(read).transpose()?;
         let target = self.target(|| match self.estimation.method {
             Method::Ekf => format!("{name}-calibration"),
             Method::SixPosition => format!("{name}-calibration-six-position"),
