@@ -389,7 +389,10 @@ fn noise_stated_too_small_widens_sigma_by_the_birge_ratio_and_is_named() {
             if by_hand {
                 made.run.recording.table = None;
             }
-            for noise in [&mut made.run.instrument.noise.gyro, &mut made.run.instrument.noise.accel] {
+            for noise in [
+                &mut made.run.instrument.noise.gyro,
+                &mut made.run.instrument.noise.accel,
+            ] {
                 noise.random_walk /= 10.0;
                 noise.gauss_markov = noise.gauss_markov.map(|of| GaussMarkov {
                     sigma: of.sigma / 10.0,

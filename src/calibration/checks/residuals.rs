@@ -58,6 +58,7 @@ impl Residuals {
             "of": of, "chi_square": chi_square, "degrees": degrees, "limit": limit, "growth": growth,
             "worst": [[begin, end]]
         });
-        self.are_large().then(|| Finding::new(Kind::ResidualsLarge, text, figures))
+        self.are_large()
+            .then(|| Finding::new(Kind::ResidualsLarge, text, figures))
     }
 }

@@ -65,16 +65,26 @@ impl Eliminated {
             }
             _ => None,
         };
-        self.errors.iter().enumerate().filter_map(of_table).collect()
+        self.errors
+            .iter()
+            .enumerate()
+            .filter_map(of_table)
+            .collect()
     }
 
     /// Takes in the rows of an event, and eliminates the errors that are over.
     fn take(&mut self, unknown: &[usize], rows: &[Scaled], is_over: impl Fn(&Common) -> bool) {
-        let new = rows.iter().flat_map(|row| row.errors.iter().map(|(of, _)| *of));
+        let new = rows
+            .iter()
+            .flat_map(|row| row.errors.iter().map(|(of, _)| *of));
         let all: BTreeSet<Common> = self.errors.iter().copied().chain(new).collect();
         let (over, left): (Vec<_>, Vec<_>) = all.into_iter().partition(is_over);
-        let order: BTreeMap<Common, usize> =
-            over.iter().chain(&left).copied().zip((0..).step_by(3)).collect();
+        let order: BTreeMap<Common, usize> = over
+            .iter()
+            .chain(&left)
+            .copied()
+            .zip((0..).step_by(3))
+            .collect();
         let (before, first) = (self.r.nrows(), 3 * order.len());
         let of_unknowns = unknown.len() + 1;
         let mut all = DMatrix::zeros(before + rows.len(), first + of_unknowns);
@@ -97,7 +107,9 @@ impl Eliminated {
         }
         let r = all.qr().r();
         let gone = 3 * over.len();
-        self.r = r.view((gone, gone), (r.nrows() - gone, r.ncols() - gone)).into_owned();
+        self.r = r
+            .view((gone, gone), (r.nrows() - gone, r.ncols() - gone))
+            .into_owned();
         self.errors = left;
     }
 }
@@ -111,7 +123,11 @@ impl Equations {
         }
         let mut last: BTreeMap<Common, usize> = BTreeMap::new();
         for row in &self.rows {
-            for (of, _) in row.common.iter().filter(|(of, _)| self.variance_of(*of) > 0.0) {
+            for (of, _) in row
+                .common
+                .iter()
+                .filter(|(of, _)| self.variance_of(*of) > 0.0)
+            {
                 let last = last.entry(*of).or_default();
                 *last = (*last).max(row.event);
             }
@@ -122,7 +138,9 @@ impl Equations {
         };
         let mut drifted: PerSensor<Option<usize>> = PerSensor::default();
         for (&event, rows) in &events {
-            let all = rows.iter().flat_map(|row| row.common.iter().map(|(of, _)| *of));
+            let all = rows
+                .iter()
+                .flat_map(|row| row.common.iter().map(|(of, _)| *of));
             let new: BTreeSet<Common> = all
                 .filter(|of| last.contains_key(of) && !eliminated.errors.contains(of))
                 .collect();
@@ -150,9 +168,7 @@ impl Equations {
     /// The prior of an error, given those before.
     fn prior_of(&self, of: Common, drifted: &mut PerSensor<Option<usize>>) -> Vec<Scaled<'static>> {
         let with_drift = match of {
-            Common::Noise(sensor, event) => {
-                self.with_drift(sensor, event, drifted.get_mut(sensor))
-            }
+            Common::Noise(sensor, event) => self.with_drift(sensor, event, drifted.get_mut(sensor)),
             _ => None,
         };
         let sigma = self.variance_of(of).sqrt();

@@ -56,7 +56,9 @@ impl Equations {
         let (step, as_stated) = self.with_prior(&factor, 1.0)?;
         let unknown = self.unknown.len();
         let degrees = self.rows.len().saturating_sub(unknown);
-        let left = factor.get((unknown, unknown)).map_or(0.0, |left| left * left);
+        let left = factor
+            .get((unknown, unknown))
+            .map_or(0.0, |left| left * left);
         let by_table = eliminated.map_or_else(BTreeMap::new, |of| of.by_table(&as_stated));
         let residuals = |chi_square, step: &DMatrix<f64>| Residuals {
             chi_square,
@@ -130,7 +132,9 @@ impl Equations {
             let partials = DVector::from_iterator(unknown, self.partials(row)) / row.weighted.x;
             sum.ger(row.own.x, &partials, &partials, 1.0);
             for (of, by) in &row.common {
-                let score = scores.entry(*of).or_insert_with(|| DMatrix::zeros(unknown, 3));
+                let score = scores
+                    .entry(*of)
+                    .or_insert_with(|| DMatrix::zeros(unknown, 3));
                 *score += &partials * by;
             }
         }
@@ -193,7 +197,9 @@ impl Equations {
             *count += 1.0;
         }
         let mean = |(sum, count): (f64, f64)| sum / count;
-        let worst = squares.into_iter().max_by(|a, b| mean(a.1).total_cmp(&mean(b.1)));
+        let worst = squares
+            .into_iter()
+            .max_by(|a, b| mean(a.1).total_cmp(&mean(b.1)));
         let event = worst.and_then(|(event, _)| self.events.get(event));
         event.map_or([0.0; 2], |event| event.times)
     }

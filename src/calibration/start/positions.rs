@@ -197,7 +197,9 @@ impl Observed {
         by_solved: &SMatrix<f64, PER_TRIAD, PER_TRIAD>,
     ) -> Fit {
         let first = parameter(self.sensor, 0);
-        let covariance = solution.covariance.fixed_view::<PER_TRIAD, PER_TRIAD>(first, first);
+        let covariance = solution
+            .covariance
+            .fixed_view::<PER_TRIAD, PER_TRIAD>(first, first);
         let by_table = solution.by_table.into_iter();
         let by_table = by_table.map(|(number, by)| {
             let of_triad = by.fixed_rows::<PER_TRIAD>(first);

@@ -43,15 +43,15 @@ fn equations(events: usize, correlated: bool) -> Equations {
         });
         let mut errors = vec![Common::Table(0), Common::Table(4)];
         errors.extend([Common::Unit(event / 3), Common::Unit(1000 + event)]);
-        errors.extend([event, (event + 1).min(events - 1)].map(|k| Common::Noise(Sensor::Accel, k)));
+        errors
+            .extend([event, (event + 1).min(events - 1)].map(|k| Common::Noise(Sensor::Accel, k)));
         errors.push(Common::Noise(Sensor::Gyro, event));
         errors.dedup();
         for _ in 0..4 {
             let mut by = |size: f64| RowVector3::from_fn(|_, _| rng.random_range(-size..size));
             let common = errors.iter().map(|of| (*of, by(0.8))).collect();
-            let partials: Partials<1> = RowSVector::<f64, PARAMETERS>::from_fn(|_, _| {
-                rng.random_range(-1.0..1.0)
-            });
+            let partials: Partials<1> =
+                RowSVector::<f64, PARAMETERS>::from_fn(|_, _| rng.random_range(-1.0..1.0));
             let residual = Vector1::new(rng.random_range(-3.0..3.0));
             equations.add(&Rows {
                 event,
@@ -69,11 +69,17 @@ fn equations(events: usize, correlated: bool) -> Equations {
 fn dense(equations: &Equations) -> (DMatrix<f64>, DVector<f64>, DMatrix<f64>) {
     let rows = &equations.rows;
     let weights = DVector::from_fn(rows.len(), |k, _| rows[k].weighted.x.sqrt());
-    let errors = equations.errors().component_mul(&(&weights * weights.transpose()));
+    let errors = equations
+        .errors()
+        .component_mul(&(&weights * weights.transpose()));
     let unknown = equations.unknown.len();
     let rows_of = rows.iter().flat_map(|row| equations.partials(row));
     let design = DMatrix::from_row_iterator(rows.len(), unknown, rows_of);
-    (design, DVector::from_fn(rows.len(), |k, _| rows[k].residual.x), errors)
+    (
+        design,
+        DVector::from_fn(rows.len(), |k, _| rows[k].residual.x),
+        errors,
+    )
 }
 
 fn assert_near(found: &DMatrix<f64>, expected: &DMatrix<f64>) {
@@ -86,7 +92,9 @@ fn of_unknowns<const N: usize>(
     equations: &Equations,
     whole: &nalgebra::SMatrix<f64, PARAMETERS, N>,
 ) -> DMatrix<f64> {
-    DMatrix::from_fn(equations.unknown.len(), N, |i, j| whole[(equations.unknown[i], j)])
+    DMatrix::from_fn(equations.unknown.len(), N, |i, j| {
+        whole[(equations.unknown[i], j)]
+    })
 }
 
 #[test]
@@ -99,7 +107,11 @@ fn elimination_event_by_event_gives_the_same_as_the_whole_covariance() {
     let solution = equations.solved().unwrap();
     let by_rows = information.clone().cholesky().unwrap().solve(&vector);
     let chi_square = residual.dot(&(&inverse * &residual)) - vector.dot(&by_rows);
-    approx::assert_relative_eq!(solution.residuals.chi_square, chi_square, max_relative = 1e-9);
+    approx::assert_relative_eq!(
+        solution.residuals.chi_square,
+        chi_square,
+        max_relative = 1e-9
+    );
     assert_eq!(solution.residuals.degrees, 36 - 5);
     let growth = solution.residuals.growth();
     assert!(growth > 1.0);
@@ -119,12 +131,18 @@ fn elimination_event_by_event_gives_the_same_as_the_whole_covariance() {
     for number in [0, 4] {
         let of_table = |row: &Rows<1>| {
             let mut common = row.common.iter();
-            common.find(|(of, _)| *of == Common::Table(number)).unwrap().1
+            common
+                .find(|(of, _)| *of == Common::Table(number))
+                .unwrap()
+                .1
         };
         let columns: Vec<_> = equations.rows.iter().map(of_table).collect();
         let columns = DMatrix::from_fn(36, 3, |i, j| columns[i][j]);
         let expected = covariance(1.0) * design.tr_mul(&inverse) * columns;
-        assert_near(&of_unknowns(&equations, &solution.by_table[&number]), &expected);
+        assert_near(
+            &of_unknowns(&equations, &solution.by_table[&number]),
+            &expected,
+        );
     }
 }
 
@@ -144,7 +162,10 @@ fn errors_of_rows_that_are_weighted_otherwise_reach_the_unknowns_as_by_the_whole
     let solution = equations.solved().unwrap();
     let of_prior = &covariance * &prior * &covariance;
     let growth = solution.residuals.growth();
-    assert_near(&whole(&solution.covariance), &(by_errors * growth.powi(2) + of_prior));
+    assert_near(
+        &whole(&solution.covariance),
+        &(by_errors * growth.powi(2) + of_prior),
+    );
     let step = covariance * (weighted * residual + equations.mean.component_div(&equations.sigma));
     let found = of_unknowns(&equations, &solution.step);
     assert_near(&found, &DMatrix::from_column_slice(5, 1, step.as_slice()));
