@@ -4,9 +4,9 @@
 //! `turncal study accuracy`.
 
 use turncal::imu::InstallationForm;
-use turncal::report::{accuracy, terminal};
 use turncal::simulation::Scenario;
 use turncal::study::{AccuracyStudy, Study, UNWATCHED};
+use turncal_report::{accuracy, terminal};
 
 /// Enough for the root mean squares to be known within a few per cent.
 const RUNS: u64 = 40;

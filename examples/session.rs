@@ -4,9 +4,9 @@
 
 use nalgebra::Vector3;
 use turncal::models::specification;
-use turncal::report::session::{data, words};
 use turncal::simulation::Scenario;
 use turncal::survey::Session;
+use turncal_report::session::{data, words};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     // Your own program would read a sensor here; this one uses simulated samples.

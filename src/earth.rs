@@ -3,11 +3,11 @@
 //! WGS-84 (NIMA TR8350.2, 3rd ed., tables 3.1 and 3.4): ellipsoid, rotation rate and normal gravity
 //! (Somigliana's closed form, continued in height by TR8350.2 Eq. 4-3).
 
-use std::f64::consts::FRAC_PI_4;
-use std::ops::RangeInclusive;
-
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::FRAC_PI_4;
+
+pub use turncal_input::{GRAVITIES, HEIGHTS};
 
 use crate::units::MILLIGAL;
 
@@ -17,10 +17,6 @@ pub const SEMI_MAJOR_AXIS: f64 = 6_378_137.0;
 pub const FLATTENING: f64 = 1.0 / 298.257_223_563;
 /// First eccentricity squared.
 pub const ECCENTRICITY_SQUARED: f64 = FLATTENING * (2.0 - FLATTENING);
-/// Heights from the shore of the Dead Sea to above any laboratory, m.
-pub const HEIGHTS: RangeInclusive<f64> = -500.0..=9000.0;
-/// Gravity anywhere at these heights, m/s².
-pub const GRAVITIES: RangeInclusive<f64> = 9.7..=9.9;
 /// Rotation rate in rad/s.
 pub const ROTATION_RATE: f64 = 7.292_115e-5;
 

@@ -12,7 +12,7 @@
 //! use turncal::simulation::Scenario;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! // A simulated run; `Run::read("run.toml".as_ref())` reads a recorded one.
+//! // A simulated run; `turncal_files::read_run("run.toml".as_ref())` reads a recorded one.
 //! let run = Scenario::load("single-axis")?.simulate(1, 0)?.run;
 //! let problem = Problem::new(&run, &Options::default());
 //! let mut solution = problem.solve(Method::Ekf, UNWATCHED)?;
@@ -26,8 +26,8 @@
 //! # Ok(())
 //! # }
 //! ```
-//! `examples/` has three more programs: samples from arrays, both methods compared with a truth, a study of a
-//! path.
+//! `examples/` has more programs: samples from arrays, both methods compared with a truth, a study of a path, rows as
+//! they arrive.
 //!
 //! # Frames, signs, units
 //! | what | convention |
@@ -38,48 +38,43 @@
 //! | instrument | `N = K C u + D`, u the angular rate in rad/s or the specific force in m/s² ([`imu`]) |
 //! | navigation errors | computed − true, `C_computed = (I − [φ×]) C_true` |
 //! | parameter errors | true − estimated |
-//! | units | SI and radians everywhere; [`units`] and [`formats`] convert at input and output |
+//! | units | SI and radians everywhere; [`units`] are for input and output |
 //!
 //! # Rooms
 //! A [`recording::Recording`] is data. A [`run::Run`] adds prior knowledge: instrument, site, table.
 //! [`calibration::Options`] select the estimated quantities; a [`calibration::Problem`] preprocesses all of it once.
-//! Data flow in one direction: [`formats`] read runs, [`calibration`] solves, [`study`] evaluates by navigation and
-//! Monte Carlo, [`lot`] compares units of one type, `report` presents the results. [`earth`], [`attitude`], [`imu`],
-//! [`turntable`] and [`navigation`] do not depend on these; [`simulation`] generates runs from [`models`]; [`survey`]
-//! examines a run before calibration, [`noise`] its noise.
+//! Data flow in one direction: [`calibration`] solves, [`study`] evaluates by navigation and Monte Carlo, [`lot`] compares
+//! units of one type. [`earth`], [`attitude`], [`imu`], [`turntable`] and [`navigation`] do not depend on these;
+//! [`simulation`] generates runs from [`models`]; [`survey`] examines a run before calibration, [`noise`] its noise.
 //!
-//! # Features
-//! `report` (pages, figures, tables), `certificate` (calibration certificates as PDF/A-3 and XML, with
-//! `report`) and `cli` (the command `turncal`, with `report`) are on by default. Without default features, turncal
-//! compiles without any user-interface dependencies: `turncal = { version = "…", default-features = false }`.
+//! # Crates
+//! This crate is the science: it reads no recording, prints nothing and draws nothing.
+//!
+//! | crate | what it does | what it knows |
+//! |---|---|---|
+//! | `turncal-input` | errors that name line and field, TOML documents, checked numbers, units | |
+//! | `turncal` | calibrates, simulates, studies | `turncal-input` |
+//! | `turncal-logs` | turns logs into rows of numbers | `turncal-input` |
+//! | `turncal-files` | reads and writes runs and calibrations, drafts a `run.toml`, exports | all above |
+//! | `turncal-report` | presents results as text, page, JSON and certificate | `turncal`, `turncal-input` |
+//! | `turncal-cli` | is the command `turncal` | all above |
 
 pub mod attitude;
 pub mod calibration;
-#[cfg(feature = "certificate")]
-pub mod certificate;
-#[cfg(feature = "cli")]
-mod cli;
 pub mod earth;
-pub mod formats;
 pub mod imu;
+pub mod laboratory;
 pub mod lot;
 pub mod models;
 pub mod navigation;
 pub mod noise;
 pub mod number;
 pub mod recording;
-#[cfg(feature = "report")]
-pub mod report;
-pub(crate) mod room;
 pub mod run;
-pub(crate) mod shown;
 pub mod simulation;
-pub(crate) mod statistics;
+pub mod statistics;
 pub mod study;
 pub mod survey;
 pub mod turntable;
-pub mod units;
 
-#[cfg(feature = "cli")]
-#[doc(hidden)]
-pub use cli::command;
+pub use turncal_input::units;

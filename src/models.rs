@@ -7,6 +7,7 @@ mod by_hand;
 mod catalogue;
 mod instrument;
 mod machine;
+mod terms;
 mod thermal;
 mod trajectory;
 
@@ -15,13 +16,15 @@ use std::path::{Path, PathBuf};
 use include_dir::Dir;
 use serde::de::DeserializeOwned;
 
-use crate::formats::{Document, FileError, Place as At};
 use crate::lot::Specification;
+use turncal_input::small_file;
+use turncal_input::{Document, FileError, Place as At};
 
 pub use by_hand::path_by_hand;
 pub use catalogue::Embedded;
-pub use instrument::{InstallationModel, Instrument, Spread, Variation};
+pub use instrument::{InstallationModel, Instrument, Spread, Tolerances, Variation};
 pub use machine::{path, turntable};
+pub use terms::{TermFile, term_sigma};
 pub use thermal::ThermalVariation;
 pub use trajectory::trajectory;
 
@@ -143,12 +146,17 @@ impl Text {
             .map_or_else(|| self.file.clone(), |stem| stem.to_string_lossy().into())
     }
 
-    pub(crate) fn parse<T: DeserializeOwned>(&self) -> Result<T, ModelError> {
+    /// The fields of the model.
+    ///
+    /// # Errors
+    /// If a field is missing, unknown or cannot be right.
+    pub fn parse<T: DeserializeOwned>(&self) -> Result<T, ModelError> {
         let document = self.document();
         Ok(document.fill(document.parse()?)?)
     }
 
-    pub(crate) fn document(&self) -> Document<'_> {
+    /// The text with its name, for errors that name a line.
+    pub fn document(&self) -> Document<'_> {
         Document {
             file: Path::new(&self.file),
             text: &self.text,
@@ -156,13 +164,13 @@ impl Text {
     }
 
     /// Inconsistent values: problem and remedy.
-    pub(crate) fn inconsistent(&self, message: impl Into<String>) -> ModelError {
+    pub fn inconsistent(&self, message: impl Into<String>) -> ModelError {
         inconsistent(&self.file, message)
     }
 }
 
 /// The same for a named file.
-pub(crate) fn inconsistent(file: &str, message: impl Into<String>) -> ModelError {
+pub fn inconsistent(file: &str, message: impl Into<String>) -> ModelError {
     let error = FileError {
         file: file.into(),
         place: At::File,
@@ -183,7 +191,7 @@ pub fn text(room: Room, name_or_path: &str, named_in: &Place) -> Result<Text, Mo
     };
     if let Some(path) = path.filter(|path| path.is_file()) {
         let file = path.display().to_string();
-        let text = std::fs::read_to_string(&path);
+        let text = small_file::read_text(&path);
         let text = text.map_err(|error| inconsistent(&file, format!("cannot be read: {error}")))?;
         return Ok(Text {
             text,

@@ -26,6 +26,12 @@ pub fn value(value: f64, sigma: f64) -> String {
     }
 }
 
+/// A value rounded to this number of significant digits.
+pub fn rounded(value: f64, digits: usize) -> f64 {
+    let text = format!("{value:.*e}", digits.saturating_sub(1));
+    text.parse().unwrap_or(value)
+}
+
 /// An accuracy, to two digits.
 pub fn sigma(sigma: f64) -> String {
     value(sigma, sigma)

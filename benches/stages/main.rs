@@ -15,12 +15,13 @@ use divan::counter::ItemsCount;
 use turncal::calibration::{
     Method, NoisePolicy, Options, Outcome, Problem, UNWATCHED, bound, estimate, test_error_terms,
 };
-use turncal::formats::write_run;
 use turncal::imu::{InstallationForm, PerSensor, Triad};
 use turncal::navigation::{Navigator, ProcessNoise, State};
 use turncal::run::Run;
 use turncal::simulation::{Scenario, Simulated};
-use turncal::study::{self, AccuracyStudy, Study};
+use turncal::study;
+use turncal::study::{AccuracyStudy, Study};
+use turncal_files::write_run;
 
 fn main() {
     divan::main();
@@ -56,7 +57,9 @@ fn read_files(bencher: Bencher) {
     let output = simulated().output;
     write_run(directory.path(), run(), output, None).expect("a run that was simulated");
     let path = directory.path().join("run.toml");
-    bencher.counter(samples()).bench(|| Run::read(&path));
+    bencher
+        .counter(samples())
+        .bench(|| turncal_files::read_run(&path));
 }
 
 #[divan::bench]
@@ -136,10 +139,10 @@ fn error_terms(bencher: Bencher) {
 #[divan::bench(sample_count = 5, args = ["three-axis-counts", "real-mems-lot-0", "nineteen-position-velocity"])]
 fn calibrate(bencher: Bencher, name: &str) {
     let data = std::env::var_os("TURNCAL_DATA").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
+        || Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("../shared/data"),
         PathBuf::from,
     );
-    let Ok(run) = Run::read(&data.join(name).join("run.toml")) else {
+    let Ok(run) = turncal_files::read_run(&data.join(name).join("run.toml")) else {
         return;
     };
     let problem = Problem::new(&run, &Options::default());

@@ -1,14 +1,12 @@
 //! The Bayesian Cramér–Rao bound of a run.
 
-use nalgebra::DVector;
-
 use crate::calibration::checks::error_term_test::{TermsOn, with_everything};
 use crate::calibration::start::coarse::initial_attitudes;
 use crate::calibration::{
     Auxiliary, CalibrationError, Epoch, ErrorTerm, Estimate, Gate, Linearisation, Observability,
-    PARAMETERS, ParameterVector, PassResult, Prior, Problem, Script, pass,
+    ParameterVector, PassResult, Prior, Problem, Script, pass,
 };
-use crate::imu::{PerSensor, TermVector, ThermalCoefficients, Triad};
+use crate::imu::{PerSensor, TermVector, Triad};
 
 /// The bound of a run: the smallest covariance that any estimator can reach.
 #[derive(Debug, Clone)]
@@ -50,6 +48,20 @@ pub fn bound(
     truth: &PerSensor<Triad>,
     terms: &TermVector,
 ) -> Result<Bound, CalibrationError> {
+    let (bound, _) = bound_with_parts(problem, truth, terms, &[])?;
+    Ok(bound)
+}
+
+/// The same, with the 1σ of the parameters without the rows between each of these increasing times in s and the next.
+///
+/// # Errors
+/// [`CalibrationError`] as for [`super::estimate`].
+pub fn bound_with_parts(
+    problem: &Problem,
+    truth: &PerSensor<Triad>,
+    terms: &TermVector,
+    times: &[f64],
+) -> Result<(Bound, Vec<ParameterVector>), CalibrationError> {
     let problem = problem.with(|model| *model = model.in_form(problem.run(), truth.gyro.form));
     let at = Linearisation::new(*truth, *terms, Vec::new());
     let at_truth = pass_at(&problem, at)?;
@@ -60,13 +72,15 @@ pub fn bound(
         covariance: at_truth.posterior.parameter_covariance,
     };
     let (_, across) = at_truth.last_attitude();
-    Ok(Bound {
+    let without = at_truth.reduction.sigma_without(&prior, times);
+    let bound = Bound {
         observability: Observability::new(&estimate, &prior_sigma, &across),
         prior_sigma,
         estimate,
         auxiliary: at_truth.auxiliary(&problem.model),
         history: at_truth.reduction.history(&prior, &at_truth.at),
-    })
+    };
+    Ok((bound, without))
 }
 
 /// The constant error terms that a problem does not estimate, at a truth as for [`bound`].
@@ -101,31 +115,4 @@ fn pass_at(problem: &Problem, truth: Linearisation) -> Result<PassResult, Calibr
         ..truth
     };
     pass(problem, &Script::new(problem, &attitudes, &at)?, Gate::Open)
-}
-
-/// Bound for the variances of any joint estimator of several recordings, at a truth with these temperature
-/// coefficients: first the parameters of both triads at the reference, then the enabled coefficients.
-///
-/// # Errors
-/// [`CalibrationError`] as for [`super::estimate`].
-pub fn thermal_bound(
-    problem: &Problem,
-    truth: &PerSensor<Triad>,
-    coefficients: &PerSensor<ThermalCoefficients>,
-) -> Result<DVector<f64>, CalibrationError> {
-    let at_truth = pass_at(
-        problem,
-        Linearisation {
-            thermal: *coefficients,
-            ..Linearisation::new(*truth, TermVector::zeros(), Vec::new())
-        },
-    )?;
-    let of_parameters = at_truth.posterior.parameter_covariance.diagonal();
-    let of_coefficients = at_truth.thermal(&problem.model);
-    let of_coefficients = of_coefficients.map(|thermal| thermal.covariance.diagonal());
-    let all = of_parameters.iter().chain(of_coefficients.iter().flatten());
-    Ok(DVector::from_iterator(
-        PARAMETERS + of_coefficients.as_ref().map_or(0, DVector::len),
-        all.copied(),
-    ))
 }

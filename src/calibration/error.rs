@@ -26,17 +26,6 @@ pub enum CalibrationError {
         /// The missing triad.
         sensor: Sensor,
     },
-    /// Not enough memory for a calibration.
-    #[error(
-        "not enough memory to calibrate {samples} samples (about {megabytes} MB needed). Free some memory, or split \
-         the recording"
-    )]
-    NoMemory {
-        /// Number of samples of all runs.
-        samples: usize,
-        /// Required memory, MB.
-        megabytes: usize,
-    },
     /// Temperature-dependent parameters with a recording that has no temperature.
     #[error(
         "recording {number}, {recording}, has no usable temperature, which the temperature model needs. Name the \
@@ -115,11 +104,6 @@ fn quoted(labels: &[String]) -> String {
 /// Errors of a comparison of calibrations.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum ComparisonError {
-    /// Only one calibration.
-    #[error(
-        "one calibration without a truth cannot be compared. Give a second calibration or a truth"
-    )]
-    Single,
     /// Outputs of different quantities.
     #[error(
         "{other} has the {} unit `{found}` and {name} has `{expected}`, so they cannot be compared. Give \

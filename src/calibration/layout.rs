@@ -109,7 +109,7 @@ impl Layout {
 }
 
 /// The constants of a model, including gravity if it is a constant.
-fn constants(model: &Model, gravity: bool) -> Vec<Constant> {
+pub fn constants(model: &Model, gravity: bool) -> Vec<Constant> {
     let parameters = (0..PARAMETERS).filter(|&i| model.prior_sigma[i] > 0.0);
     let terms = (0..TERM_PARAMETERS).filter(|&k| model.term_sigma[k] > 0.0);
     let thermal = Coefficient::all(model.form, model.thermal.as_deref()).into_iter();

@@ -10,7 +10,7 @@ use crate::calibration::{CalibrationError, Difference, Model, from_vector, param
 use crate::earth::Site;
 use crate::imu::{
     PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, Sensor, TermVector, ThermalCoefficients,
-    Triad,
+    Triad, thermal_state,
 };
 use crate::run::Run;
 use crate::turntable::TableAccuracy;
@@ -69,9 +69,8 @@ impl Linearisation {
             return triads;
         };
         let middle = 0.5 * (imu.time(samples.start) + imu.time(samples.end));
-        let state = thermal
-            .range
-            .state(&temperature.at(middle), &temperature.rate(middle));
+        let (at, rate) = (temperature.at(middle), temperature.rate(middle));
+        let state = thermal_state(&thermal.range, &at, &rate);
         PerSensor::from_fn(|sensor| {
             let coefficients = self.thermal.get(sensor);
             triads.get(sensor).warmed(coefficients, state.get(sensor))

@@ -19,7 +19,7 @@ mod estimator;
 mod gauss_newton;
 mod layout;
 mod linearisation;
-pub(crate) mod model;
+pub mod model;
 mod noise;
 mod options;
 mod outcome;
@@ -31,7 +31,7 @@ mod solution;
 mod solved;
 
 // Most files of this module import their common types from here.
-pub use bound::{Bound, TermLeftOff, bound, terms_left_off, thermal_bound};
+pub use bound::{Bound, TermLeftOff, bound, bound_with_parts, terms_left_off};
 pub use budget::{Budget, BudgetPart, BudgetPartRecord, BudgetRecord, BudgetSource, LeftOffRecord};
 pub use checks::cause::{Cause, FoundCause};
 pub use checks::dwell_scatter::DwellScatter;
@@ -72,19 +72,17 @@ pub use problem::Problem;
 use problem::Stretch;
 pub use reduction::{Epoch, Own};
 use reduction::{Reduction, Script};
-pub use result::at_rest::{AtRest, AxisAtRest, Second};
 pub use result::at_temperature::TemperatureError;
-pub use result::comparison::{Comparison, Named, Side, compare};
 pub use result::correction::{Calibrated, Correction, CorrectionError};
-pub use result::frame::{Canonical, in_body_frame};
+pub use result::frame::{Canonical, Named, in_body_frame};
 pub use result::nees::{Nees, nees};
 pub use result::record::truth_record;
-pub use result::scatter::{ChiSquare, ParameterScatter, Scatter};
 pub use result::thermal_record::{
     CoefficientRecord, RecordingRecord, TOLERANCE as TEMPERATURE_TOLERANCE, ThermalRecord,
     ValueRecord,
 };
 pub use result::{Calibration, Method, triads_of};
+pub use several::at_rest::{AtRest, MeanAtRest};
 pub use several::day_to_day::{DayToDay, Difference};
 pub use several::thermal::{Coefficient, Thermal};
 pub use several::{Repeatability, TemperatureOptions, Together};
@@ -93,6 +91,6 @@ pub use solved::SeparateEstimate;
 use solved::Solved;
 pub use start::closed_form::{ClosedForm, Reference, six_position, six_position_of};
 pub use start::coarse::{CoarseStart, coarse_start};
-pub(crate) use start::mounting::orders_of_gyros;
+pub use start::mounting::orders_of_gyros;
 pub use start::mounting::{Contradiction, Mounting, Sensitivity};
 pub use start::positions::{Position, six_position_triad};

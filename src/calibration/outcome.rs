@@ -118,7 +118,7 @@ impl Outcome {
             attitude_sigma,
             prior_attitudes: priors,
             auxiliary: held.auxiliary(model),
-            thermal: held.thermal(model),
+            thermal: held.posterior.thermal(&held.at, model),
             own: held.reduction.own(&held.at, &held.posterior),
             warming: problem.warming(),
             alone: solved.alone,

@@ -1,6 +1,6 @@
 //! A pass of the filter over a recording: estimate, covariance and accepted observations.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::Vector3;
 
 use crate::calibration::checks::observability::AttitudeCovariance;
 use crate::calibration::constants::parameters;
@@ -8,8 +8,8 @@ pub use crate::calibration::filter::Gate;
 use crate::calibration::filter::Judge;
 use crate::calibration::reduction::Keeping;
 use crate::calibration::{
-    Auxiliary, CalibrationError, Constant, Innovation, Linearisation, Model, PARAMETERS, Posterior,
-    Prior, Problem, Reduction, Script, Thermal, auxiliary_vector,
+    Auxiliary, CalibrationError, Constant, Innovation, Linearisation, Model, Posterior, Prior,
+    Problem, Reduction, Script, auxiliary_vector,
 };
 
 /// Result of a pass.
@@ -126,30 +126,5 @@ impl PassResult {
             }
         }
         auxiliary
-    }
-
-    /// Estimates of the temperature coefficients, if any.
-    pub fn thermal(&self, model: &Model) -> Option<Thermal> {
-        let of_model = model.thermal.as_deref()?;
-        let (places, coefficients): (Vec<usize>, Vec<_>) = self.reduction.coefficients().unzip();
-        let Posterior {
-            mean, covariance, ..
-        } = &self.posterior;
-        let n = places.len();
-        let mut cross = DMatrix::zeros(PARAMETERS, n);
-        for (k, index) in parameters(&self.reduction.constants) {
-            for (column, &place) in places.iter().enumerate() {
-                cross[(index, column)] = covariance[(k, place)];
-            }
-        }
-        Some(Thermal {
-            model: of_model.clone(),
-            values: DVector::from_fn(n, |k, _| {
-                coefficients[k].of(&self.at.thermal) + mean[places[k]]
-            }),
-            covariance: covariance.select_rows(&places).select_columns(&places),
-            cross,
-            coefficients,
-        })
     }
 }

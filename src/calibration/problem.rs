@@ -186,6 +186,17 @@ impl<'a> Problem<'a> {
         })
     }
 
+    /// The same problem, its run at rest throughout.
+    pub(in crate::calibration) fn as_one_dwell(&self) -> Self {
+        let samples = 0..self.run.recording.imu.len();
+        let dwell = Dwell {
+            samples,
+            position: None,
+        };
+        let stretch = Stretch::new(self.run, None, 0, vec![dwell], PerSensor::default());
+        self.with_stretches([stretch].into())
+    }
+
     /// Duration of this number of steps of a dwell, s.
     pub(in crate::calibration) fn duration_of_steps(&self, steps: usize) -> f64 {
         let period = self.run.recording.imu.period;

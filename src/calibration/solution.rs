@@ -8,16 +8,7 @@ use crate::calibration::{
     test_error_terms,
 };
 use crate::imu::{PerSensor, Sensor};
-use crate::room;
-use crate::run::Run;
 use crate::units::DEGREE;
-
-/// Bytes per sample for the passes, their history and innovations: 200 to 235 measured.
-const BYTES_A_SAMPLE: usize = 256;
-/// The same for a packed recording.
-const BYTES_A_PACKED_SAMPLE: usize = 8;
-/// Bytes that do not grow with the recording: threads, error term tests, report.
-const BYTES_BESIDE: usize = 16 << 20;
 
 /// Result of a method for a problem.
 #[derive(Debug, Clone)]
@@ -45,24 +36,6 @@ impl Problem<'_> {
     /// # Errors
     /// [`CalibrationError`] if the runs cannot give a calibration by this method.
     pub fn solve(&self, method: Method, progress: Progress) -> Result<Solution, CalibrationError> {
-        let bytes_of = |run: &Run| {
-            let imu = &run.recording.imu;
-            let each = match imu.is_packed() {
-                true => BYTES_A_PACKED_SAMPLE,
-                false => BYTES_A_SAMPLE,
-            };
-            imu.len().saturating_mul(each)
-        };
-        let bytes = self
-            .runs()
-            .map(bytes_of)
-            .fold(BYTES_BESIDE, usize::saturating_add);
-        if !room::is_there(bytes) {
-            return Err(CalibrationError::NoMemory {
-                samples: self.runs().map(|run| run.recording.imu.len()).sum(),
-                megabytes: bytes >> 20,
-            });
-        }
         let lacks = |&sensor: &Sensor| self.runs().any(|run| !run.recording.imu.has(sensor));
         if let Some(sensor) = Sensor::ALL.into_iter().find(lacks) {
             return Err(CalibrationError::OneTriad { sensor });

@@ -28,12 +28,6 @@ impl AxisOrder {
         source: [1, 0, 2],
         reversed: [true, false, false],
     };
-    /// Names of file axes in `run.toml`, with the conversion to right, front, up.
-    pub const WORDS: [(&'static str, Self); 3] = [
-        ("rfu", Self::IDENTITY),
-        ("frd", Self::FRONT_RIGHT_DOWN),
-        ("flu", Self::FRONT_LEFT_UP),
-    ];
 
     /// All 48, the first being the identity.
     pub fn all() -> impl Iterator<Item = Self> {
@@ -118,24 +112,6 @@ impl AxisOrder {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn every_frame_is_right_handed_and_names_its_axes() {
-        for (word, axes) in AxisOrder::WORDS {
-            assert!(axes.is_rotation(), "{word}");
-            for (letter, axis) in word.chars().zip(0..) {
-                let expected = match letter {
-                    'r' => Vector3::x(),
-                    'f' => Vector3::y(),
-                    'u' => Vector3::z(),
-                    'l' => -Vector3::x(),
-                    _ => -Vector3::z(),
-                };
-                let along = axes.apply(&Vector3::ith(axis, 1.0));
-                assert_eq!(along, expected, "{word}: {letter}");
-            }
-        }
-    }
 
     #[test]
     fn there_are_48_of_which_24_are_rotations() {

@@ -14,6 +14,15 @@ pub enum BodyFrame {
 }
 
 impl BodyFrame {
+    /// The frame to which all of these can be converted: that of the accelerometers if any is theirs.
+    pub fn common(mut all: impl Iterator<Item = Self>) -> Self {
+        if all.any(|frame| frame == Self::Accelerometer) {
+            Self::Accelerometer
+        } else {
+            Self::Table
+        }
+    }
+
     /// A short description.
     pub fn words(self) -> &'static str {
         match self {

@@ -9,7 +9,6 @@ pub const ANGLES: usize = 6;
 /// Definition of the installation matrix by six or three small angles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum InstallationForm {
     /// Six direction cosines, rows of unit norm: `C_ii = √(1 − C_ij² − C_ik²)` (Eqs. 4 and 7)
     #[default]

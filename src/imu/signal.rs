@@ -6,8 +6,9 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
 /// Quantity of one sample.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(schemars::JsonSchema))]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum Output {
     /// Whole pulses counted during the sample.
@@ -15,6 +16,7 @@ pub enum Output {
     /// The integral of the output over the sample.
     Increment,
     /// The mean output over the sample.
+    #[default]
     Rate,
 }
 

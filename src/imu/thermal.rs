@@ -72,23 +72,25 @@ impl ThermalRange {
     }
 }
 
-impl PerSensor<ThermalRange> {
-    /// Both triads' functions at temperatures in °C that change by these rates in K/s.
-    pub fn state(
-        &self,
-        temperatures: &PerSensor<[f64; 3]>,
-        rates: &PerSensor<[f64; 3]>,
-    ) -> ThermalState {
-        PerSensor::from_fn(|sensor| {
-            let (t, rate) = (temperatures.get(sensor), rates.get(sensor));
-            [0, 1, 2].map(|axis| self.get(sensor).values(t[axis], rate[axis]))
-        })
-    }
+/// Both triads' functions at temperatures in °C that change by these rates in K/s.
+pub fn thermal_state(
+    ranges: &PerSensor<ThermalRange>,
+    temperatures: &PerSensor<[f64; 3]>,
+    rates: &PerSensor<[f64; 3]>,
+) -> ThermalState {
+    PerSensor::from_fn(|sensor| {
+        let (t, rate) = (temperatures.get(sensor), rates.get(sensor));
+        [0, 1, 2].map(|axis| ranges.get(sensor).values(t[axis], rate[axis]))
+    })
+}
 
-    /// Both triads' functions at one temperature in °C of all axes and its rate in K/s.
-    pub fn everywhere(&self, temperature: f64, rate: f64) -> ThermalState {
-        PerSensor::from_fn(|sensor| [self.get(sensor).values(temperature, rate); 3])
-    }
+/// Both triads' functions at one temperature in °C of all axes and its rate in K/s.
+pub fn thermal_state_everywhere(
+    ranges: &PerSensor<ThermalRange>,
+    temperature: f64,
+    rate: f64,
+) -> ThermalState {
+    PerSensor::from_fn(|sensor| [ranges.get(sensor).values(temperature, rate); 3])
 }
 
 /// P₀ to the highest order (Bonnet's recursion).

@@ -1,84 +1,80 @@
-//! A production lot: joint evaluation of the calibrations of many units of one type.
+//! Several calibrations of one instrument, or of many of one type, side by side.
 //!
-//! All units are converted to one form, body frame and nominal scale. Results are mean and spread of the lot, with a
-//! test whether the spread exceeds the units' σ; outliers; trends; limits.
+//! All are converted to one form, body frame and nominal scale. Results are mean and spread of each quantity, with a
+//! test whether the spread exceeds the σ of the calibrations; outliers; differences from a truth; limits.
 
+mod joint;
 mod limits;
-mod outlier;
 mod quantity;
-mod spread;
+mod scatter;
+mod specification;
 mod statistics;
 #[cfg(test)]
 pub(crate) mod tests;
-mod trend;
 mod unit;
 
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, DVector, Vector3};
 
-use crate::calibration::result::frame::Canonical;
+use crate::calibration::result::frame::{Canonical, free_parameters, own_nominal};
+use crate::calibration::{Nees, nees};
 use crate::imu::{BodyFrame, Nominal, PerSensor};
 use crate::statistics::median_of_axes;
 
+use joint::joint;
 use limits::overall;
 use statistics::of_all;
-use unit::noise_at_rest;
 
 pub use limits::{Check, Limit, Specification, Verdict, checks, probability_outside};
 pub use quantity::{Quantity, Sample};
-pub use spread::{Scatter, Spread};
-pub use statistics::{FALSE_ALARM, FALSE_TREND, Statistics};
-pub use trend::{Against, Trend};
+pub use scatter::{ChiSquare, Scatter, Spread};
+pub use statistics::{FALSE_ALARM, Statistics};
 pub use unit::{Calibrated, Row, Unit};
 
-/// The evaluation of a lot.
+/// Calibrations side by side.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lot {
     /// Every unit, in the order given.
     pub rows: Vec<Row>,
-    /// The common body frame.
+    /// The true values, if known.
+    pub truth: Option<Row>,
+    /// The common body frame: of the accelerometers if any record is in theirs.
     pub body_frame: BodyFrame,
-    /// Nominal scales by which all are normalised: for each axis, the median of the values stated in the runs.
+    /// Nominal scales by which all are normalised: for each axis, the median of the values stated in the runs; if none
+    /// are stated, the scale factors of the truth, or of the first calibration.
     pub nominal: PerSensor<Nominal>,
+    /// Whether a run states nominal scales.
+    pub nominal_is_stated: bool,
     /// Relative 1σ of gravity, if all units were calibrated at one site and therefore share its error. It is part of
     /// each unit's σ and of the mean's σ, but not of the scatter.
     pub shared_gravity: Option<f64>,
     /// Every quantity that at least two units have.
     pub statistics: Vec<Statistics>,
+    /// χ² of the scatter of all parameters with their correlations, over the units that give correlations; `None` if
+    /// fewer than two do.
+    pub joint: Option<ChiSquare>,
     /// The limits for units; `None` if there are none.
     pub specification: Option<Specification>,
 }
 
 impl Lot {
-    /// Evaluates units, and checks them against limits if given.
-    pub fn new(units: Vec<Unit>, specification: Option<Specification>) -> Self {
-        let output = common_output(&units);
-        let usable: Vec<_> = units.iter().map(|unit| usable(unit, output)).collect();
-        let compared: Vec<&Calibrated> = usable.iter().flatten().copied().collect();
-        let by_accelerometers =
-            |of: &&Calibrated| of.calibration.body_frame == BodyFrame::Accelerometer;
-        let body_frame = match compared.iter().any(by_accelerometers) {
-            true => BodyFrame::Accelerometer,
-            false => BodyFrame::Table,
-        };
-        let nominal = PerSensor::from_fn(|sensor| {
-            let stated = compared.iter().map(|of| (*of.nominal.get(sensor)).into());
-            let middle = median_of_axes(&stated.collect::<Vec<_>>());
-            Nominal(middle.unwrap_or(Vector3::repeat(1.0)))
-        });
-        let shared_gravity = shared_gravity(&compared);
-        let canonical = |(unit, usable): (&Unit, Result<&Calibrated, String>)| {
-            Canonical::new(&unit.name, &usable?.calibration, &nominal, body_frame)
-                .map_err(|error| error.to_string())
-        };
-        let canonical: Vec<_> = units.iter().zip(usable).map(canonical).collect();
-        let rows = units.into_iter().zip(canonical).map(|(unit, canonical)| {
-            let mut row = Row {
-                noise: noise_at_rest(&unit, &nominal),
-                unit,
-                canonical,
-                checks: Vec::new(),
-                verdict: None,
-            };
+    /// Compares units, and checks them against a truth and against limits if given.
+    pub fn new(
+        units: Vec<Unit>,
+        truth: Option<Unit>,
+        specification: Option<Specification>,
+    ) -> Self {
+        let common = Common::new(truth.iter().chain(&units));
+        let parameters = free_parameters(common.body_frame);
+        let truth = truth.map(|truth| common.row(truth));
+        let exact = truth
+            .as_ref()
+            .and_then(|truth| truth.canonical.as_ref().ok());
+        let rows = units.into_iter().map(|unit| {
+            let mut row = common.row(unit);
+            let own = row.canonical.as_ref().ok();
+            row.nees = own
+                .zip(exact)
+                .and_then(|(own, exact)| nees_of(own, exact, &parameters));
             if let Some(specification) = &specification {
                 row.checks = checks(specification, |k| row.sample(Quantity::Parameter(k)));
                 row.verdict = Some(overall(&row.checks));
@@ -86,66 +82,178 @@ impl Lot {
             row
         });
         let rows: Vec<Row> = rows.collect();
+        let shared_gravity = shared_gravity(&rows);
+        let gravity = shared_gravity.unwrap_or(0.0);
         Self {
-            statistics: of_all(&rows, body_frame, shared_gravity.unwrap_or(0.0)),
+            statistics: of_all(&rows, common.body_frame, gravity),
+            joint: joint_scatter(&rows, &parameters, gravity),
             rows,
-            body_frame,
-            nominal,
+            truth,
+            body_frame: common.body_frame,
+            nominal: common.nominal,
+            nominal_is_stated: common.is_stated,
             shared_gravity,
             specification,
         }
     }
 
-    /// Units whose calibration failed or cannot be used, with the reason.
+    /// Calibrations that failed or cannot be used, with the reason.
     pub fn failures(&self) -> impl Iterator<Item = (&Unit, &str)> {
-        self.rows
-            .iter()
-            .filter_map(|row| Some((&row.unit, row.canonical.as_ref().err()?.as_str())))
+        let all = self.truth.iter().chain(&self.rows);
+        all.filter_map(|row| Some((&row.unit, row.canonical.as_ref().err()?.as_str())))
     }
 
-    /// Quantities in which a unit, given by its index in the lot, is an outlier.
+    /// Quantities in which a unit, given by its index, is an outlier.
     pub fn outliers_of(&self, row: usize) -> impl Iterator<Item = &Statistics> {
-        let apart = move |of: &&Statistics| of.outliers.contains(&row);
-        self.statistics.iter().filter(apart)
+        let is_outlier = move |of: &&Statistics| of.outliers.contains(&row);
+        self.statistics.iter().filter(is_outlier)
+    }
+
+    /// Every quantity that a unit has.
+    pub fn quantities(&self) -> impl Iterator<Item = Quantity> {
+        let has = |quantity: &Quantity| self.rows.iter().any(|row| row.sample(*quantity).is_some());
+        Quantity::all(self.body_frame).filter(has)
+    }
+
+    /// The statistics of a quantity, if at least two units have it.
+    pub fn statistics_of(&self, quantity: Quantity) -> Option<&Statistics> {
+        self.statistics.iter().find(|of| of.quantity == quantity)
+    }
+
+    /// Origin of differences: the truth or, without a truth, the first of two units.
+    pub fn reference(&self) -> Option<&Row> {
+        let first = self.rows.first().filter(|_| self.rows.len() == 2);
+        self.truth.as_ref().or(first)
+    }
+
+    /// Another unit's value minus that of the reference, with its 1σ as if both came from independent data except for
+    /// gravity.
+    pub fn difference(&self, row: &Row, quantity: Quantity) -> Option<Sample> {
+        let reference = self.reference().filter(|from| !std::ptr::eq(*from, row));
+        let (own, from) = (row.sample(quantity)?, reference?.sample(quantity)?);
+        let is_exact = self.truth.is_some();
+        let shared = match self.shared_gravity {
+            Some(gravity) if !is_exact => quantity.shared(gravity),
+            _ => 0.0,
+        };
+        let variance = own.sigma.powi(2) + from.sigma.powi(2) - 2.0 * shared.powi(2);
+        let is_known = own.sigma > 0.0 && (is_exact || from.sigma > 0.0);
+        Some(Sample {
+            value: own.value - from.value,
+            sigma: if is_known {
+                variance.max(0.0).sqrt()
+            } else {
+                0.0
+            },
+        })
     }
 }
 
-/// The calibration of a unit, if comparable with units of this output; otherwise the reason.
+/// What all records are converted to.
+struct Common {
+    /// The output of most records; the first of several equally common ones.
+    output: Option<PerSensor<String>>,
+    body_frame: BodyFrame,
+    nominal: PerSensor<Nominal>,
+    is_stated: bool,
+}
+
+impl Common {
+    fn new<'a>(units: impl Iterator<Item = &'a Unit> + Clone) -> Self {
+        let stated = units.clone().filter_map(|unit| usable(unit, None).ok());
+        let stated: Vec<_> = stated
+            .filter_map(|of| of.calibration.unit.as_ref())
+            .collect();
+        let count = |of: &&PerSensor<String>| stated.iter().filter(|other| *other == of).count();
+        // Of those that are as many the last is taken.
+        let output = stated.iter().rev().copied().max_by_key(count).cloned();
+        let compared = units.filter_map(|unit| usable(unit, output.as_ref()).ok());
+        let compared: Vec<&Calibrated> = compared.collect();
+        let frames = compared.iter().map(|of| of.calibration.body_frame);
+        let stated: Vec<_> = compared.iter().filter_map(|of| of.nominal()).collect();
+        let own = compared.first().map(|of| own_nominal(&of.calibration));
+        let nominal = PerSensor::from_fn(|sensor| {
+            let of_all = stated.iter().map(|nominal| (*nominal.get(sensor)).into());
+            let middle = median_of_axes(&of_all.collect::<Vec<_>>()).map(Nominal);
+            let own = own.as_ref().map(|own| *own.get(sensor));
+            middle.or(own).unwrap_or(Nominal(Vector3::repeat(1.0)))
+        });
+        Self {
+            output,
+            body_frame: BodyFrame::common(frames),
+            is_stated: !stated.is_empty(),
+            nominal,
+        }
+    }
+
+    fn row(&self, unit: Unit) -> Row {
+        let usable = usable(&unit, self.output.as_ref());
+        let canonical = usable.and_then(|of| {
+            Canonical::new(&unit.name, &of.calibration, &self.nominal, self.body_frame)
+                .map_err(|error| error.to_string())
+        });
+        let calibrated = unit.calibrated.as_ref().ok();
+        Row {
+            noise: calibrated.and_then(|of| of.noise_by(&self.nominal)),
+            canonical,
+            unit,
+            nees: None,
+            checks: Vec::new(),
+            verdict: None,
+        }
+    }
+}
+
+/// The calibration of a unit, if comparable with units of this output; otherwise the reason. A record without units is
+/// assumed to have those of the others.
 fn usable<'a>(
     unit: &'a Unit,
     output: Option<&PerSensor<String>>,
 ) -> Result<&'a Calibrated, String> {
     let calibrated = unit.calibrated.as_ref().map_err(Clone::clone)?;
-    let own = calibrated.calibration.unit.as_ref();
     if calibrated.calibration.converged == Some(false) {
         return Err("not converged; do not use the values or σ".to_owned());
     }
-    if output.is_none() || own == output {
-        return Ok(calibrated);
+    match (calibrated.calibration.unit.as_ref(), output) {
+        (Some(own), Some(common)) if own != common => Err(format!(
+            "outputs are `{}` and `{}`, but most calibrations have `{}` and `{}`. Give calibrations in one unit",
+            own.gyro, own.accel, common.gyro, common.accel
+        )),
+        _ => Ok(calibrated),
     }
-    let [own, of_lot] = [own, output].map(|of| match of {
-        Some(unit) => format!("`{}` and `{}`", unit.gyro, unit.accel),
-        None => "not stated".to_owned(),
-    });
-    Err(format!(
-        "outputs are {own}, but most units of the lot have {of_lot}. Give units of one type"
-    ))
-}
-
-/// The output of most units; the first of several equally common ones.
-fn common_output(units: &[Unit]) -> Option<&PerSensor<String>> {
-    let usable = units.iter().filter_map(|unit| usable(unit, None).ok());
-    let stated: Vec<_> = usable
-        .filter_map(|of| of.calibration.unit.as_ref())
-        .collect();
-    // Of those that are as many the last is taken.
-    let count = |of: &&PerSensor<String>| stated.iter().filter(|other| *other == of).count();
-    stated.iter().rev().copied().max_by_key(count)
 }
 
 /// Relative 1σ of gravity, if all units have it from the same site.
-fn shared_gravity(all: &[&Calibrated]) -> Option<f64> {
-    let first = all.first()?.calibration.gravity?;
-    let same = all.iter().all(|of| of.calibration.gravity == Some(first));
+fn shared_gravity(rows: &[Row]) -> Option<f64> {
+    let usable = rows.iter().filter(|row| row.canonical.is_ok());
+    let mut all = usable.filter_map(|row| row.unit.calibrated.as_ref().ok());
+    let first = all.next()?.calibration.gravity?;
+    let same = all.all(|of| of.calibration.gravity == Some(first));
     (same && first.sigma_m_s2 > 0.0).then(|| first.sigma_m_s2 / first.m_s2)
+}
+
+/// Consistency of the difference of a calibration from the truth with its covariance.
+fn nees_of(own: &Canonical, truth: &Canonical, parameters: &[usize]) -> Option<Nees> {
+    // A truth without σ has no correlations to miss.
+    let correlated = own.correlated && (truth.correlated || truth.covariance.is_none());
+    let covariance = own.covariance.filter(|_| correlated)?;
+    let covariance = covariance + truth.covariance.unwrap_or_default();
+    nees(&(own.vector() - truth.vector()), &covariance, parameters)
+}
+
+/// χ² of the scatter of all parameters that every unit with correlations estimated.
+fn joint_scatter(rows: &[Row], parameters: &[usize], gravity: f64) -> Option<ChiSquare> {
+    let usable = rows.iter().filter_map(|row| row.canonical.as_ref().ok());
+    let all = usable.filter(|of| of.correlated);
+    let all = all.filter_map(|of| Some((of.vector(), of.covariance?)));
+    let all: Vec<_> = all.collect();
+    let estimated = |index: &usize| all.iter().all(|(_, p)| p[(*index, *index)] > 0.0);
+    let indices: Vec<usize> = parameters.iter().copied().filter(estimated).collect();
+    let n = indices.len();
+    let shared = |i: usize| Quantity::Parameter(indices[i]).shared(gravity);
+    joint(all.iter().map(|(vector, covariance)| {
+        let vector = DVector::from_fn(n, |i, _| vector[indices[i]]);
+        let own = |i, j| covariance[(indices[i], indices[j])] - shared(i) * shared(j);
+        (vector, DMatrix::from_fn(n, n, own))
+    }))
 }

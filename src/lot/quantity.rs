@@ -1,7 +1,7 @@
-//! The quantities that are compared between units.
+//! The quantities that are compared between calibrations.
 
 use crate::calibration::result::frame::free_parameters;
-use crate::calibration::{parameter_name, sensor_and_parameter};
+use crate::calibration::{AUXILIARY, auxiliary_name, parameter_name, sensor_and_parameter};
 use crate::imu::{AXES, BodyFrame, InstallationForm, ParameterKind, Sensor, Triad};
 
 /// Every axis of both triads.
@@ -10,30 +10,37 @@ pub fn axes() -> impl Iterator<Item = (Sensor, usize)> {
     Sensor::ALL.into_iter().flat_map(axes)
 }
 
-/// A quantity with one value per unit.
+/// A quantity with one value per calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// A parameter of both triads by its index, in the general form.
     Parameter(usize),
-    /// The natural logarithm of an axis' white-noise density at rest.
+    /// A parameter of an error term by its index.
+    Auxiliary(usize),
+    /// White-noise density of an axis at rest.
     Noise(Sensor, usize),
 }
 
 impl Quantity {
-    /// All quantities of units in this body frame.
-    pub fn all(body_frame: BodyFrame) -> Vec<Self> {
-        let parameters = free_parameters(body_frame).into_iter();
+    /// All quantities in this body frame.
+    pub fn all(body_frame: BodyFrame) -> impl Iterator<Item = Self> {
+        let parameters = free_parameters(body_frame).into_iter().map(Self::Parameter);
         let noise = axes().map(|(sensor, axis)| Self::Noise(sensor, axis));
-        parameters.map(Self::Parameter).chain(noise).collect()
+        parameters
+            .chain((0..AUXILIARY).map(Self::Auxiliary))
+            .chain(noise)
     }
 
-    /// Whether a relative error of gravity causes the same relative error.
-    pub fn follows_gravity(self) -> bool {
-        let Self::Parameter(index) = self else {
-            return false;
+    /// The 1σ that all calibrations share if they have this relative 1σ of gravity in common.
+    pub fn shared(self, gravity: f64) -> f64 {
+        let follows_gravity = |index| {
+            let (sensor, of_triad) = sensor_and_parameter(index);
+            sensor == Sensor::Accel && Triad::kind(of_triad) == ParameterKind::Scale
         };
-        let (sensor, of_triad) = sensor_and_parameter(index);
-        sensor == Sensor::Accel && Triad::kind(of_triad) == ParameterKind::Scale
+        match self {
+            Self::Parameter(index) if follows_gravity(index) => gravity,
+            _ => 0.0,
+        }
     }
 
     /// Its name in files, such as `gyro.scale.x` or `gyro.noise.x`.
@@ -42,16 +49,24 @@ impl Quantity {
             Self::Parameter(index) => {
                 parameter_name(InstallationForm::General, index).unwrap_or_default()
             }
+            Self::Auxiliary(index) => auxiliary_name(index).unwrap_or_default(),
             Self::Noise(sensor, axis) => format!("{}.noise.{}", sensor.name(), AXES[axis]),
         }
     }
 }
 
-/// A unit's value with its 1σ.
+/// A value with its 1σ.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
     /// Normalised, in SI.
     pub value: f64,
     /// Zero if no σ is stated.
     pub sigma: f64,
+}
+
+impl Sample {
+    /// The value in units of its σ; `None` without σ.
+    pub fn in_sigma(self) -> Option<f64> {
+        (self.sigma > 0.0).then(|| self.value / self.sigma)
+    }
 }

@@ -1,23 +1,19 @@
-//! One quantity over all units.
+//! Statistics of each quantity over all units.
 
-use super::outlier::outliers;
 use super::quantity::{Quantity, Sample};
-use super::spread::{Scatter, scatter};
-use super::trend::{Against, Trend, trend};
+use super::scatter::{Scatter, outliers, scatter};
 use super::unit::Row;
 use crate::imu::BodyFrame;
 
-/// False-alarm rate of outliers, and of significant spreads, for all quantities of a lot together.
+/// False-alarm rate of outliers, and of significant spreads, for all quantities together.
 pub const FALSE_ALARM: f64 = 0.01;
-/// False-alarm rate of trends, for all quantities of a lot together, by serial number and by date.
-pub const FALSE_TREND: f64 = 0.01;
 
-/// Statistics of one quantity over the units.
+/// Statistics of one quantity over the units that state a σ for it, or over all if fewer than two do.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Statistics {
     /// The quantity.
     pub quantity: Quantity,
-    /// Number of units that have it.
+    /// Number of units used.
     pub count: usize,
     /// Indices of outliers, which the other statistics exclude.
     pub outliers: Vec<usize>,
@@ -25,52 +21,61 @@ pub struct Statistics {
     pub scatter: Scatter,
     /// Whether the spread exceeds the units' σ significantly, at [`FALSE_ALARM`] over all quantities.
     pub real: bool,
-    /// Significant trends with serial number or date, at [`FALSE_TREND`] over all quantities and both.
-    pub trends: Vec<Trend>,
 }
+
+impl Statistics {
+    /// The mean with its 1σ.
+    pub fn mean(&self) -> Sample {
+        Sample {
+            value: self.scatter.mean,
+            sigma: self.scatter.mean_sigma,
+        }
+    }
+}
+
+/// Values of one quantity with their variances, each with the index of its unit.
+type Samples = Vec<(usize, (f64, f64))>;
 
 /// Statistics of every quantity that at least two units have. `gravity` is the shared relative 1σ of gravity.
 pub fn of_all(rows: &[Row], body_frame: BodyFrame, gravity: f64) -> Vec<Statistics> {
-    let quantities = Quantity::all(body_frame);
+    let quantities = Quantity::all(body_frame).map(|quantity| {
+        let shared = quantity.shared(gravity);
+        (quantity, shared, samples(rows, quantity, shared))
+    });
+    let quantities: Vec<(Quantity, f64, Samples)> = quantities
+        .filter(|(.., samples)| samples.len() > 1)
+        .collect();
     let alarm = FALSE_ALARM / quantities.len() as f64;
-    let false_trend = FALSE_TREND / quantities.len() as f64 / Against::ALL.len() as f64;
-    let of = |quantity: Quantity| {
-        let shared = if quantity.follows_gravity() {
-            gravity
-        } else {
-            0.0
-        };
-        let sample = |(place, row): (usize, &Row)| {
-            let Sample { value, sigma } = row.sample(quantity)?;
-            let own = (sigma * sigma - shared * shared).max(0.0);
-            Some((place, (value, own)))
-        };
-        let samples = rows.iter().enumerate().filter_map(sample);
-        let (places, samples): (Vec<usize>, Vec<(f64, f64)>) = samples.unzip();
-        let apart = outliers(&samples, alarm);
-        let of_lot: Vec<usize> = (0..samples.len()).filter(|k| !apart.contains(k)).collect();
-        let without: Vec<(f64, f64)> = of_lot.iter().map(|&k| samples[k]).collect();
-        let mut scatter = scatter(&without)?;
+    let of = |(quantity, shared, samples): (Quantity, f64, Samples)| {
+        let values = |of: &Samples| -> Vec<(f64, f64)> { of.iter().map(|of| of.1).collect() };
+        let all = values(&samples);
+        let apart = outliers(&all, &scatter(&all)?, alarm);
+        let apart: Vec<usize> = apart.into_iter().map(|k| samples[k].0).collect();
+        let count = samples.len();
+        let rest = samples.into_iter().filter(|of| !apart.contains(&of.0));
+        let mut scatter = scatter(&values(&rest.collect()))?;
         scatter.mean_sigma = scatter.mean_sigma.hypot(shared);
-        let weight = |own: f64| match scatter.spread.value.powi(2) + own {
-            all if all > 0.0 => all.recip(),
-            _ => 1.0,
-        };
-        let trends = Against::ALL.into_iter().filter_map(|against| {
-            let points = of_lot.iter().filter_map(|&k| {
-                let (value, own) = samples[k];
-                Some((against.place(&rows[places[k]].unit)?, value, weight(own)))
-            });
-            trend(against, &points.collect::<Vec<_>>(), false_trend)
-        });
         Some(Statistics {
             quantity,
-            count: samples.len(),
-            trends: trends.collect(),
-            outliers: apart.iter().map(|&k| places[k]).collect(),
+            count,
+            outliers: apart,
             real: scatter.chi_square.is_some_and(|chi2| chi2.p < alarm),
             scatter,
         })
     };
     quantities.into_iter().filter_map(of).collect()
+}
+
+fn samples(rows: &[Row], quantity: Quantity, shared: f64) -> Samples {
+    let all = rows.iter().enumerate();
+    let all = all.filter_map(|(place, row)| Some((place, row.sample(quantity)?)));
+    let mut all: Vec<(usize, Sample)> = all.collect();
+    let stated = |of: &(usize, Sample)| of.1.sigma > 0.0;
+    if all.iter().filter(|of| stated(of)).count() > 1 {
+        all.retain(stated);
+    }
+    let own = |sigma: f64| (sigma * sigma - shared * shared).max(0.0);
+    { all.into_iter() }
+        .map(|(place, Sample { value, sigma })| (place, (value, own(sigma))))
+        .collect()
 }

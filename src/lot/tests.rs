@@ -7,8 +7,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
-use crate::calibration::result::{Calibration, GravityRecord, TriadRecord};
-use crate::imu::Sensor;
+use crate::calibration::result::frame::tests::{record, with_covariance};
+use crate::calibration::result::{Calibration, GravityRecord, Provenance, TermRecord, TriadRecord};
+use crate::imu::InstallationForm;
 use crate::noise::RestNoise;
 use crate::units::PPM;
 
@@ -22,6 +23,19 @@ pub struct Draw {
 }
 
 const SCALE: f64 = 2e6;
+
+fn provenance() -> Provenance {
+    Provenance {
+        program: "turncal".to_owned(),
+        inputs: Vec::new(),
+        nominal: PerSensor::from_fn(|_| [SCALE; 3]),
+        latitude_deg: None,
+        height_m: 0.0,
+        duration_s: 600.0,
+        rate_hz: 100.0,
+        dwells: 20,
+    }
+}
 
 pub fn drawn(count: usize, draw: Draw, seed: u64) -> Vec<Unit> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -39,6 +53,7 @@ pub fn drawn(count: usize, draw: Draw, seed: u64) -> Vec<Unit> {
         };
         let (gyro, accel) = (triad(0.0), triad(gravity));
         let mut calibration = Calibration::new(gyro, accel);
+        calibration.provenance = Some(provenance());
         calibration.converged = Some(true);
         calibration.gravity = (draw.shared > 0.0).then_some(GravityRecord {
             m_s2: 9.8,
@@ -62,10 +77,6 @@ pub fn drawn(count: usize, draw: Draw, seed: u64) -> Vec<Unit> {
             meta: meta.map(|(key, value)| (key.to_owned(), value)).into(),
             calibrated: Ok(Calibrated {
                 calibration,
-                nominal: PerSensor {
-                    gyro: [SCALE; 3],
-                    accel: [SCALE; 3],
-                },
                 noise: None,
             }),
         }
@@ -92,17 +103,13 @@ fn the_spread_of_a_lot_is_found_within_its_own_sigma_and_is_real() {
     let (mut inside, mut real, mut pull) = (0, 0, 0.0);
     let lots = 40;
     for seed in 0..lots {
-        let found = Lot::new(drawn(50, draw, seed), None);
+        let found = Lot::new(drawn(50, draw, seed), None, None);
         let scale = of(&found, "gyro.scale.x");
-        let Spread {
-            value,
-            sigma,
-            interval,
-        } = scale.scatter.spread;
+        let Spread { value, interval } = scale.scatter.spread;
         assert_eq!(scale.count, 50);
         real += usize::from(scale.real);
         inside += usize::from((interval.0..=interval.1).contains(&draw.spread));
-        pull += ((value - draw.spread) / sigma.unwrap()).powi(2);
+        pull += ((value - draw.spread) / (0.25 * (interval.1 - interval.0))).powi(2);
         assert!((scale.scatter.mean - 1.0).abs() < 5.0 * scale.scatter.mean_sigma);
     }
     // 95 % of 40 are 38 ± 1.4; the mean square of 40 numbers of σ 1 is 1 ± 0.22.
@@ -122,7 +129,7 @@ fn a_lot_whose_units_differ_by_their_own_sigma_alone_has_no_real_spread() {
     };
     let (mut real, mut p) = (0, 0.0);
     for seed in 0..100 {
-        let found = Lot::new(drawn(10, draw, seed), None);
+        let found = Lot::new(drawn(10, draw, seed), None, None);
         let scale = of(&found, "gyro.scale.y");
         real += found.statistics.iter().filter(|of| of.real).count();
         p += scale.scatter.chi_square.unwrap().p;
@@ -141,7 +148,7 @@ fn an_error_of_gravity_that_all_share_is_in_their_mean_and_not_in_their_scatter(
         sigma: 31.0 * PPM,
         shared: 30.0 * PPM,
     };
-    let found = Lot::new(drawn(50, draw, 3), None);
+    let found = Lot::new(drawn(50, draw, 3), None, None);
     assert!((found.shared_gravity.unwrap() / PPM - 30.0).abs() < 1e-9);
     let accel = of(&found, "accel.scale.x").scatter;
     // χ² of 49 degrees of freedom: 1 ± 0.2 each; with the shared part it would be 0.06.
@@ -151,7 +158,7 @@ fn an_error_of_gravity_that_all_share_is_in_their_mean_and_not_in_their_scatter(
 }
 
 #[test]
-fn units_that_are_apart_fail_or_cannot_be_used_are_named_and_left_out() {
+fn units_that_are_outliers_fail_or_cannot_be_used_are_named_and_left_out() {
     let draw = Draw {
         spread: 30.0 * PPM,
         sigma: 1.0 * PPM,
@@ -171,7 +178,7 @@ fn units_that_are_apart_fail_or_cannot_be_used_are_named_and_left_out() {
         let of = calibration(of);
         of.calibration.unit = unit(if k == 11 { "rad" } else { "count" });
     }
-    let found = Lot::new(units, None);
+    let found = Lot::new(units, None, None);
     let failed: Vec<&str> = found
         .failures()
         .map(|(unit, _)| unit.name.as_str())
@@ -180,39 +187,8 @@ fn units_that_are_apart_fail_or_cannot_be_used_are_named_and_left_out() {
     let scale = of(&found, "gyro.scale.y");
     assert_eq!((scale.outliers.as_slice(), scale.count), (&[4][..], 17));
     assert!(scale.scatter.deviation < 60.0 * PPM);
-    let apart: Vec<_> = found
-        .statistics
-        .iter()
-        .flat_map(|of| &of.outliers)
-        .collect();
-    assert_eq!(apart, [&4]);
-}
-
-#[test]
-fn a_trend_with_the_serial_is_told_and_its_slope_found() {
-    let draw = Draw {
-        spread: 10.0 * PPM,
-        sigma: 1.0 * PPM,
-        shared: 0.0,
-    };
-    let mut units = drawn(30, draw, 6);
-    for (k, unit) in units.iter_mut().enumerate() {
-        calibration(unit).calibration.gyro.scale[2] *= 1.0 + 3.0 * PPM * k as f64;
-    }
-    let found = Lot::new(units, None);
-    let told: Vec<_> = found
-        .statistics
-        .iter()
-        .filter(|of| of.trends.iter().any(|t| t.against == Against::Serial))
-        .map(|of| of.quantity.name())
-        .collect();
-    assert_eq!(told, ["gyro.scale.z"]);
-    let trend = of(&found, "gyro.scale.z").trends[0];
-    assert!(
-        (trend.slope - 3.0 * PPM).abs() < 4.0 * trend.sigma,
-        "{trend:?}"
-    );
-    assert!((trend.sigma / PPM - 0.21).abs() < 0.1, "{trend:?}");
+    let outliers = found.statistics.iter().flat_map(|of| &of.outliers);
+    assert_eq!(outliers.collect::<Vec<_>>(), [&4]);
 }
 
 #[test]
@@ -266,7 +242,8 @@ fn noise_is_compared_by_one_scale_whatever_the_runs_state() {
     for (k, unit) in units.iter_mut().enumerate() {
         let of = calibration(unit);
         let stated = if k == 3 { 2.0 } else { 1.0 };
-        of.nominal.accel = [stated * SCALE; 3];
+        let provenance = of.calibration.provenance.as_mut().unwrap();
+        provenance.nominal.accel = [stated * SCALE; 3];
         of.noise = Some(RestNoise {
             tau_s: 4.0,
             density: PerSensor {
@@ -276,12 +253,9 @@ fn noise_is_compared_by_one_scale_whatever_the_runs_state() {
             freedom: 50.0,
         });
     }
-    let found = Lot::new(units, None);
+    let found = Lot::new(units, None, None);
     let accel = of(&found, "accel.noise.y");
-    assert!((accel.scatter.mean - 1e-4f64.ln()).abs() < 1e-9 && accel.outliers.is_empty());
-    let off = found.rows[3].nominal_off(&found.nominal).unwrap();
-    assert_eq!((off.0, off.2), (Sensor::Accel, 1.0));
-    assert_eq!(found.rows[4].nominal_off(&found.nominal), None);
+    assert!((accel.scatter.mean - 1e-4).abs() < 1e-12 && accel.outliers.is_empty());
 }
 
 #[test]
@@ -291,14 +265,129 @@ fn a_lot_of_one_unit_or_none_has_rows_and_no_statistics() {
         sigma: 1.0 * PPM,
         shared: 0.0,
     };
-    let one = Lot::new(drawn(1, draw, 1), None);
+    let one = Lot::new(drawn(1, draw, 1), None, None);
     assert_eq!((one.rows.len(), one.statistics.len()), (1, 0));
-    assert!(Lot::new(Vec::new(), None).rows.is_empty());
+    assert!(Lot::new(Vec::new(), None, None).rows.is_empty());
     let failed = Unit {
         name: "a".to_owned(),
         meta: BTreeMap::new(),
         calibrated: Err("why".to_owned()),
     };
-    let none = Lot::new(vec![failed], None);
+    let none = Lot::new(vec![failed], None, None);
     assert_eq!(none.failures().next().unwrap().1, "why");
+}
+
+fn side_by_side(records: &[&Calibration], truth: Option<&Calibration>) -> Lot {
+    let unit = |(k, record): (usize, &&Calibration)| {
+        Unit::of_record(k.to_string(), (*record).clone(), None)
+    };
+    let units = records.iter().enumerate().map(unit).collect();
+    let truth = truth.map(|truth| Unit::of_record("truth", truth.clone(), None));
+    Lot::new(units, truth, None)
+}
+
+fn difference(lot: &Lot, row: usize, parameter: usize) -> Sample {
+    lot.difference(&lot.rows[row], Quantity::Parameter(parameter))
+        .unwrap()
+}
+
+#[test]
+fn a_difference_from_the_truth_is_calibration_less_truth_in_parts_of_the_nominal_value() {
+    let truth = record();
+    let mut estimate = with_covariance(record(), InstallationForm::General);
+    estimate.gyro.scale[1] *= 1.0 + 3e-6;
+    estimate.accel.bias[0] += 2e-5 * 1.006e5;
+    let lot = side_by_side(&[&estimate], Some(&truth));
+    let scale = difference(&lot, 0, 1);
+    assert!((scale.value - 3e-6).abs() < 1e-15);
+    assert!((difference(&lot, 0, 21).value - 2e-5).abs() < 1e-15);
+    let own = lot.rows[0].sample(Quantity::Parameter(1)).unwrap().sigma;
+    assert_eq!(scale.in_sigma(), Some(scale.value / own));
+    // Without any σ there is a difference and no more.
+    let lot = side_by_side(&[&truth, &truth], None);
+    assert_eq!(difference(&lot, 1, 1).in_sigma(), None);
+    assert_eq!((lot.rows[1].nees, lot.joint), (None, None));
+}
+
+#[test]
+fn nees_of_the_truth_is_zero_and_of_one_sigma_along_one_axis_one_in_n() {
+    let truth = record();
+    let mut estimate = with_covariance(record(), InstallationForm::General);
+    let nees = |estimate: &Calibration| {
+        side_by_side(&[estimate], Some(&truth)).rows[0]
+            .nees
+            .unwrap()
+    };
+    assert!(nees(&estimate).mean < 1e-12);
+    assert_eq!(nees(&estimate).count, 24);
+    for (i, row) in estimate.covariance.iter_mut().enumerate() {
+        for (j, value) in row.iter_mut().enumerate() {
+            *value *= f64::from(i == j);
+        }
+    }
+    estimate.gyro.bias[2] += estimate.covariance[11][11].sqrt();
+    assert!((nees(&estimate).mean * 24.0 - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn three_angles_have_as_many_directions_as_they_have_parameters() {
+    let mut estimate = record();
+    let c = InstallationForm::ThreeAngle.matrix(&[0.003, -0.002, 0.004, 0.0, 0.0, 0.0].into());
+    for triad in [&mut estimate.gyro, &mut estimate.accel] {
+        triad.installation = [0, 1, 2].map(|i| [c[(i, 0)], c[(i, 1)], c[(i, 2)]]);
+    }
+    let truth = estimate.clone();
+    let estimate = with_covariance(estimate, InstallationForm::ThreeAngle);
+    let lot = side_by_side(&[&estimate, &estimate], Some(&truth));
+    assert_eq!(lot.rows[0].nees.unwrap().count, 18);
+    assert_eq!(lot.joint.unwrap().freedom, 18);
+}
+
+#[test]
+fn two_calibrations_differ_by_the_sigma_of_both_except_for_a_gravity_that_they_share() {
+    let mut a = with_covariance(record(), InstallationForm::General);
+    let mut b = a.clone();
+    b.unit = None;
+    b.gyro.scale[0] *= 1.0 + 1e-5;
+    let lot = side_by_side(&[&a, &b], None);
+    let scale = difference(&lot, 1, 0);
+    let own = |parameter: usize| {
+        lot.rows[0]
+            .sample(Quantity::Parameter(parameter))
+            .unwrap()
+            .sigma
+    };
+    assert!((scale.sigma / own(0) - 2f64.sqrt()).abs() < 1e-6);
+    let chi2 = of(&lot, "gyro.scale.x").scatter.chi_square.unwrap();
+    assert!((chi2.value.sqrt() / scale.in_sigma().unwrap() - 1.0).abs() < 1e-6);
+
+    let of_accel = own(12);
+    for record in [&mut a, &mut b] {
+        record.gravity = Some(GravityRecord {
+            m_s2: 9.8,
+            sigma_m_s2: 9.8 * 0.5 * of_accel,
+        });
+    }
+    let lot = side_by_side(&[&a, &b], None);
+    let accel = difference(&lot, 1, 12).sigma;
+    assert!((accel / (of_accel * 1.5f64.sqrt()) - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn calibrations_without_sigma_have_a_mean_and_no_chi_square_and_terms_are_compared_too() {
+    let with_offset = |value: f64| {
+        let mut record = record();
+        let sigma = Some(3e-6);
+        let offset = TermRecord { value, sigma };
+        record.terms.insert("accel.time_offset".to_owned(), offset);
+        record
+    };
+    let all = [5e-3, 5.006e-3, 4.994e-3].map(with_offset);
+    let lot = side_by_side(&[&all[0], &all[1], &all[2]], None);
+    let scale = of(&lot, "gyro.scale.x");
+    assert_eq!((scale.scatter.chi_square, scale.count), (None, 3));
+    let offset = of(&lot, "accel.time_offset").scatter;
+    assert!((offset.mean - 5e-3).abs() < 1e-9);
+    // Two values are 2 σ off.
+    assert!((offset.chi_square.unwrap().value - 8.0).abs() < 1e-6);
 }

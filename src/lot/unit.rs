@@ -1,4 +1,4 @@
-//! One unit of a lot.
+//! One calibration among others.
 
 use std::collections::BTreeMap;
 
@@ -6,13 +6,14 @@ use super::limits::{Check, Verdict};
 use super::quantity::{Quantity, Sample, axes};
 use crate::calibration::result::Calibration;
 use crate::calibration::result::frame::Canonical;
-use crate::imu::{Nominal, PerSensor, Sensor};
+use crate::calibration::{Nees, auxiliary_name};
+use crate::imu::{Nominal, PerSensor};
 use crate::noise::RestNoise;
 
 /// A unit with its calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unit {
-    /// Its name, unique in the lot.
+    /// Its name, unique among the units.
     pub name: String,
     /// `[meta]` of its run, if that could be read.
     pub meta: BTreeMap<String, String>,
@@ -20,37 +21,58 @@ pub struct Unit {
     pub calibrated: Result<Calibrated, String>,
 }
 
-/// A unit's calibration, with the nominal scales and the noise of its run.
+impl Unit {
+    /// A calibration or a truth, with the noise of its run at rest if a recording shows it.
+    pub fn of_record(
+        name: impl Into<String>,
+        calibration: Calibration,
+        noise: Option<RestNoise>,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            meta: calibration.meta.clone(),
+            calibrated: Ok(Calibrated { calibration, noise }),
+        }
+    }
+}
+
+/// A unit's calibration, with the noise of its run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Calibrated {
     /// The calibration.
     pub calibration: Calibration,
-    /// Nominal scales of the run, in the file's quantity.
-    pub nominal: PerSensor<[f64; 3]>,
-    /// Noise of each axis at rest; `None` if no dwell is long enough.
+    /// Noise of each axis at rest; `None` if no dwell is long enough, or without a recording.
     pub noise: Option<RestNoise>,
 }
 
-/// A unit's noise at rest, normalised by these scales instead of those of its run.
-pub fn noise_at_rest(unit: &Unit, nominal: &PerSensor<Nominal>) -> Option<RestNoise> {
-    let calibrated = unit.calibrated.as_ref().ok()?;
-    let mut noise = calibrated.noise?;
-    for (sensor, axis) in axes() {
-        let (own, of_lot) = (calibrated.nominal.get(sensor), nominal.get(sensor).0);
-        noise.density.get_mut(sensor)[axis] *= (own[axis] / of_lot[axis]).abs();
+impl Calibrated {
+    /// Nominal scales of its run, in the file's quantity, if they are stated.
+    pub fn nominal(&self) -> Option<&PerSensor<[f64; 3]>> {
+        Some(&self.calibration.provenance.as_ref()?.nominal)
     }
-    Some(noise)
+
+    /// The noise at rest, normalised by these scales instead of those of its run.
+    pub fn noise_by(&self, nominal: &PerSensor<Nominal>) -> Option<RestNoise> {
+        let (own, mut noise) = (self.nominal()?, self.noise?);
+        for (sensor, axis) in axes() {
+            let (own, common) = (own.get(sensor)[axis], nominal.get(sensor).0[axis]);
+            noise.density.get_mut(sensor)[axis] *= (own / common).abs();
+        }
+        Some(noise)
+    }
 }
 
-/// A unit in the lot.
+/// A unit compared with the others.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Row {
     /// The unit.
     pub unit: Unit,
     /// Its calibration in the common form, or the reason why it cannot be used.
     pub canonical: Result<Canonical, String>,
-    /// Its noise at rest, by the lot's nominal scales; `None` if no dwell is long enough.
+    /// Its noise at rest, by the common nominal scales; `None` if it is not known.
     pub noise: Option<RestNoise>,
+    /// Consistency of its difference from the truth with its covariance; `None` without truth or correlations.
+    pub nees: Option<Nees>,
     /// Its checks against the limits.
     pub checks: Vec<Check>,
     /// Combined verdict of all checks; `None` without a specification.
@@ -58,19 +80,6 @@ pub struct Row {
 }
 
 impl Row {
-    /// The nominal scale of its run with the largest deviation from the lot's: triad, axis and relative deviation;
-    /// `None` if they differ by rounding only.
-    pub fn nominal_off(&self, lot: &PerSensor<Nominal>) -> Option<(Sensor, usize, f64)> {
-        const ROUNDING: f64 = 1e-12;
-        let own = &self.unit.calibrated.as_ref().ok()?.nominal;
-        let off = axes().map(|(sensor, axis)| {
-            let part = own.get(sensor)[axis] / lot.get(sensor).0[axis] - 1.0;
-            (sensor, axis, part)
-        });
-        off.filter(|off| off.2.abs() > ROUNDING)
-            .max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))
-    }
-
     /// The check of a quantity, if there is a limit for it.
     pub fn check_of(&self, quantity: Quantity) -> Option<&Check> {
         self.checks
@@ -78,7 +87,7 @@ impl Row {
             .find(|check| check.quantity() == quantity)
     }
 
-    /// A quantity of the unit.
+    /// A quantity of the unit; `None` if it was not estimated.
     pub fn sample(&self, quantity: Quantity) -> Option<Sample> {
         let canonical = self.canonical.as_ref().ok()?;
         match quantity {
@@ -88,13 +97,18 @@ impl Row {
                 // A parameter without σ beside others that have one was not estimated.
                 (sigma > 0.0 || canonical.covariance.is_none()).then_some(Sample { value, sigma })
             }
+            Quantity::Auxiliary(index) => {
+                let of = canonical.constants.get(&auxiliary_name(index)?)?;
+                Some(Sample {
+                    value: of.value,
+                    sigma: of.sigma.unwrap_or(0.0),
+                })
+            }
             Quantity::Noise(sensor, axis) => {
                 let noise = self.noise.as_ref()?;
-                let density = noise.density.get(sensor)[axis];
-                (density > 0.0).then(|| Sample {
-                    value: density.ln(),
-                    sigma: noise.relative_sigma(),
-                })
+                let value = noise.density.get(sensor)[axis];
+                let sigma = value * noise.relative_sigma();
+                Some(Sample { value, sigma })
             }
         }
     }

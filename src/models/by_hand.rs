@@ -72,16 +72,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn without_a_turn_the_next_position_is_reached_in_the_time_it_needs() {
-        let path = path_by_hand("z_up, turn x 90, z_down").unwrap();
-        let Moves::Body { steps, .. } = path.moves.without(0) else {
-            panic!("of the body");
-        };
-        // Half a turn with a peak of 90 °/s².
-        assert!((steps[0].duration - (2.0 * std::f64::consts::PI * 2.0).sqrt()).abs() < 1e-9);
-    }
-
-    #[test]
     fn words_become_positions_and_turns_and_the_first_position_is_the_start() {
         let path = path_by_hand("y_down, turn x 90, z_up").unwrap();
         let Moves::Body { start, steps } = path.moves else {

@@ -6,14 +6,14 @@ use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
+use super::terms::{TermFile, term_sigma};
 use super::thermal::{ThermalFile, ThermalVariation, thermal_variation};
 use super::{ModelError, Place, Room, text};
-use crate::formats::draft::Tolerances;
-use crate::formats::{Finite, NonNegative, Positive, TermFile, term_sigma};
 use crate::imu::{
     ANGLES, GaussMarkov, InstallationForm, Noise, PerSensor, Prior, Sensor, TermVector,
 };
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, PPM};
+use turncal_input::{Finite, NonNegative, Positive};
 
 /// A grade of instrument.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -40,6 +40,17 @@ pub struct Variation {
     pub scale: Spread,
     /// Bias, rad/s or m/s².
     pub bias: Spread,
+}
+
+/// 1σ tolerances of an instrument before calibration.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tolerances {
+    /// Its kind.
+    pub of: String,
+    /// Scale factor, relative.
+    pub scale: PerSensor<f64>,
+    /// Bias, rad/s and m/s².
+    pub bias: PerSensor<f64>,
 }
 
 /// Distribution of a quantity.

@@ -8,9 +8,9 @@ use serde::Deserialize;
 use super::{ModelError, Place, Room, text};
 use crate::attitude::from_pitch_roll_heading;
 use crate::earth::Site;
-use crate::formats::{Finite, NonNegative, Positive};
 use crate::turntable::{AxesStep, Axis, BodyStep, Moves, Path, Rotation, Table, TableErrors};
 use crate::units::{ARCSEC, DEGREE};
+use turncal_input::{Finite, NonNegative, Positive};
 
 /// Finds and reads a turntable; returns it with its name.
 ///

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::formats::{Document, FileError, NonNegative};
 use crate::imu::{ParameterKind, Sensor, Triad, TriadVector};
 use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
+use turncal_input::{Document, FileError, NonNegative};
 
 /// 1σ, over the instruments of a grade, of the temperature dependence of each parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

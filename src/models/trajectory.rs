@@ -3,9 +3,9 @@
 use serde::Deserialize;
 
 use super::{ModelError, Place, Room, text};
-use crate::formats::{Finite, NonNegative, Positive};
 use crate::navigation::{Change, Segment, Start, Trajectory};
 use crate::units::DEGREE;
+use turncal_input::{Finite, NonNegative, Positive};
 
 /// Finds and reads a trajectory; returns it with its name.
 ///

@@ -227,15 +227,6 @@ impl Linearisation {
         }
     }
 
-    /// The same with the effect of each parameter multiplied by a weight.
-    pub fn weighted(&self, weight: impl Fn(usize) -> f64) -> Self {
-        let mut weighted = self.clone();
-        for (parameter, mut forcing) in weighted.forcing.row_iter_mut().enumerate() {
-            forcing *= weight(parameter);
-        }
-        weighted
-    }
-
     /// Propagates sensitivities over a step of this duration in s, linearised at start, middle and end.
     pub fn follow(before: &Sensitivity, duration: f64, linearised: [&Self; 3]) -> Sensitivity {
         let rate =

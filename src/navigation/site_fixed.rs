@@ -13,6 +13,7 @@ use crate::attitude::{exp, orthonormalised};
 use crate::earth::Site;
 use crate::imu::{
     PerSensor, Sensed, Sensor, TermVector, ThermalCoefficients, ThermalModel, ThermalState, Triad,
+    thermal_state,
 };
 use crate::recording::{ImuSamples, Near};
 
@@ -106,7 +107,7 @@ impl<'a> Navigator<'a> {
         };
         let middle = 0.5 * (self.imu.time(samples.start) + self.imu.time(samples.end));
         let (t, rate) = (temperature.at(middle), temperature.rate(middle));
-        thermal.state = thermal.model.range.state(&t, &rate);
+        thermal.state = thermal_state(&thermal.model.range, &t, &rate);
         // Where a sensitivity is singular nothing is finite, and a pass diverges.
         let singular = Matrix3::repeat(f64::NAN);
         self.instrument = PerSensor::from_fn(|sensor| {

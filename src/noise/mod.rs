@@ -23,7 +23,7 @@ pub use allan::Curve;
 pub use analysis::{NoiseAnalysis, Stretch, StretchError};
 pub use at_rest::RestNoise;
 pub use clusters::Clusters;
-pub(crate) use conventions::normalised;
+pub use conventions::normalised;
 pub use identify::{Found, Hidden, Identified, of_kind};
 pub use process::Process;
 pub use quiet::white_noise;

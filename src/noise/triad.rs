@@ -52,7 +52,7 @@ pub struct NoiseFigures {
 
 impl TriadNoise {
     /// Noise of integrals over samples of `period` s, at rest.
-    pub(crate) fn new(samples: &[Vector3<f64>], period: f64, clusters: &Clusters) -> Self {
+    pub fn new(samples: &[Vector3<f64>], period: f64, clusters: &Clusters) -> Self {
         let axes = [0, 1, 2].map(|axis| {
             let values: Vec<f64> = samples.iter().map(|sample| sample[axis]).collect();
             AxisNoise::new(&values, period, clusters)

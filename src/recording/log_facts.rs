@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::imu::{AxisOrder, Output, PerSensor, Sensor};
+use turncal_input::FileColumn;
 
 /// Statistics of the instrument's file, in its own units.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,15 +38,6 @@ pub struct NamedColumns {
     pub temperature: Option<String>,
     /// From the file's axes to right-front-up.
     pub axes: AxisOrder,
-}
-
-/// A column of a triad.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct FileColumn {
-    /// Its name in the file; empty if the triad was not recorded.
-    pub name: String,
-    /// Whether its values are read with the sign reversed.
-    pub reversed: bool,
 }
 
 impl NamedColumns {
@@ -127,7 +119,7 @@ pub struct TemperatureFacts {
 
 impl ColumnFacts {
     /// Statistics of a column that is not empty.
-    pub(crate) fn of(name: &str, values: &[f64], unit: f64) -> Self {
+    pub fn of(name: &str, values: &[f64], unit: f64) -> Self {
         let ends = (f64::INFINITY, f64::NEG_INFINITY);
         let ends = values
             .iter()
@@ -152,7 +144,7 @@ impl ColumnFacts {
 
 impl ColumnFacts {
     /// Combines the statistics with those of the rows that follow.
-    pub(crate) fn and(self, later: &Self) -> Self {
+    pub fn and(self, later: &Self) -> Self {
         let smallest = self.smallest.min(later.smallest);
         let largest = self.largest.max(later.largest);
         let count = |of: [(f64, usize); 2], end: f64| {

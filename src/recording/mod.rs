@@ -2,7 +2,7 @@
 //! reader. Data only; prior knowledge of the instrument, the site and the table is in [`crate::run`],
 //! estimation in [`crate::calibration`].
 
-pub(crate) mod faults;
+pub mod faults;
 mod log_facts;
 mod near;
 mod samples;
@@ -11,13 +11,13 @@ mod series;
 mod temperature;
 
 pub use faults::{Bridge, Fault, FaultKind, Slower};
-pub use log_facts::{ColumnFacts, FileColumn, LogFacts, NamedColumns, TemperatureFacts};
-pub(crate) use near::Near;
-pub(crate) use samples::stretches_between;
+pub use log_facts::{ColumnFacts, LogFacts, NamedColumns, TemperatureFacts};
+pub use near::Near;
+pub use samples::stretches_between;
 pub use samples::{ImuSamples, SampleError, Stretch};
 pub use segment::{LabelledMotion, Segment};
 pub use series::Series;
-pub(crate) use series::{Packer, SeriesWriter, finest_step};
+pub use series::{Packer, SeriesWriter, finest_step};
 pub use temperature::{SPACING as TEMPERATURE_SPACING, Temperature};
 
 use std::collections::BTreeMap;
@@ -26,6 +26,8 @@ use std::path::PathBuf;
 use nalgebra::UnitQuaternion;
 
 use crate::turntable::AxisAngles;
+pub use turncal_input::FileColumn;
+pub use turncal_input::units::nanoseconds;
 
 /// One recording of one instrument.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,7 +52,7 @@ pub struct Recording {
 
 impl Recording {
     /// Labels of the segments, in their order in the recording, repetitions included.
-    pub(crate) fn labels(&self) -> Vec<String> {
+    pub fn labels(&self) -> Vec<String> {
         self.segments.iter().map(|s| s.label.clone()).collect()
     }
 
@@ -73,7 +75,7 @@ impl Recording {
     }
 
     /// These samples alone.
-    pub(crate) fn of(name: &str, imu: ImuSamples) -> Self {
+    pub fn of(name: &str, imu: ImuSamples) -> Self {
         Self {
             name: name.to_owned(),
             meta: BTreeMap::new(),
@@ -96,9 +98,4 @@ pub struct TableLog {
     pub attitude: Vec<UnitQuaternion<f64>>,
     /// Angles of the axes at each reading; empty if the log does not give them.
     pub axes: Vec<AxisAngles>,
-}
-
-/// A time rounded to 1 ns, so that it prints short.
-pub(crate) fn nanoseconds(time: f64) -> f64 {
-    (time * 1e9).round() / 1e9
 }

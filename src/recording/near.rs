@@ -30,10 +30,7 @@ impl<'a> Near<'a> {
                 accel: Cow::Borrowed(&[]),
             },
         };
-        let many = match imu.is_packed() {
-            true => 0,
-            false => imu.len(),
-        };
+        let many = if imu.is_packed() { 0 } else { imu.len() };
         near.load(0..many);
         near
     }

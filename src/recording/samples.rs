@@ -129,7 +129,7 @@ impl ImuSamples {
     }
 
     /// Samples of rates with another period, of this relative 1σ.
-    pub(crate) fn with_period(mut self, period: f64, sigma: f64) -> Self {
+    pub fn with_period(mut self, period: f64, sigma: f64) -> Self {
         let longer = period / self.period;
         for triad in [&mut self.gyro, &mut self.accel] {
             triad
@@ -148,7 +148,7 @@ impl ImuSamples {
     }
 
     /// Simulated samples, which need no checks.
-    pub(crate) fn made(
+    pub fn made(
         start: f64,
         period: f64,
         gyro: impl Into<Series>,
@@ -276,4 +276,25 @@ pub fn stretches_between(count: usize, start: f64, period: f64, faults: &[Fault]
         begin = begin.max(lost.end);
     }
     stretches
+}
+
+impl ImuSamples {
+    /// The bridges that overlap these samples, each with the overlapping fraction of the bridge.
+    pub fn bridged(&self, samples: &Range<usize>) -> impl Iterator<Item = (&Bridge, f64)> {
+        let mut rest = self.bridges.as_slice();
+        let touched = std::iter::from_fn(move || {
+            let first = rest.first()?;
+            let of_axes = |bridge: &Bridge| bridge.axes == first.axes;
+            let (alike, others) = rest.split_at(rest.partition_point(of_axes));
+            rest = others;
+            let begin = alike.partition_point(|b| b.samples.end <= samples.start);
+            let touched = alike[begin..].partition_point(|b| b.samples.start < samples.end);
+            Some(&alike[begin..begin + touched])
+        });
+        touched.flatten().map(|bridge| {
+            let Range { start, end } = bridge.samples;
+            let common = end.min(samples.end) - start.max(samples.start);
+            (bridge, common as f64 / (end - start) as f64)
+        })
+    }
 }

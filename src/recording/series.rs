@@ -8,7 +8,7 @@ use std::ops::Range;
 use nalgebra::Vector3;
 
 use packed::Packed;
-pub(crate) use packed::{Packer, finest_step};
+pub use packed::{Packer, finest_step};
 
 /// Increments of a triad along right-front-up, rad or m/s per sample.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -38,7 +38,7 @@ impl Series {
     }
 
     /// The mean packing step of the axes; zero if they are not packed.
-    pub(crate) fn step(&self) -> f64 {
+    pub fn step(&self) -> f64 {
         self.packed.as_ref().map_or(0.0, Packed::step)
     }
 
@@ -71,9 +71,10 @@ impl Series {
 
     /// Iterates over a range of increments.
     pub fn within(&self, samples: Range<usize>) -> impl Iterator<Item = Vector3<f64>> {
-        let length = match self.is_packed() {
-            true => AT_ONCE,
-            false => samples.len(),
+        let length = if self.is_packed() {
+            AT_ONCE
+        } else {
+            samples.len()
         };
         self.parts(samples, length).flat_map(|part| {
             let (borrowed, owned) = match part {
@@ -123,7 +124,9 @@ impl Series {
 
 /// Collects samples of the quantity that a file stores, rates or increments, plain or packed.
 pub enum SeriesWriter {
+    /// Samples as numbers.
     Whole(Vec<Vector3<f64>>),
+    /// Samples as whole numbers of the finest step.
     Packed(Packer),
 }
 
@@ -135,6 +138,7 @@ impl Default for SeriesWriter {
 
 impl SeriesWriter {
     /// Number of samples so far.
+    #[allow(clippy::len_without_is_empty)]
     pub fn len(&self) -> usize {
         match self {
             Self::Whole(samples) => samples.len(),
@@ -142,6 +146,7 @@ impl SeriesWriter {
         }
     }
 
+    /// Appends a sample.
     pub fn push(&mut self, sample: [f64; 3]) {
         match self {
             Self::Whole(samples) => samples.push(sample.into()),

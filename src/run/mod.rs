@@ -1,7 +1,7 @@
 //! A run: one recording, and prior knowledge of the instrument, the site and the table.
 //!
 //! Everything is in SI, on right-front-up body axes and in normalised outputs (see [`crate::imu::Nominal`]);
-//! [`crate::formats`] converts the units and axes of files.
+//! [`turncal_files`] converts the units and axes of files.
 
 mod doubts;
 mod dwell;
@@ -73,7 +73,6 @@ impl Run {
 /// The observations that the filter uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Aiding {
     /// Zero velocity in every dwell, and table attitude
     Table,

@@ -10,9 +10,9 @@ use super::scenario::ChamberFile;
 use super::{Chamber, Draws, Scenario, Simulated};
 use crate::calibration::result::Calibration;
 use crate::calibration::{DayToDay, Difference, ParameterVector, TemperatureOptions, Together};
-use crate::formats::{NonNegative, day_to_day};
 use crate::models::{self, ModelError, Place, Room};
 use crate::turntable::TableError;
+use turncal_input::NonNegative;
 
 /// Simulated recordings of one instrument.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -69,10 +69,14 @@ impl SimulatedCampaign {
             };
             Ok((recording.name, chamber.map(inherited)))
         });
+        let recordings = recordings.collect::<Result<_, ModelError>>()?;
+        let stated = &file.day_to_day;
+        (text.document()).only("day_to_day", stated.keys(), &DayToDay::keys())?;
+        let value = |key: &str| stated.get(key).map_or(0.0, |sigma| sigma.0);
         Ok(Self {
             name: text.name(),
-            recordings: recordings.collect::<Result<_, ModelError>>()?,
-            day_to_day: day_to_day(text.document(), &file.day_to_day)?,
+            recordings,
+            day_to_day: DayToDay::of_values(value),
             scenario,
         })
     }

@@ -13,13 +13,13 @@ pub struct Drive {
     imperfection: Imperfection,
     terms: TermVector,
     /// Duration, s.
-    pub(super) duration: f64,
+    pub duration: f64,
     /// Integrals over each sample: see [`true_increments`].
-    pub(super) ideal: PerSensor<Vec<Vector3<f64>>>,
+    pub ideal: PerSensor<Vec<Vector3<f64>>>,
     /// Time, position number and attitude of a perfect table at each reading.
-    pub(super) read: Vec<(f64, usize, Matrix3<f64>)>,
+    pub read: Vec<(f64, usize, Matrix3<f64>)>,
     /// Axis angles at each of these times; during a move, those of the position before it.
-    pub(super) axes: Vec<AxisAngles>,
+    pub axes: Vec<AxisAngles>,
 }
 
 /// Many runs of a scenario. With a perfect table, all of them share one drive, which is computed once.
@@ -54,7 +54,7 @@ impl Runs {
 }
 
 impl Drive {
-    pub(super) fn new(
+    pub fn new(
         scenario: &Scenario,
         imperfection: Imperfection,
         terms: TermVector,
@@ -78,7 +78,7 @@ impl Drive {
     }
 
     /// Whether it has this imperfection and these error terms.
-    pub(super) fn is_of(&self, imperfection: &Imperfection, terms: &TermVector) -> bool {
+    pub fn is_of(&self, imperfection: &Imperfection, terms: &TermVector) -> bool {
         (&self.imperfection, &self.terms) == (imperfection, terms)
     }
 }

@@ -9,12 +9,12 @@ use super::{Chamber, Integrator};
 use crate::calibration::ErrorTerm;
 use crate::calibration::model::{USUAL_LEVEL, USUAL_NORTH, usual_axis_error, usual_variation};
 use crate::earth::Site;
-use crate::formats::{Finite, Latitude, NonNegative, OneOrThree, Positive};
 use crate::imu::BodyFrame;
 use crate::imu::{ANGLES, InstallationForm, Output, PerSensor, Sensor, TermVector, Triad};
 use crate::models::{self, InstallationModel, Instrument, ModelError, Place, Room};
 use crate::turntable::{Imperfection, Motion, Path, Table, TableError};
 use crate::units::{ARCSEC, DEG_PER_H, DEGREE, MICRO_G, PPM};
+use turncal_input::{Finite, Latitude, NonNegative, OneOrThree, Positive};
 
 /// Temperature at which instruments match their model, °C.
 const ROOM_TEMPERATURE: f64 = 25.0;
@@ -198,13 +198,20 @@ impl Scenario {
         ROOM_TEMPERATURE
     }
 
+    /// Motion of a perfect table along the path.
+    ///
+    /// # Errors
+    /// If the table cannot follow the path.
+    pub fn motion(&self) -> Result<Motion, TableError> {
+        Motion::new(&self.table, &self.path, &Imperfection::none(&self.table))
+    }
+
     /// Duration of a run, s.
     ///
     /// # Errors
     /// If the table cannot follow the path.
     pub fn duration(&self) -> Result<f64, TableError> {
-        let perfect = Imperfection::none(&self.table);
-        Ok(Motion::new(&self.table, &self.path, &perfect)?.duration())
+        Ok(self.motion()?.duration())
     }
 
     /// Total time of the dwells in it, s.
@@ -212,8 +219,7 @@ impl Scenario {
     /// # Errors
     /// If the table cannot follow the path.
     pub fn standing_time(&self) -> Result<f64, TableError> {
-        let perfect = Imperfection::none(&self.table);
-        let motion = Motion::new(&self.table, &self.path, &perfect)?;
+        let motion = self.motion()?;
         Ok(motion.dwells().map(|(start, end)| end - start).sum())
     }
 

@@ -16,7 +16,6 @@ use crate::calibration::{ErrorTerm, ErrorTermTest, Group, Nis, NoisePolicy, mean
 use crate::imu::InstallationForm;
 use crate::simulation::{Runs, Scenario};
 
-pub(in crate::study) use figures::Squares;
 use navigation::Way;
 
 pub use baseline::Baseline;

@@ -1,7 +1,7 @@
 //! Studies: statistics over many simulated runs.
 
 pub mod accuracy;
-pub mod campaign;
+mod checked;
 pub mod experiment;
 pub mod navigation;
 pub mod path;
@@ -19,7 +19,7 @@ use crate::models::ModelError;
 use crate::turntable::TableError;
 
 pub use accuracy::{Accuracy, AccuracyStudy, Figures, NavigationAccuracy};
-pub use campaign::{CampaignAccuracy, CampaignStudy};
+pub use checked::{CheckedCalibration, Consequences};
 pub use experiment::{Experiment, ExperimentStudy};
 pub use ratio::Ratio;
 pub use shard::{Shard, ShardError};

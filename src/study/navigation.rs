@@ -1,17 +1,16 @@
 //! Navigation accuracy of a calibration: the navigation error due to its errors, by the nonlinear equations of
 //! navigation, and the σ of this error predicted from its covariance, by the linear model.
 
+mod methods;
 mod outlook;
 mod quantity;
-mod warming;
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use thiserror::Error;
 
 use crate::attitude::from_pitch_roll_heading;
-use crate::calibration::{
-    Comparison, ComparisonError, Named, PARAMETERS, ParameterMatrix, compare, parameter,
-};
+use crate::calibration::result::frame::{in_common_form, own_nominal};
+use crate::calibration::{ComparisonError, Named, PARAMETERS, ParameterMatrix, parameter};
 use crate::earth::Site;
 use crate::imu::{BodyFrame, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::models::{self, ModelError, Place};
@@ -22,9 +21,9 @@ use crate::navigation::{
     within_reach,
 };
 
+pub use methods::{MethodOutlook, navigate_with_each};
 pub use outlook::Outlook;
 pub use quantity::Quantity;
-pub use warming::{Warming, WarmingError, WarmingPair};
 
 /// Time in s between two moments of a result.
 pub const INTERVAL: f64 = 60.0;
@@ -114,9 +113,6 @@ pub enum NavigationStudyError {
         /// The triad.
         sensor: Sensor,
     },
-    /// Calibrations that cannot be navigated with while they warm up.
-    #[error(transparent)]
-    Warming(#[from] WarmingError),
     /// Roll and heading are not distinguishable.
     #[error(
         "at a pitch of ±90°, roll and heading cannot be distinguished: give a pitch within ±89°"
@@ -134,22 +130,15 @@ impl Pair {
         calibration: Named,
         truth: Named,
     ) -> Result<(Self, BodyFrame), ComparisonError> {
-        let Comparison {
-            body_frame,
-            reference,
-            sides,
-            ..
-        } = compare(&[calibration], Some(truth))?;
-        let Some(side) = sides.into_iter().next() else {
-            return Err(ComparisonError::Single);
-        };
-        let of_truth = reference.covariance.unwrap_or_default();
+        let nominal = own_nominal(truth.record);
+        let [truth, calibration] = in_common_form(truth, calibration, &nominal)?;
+        let of_truth = truth.covariance.unwrap_or_default();
         let pair = Self {
-            truth: reference.triads,
-            covariance: side.calibration.covariance.map(|own| own + of_truth),
-            calibration: side.calibration.triads,
+            truth: truth.triads,
+            covariance: calibration.covariance.map(|own| own + of_truth),
+            calibration: calibration.triads,
         };
-        Ok((pair, body_frame))
+        Ok((pair, calibration.body_frame))
     }
 
     /// The same with the errors of one triad only; the other is calibrated perfectly.
@@ -195,11 +184,9 @@ impl Sensed {
     }
 }
 
-impl PerSensor<Sensed> {
-    fn errors(&self, at: &Instant) -> InputError {
-        let (rate, force) = (self.gyro.error(&at.rate), self.accel.error(&at.force));
-        InputError::new(rate.x, rate.y, rate.z, force.x, force.y, force.z)
-    }
+fn input_errors(sensed: &PerSensor<Sensed>, at: &Instant) -> InputError {
+    let (rate, force) = (sensed.gyro.error(&at.rate), sensed.accel.error(&at.force));
+    InputError::new(rate.x, rate.y, rate.z, force.x, force.y, force.z)
 }
 
 impl Mission {
@@ -254,23 +241,14 @@ impl Mission {
         start: &ErrorVector,
         pair: &Pair,
     ) -> Result<Vec<Outlook>, NavigationStudyError> {
-        self.errors_by(start, |_| pair.sensed())
-    }
-
-    /// The same with sensor errors that change in each interval, given by its number.
-    fn errors_by(
-        &self,
-        start: &ErrorVector,
-        sensed: impl Fn(u32) -> Result<PerSensor<Sensed>, NavigationStudyError>,
-    ) -> Result<Vec<Outlook>, NavigationStudyError> {
+        let sensed = pair.sensed()?;
         let mut course = Course::new(&self.motion);
         within_reach(course.here().truth.latitude + start[POSITION])?;
         let mut errors = NonlinearError::new(start);
         let mut moments = vec![moment(0.0, &errors, &course.here().truth)];
         for interval in 1..=self.intervals {
-            let sensed = sensed(interval)?;
             let time = f64::from(interval) * self.interval;
-            let forcing = |at: &Instant| Forcing::of(at, &sensed.errors(at));
+            let forcing = |at: &Instant| Forcing::of(at, &input_errors(&sensed, at));
             let mut start = forcing(course.here());
             course.go(time, sensed.gyro.constant.norm(), |stride| {
                 let [middle, end] = [&stride.middle, &stride.end].map(forcing);
@@ -306,8 +284,7 @@ impl Mission {
     ) -> Result<Vec<Exposure>, NavigationStudyError> {
         let sensed = sensed_errors(truth)?;
         let Motion::Standing(truth) = &self.motion else {
-            let linear = |at: &Instant| Linearisation::about(at, &sensed);
-            return self.exposure_by(sensitivity, |_| Ok(linear));
+            return self.exposure_moving(sensitivity, &sensed);
         };
         // At rest one exact step does for all intervals.
         let at = truth.steady();
@@ -325,20 +302,20 @@ impl Mission {
         Ok(exposures)
     }
 
-    /// The same with a linear model that changes in each interval, given by its number.
-    fn exposure_by<L: Fn(&Instant) -> Linearisation>(
+    /// The same step by step along a trajectory.
+    fn exposure_moving(
         &self,
         mut sensitivity: Sensitivity,
-        linear: impl Fn(u32) -> Result<L, NavigationStudyError>,
+        sensed: &SensedErrors,
     ) -> Result<Vec<Exposure>, NavigationStudyError> {
+        let linear = |at: &Instant| Linearisation::about(at, sensed);
         let mut course = Course::new(&self.motion);
         let mut exposures = vec![exposure(0.0, &sensitivity, &course.here().truth)?];
         for interval in 1..=self.intervals {
-            let linear = linear(interval)?;
             let time = f64::from(interval) * self.interval;
             let mut start = linear(course.here());
             course.go(time, 0.0, |stride| {
-                let [middle, end] = [&stride.middle, &stride.end].map(&linear);
+                let [middle, end] = [&stride.middle, &stride.end].map(linear);
                 let linearised = [&start, &middle, &end];
                 sensitivity = Linearisation::follow(&sensitivity, stride.duration, linearised);
                 start = end;

@@ -1,17 +1,16 @@
 //! Predicted accuracy of a path, before any data exist: σ from the covariance of a recording along it.
 
-use rayon::prelude::*;
-
 use super::navigation::{Mission, NavigationStudyError, Outlook};
 use crate::calibration::{
-    Bound, CalibrationError, ErrorTerm, Options, ParameterVector, Problem, TermLeftOff, bound,
-    coarse_start, terms_left_off,
+    Bound, CalibrationError, ErrorTerm, Options, ParameterVector, Problem, TermLeftOff,
+    bound_with_parts, coarse_start, terms_left_off,
 };
 use crate::imu::{PerSensor, TermVector, Triad};
+use crate::lot::{Check, Specification};
 use crate::models::{Instrument, ModelError, Place, path_by_hand, turntable};
 use crate::run::{Aiding, Run};
 use crate::simulation::Scenario;
-use crate::survey::TURNED_BY_HAND;
+use crate::survey::{TURNED_BY_HAND, decided};
 use crate::turntable::TableError;
 
 /// A path to evaluate.
@@ -55,19 +54,23 @@ pub struct Evaluation {
     pub bound: Bound,
     /// Error terms that are not estimated.
     pub left_off: Vec<TermLeftOff>,
-    /// The path without each of its moves, in order; empty for a record.
+    /// The value of each move, in order; empty for a record.
     pub without: Vec<Without>,
     /// Expected navigation errors.
     pub navigation: Vec<Outlook>,
 }
 
-/// A path without one of its moves and the dwell after it.
+/// What a calibration would know without one of the moves.
+///
+/// The observations of the dwell after the move then say nothing about the parameters. Their effect on attitude and
+/// velocity stays, so the move before and the move after it keep their values. With the likelihood as a product of
+/// factors, each dwell given those before it, this factor is left out (partial likelihood: Cox 1975, Biometrika 62(2)).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Without {
-    /// Time that it takes, s.
+    /// Time of the move and the dwell after it, s.
     pub time: f64,
-    /// Expected σ without it; `None` if no calibration is possible along the remaining path.
-    pub sigma: Option<ParameterVector>,
+    /// Expected σ without it.
+    pub sigma: ParameterVector,
 }
 
 impl Named<'_> {
@@ -139,50 +142,35 @@ impl PathStudy {
         })
     }
 
-    /// Evaluates the path, and the path without each of its moves.
+    /// Evaluates the path and each of its moves.
     ///
     /// # Errors
     /// [`PathError`] if the table cannot follow the path, or no calibration is possible.
     pub fn evaluate(&self) -> Result<Evaluation, PathError> {
-        let (whole, without) = rayon::join(
-            || {
-                let (run, truth, terms) = self.record(&self.scenario)?;
-                Evaluation::new(&Problem::new(&run, &self.options), (&truth, &terms))
-            },
-            || {
-                let moves = 0..self.scenario.path.moves.len();
-                let each = moves.into_par_iter().map(|number| self.without(number));
-                each.collect::<Result<Vec<_>, PathError>>()
-            },
-        );
-        let mut evaluation = whole?;
-        evaluation.standing = self.scenario.standing_time()?;
-        let duration = self.scenario.duration()?;
-        for mut without in without? {
-            without.time = duration - without.time;
-            evaluation.without.push(without);
-        }
+        let motion = self.scenario.motion()?;
+        let moves = motion.moves();
+        // From the middle of one move to that of the next, there is one dwell.
+        let middles = moves.iter().map(|(start, end)| 0.5 * (start + end));
+        let middles: Vec<f64> = middles.chain([f64::INFINITY]).collect();
+        let (run, truth, terms) = self.record()?;
+        let problem = Problem::new(&run, &self.options);
+        let (mut evaluation, sigma) = Evaluation::new(&problem, (&truth, &terms), &middles)?;
+        evaluation.standing = motion.dwells().map(|(start, end)| end - start).sum();
+        let starts = moves.iter().map(|(start, _)| *start);
+        let next = starts.clone().skip(1).chain([motion.duration()]);
+        let without = starts.zip(next).zip(sigma);
+        evaluation.without = without
+            .map(|((start, next), sigma)| Without {
+                time: next - start,
+                sigma,
+            })
+            .collect();
         Ok(evaluation)
     }
 
-    /// The path without one of its moves; its time is that of the remaining path.
-    fn without(&self, number: usize) -> Result<Without, PathError> {
-        let mut scenario = self.scenario.clone();
-        scenario.path.moves = scenario.path.moves.without(number);
-        let time = scenario.duration()?;
-        let (run, truth, terms) = self.record(&scenario)?;
-        let problem = Problem::new(&run, &self.options);
-        let sigma = bound(&problem, &truth, &terms).ok();
-        let sigma = sigma.map(|bound| bound.estimate.sigma());
-        Ok(Without { time, sigma })
-    }
-
-    /// A simulated recording along a path, with its truth.
-    fn record(
-        &self,
-        scenario: &Scenario,
-    ) -> Result<(Run, PerSensor<Triad>, TermVector), TableError> {
-        let simulated = scenario.simulate(scenario.seed, 0)?;
+    /// A simulated recording along the path, with its truth.
+    fn record(&self) -> Result<(Run, PerSensor<Triad>, TermVector), TableError> {
+        let simulated = self.scenario.simulate(self.scenario.seed, 0)?;
         let mut run = simulated.run;
         if self.by_hand {
             run.recording.table = None;
@@ -201,22 +189,30 @@ impl Evaluation {
         let problem = Problem::new(run, options);
         let start = coarse_start(&problem)?;
         let problem = start.by_hand(&problem).unwrap_or(problem);
-        Self::new(&problem, (&start.at.triads, &TermVector::zeros()))
+        let (evaluation, _) = Self::new(&problem, (&start.at.triads, &TermVector::zeros()), &[])?;
+        Ok(evaluation)
     }
 
+    /// Every limit of a specification, for a unit at its nominal values: a limit that passes can be decided.
+    pub fn decided(&self, specification: &Specification) -> Vec<Check> {
+        decided(specification, &self.bound.estimate)
+    }
+
+    /// Expected results, without those of moves, and σ without the observations between each two of these times, s.
     fn new(
         problem: &Problem,
         (truth, terms): (&PerSensor<Triad>, &TermVector),
-    ) -> Result<Self, PathError> {
+        times: &[f64],
+    ) -> Result<(Self, Vec<ParameterVector>), PathError> {
         let run = problem.run();
         let imu = &run.recording.imu;
         let (bound, left_off) = rayon::join(
-            || bound(problem, truth, terms),
+            || bound_with_parts(problem, truth, terms, times),
             || terms_left_off(problem, truth, terms),
         );
-        let bound = bound?;
+        let (bound, without) = bound?;
         let mission = Mission::suited(&run.site, &[&bound.estimate])?;
-        Ok(Self {
+        let evaluation = Self {
             duration: imu.duration(),
             standing: problem.dwells().map(|dwell| dwell.duration(imu)).sum(),
             aiding: problem.model.aiding,
@@ -224,12 +220,15 @@ impl Evaluation {
             bound,
             left_off: left_off?,
             without: Vec::new(),
-        })
+        };
+        Ok((evaluation, without))
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use rayon::prelude::*;
+
     use super::*;
     use crate::calibration::{Group, NoisePolicy, PARAMETERS, UNWATCHED, estimate, to_vector};
 

@@ -23,7 +23,7 @@ pub struct Ratio {
 impl Ratio {
     /// The ratio of two root mean squares over the same runs, each given by the sums of squares of all
     /// runs; `None` without runs.
-    pub(super) fn of(over: &[f64], under: &[f64]) -> Option<Self> {
+    pub fn of(over: &[f64], under: &[f64]) -> Option<Self> {
         let sum = |of: &[f64], chosen: &[usize]| chosen.iter().map(|&k| of[k]).sum::<f64>();
         let ratio = |chosen: &[usize]| (sum(over, chosen) / sum(under, chosen)).sqrt();
         Self::bootstrapped(over.len().min(under.len()), ratio)

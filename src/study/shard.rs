@@ -22,18 +22,11 @@ pub struct Shard {
 pub struct ShardError;
 
 impl Shard {
-    /// The whole job.
-    pub const WHOLE: Self = Self { index: 1, of: 1 };
-
-    /// The numbers of its runs among `count` runs, from zero, in order.
-    pub fn runs(self, count: u64) -> Vec<u64> {
-        let mut runs = Vec::new();
-        let mut next = Some(self.index - 1);
-        while let Some(run) = next.filter(|run| *run < count) {
-            runs.push(run);
-            next = run.checked_add(self.of);
-        }
-        runs
+    /// The numbers of its runs among `count` runs, from zero, in order. A part read from a file may be no part: its
+    /// runs may repeat without end.
+    pub fn runs(self, count: u64) -> impl Iterator<Item = u64> {
+        let next = move |run: &u64| run.checked_add(self.of);
+        std::iter::successors(self.index.checked_sub(1), next).take_while(move |run| *run < count)
     }
 }
 
@@ -75,7 +68,7 @@ mod tests {
             index: u64::MAX,
             of: u64::MAX,
         };
-        assert_eq!(last.runs(9), [0; 0]);
+        assert_eq!(last.runs(9).next(), None);
     }
 
     #[test]

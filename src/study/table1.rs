@@ -12,6 +12,7 @@
 //! rows of unit norm, are included.
 
 pub mod paper;
+mod quantity;
 mod response;
 mod verdict;
 
@@ -27,8 +28,8 @@ use crate::imu::{InstallationForm, PerSensor, Sensor, Triad};
 use crate::models::{InstallationModel, Instrument, ModelError, Place};
 use crate::study::navigation::NavigationStudyError;
 
-pub use paper::{ByQuantity, Installation, Kind, QUANTITIES, Reading};
-pub use response::Moments;
+pub use paper::{Installation, Kind, Reading};
+pub use quantity::{ByQuantity, Moments, QUANTITIES};
 pub use verdict::{AGREEMENT, Verdict};
 
 /// Minimum number of samples for verdicts, so that only the sampling error of the paper matters.

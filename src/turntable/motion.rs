@@ -21,6 +21,7 @@ pub struct Motion {
     /// In order and never empty.
     stretches: Vec<Stretch>,
     breaks: Vec<f64>,
+    moves: Vec<(f64, f64)>,
 }
 
 impl Motion {
@@ -38,6 +39,7 @@ impl Motion {
         let mut motion = Self {
             stretches: Vec::new(),
             breaks: Vec::new(),
+            moves: Vec::new(),
         };
         match &path.moves {
             Moves::Axes { start, steps } => {
@@ -48,7 +50,7 @@ impl Motion {
                 for (number, step) in (1..).zip(steps) {
                     let profiles = profiles(table, step, number)?;
                     let moving = Chain::of_table(table, imperfection, &angles, &profiles);
-                    motion.push(moving.duration(), moving);
+                    motion.push_move(moving);
                     for (angle, by) in angles.iter_mut().zip(&step.angles) {
                         *angle += by;
                     }
@@ -65,7 +67,7 @@ impl Motion {
                     let profile = body_profile(table, step, vector.norm(), number)?;
                     let axis = vector.try_normalize(0.0).unwrap_or_default();
                     let moving = Chain::about_body_axis(base * attitude, axis, profile);
-                    motion.push(moving.duration(), moving);
+                    motion.push_move(moving);
                     attitude *= exp(vector);
                     motion.push(step.dwell, Chain::still(base * attitude));
                 }
@@ -104,6 +106,11 @@ impl Motion {
             .map(|stretch| (stretch.start, stretch.end))
     }
 
+    /// The moves, `(start, end)` in s, in order.
+    pub fn moves(&self) -> &[(f64, f64)] {
+        &self.moves
+    }
+
     /// Attitude, rate and acceleration at a time in s.
     pub fn at(&self, time: f64) -> Kinematics {
         let stretch = self.stretch(time);
@@ -113,6 +120,12 @@ impl Motion {
     fn stretch(&self, time: f64) -> &Stretch {
         let begun = self.stretches.partition_point(|s| s.start <= time);
         &self.stretches[begun.saturating_sub(1)]
+    }
+
+    fn push_move(&mut self, moving: Chain) {
+        let start = self.duration();
+        self.push(moving.duration(), moving);
+        self.moves.push((start, self.duration()));
     }
 
     /// Adds a stretch that takes time. The first, at rest, is kept even if it takes none: there is always an

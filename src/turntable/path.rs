@@ -5,8 +5,6 @@ use std::f64::consts::PI;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::attitude::exp;
-
 /// A sequence of positions with its initial attitude.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Path {
@@ -87,27 +85,6 @@ impl Moves {
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
-    }
-
-    /// The same without one of them and the dwell after it; unchanged if there is no such move. A rotation that then is
-    /// longer takes the time that it needs.
-    pub fn without(&self, number: usize) -> Self {
-        let mut moves = self.clone();
-        if number < moves.len() {
-            match &mut moves {
-                Self::Axes { steps, .. } => drop(steps.remove(number)),
-                Self::Body { start, steps } => {
-                    steps.remove(number);
-                    let mut attitude = *start;
-                    for step in steps {
-                        let vector = step.rotation.vector(&attitude);
-                        attitude *= exp(vector);
-                        step.duration = step.duration.max(step.shortest(vector.norm()));
-                    }
-                }
-            }
-        }
-        moves
     }
 }
 

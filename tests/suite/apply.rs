@@ -8,12 +8,11 @@ use nalgebra::{Matrix3, Vector3};
 use turncal::calibration::result::Calibration;
 use turncal::calibration::result::{TermRecord, TriadRecord};
 use turncal::calibration::{Correction, CorrectionError, truth_record};
-use turncal::formats::export::HEADER;
 use turncal::imu::{Output, PerSensor, Sensor, Term, TermVector};
-use turncal::run::Run;
 use turncal::simulation::{Scenario, true_increments};
 use turncal::turntable::{Imperfection, Motion};
 use turncal::units::{DEGREE, STANDARD_GRAVITY};
+use turncal_files::export::{HEADER, sample_rows};
 
 use crate::calibration_file::written;
 
@@ -192,7 +191,10 @@ fn errors(terms: &[Term]) -> [PerSensor<f64>; 2] {
         let correction = Correction::for_run(record, run).unwrap();
         let period = run.recording.imu.period;
         let mut largest = PerSensor::from_fn(|_| 0.0_f64);
-        for (k, sample) in correction.samples(run).enumerate() {
+        for (k, sample) in correction
+            .samples(run, 0..run.recording.imu.len())
+            .enumerate()
+        {
             let rate = (sample.rate - ideal.gyro[k] / period).amax();
             let force = (sample.force - ideal.accel[k] / period).amax();
             largest.gyro = largest.gyro.max(rate);
@@ -272,7 +274,7 @@ fn the_calibrated_record_is_a_record_again() {
         .flatten()
         .fold(toml, |toml, (from, to)| toml.replace(from, to));
     fs::write(again.join("run.toml"), toml).unwrap();
-    let read = Run::read(&again.join("run.toml")).unwrap();
+    let read = turncal_files::read_run(&again.join("run.toml")).unwrap();
     let expected = by_hand(&record.gyro, [1.0, 2.0, 3.0]);
     assert!((read.recording.imu.gyro.at(50) / 0.01 - expected).amax() < 1e-12);
     assert_eq!(read.recording.imu.start(), 0.0);
@@ -374,4 +376,30 @@ fn the_raw_record_is_never_replaced_and_a_name_says_what_is_written() {
     assert_eq!(fs::read(&raw).unwrap(), before);
     let message = failure(turncal(&apply).arg(root.path().join("calibrated.txt")), 2);
     assert!(message.contains(".csv.gz"), "{message}");
+}
+
+#[test]
+fn rows_written_in_parts_are_the_samples_to_the_last_bit_even_as_the_temperature_changes() {
+    let mut scenario = Scenario::load("warming-mems").unwrap();
+    scenario.integrator.period = 0.05;
+    let simulated = scenario.simulate(1, 0).unwrap();
+    let run = &simulated.run;
+    let correction = Correction::for_run(&simulated.truth_record(), run).unwrap();
+    assert!(correction.changes());
+    let samples: Vec<_> = correction
+        .samples(run, 0..run.recording.imu.len())
+        .collect();
+    // More than one part, and parts that begin within a second of temperature.
+    assert!(samples.len() > 4097, "{}", samples.len());
+    let mut text = Vec::new();
+    sample_rows(&mut text, &correction, run, false).unwrap();
+    let text = String::from_utf8(text).unwrap();
+    let rows: Vec<&str> = text.lines().skip(1).collect();
+    assert_eq!(rows.len(), samples.len());
+    for (row, sample) in rows.iter().zip(&samples) {
+        let row: Vec<f64> = row.split(',').map(|n| n.parse().unwrap()).collect();
+        assert_eq!(row[2..5], *sample.rate.as_slice());
+        assert_eq!(row[5..8], *sample.force.as_slice());
+        assert_eq!(row[8], f64::from(u8::from(sample.in_range)));
+    }
 }

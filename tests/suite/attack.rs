@@ -1,6 +1,8 @@
 //! What an attack on the command line found: each case ends as it should, with the message that helps.
 
+use std::io::Write;
 use std::path::Path;
+use std::time::Instant;
 
 use assert_cmd::Command;
 use serde_json::Value;
@@ -74,6 +76,36 @@ fn a_unit_that_was_edited_after_its_part_was_written_is_not_merged() {
     );
 }
 
+/// The case claims 10^15 runs; the others are parts that repeat without end and a whole lot of that many units.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_part_that_claims_more_runs_than_it_holds_is_refused_in_little_memory() {
+    let Some(directory) = shared("attack/merge-runs-1e15") else {
+        return;
+    };
+    let job = std::fs::read_to_string(directory.join("job.json")).unwrap();
+    let shard = |index: u32, of: u64| format!("\"index\": {index},\n    \"of\": {of}");
+    let unending = job.replace(&shard(2, 2), &shard(2, 0));
+    let none = job.replace(&shard(2, 2), &shard(0, 2));
+    let whole = job
+        .replace("\"shard\"", "\"unknown\"")
+        .replace("study-accuracy", "lot");
+    for text in [&job, &unending, &none, &whole] {
+        let part = tempfile::tempdir().unwrap();
+        std::fs::write(part.path().join("job.json"), text).unwrap();
+        let results = part.path().join("runs.msgpack");
+        std::fs::copy(directory.join("runs.msgpack"), results).unwrap();
+        let program = env!("CARGO_BIN_EXE_turncal");
+        let command = format!("ulimit -v 512000; exec {program} merge . -o out");
+        let mut shell = std::process::Command::new("sh");
+        let output = shell.args(["-c", &command]).current_dir(&part).output();
+        let output = output.unwrap();
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{message}");
+        assert!(message.contains("run list does not match"), "{message}");
+    }
+}
+
 #[test]
 fn a_matrix_of_zeros_is_certified_for_nobody() {
     let certificate = "certificate calibration.json --laboratory lab.toml -o c";
@@ -81,6 +113,25 @@ fn a_matrix_of_zeros_is_certified_for_nobody() {
     if let Some((status, _, message, _)) = outcome("certificate-long-word", certificate) {
         assert_eq!(status, 0, "{message}");
     }
+}
+
+/// Each move once had an evaluation of its own: 100 words took 69 s.
+#[test]
+fn a_path_of_many_moves_takes_as_long_as_its_recording() {
+    let time = |moves: usize| {
+        let words = vec!["z_up,x_up"; moves / 2].join(",");
+        let begun = Instant::now();
+        let mut command = Command::new(env!("CARGO_BIN_EXE_turncal"));
+        let arguments = ["path", "evaluate", &words, "--imu", "bmi088", "--json"];
+        let output = command.args(arguments).output().unwrap();
+        assert!(output.status.success());
+        let result: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(result["without"].as_array().unwrap().len(), moves - 1);
+        begun.elapsed()
+    };
+    let (few, many) = (time(40), time(200));
+    println!("40 words {few:?}, 200 words {many:?}");
+    assert!(many < 12 * few, "{few:?} {many:?}");
 }
 
 #[test]
@@ -195,6 +246,91 @@ fn an_archive_of_a_gigabyte_unpacked_is_drafted_in_half_of_it() {
     assert!(output.status.success(), "{message}");
     let text = String::from_utf8_lossy(&output.stdout);
     assert!(text.contains("20000000 samples"), "{text}");
+}
+
+/// A MAT file of two arrays of zeros with these rows and three columns each, compressed.
+fn mat_of_zeros(rows: u32) -> Vec<u8> {
+    let element = |kind: u32, content: &[u8]| {
+        let mut bytes = [kind, content.len() as u32].map(u32::to_le_bytes).concat();
+        bytes.extend(content);
+        bytes.resize(bytes.len().next_multiple_of(8), 0);
+        bytes
+    };
+    let mut file = b"MATLAB 5.0 MAT-file".to_vec();
+    file.resize(124, 0);
+    file.extend([0, 1, b'I', b'M']);
+    for name in ["gyro", "acc"] {
+        let size = [rows, 3].map(u32::to_le_bytes).concat();
+        let flags = [6, 0].map(u32::to_le_bytes).concat();
+        let head = [
+            element(6, &flags),
+            element(5, &size),
+            element(1, name.as_bytes()),
+        ]
+        .concat();
+        let numbers = 24 * rows;
+        let whole = head.len() as u32 + 8 + numbers;
+        let mut packer = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+        packer
+            .write_all(&[14, whole].map(u32::to_le_bytes).concat())
+            .unwrap();
+        packer.write_all(&head).unwrap();
+        packer
+            .write_all(&[9, numbers].map(u32::to_le_bytes).concat())
+            .unwrap();
+        for _ in 0..rows / 1000 {
+            packer.write_all(&[0; 24_000]).unwrap();
+        }
+        let packed = packer.finish().unwrap();
+        file.extend([15, packed.len() as u32].map(u32::to_le_bytes).concat());
+        file.extend(packed);
+    }
+    file
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_mat_file_is_read_in_parts_and_one_of_zeros_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let here = directory.path();
+    std::fs::write(here.join("m.mat"), mat_of_zeros(8_000_000)).unwrap();
+    // 384 MB unpacked.
+    let program = env!("CARGO_BIN_EXE_turncal");
+    let command = format!("ulimit -v 512000; exec {program} init m.mat");
+    let mut shell = std::process::Command::new("sh");
+    let output = shell.args(["-c", &command]).current_dir(here).output();
+    let output = output.unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{message}");
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("8000000 samples"), "{text}");
+    let zeros = mat_of_zeros(0);
+    let file = std::fs::File::create(here.join("s.mat")).unwrap();
+    (&file).write_all(&zeros[..128]).unwrap();
+    file.set_len(2 << 30).unwrap();
+    let (status, _, message) = turncal(here, "init s.mat");
+    assert!(
+        status == 1 && message.contains("an element of type 0"),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_time_that_stands_still_is_named() {
+    let directory = tempfile::tempdir().unwrap();
+    let row = |k: u32| {
+        let part = f64::from(k).sin();
+        format!("5.00,{part},0,0,0,{part},9.8\n")
+    };
+    let rows: String = (0..50_000).map(row).collect();
+    std::fs::write(
+        directory.path().join("d.csv"),
+        format!("t,gx,gy,gz,ax,ay,az\n{rows}"),
+    )
+    .unwrap();
+    let (status, _, message) = turncal(directory.path(), "calibrate d.csv --json");
+    let found = "found 5 in all rows of the column `t`, expected times that increase";
+    assert!(status == 1 && message.contains(found), "{message}");
 }
 
 #[test]

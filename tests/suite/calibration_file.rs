@@ -23,6 +23,6 @@ pub fn record() -> Calibration {
 
 pub fn written(directory: &Path, name: &str, record: &Calibration) -> PathBuf {
     let path = directory.join(name);
-    record.write(&path, false).unwrap();
+    turncal_files::write_calibration(record, &path, false).unwrap();
     path
 }

@@ -3,14 +3,17 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use nalgebra::{DMatrix, DVector, Vector3};
 use turncal::calibration::{
-    AtRest, Calibration, Finding, Options, Outcome, PARAMETERS, Problem, RecordingDifference,
-    UNWATCHED, estimate, parameter,
+    Calibration, Coefficient, Finding, Group, NoisePolicy, Options, Outcome, PARAMETERS, Problem,
+    RecordingDifference, Together, UNWATCHED, bound, estimate, mean_square_interval, nees,
+    parameter, sensor_and_parameter, to_vector,
 };
-use turncal::formats::Campaign;
-use turncal::imu::Sensor;
+use turncal::imu::{PerSensor, Sensor, TermVector};
 use turncal::run::Run;
+use turncal::simulation::{Scenario, SimulatedCampaign};
 use turncal::units::{ARCSEC, DEG_PER_H};
+use turncal_files::Campaign;
 
 use super::lot::{PATH, on_threads, turncal, words};
 use super::shared::{read, shared};
@@ -86,7 +89,7 @@ run = \"mild/run.toml\"
 
     // Between the soaks, where no recording was made, the truth lies within σ.
     let [calibration, truth] = ["once/calibration.json", "simulated/truth.json"].map(|file| {
-        let record = Calibration::read(&here.join(file)).unwrap();
+        let record = turncal_files::read_calibration(&here.join(file)).unwrap();
         record.at_temperature(30.0).unwrap()
     });
     let mut beyond = 0;
@@ -98,7 +101,7 @@ run = \"mild/run.toml\"
     // Of 24 numbers one is beyond 3 σ in 16 of 17 such runs at most.
     assert!(beyond <= 1, "{beyond} parameters beyond 3 σ");
     // Forty kelvin change them by a thousand σ.
-    let mild = Calibration::read(&here.join("once/calibration.json")).unwrap();
+    let mild = turncal_files::read_calibration(&here.join("once/calibration.json")).unwrap();
     let cold = mild.at_temperature(0.0).unwrap();
     let change = (cold["accel.bias.x"] - calibration["accel.bias.x"]).abs();
     assert!(change > 30.0 * calibration.sigma_of("accel.bias.x").unwrap());
@@ -138,8 +141,8 @@ fn autopilots_take_off_the_bias_at_a_temperature() {
     let here = here.path();
     simulated(here);
     calibrated(here, "simulated/campaign.toml", "all", "2");
-    let record = Calibration::read(&here.join("all/calibration.json")).unwrap();
-    let run = Run::read(&here.join("simulated/mild/run.toml")).unwrap();
+    let record = turncal_files::read_calibration(&here.join("all/calibration.json")).unwrap();
+    let run = turncal_files::read_run(&here.join("simulated/mild/run.toml")).unwrap();
     let formats: [(&str, Evaluated); 2] = [("px4", px4), ("ardupilot", ardupilot)];
     for (format, evaluate) in formats {
         let arguments = [
@@ -219,7 +222,7 @@ fn a_sensor_whose_bias_drifts_by_more_than_a_turn_is_calibrated_at_each_temperat
     let done = turncal(here, &arguments);
     assert!(done.status.success(), "{}", words(&done));
     let [found, truth] = ["result/calibration.json", "run/truth.json"]
-        .map(|file| Calibration::read(&here.join(file)).unwrap());
+        .map(|file| turncal_files::read_calibration(&here.join(file)).unwrap());
     for temperature in [20.0, 30.0] {
         let there = |record: &Calibration| record.at_temperature(temperature).unwrap();
         let (found, truth) = (there(&found), there(&truth));
@@ -266,7 +269,7 @@ fn an_instrument_that_is_mounted_anew_turns_as_a_whole() {
     simulated(here);
     let outcome = estimated(&made(here, "mounted", MOUNTINGS));
     assert!(outcome.converged);
-    let truth = Calibration::read(&here.join("mounted/truth.json")).unwrap();
+    let truth = turncal_files::read_calibration(&here.join("mounted/truth.json")).unwrap();
 
     // Of the turn of both triads the priors of four angles are known, 208″/√4, and the mean of three mountings,
     // 300″/√3 …
@@ -381,100 +384,169 @@ fn what_is_wrong_with_a_temperature_is_said() {
     );
 }
 
+/// Simulated MEMS sensors that stand still while they warm up and cool down: outputs by the polynomials at three
+/// temperatures against the true ones.
 #[test]
-fn a_run_may_be_navigated_with_while_it_warms_up() {
+fn sigma_of_biases_at_rest_are_those_of_their_errors() {
     let here = tempfile::tempdir().unwrap();
-    let here = here.path();
-    simulated(here);
-    calibrated(here, "simulated/campaign.toml", "all", "2");
-    let done = turncal(
-        here,
-        &["calibrate", "simulated/mild/run.toml", "-o", "mild"],
-    );
-    assert!(done.status.success(), "{}", words(&done));
-    let largest = |calibration: &str| {
-        let path = format!("{calibration}/calibration.json");
-        let arguments = [
-            "navigate",
-            &path,
-            "--truth",
-            "simulated/truth.json",
-            "--latitude-deg",
-            "45",
-            "--hours",
-            "3",
-            "--warming-degc",
-            "15,35",
-            "--json",
-        ];
-        let done = turncal(here, &arguments);
-        assert!(done.status.success(), "{}", words(&done));
-        let found: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
-        found["max_abs"]["position_nmile"].as_f64().unwrap()
-    };
-    let (with, without) = (largest("all"), largest("mild"));
-    // 20 µg and 0.01 °/h a kelvin, 1σ.
-    assert!(without > 3.0 * with, "{with} {without} nmile");
+    let path = "first_dwell_s = 3600.0\n[body]\nstart_pitch_roll_heading_deg = [0, 0, 0]\n\
+                acceleration_deg_per_s2 = 90.0\nmove_s = 4.0\ndwell_s = 5.0\nsteps = []\n";
+    fs::write(here.path().join("standing.toml"), path).unwrap();
+    let standing = WARMING
+        .replace("three-axis-hour", "standing.toml")
+        .replace("[3300.0, 45.0]", "[1800.0, 45.0], [3300.0, 10.0]")
+        .replace("100.0", "10.0");
+    let file = here.path().join("scenario.toml");
+    fs::write(&file, standing).unwrap();
+    let scenario = Scenario::load(file.to_str().unwrap()).unwrap();
+    let (mut squares, mut count) = (0.0, 0.0);
+    for stream in 0..10 {
+        let simulated = scenario.simulate(5, stream).unwrap();
+        let (run, of) = (&simulated.run, simulated.thermal.as_ref().unwrap());
+        let problem = Problem::together(&[run], &Options::default(), &Together::default());
+        let at_rest = problem.unwrap().at_rest().unwrap();
+        let (outputs, thermal) = (&at_rest.outputs, &at_rest.thermal);
+        let range = &thermal.model.range;
+        let input = PerSensor {
+            gyro: run.site.earth_rate_n(),
+            accel: Vector3::z() * run.site.gravity,
+        };
+        for temperature in [15.0, 25.0, 40.0] {
+            let state = turncal::imu::thermal_state_everywhere(range, temperature, 0.0);
+            let (change, covariance) = thermal.at(&state, &outputs.covariance);
+            let truth = of.at(&simulated.truth, temperature, 0.0);
+            for (bias, _) in &at_rest.means {
+                let (sensor, of_triad) = sensor_and_parameter(*bias);
+                let axis = of_triad + 3 - turncal::imu::PARAMETERS;
+                let expected = truth.get(sensor).output(input.get(sensor))[axis];
+                let off = outputs.vector()[*bias] + change[*bias] - expected;
+                squares += off.powi(2) / covariance[(*bias, *bias)];
+                count += 1.0;
+            }
+        }
+    }
+    let mean = squares / count;
+    println!("{mean:.2}");
+    // Ten instruments, six axes, about two independent temperatures: 120 squares.
+    assert!((0.6..1.6).contains(&mean), "{mean}");
 }
 
-/// RMS of a cubic of every other 100 s by the others: numpy's, written beside the record.
+/// Every other 100 s is predicted from the others; the RMS of a cubic is numpy's, written beside the record.
 #[test]
-fn a_real_instrument_at_rest_against_temperature_is_predicted_as_well_as_by_a_cubic() {
+fn biases_of_a_real_instrument_at_rest_follow_its_temperature_better_than_by_a_cubic() {
     let Some(directory) = shared("real-thermal-static") else {
         return;
     };
     let run: Run = read(&directory);
-    let at_rest = AtRest::new(&run, 5).unwrap();
+    let problem = Problem::together(&[&run], &Options::default(), &Together::default()).unwrap();
+    let at_rest = problem.at_rest().unwrap();
     let reference = fs::read_to_string(directory.join("reference.json")).unwrap();
     let reference: serde_json::Value = serde_json::from_str(&reference).unwrap();
-    for of in &at_rest.axes {
-        let name = format!("{}.{}", of.sensor.name(), ["x", "y", "z"][of.axis]);
-        let cubic = reference["axes"][&name]["rms_residual_cubic_cross_validated"].as_f64();
-        let cubic = cubic.unwrap();
-        // Temperatures are smoothed here, and rows there.
-        assert!(
-            (of.cubic / cubic - 1.0).abs() < 0.02,
-            "{name}: {} {cubic}",
-            of.cubic
-        );
-        assert!(
-            of.cross_validated <= cubic,
-            "{name}: {}",
-            of.cross_validated
-        );
+    let (imu, thermal) = (&run.recording.imu, &at_rest.thermal);
+    let temperature = imu.temperature.as_ref().unwrap();
+    for (bias, _) in &at_rest.means {
+        let (sensor, of_triad) = sensor_and_parameter(*bias);
+        let axis = of_triad + 3 - turncal::imu::PARAMETERS;
+        let of_axis = |(_, c): &(usize, &Coefficient)| c.index() == *bias;
+        let on: Vec<_> = thermal
+            .coefficients
+            .iter()
+            .enumerate()
+            .filter(of_axis)
+            .collect();
+        let row = |second: usize| {
+            let time = imu.time(second) + 0.5;
+            let [t, rate] = [temperature.at(time), temperature.rate(time)];
+            let [t, rate] = [t, rate].map(|of| of.get(sensor)[axis]);
+            let values = thermal.model.range.get(sensor).values(t, rate);
+            let functions = on.iter().map(|(_, c)| values[c.function]);
+            DVector::from_iterator(on.len() + 1, std::iter::once(1.0).chain(functions))
+        };
+        let output = |second: usize| imu.of(sensor).sum(second..second + 1)[axis];
+        let fit = |kept: &dyn Fn(usize) -> bool| {
+            let mut normal = DMatrix::zeros(on.len() + 1, on.len() + 1);
+            let mut right = DVector::zeros(on.len() + 1);
+            for second in (0..imu.len()).filter(|&second| kept(second)) {
+                normal += row(second) * row(second).transpose();
+                right += row(second) * output(second);
+            }
+            normal.lu().solve(&right).unwrap()
+        };
+        let mut squares = 0.0;
+        for left_out in 0..2 {
+            let is_left_out = |second: usize| second / 100 % 2 == left_out;
+            let others = fit(&|second| !is_left_out(second));
+            let off = |second: usize| output(second) - row(second).dot(&others);
+            let left_out = (0..imu.len()).filter(|&second| is_left_out(second));
+            squares += left_out.map(|second| off(second).powi(2)).sum::<f64>();
+        }
+        let name = format!("{}.{}", sensor.name(), ["x", "y", "z"][axis]);
+        let cubic = &reference["axes"][&name]["rms_residual_cubic_cross_validated"];
+        let ratio = (squares / imu.len() as f64).sqrt() / cubic.as_f64().unwrap();
+        println!("{name}: {} functions, {ratio:.3} of a cubic", on.len());
+        assert!(ratio < 1.0, "{name}: {ratio}");
+        for (&(k, c), expected) in on.iter().zip(fit(&|_| true).iter().skip(1)) {
+            let sigma = thermal.covariance[(k, k)].sqrt();
+            let off = (thermal.values[k] - expected) / sigma;
+            assert!(off.abs() < 0.5, "{name} {}: {off} σ", c.function);
+        }
     }
-    let record = at_rest.record(&run);
+    let record = at_rest.record(&problem);
     let unseen = record.findings.iter().any(|finding| {
         finding.kind == "temperature-not-seen" && finding.text.contains("gyro scale")
     });
     assert!(unseen, "{:?}", record.warnings);
 }
 
-/// ANEES of all parameters and coefficients over campaigns, and the orders that are chosen.
+/// NEES of parameters and coefficients by their σ, NEES of the parameters by the Cramér–Rao bound at the truth, and the
+/// selected orders, over simulated campaigns of one design.
 #[test]
 #[ignore = "statistics: twenty campaigns"]
-fn sigma_of_coefficients_are_true_and_orders_right() {
-    use turncal::calibration::NoisePolicy;
-    use turncal::imu::InstallationForm;
-    use turncal::simulation::SimulatedCampaign;
-    use turncal::study::{CampaignStudy, Study, UNWATCHED};
-    let study = CampaignStudy {
-        campaign: SimulatedCampaign::load("five-soaks").unwrap(),
-        form: InstallationForm::General,
-        noise: NoisePolicy::Stated,
-        runs: 20,
-        seed: 4711,
-        rate: true,
-    };
-    let accuracy = study.run(UNWATCHED).unwrap();
-    assert_eq!(accuracy.failures, 0);
-    let (anees, (low, high)) = accuracy.anees().unwrap();
-    println!("{anees} {low} {high}");
-    assert!((low..=high).contains(&anees), "{anees}");
-    for group in turncal::calibration::Group::all() {
-        let (right, all) = accuracy.right_orders(group);
-        assert!(right + 1 >= all, "{right} of {all}");
+fn errors_of_campaigns_are_as_sigma_and_bound_say_and_orders_are_right() {
+    let campaign = SimulatedCampaign::load("five-soaks").unwrap();
+    let options = Options::default().noise(NoisePolicy::Stated);
+    let (mut squares, mut counts, mut wrong) = ([0.0; 2], [0; 2], [0; 6]);
+    for stream in 0..20 {
+        let simulated = campaign.simulate(4711, stream).unwrap();
+        let runs: Vec<&Run> = simulated.iter().map(|one| &one.run).collect();
+        let problem = Problem::together(&runs, &options, &campaign.together()).unwrap();
+        let outcome = estimate(&problem, UNWATCHED).unwrap();
+        assert!(outcome.converged, "campaign {stream}");
+        let (found, thermal) = (&outcome.estimate, outcome.thermal.as_ref().unwrap());
+        let (range, of) = (&thermal.model.range, simulated[0].thermal.as_ref().unwrap());
+        let truth = of.at(&simulated[0].common, range.gyro.reference, 0.0);
+        let coefficients = of.coefficients(range);
+        let off = to_vector(&truth) - found.vector();
+        let of_coefficients = thermal.coefficients.iter().zip(&thermal.values);
+        let of_coefficients = of_coefficients
+            .map(|(c, value)| coefficients.get(c.sensor)[(c.parameter, c.function)] - value);
+        let all: Vec<f64> = off.iter().copied().chain(of_coefficients).collect();
+        let covariance = found.covariance_with(&thermal.cross, &thermal.covariance);
+        let selected = problem.with_model(outcome.model.clone());
+        let bound = bound(&selected, &truth, &TermVector::zeros()).unwrap();
+        let places: Vec<usize> = (0..all.len()).collect();
+        let by_sigma = nees(&DVector::from_vec(all), &covariance, &places);
+        let by_bound = nees(&off, &bound.estimate.covariance, &places[..PARAMETERS]);
+        for (k, nees) in [by_sigma, by_bound].into_iter().enumerate() {
+            let nees = nees.unwrap();
+            squares[k] += nees.mean * nees.count as f64;
+            counts[k] += nees.count;
+        }
+        for (wrong, group) in wrong.iter_mut().zip(Group::all()) {
+            let index = group.parameters(found.form())[0];
+            let (sensor, of_triad) = sensor_and_parameter(index);
+            let there = of.by.get(sensor).map(|by| by[of_triad] != 0.0);
+            let order = if there[1] { 2 } else { usize::from(there[0]) };
+            *wrong += usize::from(thermal.order(index) != (order, there[2]));
+        }
     }
+    for k in 0..2 {
+        let mean = squares[k] / counts[k] as f64;
+        let (low, high) = mean_square_interval(counts[k], 0.01);
+        println!("{mean:.4} ({low:.4} to {high:.4})");
+        assert!((low..=high).contains(&mean), "{mean} {low} {high}");
+    }
+    assert!(wrong.iter().all(|&wrong| wrong <= 1), "{wrong:?}");
 }
 
 #[test]
@@ -509,7 +581,7 @@ fn parts_of_a_record_whose_noise_is_stated_too_small_do_not_differ_for_that() {
         .component_div(&alone.estimate.sigma());
     // Both are of the same rows; with stated noise the accelerometers' K alone were 100 σ apart.
     let accel: Vec<f64> = (0..PARAMETERS)
-        .filter(|&i| turncal::calibration::sensor_and_parameter(i).0 == Sensor::Accel)
+        .filter(|&i| sensor_and_parameter(i).0 == Sensor::Accel)
         .map(|i| change[i])
         .filter(|change| change.is_finite())
         .collect();

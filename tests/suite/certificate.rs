@@ -54,7 +54,7 @@ fn turncal(arguments: &[&Path]) {
 
 /// Writes the certificate of a calibration to a directory.
 fn certify(calibration: &Path, paper: &Path) {
-    let lab = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/lab.toml");
+    let lab = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("examples/lab.toml");
     turncal(&[
         Path::new("certificate"),
         calibration,

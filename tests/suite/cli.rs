@@ -171,7 +171,7 @@ fn both_methods_may_follow_one_another_without_a_name_for_their_output() {
     here(&["calibrate", "mine/run.toml", "--method", "six-position"]);
     let method = |name: &str| {
         let path = directory.path().join(name).join("calibration.json");
-        let record = Calibration::read(&path).unwrap();
+        let record = turncal_files::read_calibration(&path).unwrap();
         record.method
     };
     assert_eq!(method("mine-calibration"), Some(Method::Ekf));
@@ -215,7 +215,7 @@ fn a_calibration_without_convergence_is_written_whole_and_fails() {
         .code(1);
     let said = String::from_utf8_lossy(&failed.get_output().stderr).into_owned();
     assert!(said.contains("not converged"), "{said}");
-    let record = Calibration::read(&out.join("calibration.json")).unwrap();
+    let record = turncal_files::read_calibration(&out.join("calibration.json")).unwrap();
     assert_eq!(record.converged, Some(false));
     assert!(record.findings.iter().any(|f| f.kind == "not-converged"));
     assert!(

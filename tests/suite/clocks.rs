@@ -6,10 +6,10 @@ use std::fs;
 use nalgebra::{Vector3, Vector6};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use turncal::formats::write_run;
 use turncal::imu::Sensor;
 use turncal::run::Run;
 use turncal::simulation::{Scenario, Simulated};
+use turncal_files::write_run;
 
 use crate::simulated::{Trial, accurate_as_claimed};
 
@@ -111,7 +111,7 @@ pub fn as_logged(made: Simulated, rows: &[Row]) -> Simulated {
         .find(|line| line.starts_with("sample_period_s"));
     let toml = toml.replace("imu.csv.gz", "imu.csv");
     fs::write(&path, toml.replace(period.unwrap(), "")).unwrap();
-    let run = Run::read(&path).unwrap_or_else(|error| panic!("{error}"));
+    let run = turncal_files::read_run(&path).unwrap_or_else(|error| panic!("{error}"));
     Simulated { run, ..made }
 }
 

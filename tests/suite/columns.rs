@@ -2,10 +2,12 @@
 
 use std::fmt::Write;
 
-use turncal::formats::draft::{Stated, StatedColumns, StatedUnit};
-use turncal::formats::{FileError, Opened, Place, Table};
 use turncal::imu::{PerSensor, Sensor};
 use turncal::simulation::Scenario;
+use turncal_files::Opened;
+use turncal_files::draft::{Stated, StatedColumns, StatedUnit};
+use turncal_input::{FileError, Place};
+use turncal_logs::Table;
 
 const NAMES: [&str; 6] = ["gx", "gy", "gz", "ax", "ay", "az"];
 

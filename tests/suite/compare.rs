@@ -59,14 +59,13 @@ fn further_terms_stand_side_by_side_in_the_units_of_data_sheets() {
     };
     let first = written(root.path(), "first.json", &with_offset(5.0));
     let second = written(root.path(), "second.json", &with_offset(5.006));
-    let without = written(root.path(), "without.json", &calibration(0.0));
-    let text = stdout(&compare(&[&first, &second, &without]).success());
+    let text = stdout(&compare(&[&first, &second]).success());
     let mut rows = text.lines().map(str::trim_start);
     let row = rows.find(|l| l.starts_with("accel.time_offset")).unwrap();
     // 6 µs with a σ of 3 √2 µs.
     let cells: Vec<&str> = row.split_whitespace().collect();
     let expected = [
-        "5.0000", "±", "0.0030", "ms", "5.0060", "±", "0.0030", "1.4", "–", "–",
+        "ms", "5.0000", "±", "0.0030", "5.0060", "±", "0.0030", "0.0060", "±", "0.0042", "1.4",
     ];
     assert_eq!(cells[1..], expected, "{row}");
 }
@@ -84,12 +83,12 @@ fn json_is_one_document_with_nees_and_scatter() {
         let found = document.pointer(pointer).and_then(|v| v.as_f64()).unwrap();
         assert!((found - expected).abs() < 1e-3, "{pointer}: {found}");
     };
-    near("/calibrations/1/nees_per_n", 9.0);
-    near("/groups/gyro.scale_ppm/1/largest", 3.0);
-    near("/parameters/0/calibrations/2/z", -3.0);
-    near("/scatter/parameters/0/chi2", 18.0);
-    near("/scatter/all/chi2", 18.0);
-    near("/scatter/all/degrees_of_freedom", 2.0);
+    near("/units/1/nees_per_n", 9.0);
+    near("/units/1/values/gyro.scale.x/difference", 3.0);
+    near("/units/2/values/gyro.scale.x/z", -3.0);
+    near("/quantities/0/chi2", 18.0);
+    near("/all_parameters/chi2", 18.0);
+    near("/all_parameters/degrees_of_freedom", 2.0);
 }
 
 #[test]
@@ -101,7 +100,7 @@ fn a_report_is_written_once_and_replaced_only_with_force() {
     let option = Path::new("-o");
     compare(&[&a, &b, option, &report]).success();
     let page = std::fs::read_to_string(report.join("index.html")).unwrap();
-    assert!(page.contains("<svg") && report.join("differences.svg").exists());
+    assert!(page.contains("<svg") && report.join("values.svg").exists());
     let again = compare(&[&a, &b, option, &report]).failure().code(1);
     assert!(stderr(&again).contains("--force"));
     compare(&[&a, &b, option, &report, Path::new("--force")]).success();
@@ -114,12 +113,17 @@ fn what_cannot_be_compared_is_refused() {
     let mut other = record();
     other.unit = Some(PerSensor::from_fn(|_| "rad".to_owned()));
     let b = written(root.path(), "b.json", &other);
-    let refused = compare(&[&a, &b]).failure().code(1);
-    let message = stderr(&refused);
-    assert!(
-        message.contains("`count`") && message.contains("`rad`"),
-        "{message}"
-    );
+    let mut unfinished = record();
+    unfinished.converged = Some(false);
+    let c = written(root.path(), "c.json", &unfinished);
+    for (second, says) in [
+        (&b, ["b: ", "`count`", "`rad`"]),
+        (&c, ["c: ", "not", "converged"]),
+    ] {
+        let message = stderr(&compare(&[&a, second]).failure().code(1));
+        let missing = says.iter().find(|part| !message.contains(**part));
+        assert_eq!(missing, None, "{message}");
+    }
     compare(&[&a]).failure().code(2);
     compare(&[&a, &root.path().join("none.json")])
         .failure()

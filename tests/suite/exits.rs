@@ -430,25 +430,6 @@ fn lists(text: &str, key: &str) -> Vec<Vec<f64>> {
 }
 
 #[test]
-fn dlio_gives_specific_force_and_leaves_of_the_gyros_what_its_file_states() {
-    let text = exported("dlio").0;
-    let sm = Matrix3::from_row_slice(&lists(&text, "sm")[0]);
-    let biases = lists(&text, "bias");
-    let [accel, gyro] = [0, 1].map(|k| Vector3::from_column_slice(&biases[k]));
-    let divisors = divisors(&text);
-    for vector in &record().test_vectors {
-        let n = halves(&vector.raw);
-        let n = [0, 1].map(|k| n[k].component_div(&divisors[k]));
-        let [rate, force] = halves(&vector.calibrated);
-        assert!((sm * n[1] - accel - force).norm() < 1e-9 * (1.0 + force.norm()));
-        let (errors, constant) = left(&text, "gyro");
-        let found = n[0] - gyro;
-        assert!((found - (rate + errors * rate + constant)).norm() < 1e-12);
-    }
-    assert!(text.contains("calibration: false"));
-}
-
-#[test]
 fn inav_takes_whole_counts_and_gains_and_leaves_what_its_file_states() {
     let text = exported("inav").0;
     let of = |name: &str| {
@@ -488,7 +469,7 @@ fn the_memory_of_a_realsense_gives_the_test_vectors_to_32_bits() {
     let values: Vec<f64> = (0..24)
         .map(|k| f64::from(f32::from_bits(whole(48 + 13 * 4 + 4 * k))))
         .collect();
-    let text = exported("dlio").0;
+    let text = exported("imu-calib").0;
     let divisors = divisors(&text);
     for vector in &record().test_vectors {
         for (k, at) in [(1, 0), (0, 12)] {
@@ -502,26 +483,11 @@ fn the_memory_of_a_realsense_gives_the_test_vectors_to_32_bits() {
 }
 
 #[test]
-fn depthai_gives_the_test_vectors_by_one_affine_map_a_triad() {
-    let file: serde_json::Value = serde_json::from_str(&exported("depthai").0).unwrap();
-    let map = |name: &str| -> [[f64; 4]; 3] { serde_json::from_value(file[name].clone()).unwrap() };
-    let divisors = divisors(&exported("dlio").0);
-    for vector in &record().test_vectors {
-        for (k, name) in ["gyroscope", "accelerometer"].into_iter().enumerate() {
-            let n = halves(&vector.raw)[k].component_div(&divisors[k]);
-            let u = halves(&vector.calibrated)[k];
-            let found = map(name).map(|[x, y, z, constant]| x * n.x + y * n.y + z * n.z + constant);
-            assert!((Vector3::from(found) - u).norm() < 1e-9 * (1.0 + u.norm()));
-        }
-    }
-}
-
-#[test]
 fn slimevr_gives_the_test_vectors_in_counts_but_for_what_its_file_states() {
     let text = exported("slimevr").0;
     let vector = |key: &str| Vector3::from_column_slice(&lists(&text, key)[0]);
     let inverse = Matrix3::from_row_slice(&lists(&text, ".A_Ainv")[0]);
-    let divisors = divisors(&exported("dlio").0);
+    let divisors = divisors(&exported("imu-calib").0);
     for TestVector { raw, calibrated } in &record().test_vectors {
         let [rate, force] = halves(raw);
         let force = (inverse * (force - vector(".A_B"))).component_div(&divisors[1]);

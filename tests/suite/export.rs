@@ -8,10 +8,10 @@ use std::process;
 use assert_cmd::Command;
 use nalgebra::{Matrix3, Vector3};
 use turncal::calibration::result::{Calibration, TermRecord, TestVector, TriadRecord};
-use turncal::formats::export::{Format, write};
 use turncal::imu::{BodyFrame, GaussMarkov, Noise, Nominal, PerSensor};
 use turncal::run::Run;
 use turncal::units::{ARCSEC, DEG_PER_H};
+use turncal_files::export::{Format, write};
 
 use crate::calibration_file::written;
 use crate::door::made::made_run;
@@ -178,40 +178,6 @@ int main(int argc, char **argv)
         let arguments = raw.map(|value| format!("{value:e}"));
         let ran = process::Command::new(&program)
             .args(arguments)
-            .output()
-            .unwrap();
-        numbers(&String::from_utf8(ran.stdout).unwrap())
-    });
-}
-
-#[test]
-fn the_octave_function_gives_the_test_vectors() {
-    let text = exported(&record(), "octave").0;
-    let values = |name: &str| {
-        let line = text
-            .lines()
-            .find(|l| l.trim_start().starts_with(&format!("{name} =")));
-        numbers(line.unwrap().split_once('=').unwrap().1)
-    };
-    assert_calibrates(|raw| {
-        let triad = |name: &str, n: Vector3<f64>| {
-            let matrix = Matrix3::from_row_slice(&values(&format!("{name}_correction")));
-            matrix * (n - Vector3::from_vec(values(&format!("{name}_bias"))))
-        };
-        let [gyro, accel] = halves(raw);
-        let [gyro, accel] = [triad("gyro", gyro), triad("accel", accel)];
-        gyro.iter().chain(&accel).copied().collect()
-    });
-    if !of_program("octave-cli") {
-        return;
-    }
-    let root = tempfile::tempdir().unwrap();
-    fs::write(root.path().join("turncal_calibrate.m"), &text).unwrap();
-    assert_calibrates(|raw| {
-        let call = format!("printf('%.17g\\n', turncal_calibrate({raw:?}))");
-        let ran = process::Command::new("octave-cli")
-            .current_dir(root.path())
-            .args(["--eval", &call])
             .output()
             .unwrap();
         numbers(&String::from_utf8(ran.stdout).unwrap())
@@ -516,7 +482,7 @@ fn a_record_that_is_read_and_written_again_is_the_same_to_the_bit() {
     record.covariance = vec![vec![1.0 / 3.0]];
     record.warnings = vec!["line\nbreak \"quoted\" µ".to_owned()];
     let first = written(root.path(), "first.json", &record);
-    let read = Calibration::read(&first).unwrap();
+    let read = turncal_files::read_calibration(&first).unwrap();
     assert_eq!(read, record);
     let second = written(root.path(), "second.json", &read);
     assert_eq!(fs::read(&first).unwrap(), fs::read(&second).unwrap());
@@ -540,7 +506,6 @@ fn what_a_format_does_not_hold_is_said_in_the_file_and_on_standard_error() {
         ("kalibr", &["biases", "sigma", "accel-second-order"][..]),
         ("kf-gins", &["misalignment", "sigma", "g-sensitivity"]),
         ("c", &["sigma", "accel-second-order, g-sensitivity"]),
-        ("octave", &["sigma", "accel-second-order, g-sensitivity"]),
         ("text", &["covariance"]),
     ] {
         let name = format!("{format}.out");
@@ -567,7 +532,7 @@ fn wrong_use_of_export_says_what_to_do() {
     turncal(&["c.json"], root.path()).code(2);
     let wrong = turncal(&["c.json", "--format", "matlab"], root.path()).code(2);
     let said = String::from_utf8(wrong.get_output().stderr.clone()).unwrap();
-    assert!(said.contains("octave"), "{said}");
+    assert!(said.contains("kf-gins"), "{said}");
     turncal(&["none.json", "--format", "c"], root.path()).code(1);
     let before = fs::read(&path).unwrap();
     turncal(

@@ -6,11 +6,11 @@ use std::path::Path;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use turncal::calibration::{Finding, Options, Outcome, Problem, UNWATCHED, estimate};
-use turncal::formats::write_run;
 use turncal::imu::{Output, PARAMETERS as PER_TRIAD, Sensor};
 use turncal::recording::FaultKind;
 use turncal::run::Run;
 use turncal::simulation::Scenario;
+use turncal_files::write_run;
 
 use crate::shared::{read, shared};
 

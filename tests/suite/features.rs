@@ -2,61 +2,47 @@
 
 use std::process::Command;
 
+/// The crates that one of the workspace needs, by name.
+fn needed_by(package: &str) -> Vec<String> {
+    let output = Command::new(env!("CARGO"))
+        .args(["tree", "--offline", "--edges", "normal", "--prefix", "none"])
+        .args(["--format", "{p}", "--package", package, "--manifest-path"])
+        .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"))
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let text = String::from_utf8(output.stdout).unwrap();
+    let names = text.lines().filter_map(|line| line.split(' ').next());
+    names.map(str::to_owned).collect()
+}
+
 #[test]
-fn without_default_features_no_crate_of_a_user_interface_is_compiled() {
-    let of_interface = [
-        "anyhow",
-        "clap",
-        "clap_complete",
-        "clap_mangen",
-        "indicatif",
-        "maud",
-        "signal-hook",
-        "terminal_size",
+fn the_science_compiles_no_interface_no_log_format_and_no_page() {
+    let above = [
+        "anyhow", "clap", "csv", "flate2", "hdf5-pure", "indicatif", "krilla", "maud", "plotters",
+        "ruzstd", "tempfile", "zip",
     ];
-    let of_logs = [
-        "bzip2-rs",
-        "hdf5-pure",
-        "lz4_flex",
-        "prost-reflect",
-        "ruzstd",
-        "zip",
-    ];
-    let of_certificates = ["krilla", "ttf-parser"];
-    let tree = |features: &[&str]| {
-        let output = Command::new(env!("CARGO"))
-            .args(["tree", "--offline", "--edges", "normal", "--prefix", "none"])
-            .args(["--format", "{p}", "--manifest-path"])
-            .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"))
-            .args(features)
-            .output()
-            .unwrap();
-        assert!(output.status.success(), "{output:?}");
-        let text = String::from_utf8(output.stdout).unwrap();
-        let names = text.lines().filter_map(|line| line.split(' ').next());
-        names.map(str::to_owned).collect::<Vec<String>>()
+    let of_all = needed_by("turncal-cli");
+    let of_science = needed_by("turncal");
+    for name in above {
+        assert!(of_all.iter().any(|of| of == name), "{name} is not used");
+        assert!(of_science.iter().all(|of| of != name), "{name}");
+    }
+}
+
+#[test]
+fn crates_depend_on_one_another_in_one_direction() {
+    let own = |package: &str| -> Vec<String> {
+        let mut names = needed_by(package);
+        names.retain(|name| name.starts_with("turncal") && name != package);
+        names.sort();
+        names.dedup();
+        names
     };
-    let count = |of: &[&str], names: &[String]| {
-        let found = of
-            .iter()
-            .filter(|name| names.iter().any(|found| found == *name));
-        found.count()
-    };
-    let found = |names: Vec<String>| count(&of_interface, &names);
-    assert_eq!(count(&of_logs, &tree(&["--no-default-features"])), 0);
-    assert_eq!(count(&of_logs, &tree(&[])), of_logs.len());
-    assert_eq!(
-        count(&of_certificates, &tree(&["--no-default-features"])),
-        0
-    );
-    assert_eq!(count(&of_certificates, &tree(&[])), of_certificates.len());
-    assert_eq!(found(tree(&["--no-default-features"])), 0);
-    assert_eq!(
-        found(tree(&["--no-default-features", "--features", "report"])),
-        1
-    );
-    assert_eq!(
-        found(tree(&[])),
-        of_interface.len() - usize::from(cfg!(not(unix)))
-    );
+    assert!(own("turncal-input").is_empty());
+    assert_eq!(own("turncal"), ["turncal-input"]);
+    assert_eq!(own("turncal-logs"), ["turncal-input"]);
+    assert_eq!(own("turncal-report"), ["turncal", "turncal-input"]);
+    let below_files = ["turncal", "turncal-input", "turncal-logs"];
+    assert_eq!(own("turncal-files"), below_files);
 }

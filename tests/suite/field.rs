@@ -4,10 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
-use turncal::formats::Opened;
-use turncal::formats::draft::{Draft, Stated};
 use turncal::noise::conventions::convert;
 use turncal::run::Run;
+use turncal_files::Opened;
+use turncal_files::draft::{Draft, Stated};
 
 use crate::shared::shared;
 
@@ -202,8 +202,9 @@ fn units_of_noise_are_read_as_data_sheets_and_programs_write_them() {
         (3.8, "mdps/rtHz", None, 6.63e-5, "rad/s/√Hz"),
     ] {
         let conversion = convert(value, unit, rate).unwrap_or_else(|error| panic!("{error}"));
-        let line = conversion.lines.iter().find(|(_, row)| row.unit == si);
-        let found = line.unwrap_or_else(|| panic!("no {si} of {unit}")).0;
+        let mut figures = conversion.figures.iter();
+        let figure = figures.find(|figure| figure.convention.unit == si);
+        let found = figure.unwrap_or_else(|| panic!("no {si} of {unit}")).value;
         assert!((found / expected - 1.0).abs() < 1e-3, "{unit}: {found}");
     }
 }
@@ -290,7 +291,8 @@ fn a_fraction_of_a_second_that_lost_its_zeros_is_read_as_a_number() {
     let Some(log) = file("r06-razor9dof-unpadded-fraction", "razor.csv") else {
         return;
     };
-    let run = Run::read(&log.with_file_name("run.toml")).unwrap_or_else(|error| panic!("{error}"));
+    let run = turncal_files::read_run(&log.with_file_name("run.toml"))
+        .unwrap_or_else(|error| panic!("{error}"));
     assert!(
         (run.recording.imu.period / 0.0206 - 1.0).abs() < 5e-3,
         "{}",

@@ -7,10 +7,10 @@ use std::process::{Child, Command, Output, Stdio};
 use std::thread;
 use std::time::Duration;
 
-use turncal::formats::write_run;
 use turncal::imu::Output as Quantity;
 use turncal::models::path_by_hand;
 use turncal::simulation::Scenario;
+use turncal_files::write_run;
 
 const PATH: &str =
     "z_up, turn x 180, x_up, x_down, turn z 90, y_up, y_down, turn y 180, turn x 90, turn z 180";

@@ -110,7 +110,7 @@ fn the_list_names_every_model_with_what_it_is() {
         );
         kinds.insert(kind);
     }
-    let folders = fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/models")).unwrap();
+    let folders = fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../../models")).unwrap();
     let folders = folders.map(|folder| folder.unwrap().file_name().into_string().unwrap());
     assert_eq!(kinds, folders.collect());
     let narrow = output(&["list"], Some("80"));

@@ -88,7 +88,8 @@ fn drafts_of_real_logs_are_what_their_authors_wrote() {
             ("imu.prior.gyro.bias_sigma", "100.0".to_owned()),
         ]);
         fs::write(&path, completed(&draft, &known)).unwrap();
-        let found = Run::read(&path).unwrap_or_else(|error| panic!("{name}: {error}\n{draft}"));
+        let found = turncal_files::read_run(&path)
+            .unwrap_or_else(|error| panic!("{name}: {error}\n{draft}"));
         assert_eq!(found.instrument.unit, given.instrument.unit, "{name}");
         assert_eq!(
             found.recording.imu.continuous, given.recording.imu.continuous,
@@ -352,7 +353,8 @@ fn nine_shapes_of_one_record_are_one_run_once_the_place_is_filled_in() {
         let draft = init(&[log.to_str().unwrap()]).success();
         let draft = String::from_utf8(draft.get_output().stdout.clone()).unwrap();
         fs::write(&path, completed(&draft, &known)).unwrap();
-        let run = Run::read(&path).unwrap_or_else(|error| panic!("{name}: {error}\n{draft}"));
+        let run = turncal_files::read_run(&path)
+            .unwrap_or_else(|error| panic!("{name}: {error}\n{draft}"));
         runs.push((name, run));
     }
     let (_, plain) = &runs[0];

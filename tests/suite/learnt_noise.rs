@@ -7,10 +7,10 @@ use toml::{Table, Value};
 use turncal::calibration::{
     NoisePolicy, Options, Outcome, Problem, UNWATCHED, estimate, six_position,
 };
-use turncal::formats::write_run;
 use turncal::imu::Output;
 use turncal::run::Run;
 use turncal::simulation::Scenario;
+use turncal_files::write_run;
 
 use crate::shared::{read, shared};
 
@@ -47,13 +47,16 @@ fn what_was_learnt_and_is_then_stated_gives_the_same_calibration() {
         noise.insert(key.to_owned(), Value::Float(stated / 3.0));
     }
     std::fs::write(&file, text.to_string()).unwrap();
-    let learnt = estimated(&Run::read(&file).unwrap(), NoisePolicy::Auto);
+    let learnt = estimated(&turncal_files::read_run(&file).unwrap(), NoisePolicy::Auto);
     assert!(learnt.noise.learnt);
 
     let lines = learnt.noise.run_toml(Default::default()).unwrap();
     put(&mut text, lines.parse().unwrap());
     std::fs::write(&file, text.to_string()).unwrap();
-    let stated = estimated(&Run::read(&file).unwrap(), NoisePolicy::Stated);
+    let stated = estimated(
+        &turncal_files::read_run(&file).unwrap(),
+        NoisePolicy::Stated,
+    );
     let off = stated.estimate.vector() - learnt.estimate.vector();
     let sigma = learnt.estimate.sigma();
     for i in learnt.estimate.estimated() {

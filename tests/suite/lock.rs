@@ -182,7 +182,7 @@ impl Case {
         let options = Options::default();
         match self {
             Self::Record(directory, method) => {
-                let run = Run::read(&directory.join("run.toml")).unwrap();
+                let run = turncal_files::read_run(&directory.join("run.toml")).unwrap();
                 Figures::of(&Problem::new(&run, &options), *method)
             }
             Self::Seed(scenario, seed) => {
@@ -234,7 +234,8 @@ fn seeds(count: u64) -> impl Iterator<Item = (String, Case)> {
 
 /// Compares these with the file.
 fn hold(cases: Vec<(String, Case)>) {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/suite/lock.json");
+    let path =
+        Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("tests/suite/lock.json");
     let found: Vec<_> = cases
         .into_par_iter()
         .map(|(name, case)| (name, case.figures()))

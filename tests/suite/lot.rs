@@ -177,7 +177,7 @@ fn a_lot_begun_goes_on_with_what_is_missing_or_has_changed_and_no_more() {
     fs::remove_dir_all(result.join("units/u2")).unwrap();
     fs::create_dir_all(result.join("units/.turncal-left/new")).unwrap();
     fs::write(result.join("units/.turncal-left/turncal.lock"), "").unwrap();
-    for file in ["lot.json", "lot.csv", "index.html", "lot.svg"] {
+    for file in ["lot.json", "lot.csv", "index.html", "values.svg"] {
         fs::remove_file(result.join(file)).unwrap();
     }
     let made_at = |unit: &str| {

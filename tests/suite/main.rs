@@ -33,6 +33,7 @@ mod lock;
 mod logs;
 mod lot;
 mod lot_slow;
+mod mat_7_3;
 mod modules;
 mod mounting;
 mod navigate;

@@ -1,6 +1,5 @@
 //! Records that other programs made, with known truth.
 
-use turncal::calibration::result::Calibration;
 use turncal::calibration::{
     NoisePolicy, Options, Outcome, PARAMETERS, Problem, UNWATCHED, estimate, to_vector, triads_of,
 };
@@ -18,7 +17,7 @@ fn stated() -> Options {
 fn calibrated(name: &str) -> Option<(Outcome, [f64; 6], f64)> {
     let directory = shared(name)?;
     let run = read(&directory);
-    let truth = Calibration::read(&directory.join("truth.json")).unwrap();
+    let truth = turncal_files::read_calibration(&directory.join("truth.json")).unwrap();
     let outcome = estimate(&Problem::new(&run, &stated()), UNWATCHED).unwrap();
     let truth = triads_of(&truth, &run.instrument.nominal, InstallationForm::General);
     let error = outcome.estimate.vector() - to_vector(&truth);

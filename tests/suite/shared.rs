@@ -8,7 +8,7 @@ use turncal::run::Run;
 /// The shared runs, if they are there. Continuous integration must have them.
 pub fn shared(run: &str) -> Option<PathBuf> {
     let data = std::env::var_os("TURNCAL_DATA").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
+        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../..")).join("../shared/data"),
         PathBuf::from,
     );
     let directory = data.join(run);
@@ -33,5 +33,5 @@ pub fn skipped(why: &str) {
 }
 
 pub fn read(directory: &Path) -> Run {
-    Run::read(&directory.join("run.toml")).unwrap_or_else(|error| panic!("{error}"))
+    turncal_files::read_run(&directory.join("run.toml")).unwrap_or_else(|error| panic!("{error}"))
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix};
 use rayon::prelude::*;
-use turncal::calibration::result::{Calibration, EQUATION, EQUATION_WITH_TERMS};
+use turncal::calibration::result::{EQUATION, EQUATION_WITH_TERMS};
 use turncal::calibration::{
     ErrorTerm, NoisePolicy, Options, Outcome, Problem, UNWATCHED, estimate, mean_square_interval,
     to_vector,
@@ -104,11 +104,14 @@ fn a_written_run_keeps_its_terms_and_its_truth_has_them() {
         directory.path().join("run"),
     );
     let instrument = directory.path().join("with-offset.toml");
-    let paper = concat!(env!("CARGO_MANIFEST_DIR"), "/models/imu/paper.toml");
+    let paper = concat!(env!("CARGO_MANIFEST_DIR"), "/../../models/imu/paper.toml");
     let text =
         std::fs::read_to_string(paper).unwrap() + "\n[terms]\ntime-offset = { sigma = 2.0 }\n";
     std::fs::write(&instrument, text).unwrap();
-    let demo = concat!(env!("CARGO_MANIFEST_DIR"), "/models/scenario/demo.toml");
+    let demo = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../models/scenario/demo.toml"
+    );
     let text = std::fs::read_to_string(demo).unwrap();
     let text = text.replace("model = \"paper\"", "model = \"with-offset.toml\"");
     std::fs::write(&models, text).unwrap();
@@ -118,9 +121,9 @@ fn a_written_run_keeps_its_terms_and_its_truth_has_them() {
 
     let scenario = Scenario::load(models.to_str().unwrap()).unwrap();
     let made = scenario.simulate(scenario.seed, 0).unwrap();
-    let read = turncal::run::Run::read(&run.join("run.toml")).unwrap();
+    let read = turncal_files::read_run(&run.join("run.toml")).unwrap();
     assert_eq!(read.instrument.term_sigma, made.run.instrument.term_sigma);
-    let truth = Calibration::read(&run.join("truth.json")).unwrap();
+    let truth = turncal_files::read_calibration(&run.join("truth.json")).unwrap();
     let offset = made.terms[Term::TimeOffset.parameters().start];
     assert_eq!(truth.terms["accel.time_offset"].value, offset);
     assert_eq!(truth.terms.len(), 1);
@@ -183,7 +186,7 @@ fn a_record_with_three_terms_gives_all_of_them_within_four_sigma() {
     let terms = terms.map(ErrorTerm::Instrument);
     let options = terms.into_iter().fold(stated(), Options::with);
     let outcome = estimate(&Problem::new(&run, &options), UNWATCHED).unwrap();
-    let truth = Calibration::read(&directory.join("truth.json")).unwrap();
+    let truth = turncal_files::read_calibration(&directory.join("truth.json")).unwrap();
     let truth = turncal::calibration::triads_of(&truth, &run.instrument.nominal, FORM);
     let error = outcome.estimate.vector() - to_vector(&truth);
     for index in outcome.estimate.estimated() {

@@ -9,11 +9,11 @@ use rayon::prelude::*;
 use turncal::calibration::{
     ErrorTerm, NoisePolicy, Options, Problem, UNWATCHED, estimate, mean_square_interval, to_vector,
 };
-use turncal::formats::write_run;
 use turncal::imu::{Sensor, Term};
 use turncal::run::Run;
 use turncal::simulation::{Scenario, Simulated};
 use turncal::turntable::TABLE_GEOMETRY;
+use turncal_files::write_run;
 
 /// Fixed before the first run was made.
 const SEED: u64 = 93;
@@ -72,7 +72,7 @@ fn two_streams(stream: u64, directory: &Path) -> (Run, Simulated) {
     );
     fs::write(&path, format!("{begin}{columns}\n{rest}")).unwrap();
     (
-        Run::read(&path).unwrap_or_else(|error| panic!("{error}")),
+        turncal_files::read_run(&path).unwrap_or_else(|error| panic!("{error}")),
         made,
     )
 }
@@ -138,7 +138,7 @@ fn streams_of_one_clock_are_as_one() {
     let made = simulated(100.0, 0);
     write_run(directory.path(), &made.run, made.output, None).unwrap();
     let path = directory.path().join("run.toml");
-    let one = Run::read(&path).unwrap().recording.imu;
+    let one = turncal_files::read_run(&path).unwrap().recording.imu;
     let text = fs::read_to_string(&path).unwrap();
     let line = "file = \"imu.csv.gz\"";
     fs::write(
@@ -146,7 +146,7 @@ fn streams_of_one_clock_are_as_one() {
         text.replace(line, &format!("{line}\naccel_from = {{}}")),
     )
     .unwrap();
-    let two = Run::read(&path).unwrap().recording.imu;
+    let two = turncal_files::read_run(&path).unwrap().recording.imu;
     assert_eq!(one.len(), two.len());
     let off = |sensor| {
         let pairs = one.of(sensor).iter().zip(two.of(sensor).iter());
@@ -172,7 +172,7 @@ fn a_gap_in_one_stream_is_a_gap_in_both() {
         .filter(|(k, _)| !(2000..2200).contains(k));
     let kept: String = kept.map(|(_, line)| format!("{line}\n")).collect();
     fs::write(&path, kept).unwrap();
-    let run = Run::read(&directory.path().join("run.toml")).unwrap();
+    let run = turncal_files::read_run(&directory.path().join("run.toml")).unwrap();
     let imu = &run.recording.imu;
     assert_eq!(
         (whole.recording.imu.stretches.len(), imu.stretches.len()),

@@ -165,7 +165,9 @@ pub fn samples<'py>(
     let rows: Vec<[f64; 8]> = py.detach(|| {
         let lost = run.recording.imu.lost();
         let is_kept = |k: &usize| !lost.iter().any(|lost| lost.contains(k));
-        let samples = correction.samples(run).enumerate();
+        let samples = correction
+            .samples(run, 0..run.recording.imu.len())
+            .enumerate();
         let kept = samples.filter(|(k, _)| is_kept(k));
         kept.map(|(_, of)| {
             let ([p, q, r], [x, y, z]) = (of.rate.into(), of.force.into());

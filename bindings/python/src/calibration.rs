@@ -6,12 +6,15 @@ use std::sync::{Arc, OnceLock};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyIterator;
-use turncal::calibration::{self, AtRest, Finding, FindingKind, Progress as Passes, Solution};
+use turncal::calibration;
+use turncal::calibration::{Finding, FindingKind, Progress as Passes};
 use turncal::imu::{Output, Sensor, Term};
-use turncal::lot::{self, Lot, Specification, Unit};
-use turncal::report::calibration::Calibrated;
-use turncal::report::document::Table;
-use turncal::report::{Document, at_rest, lot as of_lot, write};
+use turncal::lot::{Lot, Specification, Unit};
+use turncal::study::CheckedCalibration;
+use turncal_files::record_inputs;
+use turncal_report::calibration as of_calibration;
+use turncal_report::document::Table;
+use turncal_report::{Document, at_rest, lot as of_lot, write};
 
 use crate::errors::{in_python, raise, raised};
 use crate::report::{Report, brief, framed};
@@ -22,17 +25,18 @@ use crate::wait::finish;
 struct Solved {
     of: Arc<Recorded>,
     request: Request,
-    solution: Solution,
-    calibrated: Calibrated,
+    checked: CheckedCalibration,
 }
 
 impl Solved {
     fn document(&self) -> Result<Document, Refusal> {
         let problem = self.of.problem(&self.request)?;
-        let (name, method) = (&*self.of.name, self.request.method);
-        Ok(self
-            .calibrated
-            .document((&problem, name), &self.solution, method, None))
+        let of = (&self.checked, &self.checked.consequences(&problem, None));
+        Ok(of_calibration::document(
+            (&problem, &self.of.name),
+            of,
+            None,
+        ))
     }
 }
 
@@ -63,33 +67,30 @@ pub fn calibrated(
     progress: Passes,
 ) -> Result<Calibration, Refusal> {
     let problem = of.problem(&request)?;
-    // Without a turn, only the output at rest against temperature can be determined.
+    // Without a turn, only the biases against temperature can be determined.
     if request.temperature
-        && problem.dwells().nth(1).is_none()
-        && let Some(found) = AtRest::new(&of.runs[0], AtRest::HIGHEST_ORDER)
+        && let Some(found) = problem.at_rest()
     {
-        let run = &of.runs[0];
-        let record = found.record(run);
-        let document = at_rest::document(&found, run, &record);
+        let record = found.record(&problem);
+        let document = at_rest::document(&found, problem.run(), &record);
         return Ok(Calibration {
             document: OnceLock::from(document),
             specification: request.specification,
             ..Calibration::of_record(record)
         });
     }
-    let mut solution = problem.solve(request.method, progress)?;
-    let mut calibrated = Calibrated::new(&problem, &mut solution)?;
+    let solution = problem.solve(request.method, progress)?;
+    let mut checked = CheckedCalibration::new(&problem, solution)?;
     if let Some(path) = &of.path {
-        calibrated = calibrated.of_files(path, problem.run());
+        record_inputs(&mut checked.calibration, path, problem.run());
     }
     drop(problem);
-    let record = calibrated.calibration.clone();
+    let record = checked.calibration.clone();
     let specification = request.specification.clone();
     let solved = Arc::new(Solved {
         of,
         request,
-        solution,
-        calibrated,
+        checked,
     });
     Ok(Calibration {
         solved: Some(solved),
@@ -247,7 +248,7 @@ impl Calibration {
     /// Calibration
     #[staticmethod]
     fn read(path: PathBuf) -> PyResult<Self> {
-        calibration::Calibration::read(&path)
+        calibration::turncal_files::read_calibration(&path)
             .map(Self::of_record)
             .map_err(raise)
     }
@@ -332,21 +333,10 @@ impl Calibration {
     /// Report or None
     #[getter]
     fn conformity(&self) -> Option<Report> {
-        let calibrated = lot::Calibrated {
-            nominal: self.record.provenance.as_ref()?.nominal,
-            calibration: self.record.clone(),
-            noise: None,
-        };
-        let unit = Unit {
-            name: "calibration".to_owned(),
-            meta: self.record.meta.clone(),
-            calibrated: Ok(calibrated),
-        };
+        let unit = Unit::of_record("calibration", self.record.clone(), None);
         let specification = self.specification.clone()?;
-        Some(Report(of_lot::document(&Lot::new(
-            vec![unit],
-            Some(specification),
-        ))))
+        let lot = Lot::new(vec![unit], None, Some(specification));
+        Some(Report(of_lot::document(&lot)))
     }
 
     /// What to know before using the values: problem, meaning and remedy, the most severe first.

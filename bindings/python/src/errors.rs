@@ -6,8 +6,8 @@ use std::ops::RangeInclusive;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use turncal::calibration::{ErrorTerm, NoisePolicy};
-use turncal::formats::{FileError, Place};
 use turncal::models::ModelError;
+use turncal_input::{FileError, Place};
 
 pyo3::create_exception!(
     turncal,

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use pyo3::prelude::*;
 use turncal::earth::{GRAVITIES, HEIGHTS};
-use turncal::formats::DataFile;
-use turncal::formats::draft::{Stated, StatedUnit};
 use turncal::imu::Sensor;
+use turncal_files::draft::{Stated, StatedUnit};
+use turncal_logs::DataFile;
 
 use crate::errors::{Given, positive, raise, within, wrong};
 

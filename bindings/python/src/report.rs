@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
-use turncal::report::document::Block;
-use turncal::report::{Document, json, terminal, write};
+use turncal_report::document::Block;
+use turncal_report::{Document, json, terminal, write};
 
 use crate::errors::{in_python, raise};
 
@@ -54,7 +54,7 @@ impl Report {
 
 /// The page of a document in a frame, so that its style does not touch that of the notebook.
 pub fn framed(document: &Document) -> String {
-    let files = turncal::report::files(document);
+    let files = turncal_report::files(document);
     let page = files.into_iter().find(|(name, _)| name == "index.html");
     let page = page.map_or_else(String::new, |(_, page)| page);
     // Names in a style are no options.

@@ -3,14 +3,18 @@
 use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
+use turncal::calibration::Named;
 use turncal::calibration::result::Calibration as Record;
-use turncal::calibration::{Named, compare as compared};
-use turncal::certificate::{Certificate, Laboratory};
-use turncal::formats::{digest_of_bytes, export as formats};
-use turncal::report::navigation::{Navigated, Navigation};
-use turncal::report::{certificate as of_certificate, comparison};
-use turncal::study::navigation::{INTERVAL, Mission, Motion, NavigationStudyError, Pair};
+use turncal::lot::{Lot, Unit};
+use turncal::study::navigation::{
+    INTERVAL, MethodOutlook, Mission, Motion, NavigationStudyError, Pair,
+};
 use turncal::units::DEGREE;
+use turncal_files::{digest_of_bytes, export as formats, read_laboratory};
+use turncal_report::certificate::Certificate;
+use turncal_report::certificate::document as of_certificate;
+use turncal_report::lot as of_lot;
+use turncal_report::navigation::Navigation;
 
 use crate::calibration::Calibration;
 use crate::errors::{Given, raise, raised, within};
@@ -26,18 +30,19 @@ pub fn compare(
     calibrations: Vec<PyRef<Calibration>>,
     truth: Option<PyRef<Calibration>>,
 ) -> PyResult<Report> {
-    let named = names.iter().zip(&calibrations);
-    let named = named.map(|(name, of)| Named {
-        name,
-        record: &of.record,
-    });
-    let named: Vec<Named> = named.collect();
-    let truth = truth.as_ref().map(|of| Named {
-        name: "truth",
-        record: &of.record,
-    });
-    let comparison = compared(&named, truth).map_err(raise)?;
-    Ok(Report(comparison::document(&comparison)))
+    if calibrations.len() < 2 && truth.is_none() {
+        return Err(raised(
+            "one calibration without a truth cannot be compared. Give a second calibration or a truth",
+        ));
+    }
+    let named = names.into_iter().zip(&calibrations);
+    let units = named.map(|(name, of)| Unit::of_record(name, of.record.clone(), None));
+    let truth = truth.map(|of| Unit::of_record("truth", of.record.clone(), None));
+    let lot = Lot::new(units.collect(), truth, None);
+    if let Some((unit, reason)) = lot.failures().next() {
+        return Err(raised(format_args!("{}: {reason}", unit.name)));
+    }
+    Ok(Report(of_lot::document(&lot)))
 }
 
 #[pyfunction]
@@ -66,7 +71,7 @@ pub fn certificate(
     let bytes = record
         .to_json(Path::new("calibration.json"))
         .map_err(raise)?;
-    let laboratory = Laboratory::read(&laboratory, |key| record.meta.get(key).cloned());
+    let laboratory = read_laboratory(&laboratory, |key| record.meta.get(key).cloned());
     let laboratory = laboratory.map_err(raise)?;
     let limits = specification.as_deref().map(limits).transpose()?;
     let earlier = as_found
@@ -76,7 +81,7 @@ pub fn certificate(
             let digest = digest_of_bytes(&std::fs::read(path)?);
             Ok((
                 format!("{name}, SHA-256 {digest}"),
-                Record::read(path).map_err(raise)?,
+                turncal_files::read_calibration(path).map_err(raise)?,
             ))
         });
     let earlier = earlier.transpose()?;
@@ -120,7 +125,7 @@ pub fn navigate(
     let terms = has_terms(calibration) || has_terms(truth);
     let converged = calibration.record.converged != Some(false);
     let report = finish(py, move || {
-        let navigated = Navigated {
+        let navigated = MethodOutlook {
             method: "error",
             outlook: mission.navigate(&pair)?,
         };
@@ -132,7 +137,6 @@ pub fn navigate(
             body_frame,
             only: None,
             mission: &mission,
-            warming: None,
             trajectory: name.as_deref(),
             navigated: &navigated,
         };

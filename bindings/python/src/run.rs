@@ -8,15 +8,17 @@ use pyo3::prelude::*;
 use turncal::calibration::{
     CalibrationError, ErrorTerm, Method, NoisePolicy, Options, Problem, Together,
 };
-use turncal::formats::draft::{Draft, Found, StatedColumns};
-use turncal::formats::{Campaign, FileError, Opened, Table};
 use turncal::imu::PerSensor;
 use turncal::lot::Specification;
 use turncal::models::specification;
 use turncal::noise::{NoiseAnalysis, Stretch};
-use turncal::report::{Document, Facts, allan as of_noise, check};
 use turncal::run::Run as Recording;
 use turncal::survey::Survey;
+use turncal_files::draft::{Draft, Found, StatedColumns};
+use turncal_files::{Campaign, Opened};
+use turncal_input::FileError;
+use turncal_logs::Table;
+use turncal_report::{Document, Facts, allan as of_noise, check};
 
 use crate::calibration::{Calibration, calibrated};
 use crate::errors::{Given, in_python, named, names, raise, raised};

@@ -8,8 +8,9 @@ use numpy::PyReadonlyArray2;
 use numpy::ndarray::ArrayView1;
 use pyo3::prelude::*;
 use turncal::recording::SampleError;
-use turncal::report::session::data;
-use turncal::survey::{self, Status};
+use turncal::survey;
+use turncal::survey::Status;
+use turncal_report::session::data;
 
 use crate::errors::{Given, positive, raise, raised};
 use crate::known::Known;

@@ -8,11 +8,9 @@ use rayon::ThreadPoolBuilder;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use turncal::calibration::{ErrorTerm, NoisePolicy};
-use turncal::formats::write_run;
 use turncal::imu::InstallationForm;
-use turncal::models::{self, Place};
-use turncal::report::path::{Report as OfPath, in_words, moves_in_words};
-use turncal::report::{Document, accuracy, experiment};
+use turncal::models;
+use turncal::models::Place;
 use turncal::run::Aiding;
 use turncal::simulation::{Scenario, SimulatedCampaign};
 use turncal::study::navigation::FORTY_HOURS;
@@ -20,6 +18,9 @@ use turncal::study::path::{Named, PathError, PathStudy};
 use turncal::study::{
     AccuracyStudy, ExperimentStudy, Shard, Study as Makes, StudyError, UNWATCHED,
 };
+use turncal_files::write_run;
+use turncal_report::path::{Report as OfPath, in_words, moves_in_words};
+use turncal_report::{Document, accuracy, experiment};
 
 use crate::calibration::Calibration;
 use crate::errors::{Given, named, raise, raised, wrong};
@@ -170,15 +171,6 @@ pub fn study_options(
     }
     let usual = if of { "demo" } else { "experiment" };
     let name = scenario.unwrap_or(usual);
-    if SimulatedCampaign::is_named(name) {
-        let expected =
-            "a scenario of one recording. Use the command turncal study accuracy for a campaign.";
-        return Err(wrong(
-            "scenario",
-            format_args!("the campaign {name:?}"),
-            expected,
-        ));
-    }
     let scenario = Scenario::load(name).map_err(raise)?;
     let seed = seed.unwrap_or(scenario.seed);
     let study = match of {
@@ -293,12 +285,13 @@ pub fn evaluate(
             terms,
         })?;
         let evaluation = study.evaluate()?;
+        let checks = limits.map(|limits| evaluation.decided(&limits));
         let report = OfPath {
             name: &study.scenario.path_name,
             with: &in_words(&study),
             moves: &moves_in_words(&study.scenario),
             evaluation: &evaluation,
-            specification: limits.as_ref(),
+            checks: checks.as_deref(),
         };
         Ok::<_, PathError>(Report(report.document()))
     });

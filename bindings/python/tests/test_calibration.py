@@ -128,7 +128,7 @@ def test_help_of_simulate_names_what_exists():
 def test_values_agree_with_the_truth():
     run = turncal.simulate(str(BY_HAND), seed=7)
     report = turncal.compare(run.calibrate(noise="stated"), truth=run.truth)
-    of_run = report.data["calibrations"][0]
+    of_run = report.data["units"][0]
     low, high = of_run["nees_interval"]
     assert low < of_run["nees_per_n"] < high
 

@@ -176,7 +176,7 @@ def compare(*calibrations: AnyCalibration, truth: AnyCalibration | None = None) 
     Parameters
     ----------
     *calibrations : Calibration or path-like
-        Two or more; one is enough with a truth. Without a truth the first is the reference.
+        Two or more; one is enough with a truth. Without a truth, differences of two are from the first.
     truth : Calibration or path-like, optional
         True values.
 

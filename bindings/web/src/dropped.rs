@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use toml::{Table, Value};
-use turncal::formats::DataFile;
 use turncal::run::Run;
+use turncal_logs::DataFile;
 
 /// Signs of files that are not logs, in their first bytes.
 const OTHERS: [(&[u8], &str); 5] = [

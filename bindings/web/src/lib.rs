@@ -14,11 +14,13 @@ use std::panic;
 
 use serde_json::json;
 use turncal::calibration::{Calibration, Method, Options, Problem};
-use turncal::formats::draft::{Draft, Found, Stated};
-use turncal::formats::{DataFile, Opened};
-use turncal::report::Document;
-use turncal::report::calibration::Calibrated;
 use turncal::run::Run;
+use turncal::study::CheckedCalibration;
+use turncal_files::Opened;
+use turncal_files::draft::{Draft, Found, Stated};
+use turncal_logs::DataFile;
+use turncal_report::Document;
+use turncal_report::calibration;
 use wasm_bindgen::prelude::*;
 
 pub use output::Output;
@@ -112,7 +114,7 @@ fn show_draft(log: &str, draft: &Draft) {
 fn calibrated(run: &Run) -> Result<(Calibration, Document), Box<dyn Error>> {
     show("activity", "calibrating");
     let problem = Problem::new(run, &Options::default());
-    let mut solution = problem.solve(Method::Ekf, &|pass| {
+    let solution = problem.solve(Method::Ekf, &|pass| {
         let step = pass.largest_step;
         show(
             "activity",
@@ -121,17 +123,17 @@ fn calibrated(run: &Run) -> Result<(Calibration, Document), Box<dyn Error>> {
         ControlFlow::Continue(())
     })?;
     show("activity", "checking the result");
-    let calibrated = Calibrated::new(&problem, &mut solution)?;
+    let checked = CheckedCalibration::new(&problem, solution)?;
     show("activity", "drawing the report");
-    let unobserved = solution
-        .outcome()
-        .map_or(0, |outcome| outcome.unobserved().len());
-    if let Some(caution) = output::caution(&calibrated.calibration, unobserved) {
+    let outcome = checked.solution.outcome();
+    let unobserved = outcome.map_or(0, |outcome| outcome.unobserved().len());
+    if let Some(caution) = output::caution(&checked.calibration, unobserved) {
         show("caution", &caution);
     }
     let named = (&problem, run.recording.name.as_str());
-    let document = calibrated.document(named, &solution, Method::Ekf, None);
-    Ok((calibrated.calibration, document))
+    let of = (&checked, &checked.consequences(&problem, None));
+    let document = calibration::document(named, of, None);
+    Ok((checked.calibration, document))
 }
 
 /// Problems found in the files may be the cause of an error.

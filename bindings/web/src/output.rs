@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 
 use turncal::calibration::Calibration;
 use turncal::calibration::result::InputFile;
-use turncal::formats::{DataFile, digest_of_bytes, export};
-use turncal::report::{self, Document};
 use turncal::run::Run;
+use turncal_files::{digest_of_bytes, export};
+use turncal_logs::DataFile;
+use turncal_report as report;
+use turncal_report::Document;
 use wasm_bindgen::prelude::*;
 
 /// A file to download.
@@ -78,11 +80,7 @@ pub fn all(
     let about = "Values, σ and covariance, for turncal apply, export and certificate";
     let exported = |format: &export::Format| {
         let exported = export::write(calibration, format, Some(run)).ok()?;
-        let name = match format.name {
-            // Octave and MATLAB find a function by the name of its file.
-            "octave" => "turncal_calibrate.m".to_owned(),
-            name => format!("{log}-{name}.{}", format.extension),
-        };
+        let name = format!("{log}-{}.{}", format.name, format.extension);
         // Here the run is always there.
         let about = format.about.trim_end_matches("; needs --run");
         Some(Output::new(&name, about, exported.bytes))

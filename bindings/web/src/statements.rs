@@ -3,9 +3,10 @@
 use std::error::Error;
 
 use serde::Deserialize;
-use turncal::formats::draft::{Stated, StatedUnit};
 use turncal::imu::Sensor;
-use turncal::models::{self, Instrument, ModelError, Place, Room};
+use turncal::models;
+use turncal::models::{Instrument, ModelError, Place, Room};
+use turncal_files::draft::{Stated, StatedUnit};
 
 /// The fields of the form, with the names of the options of `turncal calibrate`; `None` for empty fields.
 #[derive(Deserialize, Default, PartialEq)]

@@ -139,15 +139,10 @@ fn each_part_is_what_passes_lose_of_a_table_with_errors_and_biases_that_vary() {
 }
 
 #[test]
-#[ignore = "slow: two real records"]
+#[ignore = "slow"]
 fn each_part_is_what_passes_lose_of_records_without_a_table() {
-    let data = concat!(env!("CARGO_MANIFEST_DIR"), "/../shared/data");
-    for name in ["real-mems-lot-0", "nineteen-position-velocity"] {
-        let path = std::path::Path::new(data).join(name).join("run.toml");
-        let Ok(run) = Run::read(&path) else {
-            println!("no {}", path.display());
-            continue;
-        };
+    for name in ["mems", "nineteen-position"] {
+        let run = simulated(name);
         assert!(held_against_passes(&run, &Options::default()) >= 4);
         let problem = Problem::new(&run, &Options::default());
         let outcome = estimate(&problem, UNWATCHED).unwrap();

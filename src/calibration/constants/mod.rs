@@ -71,6 +71,15 @@ impl Constant {
     }
 }
 
+/// The temperature coefficients among constants, with their positions in the list.
+pub fn coefficients(constants: &[Constant]) -> impl Iterator<Item = (usize, Coefficient)> + '_ {
+    let places = constants.iter().enumerate();
+    places.filter_map(|(place, constant)| match constant {
+        Constant::Thermal(coefficient) => Some((place, *coefficient)),
+        _ => None,
+    })
+}
+
 /// The parameters of both triads among constants: position in the list, and parameter index.
 pub fn parameters(constants: &[Constant]) -> impl Iterator<Item = (usize, usize)> + '_ {
     let places = constants.iter().enumerate();

@@ -2,8 +2,10 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::parameters;
-use crate::calibration::{Constant, ParameterMatrix, ParameterVector};
+use super::{coefficients, parameters};
+use crate::calibration::{
+    Constant, Linearisation, Model, PARAMETERS, ParameterMatrix, ParameterVector, Thermal,
+};
 
 /// The posterior of constants.
 #[derive(Debug, Clone)]
@@ -55,6 +57,28 @@ impl Posterior {
             covariance,
             ..self
         }
+    }
+
+    /// Estimates of the temperature coefficients, linearised `at` a point; `None` if nothing depends on temperature.
+    pub fn thermal(&self, at: &Linearisation, model: &Model) -> Option<Thermal> {
+        let of_model = model.thermal.as_deref()?;
+        let (places, coefficients): (Vec<usize>, Vec<_>) = coefficients(&self.constants).unzip();
+        let n = places.len();
+        let mut cross = DMatrix::zeros(PARAMETERS, n);
+        for (k, index) in parameters(&self.constants) {
+            for (column, &place) in places.iter().enumerate() {
+                cross[(index, column)] = self.covariance[(k, place)];
+            }
+        }
+        Some(Thermal {
+            model: of_model.clone(),
+            values: DVector::from_fn(n, |k, _| {
+                coefficients[k].of(&at.thermal) + self.mean[places[k]]
+            }),
+            covariance: self.covariance.select_rows(&places).select_columns(&places),
+            cross,
+            coefficients,
+        })
     }
 
     /// Addition to the covariance of another posterior if the prior of this one is correct: the mean square error of

@@ -4,14 +4,12 @@ use serde::{Deserialize, Serialize};
 
 /// The noise used by the filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 #[serde(rename_all = "kebab-case")]
 pub enum NoisePolicy {
     /// Use the noise that run.toml and models state
     Stated,
     /// Use the stated noise; estimate it from the recording if the two disagree (p < 0.001)
     #[default]
-    #[cfg_attr(feature = "cli", value(alias = "estimate"))]
     Auto,
     /// Estimate the noise from the recording, with the stated noise as prior
     Learnt,

@@ -36,17 +36,17 @@ macro_rules! sources {
             }
 
             /// Its triad, or the triad whose random walk is its reference.
-            pub(crate) fn triad(self) -> Sensor {
+            pub fn triad(self) -> Sensor {
                 match self { $(Self::$variant => Sensor::$triad,)* }
             }
 
             /// The table of `run.toml` that states it, the key there, and its unit in SI and radians.
-            pub(crate) fn stated_in(self) -> (&'static str, (&'static str, f64)) {
+            pub fn stated_in(self) -> (&'static str, (&'static str, f64)) {
                 match self { $(Self::$variant => ($table, $line),)* }
             }
 
             /// Its source in the uncertainty budget.
-            pub(crate) fn in_budget(self) -> BudgetSource {
+            pub fn in_budget(self) -> BudgetSource {
                 match self { $(Self::$variant => BudgetSource::$part $((Sensor::$of))?,)* }
             }
         }

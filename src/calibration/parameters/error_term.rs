@@ -51,6 +51,17 @@ impl ErrorTerm {
         }
     }
 
+    /// Moves or dwells that show it, where a path does not.
+    pub fn shown_by(self) -> &'static str {
+        match self {
+            Self::GaussMarkovBias => "a long dwell",
+            Self::TableBase => "long dwells with each axis up and down",
+            Self::TableAxes(AxisError::Tilt) => "dwells at several angles of each table axis",
+            Self::TableAxes(_) => "dwells at eight angles of each table axis",
+            Self::Instrument(term) => term.entry().shown_by,
+        }
+    }
+
     /// Its number of states.
     pub fn states(self) -> usize {
         match self {

@@ -1,7 +1,7 @@
 //! The six groups of parameters in reports: scale factor, installation and bias of both triads.
 
 use super::{PARAMETERS, parameter_name, sensor_and_parameter};
-use crate::calibration::Estimate;
+use crate::calibration::{Estimate, ParameterVector};
 use crate::imu::{InstallationForm, ParameterKind, Sensor, Triad};
 use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
 
@@ -70,6 +70,60 @@ impl Group {
         }
     }
 
+    /// Such as `gyro scale factor K`.
+    pub fn title(self) -> String {
+        format!("{} {}", self.sensor().name(), self.entry().title)
+    }
+
+    /// Its title with the unit.
+    pub fn titled(self) -> String {
+        format!("{}, {}", self.title(), self.unit())
+    }
+
+    /// Such as `gyro K`.
+    pub fn short(self) -> String {
+        let letter = self.entry().title.rsplit(' ').next().unwrap_or_default();
+        format!("{} {letter}", self.sensor().name())
+    }
+
+    /// Its key in documents, such as `gyro.scale_ppm`.
+    pub fn key(self) -> String {
+        format!("{}.{}", self.sensor().name(), self.entry().key)
+    }
+
+    /// Symbol of the unit.
+    pub fn unit(self) -> &'static str {
+        self.entry().unit
+    }
+
+    /// The unit in normalised SI values of the model.
+    pub fn unit_value(self) -> f64 {
+        self.entry().value
+    }
+
+    /// The displayed value of a parameter: scale factors as deviation from nominal.
+    pub fn shown(self, value: f64) -> f64 {
+        match self.kind() {
+            ParameterKind::Scale => (value - 1.0) / self.unit_value(),
+            ParameterKind::Installation | ParameterKind::Bias => value / self.unit_value(),
+        }
+    }
+
+    /// Root mean square of a vector's entries that were estimated, in the group's unit.
+    pub fn rms(self, v: &ParameterVector, estimate: &Estimate) -> Option<f64> {
+        let (_, rms) = self.spread(v, &self.estimated(estimate))?;
+        Some(rms)
+    }
+
+    /// Largest magnitude and RMS of some entries of a vector, in the unit of the group; `None` if there are none.
+    pub fn spread(self, v: &ParameterVector, indices: &[usize]) -> Option<(f64, f64)> {
+        let values = || indices.iter().map(|&i| (v[i] / self.unit_value()).abs());
+        let mean_square = values().map(|x| x * x).sum::<f64>() / indices.len() as f64;
+        values()
+            .reduce(f64::max)
+            .map(|largest| (largest, mean_square.sqrt()))
+    }
+
     /// Indices of its parameters in this form.
     pub fn parameters(self, form: InstallationForm) -> Vec<usize> {
         (0..PARAMETERS)
@@ -87,6 +141,11 @@ impl Group {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_scale_factor_is_shown_as_its_departure_from_nominal() {
+        assert!((Group::of(0).shown(1.002) - 2000.0).abs() < 1e-6);
+    }
 
     #[test]
     fn every_parameter_is_in_exactly_one_group_in_every_form() {

@@ -13,8 +13,8 @@ use crate::calibration::constants::triangle;
 use crate::calibration::filter::Filter;
 use crate::calibration::several::day_to_day::OwnState;
 use crate::calibration::{
-    Coefficient, Constant, Difference, Known, Linearisation, ParameterVector, Posterior, Prior,
-    from_vector, to_vector,
+    Constant, Difference, Known, Linearisation, ParameterVector, Posterior, Prior, from_vector,
+    to_vector,
 };
 pub use script::{Keeping, Moves, Script};
 
@@ -121,6 +121,43 @@ impl Reduction {
         parts.collect()
     }
 
+    /// 1σ of the parameters of both triads without the rows between each of these increasing times in s and the next.
+    ///
+    /// The rows before and after are combined as triangles, so the cost is that of a few times all rows, and no row is
+    /// subtracted from a sum that contains it.
+    pub fn sigma_without(&self, prior: &Prior, times: &[f64]) -> Vec<ParameterVector> {
+        let end = |&time: &f64| self.parts.partition_point(|part| part.time <= time);
+        let ends: Vec<usize> = times.iter().map(end).collect();
+        let (Some(&first), Some(&last)) = (ends.first(), ends.last()) else {
+            return Vec::new();
+        };
+        let left_out = ends.windows(2);
+        let left_out = left_out.map(|pair| self.parts.get(pair[0]..pair[1]).unwrap_or_default());
+        let mut known = Known::new(prior.clone());
+        folded(&self.parts[..first])
+            .iter()
+            .for_each(|part| known.learn(&part.rows));
+        let before = left_out.clone().map(|parts| {
+            let before = known.clone();
+            parts.iter().for_each(|part| known.learn(&part.rows));
+            before
+        });
+        let before: Vec<Known> = before.collect();
+        let mut after = folded(&self.parts[last..]);
+        let backward = before.into_iter().zip(left_out).rev();
+        let mut sigma: Vec<ParameterVector> = backward
+            .map(|(mut known, parts)| {
+                after.iter().for_each(|part| known.learn(&part.rows));
+                let rows: Vec<Part> = parts.iter().chain(&after).cloned().collect();
+                after = folded(&rows);
+                let variance = known.posterior().parameter_covariance.diagonal();
+                variance.map(f64::sqrt)
+            })
+            .collect();
+        sigma.reverse();
+        sigma
+    }
+
     /// Squares and products of all columns, summed over the rows.
     pub fn squares(&self) -> DMatrix<f64> {
         let n = self.constants.len();
@@ -169,15 +206,6 @@ impl Reduction {
             }
         }
         estimate
-    }
-
-    /// The temperature coefficients among the constants, with their indices.
-    pub fn coefficients(&self) -> impl Iterator<Item = (usize, Coefficient)> + '_ {
-        let places = self.constants.iter().enumerate();
-        places.filter_map(|(place, constant)| match constant {
-            Constant::Thermal(coefficient) => Some((place, *coefficient)),
-            _ => None,
-        })
     }
 }
 

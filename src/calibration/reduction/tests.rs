@@ -1,5 +1,7 @@
 use crate::calibration::pass::{Gate, pass};
-use crate::calibration::{ErrorTerm, Options, Outcome, Problem, Reduction, UNWATCHED, estimate};
+use crate::calibration::{
+    ErrorTerm, Options, Outcome, Prior, Problem, Reduction, UNWATCHED, estimate,
+};
 use crate::imu::Term;
 use crate::run::Aiding;
 use crate::simulation::Scenario;
@@ -129,4 +131,32 @@ fn folded_rows_have_the_sums_of_all_rows() {
     assert!((all.deviance - few.deviance).abs() < 1e-6 * all.deviance.abs());
     let sigma = all.covariance.diagonal().map(f64::sqrt);
     assert!((all.mean - few.mean).component_div(&sigma).amax() < 1e-6);
+}
+
+#[test]
+fn sigma_without_some_rows_is_that_of_the_other_rows() {
+    let run = Scenario::load("demo").unwrap().simulate(3, 0).unwrap().run;
+    let problem = Problem::new(&run, &Options::default());
+    let outcome = estimate(&problem, UNWATCHED).unwrap();
+    let whole = outcome.reduction(&problem).unwrap();
+    let prior = Prior::new(&whole.constants, &problem.model, &outcome.linearised_at);
+    let last = whole.parts.last().unwrap().time;
+    // A first part before all times, two groups, an empty one, and a last part after all times.
+    let times = [0.2 * last, 0.5 * last, 0.8 * last, 0.8 * last];
+    let found = whole.sigma_without(&prior, &times);
+    assert_eq!(found.len(), 3);
+    for (pair, found) in times.windows(2).zip(found) {
+        let mut others = whole.clone();
+        let is_between = |time: f64| time > pair[0] && time <= pair[1];
+        others.parts.retain(|part| !is_between(part.time));
+        assert_eq!(others.parts.len() < whole.parts.len(), pair[0] < pair[1]);
+        let expected = others.posterior(&prior).parameter_covariance.diagonal();
+        for (found, expected) in found.iter().zip(&expected.map(f64::sqrt)) {
+            assert!(
+                (found - expected).abs() <= 1e-9 * expected,
+                "{found} {expected}"
+            );
+        }
+    }
+    assert!(whole.sigma_without(&prior, &[]).is_empty());
 }

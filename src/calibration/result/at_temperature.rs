@@ -11,7 +11,9 @@ use crate::calibration::{
     Coefficient, PARAMETERS, ParameterMatrix, ParameterVector, Thermal, from_vector,
     parameter_index, parameter_name, to_vector,
 };
-use crate::imu::{Nominal, PerSensor, Sensor, ThermalModel, ThermalState};
+use crate::imu::{
+    Nominal, PerSensor, Sensor, ThermalModel, ThermalState, thermal_state_everywhere,
+};
 
 /// Converts triads that stay in the quantity of the file.
 const ONE: PerSensor<Nominal> = PerSensor {
@@ -65,7 +67,7 @@ impl Calibration {
                 });
             }
         }
-        self.in_state(&thermal.range.everywhere(temperature, 0.0))
+        self.in_state(&thermal_state_everywhere(&thermal.range, temperature, 0.0))
     }
 
     /// The same for these values of the functions of temperature.
@@ -73,7 +75,7 @@ impl Calibration {
     /// # Errors
     /// If a coefficient belongs to no parameter.
     pub fn in_state(&self, state: &ThermalState) -> Result<Self, TemperatureError> {
-        let Some(thermal) = self.thermal(&ONE)? else {
+        let Some(thermal) = self.thermal()? else {
             return Ok(self.clone());
         };
         let form = self.installation_form.unwrap_or_default();
@@ -109,7 +111,7 @@ impl Calibration {
 
     /// Covariance of its parameters, normalised by nominal scales: from σ alone if correlations are missing, zero if
     /// neither is stated. `None` if it does not match the named parameters.
-    pub(crate) fn covariance_by(&self, nominal: &PerSensor<Nominal>) -> Option<ParameterMatrix> {
+    pub fn covariance_by(&self, nominal: &PerSensor<Nominal>) -> Option<ParameterMatrix> {
         let form = self.installation_form.unwrap_or_default();
         let factor = |index| factor(nominal, index);
         if self.covariance.is_empty() && self.parameters.is_empty() {
@@ -139,14 +141,8 @@ impl Calibration {
         Some(covariance)
     }
 
-    /// Temperature dependence of its parameters, normalised by nominal scales; `None` if constant.
-    ///
-    /// # Errors
-    /// If a coefficient belongs to no parameter.
-    pub(crate) fn thermal(
-        &self,
-        nominal: &PerSensor<Nominal>,
-    ) -> Result<Option<Thermal>, TemperatureError> {
+    /// Temperature dependence of its parameters, in the file's quantity; `None` if constant.
+    fn thermal(&self) -> Result<Option<Thermal>, TemperatureError> {
         let Some(of) = &self.temperature else {
             return Ok(None);
         };
@@ -158,7 +154,6 @@ impl Calibration {
         let coefficients = of.coefficients.iter().map(coefficient);
         let coefficients: Vec<Coefficient> = coefficients.collect::<Result<_, _>>()?;
         let n = coefficients.len();
-        let by = |k: usize| factor(nominal, coefficients[k].index());
         let entry = |rows: &[Vec<f64>], i: usize, j: usize| {
             rows.get(i)
                 .and_then(|row| row.get(j))
@@ -169,7 +164,7 @@ impl Calibration {
         for (row, name) in self.parameters.iter().enumerate() {
             if let Some(index) = parameter_index(form, name) {
                 for k in 0..n {
-                    cross[(index, k)] = entry(&of.cross, row, k) / (factor(nominal, index) * by(k));
+                    cross[(index, k)] = entry(&of.cross, row, k);
                 }
             }
         }
@@ -179,10 +174,8 @@ impl Calibration {
                 range: of.range,
                 sigma: PerSensor::default(),
             },
-            values: DVector::from_fn(n, |k, _| of.coefficients[k].value / by(k)),
-            covariance: DMatrix::from_fn(n, n, |i, j| {
-                entry(&of.covariance, i, j) / (by(i) * by(j))
-            }),
+            values: DVector::from_fn(n, |k, _| of.coefficients[k].value),
+            covariance: DMatrix::from_fn(n, n, |i, j| entry(&of.covariance, i, j)),
             coefficients,
             cross,
         }))

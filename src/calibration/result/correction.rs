@@ -1,10 +1,14 @@
 //! Application of a calibration: from outputs to angular rate and specific force.
 
+use std::ops::Range;
+
 use nalgebra::{Matrix3, Vector3};
 use thiserror::Error;
 
 use crate::calibration::result::Calibration;
-use crate::imu::{AXES, PerSensor, Sensed, Sensor, TERM_PARAMETERS, Term, TermVector};
+use crate::imu::{
+    AXES, PerSensor, Sensed, Sensor, TERM_PARAMETERS, Term, TermVector, thermal_state,
+};
 use crate::recording::{Near, TEMPERATURE_SPACING};
 use crate::run::Run;
 
@@ -169,24 +173,34 @@ impl Correction {
         self.terms().any(|k| term.parameters().contains(&k))
     }
 
-    /// The calibrated samples of a run, in sequence.
+    /// These samples of a run, calibrated, in sequence.
     ///
     /// Error terms are evaluated at the calibrated sample. The angular acceleration for the size effect is the
     /// difference of the rates before and after; it is zero if the record is not continuous. The time offset
     /// uses the inertial rate instead of the rate relative to the Earth: the error is 0.7 µg for 10 ms times
     /// Earth rate.
-    pub fn samples<'a>(&'a self, run: &'a Run) -> impl Iterator<Item = Calibrated> + 'a {
+    pub fn samples<'a>(
+        &'a self,
+        run: &'a Run,
+        samples: Range<usize>,
+    ) -> impl Iterator<Item = Calibrated> + 'a {
+        let imu = &run.recording.imu;
         let plain = self.terms().next().is_none();
-        // A calibration that changes with temperature is made anew each second.
+        let second = |k| ((imu.time(k) - imu.start()) / TEMPERATURE_SPACING) as u64;
+        // A calibration that changes with temperature is evaluated once per second, at the first sample in it.
         let mut now: Option<(u64, Self, bool)> = None;
-        let mut near = Near::new(&run.recording.imu);
-        (0..run.recording.imu.len()).map(move |k| {
+        let mut near = Near::new(imu);
+        samples.map(move |k| {
             near.reach(&(k.saturating_sub(1)..k + 2));
-            let time = run.recording.imu.time(k);
-            let second = ((time - run.recording.imu.start()) / TEMPERATURE_SPACING) as u64;
-            if self.changing.is_some() && now.as_ref().is_none_or(|(of, ..)| *of != second) {
-                let (here, in_range) = self.at(run, time + 0.5 * TEMPERATURE_SPACING);
-                now = Some((second, here, in_range));
+            let this = second(k);
+            if self.changing.is_some() && now.as_ref().is_none_or(|(of, ..)| *of != this) {
+                let first = (0..k)
+                    .rev()
+                    .take_while(|&before| second(before) == this)
+                    .last();
+                let time = imu.time(first.unwrap_or(k)) + 0.5 * TEMPERATURE_SPACING;
+                let (here, in_range) = self.at(run, time);
+                now = Some((this, here, in_range));
             }
             let (here, in_range) = match &now {
                 Some((_, here, in_range)) => (here, *in_range),
@@ -200,8 +214,8 @@ impl Correction {
             let u = here.of_outputs(&outputs, &acceleration);
             Calibrated {
                 in_range,
-                start: run.recording.imu.time(k),
-                end: run.recording.imu.time(k + 1),
+                start: imu.time(k),
+                end: imu.time(k + 1),
                 rate: u.gyro,
                 force: u.accel,
             }
@@ -238,7 +252,9 @@ impl Correction {
             .and_then(|(record, temperature)| {
                 let thermal = record.temperature.as_ref()?;
                 let (t, rate) = (temperature.at(time), temperature.rate(time));
-                let there = record.in_state(&thermal.range.state(&t, &rate)).ok()?;
+                let there = record
+                    .in_state(&thermal_state(&thermal.range, &t, &rate))
+                    .ok()?;
                 Some((Self::of_record(&there).ok()?, thermal.holds(&t)))
             });
         known.unwrap_or_else(|| (self.clone(), false))

@@ -3,14 +3,11 @@
 //! Values are in the file's quantity (see [`crate::imu::Nominal`]): `N = scale ⊙ (installation · u)
 //! + bias`, with `u` in rad/s or m/s² along right-front-up.
 
-pub(super) mod at_rest;
 pub(super) mod at_temperature;
-pub(super) mod comparison;
 pub(super) mod correction;
-pub(crate) mod frame;
-pub(super) mod nees;
+pub mod frame;
+pub mod nees;
 pub(super) mod record;
-pub(super) mod scatter;
 pub(super) mod thermal_record;
 
 use std::collections::BTreeMap;
@@ -223,7 +220,6 @@ pub struct GravityRecord {
 /// Method of a calibration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Method {
     /// Extended Kalman filter over the whole run
     Ekf,

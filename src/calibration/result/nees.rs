@@ -75,7 +75,7 @@ impl Directions {
     }
 
     /// Squares of a vector's components along the directions, each in units of its σ.
-    fn squares(&self, v: DVectorView<f64>) -> Vec<f64> {
+    pub fn squares(&self, v: DVectorView<f64>) -> Vec<f64> {
         let z = DVector::from_fn(self.sigma.len(), |i, _| v[self.indices[i]] / self.sigma[i]);
         let along = self.eigenvectors.tr_mul(&z);
         let squares = along.iter().zip(&self.eigenvalues);
@@ -85,14 +85,14 @@ impl Directions {
             .collect()
     }
 
-    /// The inverse of the covariance; `None` if singular.
-    pub fn information(&self) -> Option<DMatrix<f64>> {
-        if self.eigenvalues.iter().any(|&v| v <= NO_DIRECTION) {
-            return None;
-        }
-        let inverse = DMatrix::from_diagonal(&self.eigenvalues.map(f64::recip));
+    /// The inverse of the covariance along its directions, zero across them.
+    pub fn inverse(&self) -> DMatrix<f64> {
+        let inverse = self.eigenvalues.map(|variance| {
+            let is_direction = variance > NO_DIRECTION;
+            if is_direction { variance.recip() } else { 0.0 }
+        });
         let scale = DMatrix::from_diagonal(&self.sigma.map(f64::recip));
         let whitened = &scale * &self.eigenvectors;
-        Some(&whitened * inverse * whitened.transpose())
+        &whitened * DMatrix::from_diagonal(&inverse) * whitened.transpose()
     }
 }

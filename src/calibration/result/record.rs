@@ -4,17 +4,16 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 
-use super::at_rest::AtRest;
 use super::thermal_record::{RecordingRecord, ThermalRecord};
 use super::{
     BlockRecord, Calibration, ConsistencyRecord, EQUATION, EQUATION_WITH_TERMS, FORMAT,
     FORMAT_WITH_TEMPERATURE, GravityRecord, Method, NisRecord, NoiseRecord, TermRecord, TestVector,
     TriadRecord, rows,
 };
-use crate::calibration::parameters::{factor, stacked};
+use crate::calibration::parameters::factor;
 use crate::calibration::{
-    Auxiliary, Budget, ClosedForm, ErrorTermTest, Estimate, Finding, Nis, Outcome, PARAMETERS,
-    ParameterMatrix, ParameterVector, Problem, Quality, Verdict, auxiliary_name, from_vector,
+    AtRest, Auxiliary, Budget, ClosedForm, ErrorTermTest, Estimate, Finding, Nis, Outcome,
+    PARAMETERS, ParameterVector, Problem, Quality, Verdict, auxiliary_name, from_vector,
     parameter_name,
 };
 use crate::imu::{BodyFrame, InstallationForm, Nominal, Output, PerSensor, Sensor, Triad};
@@ -147,19 +146,15 @@ impl ClosedForm {
 impl AtRest {
     /// The partial calibration that it gives: biases of the gyros to within Earth rate, and the temperature dependence
     /// of all biases; the rest is the prior.
-    pub fn record(&self, run: &Run) -> Calibration {
-        let (triads, sigma) = self.triads(run);
-        let variances = stacked(&sigma).map(|sigma| sigma.powi(2));
-        let estimate = Estimate {
-            triads,
-            covariance: ParameterMatrix::from_diagonal(&variances),
-        };
+    pub fn record(&self, problem: &Problem) -> Calibration {
+        let run = problem.run();
+        let (estimate, thermal) = self.biases(problem);
         let record = Calibration {
             format: FORMAT_WITH_TEMPERATURE.to_owned(),
-            temperature: Some(ThermalRecord::of(&self.thermal(), &estimate, run)),
-            ..estimate.record(run, BodyFrame::Accelerometer)
+            temperature: Some(ThermalRecord::of(&thermal, &estimate, run)),
+            ..estimate.record(run, problem.model.aiding.body_frame())
         };
-        record.with_findings(self.findings(&estimate))
+        record.with_findings(self.findings.clone())
     }
 }
 

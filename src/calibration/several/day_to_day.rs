@@ -7,7 +7,8 @@ use crate::calibration::parameters::derivatives;
 use crate::calibration::{
     Group, PARAMETERS, ParameterMatrix, ParameterVector, from_vector, to_vector,
 };
-use crate::imu::{PerSensor, Triad};
+use crate::imu::{InstallationForm, PerSensor, Triad};
+use crate::units::ARCSEC;
 
 /// Effect of a rotation of the instrument on its mounting face: derivatives of the recording's parameters.
 #[derive(Debug, Clone)]
@@ -47,6 +48,8 @@ pub enum OwnState {
     Mounting(usize),
 }
 
+/// The key of the mounting in a campaign's `[day_to_day]`.
+const MOUNTING: &str = "mounting_arcsec";
 /// Iterations that determine a mounting of a degree to a thousandth of a second of arc.
 const ROUNDS: usize = 3;
 
@@ -63,6 +66,35 @@ impl DayToDay {
             format!("{}_{}", group.sensor().name(), entry.key),
             entry.value,
         )
+    }
+
+    /// The keys of `[day_to_day]`.
+    pub fn keys() -> Vec<String> {
+        let groups = Group::all().map(|group| Self::key(group).0);
+        groups.chain([MOUNTING.to_owned()]).collect()
+    }
+
+    /// From the values in `[day_to_day]` by key.
+    pub fn of_values(value: impl Fn(&str) -> f64) -> Self {
+        let mut differ = Self::default();
+        for group in Group::all() {
+            let (key, unit) = Self::key(group);
+            for i in group.parameters(InstallationForm::General) {
+                differ.parameters[i] = value(&key) * unit;
+            }
+        }
+        differ.mounting = value(MOUNTING) * ARCSEC;
+        differ
+    }
+
+    /// The values in `[day_to_day]` with their keys; those of a group are equal.
+    pub fn values(&self) -> impl Iterator<Item = (String, f64)> {
+        let of_groups = Group::all().filter_map(|group| {
+            let (key, unit) = Self::key(group);
+            let first = *group.parameters(InstallationForm::General).first()?;
+            Some((key, self.parameters[first] / unit))
+        });
+        of_groups.chain([(MOUNTING.to_owned(), self.mounting / ARCSEC)])
     }
 
     /// 1σ of one differing quantity.

@@ -5,6 +5,7 @@
 //! the Gauss–Newton iterations on all data: first with all orders that the temperatures support, then with those
 //! that a likelihood-ratio test selects.
 
+pub mod at_rest;
 pub mod day_to_day;
 pub mod separate;
 pub mod thermal;
@@ -120,8 +121,10 @@ pub fn solve<'a>(
     let priors: Vec<AttitudePrior> = alone.iter().flat_map(|a| a.priors.clone()).collect();
     let at = start(&problem, &alone);
     let mut solved = Solved::of(&problem, priors, at, Gate::Innovations, progress)?;
-    if let Some(thermal) = solved.iterated.held.thermal(&problem.model) {
-        let selected = order::select(&solved, &thermal);
+    let held = &solved.iterated.held;
+    if let Some(thermal) = held.posterior.thermal(&held.at, &problem.model) {
+        let reduction = held.reduction.clone().folded();
+        let selected = order::select(&reduction, (&held.at, &problem.model), &thermal);
         findings.extend(selected.finding);
         if selected.model != thermal.model {
             let problem = problem.with(|model| model.thermal = Some(Arc::new(selected.model)));

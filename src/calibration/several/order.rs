@@ -2,9 +2,10 @@
 
 use super::thermal::{Coefficient, Thermal};
 use crate::calibration::checks::observability::temperature_not_seen;
-use crate::calibration::constants::Prior;
-use crate::calibration::solved::Solved;
-use crate::calibration::{Finding, Group, Linearisation, OBSERVED_BELOW, parameter_name};
+use crate::calibration::constants::{Prior, coefficients};
+use crate::calibration::{
+    Finding, Group, Linearisation, Model, OBSERVED_BELOW, Reduction, parameter_name,
+};
 use crate::imu::{InstallationForm, RATE, ThermalModel};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
@@ -19,18 +20,20 @@ pub struct Selected {
 
 /// Removes the highest order of a group of parameters while it is not significant: if its coefficients are zero,
 /// −2 ln of the likelihood ratio is χ² with as many degrees of freedom as there are coefficients (Wilks).
-pub fn select(solved: &Solved, thermal: &Thermal) -> Selected {
-    let (held, problem) = (&solved.iterated.held, &solved.problem);
-    let reduction = held.reduction.clone().folded();
-    let known = Prior::new(&reduction.constants, &problem.model, &held.at);
+pub fn select(
+    reduction: &Reduction,
+    (at, model): (&Linearisation, &Model),
+    thermal: &Thermal,
+) -> Selected {
+    let known = Prior::new(&reduction.constants, model, at);
     let with = |model: &ThermalModel| {
         let mut prior = known.clone();
-        for (place, coefficient) in reduction.coefficients() {
+        for (place, coefficient) in coefficients(&reduction.constants) {
             prior.sigma[place] = coefficient.of(&model.sigma);
         }
         reduction.posterior(&prior)
     };
-    let form = problem.model.form;
+    let form = model.form;
     let mut model = thermal.model.clone();
     let mut now = with(&model);
     loop {
@@ -63,7 +66,7 @@ pub fn select(solved: &Solved, thermal: &Thermal) -> Selected {
     }
     Selected {
         model,
-        at: reduction.estimate(&held.at, &now),
+        at: reduction.estimate(at, &now),
         finding: unseen(form, thermal),
     }
 }

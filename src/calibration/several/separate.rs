@@ -12,7 +12,7 @@ use crate::calibration::{
     AttitudePrior, CalibrationError, Estimate, Gate, Iterated, Linearisation, Model, Problem,
     SeparateEstimate, Solved, UNWATCHED, coarse_start, from_vector, parameter, to_vector,
 };
-use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalModel, ThermalRange};
+use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalModel, ThermalRange, thermal_state};
 use crate::run::Dwell;
 
 /// Factor by which σ of a recording calibrated alone may exceed that of its noise: neglected effects may be
@@ -98,7 +98,7 @@ fn of(
     });
     let middle = middle_temperature(plain);
     let state = thermal.zip(middle.as_ref());
-    let state = state.map(|(thermal, at)| thermal.range.state(at, &PerSensor::default()));
+    let state = state.map(|(thermal, at)| thermal_state(&thermal.range, at, &PerSensor::default()));
     // What changes within a recording has no calibration without its change.
     let whole = thermal.map_or(f64::INFINITY, |thermal| {
         let span = |range: &ThermalRange| range.highest - range.lowest;

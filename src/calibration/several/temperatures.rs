@@ -6,6 +6,7 @@ use crate::imu::{
     HIGHEST_ORDER, ParameterKind, PerSensor, RATE, Sensor, ThermalCoefficients, ThermalModel, Triad,
 };
 use crate::recording::Temperature;
+use crate::units::MINUTE;
 
 /// Recordings within this many kelvin count as one temperature, because of the self-heating of a soaked instrument.
 const ONE_TEMPERATURE: f64 = 1.0;
@@ -72,18 +73,19 @@ pub fn model(
     Ok(any.then_some(ThermalModel { range, sigma }))
 }
 
-/// Number of temperatures at the ends of dwells, averaged over a triad's axes, that are far enough apart for a
-/// polynomial of the highest order.
+/// Number of temperatures in dwells, averaged over a triad's axes, that are far enough apart for a polynomial of the
+/// highest order.
 fn distinct(problem: &Problem, sensor: Sensor) -> usize {
     let of_stretch = |stretch: &Stretch| {
         let imu = &stretch.run.recording.imu;
-        let edges = stretch
-            .dwells
-            .iter()
-            .flat_map(|d| [d.samples.start, d.samples.end]);
-        let at = |edge: usize| Some(imu.temperature.as_ref()?.at(imu.time(edge)));
+        let minute = ((MINUTE / imu.period) as usize).max(1);
+        let each = stretch.dwells.iter().flat_map(|dwell| {
+            let samples = dwell.samples.clone();
+            samples.step_by(minute).chain([dwell.samples.end])
+        });
+        let at = |sample: usize| Some(imu.temperature.as_ref()?.at(imu.time(sample)));
         let mean = |axes: PerSensor<[f64; 3]>| axes.get(sensor).iter().sum::<f64>() / 3.0;
-        edges.filter_map(at).map(mean).collect::<Vec<f64>>()
+        each.filter_map(at).map(mean).collect::<Vec<f64>>()
     };
     let mut all: Vec<f64> = problem.stretches().iter().flat_map(of_stretch).collect();
     all.sort_by(f64::total_cmp);

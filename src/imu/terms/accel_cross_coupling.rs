@@ -10,6 +10,7 @@ pub const ENTRY: TermEntry = TermEntry {
     title: "accel cross coupling",
     help: "Accelerometers: products of specific force along two axes",
     adds: "adds q times the product of these two components of f to f, along its axis",
+    shown_by: "dwells on edges, two axes 45° up",
     // Accelerometer, then the components that are multiplied.
     parameters: (
         "accel.cross_coupling",

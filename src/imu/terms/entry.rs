@@ -31,6 +31,8 @@ pub struct TermEntry {
     pub help: &'static str,
     /// Formula of the term: its addition to specific force f or angular rate w for a parameter q.
     pub adds: &'static str,
+    /// Moves or dwells that show it, where a path does not.
+    pub shown_by: &'static str,
     /// The triad whose input it changes.
     pub sensor: Sensor,
     /// The unit of its parameters in files and reports: its symbol, and its value in SI.

@@ -14,6 +14,7 @@ pub const ENTRY: TermEntry = TermEntry {
     title: "gyro g²-sensitivity",
     help: "Gyros: square of specific force",
     adds: "q f^2 along its axis to w",
+    shown_by: "long dwells with each axis up, down and level",
     sensor: Sensor::Gyro,
     unit: ("°/h/g²", DEG_PER_H / (STANDARD_GRAVITY * STANDARD_GRAVITY)),
     si_unit: "(rad/s)/(m/s^2)^2",

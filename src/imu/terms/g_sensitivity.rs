@@ -9,6 +9,7 @@ pub const ENTRY: TermEntry = TermEntry {
     title: "gyro g-sensitivity",
     help: "Gyros: sensitivity to specific force",
     adds: "Q f to w, this the row and column of Q",
+    shown_by: "long dwells with each axis up and down",
     sensor: Sensor::Gyro,
     unit: ("°/h/g", DEG_PER_H / STANDARD_GRAVITY),
     si_unit: "(rad/s)/(m/s^2)",

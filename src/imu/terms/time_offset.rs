@@ -12,6 +12,7 @@ pub const ENTRY: TermEntry = TermEntry {
     title: "accel time offset",
     help: "Accelerometers: delay of their samples relative to the gyros",
     adds: "-q w x f to f, accelerometers sampled later",
+    shown_by: "fast turns about level axes",
     sensor: Sensor::Accel,
     unit: ("ms", 1e-3),
     si_unit: "s",

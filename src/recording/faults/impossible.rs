@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::repair::Rows;
-use super::{FaultKind, Found, ranges};
+use super::fault::FaultKind;
+use super::rows::{FaultyRows, Rows, ranges};
 use crate::units::STANDARD_GRAVITY;
 
 /// Beyond the range of any gyro, rad/s (57,000 °/s).
@@ -13,13 +13,13 @@ const LARGEST_FORCE: f64 = 1e4;
 
 /// Rows beyond the range of any instrument by nominal scales, and rows of zeros in all columns although gravity exceeds
 /// the smallest step, in order. None of a kind if most rows are impossible, because then a unit is wrong.
-pub fn impossible(rows: &Rows) -> Vec<Found> {
+pub fn impossible(rows: &Rows) -> Vec<FaultyRows> {
     let count = rows.columns[0].len();
     let found = |kind, column, is: &dyn Fn(usize) -> bool| {
         let found = ranges(count, is);
         let are_few = 2 * found.iter().map(Range::len).sum::<usize>() < count;
         let found = found.into_iter().filter(move |_| are_few);
-        found.map(move |rows| Found { kind, column, rows })
+        found.map(move |rows| FaultyRows { kind, column, rows })
     };
     let beyond = (0..6).flat_map(|k| {
         let largest = if k < 3 { FASTEST } else { LARGEST_FORCE };
@@ -41,13 +41,13 @@ pub fn impossible(rows: &Rows) -> Vec<Found> {
     let zero = found(FaultKind::Zero, None, &|row| {
         are_shown && rows.columns.iter().all(|column| column[row] == 0.0)
     });
-    let mut all: Vec<Found> = beyond.chain(zero).collect();
+    let mut all: Vec<FaultyRows> = beyond.chain(zero).collect();
     all.sort_by_key(|found| found.rows.start);
     all
 }
 
 /// Columns with each impossible value replaced by the previous value.
-pub fn without(columns: &[Vec<f64>; 6], impossible: &[Found]) -> [Vec<f64>; 6] {
+pub fn without(columns: &[Vec<f64>; 6], impossible: &[FaultyRows]) -> [Vec<f64>; 6] {
     let mut without = columns.clone();
     for found in impossible {
         let beside = found.rows.start.checked_sub(1);

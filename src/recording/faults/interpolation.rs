@@ -5,10 +5,8 @@ mod fill;
 use std::cell::OnceCell;
 use std::ops::Range;
 
-use fill::Fill;
+use fill::{Fill, MOST};
 
-/// Maximum number of samples used on either side.
-const MOST: usize = 64;
 /// Polynomials tried: degree, and samples used from either side. Each next one must agree with the
 /// best so far at the hole itself, because the stretches on which it is tested are farther away.
 const CANDIDATES: [(usize, usize); 12] = [

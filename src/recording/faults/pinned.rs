@@ -12,7 +12,7 @@ use nalgebra::{SMatrix, SVector};
 use statrs::function::erf::erf;
 
 use super::chance::Limit;
-use super::{mean, mean_and_slope};
+use super::line::{mean, mean_and_slope};
 use crate::recording::ColumnFacts;
 use crate::statistics::median;
 pub use ends::saturated;
@@ -67,12 +67,13 @@ impl<'a> Axis<'a> {
             noise: 0.0,
             repeated: repeats_of_repeats(free),
         };
-        match step > 0.0 {
-            true => Self {
+        if step > 0.0 {
+            Self {
                 noise: axis.noise_at_rest(free),
                 ..axis
-            },
-            false => axis,
+            }
+        } else {
+            axis
         }
     }
 
@@ -102,9 +103,10 @@ impl<'a> Axis<'a> {
         // eigenvalue of such a walk (Siegmund's correction of the edges: 0.5826 σ each).
         let walk = -0.5 * std::f64::consts::PI.powi(2) * variance
             / (1.0 + 1.1652 * variance.sqrt()).powi(2);
-        let by_noise = match self.pulses && variance < 0.25 {
-            true => white.min(walk.exp()),
-            false => white,
+        let by_noise = if self.pulses && variance < 0.25 {
+            white.min(walk.exp())
+        } else {
+            white
         };
         by_noise.max(self.repeated).recip().ln()
     }
@@ -201,9 +203,10 @@ impl<'a> Axis<'a> {
         let all = || means.into_iter().chain(next);
         let spread = all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min);
         // Sums of pulses are right to a step, so that means may differ by as much without a change.
-        let rounded = match self.pulses {
-            true => 1.0 / beside + 1.0 / NEXT as f64,
-            false => 0.0,
+        let rounded = if self.pulses {
+            1.0 / beside + 1.0 / NEXT as f64
+        } else {
+            0.0
         };
         let change = (spread / self.step - rounded).max(0.0);
         // Rounding averages out in sums, which leaves noise and the rest of the motion.

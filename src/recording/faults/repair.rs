@@ -2,9 +2,11 @@
 
 use std::ops::Range;
 
+use super::fault::{Bridge, Fault, FaultKind};
 use super::impossible::{impossible, without};
 use super::interpolation::Hole;
-use super::{Bridge, Fault, FaultKind, Found, find, ranges};
+use super::rows::{FaultyRows, Rows, ranges, sensor};
+use super::search::find;
 use crate::imu::Sensor;
 use crate::recording::ColumnFacts;
 use crate::units::DEGREE;
@@ -17,34 +19,13 @@ const SHORT: usize = 8;
 /// Largest attitude error that a linear filter can handle, rad.
 const WORST_ANGLE: f64 = 0.2 * DEGREE;
 
-/// The rows of a file without duplicates. Columns are gyro x, y, z and accelerometer x, y, z of the
-/// file.
-pub struct Rows<'a> {
-    pub columns: [Vec<f64>; 6],
-    pub facts: &'a [ColumnFacts; 6],
-    /// Full scale of each column, in the file's quantity.
-    pub full_scale: [Option<f64>; 6],
-    /// Whether rows are whole pulses, the remainder being carried into the next.
-    pub pulses: bool,
-    /// The body axis of each column.
-    pub body_axes: [usize; 6],
-    /// One unit of the file's quantity in rad or m/s.
-    pub units: [f64; 6],
-    /// Line of each row.
-    pub lines: Vec<u64>,
-    /// Sample of each row, increasing from zero.
-    pub numbers: Vec<usize>,
-    /// Sample period, s.
-    pub period: f64,
-    /// Rows before each duplicate, and its line.
-    pub duplicates: Vec<(usize, u64)>,
-}
-
 /// The complete samples, with faults and bridges.
 pub struct Repaired {
     /// As in [`Rows`], a value for each sample.
     pub columns: [Vec<f64>; 6],
+    /// Faults found.
     pub faults: Vec<Fault>,
+    /// Gaps that were bridged.
     pub bridges: Vec<Bridge>,
 }
 
@@ -61,10 +42,6 @@ impl Repaired {
             |fault: &Fault| fault.kind != FaultKind::Duplicate && fault.samples.contains(&sample);
         !self.faults.iter().any(concerns)
     }
-}
-
-fn sensor(column: usize) -> Sensor {
-    Sensor::ALL[column / 3]
 }
 
 impl Rows<'_> {
@@ -85,7 +62,7 @@ impl Rows<'_> {
     }
 
     /// Every fault, in order of kind, axis and time.
-    fn faults(&self, found: &[Found]) -> Vec<Fault> {
+    fn faults(&self, found: &[FaultyRows]) -> Vec<Fault> {
         let fault = |kind, axis, rows: &Range<usize>| Fault {
             kind,
             axis,
@@ -97,7 +74,7 @@ impl Rows<'_> {
             line,
             ..fault(FaultKind::Duplicate, None, &(row - 1..row))
         });
-        let found = found.iter().map(|Found { kind, column, rows }| {
+        let found = found.iter().map(|FaultyRows { kind, column, rows }| {
             let axis = column.map(|column| (sensor(column), self.body_axes[column]));
             fault(*kind, axis, rows)
         });
@@ -163,7 +140,7 @@ impl Rows<'_> {
     }
 
     /// Impossible values, and faults that the other values reveal.
-    fn found(&self) -> Vec<Found> {
+    fn found(&self) -> Vec<FaultyRows> {
         let impossible = impossible(self);
         if impossible.is_empty() {
             return find(&self.columns, self.facts, &self.full_scale, self.pulses);
@@ -205,19 +182,6 @@ impl Rows<'_> {
                 bridged: true,
             })
             .collect()
-    }
-}
-
-impl Fault {
-    /// Sort key: kind, axis and time.
-    pub fn order(&self) -> (usize, Option<(usize, usize)>, usize) {
-        let axis = self.axis.map(|(sensor, axis)| (sensor as usize, axis));
-        (self.kind as usize, axis, self.samples.start)
-    }
-
-    /// Whether the fault affects samples of this axis.
-    fn concerns(&self, sensor: Sensor, axis: usize) -> bool {
-        self.kind != FaultKind::Duplicate && self.axis.is_none_or(|of| of == (sensor, axis))
     }
 }
 

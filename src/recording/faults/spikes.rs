@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::chance::Limit;
-use super::mean_and_slope;
+use super::line::mean_and_slope;
 
 /// Numbers of samples of the lines that are extrapolated to the next sample: few follow a motion, many average noise.
 const LINES: [usize; 5] = [2, 4, 8, 16, 32];

@@ -26,6 +26,8 @@ pub struct Packed {
 }
 
 impl Packed {
+    /// Number of samples so far.
+    #[allow(clippy::len_without_is_empty)]
     pub fn len(&self) -> usize {
         self.len
     }
@@ -152,9 +154,10 @@ pub fn finest_step(values: &[f64]) -> f64 {
     let grid = changes.filter(|change| *change > 0.0).reduce(f64::min);
     let range = values.iter().fold(0.0, |range: f64, v| range.max(v.abs()));
     let rank = (AT_REST * noise.len() as f64) as usize;
-    let noise = match noise.is_empty() {
-        true => 0.0,
-        false => *noise.select_nth_unstable_by(rank, f64::total_cmp).1,
+    let noise = if noise.is_empty() {
+        0.0
+    } else {
+        *noise.select_nth_unstable_by(rank, f64::total_cmp).1
     };
     let step = (noise / STEPS_OF_NOISE)
         .max(grid.unwrap_or(0.0) / STEPS_OF_GRID)

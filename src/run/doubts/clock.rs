@@ -68,17 +68,21 @@ pub fn clock(run: &Run) -> Option<String> {
     }
     let interval = moves.iter().map(|m| m.interval).fold(0.0, f64::max);
     let resolved = interval + run.recording.imu.period;
-    match moves.iter().any(|m| m.late.abs() > resolved) {
-        true => other_times(&moves, resolved, run.recording.imu.period),
-        false => scale(run, &moves),
+    if moves.iter().any(|m| m.late.abs() > resolved) {
+        other_times(&moves, resolved, run.recording.imu.period)
+    } else {
+        scale(run, &moves)
     }
 }
 
 /// The common cause of time differences: an offset, a jump, or a drift of the clocks.
 fn other_times(moves: &[Move], resolved: f64, period: f64) -> Option<String> {
-    let by = |late: f64| match late > 0.0 {
-        true => format!("{late:.2} s later"),
-        false => format!("{:.2} s earlier", -late),
+    let by = |late: f64| {
+        if late > 0.0 {
+            format!("{late:.2} s later")
+        } else {
+            format!("{:.2} s earlier", -late)
+        }
     };
     let late = || moves.iter().map(|m| m.late);
     let (low, high) = (late().reduce(f64::min)?, late().reduce(f64::max)?);
@@ -100,9 +104,10 @@ fn other_times(moves: &[Move], resolved: f64, period: f64) -> Option<String> {
             jump[0].time,
             jump[1].time,
             by(change),
-            match change < 0.0 {
-                true => "the IMU log has lost",
-                false => "the IMU log repeats",
+            if change < 0.0 {
+                "the IMU log has lost"
+            } else {
+                "the IMU log repeats"
             },
             change.abs() / period
         ));

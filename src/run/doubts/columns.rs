@@ -60,9 +60,12 @@ fn listed(run: &Run, of: impl Fn(Sensor, &Series) -> Vec<String>) -> Option<Stri
 fn smallest_changes(rows: &Series) -> Vector3<f64> {
     let (mut smallest, mut before) = (Vector3::repeat(f64::INFINITY), rows.at(0));
     for row in rows.iter() {
-        let changes = (row - before).map(|change| match change == 0.0 {
-            true => f64::INFINITY,
-            false => change.abs(),
+        let changes = (row - before).map(|change| {
+            if change == 0.0 {
+                f64::INFINITY
+            } else {
+                change.abs()
+            }
         });
         (smallest, before) = (smallest.inf(&changes), row);
     }

@@ -141,9 +141,10 @@ pub fn standstills(run: &Run) -> Vec<Range<usize>> {
         let Range { start, end } = gyro.settled(still);
         let begin = start + usize::from(!unknown(start.wrapping_sub(1)));
         let end = end - usize::from(!unknown(end));
-        let samples = match end == count {
-            true => begin * length..imu.len(),
-            false => begin * length..end * length,
+        let samples = if end == count {
+            begin * length..imu.len()
+        } else {
+            begin * length..end * length
         };
         (end >= begin + FEWEST).then_some(samples)
     });

@@ -65,9 +65,10 @@ impl fmt::Display for LabelCheck {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Segment { label, start, .. } = &self.segment;
         let said = self.disagreement.as_deref().unwrap_or_default();
-        let used = match self.as_labelled.is_some() {
-            true => "used with corrected limits",
-            false => "not used",
+        let used = if self.as_labelled.is_some() {
+            "used with corrected limits"
+        } else {
+            "not used"
         };
         write!(f, "`{label}` at {start:.1} s {said} ({used})")
     }
@@ -151,9 +152,10 @@ impl Record<'_> {
         let (first, last) = (samples.start + length, samples.end - length);
         let turns = |end: Range<usize>| angle(&end).norm() / length as f64 / imu.period > TURNING;
         // Beyond sections laid end to end lies something else.
-        let whole = match imu.continuous {
-            true => self.to_rests(&samples),
-            false => samples.clone(),
+        let whole = if imu.continuous {
+            self.to_rests(&samples)
+        } else {
+            samples.clone()
         };
         let to_rests = angle(&whole).dot(axis);
         let is_more = !imu.continuous || (to_rests - within).abs() > LOST;

@@ -126,8 +126,9 @@ pub fn turns(run: &Run, rests: &[Rest]) -> Vec<Turn> {
         Some(LabelledMotion::Turns { .. }) => turn(segment.samples.clone()),
         _ => None,
     });
-    match imu.continuous {
-        true => between.collect(),
-        false => labelled.collect(),
+    if imu.continuous {
+        between.collect()
+    } else {
+        labelled.collect()
     }
 }

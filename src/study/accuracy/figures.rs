@@ -38,7 +38,7 @@ pub struct Squares {
 }
 
 impl Figures {
-    pub(in crate::study) fn new(runs: impl Iterator<Item = Squares>) -> Self {
+    pub(super) fn new(runs: impl Iterator<Item = Squares>) -> Self {
         let runs: Vec<Squares> = runs.collect();
         let of = |one: &dyn Fn(&Squares) -> Option<f64>| -> Vec<f64> {
             runs.iter().filter_map(one).collect()

@@ -83,7 +83,7 @@ pub struct Calibrated {
 pub struct Scenarios(Vec<(Estimator, Scenario)>);
 
 impl Scenarios {
-    pub(super) fn new(scenario: &Scenario) -> Result<Self, ModelError> {
+    pub fn new(scenario: &Scenario) -> Result<Self, ModelError> {
         let on = |estimator| {
             let scenario = scenario.clone();
             let scenario = match estimator {
@@ -98,7 +98,7 @@ impl Scenarios {
     }
 
     /// Table time of each of [`Method::all`], s.
-    pub(super) fn table_times(&self) -> Result<Vec<f64>, TableError> {
+    pub fn table_times(&self) -> Result<Vec<f64>, TableError> {
         let mut times = Vec::new();
         for (_, scenario) in &self.0 {
             times.extend([scenario.duration()?; InstallationForm::ALL.len()]);
@@ -107,7 +107,7 @@ impl Scenarios {
     }
 
     /// One instrument, the same for all methods.
-    pub(super) fn trial(&self, seed: u64, run: u64) -> Result<Trial, StudyError> {
+    pub fn trial(&self, seed: u64, run: u64) -> Result<Trial, StudyError> {
         let mut calibrations = Vec::new();
         for (estimator, scenario) in &self.0 {
             let simulated = scenario.simulate(seed, run)?;

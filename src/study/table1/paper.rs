@@ -2,10 +2,9 @@
 
 use nalgebra::Vector3;
 
+use super::quantity::{ByQuantity, Moments};
 use crate::calibration::{Position, six_position_triad};
 use crate::imu::{InstallationForm, Sensor, Triad};
-use crate::study::navigation::Quantity;
-use crate::study::table1::response::Moments;
 
 /// Samples behind each figure of the table.
 pub const SAMPLES: usize = 50;
@@ -89,7 +88,7 @@ const LONG_SLIP: Reading = Reading {
     ..SLIP
 };
 
-/// The table in the usual units of [`QUANTITIES`].
+/// The table in the usual units of [`super::QUANTITIES`].
 pub static TABLE: [Published; 4] = [
     Published {
         sensor: Sensor::Gyro,
@@ -128,15 +127,6 @@ pub static TABLE: [Published; 4] = [
         others: &[UPPER, LOWER],
     },
 ];
-
-/// The errors in the paper's table, in its order; velocity and position are horizontal.
-pub const QUANTITIES: ByQuantity<Quantity> = {
-    let [pitch, roll, heading, _, _, velocity, _, _, position] = Quantity::ALL;
-    [pitch, roll, heading, velocity, position]
-};
-
-/// A value for each of [`QUANTITIES`].
-pub type ByQuantity<T> = [T; 5];
 
 /// A reading of the paper.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, Vector3};
 
-use super::paper::{ByQuantity, QUANTITIES};
+use super::quantity::{ByQuantity, QUANTITIES};
 use crate::calibration::parameter;
 use crate::earth::Site;
 use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
@@ -12,28 +12,6 @@ use crate::study::navigation::{Exposure, Mission, NavigationStudyError};
 /// Longest output step in s. The largest of a Schuler swing of 84 min lies within half a step of an
 /// output, and is at most 1.7e-4 above it.
 const STEP: f64 = 30.0;
-
-/// Mean and standard deviation (`n − 1`).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Moments {
-    /// Mean.
-    pub mean: f64,
-    /// Standard deviation.
-    pub std: f64,
-}
-
-impl Moments {
-    /// Moments of some values; NaN for fewer than two.
-    pub(super) fn of(values: impl Iterator<Item = f64> + Clone) -> Self {
-        let n = values.clone().count() as f64;
-        let mean = values.clone().sum::<f64>() / n;
-        let squares: f64 = values.map(|x| (x - mean).powi(2)).sum();
-        Self {
-            mean,
-            std: (squares / (n - 1.0)).sqrt(),
-        }
-    }
-}
 
 /// A body at rest on the ellipsoid, level and heading north, for a time in s.
 pub fn standing(latitude: f64, duration: f64) -> Mission {
@@ -60,7 +38,7 @@ pub struct Moment {
 }
 
 impl Response {
-    pub(super) fn new(mission: &Mission) -> Result<Self, NavigationStudyError> {
+    pub fn new(mission: &Mission) -> Result<Self, NavigationStudyError> {
         let ideal = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
         let moment = |exposure: &Exposure| Moment {
             time: exposure.time,
@@ -73,7 +51,7 @@ impl Response {
     }
 
     /// Largest absolute error over the run.
-    pub(super) fn largest(&self, sensor: Sensor, sensed: &Vector3<f64>) -> ByQuantity<f64> {
+    pub fn largest(&self, sensor: Sensor, sensed: &Vector3<f64>) -> ByQuantity<f64> {
         let mut largest = [0.0; 5];
         for moment in &self.0 {
             for (largest, error) in largest.iter_mut().zip(errors(moment, sensor, sensed)) {
@@ -84,7 +62,7 @@ impl Response {
     }
 
     /// About this many moments, evenly spaced from the first on.
-    pub(super) fn thinned(&self, moments: usize) -> impl Iterator<Item = &Moment> {
+    pub fn thinned(&self, moments: usize) -> impl Iterator<Item = &Moment> {
         self.0.iter().step_by(self.0.len().div_ceil(moments.max(1)))
     }
 }

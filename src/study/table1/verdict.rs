@@ -1,7 +1,7 @@
 //! Verdicts on the reproduction of the paper's figures.
 
-use super::paper::{ByQuantity, Kind, Published, Reading, SAMPLES};
-use super::response::Moments;
+use super::paper::{Kind, Published, Reading, SAMPLES};
+use super::quantity::{ByQuantity, Moments};
 
 /// Two means agree if they differ by no more than this many standard errors of their difference: 99 %
 /// of the normal distribution.

@@ -9,8 +9,8 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 
 use super::made::made_run;
-use turncal::formats::write_run;
 use turncal::imu::Output as Rows;
+use turncal_files::write_run;
 
 /// So much address space is enough for a command on one thread, and for no bomb, KiB.
 const ROOM: u32 = 200 * 1024;
@@ -176,21 +176,22 @@ fn names_are_shown_with_their_escapes_escaped() {
 
 #[test]
 #[cfg(target_os = "linux")]
-fn a_record_that_outgrows_memory_is_refused_at_the_row_where_it_does() {
+fn every_description_has_at_most_sixteen_mebibytes() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
-    let rows = "0.5,-1,2,3,0,1,9.8\n".repeat(100_000);
-    let mut file = GzEncoder::new(
-        File::create(here.join("imu.csv.gz")).unwrap(),
-        Compression::fast(),
-    );
-    for _ in 0..40 {
-        file.write_all(rows.as_bytes()).unwrap();
+    for name in ["big.toml", "big.json"] {
+        let file = File::create(here.join(name)).unwrap();
+        file.set_len(1 << 30).unwrap();
     }
-    file.finish().unwrap();
-    refused(
-        here,
-        "init imu.csv.gz",
-        &["imu.csv.gz, line", "rows so far", "memory"],
-    );
+    for arguments in [
+        "check big.toml",
+        "calibrate big.toml",
+        "simulate big.toml -o run",
+        "path evaluate big.toml",
+        "export big.json --format kalibr",
+        "compare big.json big.json",
+        "certificate big.json --laboratory big.toml",
+    ] {
+        refused(here, arguments, &["longer than 16 MiB"]);
+    }
 }

@@ -7,11 +7,11 @@ use std::path::Path;
 use flate2::Compression;
 use flate2::read::MultiGzDecoder;
 use flate2::write::GzEncoder;
-use turncal::formats::write_run;
 use turncal::imu::{Output, Sensor};
 use turncal::recording::FaultKind;
 use turncal::run::Run;
 use turncal::units::MILLIGAL;
+use turncal_files::write_run;
 
 use super::made::made_run;
 use crate::shared::read;

@@ -4,12 +4,11 @@ use std::fs;
 
 use nalgebra::Vector3;
 use turncal::attitude;
-use turncal::calibration::result::Calibration;
-use turncal::formats::write_run;
 use turncal::imu::Output;
 use turncal::recording::LabelledMotion;
 use turncal::run::Run;
 use turncal::units::DEGREE;
+use turncal_files::write_run;
 
 use super::made::{assert_same, made_run};
 use crate::shared::{read, shared};
@@ -35,7 +34,8 @@ fn every_shared_run_and_truth_reads() {
         assert_eq!(run.recording.segments.len(), segments, "{name}");
         let truth = directory.join("truth.json");
         if truth.exists() {
-            let truth = Calibration::read(&truth).unwrap_or_else(|error| panic!("{error}"));
+            let truth =
+                turncal_files::read_calibration(&truth).unwrap_or_else(|error| panic!("{error}"));
             assert_eq!(truth.unit, Some(run.instrument.unit), "{name}");
         }
     }

@@ -7,11 +7,11 @@ use nalgebra::Vector3;
 use turncal::calibration::result::{
     Calibration, ConsistencyRecord, EQUATION, Method, NisRecord, TestVector, TriadRecord,
 };
-use turncal::formats::write_run;
 use turncal::imu::{BodyFrame, InstallationForm, Nominal, Output, PerSensor};
 use turncal::run::Aiding;
 use turncal::simulation::{Scenario, Simulated};
 use turncal::units::{DEG_PER_H, STANDARD_GRAVITY};
+use turncal_files::write_run;
 
 use super::made::{assert_same, made_run};
 use crate::shared::{read, shared};
@@ -33,7 +33,10 @@ fn increments_and_rates_come_back_as_they_went() {
     fs::create_dir(&place).unwrap();
     write_run(&place, &run, Output::Increment, Some(&truth)).unwrap();
     assert_same(&run, &read(&place));
-    assert_eq!(Calibration::read(&place.join("truth.json")), Ok(truth));
+    assert_eq!(
+        turncal_files::read_calibration(&place.join("truth.json")),
+        Ok(truth)
+    );
 
     run.recording.name = "rates".to_owned();
     run.instrument.unit = PerSensor {
@@ -146,17 +149,17 @@ fn a_calibration_comes_back_as_it_went() {
 
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("calibration.json");
-    record.write(&path, false).unwrap();
-    assert_eq!(Calibration::read(&path), Ok(record.clone()));
+    turncal_files::write_calibration(&record, &path, false).unwrap();
+    assert_eq!(turncal_files::read_calibration(&path), Ok(record.clone()));
     let json: serde_json::Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
     assert_eq!(json["consistency"]["nis_interval"][1], 1.1);
     assert_eq!(json["installation_form"], "three-angle");
     assert_eq!(json["body_frame"], "accelerometer");
 
     record.gyro.bias[0] = f64::NAN;
-    let error = record
-        .write(&directory.path().join("other.json"), false)
-        .unwrap_err();
+    let error =
+        turncal_files::write_calibration(&record, &directory.path().join("other.json"), false)
+            .unwrap_err();
     assert!(error.to_string().contains("gyro"), "{error}");
     assert!(!directory.path().join("other.json").exists());
 }

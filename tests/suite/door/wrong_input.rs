@@ -3,9 +3,6 @@
 use std::fs;
 use std::path::Path;
 
-use turncal::calibration::result::Calibration;
-use turncal::run::Run;
-
 const RUN: &str = r#"format = "turncal-run/1"
 [site]
 latitude_deg = 34.0
@@ -75,7 +72,7 @@ fn error_after(file: &str, from: &str, to: &str) -> String {
     let text = fs::read_to_string(&path).unwrap();
     assert_eq!(text.matches(from).count(), 1, "`{from}` in {file}");
     fs::write(&path, text.replace(from, to)).unwrap();
-    match Run::read(&directory.path().join("run.toml")) {
+    match turncal_files::read_run(&directory.path().join("run.toml")) {
         Ok(_) => panic!("`{to}` for `{from}` in {file} was accepted"),
         Err(error) => {
             let message = error.to_string();
@@ -112,7 +109,7 @@ fn assert_says(message: &str, file: &str, words: &str) {
 fn the_run_that_the_cases_spoil_is_good() {
     let directory = tempfile::tempdir().unwrap();
     good_run(directory.path());
-    let run = Run::read(&directory.path().join("run.toml")).unwrap();
+    let run = turncal_files::read_run(&directory.path().join("run.toml")).unwrap();
     assert_eq!(
         (
             run.recording.imu.len(),
@@ -263,7 +260,7 @@ fn a_scale_that_its_unit_rules_out_is_refused() {
         .replace("gyro_unit = \"count\"", "gyro_unit = \"deg/s\"")
         .replace("scale = 2000000.0", "scale = 1.0");
     fs::write(directory.path().join("run.toml"), text).unwrap();
-    let error = Run::read(&directory.path().join("run.toml")).unwrap_err();
+    let error = turncal_files::read_run(&directory.path().join("run.toml")).unwrap_err();
     assert_says(
         &error.to_string(),
         "run.toml",
@@ -399,7 +396,7 @@ fn each_wrong_file_has_its_message() {
         let directory = tempfile::tempdir().unwrap();
         good_run(directory.path());
         fs::write(directory.path().join(file), content).unwrap();
-        let error = Run::read(&directory.path().join("run.toml")).expect_err(words);
+        let error = turncal_files::read_run(&directory.path().join("run.toml")).expect_err(words);
         assert_says(&error.to_string(), file, words);
     }
 }
@@ -409,7 +406,11 @@ fn missing_damaged_and_foreign_files_have_their_message() {
     let directory = tempfile::tempdir().unwrap();
     let at = |name: &str| directory.path().join(name);
     good_run(directory.path());
-    let error = || Run::read(&at("run.toml")).unwrap_err().to_string();
+    let error = || {
+        turncal_files::read_run(&at("run.toml"))
+            .unwrap_err()
+            .to_string()
+    };
 
     fs::remove_file(at("imu.csv")).unwrap();
     assert_says(&error(), "imu.csv", "cannot open & relative to run.toml");
@@ -421,7 +422,7 @@ fn missing_damaged_and_foreign_files_have_their_message() {
     flipped[whole.len() - 8] ^= 0xff;
     fs::write(at("run.toml"), RUN.replace("imu.csv", "imu.csv.gz")).unwrap();
     fs::write(at("imu.csv.gz"), &whole).unwrap();
-    assert!(Run::read(&at("run.toml")).is_ok());
+    assert!(turncal_files::read_run(&at("run.toml")).is_ok());
     for damaged in [&whole[..whole.len() / 2], &flipped] {
         fs::write(at("imu.csv.gz"), damaged).unwrap();
         assert_says(&error(), "imu.csv.gz", "damaged or truncated");
@@ -437,12 +438,14 @@ fn missing_damaged_and_foreign_files_have_their_message() {
     assert_says(&error(), "imu.mat", "binary data & a text log");
     // What a file holds counts, not how it is called.
     fs::write(at("imu.mat"), imu()).unwrap();
-    assert!(Run::read(&at("run.toml")).is_ok());
+    assert!(turncal_files::read_run(&at("run.toml")).is_ok());
     fs::write(at("run.toml"), [0xff, 0xfe]).unwrap();
     assert_says(&error(), "run.toml", "cannot read");
     fs::remove_file(at("run.toml")).unwrap();
     assert_says(&error(), "run.toml", "cannot read & Give the path");
-    let error = Run::read(directory.path()).unwrap_err().to_string();
+    let error = turncal_files::read_run(directory.path())
+        .unwrap_err()
+        .to_string();
     assert_says(&error, "", "cannot read & Give the path");
 }
 
@@ -456,7 +459,7 @@ fn each_wrong_calibration_has_its_message() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("calibration.json");
     fs::write(&path, &good).unwrap();
-    assert!(Calibration::read(&path).is_ok());
+    assert!(turncal_files::read_calibration(&path).is_ok());
     for (from, to, words) in [
         ("tion/1", "tion/3", "calibration/3"),
         ("\"accel\":", "\"axel\":", "missing field `accel` & line"),
@@ -545,7 +548,7 @@ fn each_wrong_calibration_has_its_message() {
         let spoilt = good.replacen(from, &to, 1);
         assert_ne!(spoilt, good, "{from}");
         fs::write(&path, spoilt).unwrap();
-        let error = Calibration::read(&path).expect_err(words);
+        let error = turncal_files::read_calibration(&path).expect_err(words);
         assert_says(&error.to_string(), "calibration.json", words);
     }
 }
@@ -563,7 +566,7 @@ fn a_covariance_that_gives_a_combination_a_negative_variance_is_refused_by_every
             4.0 * r
         );
         fs::write(&path, text).unwrap();
-        Calibration::read(&path)
+        turncal_files::read_calibration(&path)
     };
     assert!(file(-0.499).is_ok() && file(0.999).is_ok() && file(1.0).is_ok());
     let error = file(-0.9).unwrap_err().to_string();
@@ -597,8 +600,11 @@ fn a_covariance_that_gives_a_combination_a_negative_variance_is_refused_by_every
 fn byte_order_mark_spaces_and_other_line_ends_are_not_wrong() {
     let directory = tempfile::tempdir().unwrap();
     good_run(directory.path());
-    let good = Run::read(&directory.path().join("run.toml")).unwrap();
+    let good = turncal_files::read_run(&directory.path().join("run.toml")).unwrap();
     let spaced = "\u{feff}".to_owned() + &imu().replace(',', ", ").replace('\n', "\r\n");
     fs::write(directory.path().join("imu.csv"), spaced).unwrap();
-    assert_eq!(Run::read(&directory.path().join("run.toml")), Ok(good));
+    assert_eq!(
+        turncal_files::read_run(&directory.path().join("run.toml")),
+        Ok(good)
+    );
 }

@@ -6,7 +6,6 @@ use std::process::Command;
 
 use turncal::calibration::result::Calibration;
 use turncal::imu::Sensor;
-use turncal::run::Run;
 
 use crate::shared::{read, shared, skipped};
 
@@ -38,7 +37,10 @@ fn python() -> String {
 
 /// Writes a record of accelerometers and gyros as these formats; false where Python or a package is missing.
 fn write(log: &Path, directory: &Path, formats: &[&str]) -> bool {
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/suite/logs/write.py");
+    let script = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../tests/suite/logs/write.py"
+    );
     let mut command = Command::new(python());
     command
         .arg(script)
@@ -115,7 +117,7 @@ fn every_format_gives_the_samples_of_the_text() {
     let expected = read(directory.path()).recording.imu;
     for format in FORMATS {
         let path = directory.path().join(format!("imu.{format}"));
-        let run = Run::read(&run_of(&path, &text, directory.path()))
+        let run = turncal_files::read_run(&run_of(&path, &text, directory.path()))
             .unwrap_or_else(|e| panic!("{format}: {e}"));
         let imu = run.recording.imu;
         assert_eq!(imu.len(), expected.len(), "{format}");
@@ -148,7 +150,7 @@ fn every_format_gives_the_calibration_of_the_text() {
             .args(["--force", "-o"])
             .arg(&result);
         calibrate.assert().success();
-        Calibration::read(&result.join("calibration.json")).unwrap()
+        turncal_files::read_calibration(&result.join("calibration.json")).unwrap()
     };
     let text = fs::read_to_string(record.join("run.toml")).unwrap();
     let values = |calibration: &Calibration| {
@@ -207,7 +209,7 @@ fn a_cut_log_is_refused_with_its_place_and_used_if_asked() {
         return;
     };
     let run = directory.path().join("run.toml");
-    let whole = Run::read(&run).unwrap();
+    let whole = turncal_files::read_run(&run).unwrap();
     assert!(
         whole
             .recording
@@ -218,7 +220,7 @@ fn a_cut_log_is_refused_with_its_place_and_used_if_asked() {
     let bytes = fs::read(&log).unwrap();
     let cut = bytes.len() * 3 / 5;
     fs::write(&log, &bytes[..cut]).unwrap();
-    let error = Run::read(&run).unwrap_err().to_string();
+    let error = turncal_files::read_run(&run).unwrap_err().to_string();
     // The message that the end cuts begins not far before it.
     let byte: usize = error
         .split("byte ")
@@ -234,7 +236,7 @@ fn a_cut_log_is_refused_with_its_place_and_used_if_asked() {
     let text = fs::read_to_string(&run).unwrap();
     let line = "file = \"flight.ulg\"";
     fs::write(&run, text.replace(line, &format!("{line}\nsalvage = true"))).unwrap();
-    let part = Run::read(&run).unwrap();
+    let part = turncal_files::read_run(&run).unwrap();
     let (part_imu, imu) = (&part.recording.imu, &whole.recording.imu);
     assert!(part_imu.len() > imu.len() / 2 && part_imu.len() < imu.len() * 7 / 10);
     assert!(
@@ -254,7 +256,7 @@ fn a_stream_that_is_not_there_is_named_beside_those_that_are() {
     let run = directory.path().join("run.toml");
     let text = fs::read_to_string(&run).unwrap();
     fs::write(&run, text.replace("sensor_combined[0]", "sensor_combind")).unwrap();
-    let error = Run::read(&run).unwrap_err().to_string();
+    let error = turncal_files::read_run(&run).unwrap_err().to_string();
     assert!(
         error.contains("flight.ulg") && error.contains("Did you mean `sensor_combined[0]`?"),
         "{error}"
@@ -382,7 +384,7 @@ fn a_phones_two_files_are_drafted_as_one_run() {
         .replace("# latitude_deg = ", "latitude_deg = 61.8")
         .replace("# height_m = ", "height_m = 60.0");
     fs::write(&run, text).unwrap();
-    let found = Run::read(&run)
+    let found = turncal_files::read_run(&run)
         .unwrap_or_else(|error| panic!("{error}"))
         .recording
         .imu;

@@ -18,11 +18,48 @@ use crate::calibration::{
 };
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, PerSensor, Sensor, Triad};
 
+/// A record with its name in messages.
+#[derive(Debug, Clone, Copy)]
+pub struct Named<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// The calibration, or the truth.
+    pub record: &'a Calibration,
+}
+
+/// Converts two records to the general form, a common body frame and these nominal scales. A record without units is
+/// assumed to have those of the other.
+///
+/// # Errors
+/// [`ComparisonError`] if their units differ or one of them cannot be converted.
+pub fn in_common_form(
+    first: Named,
+    second: Named,
+    nominal: &PerSensor<Nominal>,
+) -> Result<[Canonical; 2], ComparisonError> {
+    let units = [first, second].map(|of| of.record.unit.as_ref());
+    for sensor in Sensor::ALL {
+        if let [Some(expected), Some(found)] = units.map(|unit| Some(unit?.get(sensor)))
+            && expected != found
+        {
+            return Err(ComparisonError::Unit {
+                sensor,
+                name: first.name.to_owned(),
+                expected: expected.clone(),
+                other: second.name.to_owned(),
+                found: found.clone(),
+            });
+        }
+    }
+    let frames = [first, second].map(|of| of.record.body_frame);
+    let body_frame = BodyFrame::common(frames.into_iter());
+    let canonical = |of: Named| Canonical::new(of.name, of.record, nominal, body_frame);
+    Ok([canonical(first)?, canonical(second)?])
+}
+
 /// A calibration in the general form, in a given body frame, normalised by given nominal scales.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Canonical {
-    /// Its name in tables and messages.
-    pub name: String,
     /// The body frame.
     pub body_frame: BodyFrame,
     /// Both triads, in the general form.
@@ -34,14 +71,12 @@ pub struct Canonical {
     pub correlated: bool,
     /// Auxiliary constants by name, which to first order do not depend on the body frame.
     pub constants: BTreeMap<String, TermRecord>,
-    /// False only if the record says that its method did not converge.
-    pub converged: bool,
 }
 
 impl Canonical {
     /// Converts a record to a body frame and nominal scales. A record in the accelerometer frame cannot be converted to
     /// the table frame, because the table was not observed.
-    pub(crate) fn new(
+    pub fn new(
         name: &str,
         record: &Calibration,
         nominal: &PerSensor<Nominal>,
@@ -73,13 +108,11 @@ impl Canonical {
             j * covariance * j.transpose()
         });
         Ok(Self {
-            name: name.to_owned(),
             body_frame,
             triads,
             covariance,
             correlated: !record.covariance.is_empty(),
             constants: record.terms.clone(),
-            converged: record.converged != Some(false),
         })
     }
 

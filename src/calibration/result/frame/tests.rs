@@ -6,7 +6,6 @@ use rand_distr::{Distribution, StandardNormal};
 use super::*;
 use crate::attitude;
 use crate::calibration::result::TriadRecord;
-use crate::calibration::result::comparison::{Named, compare};
 use crate::calibration::{parameter_name, sensor_and_parameter};
 use crate::imu::{Instrument, Prior};
 
@@ -86,14 +85,15 @@ fn an_instrument_is_the_same_from_two_frames() {
     turned.body_frame = BodyFrame::Accelerometer;
     let compared = |b: &Calibration| {
         let [a, b] = [("a", &on_table), ("b", b)].map(|(name, record)| Named { name, record });
-        compare(&[a, b], None).unwrap()
+        in_common_form(a, b, &own_nominal(&on_table)).unwrap()
     };
-    let comparison = compared(&turned);
-    assert_eq!(comparison.body_frame, BodyFrame::Accelerometer);
-    assert!(comparison.sides[0].difference.amax() < 1e-12);
-    assert_eq!(comparison.parameters.len(), 21);
+    let [a, b] = compared(&turned);
+    assert_eq!(b.body_frame, BodyFrame::Accelerometer);
+    assert!((a.vector() - b.vector()).amax() < 1e-12);
+    assert_eq!(free_parameters(b.body_frame).len(), 21);
     turned.body_frame = BodyFrame::Table;
-    assert!(compared(&turned).sides[0].difference.amax() > 1e-3);
+    let [a, b] = compared(&turned);
+    assert!((a.vector() - b.vector()).amax() > 1e-3);
 }
 
 #[test]
@@ -284,4 +284,22 @@ fn the_prior_along_the_accelerometers_is_that_of_the_mounting_face_turned() {
             );
         }
     }
+}
+
+#[test]
+fn other_units_are_an_error_that_names_both_and_units_not_stated_are_none() {
+    let (a, mut b) = (record(), record());
+    let compared = |b: &Calibration| {
+        let [a, b] = [("one", &a), ("two", b)].map(|(name, record)| Named { name, record });
+        in_common_form(a, b, &own_nominal(&record()))
+    };
+    if let Some(unit) = &mut b.unit {
+        unit.accel = "m/s".to_owned();
+    }
+    let text = compared(&b).unwrap_err().to_string();
+    for part in ["one", "two", "accel", "`count`", "`m/s`"] {
+        assert!(text.contains(part), "{text}");
+    }
+    b.unit = None;
+    assert!(compared(&b).is_ok());
 }

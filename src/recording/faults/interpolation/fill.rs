@@ -4,8 +4,10 @@ use std::ops::Range;
 
 use nalgebra::{Matrix4, Vector4};
 
-use crate::recording::faults::consecutive;
+use crate::recording::faults::rows::consecutive;
 
+/// Maximum number of samples used on either side of a hole.
+pub const MOST: usize = 64;
 /// Most intact stretches on either side on which a fill is tested …
 const TRIALS: usize = 16;
 /// … and fewest on both sides together.
@@ -107,7 +109,7 @@ impl Fill {
         let length = self.hole.len();
         let used: usize = self.runs.iter().map(Range::len).sum();
         let stride = length.div_ceil(2);
-        let reach = (6 * (length + used) + super::MOST) as isize;
+        let reach = (6 * (length + used) + MOST) as isize;
         let of_side = |direction: isize| {
             let shifts = (1..).map(move |k: isize| k * stride as isize);
             let shifts = shifts.take_while(move |&shift| shift <= reach);
@@ -141,9 +143,10 @@ impl Fill {
         };
         let halves = [mean_square(0, most)?, mean_square(1, f64::INFINITY)?];
         // A larger change than any tried may have come at any moment.
-        let sudden = match is_tried {
-            true => 0.0,
-            false => (change * self.hole.len() as f64).powi(2) / 12.0,
+        let sudden = if is_tried {
+            0.0
+        } else {
+            (change * self.hole.len() as f64).powi(2) / 12.0
         };
         Some(halves.map(|half| half.max(sudden)))
     }

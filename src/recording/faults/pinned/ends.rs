@@ -311,9 +311,10 @@ mod tests {
         let mut random = ChaCha8Rng::seed_from_u64(8);
         [0, 1, 2].map(|axis| {
             let mut row = |k: usize| {
-                let (mean, sigma) = match HIGH.contains(&k) {
-                    true => (if axis == 0 { level } else { 300.0 }, there[axis]),
-                    false => (100.0, sigma),
+                let (mean, sigma) = if HIGH.contains(&k) {
+                    (if axis == 0 { level } else { 300.0 }, there[axis])
+                } else {
+                    (100.0, sigma)
                 };
                 let normal: f64 = StandardNormal.sample(&mut random);
                 (mean + sigma * normal).round()

@@ -1,0 +1,105 @@
+//! Options whose value is one of a few names.
+
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+
+use turncal::calibration::{Method, NoisePolicy};
+use turncal::imu::InstallationForm;
+use turncal::run::Aiding;
+use turncal_files::export::{FORMATS, Format};
+
+/// A name on the command line, what it stands for in words, and its value.
+type Choice<T> = (&'static str, &'static str, T);
+
+/// Methods of estimation.
+pub const METHODS: [Choice<Method>; 2] = [
+    (
+        "ekf",
+        "Extended Kalman filter over the whole run",
+        Method::Ekf,
+    ),
+    (
+        "six-position",
+        "Closed form from table positions, otherwise from labelled sections, otherwise from gravity",
+        Method::SixPosition,
+    ),
+];
+
+/// Forms of the installation matrix.
+pub const FORMS: [Choice<InstallationForm>; 3] = [
+    (
+        "general",
+        "Six direction cosines, rows of unit norm: `C_ii = √(1 − C_ij² − C_ik²)` (Eqs. 4 and 7)",
+        InstallationForm::General,
+    ),
+    (
+        "six-angle",
+        "Six off-diagonal entries, unit diagonal (Eq. 8)",
+        InstallationForm::SixAngle,
+    ),
+    (
+        "three-angle",
+        "Identity plus a cross-product matrix of three angles `E_yz`, `E_xz`, `E_xy` (Eq. 10)",
+        InstallationForm::ThreeAngle,
+    ),
+];
+
+/// Observations of the filter.
+pub const AIDINGS: [Choice<Aiding>; 2] = [
+    (
+        "table",
+        "Zero velocity in every dwell, and table attitude",
+        Aiding::Table,
+    ),
+    (
+        "velocity",
+        "Zero velocity only; the accelerometers define the body axes",
+        Aiding::Velocity,
+    ),
+];
+
+/// Policies for the noise of the filter. A name without words is not listed.
+pub const NOISE: [Choice<NoisePolicy>; 4] = [
+    (
+        "stated",
+        "Use the noise that run.toml and models state",
+        NoisePolicy::Stated,
+    ),
+    (
+        "auto",
+        "Use the stated noise; estimate it from the recording if the two disagree (p < 0.001)",
+        NoisePolicy::Auto,
+    ),
+    ("estimate", "", NoisePolicy::Auto),
+    (
+        "learnt",
+        "Estimate the noise from the recording, with the stated noise as prior",
+        NoisePolicy::Learnt,
+    ),
+];
+
+/// Parses the name of one of these.
+pub fn one_of<T: Copy + Send + Sync>(
+    choices: &'static [Choice<T>],
+) -> impl TypedValueParser<Value = T> {
+    let listed = |&(name, help, _): &Choice<T>| {
+        let name = PossibleValue::new(name).hide(help.is_empty());
+        if help.is_empty() {
+            name
+        } else {
+            name.help(help)
+        }
+    };
+    PossibleValuesParser::new(choices.iter().map(listed)).try_map(|name| {
+        let chosen = choices.iter().find(|(of, ..)| *of == name);
+        chosen.map(|&(.., value)| value).ok_or("an unknown name")
+    })
+}
+
+/// Parses the name of a format of exports.
+pub fn export_format() -> impl TypedValueParser<Value = Format> {
+    let listed = |format: &Format| PossibleValue::new(format.name).help(format.about);
+    PossibleValuesParser::new(FORMATS.iter().map(listed)).try_map(|name| {
+        let chosen = FORMATS.iter().find(|format| format.name == name);
+        chosen.copied().ok_or("an unknown format")
+    })
+}

@@ -1,0 +1,20 @@
+//! Options common to several commands: inputs, estimation, output.
+
+mod choice;
+mod delivery;
+mod error_term;
+mod estimation;
+mod log;
+mod sharding;
+mod values;
+
+pub use choice::{AIDINGS, FORMS, NOISE, export_format, one_of};
+pub use delivery::{Delivery, Overwrite, keep};
+pub use error_term::{error_term, needs_table};
+pub use estimation::Estimation;
+pub use log::{OfLog, run_file, run_or_log, show_found};
+pub use sharding::Sharding;
+pub use values::{
+    at_least_two, at_temperature, gravity, height, hours, latitude, number, positive, seconds,
+    seed, shard,
+};

@@ -1,0 +1,383 @@
+//! `turncal calibrate`
+
+mod follow;
+mod incoming;
+mod lines;
+mod lot;
+mod merge;
+mod screen;
+
+pub use lot::NotMet;
+pub use merge::Merge;
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use turncal_files::{calibration_json, write_calibration};
+
+use anyhow::{Context, bail};
+use clap::error::ErrorKind;
+
+use crate::arguments::{Estimation, OfLog, Overwrite, run_file, run_or_log, seconds, shard};
+use crate::terminal::{Activity, print, show, show_brief};
+use turncal::calibration::{
+    AtRest, Method, Problem, Solution, Together, Word, in_body_frame, triads_of,
+};
+use turncal::imu::{BodyFrame, InstallationForm};
+use turncal::models;
+use turncal::recording::Recording;
+use turncal::run::Run;
+use turncal::study::{CheckedCalibration, Shard};
+use turncal_files::{Campaign, Opened, record_inputs};
+use turncal_report as report;
+use turncal_report::calibration as of_calibration;
+use turncal_report::calibration::Truth;
+use turncal_report::terminal::printable;
+use turncal_report::{Document, Facts};
+
+use follow::Follow;
+
+/// Heading of the options for a log that is still being written.
+const FOLLOWING: &str = "Following a log";
+
+/// Estimates scale factors, misalignments and biases from a run
+///
+/// Writes DIR/calibration.json and DIR/report/, and prints a summary. The command fails if the filter does not
+/// converge.
+///
+/// With --temperature, parameters depend on the temperature column; for an instrument at rest in one attitude, only
+/// biases do.
+///
+/// A campaign.toml names several recordings of one instrument, which are calibrated jointly: parameters may depend
+/// on temperature and differ from day to day.
+///
+/// Several runs are the units of a lot: each is calibrated into DIR/units/NAME/, and DIR/lot.json, lot.csv and
+/// index.html summarise the lot. Units that fail are listed with the reason; the command then fails after writing
+/// everything. Rerun it to process only missing or changed units.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  turncal calibrate imu.csv --latitude 48.1 --sensor bmi088
+  turncal calibrate my-run/run.toml
+  turncal calibrate my-run/run.toml -o mine --truth my-run/truth.json
+  turncal calibrate my-run/run.toml --method six-position
+  turncal calibrate my-run/run.toml --aiding velocity
+  turncal calibrate my-run/run.toml --json | jq .gyro.scale
+  turncal calibrate my-run/run.toml --temperature
+  turncal calibrate campaign.toml -o mine
+  turncal calibrate lot/*/run.toml -o lot-result \\
+      --specification specification.toml
+  turncal calibrate --follow - --sensor bmi088 < /dev/ttyUSB0
+  turncal calibrate --follow imu.csv --specification mems-by-hand
+  turncal calibrate lot/*/run.toml --shard 3/8 -o part-3")]
+pub struct Calibrate {
+    /// A run.toml, a log, or - for text on standard input; several are units of a lot; a campaign.toml lists recordings
+    /// of one instrument
+    #[arg(required = true, value_name = "RUN.toml|LOG", value_parser = run_or_log)]
+    runs: Vec<PathBuf>,
+    #[command(flatten)]
+    of_log: OfLog,
+    /// Output directory [default: NAME-calibration, NAME-calibration-six-position for that method, lot-calibration for
+    /// a lot; none with --json]
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    estimation: Estimation,
+    /// Let parameters depend on the temperature column of the run (the default for campaigns with known temperature)
+    #[arg(long, conflicts_with_all = ["specification", "shard"])]
+    temperature: bool,
+    /// True calibration, not used by the estimator; summary and report show the errors relative to it
+    #[arg(long, value_name = "FILE")]
+    truth: Option<PathBuf>,
+    /// Limits for the units of a lot (a specification.toml)
+    #[arg(long, value_name = "FILE", conflicts_with = "truth")]
+    specification: Option<PathBuf>,
+    /// Calibrate part i of M of a lot, for turncal merge
+    #[arg(long, value_name = "i/M", value_parser = shard, requires = "output", conflicts_with_all = ["json", "truth"], help_heading = "Advanced")]
+    shard: Option<Shard>,
+    /// Follow a growing log, - or a serial device: show the accuracy so far and the next move, and calibrate when the
+    /// specification can be decided, no more rows arrive, or Ctrl-C is pressed
+    #[arg(long, conflicts_with_all = ["shard", "temperature", "truth"], help_heading = FOLLOWING)]
+    follow: bool,
+    /// File to keep the rows of - or a device in; rows are appended to an existing file [default: follow-TIME.csv]
+    #[arg(long, value_name = "FILE", requires = "follow", help_heading = FOLLOWING)]
+    keep: Option<PathBuf>,
+    /// The run.toml that describes the rows; those of - or a device are kept in the file named there
+    #[arg(long, value_name = "RUN.toml", requires = "follow", conflicts_with = "keep", value_parser = run_file, help_heading = FOLLOWING)]
+    run: Option<PathBuf>,
+    /// Time without growth after which a followed file is complete, s
+    #[arg(long, value_name = "S", requires = "follow", value_parser = seconds, default_value = "30", help_heading = FOLLOWING)]
+    patience: Duration,
+    /// Print the calibration, or the evaluation of the lot, as one JSON document and nothing else
+    #[arg(long)]
+    json: bool,
+    /// Print all parameters, tests and findings
+    #[arg(short, long, conflicts_with = "json")]
+    verbose: bool,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+impl Calibrate {
+    pub fn run(&self) -> anyhow::Result<()> {
+        self.estimation.check();
+        if self.follow {
+            return self.followed();
+        }
+        match self.runs.as_slice() {
+            [file] if self.specification.is_none() && self.shard.is_none() => {
+                match Campaign::is_at(file) {
+                    true => self.campaign(file),
+                    false => self.one(file),
+                }
+            }
+            _ if self.truth.is_some() => {
+                let message = "--truth applies to one run; to compare units of a lot with their truths, use turncal \
+                    compare\n";
+                clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
+            }
+            _ => self.lot(),
+        }
+    }
+
+    /// Follows a log until it ends, then calibrates it.
+    fn followed(&self) -> anyhow::Result<()> {
+        let [source] = self.runs.as_slice() else {
+            let message = "--follow takes one log; calibrate several logs when they are complete\n";
+            clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
+        };
+        let specification = self.specification.as_deref().map(models::specification);
+        let specification = specification.transpose()?;
+        let follow = Follow {
+            source,
+            of_log: &self.of_log,
+            run: self.run.as_deref(),
+            options: self.estimation.options(),
+            specification,
+            keep: self.keep.as_deref(),
+            patience: self.patience,
+            silent: self.json,
+        };
+        self.one(&follow.run()?)
+    }
+
+    fn one(&self, path: &Path) -> anyhow::Result<()> {
+        let activity = Activity::new(format!("reading {}", path.display()));
+        let opened = self.of_log.open(path)?;
+        let run = &opened.run;
+        let problem = match self.temperature {
+            true => {
+                let together = Together::default();
+                let problem = self.estimation.together(&[run], &together);
+                let problem = problem.inspect_err(|_| say(&run.recording))?;
+                // Without a turn, only the biases against temperature can be determined.
+                if let Some(at_rest) = problem.at_rest() {
+                    return self.at_rest(&at_rest, &problem, (&opened, path));
+                }
+                problem
+            }
+            false => self.estimation.problem(run, path)?,
+        };
+        self.solved(
+            &problem,
+            &run.recording.name,
+            (path, Some(&opened)),
+            activity,
+        )
+    }
+
+    /// Biases of a stationary instrument against temperature.
+    fn at_rest(
+        &self,
+        at_rest: &AtRest,
+        problem: &Problem,
+        (opened, path): (&Opened, &Path),
+    ) -> anyhow::Result<()> {
+        let run = problem.run();
+        let calibration = at_rest.record(problem);
+        let document = report::at_rest::document(at_rest, run, &calibration);
+        let target = self.target(|| format!("{}-calibration", run.recording.name));
+        if let Some(target) = &target {
+            let directory = self.overwrite.directory(target, &[path])?;
+            let file = directory.path().join("calibration.json");
+            write_calibration(&calibration, &file, false)?;
+            write_report(&document, &directory.path().join("report"))?;
+            opened.write_run(&directory.path())?;
+            directory.commit()?;
+        }
+        match self.json {
+            true => print(&calibration_json(
+                &calibration,
+                Path::new("standard output"),
+            )?),
+            false => show(&document, false),
+        }?;
+        say(&run.recording);
+        Ok(())
+    }
+
+    fn campaign(&self, path: &Path) -> anyhow::Result<()> {
+        let activity = Activity::new(format!("reading {}", path.display()));
+        let campaign = Campaign::read(path)?;
+        let runs: Vec<&Run> = campaign.runs.iter().collect();
+        let problem = self.estimation.together(&runs, &campaign.together);
+        let problem = problem.inspect_err(|_| {
+            runs.iter().for_each(|run| say(&run.recording));
+        });
+        let problem = problem.with_context(|| path.display().to_string())?;
+        self.solved(&problem, &campaign.name, (path, None), activity)
+    }
+
+    /// Output directory, if any, with this default name.
+    fn target(&self, default: impl FnOnce() -> String) -> Option<PathBuf> {
+        let default = || (!self.json).then(|| PathBuf::from(default()));
+        self.output.clone().or_else(default)
+    }
+
+    /// Solves a problem, then writes and shows the result.
+    fn solved(
+        &self,
+        problem: &Problem,
+        name: &str,
+        (path, opened): (&Path, Option<&Opened>),
+        activity: Activity,
+    ) -> anyhow::Result<()> {
+        let run = problem.run();
+        let truth = self
+            .truth
+            .as_deref()
+            .map(|path| read_truth(path, run, problem.model.aiding.body_frame()))
+            .transpose()?;
+        let target = self.target(|| match self.estimation.method {
+            Method::Ekf => format!("{name}-calibration"),
+            Method::SixPosition => format!("{name}-calibration-six-position"),
+        });
+        let inputs = Vec::from_iter([Some(path), self.truth.as_deref()].into_iter().flatten());
+        let begin = |target: &PathBuf| self.overwrite.directory(target, &inputs);
+        let directory = target.as_ref().map(begin).transpose()?;
+
+        // Problems found in the files may be the cause.
+        let solution = solve(problem, self.estimation.method, &activity)
+            .inspect_err(|_| say(&run.recording))?;
+        let mut checked = CheckedCalibration::new(problem, solution)?;
+        record_inputs(&mut checked.calibration, path, run);
+        activity.next("writing");
+        // JSON on standard output has no report.
+        let document = (directory.is_some() || !self.json).then(|| {
+            let triads = truth.as_ref().map(|truth| &truth.triads);
+            let of = (&checked, &checked.consequences(problem, triads));
+            of_calibration::document((problem, name), of, truth.as_ref())
+        });
+        let CheckedCalibration {
+            calibration,
+            solution,
+            ..
+        } = checked;
+        if let (Some(directory), Some(document)) = (directory, &document) {
+            let file = directory.path().join("calibration.json");
+            write_calibration(&calibration, &file, false)?;
+            write_report(document, &directory.path().join("report"))?;
+            opened.map_or(Ok(()), |opened| opened.write_run(&directory.path()))?;
+            directory.commit()?;
+        }
+        drop(activity);
+        match document {
+            Some(document) if self.verbose => show(&document, false)?,
+            Some(mut document) if !self.json => {
+                let run = read_by(opened, target.as_deref(), path);
+                let files = files(target.as_deref(), &run, &document);
+                document.brief.push(files.into());
+                show_brief(&document)?;
+            }
+            _ => print(&calibration_json(&calibration, "standard output".as_ref())?)?,
+        }
+        if !solution.converged() {
+            bail!("{name}: not converged; do not use the values or σ, see the findings");
+        }
+        if !solution.is_usable() {
+            bail!("{name}: do not use the values, see the findings");
+        }
+        Ok(())
+    }
+}
+
+/// The run.toml of a run: for a log, the one written next to the result; for a campaign, a placeholder.
+fn read_by(opened: Option<&Opened>, target: Option<&Path>, path: &Path) -> PathBuf {
+    match (opened, target) {
+        (Some(opened), Some(target)) if opened.is_of_log() => target.join("run.toml"),
+        (Some(_), _) => path.to_owned(),
+        (None, _) => PathBuf::from("RUN.toml"),
+    }
+}
+
+/// Files written, and the next command.
+fn files(target: Option<&Path>, run: &Path, document: &Document) -> Facts {
+    let mut facts = Facts::default();
+    let shown = |path: PathBuf| path.display().to_string();
+    if let Some(target) = target {
+        let calibration = shown(target.join("calibration.json"));
+        facts.push("calibration", calibration.clone());
+        facts.push("report", shown(target.join("report").join("index.html")));
+        if !matches!(document.verdict, Some((Word::Failed, _))) {
+            let run = run.display();
+            facts.push(
+                "use it",
+                format!("turncal apply {calibration} {run} -o calibrated.csv"),
+            );
+        }
+    }
+    let explain = document
+        .findings
+        .first()
+        .map(|finding| format!(", or turncal explain {}", finding.code));
+    // The same command would replace the existing files.
+    let force = target.map_or("", |_| " --force");
+    let more = format!("--verbose{force}{}", explain.unwrap_or_default());
+    facts.push("more", more);
+    facts
+}
+
+fn say(recording: &Recording) {
+    for note in recording.doubts.iter().chain(&recording.notes) {
+        tell!("note: {}", printable(note));
+    }
+}
+
+/// Solves a problem and shows the passes.
+pub fn solve(problem: &Problem, method: Method, activity: &Activity) -> anyhow::Result<Solution> {
+    let name = &problem.run().recording.name;
+    activity.next(format!("calibrating {name}"));
+    let solution = problem.solve(method, &|pass| {
+        activity.pass(pass);
+        ControlFlow::Continue(())
+    });
+    solution.with_context(|| name.clone())
+}
+
+/// Writes a report into a new directory.
+pub fn write_report(document: &Document, directory: &Path) -> anyhow::Result<()> {
+    std::fs::create_dir(directory)
+        .with_context(|| format!("cannot create {}", directory.display()))?;
+    Ok(report::write(document, directory)?)
+}
+
+/// A truth, converted to the general form, which can represent any other.
+pub fn read_truth(path: &Path, run: &Run, body_frame: BodyFrame) -> anyhow::Result<Truth> {
+    let record = turncal_files::read_calibration(path)?;
+    if let Some(unit) = &record.unit
+        && *unit != run.instrument.unit
+    {
+        bail!(
+            "{}: units are {} and {}, but those of the run are {} and {}. Give the truth of this run",
+            path.display(),
+            unit.gyro,
+            unit.accel,
+            run.instrument.unit.gyro,
+            run.instrument.unit.accel
+        );
+    }
+    let triads = triads_of(&record, &run.instrument.nominal, InstallationForm::General);
+    Ok(Truth {
+        triads: in_body_frame(&triads, body_frame),
+        terms: record.terms,
+    })
+}

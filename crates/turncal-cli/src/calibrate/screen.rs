@@ -1,0 +1,138 @@
+//! What is shown while a log is followed.
+
+use std::collections::BTreeSet;
+use std::io::{self, IsTerminal};
+
+use crate::terminal::{columns, print};
+use turncal::lot::Specification;
+use turncal::number::count;
+use turncal::run::Run;
+use turncal::survey::Status;
+use turncal_report::session;
+use turncal_report::terminal::{printable, wrapped};
+
+/// Output: a screen that is redrawn on a terminal, otherwise a line for each dwell.
+pub struct Screen {
+    is_terminal: bool,
+    silent: bool,
+    /// Lines on the terminal that the next screen replaces.
+    drawn: usize,
+    /// Number of dwells already reported.
+    told: usize,
+    trouble: String,
+    /// Notes already reported, without their figures.
+    noted: BTreeSet<String>,
+    /// Content of the screen below the number of lines received.
+    content: Vec<String>,
+    received: usize,
+}
+
+impl Screen {
+    pub fn new(silent: bool) -> Self {
+        Self {
+            is_terminal: io::stdout().is_terminal(),
+            silent,
+            drawn: 0,
+            told: 0,
+            trouble: String::new(),
+            noted: BTreeSet::new(),
+            content: Vec::new(),
+            received: 0,
+        }
+    }
+
+    pub fn show(
+        &mut self,
+        run: &Run,
+        status: &Status,
+        specification: Option<&Specification>,
+    ) -> anyhow::Result<()> {
+        self.trouble.clear();
+        if self.is_terminal && !self.silent {
+            return self.draw(session::screen(run, status, specification));
+        }
+        for note in session::notes(run, status) {
+            let is_new = self
+                .noted
+                .insert(note.replace(|c: char| c.is_ascii_digit(), ""));
+            if is_new {
+                self.tell(&note)?;
+            }
+        }
+        // The last dwell is not complete while the instrument is at rest.
+        let whole = status.survey.rests.len() - usize::from(status.still > 0.0);
+        while self.told < whole {
+            if let Some(line) = session::line(status, self.told) {
+                self.tell(&line)?;
+            }
+            self.told += 1;
+            if self.told == whole
+                && let Some(next) = status.next
+            {
+                self.tell(&format!("next: {}", session::words(next)))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Reports once why the rows cannot be evaluated.
+    pub fn trouble(&mut self, text: &str) -> anyhow::Result<()> {
+        if self.is_terminal && !self.silent {
+            return self.draw(vec![
+                "waiting for readable rows".to_owned(),
+                text.to_owned(),
+            ]);
+        }
+        if self.trouble != text {
+            text.clone_into(&mut self.trouble);
+            self.tell(&format!("not yet: {text}"))?;
+        }
+        Ok(())
+    }
+
+    fn tell(&self, line: &str) -> anyhow::Result<()> {
+        match self.silent {
+            true => {
+                tell!("{}", printable(line));
+                Ok(())
+            }
+            false => print(format!("{}\n", printable(line)).as_bytes()),
+        }
+    }
+
+    /// Shows at once that lines arrive, before they are evaluated.
+    pub fn count(&mut self, received: usize) -> anyhow::Result<()> {
+        if received == self.received {
+            return Ok(());
+        }
+        self.received = received;
+        match self.is_terminal && !self.silent {
+            true => self.redraw(),
+            false => Ok(()),
+        }
+    }
+
+    fn draw(&mut self, content: Vec<String>) -> anyhow::Result<()> {
+        self.content = content;
+        self.redraw()
+    }
+
+    fn redraw(&mut self) -> anyhow::Result<()> {
+        let width = usize::from(columns().unwrap_or(80)).max(20);
+        let mut text = String::new();
+        if self.drawn > 0 {
+            text += &format!("\u{1b}[{}A", self.drawn);
+        }
+        text += "\u{1b}[J";
+        self.drawn = 0;
+        let received = format!("{} lines received", count(self.received));
+        for line in std::iter::once(&received).chain(&self.content) {
+            for part in wrapped(&printable(line), "  ", Some(width)) {
+                text += &part;
+                text.push('\n');
+                self.drawn += 1;
+            }
+        }
+        print(text.as_bytes())
+    }
+}

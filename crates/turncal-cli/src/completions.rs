@@ -1,0 +1,30 @@
+//! `turncal completions`
+
+use clap::CommandFactory;
+use clap_complete::Shell;
+
+use super::Cli;
+use crate::terminal::print;
+
+/// Prints a shell-completion script
+///
+/// Save it where your shell looks for completions; the examples show where.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  turncal completions bash > \\
+      ~/.local/share/bash-completion/completions/turncal
+  turncal completions zsh > ~/.zfunc/_turncal
+  turncal completions fish > ~/.config/fish/completions/turncal.fish")]
+pub struct Completions {
+    /// The shell
+    #[arg(value_enum)]
+    shell: Shell,
+}
+
+impl Completions {
+    pub fn run(&self) -> anyhow::Result<()> {
+        let mut script = Vec::new();
+        clap_complete::generate(self.shell, &mut Cli::command(), "turncal", &mut script);
+        print(&script)
+    }
+}

@@ -1,0 +1,46 @@
+//! `turncal check`
+
+use std::path::PathBuf;
+
+use crate::arguments::{Delivery, OfLog, run_or_log};
+use crate::terminal::Activity;
+use turncal::survey::Survey;
+use turncal_report::check;
+
+/// Describes a run and the parameters that each method could observe
+///
+/// Does not calibrate. Shows rate, jitter, faults and resolution of the log; dwells with their upward axis; turns with
+/// axis and angle; labelled sections compared with both; the predicted σ of each method and the parameters that it
+/// would not observe; recommended changes. Problems that it finds do not change the exit status.
+#[derive(Debug, clap::Args)]
+#[command(mut_arg("output", |output| output.help("Directory for the report and a figure of the recording")))]
+#[command(after_help = "Examples:
+  turncal check imu.csv
+  turncal check run.toml
+  turncal check run.toml -o check
+  turncal check run.toml --json")]
+pub struct Check {
+    /// A run.toml, a log, or - for text on standard input
+    #[arg(value_name = "RUN.toml|LOG", value_parser = run_or_log)]
+    run: PathBuf,
+    #[command(flatten)]
+    of_log: OfLog,
+    #[command(flatten)]
+    delivery: Delivery,
+}
+
+impl Check {
+    pub fn run(&self) -> anyhow::Result<()> {
+        let activity = Activity::new("reading");
+        let run = self.of_log.open(&self.run)?.run;
+        let begun = self.delivery.begin(&[&self.run])?;
+        activity.next("checking the run");
+        let survey = Survey::of(&run);
+        drop(activity);
+        begun.deliver(&check::document(&run, &survey))?;
+        if !self.delivery.json() {
+            tell!("\nnext: turncal calibrate {}", self.run.display());
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,40 @@
+//! `turncal noise`
+
+use crate::arguments::positive;
+use crate::terminal::show;
+use turncal::noise::conventions::{convert, known};
+use turncal_report::conversion;
+
+/// Converts a noise figure to every convention: data sheets, Kalibr, PSINS, KF-GINS
+///
+/// Each line names the convention and its users. Densities are two-sided, as in IEEE Std 952; a one-sided density is √2
+/// times as large. A unit of rate or acceleration (deg/s, m/s^2) means noise per sample with --rate, and bias
+/// instability without.
+#[derive(Debug, clap::Args)]
+#[command(after_help = format!("Examples:
+  turncal noise 0.3 'deg/sqrt(h)'
+  turncal noise 0.005 'deg/s/sqrt(Hz)' --rate 100
+  turncal noise 1.7e-4 gyroscope_noise_density
+
+Units (also in the form deg/sqrt(h), ug/sqrt(Hz), m/s^2):\n{}", known()))]
+pub struct Noise {
+    /// The figure
+    #[arg(value_name = "VALUE", allow_negative_numbers = true, value_parser = positive)]
+    value: f64,
+    /// Unit, or the name of the figure in a program
+    #[arg(value_name = "UNIT")]
+    unit: String,
+    /// Sample rate in Hz, for noise per sample
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true, value_parser = positive)]
+    rate: Option<f64>,
+    /// Print the results as one JSON document and nothing else
+    #[arg(long)]
+    json: bool,
+}
+
+impl Noise {
+    pub fn run(&self) -> anyhow::Result<()> {
+        let conversion = convert(self.value, &self.unit, self.rate)?;
+        show(&conversion::document(&conversion), self.json)
+    }
+}

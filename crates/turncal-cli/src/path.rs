@@ -1,0 +1,147 @@
+//! `turncal path`
+
+use crate::arguments::{AIDINGS, one_of};
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::Subcommand;
+
+use crate::NotMet;
+use crate::arguments::{Delivery, OfLog, error_term, needs_table};
+use crate::terminal::Activity;
+use turncal::calibration::{ErrorTerm, Word};
+use turncal::models::specification;
+use turncal::run::Aiding;
+use turncal::study::path::{Evaluation, Named, PathStudy};
+use turncal_files::Opened;
+use turncal_input::small_file;
+use turncal_report::path::{Report, in_words, moves_in_words};
+
+/// Predicts calibration accuracy for a path of a table or by hand, before any data exist
+#[derive(Debug, clap::Args)]
+#[command(arg_required_else_help = true)]
+#[command(after_help = "Example:  turncal path evaluate three-axis")]
+pub struct PathCommand {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Evaluate(Evaluate),
+}
+
+impl PathCommand {
+    pub fn run(&self) -> anyhow::Result<()> {
+        let Command::Evaluate(evaluate) = &self.command;
+        evaluate.run()
+    }
+}
+
+/// Predicts σ, the value of each move, and errors that a path cannot reveal
+///
+/// The path is a TOML file or an embedded name, or words for a sensor turned by hand: x_up … z_down, and turns such
+/// as "turn x 90", separated by commas. For a run.toml, σ are those expected from its own recording. The prediction
+/// is the Cramér–Rao bound for the stated noise. With a specification, the exit status is 3 if σ are too large to
+/// decide a limit.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  turncal path evaluate three-axis
+  turncal path evaluate three-axis --imu navigation-fog -o expected
+  turncal path evaluate z_up,x_up,x_down,y_up,y_down --imu bmi088
+  turncal path evaluate my-run/run.toml")]
+pub struct Evaluate {
+    /// Path: a TOML file, an embedded name, words for turns by hand, or a run.toml
+    path: String,
+    /// Scenario with site, rate, instrument and table [default: demo; by hand: mems]
+    #[arg(long, value_name = "SCENARIO")]
+    scenario: Option<String>,
+    /// Instrument that replaces the scenario's: a TOML file or an embedded name
+    #[arg(long, value_name = "MODEL")]
+    imu: Option<String>,
+    /// Table that replaces the scenario's: a TOML file or an embedded name
+    #[arg(long, value_name = "MODEL")]
+    table: Option<String>,
+    /// Observations of the filter [default: table; by hand: velocity]
+    #[arg(long, value_parser = one_of(&AIDINGS))]
+    aiding: Option<Aiding>,
+    /// Error terms to estimate
+    #[arg(long, value_name = "TERM", value_parser = error_term(), value_delimiter = ',')]
+    with: Vec<ErrorTerm>,
+    /// Limits that the calibration must decide (a specification.toml)
+    #[arg(long, value_name = "FILE")]
+    specification: Option<PathBuf>,
+    #[command(flatten)]
+    delivery: Delivery,
+}
+
+impl Evaluate {
+    fn run(&self) -> anyhow::Result<()> {
+        let specification = self.specification.as_deref().map(specification);
+        let specification = specification.transpose()?;
+        let file = Path::new(&self.path);
+        let inputs: Vec<&Path> = std::iter::once(file)
+            .chain(self.specification.as_deref())
+            .collect();
+        let begun = self.delivery.begin(&inputs)?;
+        let activity = Activity::new("evaluating the path");
+        let (name, with, moves, evaluation) = if is_run(file) {
+            self.of_run(file)?
+        } else {
+            self.of_path()?
+        };
+        drop(activity);
+        let checks = specification.map(|of| evaluation.decided(&of));
+        let report = Report {
+            name: &name,
+            with: &with,
+            moves: &moves,
+            evaluation: &evaluation,
+            checks: checks.as_deref(),
+        };
+        let document = report.document();
+        begun.deliver(&document)?;
+        match document.verdict {
+            Some((Word::Undecided, text)) => Err(NotMet(format!("{name}: {text}")).into()),
+            _ => Ok(()),
+        }
+    }
+
+    fn named(&self) -> Named<'_> {
+        Named {
+            path: &self.path,
+            scenario: self.scenario.as_deref(),
+            imu: self.imu.as_deref(),
+            table: self.table.as_deref(),
+            aiding: self.aiding,
+            terms: self.with.clone(),
+        }
+    }
+
+    fn of_run(&self, file: &Path) -> anyhow::Result<(String, String, Vec<String>, Evaluation)> {
+        let Opened { run, .. } = OfLog::default().open(file)?;
+        let aiding = self.aiding.unwrap_or_else(|| run.aiding());
+        self.with
+            .iter()
+            .for_each(|&term| needs_table(term, Some(aiding)));
+        let options = self.named().options(aiding);
+        let evaluation = Evaluation::of_run(&run, &options).with_context(|| self.path.clone())?;
+        let with = format!("Recording of {}, with the noise stated there", self.path);
+        Ok((run.recording.name.clone(), with, Vec::new(), evaluation))
+    }
+
+    fn of_path(&self) -> anyhow::Result<(String, String, Vec<String>, Evaluation)> {
+        let study = PathStudy::load(&self.named())?;
+        let aiding = study.options.aiding;
+        self.with.iter().for_each(|&term| needs_table(term, aiding));
+        let name = study.scenario.path_name.clone();
+        let moves = moves_in_words(&study.scenario);
+        let evaluation = study.evaluate().with_context(|| format!("path {name}"))?;
+        Ok((name, in_words(&study), moves, evaluation))
+    }
+}
+
+/// Whether a file describes a run.
+fn is_run(file: &Path) -> bool {
+    file.is_file() && small_file::read_text(file).is_ok_and(|text| text.contains("turncal-run/"))
+}

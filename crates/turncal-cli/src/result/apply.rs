@@ -1,0 +1,179 @@
+//! `turncal apply`
+
+use std::ops::Range;
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+use clap::error::ErrorKind;
+
+use crate::arguments::{OfLog, keep, run_or_log};
+use crate::terminal::{Activity, stream};
+use turncal::calibration::result::Calibration;
+use turncal::calibration::{Correction, TEMPERATURE_TOLERANCE, ThermalRecord};
+use turncal::imu::{Sensor, Term};
+use turncal::run::Run;
+use turncal::units::PPM;
+use turncal_files::export::{sample_rows, write_samples};
+use turncal_report::terminal::printable;
+
+/// A scale factor that differs by more than this many prior σ probably belongs to another instrument.
+const SUSPECT_SIGMAS: f64 = 10.0;
+
+/// Converts the raw samples of a run to angular rate and specific force
+///
+/// Writes one row per sample: start and end in s, angular rate in rad/s and specific force in m/s², both averaged over
+/// the sample, along right, front and up in the body frame of the calibration. Error terms of the calibration are also
+/// corrected, as is temperature dependence if the run has a temperature; the correction of the time offset neglects
+/// Earth rate. The output can itself be the log of a run.toml: output = "rate", time_stamp = "end".
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  turncal apply result/calibration.json run.toml -o calibrated.csv.gz
+  turncal apply result/calibration.json run.toml | head")]
+pub struct Apply {
+    /// The calibration
+    #[arg(value_name = "CALIBRATION.json")]
+    calibration: PathBuf,
+    /// A run.toml, a log, or - for text on standard input
+    #[arg(value_name = "RUN.toml|LOG", value_parser = run_or_log)]
+    run: PathBuf,
+    #[command(flatten)]
+    of_log: OfLog,
+    /// File to write, `.csv` or `.csv.gz` [default: standard output]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Interpolate missing rows and mark them with 1 in a column `filled`, except in gaps too long for calibrate to
+    /// bridge
+    #[arg(long)]
+    fill: bool,
+    /// Replace the output file if it exists
+    #[arg(long)]
+    force: bool,
+}
+
+impl Apply {
+    pub fn run(&self) -> anyhow::Result<()> {
+        if let Some(output) = &self.output {
+            let name = output.to_string_lossy();
+            if !(name.ends_with(".csv") || name.ends_with(".csv.gz")) {
+                let message = format!(
+                    "-o {name}: the output is CSV; give a name that ends in .csv, or in .csv.gz for compression\n"
+                );
+                clap::Error::raw(ErrorKind::ValueValidation, message).exit();
+            }
+        }
+        let record = turncal_files::read_calibration(&self.calibration)?;
+        let activity = Activity::new(format!("reading {}", self.run.display()));
+        let run = self.of_log.open(&self.run)?.run;
+        let correction = Correction::for_run(&record, &run)
+            .with_context(|| format!("{}, {}", self.calibration.display(), self.run.display()))?;
+        let lost: usize = run.recording.imu.lost().iter().map(Range::len).sum();
+        if let Some(missing) = run.recording.imu.missing().next().filter(|_| self.fill) {
+            bail!(
+                "{}: {} rows are missing from {:.3} s on, too many to fill. Omit --fill, or split the log there",
+                self.run.display(),
+                missing.len(),
+                run.recording.imu.time(missing.start)
+            );
+        }
+        activity.next("writing");
+        match &self.output {
+            Some(output) => {
+                keep(
+                    output,
+                    run.recording.files.iter().chain([&self.calibration]),
+                )?;
+                write_samples(output, &correction, &run, self.fill, self.force)?;
+            }
+            None => stream(|rows| sample_rows(rows, &correction, &run, self.fill))?,
+        }
+        drop(activity);
+        tell!(
+            "{} rows of {} s{}; x right, y front, z up, along: {}",
+            run.recording.imu.len() - if self.fill { 0 } else { lost },
+            run.recording.imu.period,
+            match (lost, self.fill) {
+                (0, _) => String::new(),
+                (lost, true) =>
+                    format!(", of which {lost} were missing in the log and interpolated"),
+                (lost, false) => format!(
+                    "; {lost} rows missing in the log were skipped (--fill interpolates them)"
+                ),
+            },
+            record.body_frame.words()
+        );
+        for note in notes(&record, &correction, &run) {
+            tell!("note: {}", printable(&note));
+        }
+        Ok(())
+    }
+}
+
+fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String> {
+    let mut notes = Vec::new();
+    if record.is_failed() {
+        notes.push("the verdict of the calibration is FAILED: do not use these values".to_owned());
+    }
+    if record.unit.is_none() {
+        notes.push(
+            "the calibration states no units, so turncal assumed those of the run".to_owned(),
+        );
+    }
+    for sensor in Sensor::ALL {
+        let scale = correction.sensitivity.get(sensor).diagonal();
+        let off = scale
+            .component_div(&run.instrument.nominal.get(sensor).0)
+            .add_scalar(-1.0);
+        let sigmas = off
+            .abs()
+            .component_div(&run.instrument.prior.get(sensor).scale_sigma);
+        if sigmas.max() > SUSPECT_SIGMAS {
+            notes.push(format!(
+                "{} scale factors differ by up to {:.0} ppm from the nominal values of the run, {:.0} times the 1σ \
+                 in [imu.prior.{0}]. Check that this calibration belongs to this instrument",
+                sensor.name(),
+                off.amax() / PPM,
+                sigmas.max()
+            ));
+        }
+    }
+    if let Some(thermal) = &record.temperature {
+        notes.extend(of_temperature(thermal, run));
+    }
+    if correction.has(Term::TimeOffset) {
+        notes
+            .push("the correction of the accelerometer time offset neglects Earth rate".to_owned());
+    }
+    if correction.has(Term::SizeEffect) && !run.recording.imu.continuous {
+        notes.push(
+            "the recording is not continuous, so the size effect is corrected without its angular-acceleration part"
+                .to_owned(),
+        );
+    }
+    notes
+}
+
+/// Notes if the temperature of the run is unknown or outside the range of the calibration.
+fn of_temperature(thermal: &ThermalRecord, run: &Run) -> Vec<String> {
+    let Some(temperature) = &run.recording.imu.temperature else {
+        return vec![format!(
+            "the calibration depends on temperature, but the run has none: all rows are corrected for {} °C and have \
+             0 in in_range",
+            thermal.range.gyro.reference
+        )];
+    };
+    let beyond = Sensor::ALL.into_iter().filter_map(|sensor| {
+        let ([lowest, highest], range) = (temperature.range(sensor), thermal.range.get(sensor));
+        let is_beyond = lowest < range.lowest - TEMPERATURE_TOLERANCE
+            || highest > range.highest + TEMPERATURE_TOLERANCE;
+        is_beyond.then(|| {
+            format!(
+                "{}: the run covers {lowest:.1} to {highest:.1} °C, but the calibration is valid for {:.1} to {:.1} \
+                 °C; rows outside have 0 in in_range",
+                sensor.name(),
+                range.lowest,
+                range.highest
+            )
+        })
+    });
+    beyond.collect()
+}

@@ -1,0 +1,56 @@
+//! `turncal compare`: calibrations side by side.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::bail;
+use clap::error::ErrorKind;
+
+use crate::arguments::{Delivery, at_temperature};
+use crate::terminal::short_names;
+use turncal::lot::{Lot, Unit};
+use turncal_report as report;
+
+/// Compares calibrations, parameter by parameter, with their σ
+///
+/// All calibrations are first converted to the general installation form and one body frame. Differences are from the
+/// truth or, for two calibrations without a truth, from the first. For three or more, the mean, scatter and χ² of the
+/// scatter relative to the stated σ are also shown, and outliers are named.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  turncal compare monday.json friday.json --truth truth.json")]
+pub struct Compare {
+    /// Two or more calibrations (one is enough with --truth)
+    #[arg(required = true, value_name = "CALIBRATION.json")]
+    calibrations: Vec<PathBuf>,
+    /// True values, if known
+    #[arg(long, value_name = "FILE")]
+    truth: Option<PathBuf>,
+    /// Temperature of the comparison, °C [default: reference temperature of each calibration]
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    temperature_degc: Option<f64>,
+    #[command(flatten)]
+    delivery: Delivery,
+}
+
+impl Compare {
+    pub fn run(&self) -> anyhow::Result<()> {
+        if self.calibrations.len() == 1 && self.truth.is_none() {
+            let message = "one calibration can be compared only with a truth; give --truth or a second calibration\n";
+            clap::Error::raw(ErrorKind::TooFewValues, message).exit();
+        }
+        let paths = self.truth.iter().chain(&self.calibrations);
+        let paths: Vec<&Path> = paths.map(PathBuf::as_path).collect();
+        let named = short_names(&paths).into_iter().zip(&paths);
+        let units = named.map(|(name, path)| {
+            let calibration = at_temperature(path, self.temperature_degc)?;
+            anyhow::Ok(Unit::of_record(name, calibration, None))
+        });
+        let mut units = units.collect::<anyhow::Result<Vec<Unit>>>()?;
+        let calibrations = units.split_off(usize::from(self.truth.is_some()));
+        let lot = Lot::new(calibrations, units.pop(), None);
+        if let Some((unit, reason)) = lot.failures().next() {
+            bail!("{}: {reason}", unit.name);
+        }
+        let begun = self.delivery.begin(&paths)?;
+        begun.deliver(&report::lot::document(&lot))
+    }
+}

@@ -1,0 +1,70 @@
+//! `turncal export`
+
+use crate::arguments::export_format;
+use std::path::PathBuf;
+
+use anyhow::Context;
+
+use crate::arguments::{at_temperature, keep, run_file};
+use crate::terminal::print;
+use turncal_files::export;
+use turncal_files::write_whole;
+
+/// Exports a calibration for other programs (Kalibr, PX4, ROS, C, …)
+///
+/// Formats with inputs in rad/s and m/s² state the divisor of the raw output: the nominal scale of its unit or, for
+/// counts, that of --run, otherwise the calibrated scale factors rounded to three digits. Parts of the calibration that
+/// a format cannot represent are named in the file and on standard error.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  turncal export result/calibration.json --format c -o imu.h
+  turncal export result/calibration.json --format kalibr \\
+      --run my-run/run.toml -o imu.yaml
+  turncal export result/calibration.json --format text")]
+pub struct Export {
+    /// The calibration
+    #[arg(value_name = "CALIBRATION.json")]
+    calibration: PathBuf,
+    /// Format to write
+    #[arg(long, value_parser = export_format())]
+    format: export::Format,
+    /// Run of the same instrument, for noise figures, sample rate and nominal scales
+    #[arg(long, value_name = "RUN.toml", value_parser = run_file)]
+    run: Option<PathBuf>,
+    /// Calibration temperature, °C [default: reference temperature; c, px4 and ardupilot contain the temperature
+    /// dependence]
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    temperature_degc: Option<f64>,
+    /// File to write [default: standard output]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Replace the output file if it exists
+    #[arg(long)]
+    force: bool,
+}
+
+impl Export {
+    pub fn run(&self) -> anyhow::Result<()> {
+        let record = at_temperature(&self.calibration, self.temperature_degc)?;
+        let run = self
+            .run
+            .as_deref()
+            .map(turncal_files::read_run)
+            .transpose()?;
+        let exported = export::write(&record, &self.format, run.as_ref())
+            .with_context(|| self.calibration.display().to_string())?;
+        let text = &exported.bytes;
+        match &self.output {
+            Some(output) => {
+                let files = run.iter().flat_map(|run| &run.recording.files);
+                keep(output, files.chain([&self.calibration]))?;
+                write_whole(output, text, self.force)?;
+            }
+            None => print(text)?,
+        }
+        for note in exported.notes {
+            tell!("not included: {note}");
+        }
+        Ok(())
+    }
+}

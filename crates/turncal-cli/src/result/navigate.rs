@@ -1,0 +1,187 @@
+//! `turncal navigate`
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use clap::ValueEnum;
+
+use crate::arguments::{Delivery, at_temperature, hours, latitude, number};
+use crate::terminal::{Activity, short_names};
+use turncal::calibration::{Calibration, Named};
+use turncal::imu::Sensor;
+use turncal::study::navigation::{INTERVAL, MethodOutlook, Mission, Motion, Pair};
+use turncal::units::DEGREE;
+use turncal_report::navigation::Navigation;
+
+const HOUR: f64 = 3600.0;
+/// Largest pitch at which roll and heading are distinguishable, degrees.
+const LARGEST_PITCH: f64 = 89.0;
+
+/// Shows the navigation error due to the errors of a calibration
+///
+/// Navigates with the instrument of --truth, corrected by the calibration, from perfect alignment and with the height
+/// fixed to the true height, at rest or along a trajectory. Shows the errors of attitude, velocity and position, and
+/// their σ predicted from the covariance of the calibration.
+#[derive(Debug, clap::Args)]
+#[command(mut_arg("output", |output| output.help("Directory for navigation.csv, figures and a page")))]
+#[command(after_help = "Examples:
+  turncal navigate calibration.json --truth truth.json \\
+      --latitude-deg 45
+  turncal navigate calibration.json --truth truth.json \\
+      --trajectory flight --hours 3 -o flight
+  turncal navigate monday.json --truth friday.json \\
+      --latitude-deg -33.9 --errors gyro --json")]
+pub struct Navigate {
+    /// The calibration that navigation uses
+    #[arg(value_name = "CALIBRATION.json")]
+    calibration: PathBuf,
+    /// The true parameters of the instrument: a truth.json or another calibration
+    #[arg(long, value_name = "FILE")]
+    truth: PathBuf,
+    /// Latitude in degrees, north positive [default: from the trajectory, otherwise from the calibration]
+    #[arg(
+        long,
+        alias = "latitude",
+        value_name = "L",
+        allow_negative_numbers = true,
+        value_parser = latitude
+    )]
+    latitude_deg: Option<f64>,
+    /// Height above the ellipsoid in metres [default: 0, or that of the trajectory, which shifts with it]
+    #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = height)]
+    height_m: Option<f64>,
+    /// Attitude at rest, in degrees
+    #[arg(
+        long,
+        value_name = "PITCH,ROLL,HEADING",
+        allow_hyphen_values = true,
+        conflicts_with = "trajectory",
+        default_value = "0,0,0",
+        value_parser = attitude
+    )]
+    attitude_deg: Attitude,
+    /// Triads with calibration errors
+    #[arg(long, value_enum, default_value_t = Errors::Both)]
+    errors: Errors,
+    /// Duration in hours (whole minutes, up to 1000)
+    #[arg(long, default_value_t = 40.0, allow_negative_numbers = true, value_parser = hours)]
+    hours: f64,
+    /// Trajectory to follow instead of rest: a TOML file or an embedded name (flight, vehicle)
+    #[arg(long, value_name = "FILE.toml")]
+    trajectory: Option<String>,
+    /// Temperature, °C [default: reference temperature of each calibration]
+    #[arg(long, value_name = "T", allow_negative_numbers = true)]
+    temperature_degc: Option<f64>,
+    #[command(flatten)]
+    delivery: Delivery,
+}
+
+/// Pitch, roll and heading in degrees.
+#[derive(Debug, Clone, Copy)]
+struct Attitude([f64; 3]);
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Errors {
+    /// Both triads
+    Both,
+    /// The gyros; the accelerometers are exact
+    Gyro,
+    /// The accelerometers; the gyros are exact
+    Accel,
+}
+
+impl Errors {
+    fn only(self) -> Option<Sensor> {
+        match self {
+            Self::Both => None,
+            Self::Gyro => Some(Sensor::Gyro),
+            Self::Accel => Some(Sensor::Accel),
+        }
+    }
+}
+
+impl Navigate {
+    pub fn run(&self) -> anyhow::Result<()> {
+        let paths = [self.calibration.as_path(), self.truth.as_path()];
+        let names = short_names(&paths);
+        let [calibration, truth] = [
+            at_temperature(&self.calibration, self.temperature_degc)?,
+            at_temperature(&self.truth, self.temperature_degc)?,
+        ];
+        let [of_calibration, of_truth] = [(&names[0], &calibration), (&names[1], &truth)]
+            .map(|(name, record)| Named { name, record });
+        let (mut pair, body_frame) = Pair::of_records(of_calibration, of_truth)?;
+        let only = self.errors.only();
+        if let Some(sensor) = only {
+            pair = pair.with_errors_of(sensor);
+        }
+        let (motion, trajectory) = self.motion(&calibration)?;
+        let mission = Mission {
+            motion,
+            intervals: (self.hours * HOUR / INTERVAL).round() as u32,
+            interval: INTERVAL,
+        };
+        let inputs: Vec<&Path> = paths
+            .into_iter()
+            .chain(self.trajectory.as_deref().map(Path::new))
+            .collect();
+        let begun = self.delivery.begin(&inputs)?;
+
+        let activity = Activity::new(format!("navigating {} h", self.hours));
+        let moments = mission.navigate(&pair);
+        let moments = moments.with_context(|| self.calibration.display().to_string())?;
+        drop(activity);
+        let navigated = MethodOutlook {
+            method: "error",
+            outlook: moments,
+        };
+        let navigation = Navigation {
+            calibration: &names[0],
+            truth: &names[1],
+            converged: calibration.converged != Some(false),
+            terms: !calibration.terms.is_empty() || !truth.terms.is_empty(),
+            body_frame,
+            only,
+            mission: &mission,
+            trajectory: trajectory.as_deref(),
+            navigated: &navigated,
+        };
+        begun.deliver(&navigation.document())
+    }
+
+    /// How the body moves, and the name of its trajectory.
+    fn motion(&self, calibration: &Calibration) -> anyhow::Result<(Motion, Option<String>)> {
+        let latitude = self.latitude_deg.map(|latitude| latitude * DEGREE);
+        if let Some(name) = &self.trajectory {
+            let (motion, name) = Motion::along(name, latitude, self.height_m)?;
+            return Ok((motion, Some(name)));
+        }
+        let of_run = calibration.provenance.as_ref();
+        let of_run = of_run.and_then(|of| Some(of.latitude_deg? * DEGREE));
+        let Some(latitude) = latitude.or(of_run) else {
+            bail!("no latitude: give --latitude-deg, or --trajectory");
+        };
+        let attitude = self.attitude_deg.0.map(|angle| angle * DEGREE);
+        let height = self.height_m.unwrap_or(0.0);
+        Ok((Motion::at_rest(latitude, height, attitude), None))
+    }
+}
+
+fn height(text: &str) -> Result<f64, String> {
+    number(text, -12e3, 1e5)
+}
+
+fn attitude(text: &str) -> Result<Attitude, String> {
+    let angles: Vec<&str> = text.split(',').collect();
+    let [pitch, roll, heading] = angles[..] else {
+        return Err(format!(
+            "expected pitch, roll and heading with commas between, found {} number(s)",
+            angles.len()
+        ));
+    };
+    Ok(Attitude([
+        number(pitch, -LARGEST_PITCH, LARGEST_PITCH).map_err(|e| format!("pitch: {e}"))?,
+        number(roll, -360.0, 360.0).map_err(|e| format!("roll: {e}"))?,
+        number(heading, -360.0, 360.0).map_err(|e| format!("heading: {e}"))?,
+    ]))
+}

@@ -1,0 +1,17 @@
+//! `turncal schema`
+
+use crate::terminal::print;
+use turncal_files::run_schema;
+
+/// Prints the JSON schema of run.toml, for completion and checks in editors
+///
+/// Save it and name it in the first line of a run.toml: #:schema ./run.schema.json
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:  turncal schema > run.schema.json")]
+pub struct Schema {}
+
+impl Schema {
+    pub fn run(&self) -> anyhow::Result<()> {
+        print((serde_json::to_string_pretty(&run_schema())? + "\n").as_bytes())
+    }
+}

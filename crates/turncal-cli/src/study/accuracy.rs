@@ -1,0 +1,98 @@
+//! `turncal study accuracy`
+
+use crate::arguments::{AIDINGS, FORMS, NOISE, one_of};
+use std::path::Path;
+
+use super::carry_out;
+use crate::arguments::{Delivery, Sharding, at_least_two, error_term, needs_table, seed};
+use turncal::calibration::{ErrorTerm, NoisePolicy};
+use turncal::imu::InstallationForm;
+use turncal::models::{InstallationModel, Place};
+use turncal::run::Aiding;
+use turncal::simulation::Scenario;
+use turncal::study::AccuracyStudy;
+use turncal_files::JobKind;
+use turncal_report as report;
+
+/// Tests the accuracy of the filter and the consistency of its σ
+///
+/// Simulates many runs, each with a different instrument, different noise and different table errors, and calibrates
+/// each with the filter and, on the static positions of the paper, with the closed form. Shows the RMS error of each
+/// group, and of the position after 40 h of navigation, compared with the Cramér–Rao bound and with the closed form,
+/// and the consistency of the filter σ (NEES, NIS, position errors within their predicted σ). Runs in which the filter
+/// fails are included.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  turncal study accuracy --runs 500
+  turncal study accuracy nineteen-position --runs 200 -o nineteen
+  turncal study accuracy --installation three-angle \\
+      --truth-installation three-angle
+  turncal study accuracy real-table --unmodelled table-base,table-axes
+  turncal study accuracy --with accel-second-order,size-effect")]
+pub struct Accuracy {
+    /// Scenario: a TOML file or an embedded name
+    #[arg(default_value = "demo")]
+    scenario: String,
+    /// Different path: a TOML file or an embedded name
+    #[arg(long, value_name = "PATH")]
+    path: Option<String>,
+    /// Observations used by the filter
+    #[arg(long, value_parser = one_of(&AIDINGS), default_value = "table")]
+    aiding: Aiding,
+    /// Installation form of the filter
+    #[arg(long, value_parser = one_of(&FORMS), default_value = "general")]
+    installation: InstallationForm,
+    /// Installation of the simulated instruments: a TOML file or an embedded name [default: from the scenario]
+    #[arg(long, value_name = "MODEL")]
+    truth_installation: Option<String>,
+    /// Error terms to simulate and to estimate, in addition to those of the scenario
+    #[arg(long, value_name = "TERM", value_parser = error_term(), value_delimiter = ',')]
+    with: Vec<ErrorTerm>,
+    /// Error terms to simulate but not to estimate
+    #[arg(long, value_name = "TERM", value_parser = error_term(), value_delimiter = ',')]
+    unmodelled: Vec<ErrorTerm>,
+    /// Noise used by the filter; the noise stated in a scenario is correct
+    #[arg(long, value_parser = one_of(&NOISE), default_value = "stated")]
+    noise: NoisePolicy,
+    /// Number of runs
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = at_least_two)]
+    runs: u64,
+    /// Seed of all random numbers [default: from the scenario]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = seed)]
+    seed: Option<u64>,
+    #[command(flatten)]
+    sharding: Sharding,
+    #[command(flatten)]
+    delivery: Delivery,
+}
+
+impl Accuracy {
+    pub fn run(&self) -> anyhow::Result<()> {
+        let mut scenario = Scenario::load(&self.scenario)?;
+        scenario.body_frame = self.aiding.body_frame();
+        if let Some(path) = &self.path {
+            scenario = scenario.with_path(path)?;
+        }
+        if let Some(model) = &self.truth_installation {
+            scenario.installation = InstallationModel::load(model, &Place::CommandLine)?;
+        }
+        for &term in self.with.iter().chain(&self.unmodelled) {
+            needs_table(term, Some(self.aiding));
+            scenario = scenario.with_error_term(term);
+        }
+        let study = AccuracyStudy {
+            unmodelled: self.unmodelled.clone(),
+            form: self.installation,
+            noise: self.noise,
+            runs: self.runs,
+            seed: self.seed.unwrap_or(scenario.seed),
+            scenario,
+        };
+        let inputs = [Path::new(&self.scenario)];
+        let part = self.sharding;
+        if part.make(JobKind::StudyAccuracy, &study, &self.delivery, &inputs)? {
+            return Ok(());
+        }
+        carry_out(&study, &self.delivery, &inputs, report::accuracy::document)
+    }
+}

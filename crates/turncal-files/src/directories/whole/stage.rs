@@ -1,0 +1,306 @@
+//! A temporary location next to an output.
+
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread;
+use std::time::Duration;
+
+use turncal_input::FileError;
+
+const PREFIX: &str = ".turncal-";
+/// Locked during the lifetime of the process that created the stage.
+const LOCK: &str = "turncal.lock";
+const NEW: &str = "new";
+const OLD: &str = "old";
+/// New output that is being removed.
+const DEAD: &str = "dead";
+
+/// Announces every stage to the thread that ends the process on a signal; not set in a library.
+static ANNOUNCED: OnceLock<Sender<Beside>> = OnceLock::new();
+/// Whether that thread is about to end the process.
+static ENDING: AtomicBool = AtomicBool::new(false);
+
+/// Error: an output must not replace what is at `target`.
+pub fn taken(target: &Path) -> FileError {
+    FileError::of(
+        target,
+        "an existing file or directory of this name",
+        "an unused name",
+        "Choose another name, or add --force to replace it.",
+    )
+}
+
+/// Error: the system does not allow writing at `target`.
+pub fn unwritable(target: &Path, doing: &str, error: &io::Error) -> FileError {
+    let advice = "Choose a directory that can be written.";
+    FileError::io(target, doing, error, advice)
+}
+
+/// Unfinished outputs of this process, for the thread that ends the process on a signal.
+pub struct Unfinished(Receiver<Beside>);
+
+impl Unfinished {
+    /// Collects them from here on; `None` if another thread already does.
+    pub fn of_this_process() -> Option<Self> {
+        let (announced, all) = channel();
+        ANNOUNCED.set(announced).ok().map(|()| Self(all))
+    }
+
+    /// Removes them, for a process that is about to end. Threads that start, finish or abandon an output from here on
+    /// wait for that end.
+    pub fn abandon(self) {
+        ENDING.store(true, Ordering::SeqCst);
+        for beside in self.0.try_iter() {
+            // Another thread may be writing into it or exchanging old and new.
+            for _ in 0..100 {
+                if beside.remove().is_ok() {
+                    break;
+                }
+                thread::sleep(Duration::from_millis(10));
+            }
+        }
+    }
+}
+
+/// A stage, and the directories created for it, innermost first.
+#[derive(Clone)]
+struct Beside {
+    stage: PathBuf,
+    parents: Vec<PathBuf>,
+}
+
+impl Beside {
+    /// Announces the stage; does not return if the process is about to end.
+    fn announce(&self) {
+        if let Some(all) = ANNOUNCED.get() {
+            // Without that thread nobody receives it.
+            let _ = all.send(self.clone());
+        }
+        if ENDING.load(Ordering::SeqCst) {
+            let _ = self.remove();
+            loop {
+                thread::park();
+            }
+        }
+    }
+
+    /// Removes the stage and the directories created for it, if empty.
+    fn remove(&self) -> io::Result<()> {
+        let removed = remove(&self.stage);
+        // The first that is not empty ends this; so does a target that is in place.
+        let _ = self.parents.iter().try_for_each(fs::remove_dir);
+        removed
+    }
+}
+
+/// A target for new output.
+pub struct Stage {
+    /// Contains the new output and, during the exchange, the old one. Removed on drop.
+    beside: Beside,
+    /// `None` if the file system has no locks.
+    lock: Option<File>,
+    target: PathBuf,
+}
+
+impl Stage {
+    pub fn new(target: &Path) -> Result<Self, FileError> {
+        if target.file_name().is_none() {
+            return Err(FileError::of(
+                target,
+                "a path that does not end in a name",
+                "the name of a file or directory to write",
+                "Give a name that does not end in `..` or `/`.",
+            ));
+        }
+        let parent = match target.parent() {
+            Some(parent) if parent != Path::new("") => parent,
+            _ => Path::new("."),
+        };
+        let missing: Vec<PathBuf> = parent
+            .ancestors()
+            .take_while(|ancestor| *ancestor != Path::new("") && !ancestor.exists())
+            .map(Path::to_owned)
+            .collect();
+        let begun = fs::create_dir_all(parent).and_then(|()| {
+            remove_abandoned(parent);
+            begin(parent)
+        });
+        match begun {
+            Ok((stage, lock)) => {
+                let beside = Beside {
+                    stage,
+                    parents: missing,
+                };
+                beside.announce();
+                Ok(Self {
+                    beside,
+                    lock,
+                    target: target.to_owned(),
+                })
+            }
+            Err(error) => {
+                let _ = missing.iter().try_for_each(fs::remove_dir);
+                let file = parent.ancestors().find(|ancestor| ancestor.is_file());
+                Err(file.map_or_else(
+                    || unwritable(target, "write here", &error),
+                    |file| {
+                        FileError::of(
+                            target,
+                            format_args!("the file {} in the path", file.display()),
+                            "directories",
+                            "Choose another name.",
+                        )
+                    },
+                ))
+            }
+        }
+    }
+
+    pub fn new_path(&self) -> PathBuf {
+        self.beside.stage.join(NEW)
+    }
+
+    pub fn target(&self) -> &Path {
+        &self.target
+    }
+
+    /// Moves the new output into place; existing output is replaced only with `force`.
+    pub fn commit(self, force: bool) -> Result<(), FileError> {
+        let old = self.beside.stage.join(OLD);
+        let exists = fs::symlink_metadata(&self.target).is_ok();
+        if exists && !force {
+            return Err(taken(&self.target));
+        }
+        // The target is never missing where the system can exchange two names.
+        if exists && exchange(&self.new_path(), &self.target).is_ok() {
+            return Ok(());
+        }
+        let refused = |error| unwritable(&self.target, "put the output in place", &error);
+        if exists {
+            fs::rename(&self.target, &old).map_err(refused)?;
+        }
+        let Err(error) = fs::rename(self.new_path(), &self.target) else {
+            return Ok(());
+        };
+        if exists && fs::rename(&old, &self.target).is_err() {
+            let doing = format!(
+                "put the output in place (the old output is in {})",
+                self.beside.stage.display()
+            );
+            return Err(FileError::io(
+                &self.target,
+                &doing,
+                &error,
+                "Move it back by hand.",
+            ));
+        }
+        Err(refused(error))
+    }
+}
+
+impl Drop for Stage {
+    fn drop(&mut self) {
+        self.lock = None;
+        let _ = self.beside.remove();
+        self.beside.announce();
+    }
+}
+
+/// Creates and locks a stage.
+fn begin(parent: &Path) -> io::Result<(PathBuf, Option<File>)> {
+    const ATTEMPTS: usize = 20;
+    for _ in 0..ATTEMPTS {
+        let beside = tempfile::Builder::new()
+            .prefix(PREFIX)
+            .tempdir_in(parent)?
+            .keep();
+        let lock = beside.join(LOCK);
+        let file = match File::create_new(&lock) {
+            Ok(file) => file,
+            // Taken for abandoned by another process before it could be locked.
+            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
+            Err(error) => {
+                let _ = fs::remove_dir(&beside);
+                return Err(error);
+            }
+        };
+        match file.try_lock() {
+            Ok(()) if lock.exists() => return Ok((beside, Some(file))),
+            Ok(()) | Err(TryLockError::WouldBlock) => {}
+            Err(TryLockError::Error(_)) => return Ok((beside, None)),
+        }
+    }
+    Err(io::ErrorKind::ResourceBusy.into())
+}
+
+/// Removes stages of processes that no longer exist from a directory.
+pub fn remove_abandoned(parent: &Path) {
+    let Ok(entries) = fs::read_dir(parent) else {
+        return;
+    };
+    for entry in entries.flatten() {
+        let is_stage = entry
+            .file_name()
+            .as_encoded_bytes()
+            .starts_with(PREFIX.as_bytes())
+            && entry.file_type().is_ok_and(|kind| kind.is_dir());
+        if is_stage {
+            // What cannot be removed, another user's for one, does no harm.
+            let _ = remove_if_abandoned(&entry.path());
+        }
+    }
+}
+
+fn remove_if_abandoned(stage: &Path) -> io::Result<()> {
+    let lock = stage.join(LOCK);
+    match fs::symlink_metadata(&lock) {
+        Ok(found) if found.is_file() => {}
+        Ok(_) => return Ok(()),
+        // Not locked yet, or never to be: one that is still empty is made again.
+        Err(_) => return fs::remove_dir(stage),
+    }
+    let file = OpenOptions::new().read(true).write(true).open(&lock)?;
+    if file.try_lock().is_err() {
+        return Ok(());
+    }
+    // Locked until it is gone: it may be about to be taken into use.
+    remove(stage)
+}
+
+/// Removes a stage, except one with the only copy of the output that was to be replaced.
+fn remove(stage: &Path) -> io::Result<()> {
+    let [new, old, dead] = [NEW, OLD, DEAD].map(|name| stage.join(name));
+    if new.exists() && old.exists() {
+        return Err(io::ErrorKind::ResourceBusy.into());
+    }
+    // Output that has lost its name is not put in place half removed.
+    let _ = fs::rename(&new, &dead);
+    for thing in [dead, old] {
+        match fs::symlink_metadata(&thing) {
+            Ok(found) if found.is_dir() => fs::remove_dir_all(&thing)?,
+            Ok(_) => fs::remove_file(&thing)?,
+            Err(_) => {}
+        }
+    }
+    let _ = fs::remove_file(stage.join(LOCK));
+    match fs::remove_dir(stage) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// Exchanges two paths atomically.
+#[cfg(any(target_os = "linux", target_vendor = "apple"))]
+fn exchange(a: &Path, b: &Path) -> io::Result<()> {
+    use rustix::fs::{CWD, RenameFlags, renameat_with};
+    Ok(renameat_with(CWD, a, CWD, b, RenameFlags::EXCHANGE)?)
+}
+
+#[cfg(not(any(target_os = "linux", target_vendor = "apple")))]
+fn exchange(_: &Path, _: &Path) -> io::Result<()> {
+    Err(io::ErrorKind::Unsupported.into())
+}

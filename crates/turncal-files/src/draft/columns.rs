@@ -1,0 +1,423 @@
+//! Assignment of columns.
+
+use nalgebra::Vector3;
+
+use super::name::Name;
+use super::raw_samples::offset;
+use super::stated::StatedColumns;
+use crate::Sheet;
+use turncal::imu::{PerSensor, Sensor};
+use turncal::statistics::median;
+
+/// Columns by index in the file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Columns {
+    pub names: Vec<String>,
+    pub time: Option<usize>,
+    /// Nanoseconds in addition to a time in whole seconds.
+    pub nanoseconds: Option<usize>,
+    pub triads: PerSensor<Option<[usize; 3]>>,
+    /// Other candidates.
+    pub others: PerSensor<Vec<[usize; 3]>>,
+    /// Whether the triads were identified by value, because their names are not informative.
+    pub by_size: bool,
+    pub temperature: Option<usize>,
+    /// Four columns of norm one.
+    pub quaternion: Option<[usize; 4]>,
+}
+
+/// Fraction of rows that must be numeric.
+const NUMBERS: f64 = 0.5;
+/// Sensor failures affect fewer rows; if one triad is empty in more, the rates differ.
+const LACKING: f64 = 0.1;
+/// Maximum number of instruments in a log.
+const MOST_INSTANCES: usize = 8;
+/// Fraction of increasing steps of a time column, and of a column named as time, which may repeat.
+const FORWARD: f64 = 0.9;
+const SELDOM_FORWARD: f64 = 0.01;
+/// Accelerometers have the magnitude of gravity within this fraction in half of the rows …
+const EVEN: f64 = 0.05;
+/// … and a column that deviates more from its median is not an accelerometer.
+const UNEVEN: f64 = 0.2;
+/// Gyros in a turn exceed their median by more than this factor.
+const LIVELY: f64 = 3.0;
+
+/// Samples of both triads, row by row.
+type Samples = PerSensor<Vec<Vector3<f64>>>;
+
+impl Columns {
+    pub fn find(sheet: &Sheet) -> Self {
+        let columns = sheet.names.iter().zip(&sheet.units);
+        let names: Vec<Name> = columns
+            .map(|(name, unit)| Name::of_column(name, unit))
+            .collect();
+        let mut found = PerSensor::from_fn(|sensor| by_name(&names, sheet, sensor));
+        // Of several the first with a unit, and that is gravity's in those of the accelerometers.
+        let is_bare =
+            |triad: &[usize; 3]| names[triad[0]].unit.is_none_or(|unit| unit.word == "count");
+        found.gyro.sort_by_key(is_bare);
+        found
+            .accel
+            .sort_by_key(|triad| (magnitude(sheet, triad).0 > UNEVEN, is_bare(triad)));
+        let of_triads = found.gyro.iter().chain(&found.accel).flatten();
+        let of_triads: Vec<usize> = of_triads.copied().collect();
+        // Rows of another sensor may have other times.
+        let is_sample = |row: &usize| of_triads.is_empty() || sheet.has(&of_triads, *row);
+        let rows: Vec<usize> = (0..sheet.rows()).filter(is_sample).collect();
+        let forward = |k: usize| forward(rows.iter().map(|&row| sheet.columns[k][row]));
+        let split = split_time(sheet, &names);
+        let time = split
+            .map(|pair| pair[0])
+            .or_else(|| time(sheet, &names, forward));
+        let temperature =
+            (0..names.len()).find(|&k| names[k].is_temperature() && is_numeric(sheet, k));
+        let quaternion = quaternion(sheet, time);
+        let lacks = |found: &PerSensor<Vec<_>>, sensor: Sensor| found.get(sensor).is_empty();
+        let lacked = PerSensor::from_fn(|sensor| lacks(&found, sensor));
+        if lacked.gyro || lacked.accel {
+            let taken = [time, split.map(|pair| pair[1]), temperature]
+                .into_iter()
+                .flatten();
+            let taken = taken
+                .chain(of_triads)
+                .chain(quaternion.into_iter().flatten());
+            by_numbers(sheet, &names, &taken.collect::<Vec<_>>(), &mut found);
+        }
+        let is_new = |&sensor: &Sensor| *lacked.get(sensor) && !lacks(&found, sensor);
+        let first = |triads: &Vec<[usize; 3]>| triads.first().copied();
+        Self {
+            names: (0..names.len())
+                .map(|k| distinct(&sheet.names, k))
+                .collect(),
+            time,
+            nanoseconds: split.map(|pair| pair[1]),
+            triads: PerSensor::from_fn(|sensor| first(found.get(sensor))),
+            others: PerSensor::from_fn(|sensor| {
+                found.get(sensor).iter().skip(1).copied().collect()
+            }),
+            by_size: Sensor::ALL.iter().any(is_new),
+            temperature,
+            quaternion,
+        }
+    }
+
+    /// Replaces columns by those that the user states.
+    pub fn state(&mut self, stated: &StatedColumns) {
+        let place = |name: &String| self.names.iter().position(|of| of == name);
+        let of_triads = PerSensor::from_fn(|sensor| {
+            let [x, y, z] = stated.triads.get(sensor).as_ref()?;
+            Some([place(x)?, place(y)?, place(z)?])
+        });
+        let time = stated.time.as_ref().and_then(place);
+        let temperature = stated.temperature.as_ref().and_then(place);
+        for sensor in Sensor::ALL {
+            let stated = of_triads.gyro.iter().chain(&of_triads.accel).flatten();
+            let is_taken = |of: [usize; 3]| stated.clone().any(|k| of.contains(k));
+            let found = self.triads.get_mut(sensor);
+            *found = found.filter(|of| !is_taken(*of));
+            if let Some(triad) = of_triads.get(sensor) {
+                *self.triads.get_mut(sensor) = Some(*triad);
+                self.others.get_mut(sensor).clear();
+                self.by_size = false;
+            }
+        }
+        if time.is_some() {
+            (self.time, self.nanoseconds) = (time, None);
+        }
+        self.temperature = temperature.or(self.temperature);
+        self.time = self.time.filter(|time| Some(*time) != temperature);
+    }
+
+    /// The times of all rows, in the unit of the column.
+    pub fn stamps(&self, sheet: &Sheet) -> Option<Vec<f64>> {
+        let times = &sheet.columns[self.time?];
+        Some(match self.nanoseconds {
+            Some(column) => both(times, &sheet.columns[column]),
+            None => times.clone(),
+        })
+    }
+
+    /// Rows with numeric triads, and their samples; zeros for a missing triad.
+    pub fn samples(&self, sheet: &Sheet) -> Option<(Vec<usize>, Samples)> {
+        let at = |sensor: Sensor, row: usize| match self.triads.get(sensor) {
+            Some(columns) => Vector3::from(columns.map(|k| sheet.columns[k][row])),
+            None => Vector3::zeros(),
+        };
+        let (mut rows, mut samples) = (Vec::new(), PerSensor::from_fn(|_| Vec::new()));
+        let any = self.triads.gyro.or(self.triads.accel)?;
+        for row in 0..sheet.columns[any[0]].len() {
+            let both = PerSensor::from_fn(|sensor| at(sensor, row));
+            if (both.gyro + both.accel)
+                .iter()
+                .all(|value| value.is_finite())
+            {
+                rows.push(row);
+                Sensor::ALL
+                    .iter()
+                    .for_each(|&sensor| samples.get_mut(sensor).push(*both.get(sensor)));
+            }
+        }
+        (rows.len() > 1).then_some((rows, samples))
+    }
+}
+
+/// The name of a column, or its number if the name is missing or not unique.
+fn distinct(names: &[String], column: usize) -> String {
+    let like = names.iter().filter(|name| **name == names[column]);
+    match names[column].is_empty() || like.count() > 1 {
+        true => (column + 1).to_string(),
+        false => names[column].clone(),
+    }
+}
+
+/// Columns that belong to this sensor by name.
+pub fn named(sheet: &Sheet, sensor: Sensor) -> Vec<usize> {
+    let is = |k: &usize| Name::of(&sheet.names[*k]).sensor() == Some(sensor);
+    (0..sheet.names.len()).filter(is).collect()
+}
+
+/// Whether gyros and accelerometers have separate rows, by their names.
+pub fn have_rows_of_their_own(sheet: &Sheet) -> bool {
+    let places = PerSensor::from_fn(|sensor| named(sheet, sensor));
+    let (mut both, mut one) = (0, 0);
+    for row in 0..sheet.rows() {
+        match (sheet.has(&places.gyro, row), sheet.has(&places.accel, row)) {
+            (true, true) => both += 1,
+            (false, false) => {}
+            _ => one += 1,
+        }
+    }
+    let has = |sensor: Sensor| !places.get(sensor).is_empty();
+    Sensor::ALL.into_iter().all(has) && f64::from(one) > LACKING * f64::from(both + one)
+}
+
+/// Whether a column has two different numbers.
+fn varies(values: &[f64]) -> bool {
+    let mut values = values.iter().filter(|value| value.is_finite());
+    let first = values.next();
+    first.is_some_and(|first| values.any(|value| value != first))
+}
+
+/// Name of the first column called a time whose number never changes, and the number.
+pub fn standing_time(sheet: &Sheet) -> Option<(&str, f64)> {
+    let mut columns = sheet.names.iter().zip(&sheet.columns);
+    let stands = |(name, values): &(&String, &Vec<f64>)| {
+        let is_time = Name::of(name).is_time() > 1;
+        is_time && values.iter().all(|value| value.is_finite()) && !varies(values)
+    };
+    let (name, values) = columns.find(stands)?;
+    Some((name.as_str(), *values.first()?))
+}
+
+fn is_numeric(sheet: &Sheet, column: usize) -> bool {
+    let values = &sheet.columns[column];
+    let numbers = values.iter().filter(|value| value.is_finite()).count();
+    numbers as f64 >= NUMBERS * values.len() as f64
+}
+
+fn both(seconds: &[f64], nanoseconds: &[f64]) -> Vec<f64> {
+    let rows = seconds.iter().zip(nanoseconds);
+    rows.map(|(seconds, nanoseconds)| seconds + 1e-9 * nanoseconds)
+        .collect()
+}
+
+/// Columns of whole seconds and of nanoseconds, found by their names or, without names, by their values.
+fn split_time(sheet: &Sheet, names: &[Name]) -> Option<[usize; 2]> {
+    let is_whole = |k: usize| sheet.columns[k].iter().all(|value| value.fract() == 0.0);
+    let is_pair = |k: &usize| {
+        let is_named = names[*k].is_part_of_time("s") && names[k + 1].is_part_of_time("ns");
+        let is_numbered = sheet.names[*k] == (k + 1).to_string();
+        let are_nanoseconds = || {
+            sheet.columns[k + 1]
+                .iter()
+                .all(|value| (0.0..1e9).contains(value))
+        };
+        (is_named || is_numbered && are_nanoseconds()) && is_whole(*k) && is_whole(k + 1)
+    };
+    let goes_on = |k: &usize| {
+        let seconds = forward(sheet.columns[*k].iter().copied());
+        let times = both(&sheet.columns[*k], &sheet.columns[k + 1]);
+        seconds.0 > 0.0 && seconds.0 < FORWARD && forward(times.into_iter()).0 >= FORWARD
+    };
+    let pair = (0..names.len().saturating_sub(1))
+        .filter(is_pair)
+        .find(goes_on)?;
+    Some([pair, pair + 1])
+}
+
+/// The column that distinguishes several instruments, with its value for the first.
+pub fn instance(sheet: &Sheet) -> Option<(usize, f64)> {
+    let tells = |k: &usize| {
+        let mut known: Vec<f64> = Vec::new();
+        let is_number = |value: &f64| {
+            if !known.contains(value) {
+                known.push(*value);
+            }
+            value.fract() == 0.0 && known.len() <= MOST_INSTANCES
+        };
+        Name::of(&sheet.names[*k]).is_instance()
+            && sheet.columns[*k].iter().all(is_number)
+            && known.len() > 1
+    };
+    let column = (0..sheet.names.len()).find(tells)?;
+    Some((column, *sheet.columns[column].first()?))
+}
+
+/// Fractions of increasing and decreasing steps.
+fn forward(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (mut steps, mut forward, mut back) = (0.0, 0.0, 0.0);
+    let mut last = f64::NAN;
+    for value in values {
+        steps += f64::from(!last.is_nan());
+        forward += f64::from(value > last);
+        back += f64::from(value < last);
+        last = value;
+    }
+    (forward / f64::max(steps, 1.0), back / f64::max(steps, 1.0))
+}
+
+/// The column with the most time-like name, otherwise the first increasing one.
+fn time(sheet: &Sheet, names: &[Name], forward: impl Fn(usize) -> (f64, f64)) -> Option<usize> {
+    let goes_on = |k: &usize| match forward(*k) {
+        (forward, _) if forward >= FORWARD => true,
+        (forward, back) => {
+            names[*k].is_time() > 1 && forward > SELDOM_FORWARD && back < 1.0 - FORWARD
+        }
+    };
+    let rank = |k: &usize| {
+        let is_text = sheet.units[*k] == "h:m:s";
+        // Raw ticks behind times that have a unit.
+        let is_raw = names[*k].unit.is_some_and(|unit| unit.word == "count");
+        let named = names[*k].is_time().saturating_sub(u8::from(is_raw));
+        (named, names[*k].is_of_time() && !is_text, names.len() - k)
+    };
+    let best = (0..names.len()).filter(goes_on).max_by_key(rank)?;
+    // The angle of an integrating sensor goes forward, too, and a temperature that rises.
+    let name = &names[best];
+    let named_otherwise = name.is_time() == 0 && (name.sensor().is_some() || name.is_temperature());
+    (!named_otherwise).then_some(best)
+}
+
+/// Complete triads of a sensor, in order of their columns.
+fn by_name(names: &[Name], sheet: &Sheet, sensor: Sensor) -> Vec<[usize; 3]> {
+    let of_sensor = |k: &usize| names[*k].sensor() == Some(sensor) && is_numeric(sheet, *k);
+    by_stem(
+        names,
+        &(0..names.len()).filter(of_sensor).collect::<Vec<_>>(),
+    )
+}
+
+/// Groups of three columns whose names differ only in the axis.
+pub fn by_stem(names: &[Name], candidates: &[usize]) -> Vec<[usize; 3]> {
+    let mut triads = Vec::new();
+    for &first in candidates {
+        let axes = match names[first].axis {
+            Some('x') => ['x', 'y', 'z'],
+            Some('0') => ['0', '1', '2'],
+            Some('1') if !candidates.iter().any(|&k| names[k].axis == Some('0')) => ['1', '2', '3'],
+            _ => continue,
+        };
+        let of = |axis| {
+            let same =
+                |k: &&usize| names[**k].stem == names[first].stem && names[**k].axis == Some(axis);
+            candidates.iter().find(same).copied()
+        };
+        if let [Some(x), Some(y), Some(z)] = axes.map(of) {
+            triads.push([x, y, z]);
+        }
+    }
+    triads
+}
+
+/// Triads identified by value instead of name: accelerometers by the constant magnitude of gravity, gyros by turns.
+fn by_numbers(
+    sheet: &Sheet,
+    names: &[Name],
+    taken: &[usize],
+    found: &mut PerSensor<Vec<[usize; 3]>>,
+) {
+    let varies = |k: &usize| varies(&sheet.columns[*k]);
+    let is_free = |k: &usize| {
+        !taken.contains(k) && !names[*k].is_of_another_sensor() && is_numeric(sheet, *k)
+    };
+    let has_stem = |k: &usize| names[*k].stem.contains(char::is_alphabetic);
+    let magnitudes = |free: &[usize]| {
+        let named: Vec<usize> = free.iter().copied().filter(has_stem).collect();
+        let mut triads = by_stem(names, &named);
+        triads.retain(|triad| triad.iter().any(varies));
+        if triads.is_empty() {
+            let side_by_side = free.chunks_exact(3).map(|of| [of[0], of[1], of[2]]);
+            triads = side_by_side
+                .filter(|triad| triad.iter().all(varies))
+                .collect();
+        }
+        let with_size = |triad| (triad, magnitude(sheet, &triad));
+        triads.into_iter().map(with_size).collect::<Vec<_>>()
+    };
+    let even = |sizes: &[([usize; 3], (f64, f64))], limit: f64| {
+        sizes
+            .iter()
+            .position(|&(_, (uneven, lively))| uneven < limit && lively < LIVELY)
+    };
+    let mut free: Vec<usize> = (0..names.len()).filter(is_free).collect();
+    let mut sizes = magnitudes(&free);
+    if even(&sizes, EVEN).is_none() {
+        // Constants may stand between triads.
+        free.retain(varies);
+        sizes = magnitudes(&free);
+    }
+    if found.accel.is_empty() {
+        let is_pair = found.gyro.is_empty() && sizes.len() > 1;
+        let of = |k: &usize| sizes[*k].1.0;
+        let least = || {
+            (0..sizes.len())
+                .min_by(|a, b| of(a).total_cmp(&of(b)))
+                .filter(|_| is_pair)
+        };
+        // A compass usually stands behind them.
+        let best = even(&sizes, EVEN).or_else(least).or(even(&sizes, UNEVEN));
+        found.accel.extend(best.map(|k| sizes.remove(k).0));
+    }
+    if found.gyro.is_empty() {
+        // Of several, the gyro is usually beside the accelerometer.
+        let place = found.accel.first().map_or(0, |accel| accel[0]);
+        sizes.sort_by_key(|(triad, (_, lively))| (*lively < LIVELY, triad[0].abs_diff(place)));
+        found.gyro.extend(sizes.iter().map(|(triad, _)| *triad));
+    }
+}
+
+/// Median deviation of the magnitude of a triad from its median, and its 99 % quantile, divided by the median.
+fn magnitude(sheet: &Sheet, triad: &[usize; 3]) -> (f64, f64) {
+    let at = |row: usize| Vector3::from(triad.map(|k| sheet.columns[k][row]));
+    let samples = (0..sheet.rows()).map(at);
+    let samples: Vec<Vector3<f64>> = samples.filter(|sample| sample.sum().is_finite()).collect();
+    let zero = offset(&samples).unwrap_or(0.0);
+    let sizes = samples.iter().map(|sample| sample.add_scalar(-zero).norm());
+    let mut sizes: Vec<f64> = sizes.collect();
+    let Some(middle) = median(&mut sizes).filter(|middle| *middle > 0.0) else {
+        return (f64::INFINITY, f64::INFINITY);
+    };
+    let mut off: Vec<f64> = sizes.iter().map(|size| (size - middle).abs()).collect();
+    let off = median(&mut off).unwrap_or(0.0);
+    let hundredth = (sizes.len() - 1) / 100;
+    sizes.sort_unstable_by(|a, b| b.total_cmp(a));
+    (off / middle, sizes[hundredth] / middle)
+}
+
+/// Four adjacent columns with similar or uninformative names whose squares add up to one in every row.
+fn quaternion(sheet: &Sheet, time: Option<usize>) -> Option<[usize; 4]> {
+    let begin = |k: usize| {
+        let name = &sheet.names[k];
+        name.chars().next().filter(|_| name.len() > 2)
+    };
+    let is_one = |four: &[usize; 4], row: usize| {
+        let norm: f64 = four.iter().map(|&k| sheet.columns[k][row].powi(2)).sum();
+        (norm - 1.0).abs() < 1e-3
+    };
+    let places = 0..sheet.names.len().saturating_sub(3);
+    let mut all = places.map(|k| [k, k + 1, k + 2, k + 3]);
+    all.find(|four| {
+        let fits = |&k: &usize| Some(k) != time && begin(k) == begin(four[0]);
+        four.iter().all(fits) && (0..sheet.rows()).all(|row| is_one(four, row))
+    })
+}

@@ -1,0 +1,81 @@
+//! A log of another program as rows of text, with a draft for them.
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::Path;
+
+use super::Draft;
+use super::streams::{Streams, Written};
+use crate::write_rows;
+use turncal_input::FileError;
+use turncal_logs::Source;
+
+/// File of the gyros, and of accelerometers in the same stream.
+const GYRO_FILE: &str = "imu.csv.gz";
+const ACCEL_FILE: &str = "accelerometers.csv.gz";
+
+impl Draft {
+    /// Writes the streams of the instrument as text, with this draft for them, into an existing directory; a damaged
+    /// log only if its intact part is to be used.
+    ///
+    /// # Errors
+    /// [`FileError`] if the log is text already, is damaged, or cannot be read or written.
+    pub fn convert(mut self, log: &Path, directory: &Path, salvage: bool) -> Result<(), FileError> {
+        let of_text = |streams: &Streams| streams.written.is_some();
+        let streams = self.streams.as_mut().filter(|streams| !of_text(streams));
+        let Some(streams) = streams else {
+            let advice = "`turncal init` can draft a run.toml for it without conversion.";
+            let expected = "a log of another program, which needs no conversion";
+            return Err(FileError::of(
+                log,
+                "a text file with rows",
+                expected,
+                advice,
+            ));
+        };
+        let source = |stream| Source {
+            stream: Some(stream),
+            salvage,
+            ..Source::of_file(log)
+        };
+        rows_as_text(&source(&streams.gyro), &directory.join(GYRO_FILE))?;
+        if let Some(accel) = &streams.accel {
+            rows_as_text(&source(accel), &directory.join(ACCEL_FILE))?;
+        }
+        let accel = streams.accel.is_some().then(|| ACCEL_FILE.to_owned());
+        streams.written = Some(Written { accel });
+        let path = directory.join("run.toml");
+        fs::write(&path, self.to_toml(GYRO_FILE))
+            .map_err(|error| FileError::unwritten(&path, &error))
+    }
+}
+
+/// Every column of a stream, with all digits.
+fn rows_as_text(source: &Source, path: &Path) -> Result<(), FileError> {
+    let mut rows = source.open()?;
+    let mut stopped = Ok(());
+    let content = |file: &mut dyn Write| -> io::Result<()> {
+        let mut csv = csv::Writer::from_writer(file);
+        csv.write_record(rows.header())?;
+        let columns = rows.header().len();
+        loop {
+            match rows.advance() {
+                Ok(true) => {}
+                Ok(false) => break,
+                Err(error) => {
+                    stopped = Err(error);
+                    break;
+                }
+            }
+            let field = |k| match rows.number(k) {
+                Ok(_) => rows.shown(k).into_owned(),
+                Err(_) => String::new(),
+            };
+            csv.write_record((0..columns).map(field))?;
+        }
+        csv.flush()
+    };
+    let written = File::create(path).and_then(|file| write_rows(path, file, content));
+    written.map_err(|error| FileError::unwritten(path, &error))?;
+    stopped
+}

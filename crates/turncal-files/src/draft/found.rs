@@ -1,0 +1,170 @@
+//! Fields detected in a log, with their certainty.
+
+use std::path::Path;
+
+use super::certainty::Certainty;
+use super::motion::Motion;
+use super::{AXES_OF_PROGRAM, Draft, NO_COLUMNS};
+use turncal::imu::Sensor;
+use turncal::number::rounded;
+use turncal_input::FileError;
+
+/// A detected field.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    /// Name, such as `gyros`.
+    pub what: &'static str,
+    /// Its value.
+    pub value: String,
+    /// Its certainty.
+    pub certainty: Certainty,
+    /// The reason.
+    pub why: String,
+}
+
+impl Draft {
+    /// Detected fields, in display order.
+    pub fn found(&self) -> Vec<Found> {
+        vec![
+            self.time_found(),
+            self.triad_found(Sensor::Gyro),
+            self.triad_found(Sensor::Accel),
+            self.axes_found(),
+            self.place_found(),
+        ]
+    }
+
+    /// Fails for a damaged log, and for a field that the log does not show but a run needs.
+    pub(crate) fn check(&self, file: &Path) -> Result<(), FileError> {
+        let damage = self.streams.as_ref().and_then(|of| of.damage.clone());
+        let question = self.contradiction.clone().or_else(|| self.open_question());
+        let open =
+            question.map(|[found, expected, advice]| FileError::of(file, found, expected, advice));
+        damage.or(open).map_or(Ok(()), Err)
+    }
+
+    /// The first open field that prevents a run: evidence in the log, requirement, remedy.
+    fn open_question(&self) -> Option<[String; 3]> {
+        let (_, remarks) = self.run_file("log");
+        let (field, why) = remarks.open.into_iter().next()?;
+        let is_zero = |motion: &Motion| motion.gravity == 0.0;
+        let has_accels =
+            self.columns.triads.accel.is_some() && !self.motion.as_ref().is_some_and(is_zero);
+        let (expected, advice) = match &*field {
+            "gyro_unit" if !has_accels => (
+                "gyros of a known unit, and accelerometers",
+                "Give both files: `turncal init GYROS ACCELS -o run.toml`. For an Allan analysis of the gyros alone, \
+                 set --gyro-unit.",
+            ),
+            "gyro_unit" => ("the unit of the gyros", "Set it with --gyro-unit."),
+            "accel_unit" => (
+                "the unit of the accelerometers",
+                "Set it with --accel-unit.",
+            ),
+            "scale" => (
+                "the size of one count",
+                "Take it from the data sheet and set it, e.g. --gyro-unit '1/131 deg/s' or --accel-unit '1/16384 g'.",
+            ),
+            "sample_period_s" => ("the sample rate", "Set it with --rate."),
+            _ => (
+                "all fields that run.toml needs",
+                "Write a draft with `turncal init LOG -o run.toml` and complete it.",
+            ),
+        };
+        let found = format!("no evidence for `{field}` ({why})");
+        Some([found, expected.to_owned(), advice.to_owned()])
+    }
+
+    /// Units that are neither known nor whole counts: a rate or a unit may be wrong that only turns and gravity show.
+    pub(crate) fn doubts(&self) -> impl Iterator<Item = String> + '_ {
+        Sensor::ALL.into_iter().filter_map(|sensor| {
+            let unit = self.quantities.units.get(sensor);
+            let scale = unit.scale.as_ref().filter(|_| unit.is_unfit)?;
+            let (name, why, found) = (sensor.name(), &unit.why, &scale.why);
+            Some(format!(
+                "The unit of the {name} rows is not clear: {why}. turncal estimated {found}. Check --rate, and state \
+                 --{name}-unit."
+            ))
+        })
+    }
+
+    fn time_found(&self) -> Found {
+        let clock = &self.clock;
+        let name = self.columns.time.map(|k| self.columns.names[k].as_str());
+        let hertz = |rate: f64| format!("{} Hz", rounded(rate, 4));
+        let (value, certainty) = match (name, clock.period.map(f64::recip)) {
+            (None, Some(rate)) if self.stated.rate_hz.is_some() => {
+                return Found::new("time", hertz(rate), Certainty::Certain, "as stated");
+            }
+            (Some(name), Some(rate)) => (
+                format!("{name}, {}, {}", clock.unit, hertz(rate)),
+                clock.certainty,
+            ),
+            (None, Some(rate)) => (hertz(rate), clock.certainty),
+            (_, None) => ("sample period".to_owned(), Certainty::Unknown),
+        };
+        Found::new("time", value, certainty, &clock.why)
+    }
+
+    fn triad_found(&self, sensor: Sensor) -> Found {
+        let what = sensor.pick("gyros", "accels");
+        let unit = self.quantities.units.get(sensor);
+        let Some(triad) = self.columns.triads.get(sensor) else {
+            return Found::new(what, "no columns", Certainty::Unknown, NO_COLUMNS);
+        };
+        let names = triad.map(|k| self.columns.names[k].as_str()).join(" ");
+        let certainty = match unit.word {
+            None => Certainty::Unknown,
+            Some(_) if unit.is_shown => Certainty::Certain,
+            Some(_) => Certainty::Guess,
+        };
+        let mut value = format!("{names}, {}", unit.word.unwrap_or("unit unknown"));
+        if let Some(scale) = &unit.scale {
+            value += &format!(" ({})", scale.why);
+        }
+        let mut why = unit.why.clone();
+        if let Some(down) = self.down.filter(|_| sensor == Sensor::Accel) {
+            why += &format!("; at the start {}", self.down_words(down));
+        }
+        Found::new(what, value, certainty, why)
+    }
+
+    fn axes_found(&self) -> Found {
+        let of_streams = self.streams.as_ref().and_then(|streams| streams.axes);
+        let (value, certainty, why) = match of_streams {
+            Some(axes) => (axes, Certainty::Certain, AXES_OF_PROGRAM),
+            None => ("x right, y front, z up", Certainty::Guess, "check this"),
+        };
+        Found::new("axes", value, certainty, why)
+    }
+
+    fn place_found(&self) -> Found {
+        let stated = &self.stated;
+        let latitude = stated.latitude_deg.map(|of| format!("latitude {of}°"));
+        let height = stated.height_m.map(|of| format!("height {of} m"));
+        let gravity = stated.gravity_m_s2.map(|of| format!("gravity {of} m/s²"));
+        let place: Vec<String> = [latitude, height, gravity].into_iter().flatten().collect();
+        if !place.is_empty() {
+            return Found::new("place", place.join(", "), Certainty::Certain, "as stated");
+        }
+        let gravity = "gravity 9.806 ± 0.015 m/s²";
+        let why = "set --latitude and --height for smaller σ";
+        Found::new("place", gravity, Certainty::Unknown, why)
+    }
+}
+
+impl Found {
+    fn new(
+        what: &'static str,
+        value: impl Into<String>,
+        certainty: Certainty,
+        why: impl AsRef<str>,
+    ) -> Self {
+        Self {
+            what,
+            value: value.into(),
+            certainty,
+            why: why.as_ref().to_owned(),
+        }
+    }
+}

@@ -1,0 +1,288 @@
+//! A draft of `run.toml` for a log without one: detected fields with reasons, and open fields for the user.
+
+mod certainty;
+mod columns;
+mod convert;
+mod found;
+mod motion;
+mod name;
+mod priors;
+mod raw_run;
+mod raw_samples;
+mod registers;
+mod stated;
+mod streams;
+mod text;
+mod time;
+mod units;
+
+use std::path::Path;
+
+use nalgebra::Vector3;
+
+use crate::Sheet;
+use crate::instrument::USUAL_PERIOD;
+pub use certainty::Certainty;
+use columns::Columns;
+pub use found::Found;
+use motion::{FOLLOWED, Motion};
+use raw_samples::RawSamples;
+use registers::Registers;
+pub use stated::{DataSheetError, KalibrImu, Stated, StatedColumns, StatedUnit};
+use streams::{FEWEST_ROWS, Streams};
+use time::Clock;
+use turncal::imu::{PerSensor, Sensor};
+use turncal::noise::{Clusters, TriadNoise};
+use turncal_input::FileError;
+use turncal_logs::DataFile;
+use units::Quantities;
+
+/// Minimum number of samples at rest for a noise estimate.
+const FEWEST_AT_REST: usize = 64;
+
+const NO_COLUMNS: &str = "not recognised by name or values";
+const AXES_OF_PROGRAM: &str = "axis convention of the program that wrote the log";
+
+/// Information in a log about the instrument and its recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Draft {
+    /// For a log of streams, their content.
+    streams: Option<Streams>,
+    /// The column that distinguishes several instruments, with the number of the selected one.
+    instance: Option<(usize, f64)>,
+    columns: Columns,
+    clock: Clock,
+    quantities: Quantities,
+    /// Nominal zero output of a register per row …
+    offset: PerSensor<f64>,
+    /// … and its estimate from the recording, for counts.
+    registers: Option<Registers>,
+    /// Reasons why the columns cannot be used unchanged.
+    blocked: Vec<String>,
+    /// White noise in the quantity of the file per second, per √Hz, if the log has dwells.
+    random_walk: PerSensor<Option<f64>>,
+    /// Motion in the rows, relative to the nominal register zero.
+    motion: Option<Motion>,
+    /// The accelerometer column with negative gravity at the start.
+    down: Option<usize>,
+    /// Number of rows examined, if the log has more.
+    only: Option<usize>,
+    /// Statements of the user …
+    stated: Stated,
+    /// … and the first that the rows contradict: evidence, statement, remedy.
+    contradiction: Option<[String; 3]>,
+}
+
+impl Draft {
+    /// Examines a file of rows.
+    ///
+    /// # Errors
+    /// [`FileError`] if it cannot be read or has too few rows.
+    pub fn of_file(path: &Path) -> Result<Self, FileError> {
+        Self::of_stream(&path.into(), None, &Stated::default())
+    }
+
+    /// The same for one stream of a log, with statements about it.
+    ///
+    /// # Errors
+    /// [`FileError`] if it cannot be read or has too few rows.
+    pub fn of_stream(
+        file: &DataFile,
+        stream: Option<&str>,
+        stated: &Stated,
+    ) -> Result<Self, FileError> {
+        if let Some(accel) = &stated.accel_file {
+            let whole = accel.canonicalize().unwrap_or_else(|_| accel.to_path_buf());
+            return Self::of_two_files(file, accel, &whole.to_string_lossy(), stated);
+        }
+        let streams = match file.table() {
+            Some(table) => {
+                stated.columns.check(table)?;
+                None
+            }
+            None => Streams::of_file(file, stream)?,
+        };
+        if let Some((streams, sheet)) = streams {
+            return Ok(Self::of_sheet(sheet, Some(streams), stated));
+        }
+        let sheet = Sheet::read(file, FEWEST_ROWS)?;
+        if columns::have_rows_of_their_own(&sheet) {
+            let (streams, sheet) = Streams::of_two_files(file, file, None)?;
+            return Ok(Self::of_sheet(sheet, Some(streams), stated));
+        }
+        Ok(Self::of_sheet(sheet, None, stated))
+    }
+
+    /// Examines two files of rows, of gyros and of accelerometers. `accel_name` is the name of the latter in the draft.
+    ///
+    /// # Errors
+    /// [`FileError`] if one cannot be read, has hardly any rows or lacks its triad or its time.
+    pub fn of_two_files(
+        gyro: &DataFile,
+        accel: &DataFile,
+        accel_name: &str,
+        stated: &Stated,
+    ) -> Result<Self, FileError> {
+        let (streams, sheet) = Streams::of_two_files(gyro, accel, Some(accel_name))?;
+        Ok(Self::of_sheet(sheet, Some(streams), stated))
+    }
+
+    fn of_sheet(mut sheet: Sheet, streams: Option<Streams>, stated: &Stated) -> Self {
+        sheet.rate = stated.rate_hz.or(sheet.rate);
+        let only = sheet.goes_on.then(|| sheet.rows());
+        let instance = match streams {
+            Some(_) => None,
+            None => retain_instance(&mut sheet),
+        };
+        let mut columns = Columns::find(&sheet);
+        columns.state(&stated.columns);
+        retain_samples(&mut sheet, &columns);
+        let clock = Clock::find(&sheet, &mut columns);
+        let of_clock = || columns::standing_time(&sheet).filter(|_| clock.period.is_none());
+        let contradiction = match stated.rate_hz {
+            Some(rate) => clock.contradiction(rate),
+            None => of_clock().map(|(name, value)| {
+                [
+                    format!("{value} in all rows of the column `{name}`"),
+                    "times that increase".to_owned(),
+                    "Log the time of each row, or set --rate.".to_owned(),
+                ]
+            }),
+        };
+        let rows = columns.samples(&sheet).map(|(numbers, triads)| {
+            let period = clock.period.unwrap_or(USUAL_PERIOD);
+            let breaks = clock.breaks(&numbers, period, FOLLOWED);
+            RawSamples::new(triads, breaks, period)
+        });
+        let down = rows.as_ref().and_then(RawSamples::points_down);
+        let mut draft = Self {
+            down: down.and_then(|axis| Some(columns.triads.accel?[axis])),
+            quantities: Quantities::unknown(),
+            streams,
+            instance,
+            columns,
+            clock,
+            offset: PerSensor::default(),
+            registers: None,
+            blocked: Vec::new(),
+            random_walk: PerSensor::default(),
+            motion: None,
+            only,
+            contradiction,
+            stated: stated.clone(),
+        };
+        match rows {
+            Some(rows) => draft.take_rows(rows, &sheet),
+            None => draft.quantities.state(stated),
+        }
+        if let Some(streams) = &draft.streams {
+            draft.columns.names.clone_from(&streams.names);
+            if let Some(time) = &streams.time {
+                draft.clock.unit.clone_from(&time.gyro.1);
+                "stated in the file".clone_into(&mut draft.clock.why);
+                draft.clock.certainty = Certainty::Certain;
+            }
+        }
+        draft
+    }
+
+    /// Detects units, registers and noise.
+    fn take_rows(&mut self, mut rows: RawSamples, sheet: &Sheet) {
+        let mut motion = rows.motion();
+        self.quantities = Quantities::find(sheet, &self.columns, &self.clock, rows.whole, &motion);
+        let is_open = motion.angle.is_none() && motion.is_turned;
+        if self.quantities.has_counts() || is_open {
+            motion = self.look_behind(&mut rows, &motion, sheet);
+        }
+        let period = self.clock.period.unwrap_or(f64::NAN);
+        let of_units = || self.quantities.contradiction(&self.stated, &motion, period);
+        self.contradiction = self.contradiction.take().or_else(of_units);
+        self.quantities.state(&self.stated);
+        let random_walk = white_noise(&rows, &motion, &self.quantities, self.clock.period);
+        self.random_walk = random_walk.unwrap_or_default();
+        self.offset = rows.offset;
+        self.motion = Some(motion);
+    }
+
+    /// Detects the registers behind the rows, and returns the motion without their zero.
+    fn look_behind(&mut self, rows: &mut RawSamples, motion: &Motion, sheet: &Sheet) -> Motion {
+        let found = Registers::find(rows, motion);
+        let is_count = PerSensor::from_fn(|sensor| self.quantities.is_count(sensor));
+        found.apply(&mut rows.triads, &mut self.columns, &is_count);
+        let mut motion = rows.motion();
+        if let Some(turns) = &found.turns {
+            motion.cuts.clear();
+            motion.angle = motion.angle.or(turns.angle());
+        }
+        let (columns, clock) = (&self.columns, &self.clock);
+        self.quantities = Quantities::find(sheet, columns, clock, rows.whole, &motion);
+        self.quantities.of_registers(&found, clock.period);
+        if self.quantities.has_counts() {
+            self.blocked = rows.unfit();
+            self.registers = Some(found);
+        }
+        motion
+    }
+
+    /// Whether the log has this triad; both if none was identified.
+    fn is_present(&self, sensor: Sensor) -> bool {
+        let triads = &self.columns.triads;
+        let none = triads.gyro.is_none() && triads.accel.is_none();
+        none || triads.get(sensor).is_some()
+    }
+}
+
+/// Angle in rad per gyro unit in one row, from the rotation of gravity; negative if the triads have opposite signs.
+pub fn turned_angle(triads: PerSensor<Vec<Vector3<f64>>>, period: f64) -> Option<f64> {
+    let rows = RawSamples::new(triads, Vec::new(), period);
+    let motion = rows.motion();
+    motion
+        .angle
+        .or_else(|| Registers::find(&rows, &motion).turns?.angle())
+}
+
+/// Keeps the rows of one of several instruments, and returns the column and number.
+fn retain_instance(sheet: &mut Sheet) -> Option<(usize, f64)> {
+    let (column, number) = columns::instance(sheet)?;
+    sheet.retain(|of, row| of.columns[column][row] == number);
+    Some((column, number))
+}
+
+/// Keeps the rows in which a triad has a value.
+fn retain_samples(sheet: &mut Sheet, columns: &Columns) {
+    // Rows of another sensor have nothing in them.
+    let triads = [columns.triads.gyro, columns.triads.accel];
+    let of_triads: Vec<usize> = triads.into_iter().flatten().flatten().collect();
+    let Some(time) = columns.time.filter(|_| !of_triads.is_empty()) else {
+        return;
+    };
+    sheet.retain(|of, row| of.has(&of_triads, row));
+    // A row that is there twice is one sample.
+    let of_samples = [&of_triads[..], &[time]].concat();
+    sheet.retain(|of, row| {
+        let is_new = |&k: &usize| of.columns[k][row] != of.columns[k][row - 1];
+        row == 0 || of_samples.iter().any(is_new)
+    });
+}
+
+/// White noise of both triads in the longest dwell, as from `turncal allan`.
+fn white_noise(
+    rows: &RawSamples,
+    motion: &Motion,
+    quantities: &Quantities,
+    period: Option<f64>,
+) -> Option<PerSensor<Option<f64>>> {
+    let (period, rest) = (period?, motion.longest_rest.clone());
+    let clusters = Clusters::new(rest.len(), period);
+    let seconds = period * quantities.per_second(period);
+    let of = |sensor: Sensor| {
+        let rows = rows.triads.get(sensor)[rest.clone()].iter();
+        let increments: Vec<Vector3<f64>> = rows.map(|row| row * seconds).collect();
+        let figures = TriadNoise::new(&increments, period, &clusters).figures();
+        figures.map(|figures| figures.noise.random_walk)
+    };
+    (rest.len() >= FEWEST_AT_REST).then(|| PerSensor::from_fn(of))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,265 @@
+//! Motion from raw samples of unknown unit: dwells, magnitude of gravity, and gyro rotation from the gravity direction.
+
+use std::ops::Range;
+
+use nalgebra::Vector3;
+use statrs::statistics::Statistics;
+
+use turncal::imu::PerSensor;
+use turncal::statistics::{FALSE_ALARM, SIGMA_OF_MEDIAN, median, median_of_axes, student_limit};
+use turncal::units::DEGREE;
+
+/// Length of the compared windows, s.
+pub const WINDOW: f64 = 0.25;
+/// Windows at rest differ by less than this many σ of their noise …
+const SIGMAS: f64 = 6.0;
+/// … and this fraction of gravity or of the fastest turn.
+const PART: f64 = 1e-3;
+/// Samples on either side of a cut …
+const BESIDE: usize = 8;
+/// … between which the gravity direction jumps by this much, rad …
+const CUT: f64 = 30.0 * DEGREE;
+/// … but varies by less on each side.
+const STEADY: f64 = 5.0 * DEGREE;
+/// Step of the integration of the gravity direction, s.
+pub const FOLLOWED: f64 = 0.08;
+/// Specific force within this fraction of gravity gives its direction.
+const NEAR_GRAVITY: f64 = 0.1;
+/// Smaller changes of direction are not used, rad.
+const ENOUGH: f64 = 20.0 * DEGREE;
+/// Required agreement between gravity direction and gyros.
+const CORRELATION: f64 = 0.98;
+/// Scale tolerance of data sheets.
+pub const TOLERANCE: f64 = 0.03;
+/// Number of samples summed to distinguish pulses, which carry fractions, from readings.
+const SUM: usize = 16;
+
+/// Motion detected in the samples.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Motion {
+    /// The longest stretch at rest.
+    pub longest_rest: Range<usize>,
+    /// Specific force at rest, in the quantity of the file per row.
+    pub gravity: f64,
+    /// Gyros at rest.
+    pub rest: Vector3<f64>,
+    /// Whether the gravity direction changes.
+    pub is_turned: bool,
+    /// Angle in rad per gyro unit in one row, if determined by turns; negative if the triads have opposite signs.
+    pub angle: Option<f64>,
+    /// A first guess of its size.
+    pub size: f64,
+    /// Samples before which the gravity direction jumps, as in concatenated sections.
+    pub cuts: Vec<usize>,
+    /// Variance of sums of samples at rest, relative to independent samples; smallest axis.
+    pub sum_variance: Option<f64>,
+}
+
+pub fn mean(samples: &[Vector3<f64>]) -> Vector3<f64> {
+    samples.iter().sum::<Vector3<f64>>() / samples.len().max(1) as f64
+}
+
+pub fn means(samples: &[Vector3<f64>], length: usize) -> Vec<Vector3<f64>> {
+    samples.chunks_exact(length).map(mean).collect()
+}
+
+/// 1σ noise of window means, from successive differences.
+fn noise(means: &[Vector3<f64>]) -> f64 {
+    let differences = means.windows(2).map(|pair| pair[1] - pair[0]);
+    let mut changes: Vec<f64> = differences
+        .flat_map(|d| <[f64; 3]>::from(d.abs()))
+        .collect();
+    SIGMA_OF_MEDIAN * std::f64::consts::FRAC_1_SQRT_2 * median(&mut changes).unwrap_or(0.0)
+}
+
+impl Motion {
+    /// From samples; others are missing before those in `breaks`.
+    pub fn find(samples: &PerSensor<Vec<Vector3<f64>>>, breaks: &[usize], period: f64) -> Self {
+        let length = ((WINDOW / period).round() as usize).clamp(1, samples.gyro.len().div_ceil(8));
+        let gyro = means(&samples.gyro, length);
+        let accel = means(&samples.accel, length);
+        let mut sizes: Vec<f64> = accel.iter().map(|f| f.norm()).collect();
+        let usual = median(&mut sizes).unwrap_or(0.0);
+        let force = SIGMAS * noise(&accel) + PART * usual;
+        let steady = |k: usize| {
+            let near =
+                |other: Option<&Vector3<f64>>| other.is_none_or(|f| (f - accel[k]).norm() <= force);
+            near(k.checked_sub(1).and_then(|k| accel.get(k))) && near(accel.get(k + 1))
+        };
+        let standing = (0..accel.len()).filter(|&k| steady(k));
+        let standing: Vec<Vector3<f64>> = standing.map(|k| gyro[k]).collect();
+        let rest = median_of_axes(&standing).unwrap_or_default();
+        let fastest = gyro
+            .iter()
+            .map(|rate| (rate - rest).norm())
+            .fold(0.0, f64::max);
+        let rate = SIGMAS * noise(&gyro) + PART * fastest;
+        let at_rest: Vec<bool> = (0..gyro.len())
+            .map(|k| steady(k) && (gyro[k] - rest).norm() <= rate)
+            .collect();
+        let mut sizes: Vec<f64> = (0..accel.len())
+            .filter(|&k| at_rest[k])
+            .map(|k| accel[k].norm())
+            .collect();
+        let stretches = stretches(&at_rest);
+        let longest = stretches
+            .iter()
+            .max_by_key(|stretch| stretch.len())
+            .cloned()
+            .unwrap_or(0..0);
+        // At its ends a rest is already or still a motion.
+        let settled: Vec<Range<usize>> = stretches
+            .iter()
+            .filter(|stretch| stretch.len() > 3)
+            .map(|stretch| (stretch.start + 1) * length..(stretch.end - 1) * length)
+            .collect();
+        let cuts = cuts(samples, breaks);
+        let step = ((FOLLOWED / period).round() as usize).max(1);
+        let followed = Followed::new(samples, breaks, rest, usual, step);
+        Self {
+            longest_rest: longest.start * length..longest.end * length,
+            gravity: median(&mut sizes).unwrap_or(usual),
+            rest,
+            is_turned: is_turned(&accel, usual),
+            angle: followed.angle.filter(|_| cuts.is_empty()),
+            size: followed.size,
+            cuts,
+            sum_variance: sum_variance(samples, &settled),
+        }
+    }
+}
+
+fn is_near(force: &Vector3<f64>, gravity: f64) -> bool {
+    (force.norm() / gravity - 1.0).abs() < NEAR_GRAVITY
+}
+
+/// Whether the gravity direction changes enough to be used.
+fn is_turned(forces: &[Vector3<f64>], gravity: f64) -> bool {
+    let mut shown = forces.iter().filter(|force| is_near(force, gravity));
+    let first = shown.next();
+    first.is_some_and(|first| shown.any(|force| force.angle(first) > ENOUGH))
+}
+
+pub fn is_whole(samples: &[Vector3<f64>]) -> bool {
+    let mut values = samples.iter().flat_map(|sample| sample.iter());
+    values.all(|value| value.fract() == 0.0)
+}
+
+/// Rotation per gyro unit in one row, rad, from the gravity direction step by step.
+struct Followed {
+    angle: Option<f64>,
+    size: f64,
+}
+
+impl Followed {
+    /// By least squares of `ḟ = f × ω`, wherever |f| equals gravity.
+    fn new(
+        samples: &PerSensor<Vec<Vector3<f64>>>,
+        breaks: &[usize],
+        zero: Vector3<f64>,
+        gravity: f64,
+        length: usize,
+    ) -> Self {
+        let gyro = means(&samples.gyro, length);
+        let accel = means(&samples.accel, length);
+        let (mut both, mut turned, mut seen, mut way) = (0.0, 0.0, 0.0, 0.0);
+        for (k, (rate, force)) in gyro.windows(3).zip(accel.windows(3)).enumerate() {
+            let at = k * length..(k + 3) * length;
+            if !force.iter().all(|f| is_near(f, gravity)) || is_broken(breaks, &at) {
+                continue;
+            }
+            let angle = (0.5 * (rate[0] + rate[2]) + rate[1] - 2.0 * zero) * length as f64;
+            let expected = force[1].normalize().cross(&angle);
+            let change = force[2].normalize() - force[0].normalize();
+            both += expected.dot(&change);
+            turned += expected.norm_squared();
+            seen += change.norm_squared();
+            way += angle.norm_squared();
+        }
+        let correlation: f64 = both / (turned * seen).sqrt();
+        let is_shown = correlation.abs() > CORRELATION && seen.sqrt() > 0.1 * ENOUGH;
+        Self {
+            angle: is_shown.then(|| both / turned),
+            // Of turns about any axis gravity's direction shows two thirds.
+            size: (1.5 * seen / way).sqrt(),
+        }
+    }
+}
+
+/// Runs of windows at rest.
+fn stretches(at_rest: &[bool]) -> Vec<Range<usize>> {
+    let mut found = Vec::new();
+    let mut begin = 0;
+    for stretch in at_rest.chunk_by(|a, b| a == b) {
+        if stretch.first() == Some(&true) {
+            found.push(begin..begin + stretch.len());
+        }
+        begin += stretch.len();
+    }
+    found
+}
+
+/// Whether samples are missing between these.
+fn is_broken(breaks: &[usize], samples: &Range<usize>) -> bool {
+    let after = breaks.partition_point(|&next| next <= samples.start);
+    breaks.get(after).is_some_and(|&next| next < samples.end)
+}
+
+/// Places where the gravity direction jumps without missing samples or gyro rotation.
+fn cuts(samples: &PerSensor<Vec<Vector3<f64>>>, breaks: &[usize]) -> Vec<usize> {
+    let accel = &samples.accel;
+    let (mut cuts, mut next) = (Vec::new(), 2 * BESIDE);
+    while next + 2 * BESIDE <= accel.len() {
+        let part = |from: usize| mean(&accel[from..from + BESIDE]);
+        let (before, after) = (part(next - BESIDE), part(next));
+        let cut = before.angle(&after) > CUT
+            && part(next - 2 * BESIDE).angle(&before) < STEADY
+            && after.angle(&part(next + BESIDE)) < STEADY
+            && !is_broken(breaks, &(next - BESIDE..next + BESIDE))
+            && !turn_about(
+                &before.cross(&after).normalize(),
+                &samples.gyro[next - 2 * BESIDE..next + 2 * BESIDE],
+            );
+        cuts.extend(cut.then_some(next));
+        next += if cut { 2 * BESIDE } else { 1 };
+    }
+    cuts
+}
+
+/// Whether gyros turn about an axis in the middle half of these samples, significantly relative to their scatter in the
+/// others: at low rates a turn can be as short as a cut, but the gyros show it.
+fn turn_about(axis: &Vector3<f64>, gyro: &[Vector3<f64>]) -> bool {
+    let rates: Vec<f64> = gyro.iter().map(|rate| rate.dot(axis)).collect();
+    let (before, others) = rates.split_at(BESIDE);
+    let (between, after) = others.split_at(2 * BESIDE);
+    let variance = 0.5 * (before.variance() + after.variance());
+    // As many samples are between as beside.
+    let sigma = (2.0 * variance / (2 * BESIDE) as f64).sqrt();
+    let change = between.mean() - 0.5 * (before.mean() + after.mean());
+    let degrees = (2 * BESIDE - 2) as f64;
+    change.abs() > student_limit(degrees, 0.5 * FALSE_ALARM) * sigma
+}
+
+/// Variance of sums of samples at rest, relative to independent samples; smallest axis.
+fn sum_variance(samples: &PerSensor<Vec<Vector3<f64>>>, settled: &[Range<usize>]) -> Option<f64> {
+    let ratio = |triad: &[Vector3<f64>], axis: usize| {
+        let (mut of_sums, mut of_one) = (0.0, 0.0);
+        for stretch in settled {
+            let values: Vec<f64> = triad[stretch.clone()].iter().map(|row| row[axis]).collect();
+            let sums: Vec<f64> = values
+                .chunks_exact(SUM)
+                .map(|part| part.iter().sum())
+                .collect();
+            // Differences of neighbours are free of what wanders.
+            let differences = sums.windows(2).map(|pair| pair[1] - pair[0]);
+            of_one += differences.len() as f64 * values.population_variance();
+            of_sums += differences
+                .map(|difference| difference.powi(2))
+                .sum::<f64>();
+        }
+        of_sums / (2.0 * SUM as f64 * of_one)
+    };
+    let of_triad = |triad| (0..3).map(move |axis| ratio(triad, axis));
+    let ratios = of_triad(&samples.gyro).chain(of_triad(&samples.accel));
+    ratios.filter(|ratio| ratio.is_finite()).reduce(f64::min)
+}

@@ -1,0 +1,214 @@
+//! Prior: scale and bias from the recording, the rest typical for the class of its noise.
+
+use nalgebra::Vector3;
+
+use super::{Draft, Stated};
+use crate::instrument::{USUAL_BIAS, USUAL_INSTALLATION, USUAL_SCALE};
+use crate::schema::PriorFile;
+use crate::schema::page::Remarks;
+use turncal::imu::{Instrument, PerSensor, Prior, Sensor};
+use turncal::number::rounded;
+use turncal::units::{ARCSEC, DEG_PER_SQRT_H, DEGREE, MICRO_G_PER_SQRT_HZ, PPM};
+use turncal_input::{Finite, OneOrThree};
+
+/// Typical prior of a class of instruments, 1σ.
+struct Class {
+    name: &'static str,
+    /// Gyro white noise below which an instrument belongs to this class, rad/√s.
+    angle_random_walk: f64,
+    /// The same of the accelerometers, (m/s)/√s.
+    velocity_random_walk: f64,
+    scale_ppm: f64,
+    installation: f64,
+    /// rad/s.
+    gyro_bias: f64,
+    /// m/s².
+    accel_bias: f64,
+}
+
+/// Largest bias, in σ of a class, of an instrument of that class.
+const BEYOND: f64 = 3.0;
+
+#[rustfmt::skip]
+const CLASSES: [Class; 3] = [
+    Class {
+        name: "a navigation-grade",
+        angle_random_walk: 0.01 * DEG_PER_SQRT_H, velocity_random_walk: 20.0 * MICRO_G_PER_SQRT_HZ,
+        scale_ppm: 7_000.0, installation: 600.0 * ARCSEC, gyro_bias: 0.03 * DEGREE, accel_bias: 0.05,
+    },
+    Class {
+        name: "a tactical-grade",
+        angle_random_walk: 0.1 * DEG_PER_SQRT_H, velocity_random_walk: 60.0 * MICRO_G_PER_SQRT_HZ,
+        scale_ppm: 10_000.0, installation: 3_600.0 * ARCSEC, gyro_bias: 0.2 * DEGREE, accel_bias: 0.2,
+    },
+    Class {
+        name: "a MEMS",
+        angle_random_walk: f64::INFINITY, velocity_random_walk: f64::INFINITY,
+        scale_ppm: USUAL_SCALE / PPM, installation: USUAL_INSTALLATION, gyro_bias: USUAL_BIAS.gyro,
+        accel_bias: USUAL_BIAS.accel,
+    },
+];
+
+impl Class {
+    /// From the white noise of the gyros, otherwise of the accelerometers.
+    fn of(walk: impl Fn(Sensor) -> Option<f64>) -> &'static Self {
+        let is_of = |class: &&Class| match (walk(Sensor::Gyro), walk(Sensor::Accel)) {
+            (Some(walk), _) => walk < class.angle_random_walk,
+            (None, Some(walk)) => walk < class.velocity_random_walk,
+            (None, None) => class.angle_random_walk.is_infinite(),
+        };
+        let [.., widest] = &CLASSES;
+        CLASSES.iter().find(is_of).unwrap_or(widest)
+    }
+
+    fn bias(&self, sensor: Sensor) -> f64 {
+        sensor.pick(self.gyro_bias, self.accel_bias)
+    }
+}
+
+impl Stated {
+    /// An instrument with outputs in rad/s and m/s², if its noise is stated.
+    pub fn instrument(&self) -> Option<Instrument> {
+        let noise = self.noise?;
+        let class = Class::of(|sensor| Some(noise.get(sensor).random_walk));
+        let stated = self.tolerances.as_ref();
+        let prior = |sensor: Sensor| Prior {
+            scale_sigma: Vector3::repeat(
+                stated.map_or(class.scale_ppm * PPM, |of| *of.scale.get(sensor)),
+            ),
+            installation_sigma: Vector3::repeat(class.installation),
+            bias: Vector3::zeros(),
+            bias_sigma: Vector3::repeat(
+                stated.map_or(class.bias(sensor), |of| *of.bias.get(sensor)),
+            ),
+        };
+        Some(Instrument::new(PerSensor::from_fn(prior), noise))
+    }
+}
+
+impl Draft {
+    /// The prior of a triad: stated, from a data sheet, or typical of its class.
+    pub fn prior(&self, sensor: Sensor, remarks: &mut Remarks) -> PriorFile {
+        let class = Class::of(|sensor| self.white_noise(sensor));
+        let unit = self.quantities.units.get(sensor);
+        let stated = self.stated.tolerances.as_ref();
+        let scale_sigma = stated.map_or(class.scale_ppm, |of| of.scale.get(sensor) / PPM);
+        let bias_sigma = stated.map_or(class.bias(sensor), |of| *of.bias.get(sensor));
+        let from = match stated {
+            Some(of) => format!("from the data sheet of {}", of.of),
+            None => format!(
+                "typical for {} instrument; check against the data sheet",
+                class.name
+            ),
+        };
+        let table = format!("imu.prior.{}", sensor.name());
+        let remark = format_args!("{from}; N = scale * installation * u + bias");
+        remarks.before(&table, remark);
+        let path = format!("{table}.scale");
+        if let Some(scale) = &unit.scale {
+            remarks.reason(&path, &scale.why);
+        } else if unit.word.is_none_or(|word| word == "count") {
+            remarks.open(&path, self.open_scale(sensor));
+        }
+        let off = unit.scale.as_ref().map_or(0.0, |scale| 1e6 * scale.off);
+        let scale_sigma = rounded(scale_sigma, 7).max(rounded(off, 4));
+        let one = |value: f64| Some(OneOrThree::One(Finite(value)));
+        let (bias, bias_sigma) = self.bias(sensor, bias_sigma, &table, remarks);
+        PriorFile {
+            scale: unit.scale.as_ref().map(|scale| seven_digits(&scale.value)),
+            scale_sigma_ppm: one(scale_sigma),
+            installation_sigma_arcsec: one(class.installation / ARCSEC),
+            bias: bias.map(|bias| seven_digits(&bias)),
+            bias_sigma: bias_sigma.and_then(one),
+        }
+    }
+
+    fn open_scale(&self, sensor: Sensor) -> String {
+        let plain = sensor.pick(
+            "counts per rad/s from the data sheet: 57.29578 times the counts per deg/s, which are often 131, 65.5, \
+             32.8 or 16.4",
+            "counts per m/s² from the data sheet: counts per g divided by 9.80665",
+        );
+        let why = match &self.registers {
+            Some(found) if !found.has_rests => "; the log has no dwells to estimate it from",
+            Some(_) if sensor == Sensor::Accel => {
+                "; it could not be estimated from gravity in the dwells"
+            }
+            Some(_) => "; it could not be estimated from the change of gravity direction",
+            None => "",
+        };
+        let likely = self.quantities.units.get(sensor).likely.as_ref();
+        let likely = likely.map_or(String::new(), |likely| format!("; {likely}"));
+        format!("{plain}{why}{likely}")
+    }
+
+    /// Bias and its σ, in the quantity of the file per second.
+    fn bias(
+        &self,
+        sensor: Sensor,
+        usual: f64,
+        table: &str,
+        remarks: &mut Remarks,
+    ) -> (Option<Vector3<f64>>, Option<f64>) {
+        let offset = *self.offset.get(sensor);
+        let per_second = self.quantities.per_second(self.clock.period.unwrap_or(1.0));
+        let usual = self
+            .quantities
+            .scale(sensor)
+            .map(|scale| usual * scale.abs());
+        let path = format!("{table}.bias");
+        let own = self.own_zero(sensor, usual.map(|usual| usual / per_second));
+        let (bias, off) = match own {
+            Some((zero, off, why)) => {
+                remarks.reason(&path, why);
+                (Some(zero.add_scalar(offset)), off)
+            }
+            None => {
+                let rest = self.rest().filter(|_| sensor == Sensor::Gyro);
+                remarks.reason(&path, "output of an unsigned register at zero input");
+                let register = Some(Vector3::repeat(offset)).filter(|_| offset != 0.0);
+                (register, rest.map_or(0.0, |rest| rest.amax()))
+            }
+        };
+        let unit = match per_second {
+            1.0 => "in the unit of the file",
+            _ => "in the unit of the file, per second",
+        };
+        remarks.reason(&format!("{table}.bias_sigma"), unit);
+        let sigma = usual.map(|usual| rounded(usual.max(2.0 * off * per_second), 4));
+        (bias.map(|bias| bias * per_second), sigma)
+    }
+
+    /// Gyro output at rest, in the quantity of the file per row.
+    fn rest(&self) -> Option<Vector3<f64>> {
+        self.motion.as_ref().map(|motion| motion.rest)
+    }
+
+    /// Register zero estimated from the recording, with its σ, if it is not typical for the class; in the quantity of
+    /// the file per row.
+    fn own_zero(
+        &self,
+        sensor: Sensor,
+        usual: Option<f64>,
+    ) -> Option<(Vector3<f64>, f64, &'static str)> {
+        if !self.quantities.is_count(sensor) {
+            return None;
+        }
+        let registers = self.registers.as_ref()?;
+        match sensor {
+            Sensor::Accel => {
+                let gravity = registers.gravity.as_ref()?;
+                let why = "centre of the gravity vectors in the dwells";
+                Some((gravity.own_zero?, gravity.zero_sigma, why))
+            }
+            Sensor::Gyro => {
+                let rest = self.rest().filter(|_| registers.has_rests)?;
+                (rest.amax() > BEYOND * usual?).then_some((rest, 0.0, "mean output at rest"))
+            }
+        }
+    }
+}
+
+fn seven_digits(values: &Vector3<f64>) -> OneOrThree {
+    values.map(|value| rounded(value, 7)).into()
+}

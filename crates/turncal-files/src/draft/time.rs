@@ -1,0 +1,191 @@
+//! The clock of a log.
+
+use std::path::Path;
+
+use super::certainty::Certainty;
+use super::columns::Columns;
+use super::name::Name;
+use crate::Sheet;
+use crate::quantity::units_of_time;
+use turncal::number::rounded;
+use turncal::statistics::median;
+use turncal_logs::clock::Uniform;
+
+/// Plausible sample periods, s (5 kHz to 5 Hz): units that differ by 1000 cannot both be plausible.
+pub const PERIODS: std::ops::Range<f64> = 2e-4..0.2;
+/// Steps within this factor match a stated rate.
+const STATED: f64 = 1.2;
+
+/// Clock detected in the time column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Clock {
+    /// The word or number for `time_unit`.
+    pub unit: String,
+    /// Reason and certainty.
+    pub why: String,
+    pub certainty: Certainty,
+    /// Sample period in s, if known.
+    pub period: Option<f64>,
+    /// Whether the period is stated in the file rather than derived from times.
+    pub is_stated: bool,
+    /// Steps longer than the usual one.
+    pub gaps: Vec<Gap>,
+    /// Steps that do not increase.
+    pub repeated: usize,
+}
+
+impl Clock {
+    /// Examines the time column, and drops it if it is a counter that other packets share.
+    pub fn find(sheet: &Sheet, columns: &mut Columns) -> Self {
+        let stated = sheet.rate.map(f64::recip);
+        let Some((column, stamps)) = columns.time.zip(columns.stamps(sheet)) else {
+            return Self::without(stated, "no column increases like a time");
+        };
+        let steps = Steps::of(&stamps);
+        let name = Name::of_column(&sheet.names[column], &sheet.units[column]);
+        if name.is_counter() && name.is_time() < 2 && !steps.is_count {
+            columns.time = None;
+            return Self::without(stated, "a counter shared with other packets is not a time");
+        }
+        let second = |word: &str| units_of_time().find(|of| of.0 == word);
+        let named = name
+            .unit
+            .and_then(|unit| Some(unit.times * second(unit.word)?.1));
+        let tick = name.tick().map(|tick| tick * steps.mean);
+        let known = stated.or(tick.filter(|period| PERIODS.contains(period)));
+        let seconds = || units_of_time().map(|(_, second)| second);
+        let usual = rounded(steps.mean, 6);
+        let (second, why) = if columns.nanoseconds.is_some() {
+            (Some(1.0), "seconds and nanoseconds".to_owned())
+        } else if named.is_some() {
+            (named, "stated in the file".to_owned())
+        } else if (steps.is_count || name.is_counter()) && name.is_time() < 2 {
+            (None, "steps of one, as in a sample counter".to_owned())
+        } else if let Some((second, period)) = known.and_then(|period| {
+            let is_near = |second: &f64| (steps.mean * second / period).ln().abs() < STATED.ln();
+            // Ticks of a clock of its own.
+            let own = || steps.is_whole.then(|| period / steps.mean);
+            let tick = name.tick().filter(is_near).or_else(own);
+            Some((seconds().find(is_near).or(tick)?, period))
+        }) {
+            let rate = rounded(period.recip(), 6);
+            (Some(second), format!("steps of {usual} at {rate} Hz"))
+        } else {
+            let is_usual = |second: &f64| PERIODS.contains(&(steps.mean * second));
+            let likely = seconds().find(is_usual).unwrap_or(1.0);
+            (Some(likely), format!("steps of {usual}"))
+        };
+        let word = |second: f64| units_of_time().find(|of| (second / of.1 - 1.0).abs() < 1e-9);
+        Self {
+            unit: second.map_or("count".to_owned(), |second| match word(second) {
+                Some((word, _)) => word.to_owned(),
+                None => format!("{:?}", rounded(second, 7)),
+            }),
+            certainty: match named {
+                Some(_) if columns.nanoseconds.is_none() => Certainty::Certain,
+                _ => Certainty::Guess,
+            },
+            why,
+            period: second.map(|second| steps.mean * second).or(stated),
+            is_stated: second.is_none() && stated.is_some(),
+            gaps: steps.gaps,
+            repeated: steps.repeated,
+        }
+    }
+
+    /// Samples, among these rows of this period, that follow a gap longer than `seconds`.
+    pub fn breaks(&self, rows: &[usize], period: f64, seconds: f64) -> Vec<usize> {
+        let long = |gap: &&Gap| gap.missing * period > seconds;
+        let first = |gap: &Gap| rows.partition_point(|&row| row < gap.before);
+        self.gaps.iter().filter(long).map(first).collect()
+    }
+
+    /// Evidence, statement and remedy if the steps of a time contradict a stated rate.
+    pub fn contradiction(&self, rate: f64) -> Option<[String; 3]> {
+        let found = self.period?.recip();
+        ((found / rate).ln().abs() > STATED.ln()).then(|| {
+            [
+                format!(
+                    "time stamps at {} Hz ({}; {})",
+                    rounded(found, 6),
+                    self.unit,
+                    self.why
+                ),
+                format!("{rate} Hz, as stated"),
+                "Correct or omit --rate, or update_rate in --noise-file.".to_owned(),
+            ]
+        })
+    }
+
+    fn without(period: Option<f64>, why: &str) -> Self {
+        Self {
+            unit: "s".to_owned(),
+            why: why.to_owned(),
+            certainty: Certainty::Guess,
+            period,
+            is_stated: period.is_some(),
+            gaps: Vec::new(),
+            repeated: 0,
+        }
+    }
+}
+
+/// A step longer than the usual one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gap {
+    /// The row after it.
+    before: usize,
+    /// The rows that are missing.
+    missing: f64,
+}
+
+/// Steps of the times, as interpreted by the reader.
+struct Steps {
+    /// Mean step per sample, with missing rows counted.
+    mean: f64,
+    /// Whether steps are whole numbers …
+    is_whole: bool,
+    /// … mostly one.
+    is_count: bool,
+    gaps: Vec<Gap>,
+    repeated: usize,
+}
+
+impl Steps {
+    fn of(stamps: &[f64]) -> Self {
+        let steps = || stamps.windows(2).map(|pair| pair[1] - pair[0]);
+        let mut forward: Vec<f64> = steps().filter(|&step| step > 0.0).collect();
+        let is_whole = forward.iter().all(|step| step.fract() == 0.0);
+        let repeated = steps().filter(|&step| step <= 0.0).count();
+        let usual = median(&mut forward).unwrap_or(1.0);
+        // A clock that goes back begins again, or was set.
+        let goes_on = |time: &mut f64, step: f64| {
+            *time += match step {
+                _ if step.is_nan() => 0.0,
+                _ if step < 0.0 => usual,
+                _ => step,
+            };
+            Some(*time)
+        };
+        let times = std::iter::once(0.0).chain(steps().scan(0.0, goes_on));
+        let rows: Vec<(f64, u64)> = times.zip(1..).collect();
+        let is_clock = !forward.is_empty();
+        let clock = is_clock.then(|| Uniform::new(Path::new(""), &rows, None).ok());
+        let clock = clock.flatten();
+        let numbers = clock.as_ref().map_or(&[][..], |clock| &clock.numbers);
+        let gap = |(row, pair): (usize, &[usize])| {
+            let missing = pair[1].saturating_sub(pair[0] + 1) as f64;
+            (missing > 0.0).then_some(Gap {
+                before: row + 1,
+                missing,
+            })
+        };
+        Self {
+            mean: clock.as_ref().map_or(usual, |clock| clock.period),
+            is_count: usual == 1.0 && is_whole,
+            is_whole,
+            gaps: numbers.windows(2).enumerate().filter_map(gap).collect(),
+            repeated,
+        }
+    }
+}

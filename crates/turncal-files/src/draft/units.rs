@@ -1,0 +1,391 @@
+//! Quantity and units of a row: each unit of `run.toml` is compared with gravity at rest or its rotation.
+
+mod data_sheet;
+mod hypothesis;
+
+use nalgebra::Vector3;
+
+use data_sheet::{Scale, likely_for_g};
+use hypothesis::{Hypothesis, TriadRows};
+
+use super::columns::Columns;
+use super::motion::{Motion, TOLERANCE};
+use super::name::Name;
+use super::raw_run::Axes;
+use super::registers::Registers;
+use super::stated::{Stated, StatedUnit};
+use super::time::{Clock, PERIODS};
+use crate::quantity::{Of, units};
+use crate::{Sheet, unit_scale};
+use turncal::imu::{Output, PerSensor, Sensor};
+use turncal::number::rounded;
+
+/// Sums of pulses vary less than sums of readings by more than this factor.
+const PULSE_SUMS: f64 = 0.5;
+
+/// Unit of a triad, as far as known.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Unit {
+    /// Its name in `run.toml`, if known.
+    pub word: Option<&'static str>,
+    pub why: String,
+    /// Whether it is confirmed by motion or stated by the user.
+    pub is_shown: bool,
+    /// Whether rows that are not whole numbers fit no known unit.
+    pub is_unfit: bool,
+    /// Scale of counts, if determined …
+    pub scale: Option<Scale>,
+    /// … and typical values otherwise.
+    pub likely: Option<String>,
+}
+
+impl Unit {
+    fn open(why: &str) -> Self {
+        Self {
+            why: why.to_owned(),
+            ..Self::default()
+        }
+    }
+}
+
+/// Quantity of the rows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Quantities {
+    pub output: Output,
+    pub output_why: String,
+    pub units: PerSensor<Unit>,
+    /// Whether gyros and accelerometers have opposite signs.
+    pub opposed: bool,
+}
+
+impl Quantities {
+    /// If there are too few numeric rows.
+    pub fn unknown() -> Self {
+        Self {
+            output: Output::Rate,
+            output_why: "as in most logs".to_owned(),
+            units: PerSensor::from_fn(|_| Unit::open("too few numeric rows to tell")),
+            opposed: false,
+        }
+    }
+
+    pub fn find(
+        sheet: &Sheet,
+        columns: &Columns,
+        clock: &Clock,
+        whole: PerSensor<bool>,
+        motion: &Motion,
+    ) -> Self {
+        let mut found = Self::unknown();
+        found.opposed = motion.angle.is_some_and(|angle| angle < 0.0);
+        // The accelerometers tell what rows hold.
+        for sensor in [Sensor::Accel, Sensor::Gyro] {
+            let first = columns.triads.get(sensor).map(|triad| triad[0]);
+            let named = |k: usize| Name::of_column(&sheet.names[k], &sheet.units[k]).unit;
+            let rows = TriadRows {
+                motion,
+                period: clock.period.unwrap_or(f64::NAN),
+                named: first.and_then(named),
+                whole: *whole.get(sensor),
+            };
+            let unit = found.unit(sensor, &rows);
+            *found.units.get_mut(sensor) = match first {
+                Some(_) => unit,
+                None => Unit::default(),
+            };
+        }
+        found
+    }
+
+    fn unit(&mut self, sensor: Sensor, rows: &TriadRows) -> Unit {
+        if let Some(unit) = scaled(sensor, rows) {
+            return unit;
+        }
+        let outputs = match sensor {
+            Sensor::Accel => &[Output::Rate, Output::Increment][..],
+            Sensor::Gyro => &[self.output],
+        };
+        let of_output = |&output: &Output| {
+            let known = units(sensor, output).filter_map(|(word, per_si)| Some((word, per_si?)));
+            known.map(move |unit| Hypothesis::new(sensor, unit, output, rows))
+        };
+        let all: Vec<Hypothesis> = outputs.iter().flat_map(of_output).collect();
+        let named = rows.named.map(|unit| unit.word);
+        let by_name = all.iter().find(|of| Some(of.word) == named);
+        let mut by_motion = all.iter().filter(|of| of.fits());
+        let shown = by_motion.next();
+        let evidence = shown.map_or(String::new(), |of| of.evidence(sensor, rows.motion));
+        let (chosen, why) = match (by_name, shown) {
+            (Some(name), Some(shown)) if name.is_contradicted() => {
+                let why = format!("{evidence}, although the file states {}", name.word);
+                (shown, why)
+            }
+            (Some(name), _) if !name.is_contradicted() || sensor == Sensor::Accel => {
+                (name, name.why_named(sensor, rows.motion))
+            }
+            (None, Some(shown)) if !rows.whole && (named.is_none() || sensor == Sensor::Gyro) => {
+                let others = by_motion.map(|of| format!("; could also be {}", of.word));
+                (shown, evidence + &others.collect::<String>())
+            }
+            _ => {
+                return match sensor {
+                    Sensor::Accel => self.counts_of_accelerometers(rows),
+                    Sensor::Gyro => self.counts_of_gyros(rows, by_name, &all),
+                };
+            }
+        };
+        if sensor == Sensor::Accel {
+            self.hold(chosen.output, rows);
+        }
+        Unit {
+            word: Some(chosen.word),
+            is_shown: chosen.fits(),
+            ..Unit::open(&why)
+        }
+    }
+
+    /// Sets the row quantity from the accelerometers.
+    fn hold(&mut self, output: Output, rows: &TriadRows) {
+        self.output = output;
+        self.output_why = match output {
+            Output::Pulse => {
+                "integer counts that carry their remainder, as pulse outputs do".to_owned()
+            }
+            Output::Increment => format!(
+                "specific force at rest is g times {} s per row",
+                rounded(rows.period, 4)
+            ),
+            Output::Rate => {
+                "specific force at rest is g itself, not g times the sample period".to_owned()
+            }
+        };
+    }
+
+    fn counts_of_accelerometers(&mut self, rows: &TriadRows) -> Unit {
+        let gravity = rows.motion.gravity;
+        let is_carried = |ratio: f64| rows.whole && ratio < PULSE_SUMS;
+        let output = match rows.motion.sum_variance.is_some_and(is_carried) {
+            true => Output::Pulse,
+            false => Output::Rate,
+        };
+        self.hold(output, rows);
+        let per_g = gravity * self.per_second(rows.period);
+        Unit {
+            word: Some("count"),
+            why: why_count(
+                rows,
+                &format!("no known unit gives {} at rest", rounded(gravity, 4)),
+            ),
+            is_unfit: !rows.whole,
+            likely: per_g.is_finite().then(|| likely_for_g(per_g)),
+            ..Unit::default()
+        }
+    }
+
+    fn counts_of_gyros(
+        &self,
+        rows: &TriadRows,
+        by_name: Option<&Hypothesis>,
+        all: &[Hypothesis],
+    ) -> Unit {
+        let angle = rows.motion.angle.map(f64::abs);
+        let row = self.row(rows.period);
+        let is_bare = !rows.whole && rows.named.is_none();
+        match angle {
+            // Without a clock each unit needs a period of its own.
+            Some(angle) if !row.is_finite() && is_bare => {
+                let Some((word, period)) = usual_period(all, angle) else {
+                    return Unit::open("cannot be estimated from turns without time stamps");
+                };
+                let rate = rounded(period.recip(), 4);
+                return Unit {
+                    word: Some(word),
+                    ..Unit::open(&format!(
+                        "integrated gyro angles match the change of gravity direction at about \
+                        {rate} Hz"
+                    ))
+                };
+            }
+            None if is_bare && self.output != Output::Pulse => {
+                return Unit::open(match rows.motion.is_turned {
+                    true => "too few usable turns of gravity to estimate it",
+                    false => "gravity direction does not change, so it cannot be estimated",
+                });
+            }
+            _ => {}
+        }
+        let why = match by_name {
+            Some(name) => format!(
+                "{} {}",
+                name.word,
+                name.why_named(Sensor::Gyro, rows.motion)
+            ),
+            None => why_count(rows, "no known unit fits the change of gravity direction"),
+        };
+        // Rows add up to the angle.
+        let measured = angle.map(|angle| row / angle);
+        let measured = measured.filter(|scale| scale.is_finite());
+        Unit {
+            word: Some("count"),
+            is_shown: measured.is_some() && rows.whole,
+            is_unfit: measured.is_some() && !rows.whole,
+            scale: measured.map(|value| {
+                let axes = Axes {
+                    scale: Vector3::repeat(value),
+                    sigma: TOLERANCE,
+                    by_axis: false,
+                };
+                Scale::of_turns(&axes, None, 1.0, self.output)
+            }),
+            ..Unit::open(&why)
+        }
+    }
+
+    /// The first stated unit that motion contradicts, if motion confirms another: evidence, statement, remedy.
+    pub fn contradiction(
+        &self,
+        stated: &Stated,
+        motion: &Motion,
+        period: f64,
+    ) -> Option<[String; 3]> {
+        let rows = TriadRows {
+            motion,
+            period,
+            named: None,
+            whole: false,
+        };
+        stated.units().find_map(|(sensor, StatedUnit(of))| {
+            let Of::Rows(_, output) = of.of else {
+                return None;
+            };
+            let per_si = unit_scale(sensor, of.word)? / of.times;
+            let unit = (of.word, per_si);
+            let found = self.units.get(sensor);
+            let shown = found.word.filter(|_| found.is_shown)?;
+            let is_contradicted = Hypothesis::new(sensor, unit, output, &rows).is_contradicted();
+            let (name, times) = (sensor.name(), of.times);
+            let multiple = if times == 1.0 {
+                String::new()
+            } else {
+                format!("{} ", rounded(times, 4))
+            };
+            is_contradicted.then(|| {
+                [
+                    format!("{name} rows in {shown} ({})", found.why),
+                    format!("{multiple}{}, as stated", of.word),
+                    format!("Correct or omit --{name}-unit, or check --rate."),
+                ]
+            })
+        })
+    }
+
+    /// Applies the units stated by the user.
+    pub fn state(&mut self, stated: &Stated) {
+        for (sensor, StatedUnit(of)) in stated.units() {
+            if let Of::Rows(_, output) = of.of {
+                self.output = output;
+                "follows from the stated unit".clone_into(&mut self.output_why);
+            }
+            let unit = self.units.get_mut(sensor);
+            let found = unit.scale.take().filter(|_| of.word == "count");
+            unit.scale = Scale::of_unit(sensor, of).or(found);
+            unit.word = Some(unit.scale.as_ref().map_or(of.word, |_| "count"));
+            (unit.is_shown, unit.is_unfit) = (true, false);
+            unit.why = "as stated".to_owned();
+        }
+    }
+
+    /// Whether a triad holds counts of no known size.
+    pub fn has_counts(&self) -> bool {
+        Sensor::ALL.into_iter().any(|sensor| self.is_count(sensor))
+    }
+
+    pub fn is_count(&self, sensor: Sensor) -> bool {
+        self.units.get(sensor).word == Some("count")
+    }
+
+    /// Applies the registers detected behind the counts.
+    pub fn of_registers(&mut self, found: &Registers, period: Option<f64>) {
+        let period = period.unwrap_or(f64::NAN);
+        let (per_second, row) = (self.per_second(period), self.row(period));
+        let is_open = |unit: &Unit| unit.scale.as_ref().is_none_or(|of| !of.is_named);
+        let accel = &mut self.units.accel;
+        if accel.word == Some("count") && is_open(accel) {
+            let gravity = found.gravity.as_ref().filter(|_| per_second.is_finite());
+            accel.scale = gravity.map(|gravity| Scale::of_gravity(gravity, per_second));
+        }
+        let gyro = &mut self.units.gyro;
+        let Some(turns) = found.turns.as_ref().filter(|_| row.is_finite()) else {
+            return;
+        };
+        if gyro.word.is_none_or(|word| word == "count") && is_open(gyro) {
+            if gyro.word.is_none() {
+                gyro.word = Some("count");
+                gyro.is_unfit = true;
+                gyro.why = "no known unit fits the change of gravity direction".to_owned();
+            }
+            gyro.scale = Some(Scale::of_turns(
+                &turns.axes,
+                Some(turns.moves),
+                row,
+                self.output,
+            ));
+            self.opposed = false;
+        }
+    }
+
+    /// Rows to rates.
+    pub fn per_second(&self, period: f64) -> f64 {
+        match self.output {
+            Output::Rate => 1.0,
+            Output::Pulse | Output::Increment => period.recip(),
+        }
+    }
+
+    /// Factor from a gyro row to its integral.
+    fn row(&self, period: f64) -> f64 {
+        period * self.per_second(period)
+    }
+
+    /// The file's quantity per second for one rad/s or m/s², if it is known.
+    pub fn scale(&self, sensor: Sensor) -> Option<f64> {
+        let unit = self.units.get(sensor);
+        let measured = unit.scale.as_ref().map(|scale| scale.value.abs().mean());
+        measured.or_else(|| unit_scale(sensor, unit.word?))
+    }
+}
+
+/// A unit that the file states as a multiple of one in `run.toml`, unless motion contradicts it.
+fn scaled(sensor: Sensor, rows: &TriadRows) -> Option<Unit> {
+    let unit = rows.named?;
+    let scale = Scale::of_unit(sensor, unit)?;
+    let per_si = scale.value.x;
+    let of_it = Hypothesis::new(sensor, (unit.word, per_si), Output::Rate, rows);
+    (of_it.factor.is_none() || of_it.fits()).then(|| Unit {
+        word: Some("count"),
+        why: "stated in the file".to_owned(),
+        is_shown: true,
+        is_unfit: false,
+        scale: Some(scale),
+        likely: None,
+    })
+}
+
+/// Reason for treating a triad as counts.
+fn why_count(rows: &TriadRows, unfit: &str) -> String {
+    match rows.named {
+        _ if rows.whole => "whole numbers".to_owned(),
+        Some(unit) => format!(
+            "{} is not a built-in unit, so it is a count with a scale",
+            unit.word
+        ),
+        None => unfit.to_owned(),
+    }
+}
+
+/// The only unit that gives a usual period for rows with this rotation, and the period.
+fn usual_period(all: &[Hypothesis], angle: f64) -> Option<(&'static str, f64)> {
+    let periods = all.iter().map(|of| (of.word, of.per_si * angle));
+    let mut usual = periods.filter(|(_, period)| PERIODS.contains(period));
+    usual.next().filter(|_| usual.next().is_none())
+}

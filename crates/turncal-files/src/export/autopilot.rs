@@ -1,0 +1,201 @@
+//! Parameters of PX4, ArduPilot, Betaflight and INAV: offsets, and scales of accelerometers.
+//!
+//! PX4 and ArduPilot compute `(n − offset) ⊙ scale` for accelerometers and `n − offset` for gyros, in sensor axes, and
+//! then rotate to body axes (`SENS_BOARD_ROT`, `AHRS_ORIENTATION`). INAV and Betaflight do the same in whole counts.
+//!
+//! Source: PX4-Autopilot, `src/lib/sensor_calibration` and `src/modules/temperature_compensation`; ArduPilot,
+//! `AP_InertialSensor_Backend.cpp`, `_rotate_and_correct_accel`, and `AP_InertialSensor_tempcal.cpp`, `correct_sensor`;
+//! Betaflight, `acceleration.c`, `applyAccelerationTrims`; INAV, `acceleration.c`, `applyAccelerationZero`, and
+//! `gyro.c`, `gyro_zero_x`.
+
+use nalgebra::Vector3;
+
+use super::affine::Affine;
+use super::remarks::{Exported, Remarks};
+use super::values::Values;
+use turncal::imu::{AXES, PerSensor, Sensor};
+use turncal::units::{DEGREE, STANDARD_GRAVITY};
+
+const UPPER: [&str; 3] = ["X", "Y", "Z"];
+const UNCORRECTED: &str = "gyro scale factors and all misalignments";
+/// Reference temperature of ArduPilot, °C, and the factor of its coefficients.
+const ARDUPILOT_REFERENCE: f64 = 35.0;
+const ARDUPILOT_FACTOR: f64 = 1e6;
+/// Counts per g of a 16-bit sensor with ±16 g, the setting of Betaflight and INAV …
+const COUNTS_PER_G: f64 = 2048.0;
+/// … and per rad/s with ±2000 °/s.
+const COUNTS_PER_RAD_S: f64 = 16.4 / DEGREE;
+/// Unit gain in INAV.
+const INAV_ONE: f64 = 4096.0;
+
+/// Names with values.
+type Parameters = Vec<(String, f64)>;
+
+/// Offsets of both triads, and scales of the accelerometers, as far as numbers of 32 bits represent them.
+fn single(values: &Values) -> PerSensor<Affine> {
+    let rounded = |v: Vector3<f64>| v.map(|value| f64::from(value as f32));
+    let PerSensor { gyro, accel } = &values.triads;
+    let scale = accel.sensitivity.diagonal().map(f64::recip);
+    PerSensor {
+        gyro: Affine::offset(rounded(gyro.bias)),
+        accel: Affine::diagonal(rounded(scale), rounded(accel.bias)),
+    }
+}
+
+/// Parameters whose names have `#` in place of the axis: offsets of the gyros, offsets and scales of the accelerometers.
+fn parameters(program: &PerSensor<Affine>, [gyro, offset, scale]: [&str; 3]) -> Parameters {
+    let PerSensor { gyro: g, accel: a } = program;
+    let of_axis = |name: &str, k: usize, value: f64| (name.replace('#', UPPER[k]), value);
+    let gyros = (0..3).map(|k| of_axis(gyro, k, g.offset[k]));
+    let accel = |k| {
+        [
+            of_axis(offset, k, a.offset[k]),
+            of_axis(scale, k, a.matrix[(k, k)]),
+        ]
+    };
+    gyros.chain((0..3).flat_map(accel)).collect()
+}
+
+/// Vehicle, component, name, value, type: 9 is a number of 32 bits, 6 a whole number.
+fn px4_lines(parameters: Parameters) -> String {
+    let line = |(name, value): (String, f64)| format!("1\t1\t{name}\t{:?}\t9\n", value as f32);
+    parameters.into_iter().map(line).collect()
+}
+
+/// PX4's temperature: `n − (X0 + X1 d + X2 d² + X3 d³)`, d = T − TREF, before `CAL_*` are applied.
+pub fn px4(values: &Values) -> Exported {
+    let program = single(values);
+    let id = "device identity: PX4 uses the parameters whose CAL_ACC0_ID and CAL_GYRO0_ID match the device; rename \
+        them for an instrument other than number 0";
+    let names = ["CAL_GYRO0_#OFF", "CAL_ACC0_#OFF", "CAL_ACC0_#SCALE"];
+    let mut text = px4_lines(parameters(&program, names));
+    let thermal = values.record.temperature.iter();
+    for (thermal, sensor) in thermal.flat_map(|thermal| Sensor::ALL.map(|sensor| (thermal, sensor)))
+    {
+        let range = thermal.range.get(sensor);
+        let all = sensor.pick("TC_G", "TC_A");
+        let mut parameters = vec![
+            (format!("{all}0_TREF"), range.reference),
+            (format!("{all}0_TMIN"), range.lowest),
+            (format!("{all}0_TMAX"), range.highest),
+        ];
+        for (axis, [a, b, c]) in values
+            .triads
+            .get(sensor)
+            .bias_powers
+            .into_iter()
+            .enumerate()
+        {
+            // The constant part is in CAL_*.
+            let powers = [0.0, a, b, c].into_iter().enumerate();
+            parameters.extend(powers.map(|(k, power)| (format!("{all}0_X{k}_{axis}"), power)));
+        }
+        text += &px4_lines(parameters);
+        text += &format!("1\t1\t{all}_ENABLE\t1\t6\n");
+    }
+    let reads = ("#", "PX4 reads rad/s and m/s^2");
+    Remarks::of_program(values, reads, &program, &[UNCORRECTED, id]).above(&text)
+}
+
+/// ArduPilot's temperature: `n − p(T) + p(T_cal)` before the offsets are subtracted, with `p(T) = (c₁ d + c₂ d² + c₃
+/// d³) 10⁻⁶`, d = T − 35 °C.
+pub fn ardupilot(values: &Values) -> Exported {
+    let program = single(values);
+    let notes = [
+        UNCORRECTED,
+        "instance number: the second instance uses INS_ACC2OFFS_X and so on",
+        "permanent gyro offsets: ArduPilot re-estimates them at every start unless INS_GYR_CAL is 0",
+    ];
+    let lines = |parameters: Parameters| -> String {
+        let line = |(name, value): (String, f64)| format!("{name},{:?}\n", value as f32);
+        parameters.into_iter().map(line).collect()
+    };
+    let names = ["INS_GYROFFS_#", "INS_ACCOFFS_#", "INS_ACCSCAL_#"];
+    let mut text = lines(parameters(&program, names));
+    if let Some(thermal) = &values.record.temperature {
+        let range = thermal.range.gyro;
+        let mut parameters = vec![
+            ("INS_TCAL1_TMIN".to_owned(), range.lowest),
+            ("INS_TCAL1_TMAX".to_owned(), range.highest),
+        ];
+        for (sensor, kind) in [(Sensor::Accel, "ACC"), (Sensor::Gyro, "GYR")] {
+            let reference = thermal.range.get(sensor).reference;
+            for (axis, [a, b, c]) in UPPER.iter().zip(values.triads.get(sensor).bias_powers) {
+                // Of a polynomial about the reference the same about 35 °C, except for a constant.
+                let s = ARDUPILOT_REFERENCE - reference;
+                let about = [a + 2.0 * b * s + 3.0 * c * s * s, b + 3.0 * c * s, c];
+                let name = |k: usize| format!("INS_TCAL1_{kind}{k}_{axis}");
+                parameters.extend(
+                    (1..)
+                        .map(name)
+                        .zip(about.map(|power| power * ARDUPILOT_FACTOR)),
+                );
+            }
+            parameters.push((format!("INS_{kind}1_CALTEMP"), reference));
+        }
+        text += "INS_TCAL1_ENABLE,1\n";
+        text += &lines(parameters);
+    }
+    let reads = ("#", "ArduPilot reads rad/s and m/s^2");
+    Remarks::of_program(values, reads, &program, &notes).above(&text)
+}
+
+/// A vector in whole counts.
+fn counts(v: &Vector3<f64>, per_unit: f64) -> Vector3<f64> {
+    v.map(|value| (value * per_unit).round())
+}
+
+fn of_counts(what: &str, counts: f64, unit: &str) -> String {
+    format!(
+        "counts are for {what} with {counts:.0} counts per {unit}; for n counts per {unit}, multiply by n / {counts:.0}"
+    )
+}
+
+/// Betaflight subtracts `acc_calibration` from the counts of each axis and zeroes the gyros at every start.
+pub fn betaflight(values: &Values) -> Exported {
+    let per_unit = COUNTS_PER_G / STANDARD_GRAVITY;
+    let zero = counts(&values.triads.accel.bias, per_unit);
+    let program = PerSensor {
+        gyro: Affine::offset(Vector3::zeros()),
+        accel: Affine::offset(zero / per_unit),
+    };
+    let notes = ["all gyro parameters, because it zeroes the gyros at every start"];
+    let reads = ("#", "commands for its command line,");
+    let [x, y, z] = [zero.x, zero.y, zero.z].map(|count| count as i64);
+    Remarks::of_program(values, reads, &program, &notes)
+        .defines([of_counts("an accelerometer", COUNTS_PER_G, "g")])
+        .above(&format!("set acc_calibration = {x},{y},{z},1\nsave\n"))
+}
+
+/// INAV computes `(counts − acczero) accgain / 4096` for accelerometers; gyro zeros are used if it does not estimate
+/// them.
+pub fn inav(values: &Values) -> Exported {
+    let PerSensor { gyro, accel } = &values.triads;
+    let per_unit = COUNTS_PER_G / STANDARD_GRAVITY;
+    let zero = counts(&accel.bias, per_unit);
+    let gain = counts(&accel.sensitivity.diagonal().map(f64::recip), INAV_ONE);
+    let gyro_zero = counts(&gyro.bias, COUNTS_PER_RAD_S);
+    let program = PerSensor {
+        gyro: Affine::offset(gyro_zero / COUNTS_PER_RAD_S),
+        accel: Affine::diagonal(gain / INAV_ONE, zero / per_unit),
+    };
+    let set = |name: &str, values: &Vector3<f64>| -> String {
+        let lines = AXES.iter().zip(values);
+        lines
+            .map(|(axis, value)| format!("set {name}_{axis} = {value:.0}\n"))
+            .collect()
+    };
+    let text = [
+        set("acczero", &zero),
+        set("accgain", &gain),
+        set("gyro_zero", &gyro_zero),
+        "set init_gyro_cal = OFF\nsave\n".to_owned(),
+    ];
+    let reads = ("#", "commands for its command line,");
+    Remarks::of_program(values, reads, &program, &[UNCORRECTED])
+        .defines([
+            of_counts("an accelerometer", COUNTS_PER_G, "g"),
+            of_counts("gyros", COUNTS_PER_RAD_S, "rad/s"),
+        ])
+        .above(&text.concat())
+}

@@ -1,0 +1,92 @@
+//! Devices that calibrate their output themselves: the memory of a RealSense D400 camera, and SlimeVR trackers.
+//!
+//! Source: librealsense, `tools/rs-imu-calibration/rs-imu-calibration.py`; SlimeVR-Tracker-ESP,
+//! `src/configuration/SensorConfig.h` and `src/sensors/softfusion`.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::affine::Affine;
+use super::remarks::{Exported, Remarks};
+use super::values::Values;
+use turncal::imu::PerSensor;
+
+/// A table with its header: version, kind, size, and checksum of the content.
+fn table([major, minor]: [u8; 2], kind: u16, content: &[u8]) -> Vec<u8> {
+    let mut sum = flate2::Crc::new();
+    sum.update(content);
+    let mut table = vec![major, minor];
+    table.extend(kind.to_le_bytes());
+    table.extend((content.len() as u32).to_le_bytes());
+    table.extend([0xff; 4]);
+    table.extend(sum.sum().to_le_bytes());
+    table.extend(content);
+    table
+}
+
+/// The 520 bytes of the memory of the motion module, as `rs-imu-calibration` writes them.
+///
+/// librealsense computes `matrix n − bias`, with matrices column by column. Unused bytes are 0xff.
+pub fn realsense(values: &Values) -> Exported {
+    let program = PerSensor::from_fn(|sensor| Affine::complete(values.triads.get(sensor)));
+    let notes = [
+        "rotation and translation to the depth sensor, which keep their design values",
+        "the serial number after the table, which stays empty",
+    ];
+    let mut imu = vec![0xff; 37 * 4 + 96];
+    // Intrinsics are used, extrinsics are not.
+    imu[..4].copy_from_slice(&(1u32 << 8).to_le_bytes());
+    let of_triad =
+        |triad: &Affine| [triad.matrix.as_slice(), triad.corrected_bias().as_slice()].concat();
+    let numbers = [of_triad(&program.accel), of_triad(&program.gyro)].concat();
+    for (place, value) in imu[13 * 4..].chunks_exact_mut(4).zip(numbers) {
+        place.copy_from_slice(&(value as f32).to_le_bytes());
+    }
+    let mut tables = table([2, 1], 0x20, &imu);
+    tables.extend([0xff; 32]);
+    let mut memory = table([2, 0], 0x20, &tables);
+    memory.resize(520 - 16, 0xff);
+    Remarks::of_program(values, ("#", "in memory"), &program, &notes).of_file(table(
+        [1, 1],
+        0x09,
+        &memory,
+    ))
+}
+
+/// The fields of SlimeVR's `SoftFusionSensorConfig`.
+///
+/// It computes `A_Ainv (counts − A_B)` for accelerometers and `G_Sens ⊙ (counts − G_off)` for gyros, then scales both
+/// by the nominal sensitivity of the sensor.
+pub fn slimevr(values: &Values) -> Exported {
+    let PerSensor { gyro, accel } = &values.triads;
+    let program = PerSensor {
+        gyro: Affine::diagonal(gyro.sensitivity.diagonal().map(f64::recip), gyro.bias),
+        accel: Affine::complete(accel),
+    };
+    let notes = [
+        "gyro misalignment",
+        "sample rates and magnetometer, which keep the values found by the tracker",
+    ];
+    let reads = ("//", "SlimeVR reads counts, here");
+    let unit = "offsets are in the unit of the log, which must be counts of the tracker driver";
+    let list = |v: Vector3<f64>| {
+        let [x, y, z] = [v.x, v.y, v.z].map(|value| value as f32);
+        format!("{{{x:?}f, {y:?}f, {z:?}f}}")
+    };
+    // In counts a row has the nominal scale of its axis, a column that of its input.
+    let scale = accel.nominal;
+    let inverse = Matrix3::from_diagonal(&scale)
+        * accel.inverse
+        * Matrix3::from_diagonal(&scale.map(f64::recip));
+    let text = format!(
+        ".A_B = {},\n.A_Ainv = {{{}}},\n.G_off = {},\n.G_Sens = {},\n",
+        list(accel.bias.component_mul(&accel.nominal)),
+        [0, 1, 2]
+            .map(|i| list(inverse.row(i).transpose()))
+            .join(", "),
+        list(gyro.bias.component_mul(&gyro.nominal)),
+        list(program.gyro.matrix.diagonal())
+    );
+    Remarks::of_program(values, reads, &program, &notes)
+        .defines([unit.to_owned()])
+        .above(&text)
+}

@@ -1,0 +1,124 @@
+//! A structure for MATLAB, as a MAT file of version 5: every value with its σ, ready to use.
+//!
+//! Source: MathWorks, "MAT-File Format", 2023.
+
+use nalgebra::Matrix3;
+
+use super::remarks::{Exported, Remarks, about};
+use super::values::Values;
+use turncal::calibration::result::{EQUATION, TriadRecord};
+use turncal::imu::Sensor;
+
+const INT8: u32 = 1;
+const INT32: u32 = 5;
+const UINT16: u32 = 4;
+const UINT32: u32 = 6;
+const DOUBLE: u32 = 9;
+const MATRIX: u32 = 14;
+/// Classes of arrays.
+const STRUCT: u32 = 2;
+const CHAR: u32 = 4;
+const NUMBERS: u32 = 6;
+/// Longest field name, with its terminator.
+const NAME: usize = 32;
+
+pub fn write(values: &Values) -> Exported {
+    let mut fields = vec![
+        ("equation", text("", EQUATION)),
+        ("axes", text("", "right, front, up")),
+        ("about", text("", &about(values).join("; "))),
+    ];
+    for sensor in Sensor::ALL {
+        let mut of_triad = triad(values.record.triad(sensor));
+        let matrix = values.correction.matrix.get(sensor);
+        of_triad.push(("correction", numbers("", 3, matrix.as_slice())));
+        of_triad.push(("unit", text("", &values.unit(sensor))));
+        if let Some(sigma) = values.sigma(sensor) {
+            of_triad.push(("sigma", structure("", &triad(sigma))));
+        }
+        fields.push((sensor.name(), structure("", &of_triad)));
+    }
+    // It is symmetric, so rows are columns.
+    let covariance = values.record.covariance.concat();
+    let size = values.record.covariance.len();
+    fields.push(("covariance", numbers("", size, &covariance)));
+    fields.push(("parameters", text("", &values.record.parameters.join(" "))));
+    let mut file = vec![b' '; 124];
+    let title = b"MATLAB 5.0 MAT-file, a calibration by turncal";
+    file[..title.len()].copy_from_slice(title);
+    // No data of subsystems.
+    file[116..124].fill(0);
+    file.extend([0x00, 0x01, b'I', b'M']);
+    file.extend(structure("turncal", &fields));
+    Remarks::new(values, "", &[]).of_file(file)
+}
+
+fn triad(record: &TriadRecord) -> Vec<(&'static str, Vec<u8>)> {
+    let installation = Matrix3::from_fn(|i, j| record.installation[i][j]);
+    vec![
+        ("scale", numbers("", 3, &record.scale)),
+        ("installation", numbers("", 3, installation.as_slice())),
+        ("bias", numbers("", 3, &record.bias)),
+    ]
+}
+
+fn element(kind: u32, content: &[u8]) -> Vec<u8> {
+    let mut bytes = Vec::with_capacity(content.len() + 16);
+    bytes.extend(kind.to_le_bytes());
+    bytes.extend((content.len() as u32).to_le_bytes());
+    bytes.extend(content);
+    bytes.resize(bytes.len().next_multiple_of(8), 0);
+    bytes
+}
+
+/// Start of an array: class, size and name.
+fn array(class: u32, name: &str, rows: usize, columns: usize, rest: &[u8]) -> Vec<u8> {
+    let flags: Vec<u8> = [class, 0].into_iter().flat_map(u32::to_le_bytes).collect();
+    let size: Vec<u8> = [rows, columns]
+        .into_iter()
+        .flat_map(|n| (n as i32).to_le_bytes())
+        .collect();
+    let parts = [
+        element(UINT32, &flags),
+        element(INT32, &size),
+        element(INT8, name.as_bytes()),
+        rest.to_vec(),
+    ];
+    element(MATRIX, &parts.concat())
+}
+
+/// A matrix with this number of rows, column by column.
+fn numbers(name: &str, rows: usize, values: &[f64]) -> Vec<u8> {
+    let bytes: Vec<u8> = values
+        .iter()
+        .flat_map(|value| value.to_le_bytes())
+        .collect();
+    let columns = values.len().checked_div(rows).unwrap_or(0);
+    array(NUMBERS, name, rows, columns, &element(DOUBLE, &bytes))
+}
+
+fn text(name: &str, text: &str) -> Vec<u8> {
+    let letters: Vec<u16> = text.encode_utf16().collect();
+    let bytes: Vec<u8> = letters
+        .iter()
+        .flat_map(|letter| letter.to_le_bytes())
+        .collect();
+    array(CHAR, name, 1, letters.len(), &element(UINT16, &bytes))
+}
+
+fn structure(name: &str, fields: &[(&str, Vec<u8>)]) -> Vec<u8> {
+    // A short element: its size in the upper half of its type.
+    let mut rest: Vec<u8> = [INT32 | 4 << 16, NAME as u32]
+        .into_iter()
+        .flat_map(u32::to_le_bytes)
+        .collect();
+    let mut names = Vec::new();
+    for (field, _) in fields {
+        let end = names.len() + NAME;
+        names.extend(field.bytes().take(NAME - 1));
+        names.resize(end, 0);
+    }
+    rest.extend(element(INT8, &names));
+    fields.iter().for_each(|(_, content)| rest.extend(content));
+    array(STRUCT, name, 1, 1, &rest)
+}

@@ -1,0 +1,51 @@
+//! ROS: covariances of `sensor_msgs/Imu`, and the accelerometers' calibration of `imu_calib`.
+//!
+//! Source: ROS common_interfaces, `sensor_msgs/Imu`; imu_calib, `AccelCalib::applyCalib` and
+//! `ApplyCalib::rawImuCallback`.
+
+use super::affine::Affine;
+use super::notation::list;
+use super::remarks::{Exported, Remarks};
+use super::values::Values;
+use turncal::imu::{PerSensor, Sensor};
+
+/// Row-major about x, y, z: variance per sample, density² × rate.
+pub fn covariance(values: &Values) -> Exported {
+    let notes = [
+        "scale, misalignment and bias; publish the output of `turncal apply`, which has these errors removed",
+        "bias drift, which is not white; measure it with `turncal allan`",
+    ];
+    let line = |(key, sensor)| match values.triads.get(sensor).density().zip(values.period) {
+        Some((density, period)) => {
+            let variance = density.powi(2) / period;
+            let all = [0, 1, 2, 3, 4, 5, 6, 7, 8].map(|k| if k % 4 == 0 { variance } else { 0.0 });
+            format!("{key}: {}\n", list(&all))
+        }
+        None => format!("# {key}: needs the noise and rate of a run; export with --run RUN.toml\n"),
+    };
+    let lines = [
+        ("angular_velocity_covariance", Sensor::Gyro),
+        ("linear_acceleration_covariance", Sensor::Accel),
+    ];
+    let variance = "variance per sample: density^2 times rate, (rad/s)^2 and (m/s^2)^2";
+    Remarks::new(values, "#", &notes)
+        .including(|_| true)
+        .defines([String::new(), variance.to_owned()])
+        .above(&lines.map(line).concat())
+}
+
+/// `SM n − bias` for the accelerometers, so the bias is in corrected units.
+pub fn imu_calib(values: &Values) -> Exported {
+    let program = PerSensor {
+        gyro: Affine::offset(values.triads.gyro.bias),
+        accel: Affine::complete(&values.triads.accel),
+    };
+    let notes = [
+        "gyro biases: imu_calib averages the gyros at its start, which includes Earth rate of up to 15.041 deg/h",
+    ];
+    let reads = ("#", "imu_calib reads rad/s and m/s^2, here");
+    let matrix = list(&program.accel.matrix.transpose());
+    let bias = list(&program.accel.corrected_bias());
+    Remarks::of_program(values, reads, &program, &notes)
+        .above(&format!("SM: {matrix}\nbias: {bias}\n"))
+}

@@ -1,0 +1,97 @@
+//! Every value with its name, σ and unit, as text.
+
+use nalgebra::Vector3;
+
+use super::remarks::{Exported, Remarks, test_vectors};
+use super::values::Values;
+use turncal::imu::{AXES, Sensor, Term};
+use turncal::units::{DEG_PER_H, MICRO_G};
+
+pub fn write(values: &Values) -> Exported {
+    let covariance = "covariance of the parameters; it is in calibration.json";
+    let mut lines = vec![format!(
+        "\n{:<26}{:>25}{:>12}  unit",
+        "name", "value", "1 sigma"
+    )];
+    for sensor in Sensor::ALL {
+        lines.extend(triad(values, sensor));
+    }
+    for (name, term) in &values.record.terms {
+        let of_term = Term::parameter_named(name).and_then(Term::of);
+        // The others are the table's, all of them angles.
+        let unit = of_term.map_or("rad", |term| term.entry().si_unit);
+        lines.push(row(name, term.value, term.sigma, unit));
+    }
+    for sensor in Sensor::ALL {
+        let matrix = values.correction.matrix.get(sensor);
+        let unit = format!("{} per {}", Values::input(sensor), values.unit(sensor));
+        lines.extend(places().map(|(i, j, place)| {
+            let name = format!("{}.correction.{place}", sensor.name());
+            row(&name, matrix[(i, j)], None, &unit)
+        }));
+    }
+    let mut vectors = test_vectors(values);
+    if let Some(title) = vectors.first_mut() {
+        title.insert(0, '\n');
+    }
+    lines.extend(vectors);
+    Remarks::new(values, "#", &[covariance])
+        .including(|_| true)
+        .above(&(lines.join("\n") + "\n"))
+}
+
+/// Entries of a matrix, with their names.
+fn places() -> impl Iterator<Item = (usize, usize, String)> {
+    let places = (0..9).map(|k| (k / 3, k % 3));
+    places.map(|(i, j)| (i, j, format!("{}{}", AXES[i], AXES[j])))
+}
+
+fn triad(values: &Values, sensor: Sensor) -> Vec<String> {
+    let (of, sigma) = (values.record.triad(sensor), values.sigma(sensor));
+    let (name, unit) = (sensor.name(), values.unit(sensor));
+    let (in_words, factor) = sensor.pick(("deg/h", DEG_PER_H), ("ug", MICRO_G));
+    let in_input = Vector3::from(of.bias).component_div(&Vector3::from(of.scale)) / factor;
+    let scale = |k: usize| {
+        let unit = format!("{unit} per {}", Values::input(sensor));
+        let sigma = sigma.map(|sigma| sigma.scale[k]);
+        row(
+            &format!("{name}.scale.{}", AXES[k]),
+            of.scale[k],
+            sigma,
+            &unit,
+        )
+    };
+    let installation = |(i, j, place): (usize, usize, String)| {
+        let sigma = sigma
+            .map(|sigma| sigma.installation[i][j])
+            .filter(|_| i != j);
+        row(
+            &format!("{name}.installation.{place}"),
+            of.installation[i][j],
+            sigma,
+            "1",
+        )
+    };
+    let bias = |k: usize| {
+        let unit = format!("{unit}, {:.6} {in_words}", in_input[k]);
+        let sigma = sigma.map(|sigma| sigma.bias[k]);
+        row(
+            &format!("{name}.bias.{}", AXES[k]),
+            of.bias[k],
+            sigma,
+            &unit,
+        )
+    };
+    let rows = (0..3).map(scale).chain(places().map(installation));
+    rows.chain((0..3).map(bias)).collect()
+}
+
+/// A σ of zero means that the value was not estimated.
+fn row(name: &str, value: f64, sigma: Option<f64>, unit: &str) -> String {
+    let sigma = match sigma {
+        None => String::new(),
+        Some(0.0) => "fixed".to_owned(),
+        Some(sigma) => format!("{sigma:.2e}"),
+    };
+    format!("{name:<26}{value:>25e}{sigma:>12}  {unit}")
+}

@@ -1,0 +1,177 @@
+//! The table that every format reads: a calibration, its run, and all values along the axes of the format.
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::unit_scale;
+use turncal::calibration::result::{Calibration, TriadRecord};
+use turncal::calibration::{Correction, CorrectionError};
+use turncal::imu::{AXES, AxisOrder, GaussMarkov, Noise, PerSensor, Sensor, Term};
+use turncal::run::Run;
+
+/// Polynomial orders in temperature supported by autopilots.
+pub const ORDERS: usize = 3;
+
+/// Axes of the values of a format.
+#[derive(Debug, Clone, Copy)]
+pub enum Axes {
+    RightFrontUp,
+    FrontRightDown,
+    /// Those of the log of the run, without a run right, front, up.
+    Log,
+}
+
+/// Every value of a calibration and, perhaps, a run of its instrument.
+pub struct Values<'a> {
+    pub record: &'a Calibration,
+    /// In the unit of the record, along right, front, up.
+    pub correction: Correction,
+    /// From the axes of the format to right, front, up.
+    pub order: AxisOrder,
+    /// Along the axes of the format.
+    pub triads: PerSensor<Normalised>,
+    /// Gyro output per specific force, along the axes of the format.
+    pub g_sensitivity: Matrix3<f64>,
+    /// Sample period of the run, s.
+    pub period: Option<f64>,
+}
+
+/// A triad in rad/s or m/s²: `n = sensitivity u + bias`, `u = inverse (n − bias)`, with `n = N / nominal`.
+pub struct Normalised {
+    /// Divisor of the quantity of the file per second, axis by axis.
+    pub nominal: Vector3<f64>,
+    pub sensitivity: Matrix3<f64>,
+    pub inverse: Matrix3<f64>,
+    pub bias: Vector3<f64>,
+    /// 1σ of the scale factors of n; `None` if the record has none.
+    pub scale_sigma: Option<Vector3<f64>>,
+    /// 1σ of the bias in n.
+    pub bias_sigma: Option<Vector3<f64>>,
+    /// Coefficients of powers 1 to 3 of the bias about the reference temperature, axis by axis, in n per °C, °C², °C³.
+    pub bias_powers: [[f64; ORDERS]; 3],
+    /// Stated noise of the run.
+    pub noise: Option<Noise>,
+}
+
+impl<'a> Values<'a> {
+    /// Without a run, the nominal scale is that of the unit; for counts the calibrated scale factors, rounded to three
+    /// digits.
+    pub fn new(
+        record: &'a Calibration,
+        run: Option<&Run>,
+        axes: Axes,
+    ) -> Result<Self, CorrectionError> {
+        let correction = match run {
+            Some(run) => Correction::for_run(record, run)?,
+            None => Correction::of_record(record)?,
+        };
+        let log = run.and_then(|run| run.recording.imu.log.as_ref());
+        let order = match axes {
+            Axes::RightFrontUp => AxisOrder::IDENTITY,
+            Axes::FrontRightDown => AxisOrder::FRONT_RIGHT_DOWN,
+            Axes::Log => log.map_or(AxisOrder::IDENTITY, |log| log.named.axes),
+        };
+        let turn = order.matrix();
+        let q = Term::GSensitivity.parameters().start;
+        let g_sensitivity = Matrix3::from_fn(|i, j| correction.terms[q + 3 * i + j]);
+        Ok(Self {
+            triads: PerSensor::from_fn(|sensor| {
+                Normalised::new(record, &correction, run, &order, sensor)
+            }),
+            g_sensitivity: turn.transpose() * g_sensitivity * turn,
+            period: run.map(|run| run.recording.imu.period),
+            record,
+            correction,
+            order,
+        })
+    }
+
+    /// The unit of `N`. A count is that of a rate or, per second, of an increment; the record does not distinguish
+    /// them.
+    pub fn unit(&self, sensor: Sensor) -> String {
+        match self
+            .record
+            .unit
+            .as_ref()
+            .map(|unit| unit.get(sensor).as_str())
+        {
+            None => "an unnamed unit".to_owned(),
+            Some(unit @ ("rad" | "deg" | "arcsec" | "m/s" | "g*s")) => format!("{unit}/s"),
+            Some(unit) => unit.to_owned(),
+        }
+    }
+
+    /// The unit of `u`.
+    pub fn input(sensor: Sensor) -> &'static str {
+        sensor.pick("rad/s", "m/s^2")
+    }
+
+    /// 1σ of the parameters of a triad, in the unit of the record.
+    pub fn sigma(&self, sensor: Sensor) -> Option<&TriadRecord> {
+        Some(self.record.sigma.as_ref()?.get(sensor))
+    }
+
+    /// Reason for a missing noise figure.
+    pub fn no_noise(&self) -> &'static str {
+        match self.period {
+            Some(_) => "[imu.noise] in run.toml does not state it",
+            None => "measure it with `turncal allan` or export with --run RUN.toml",
+        }
+    }
+}
+
+impl Normalised {
+    fn new(
+        record: &Calibration,
+        correction: &Correction,
+        run: Option<&Run>,
+        order: &AxisOrder,
+        sensor: Sensor,
+    ) -> Self {
+        let of_unit = correction.sensitivity.get(sensor);
+        let unit = record.unit.as_ref().map(|unit| unit.get(sensor));
+        let nominal = match (run, unit.and_then(|unit| unit_scale(sensor, unit))) {
+            (Some(run), _) => run.instrument.nominal.get(sensor).0,
+            (None, Some(scale)) => Vector3::repeat(scale),
+            (None, None) => Vector3::from_fn(|i, _| {
+                let scale = of_unit.row(i).norm().copysign(of_unit[(i, i)]);
+                format!("{scale:.2e}").parse().unwrap_or(scale)
+            }),
+        };
+        let turn = order.matrix();
+        let back = order.inverse();
+        let bias = correction.bias.get(sensor).component_div(&nominal);
+        let sensitivity = Matrix3::from_fn(|i, j| of_unit[(i, j)] / nominal[i]);
+        let sensitivity = turn.transpose() * sensitivity * turn;
+        let nominal = back.each(nominal);
+        let sigma = record.sigma.as_ref().map(|sigma| sigma.get(sensor));
+        let in_n = |sigma: [f64; 3]| back.each(sigma.into()).component_div(&nominal.abs());
+        let powers = record.temperature.as_ref().map(|thermal| &thermal.powers);
+        let bias_powers = std::array::from_fn(|axis| {
+            let name = format!("{}.bias.{}", sensor.name(), AXES[back.source[axis]]);
+            let of_axis = powers.and_then(|powers| powers.get(&name));
+            let power = |k| of_axis.and_then(|of| of.get(k)).copied().unwrap_or(0.0);
+            std::array::from_fn(|k| back.sign(axis) * power(k) / nominal[axis])
+        });
+        Self {
+            // An exportable calibration has an inverse.
+            inverse: sensitivity.try_inverse().unwrap_or_else(Matrix3::identity),
+            sensitivity,
+            bias: turn.transpose() * bias,
+            scale_sigma: sigma.map(|sigma| in_n(sigma.scale)),
+            bias_sigma: sigma.map(|sigma| in_n(sigma.bias)),
+            nominal,
+            bias_powers,
+            noise: run.map(|run| *run.instrument.noise.get(sensor)),
+        }
+    }
+
+    /// White noise density of the run, rad/√s or (m/s)/√s.
+    pub fn density(&self) -> Option<f64> {
+        Some(self.noise?.random_walk)
+    }
+
+    /// Bias variation of the run.
+    pub fn varying(&self) -> Option<GaussMarkov> {
+        self.noise?.gauss_markov
+    }
+}

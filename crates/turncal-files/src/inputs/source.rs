@@ -1,0 +1,104 @@
+//! Sources of rows and their clocks, as described in `run.toml`.
+
+use crate::schema::instrument::Fields;
+use crate::schema::{TimeColumn, TimeUnitField};
+use turncal_input::Positive;
+use turncal_input::{FileError, list, suggestion};
+use turncal_logs::DataFile;
+use turncal_logs::Source;
+use turncal_logs::clock::{Breaks, Clock, TimeUnit};
+
+impl<'a> Fields<'a> {
+    /// The file of this name in `run.toml`.
+    pub fn file(&self, name: &str) -> DataFile {
+        DataFile::find(self.directory.join(name), self.in_memory)
+    }
+
+    /// Source described by a TOML table.
+    pub fn source(
+        &self,
+        file: &str,
+        stream: &'a Option<String>,
+        salvage: Option<bool>,
+    ) -> Source<'a> {
+        Source {
+            file: self.file(file),
+            stream: stream.as_deref(),
+            salvage: salvage.unwrap_or(false),
+        }
+    }
+
+    /// Clock described by a TOML table.
+    pub fn clock(
+        &self,
+        table: &str,
+        column: Option<&'a TimeColumn>,
+        (unit, period): (Option<&TimeUnitField>, Option<Positive>),
+    ) -> Result<Clock<'a>, FileError> {
+        let unknown = |name: &str| {
+            let known = || TimeUnit::WORDS.iter().map(|(word, _)| *word);
+            self.document.wrong(
+                &format!("{table}.time_unit"),
+                format_args!("one of {}, or the duration of a tick in s", list(known())),
+                suggestion(name, known(), "Choose one of them."),
+            )
+        };
+        let unit = unit.map(TimeUnitField::unit).transpose().map_err(unknown)?;
+        if unit == Some(TimeUnit::Count) && period.is_none() {
+            let path = format!("{table}.sample_period_s");
+            return Err(self.document.missing(&path, "the duration of one count"));
+        }
+        let seconds = TimeUnit::PerSecond(1.0);
+        let (column, nanoseconds) = match column {
+            None => (None, None),
+            Some(TimeColumn::One(column)) => (Some(column.as_str()), None),
+            Some(TimeColumn::SecondsAndNanoseconds([seconds, rest])) => {
+                (Some(seconds.as_str()), Some(rest.as_str()))
+            }
+        };
+        if nanoseconds.is_some() && unit.is_some_and(|unit| unit != seconds) {
+            let path = format!("{table}.time_unit");
+            let advice = "Set it to `s`, or remove it.";
+            return Err(self.document.wrong(&path, "`s`", advice));
+        }
+        Ok(Clock {
+            column,
+            nanoseconds,
+            unit: unit.unwrap_or(seconds),
+            period: period.map(|period| period.0),
+            breaks: Breaks::None,
+        })
+    }
+
+    /// Source of the accelerometers, if not in the gyro rows, and their clock.
+    pub fn accel_from(
+        &self,
+        gyro: &Source<'a>,
+        of_gyro: Clock<'a>,
+    ) -> Result<Option<(Source<'a>, Clock<'a>)>, FileError> {
+        let Some(fields) = &self.run.imu.accel_from else {
+            return Ok(None);
+        };
+        let file = fields.file.as_ref();
+        let source = Source {
+            file: file.map_or_else(|| gyro.file.clone(), |file| self.file(file)),
+            stream: fields.stream.as_deref().or(gyro.stream),
+            salvage: fields.salvage.unwrap_or(gyro.salvage),
+        };
+        let stated = (fields.time_unit.as_ref(), fields.sample_period_s);
+        let mut clock = self.clock("imu.accel_from", fields.time.as_ref(), stated)?;
+        if clock.column.is_none() {
+            (clock.column, clock.nanoseconds) = (of_gyro.column, of_gyro.nanoseconds);
+        }
+        if fields.time_unit.is_none() {
+            clock.unit = of_gyro.unit;
+        }
+        match clock.column {
+            Some(_) => Ok(Some((source, clock))),
+            None => Err(self.document.missing(
+                "imu.accel_from.time",
+                "the time column of the accelerometers, because separate streams both need one",
+            )),
+        }
+    }
+}

@@ -1,0 +1,226 @@
+//! `campaign.toml`: recordings of one instrument that are calibrated jointly.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::page::{self, Remarks};
+use crate::is_toml;
+use turncal::calibration::{DayToDay, Group, TemperatureOptions, Together};
+use turncal::imu::{HIGHEST_ORDER, InstallationForm, ParameterKind};
+use turncal::number::rounded;
+use turncal::recording::Temperature;
+use turncal::run::Run;
+use turncal_input::FileError;
+use turncal_input::small_file;
+use turncal_input::{Celsius, Document, NonNegative};
+
+/// The version of the format.
+const FORMAT: &str = "turncal-campaign/1";
+/// Recordings of one instrument with their common settings.
+#[derive(Debug, Clone)]
+pub struct Campaign {
+    /// Name of its directory or file.
+    pub name: String,
+    /// In order of name, independent of the order in the file.
+    pub runs: Vec<Run>,
+    /// Common settings.
+    pub together: Together,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CampaignFile {
+    /// Parameter groups that are independent in each recording.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    own: Vec<String>,
+    temperature: Option<TemperatureFile>,
+    recording: Vec<RecordingFile>,
+    /// 1σ from one recording to the next.
+    #[serde(default)]
+    day_to_day: BTreeMap<String, NonNegative>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RecordingFile {
+    run: PathBuf,
+    temperature_degc: Option<Celsius>,
+}
+
+/// Temperature dependence of parameters.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[serde(
+    untagged,
+    deny_unknown_fields,
+    expecting = "true, false, or a table with `highest_order` (1 to 5), `rate` and `reference_degc`"
+)]
+enum TemperatureFile {
+    Follows(bool),
+    With {
+        highest_order: Option<u8>,
+        rate: Option<bool>,
+        reference_degc: Option<Celsius>,
+    },
+}
+
+impl Campaign {
+    /// Whether a file is a campaign.
+    pub fn is_at(path: &Path) -> bool {
+        if !is_toml(path) {
+            return false;
+        }
+        let text = small_file::text(path, "", "").unwrap_or_default();
+        let table = Document::of(path, &text).parse().ok();
+        let format = table.and_then(|table| {
+            let format = table.get_ref().get("format")?.get_ref().as_str()?;
+            Some(format.starts_with("turncal-campaign/"))
+        });
+        format == Some(true)
+    }
+
+    /// Reads a campaign and its recordings, whose paths are relative to it.
+    ///
+    /// # Errors [`FileError`] if it or a recording cannot be read, or a value is invalid.
+    pub fn read(path: &Path) -> Result<Self, FileError> {
+        let text = small_file::text(path, "the campaign", "Give the path of a campaign.toml.")?;
+        let document = Document::of(path, &text);
+        let mut file: CampaignFile = document.fill(document.of_format(FORMAT)?)?;
+        if file.recording.is_empty() {
+            return Err(document.missing("recording", ""));
+        }
+        let directory = path.parent().unwrap_or(Path::new(""));
+        let named = &mut file.recording;
+        named
+            .iter_mut()
+            .for_each(|one| one.run = directory.join(&one.run));
+        named.sort_by(|a, b| a.run.cmp(&b.run));
+        if let Some(pair) = named.windows(2).find(|pair| pair[0].run == pair[1].run) {
+            let advice = "List each recording once.";
+            let found = format_args!("{} twice", pair[0].run.display());
+            return Err(FileError::of(path, found, "each recording once", advice));
+        }
+        let temperature = file
+            .temperature
+            .map(|of| temperature(document, of))
+            .transpose()?;
+        let runs = named.par_iter().map(|named| {
+            let mut run = crate::read_run(&named.run)?;
+            let of_meta = run.recording.meta.get("temperature_degc");
+            let of_meta = || Celsius::try_from(of_meta?.parse::<f64>().ok()?).ok();
+            let stated = named.temperature_degc.or_else(of_meta).map(|of| of.0);
+            let of_run = &mut run.recording.imu.temperature;
+            *of_run = of_run.take().or(stated.map(Temperature::constant));
+            Ok(run)
+        });
+        let runs: Vec<Run> = runs.collect::<Result<_, FileError>>()?;
+        let stated = &file.day_to_day;
+        document.only("day_to_day", stated.keys(), &DayToDay::keys())?;
+        let value = |key: &str| stated.get(key).map_or(0.0, |sigma| sigma.0);
+        let mut day_to_day = DayToDay::of_values(value);
+        own_parameters(document, &file.own, &runs, &mut day_to_day)?;
+        let temperature = match temperature {
+            Some(stated) => stated,
+            None => {
+                let known = |run: &Run| run.recording.imu.temperature.is_some();
+                runs.iter().all(known).then(TemperatureOptions::default)
+            }
+        };
+        Ok(Self {
+            name: super::read::name(path),
+            runs,
+            together: Together {
+                day_to_day,
+                temperature,
+            },
+        })
+    }
+}
+
+/// The `campaign.toml` for recordings with these relative paths and this 1σ between recordings.
+pub fn campaign_text(paths: &[String], day_to_day: &DayToDay) -> String {
+    let recording = |path: &String| RecordingFile {
+        run: path.into(),
+        temperature_degc: None,
+    };
+    let differing = day_to_day.values().filter(|(_, sigma)| *sigma > 0.0);
+    let file = CampaignFile {
+        own: Vec::new(),
+        temperature: None,
+        recording: paths.iter().map(recording).collect(),
+        day_to_day: differing
+            .map(|(key, sigma)| (key, NonNegative(rounded(sigma, 3))))
+            .collect(),
+    };
+    let mut remarks = Remarks::default();
+    remarks.before("day_to_day", "1σ from one recording to the next");
+    page::text(FORMAT, &file, &remarks)
+}
+
+/// Temperature dependence of parameters; `None` if constant.
+fn temperature(
+    document: Document,
+    stated: TemperatureFile,
+) -> Result<Option<TemperatureOptions>, FileError> {
+    let usual = TemperatureOptions::default();
+    match stated {
+        TemperatureFile::Follows(follows) => Ok(follows.then_some(usual)),
+        TemperatureFile::With {
+            highest_order: Some(order),
+            ..
+        } if !(1..=HIGHEST_ORDER).contains(&usize::from(order)) => {
+            let expected = format_args!("a whole number from 1 to {HIGHEST_ORDER}");
+            let path = "temperature.highest_order";
+            Err(document.wrong(path, expected, "Correct this value."))
+        }
+        TemperatureFile::With {
+            highest_order,
+            rate,
+            reference_degc,
+        } => Ok(Some(TemperatureOptions {
+            highest_order: highest_order.map_or(usual.highest_order, usize::from),
+            rate: rate.unwrap_or(usual.rate),
+            reference: reference_degc.map(|of| of.0).or(usual.reference),
+        })),
+    }
+}
+
+/// The name of a group in `own`.
+fn own_name(group: Group) -> String {
+    let kind = match group.kind() {
+        ParameterKind::Scale => "scale",
+        ParameterKind::Installation => "installation",
+        ParameterKind::Bias => "bias",
+    };
+    format!("{}.{kind}", group.sensor().name())
+}
+
+/// Lets groups differ freely between recordings: by the 1σ by which instruments differ.
+fn own_parameters(
+    document: Document,
+    own: &[String],
+    runs: &[Run],
+    day_to_day: &mut DayToDay,
+) -> Result<(), FileError> {
+    let form = InstallationForm::General;
+    for name in own {
+        let Some(group) = Group::all().find(|&group| own_name(group) == *name) else {
+            let known: Vec<String> = Group::all().map(own_name).collect();
+            return Err(document.wrong(
+                "own",
+                format_args!("names from the list {}", known.join(", ")),
+                "Name parameter groups that differ freely between recordings.",
+            ));
+        };
+        for i in group.parameters(form) {
+            let (sensor, of_triad) = turncal::calibration::sensor_and_parameter(i);
+            let prior = runs
+                .first()
+                .map(|run| run.instrument.prior.get(sensor).sigma(form));
+            day_to_day.parameters[i] = prior.map_or(0.0, |prior| prior[of_triad]);
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,298 @@
+//! The instrument as described in `run.toml`: log, noise, unit, nominal scale and prior.
+
+use std::path::Path;
+
+use nalgebra::Vector3;
+
+use super::{Names, RunFile};
+use crate::imu_log::ImuLog;
+use crate::inputs::temperature::TemperatureColumns;
+use crate::quantity::units;
+use turncal::imu::{
+    GaussMarkov, Instrument, MotionNoise, Noise, NoiseKeys, Nominal, Output, PerSensor, Prior,
+    Sensor,
+};
+use turncal::models::term_sigma;
+use turncal::units::{ARCSEC, DEGREE, PPM};
+use turncal_input::{Document, OneOrThree};
+use turncal_input::{FileError, list, suggestion};
+use turncal_logs::DataFile;
+use turncal_logs::clock::{Breaks, Clock};
+
+/// Default 1σ of scale factors, misalignments and biases, typical of consumer MEMS.
+pub const USUAL_SCALE: f64 = 50_000.0 * PPM;
+pub const USUAL_INSTALLATION: f64 = 2.0 * DEGREE;
+/// rad/s and m/s².
+pub const USUAL_BIAS: PerSensor<f64> = PerSensor {
+    gyro: 2.0 * DEGREE,
+    accel: 1.0,
+};
+/// Assumed sample period until estimated from motion, s.
+pub const USUAL_PERIOD: f64 = 0.01;
+/// Maximum relative 1σ of a scale factor.
+const WIDEST_SCALE: f64 = 10.0;
+/// Maximum 1σ of a bias, beyond the range of any instrument, rad/s or m/s².
+const WIDEST_BIAS: f64 = 1e6;
+/// Maximum angle error, ″.
+const HALF_TURN: f64 = 648_000.0;
+
+/// Content of a `run.toml` while reading; `notes` receives remarks on assumptions and fields without effect.
+pub struct Fields<'a> {
+    pub document: Document<'a>,
+    pub run: &'a RunFile,
+    pub directory: &'a Path,
+    /// Files of this directory that are in memory.
+    pub in_memory: &'a [DataFile],
+    pub notes: Vec<String>,
+}
+
+/// Content of `[imu]` and its subtables.
+pub struct InstrumentFields<'a> {
+    pub log: ImuLog<'a>,
+    pub known: Instrument,
+    /// Whether the sample period is stated neither in run.toml nor by a time column.
+    pub without_period: bool,
+}
+
+impl<'a> Fields<'a> {
+    pub fn instrument(&mut self) -> Result<InstrumentFields<'a>, FileError> {
+        let imu = &self.run.imu;
+        let known = self.knowledge()?;
+        let stated = (imu.time_unit.as_ref(), imu.sample_period_s);
+        let mut of_gyro = self.clock("imu", imu.columns.time.as_ref(), stated)?;
+        let source = self.source(&imu.file, &imu.stream, imu.salvage);
+        let accel_from = self.accel_from(&source, of_gyro)?;
+        if let (Some(of), Some(_)) = (&imu.instance, &accel_from) {
+            let meaning = format!(
+                "a stream of one instrument without `{}`, which accel_from requires",
+                of.column
+            );
+            return Err(self.document.missing("imu.stream", &meaning));
+        }
+        of_gyro.breaks = match self.run.turntable.is_some() || self.run.segments.is_some() {
+            _ if accel_from.is_some() => Breaks::None,
+            true => Breaks::Pauses,
+            false => Breaks::Settings,
+        };
+        let without_period = self.with_usual_period(&mut of_gyro)?;
+        let names = |sensor| match imu.of(sensor).columns {
+            Some(Names(names)) => names.each_ref().map(String::as_str),
+            None => [""; 3],
+        };
+        let log = ImuLog {
+            source,
+            clock: of_gyro,
+            accel_from,
+            instance: (imu.instance.as_ref()).map(|of| (of.column.as_str(), of.number.0)),
+            triads: PerSensor::from_fn(names),
+            temperature: imu.columns.temperature.as_ref().map(|column| {
+                let unit = imu.temperature_unit.unwrap_or_default();
+                TemperatureColumns::of_fields(column, unit)
+            }),
+            output: imu.output,
+            axes: imu.axes(),
+            stamp: imu.time_stamp,
+            continuous: imu.continuous.unwrap_or(true),
+            nominal: known.nominal,
+            full_scale: PerSensor::from_fn(|sensor| imu.of(sensor).full_scale),
+        };
+        Ok(InstrumentFields {
+            log,
+            known,
+            without_period,
+        })
+    }
+
+    /// The default period if none is stated; the period can only be estimated for rates without other logs.
+    fn with_usual_period(&self, clock: &mut Clock) -> Result<bool, FileError> {
+        if clock.column.is_some() || clock.period.is_some() {
+            return Ok(false);
+        }
+        if self.run.imu.output != Output::Rate || self.run.turntable.is_some() {
+            let meaning = "a column name (pulses, increments and runs with a [turntable] need either this or \
+                sample_period_s)";
+            return Err(self.document.missing("imu.columns.time", meaning));
+        }
+        clock.period = Some(USUAL_PERIOD);
+        Ok(true)
+    }
+
+    /// Units, nominal scales, priors, noise and error terms.
+    fn knowledge(&mut self) -> Result<Instrument, FileError> {
+        let imu = &self.run.imu;
+        let axes = imu.axes();
+        let unit = PerSensor::try_from_fn(|sensor| self.unit(sensor))?;
+        let nominal = PerSensor::try_from_fn(|sensor| self.nominal(sensor, unit.get(sensor)))?;
+        let names = Sensor::ALL.map(|sensor| NoiseKeys::of(sensor).names());
+        let names = names.as_flattened();
+        (self.document).only("imu.noise", imu.noise.keys(), names)?;
+        let noise = PerSensor::try_from_fn(|sensor| self.noise(sensor))?;
+        let prior = PerSensor::try_from_fn(|sensor| self.prior(sensor, *nominal.get(sensor)))?;
+        let walk = |sensor| NoiseKeys::of(sensor).random_walk.0;
+        Ok(Instrument {
+            prior,
+            nominal: PerSensor::from_fn(|sensor| Nominal(axes.each(*nominal.get(sensor)))),
+            unit,
+            noise: PerSensor::from_fn(|sensor| noise.get(sensor).0),
+            noise_is_stated: PerSensor::from_fn(|sensor| imu.noise.contains_key(walk(sensor))),
+            motion_noise: PerSensor::from_fn(|sensor| noise.get(sensor).1),
+            term_sigma: term_sigma(self.document, "imu.terms", &imu.terms)?,
+        })
+    }
+
+    /// Noise of a triad at rest and in moves; zero if not stated.
+    fn noise(&self, sensor: Sensor) -> Result<(Noise, MotionNoise), FileError> {
+        let keys = NoiseKeys::of(sensor);
+        let get = |name: &str| (*self.run.imu.noise.get(name)?).map(|value| value.0);
+        let ((key, sigma_unit), time) = (keys.gauss_markov, keys.correlation_time);
+        let key = get(keys.former).map_or(key, |_| keys.former);
+        let path = |name: &str| format!("imu.noise.{name}");
+        let gauss_markov = match (get(key), get(time)) {
+            (None, None) => None,
+            (Some(sigma), Some(correlation_time)) => {
+                for (name, value) in [(key, sigma), (time, correlation_time)] {
+                    if value <= 0.0 {
+                        let (expected, advice) = ("a number above zero", "Correct this value.");
+                        return Err(self.document.wrong(&path(name), expected, advice));
+                    }
+                }
+                Some(GaussMarkov {
+                    sigma: sigma * sigma_unit,
+                    correlation_time,
+                })
+            }
+            (Some(_), None) => {
+                return Err(self.document.missing(&path(time), "its correlation time"));
+            }
+            (None, Some(_)) => {
+                let meaning = "the 1σ of the Gauss–Markov bias";
+                return Err(self.document.missing(&path(key), meaning));
+            }
+        };
+        let or_zero = |(name, unit): (&str, f64)| get(name).unwrap_or(0.0) * unit;
+        let noise = Noise {
+            random_walk: or_zero(keys.random_walk),
+            gauss_markov,
+        };
+        let of_moves = MotionNoise {
+            by_motion: or_zero((keys.by_motion, 1.0)),
+            by_duration: or_zero(keys.by_duration),
+        };
+        Ok((noise, of_moves))
+    }
+
+    /// The unit of a triad; one of two may be missing from a log.
+    fn unit(&mut self, sensor: Sensor) -> Result<String, FileError> {
+        let (imu, name) = (&self.run.imu, sensor.name());
+        let is_there = |sensor| imu.of(sensor).columns.is_some();
+        if is_there(sensor) {
+            let unit = imu.of(sensor).unit.map(str::to_owned);
+            let path = format!("imu.{name}_unit");
+            let missing = || {
+                self.document
+                    .missing(&path, "the unit of the values in the file")
+            };
+            return unit.ok_or_else(missing);
+        }
+        if imu.accel_from.is_some() || !Sensor::ALL.into_iter().any(is_there) {
+            let path = format!("imu.columns.{name}");
+            return Err(self.document.missing(&path, "the names of three columns"));
+        }
+        let note = format!("The log has no {name} columns. turncal assumed zero output.");
+        self.notes.push(note);
+        Ok("count".to_owned())
+    }
+
+    /// The file's quantity per second for one rad/s or m/s², along the file's axes.
+    fn nominal(&self, sensor: Sensor, unit: &str) -> Result<Vector3<f64>, FileError> {
+        let (imu, document) = (&self.run.imu, self.document);
+        let of = imu.of(sensor);
+        if of.columns.is_none() {
+            return Ok(Vector3::repeat(1.0));
+        }
+        let known = || units(sensor, imu.output);
+        let names = || known().map(|(name, _)| name);
+        let Some((_, of_unit)) = known().find(|(name, _)| *name == unit) else {
+            return Err(document.wrong(
+                &format!("imu.{}_unit", sensor.name()),
+                format_args!("one of {}", list(names())),
+                suggestion(unit, names(), "Choose one of them."),
+            ));
+        };
+        let path = format!("imu.prior.{}.scale", sensor.name());
+        let is_near = |scale: &Vector3<f64>, of_unit: f64| {
+            let mut ratios = scale.iter().map(|s| s.abs() / of_unit);
+            ratios.all(|ratio| (0.5..=2.0).contains(&ratio))
+        };
+        match (of.prior.scale.map(OneOrThree::vector), of_unit) {
+            (None, Some(of_unit)) => Ok(Vector3::repeat(of_unit)),
+            (None, None) => {
+                let meaning = "the counts per second for 1 rad/s or 1 m/s², because the size of a count varies by instrument";
+                Err(document.missing(&path, meaning))
+            }
+            (Some(scale), _) if scale.iter().any(|&s| s == 0.0) => Err(document.wrong(
+                &path,
+                "non-zero values",
+                "Set the scale factor from the data sheet.",
+            )),
+            (Some(scale), Some(of_unit)) if !is_near(&scale, of_unit) => Err(document.wrong(
+                &path,
+                format_args!("about {of_unit} (1 rad/s or 1 m/s² in this unit)"),
+                "Correct the scale or the unit, or remove the scale.",
+            )),
+            (Some(scale), _) => Ok(scale),
+        }
+    }
+
+    /// The prior of a triad with this nominal scale, along right-front-up; wide defaults if not stated.
+    fn prior(&mut self, sensor: Sensor, nominal: Vector3<f64>) -> Result<Prior, FileError> {
+        let (of, axes) = (self.run.imu.of(sensor), self.run.imu.axes());
+        let bias_words = sensor.pick("bias ± 2 °/s", "bias ± 1 m/s²");
+        let mut assumed = Vec::new();
+        let mut sigma = |key: &str, stated: Option<OneOrThree>, most: f64, usual, words| {
+            let stated = stated.map(OneOrThree::vector);
+            assumed.extend(stated.is_none().then_some(words));
+            if !stated.iter().flatten().all(|&s| s > 0.0 && s <= most) {
+                let path = format!("imu.prior.{}.{key}", sensor.name());
+                let expected = format_args!("numbers above zero and at most {most}");
+                return Err(self.document.wrong(&path, expected, "Correct this value."));
+            }
+            Ok(stated.unwrap_or(usual))
+        };
+        let scale_sigma = sigma(
+            "scale_sigma_ppm",
+            of.prior.scale_sigma_ppm,
+            WIDEST_SCALE / PPM,
+            Vector3::repeat(USUAL_SCALE / PPM),
+            "scale factor ± 5 %",
+        )?;
+        let installation_sigma = sigma(
+            "installation_sigma_arcsec",
+            of.prior.installation_sigma_arcsec,
+            HALF_TURN,
+            Vector3::repeat(USUAL_INSTALLATION / ARCSEC),
+            "misalignment ± 2°",
+        )?;
+        let bias_sigma = sigma(
+            "bias_sigma",
+            of.prior.bias_sigma,
+            WIDEST_BIAS * nominal.amax(),
+            nominal.abs() * *USUAL_BIAS.get(sensor),
+            bias_words,
+        )?;
+        if !assumed.is_empty() && of.columns.is_some() {
+            self.notes.push(format!(
+                "[imu.prior.{}] in run.toml is incomplete. turncal assumed (1σ): {}.",
+                sensor.name(),
+                assumed.join(", ")
+            ));
+        }
+        let bias = (of.prior.bias).map_or_else(Vector3::zeros, OneOrThree::vector);
+        Ok(Prior {
+            scale_sigma: axes.each(scale_sigma) * PPM,
+            installation_sigma: axes.each(installation_sigma) * ARCSEC,
+            bias: axes.apply(&bias.component_div(&nominal)),
+            bias_sigma: axes.each(bias_sigma.component_div(&nominal.abs())),
+        })
+    }
+}

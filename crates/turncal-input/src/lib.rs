@@ -1,0 +1,22 @@
+//! What all readers share: errors that name file, line and field; TOML documents; checked numbers; units.
+//!
+//! A reader finds something, expects something else and knows what to do: [`FileError`] says so in these words and with
+//! the place. [`Document`] gives these errors for TOML files, [`small_file`] reads a file as a whole with a limit on its
+//! size, and the checked numbers ([`Positive`], [`Latitude`] …) refuse a field that cannot be right.
+
+mod checked;
+mod document;
+mod error;
+pub mod names;
+mod sensor;
+pub mod small_file;
+pub mod units;
+
+pub use checked::{
+    Angle, Celsius, Finite, GRAVITIES, Gravity, HEIGHTS, Height, Latitude, Longitude, Milligals,
+    NonNegative, OneOrThree, Positive, stated_gravity_sigma,
+};
+pub use document::Document;
+pub use error::{FileError, Place, choice, excerpt, list, nearest, suggestion};
+pub use names::FileColumn;
+pub use sensor::{PerSensor, Sensor};

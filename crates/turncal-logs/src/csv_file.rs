@@ -1,0 +1,291 @@
+//! Rows of numbers below a line of names, plain or gzipped, read row by row without storing the text.
+
+mod clock_text;
+mod heading;
+mod lines;
+mod row;
+
+use std::borrow::Cow;
+use std::fmt::Display;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+
+use flate2::read::MultiGzDecoder;
+
+use super::data_file::DataFile;
+use super::rows::Rows;
+use heading::{Heading, Looks};
+use lines::{LONGEST, Lines, Stop};
+use row::{LONGEST_FIELD, MOST_COLUMNS, Malformed, Row};
+use turncal_input::{FileError, Place};
+
+/// First bytes of a gzipped file.
+const GZIP: [u8; 2] = [0x1f, 0x8b];
+
+/// A file of rows, positioned at one row.
+///
+/// Fields are separated by commas, semicolons, tabs or blanks, whichever most rows use. Lines that begin with `#`, `%`
+/// or `//` are comments; those above the names, or above rows of numbers without names, are a preamble. Columns without
+/// names are called `1`, `2`, …. Numbers may have a decimal comma if commas are not separators; a time may be a clock
+/// time.
+pub struct CsvFile {
+    file: PathBuf,
+    lines: Lines,
+    heading: Heading,
+    /// For rows of several kinds, the tag of the selected ones and its column.
+    tag: Option<(usize, String)>,
+    row: Row,
+    line: u64,
+    cut: Option<Cut>,
+}
+
+/// Uncertainty at the end of a file without a line ending.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Cut {
+    /// Its last row lacks fields.
+    Row,
+    /// The last number of its last row may lack digits.
+    Number,
+}
+
+impl CsvFile {
+    /// Opens a file and reads its header; for tagged rows, selects those with this tag.
+    pub fn open(file: &DataFile, tag: Option<&str>) -> Result<Self, FileError> {
+        let stopped = |stop: Stop| stopped(file, &stop);
+        let mut lines = Lines::open(source(file)?).map_err(stopped)?;
+        let looks = Looks::of(lines.ahead());
+        let tags = tag.map(|tag| {
+            let tags = looks
+                .tags()
+                .filter(|tags| tags.names.iter().any(|name| name == tag));
+            tags.ok_or_else(|| no_tag(file, tag))
+        });
+        let tags = tags.transpose()?;
+        let heading = looks.heading(tags.as_ref().zip(tag)).map_err(stopped)?;
+        let heading = heading.ok_or_else(|| {
+            FileError::new(
+                file,
+                Place::File,
+                "an empty file",
+                "a line of column names followed by rows",
+                "Record or export the file again.",
+            )
+        })?;
+        lines.skip(heading.above);
+        Ok(Self {
+            file: file.to_path_buf(),
+            lines,
+            row: Row::new(heading.delimiter.byte()),
+            tag: tags
+                .zip(tag)
+                .map(|(tags, tag)| (tags.column, tag.to_owned())),
+            line: heading.line,
+            heading,
+            cut: None,
+        })
+    }
+
+    /// Tags of rows of several kinds.
+    pub fn tags(file: &DataFile) -> Result<Vec<String>, FileError> {
+        let lines = Lines::open(source(file)?).map_err(|stop| stopped(file, &stop))?;
+        Ok(Looks::of(lines.ahead())
+            .tags()
+            .map_or_else(Vec::new, |tags| tags.names))
+    }
+
+    fn bytes(&self, column: usize) -> &[u8] {
+        self.row.get(column).unwrap_or_default().trim_ascii()
+    }
+
+    fn error_here(&self, found: impl Display, expected: impl Display, advice: &str) -> FileError {
+        FileError::new(&self.file, self.place(None), found, expected, advice)
+    }
+}
+
+impl Rows for CsvFile {
+    fn file(&self) -> &Path {
+        &self.file
+    }
+
+    fn header(&self) -> &[String] {
+        &self.heading.names
+    }
+
+    fn units(&self) -> &[String] {
+        self.heading.units.as_deref().unwrap_or_default()
+    }
+
+    fn rate(&self) -> Option<f64> {
+        self.heading.rate
+    }
+
+    fn remarks(&self) -> &[String] {
+        &self.heading.remarks
+    }
+
+    /// Also false at a truncated last row.
+    fn advance(&mut self, used: &[usize]) -> Result<bool, FileError> {
+        let split = loop {
+            let more = self.lines.advance();
+            if !more.map_err(|stop| stopped(&self.file, &stop))? {
+                return Ok(false);
+            }
+            let line = self.lines.line();
+            self.heading.delimiter.tidy(&mut line.text);
+            let split = self.row.split(&line.text);
+            self.line = line.number;
+            match &self.tag {
+                Some((column, tag)) if self.bytes(*column) != tag.as_bytes() => {}
+                _ => break split,
+            }
+        };
+        let (found, expected) = (self.row.len(), self.header().len());
+        let is_cut = split == Err(Malformed::Quote) || found < expected;
+        if is_cut && !self.lines.is_ended() {
+            self.cut = Some(Cut::Row);
+            return Ok(false);
+        }
+        split.map_err(|what| malformed(&self.file, self.line, what))?;
+        let ends_in_delimiter = found == expected + 1 && self.bytes(expected).is_empty();
+        if found != expected && !ends_in_delimiter {
+            return Err(self.error_here(
+                format_args!("{found} fields"),
+                format_args!("{expected} as in the header"),
+                "Complete or remove the row.",
+            ));
+        }
+        if !self.lines.is_ended() && used.contains(&(expected - 1)) && !ends_in_delimiter {
+            self.cut = Some(Cut::Number);
+        }
+        Ok(true)
+    }
+
+    fn value(&self, column: usize) -> f64 {
+        let text = std::str::from_utf8(self.bytes(column)).unwrap_or_default();
+        let clock = self.heading.clocks.get(column).copied().flatten();
+        let number = match (clock, text.parse()) {
+            (Some(clock), _) => clock.seconds(text),
+            (None, Err(_)) if self.heading.delimiter.leaves_commas() => {
+                text.replacen(',', ".", 1).parse().ok()
+            }
+            (None, number) => number.ok(),
+        };
+        number.unwrap_or(f64::NAN)
+    }
+
+    fn shown(&self, column: usize) -> Cow<'_, str> {
+        String::from_utf8_lossy(self.bytes(column))
+    }
+
+    /// Also true for placeholders of loggers.
+    fn is_blank(&self, column: usize) -> bool {
+        let bytes = self.bytes(column);
+        bytes.is_empty() || bytes.eq_ignore_ascii_case(b"nan")
+    }
+
+    fn line(&self) -> u64 {
+        self.line
+    }
+
+    fn place(&self, column: Option<usize>) -> Place {
+        let line = self.line;
+        let name = column.map(|column| self.header().get(column).cloned().unwrap_or_default());
+        name.map_or(Place::Line(line), |column| Place::Column { line, column })
+    }
+
+    fn place_of_names(&self) -> Place {
+        Place::Line(self.heading.line)
+    }
+
+    fn may_be_cut(&self) -> bool {
+        self.cut == Some(Cut::Number)
+    }
+
+    fn cut_off(&self, done: &str) -> Option<String> {
+        let (file, line) = (self.file.display(), self.line);
+        let what = match self.cut? {
+            Cut::Row => "is truncated (fields are missing), so turncal ignored it",
+            Cut::Number => &format!("has no line end, so its last number may lack digits. {done}"),
+        };
+        Some(format!(
+            "The last row of {file} (line {line}) {what}. Check that the file is complete."
+        ))
+    }
+}
+
+/// Error for a tag in a file without tagged rows.
+fn no_tag(path: &Path, tag: &str) -> FileError {
+    FileError::new(
+        path,
+        Place::File,
+        "rows of text",
+        format_args!("a log with a stream `{tag}`"),
+        "Leave `stream` out, or name another file.",
+    )
+}
+
+/// The bytes of a file, unzipped.
+fn source(file: &DataFile) -> Result<Box<dyn BufRead>, FileError> {
+    let mut plain = BufReader::with_capacity(1 << 16, file.open()?);
+    let begin = plain
+        .fill_buf()
+        .map_err(|error| stopped(file, &Stop::System(error)))?;
+    Ok(if begin.starts_with(&GZIP) {
+        Box::new(BufReader::with_capacity(
+            1 << 16,
+            MultiGzDecoder::new(plain),
+        ))
+    } else {
+        Box::new(plain)
+    })
+}
+
+fn stopped(file: &Path, stop: &Stop) -> FileError {
+    match stop {
+        Stop::System(error) => FileError::io(
+            file,
+            "continue reading",
+            error,
+            "The file is damaged or truncated. Copy or compress it again.",
+        ),
+        Stop::Endless { line } => FileError::new(
+            file,
+            Place::Line(*line),
+            format_args!("more than {} KiB without an end of line", LONGEST / 1024),
+            "one row of numbers per line",
+            "Is this the right file? Record or export it again.",
+        ),
+        Stop::Malformed { line, what } => malformed(file, *line, *what),
+        Stop::Binary => FileError::new(
+            file,
+            Place::File,
+            "binary data of an unknown format",
+            "a text log or a supported binary log",
+            "Convert the file.",
+        ),
+    }
+}
+
+fn malformed(file: &Path, line: u64, what: Malformed) -> FileError {
+    let (found, expected, advice) = match what {
+        Malformed::Quote => (
+            "an unclosed quote".to_owned(),
+            "one row per line, with every quote closed".to_owned(),
+            "Remove the quote or close it.",
+        ),
+        Malformed::Columns => (
+            "too many columns".to_owned(),
+            format!("at most {MOST_COLUMNS} columns"),
+            "Is this the right file? Export the columns that are needed.",
+        ),
+        Malformed::Field => (
+            format!("a field longer than {} KiB", LONGEST_FIELD / 1024),
+            "short numbers or names".to_owned(),
+            "Is this the right file? Record or export it again.",
+        ),
+    };
+    FileError::new(file, Place::Line(line), found, expected, advice)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,18 @@
+//! Logs to rows of numbers.
+//!
+//! A [`Source`] opens a file by its content: text ([`csv_file`]), or one of the binary formats of [`streams`], each of
+//! which provides streams of samples. Either gives [`LogRows`]; a [`clock`] turns their time stamps into seconds.
+//! Nothing here knows what the numbers are for.
+
+pub mod clock;
+pub mod csv_file;
+mod data_file;
+pub mod rows;
+mod source;
+pub mod streams;
+mod table;
+
+pub use data_file::{Content, DataFile};
+pub use rows::{LogRows, Rows};
+pub use source::Source;
+pub use table::{Table, TableRows};

@@ -1,0 +1,262 @@
+//! The report of a study of accuracy.
+
+mod figures;
+mod tables;
+#[cfg(test)]
+mod tests;
+mod verdict;
+
+use super::terms;
+use crate::accuracy::tables::white_within;
+use crate::prelude::*;
+use crate::terms::title;
+use turncal::calibration::result::BlockRecord;
+use turncal::calibration::{ErrorTerm, Nis};
+use turncal::study::accuracy::{Containment, Journey, Region};
+use turncal::study::navigation::{FORTY_HOURS, INTERVAL};
+use turncal::study::{Accuracy, Figures};
+
+/// The complete report of the study.
+pub fn document(accuracy: &Accuracy) -> Document {
+    let mut document = Document::new(format!(
+        "Accuracy of the filter over {} simulated runs of {}",
+        count(accuracy.trials.len()),
+        accuracy.study.scenario.name
+    ));
+    verdict::say(&mut document, accuracy);
+    document.both(facts(accuracy));
+    document.both(tables::bound(accuracy));
+    document.both(tables::gain(accuracy));
+    document.both(tables::consistency(accuracy));
+    document.both(tables::auxiliary(accuracy));
+    document.both(terms::costs(&accuracy.effects));
+    document.both(terms::explained(&accuracy.effects));
+    document.both(tables::containment(accuracy));
+    document.pages(figures::figures(accuracy));
+    document.data = data(accuracy);
+    document
+}
+
+/// Number of reasons for failure shown.
+const REASONS: usize = 3;
+
+/// What was studied.
+pub fn facts(accuracy: &Accuracy) -> Facts {
+    let (study, scenario) = (&accuracy.study, &accuracy.study.scenario);
+    let (form, truth) = accuracy.forms();
+    let (form, truth) = (form.name(), truth.name());
+    let what = format!(
+        "{}: instrument {}, table {}, path {}, latitude {}°",
+        scenario.name,
+        scenario.instrument.name,
+        scenario.table_name,
+        scenario.path_name,
+        three_digits(scenario.site.latitude / DEGREE)
+    );
+    let aiding = match accuracy.table.count {
+        0 => "zero velocity",
+        _ => "zero velocity and table attitude",
+    };
+    let mut facts = Facts::new("The study", [("scenario", what)]);
+    let runs = format!("{}, seed {}", count(accuracy.trials.len()), study.seed);
+    facts.push("runs", runs);
+    let forms = format!("filter {form}, truth {truth}; compared in the general form");
+    facts.push("installation", forms);
+    facts.push("aiding", aiding);
+    facts.push("error terms", terms(accuracy));
+    facts.push("table time", table_time(accuracy));
+    facts.push("failures", failures(accuracy));
+    if let Some((median, most)) = passes(accuracy) {
+        let median = value(median, if median.fract() == 0.0 { 10.0 } else { 1.0 });
+        facts.push("passes", format!("median {median}, most {most}"));
+    }
+    let rejected = match rejected(accuracy) {
+        (0, _) => "none".to_owned(),
+        (of, runs) => format!("{} in {} of the runs", count(of), count(runs)),
+    };
+    facts.push("rejected observations", rejected);
+    facts
+}
+
+/// The error terms that were estimated, and those that were simulated only.
+fn terms(accuracy: &Accuracy) -> String {
+    let (scenario, unmodelled) = (&accuracy.study.scenario, &accuracy.study.unmodelled);
+    let there = ErrorTerm::ALL.into_iter().filter(|&b| scenario.has(b));
+    let (left_out, on): (Vec<_>, Vec<_>) = there.partition(|block| unmodelled.contains(block));
+    let named = |blocks: &[ErrorTerm]| match blocks {
+        [] => "none".to_owned(),
+        blocks => blocks
+            .iter()
+            .map(|&block| title(block))
+            .collect::<Vec<_>>()
+            .join(", "),
+    };
+    let mut text = format!("in addition to K, E and D: {}", named(&on));
+    if !left_out.is_empty() {
+        text += &format!("; simulated but not modelled: {}", named(&left_out));
+    }
+    text
+}
+
+/// Median and largest number of passes; `None` if no run gave an estimate.
+pub fn passes(accuracy: &Accuracy) -> Option<(f64, usize)> {
+    let mut passes: Vec<usize> = accuracy.filtered().map(|of| of.passes).collect();
+    passes.sort_unstable();
+    let most = *passes.last()?;
+    let [low, high] = [(passes.len() - 1) / 2, passes.len() / 2].map(|k| passes[k] as f64);
+    Some((0.5 * (low + high), most))
+}
+
+/// Number of observations that the gate rejected, and in how many runs.
+pub fn rejected(accuracy: &Accuracy) -> (usize, usize) {
+    let rejected = || accuracy.filtered().map(|filtered| filtered.rejected);
+    (rejected().sum(), rejected().filter(|of| *of > 0).count())
+}
+
+fn table_time(accuracy: &Accuracy) -> String {
+    let baseline = &accuracy.baseline;
+    let cut = match baseline.equal_time() {
+        Some(time) => format!(", also cut to {}", minutes(time)),
+        None => "; its positions do not fit into the time of the EKF".to_owned(),
+    };
+    let (filter, closed) = (minutes(accuracy.table_time), minutes(baseline.table_time));
+    let path = &baseline.scenario.path_name;
+    format!("EKF {filter}; closed form {closed} on path {path}{cut}")
+}
+
+fn failures(accuracy: &Accuracy) -> String {
+    let failed = accuracy.failures().count();
+    let reasons = accuracy.failures().take(REASONS);
+    let reasons = reasons.map(|(run, reason)| format!("run {run}: {reason}"));
+    let more = if failed > REASONS { "; …" } else { "" };
+    let reasons = reasons.collect::<Vec<_>>().join("; ");
+    match failed {
+        0 => "none".to_owned(),
+        _ => format!("{} ({reasons}{more})", count(failed)),
+    }
+}
+
+/// The figures of a study as JSON.
+pub fn data(accuracy: &Accuracy) -> Value {
+    let study = &accuracy.study;
+    let (form, truth) = accuracy.forms();
+    let (rejections, tested) = accuracy.rejections();
+    let failures = accuracy
+        .failures()
+        .map(|(run, reason)| json!({ "run": run, "reason": reason }));
+    let mut data = json!({
+        "scenario": study.scenario.name,
+        "path": study.scenario.path_name,
+        "seed": study.seed,
+        "installation_form": form,
+        "truth_installation_form": truth,
+        "form_holds_truth": form.holds(truth),
+        "runs": accuracy.trials.len(),
+        "failures": accuracy.failures().count(),
+        "failure_reasons": failures.collect::<Value>(),
+        "anees": accuracy.anees.map(|anees| anees.mean),
+        "anees_interval": accuracy.anees.map(|anees| anees.interval_95),
+        "anees_interval_998": accuracy.anees.map(|anees| anees.interval_998),
+        "anees_directions": accuracy.anees.map(|anees| anees.directions),
+        "nis": { "velocity": nis(&accuracy.velocity), "table": nis(&accuracy.table) },
+        "passes": passes(accuracy).map(|(median, most)| json!({ "median": median, "largest": most })),
+        "rejected_observations": rejected(accuracy).0,
+        "form_rejections":
+            (tested > 0).then(|| json!({ "rejected": rejections, "tested": tested })),
+    });
+    for (group, of) in &accuracy.groups {
+        data[group.key()] = figures(accuracy, of, group.unit_value());
+    }
+    let terms = accuracy.error_terms.iter();
+    let terms = terms.map(|(term, of)| (term.name().to_owned(), against_bound(of, 1.0)));
+    data["blocks"] = Value::Object(terms.collect());
+    let effects: Vec<BlockRecord> = accuracy.effects.iter().map(BlockRecord::from).collect();
+    data["block_effects"] = json!(effects);
+    data["navigation"] = navigation(accuracy);
+    data
+}
+
+fn nis(nis: &Nis) -> Option<Value> {
+    let white = white_within(nis);
+    (nis.count > 0).then(|| {
+        json!({
+            "mean": nis.mean,
+            "interval_998": nis.interval,
+            "lag_one": nis.lag_one,
+            "lag_one_interval": [-white, white],
+            "scalars": nis.count,
+        })
+    })
+}
+
+/// One per mission, or the reason why it cannot be navigated from the site of the scenario.
+fn navigation(accuracy: &Accuracy) -> Value {
+    let mission = |journey| {
+        json!({
+            "mission": match journey {
+                Journey::Standing => "standing",
+                Journey::Flight => "flight",
+            },
+            "hours": f64::from(FORTY_HOURS) * INTERVAL / 3600.0,
+            "latitude_deg": accuracy.study.scenario.site.latitude / DEGREE,
+            "not_navigated": null,
+            "position_nmile": null,
+            "containment": [],
+        })
+    };
+    let navigated = accuracy.navigation.iter().map(|of| {
+        let mut data = mission(of.journey);
+        data["position_nmile"] = figures(accuracy, &of.figures, NAUTICAL_MILE);
+        data["containment"] = of.containment.iter().map(containment).collect();
+        data
+    });
+    let others = accuracy.not_navigated.iter().map(|(journey, reason)| {
+        let mut data = mission(*journey);
+        data["not_navigated"] = reason.to_string().into();
+        data
+    });
+    navigated.chain(others).collect()
+}
+
+/// Number of runs whose position error is within a region given by the predicted covariance.
+fn containment(of: &Containment) -> Value {
+    let (region, sigmas) = match of.region {
+        Region::East => ("east", 1.0),
+        Region::North => ("north", 1.0),
+        Region::Ellipse(sigmas) => ("ellipse", sigmas),
+    };
+    json!({
+        "region": region,
+        "sigmas": sigmas,
+        "probability": of.region.probability(),
+        "runs": of.runs,
+        "within": of.within,
+        "within_interval": of.interval,
+        "as_claimed": of.as_claimed(),
+    })
+}
+
+fn against_bound(of: &Figures, unit: f64) -> Value {
+    json!({
+        "ekf_rms": of.filter / unit,
+        "claimed_rms": of.claimed / unit,
+        "bound_rms": of.bound / unit,
+        "ratio": of.ratio.map(|r| r.value),
+        "ratio_interval": of.ratio.map(|r| r.interval),
+    })
+}
+
+fn figures(accuracy: &Accuracy, of: &Figures, unit: f64) -> Value {
+    let gain = json!({
+        "six_position_rms": of.closed_form.map(|rms| rms / unit),
+        "gain": of.gain.map(|r| r.value),
+        "gain_interval": of.gain.map(|r| r.interval),
+        "six_position_rms_equal_time": of.closed_form_in_equal_time.map(|rms| rms / unit),
+        "gain_equal_time": of.gain_in_equal_time.map(|r| r.value),
+        "gain_equal_time_interval": of.gain_in_equal_time.map(|r| r.interval),
+        "ekf_table_time_s": accuracy.table_time,
+        "six_position_table_time_s": accuracy.baseline.table_time,
+        "six_position_equal_table_time_s": accuracy.baseline.equal_time(),
+    });
+    joined(against_bound(of, unit), gain)
+}

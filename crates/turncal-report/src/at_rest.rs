@@ -1,0 +1,58 @@
+//! Report on the biases of an instrument at rest against temperature.
+
+use super::calibration::temperature::{curves, hysteresis, orders};
+use crate::prelude::*;
+use turncal::calibration::{AtRest, Calibration, MeanAtRest};
+use turncal::run::Run;
+
+/// The complete report.
+pub fn document(at_rest: &AtRest, run: &Run, calibration: &Calibration) -> Document {
+    let name = &run.recording.name;
+    let mut document = Document::new(format!("{name}: biases at rest against temperature"));
+    let (outputs, thermal) = (&at_rest.outputs, &at_rest.thermal);
+    let range = thermal.model.range.gyro;
+    document.lead.push(format!(
+        "Run {name} stays in one attitude for {:.0} s while its temperature covers {:.1} to {:.1} °C. It can show \
+         only bias against temperature; the accelerometer values also contain the scale-factor error times gravity \
+         in this attitude.",
+        run.recording.imu.duration(),
+        range.lowest,
+        range.highest
+    ));
+    document.warnings.items.extend(calibration.warnings.clone());
+    document.both(orders(outputs.form(), thermal));
+    document.both(hysteresis(outputs.form(), thermal));
+    let changes = |index: usize| {
+        let means = at_rest.means.iter().filter(|(bias, _)| *bias == index);
+        let means = means.flat_map(|(_, means)| means);
+        means.map(|mean| (mean.temperature, mean.change)).collect()
+    };
+    document.page(curves(outputs, thermal, "means over blocks", changes));
+    document.page(residuals(at_rest));
+    document
+}
+
+/// What the polynomials leave, separately for heating and cooling.
+fn residuals(at_rest: &AtRest) -> Plot {
+    let form = at_rest.outputs.form();
+    let panel = |(bias, means): &(usize, Vec<MeanAtRest>)| {
+        let unit = Group::of(*bias).unit_value();
+        let title = format!("{}, {}", short_name(form, *bias), Group::of(*bias).unit());
+        let x = Axis::linear("temperature, °C").room(0.02, 0.02);
+        let marks = [(false, "heating"), (true, "cooling")].map(|(cools, name)| {
+            let of_sense = means.iter().filter(|mean| (mean.rate < 0.0) == cools);
+            let points = of_sense.map(|mean| (mean.temperature, mean.residual / unit));
+            let nth = usize::from(cools) + 1;
+            Series::marks(Mark::Ring, points).nth(nth).key(name)
+        });
+        Panel::new(title, x, Axis::linear("").room(0.05, 0.05))
+            .with(Series::zero())
+            .with_all(marks)
+    };
+    let heading = "Residuals of the biases against temperature";
+    let panels = at_rest.means.iter().map(panel);
+    Plot::new("residuals-temperature.svg", heading, (3, 260), panels).caption(
+        "Mean output over a block minus the polynomial with its rate term. If heating and cooling differ, the \
+         temperature sensor lags the instrument, or the instrument has hysteresis.",
+    )
+}

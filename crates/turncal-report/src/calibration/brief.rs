@@ -1,0 +1,91 @@
+//! One-screen summary: accuracy and its main source, cross-validation, navigation error.
+
+use super::super::navigation;
+use super::report::Report;
+use super::{budget, tables};
+use crate::prelude::*;
+use turncal::calibration::{Estimate, ParameterVector};
+
+/// Adds the one-screen summary.
+pub fn add(document: &mut Document, report: &Report) {
+    let Some(estimate) = report.estimate() else {
+        return;
+    };
+    document.brief.push(accuracy(report, estimate).into());
+    let mut facts = Facts::default();
+    for (name, value) in [
+        ("weakest", weakest(report)),
+        ("excluded from fit", tables::cross_validation(report)),
+        ("navigation", navigation(report)),
+        ("not covered", budget::unseen(report, estimate)),
+    ] {
+        if let Some(value) = value {
+            facts.push(name, value);
+        }
+    }
+    document.brief.push(facts.into());
+}
+
+/// RMS σ and error of each group, with the predicted σ and the largest source.
+fn accuracy(report: &Report, estimate: &Estimate) -> Table {
+    let both = match report.methods()[..] {
+        [(_, closed), (_, _)] => Some(closed),
+        _ => None,
+    };
+    let truth = report.truth_vector();
+    let mut columns = vec!["Accuracy (group RMS)", "1σ"];
+    columns.extend(truth.map(|_| "error"));
+    columns.extend(both.map(|_| "closed form 1σ"));
+    columns.extend(both.and(truth).map(|_| "closed form error"));
+    columns.extend(report.predicted.map(|_| "predicted 1σ"));
+    columns.extend(report.budget.map(|_| "mostly from"));
+    let row = |group: Group| {
+        let with_unit = |value: Option<f64>| {
+            or_dash(value, |value| format!("{} {}", sigma(value), group.unit()))
+        };
+        let mut row = vec![group.title()];
+        for of in std::iter::once(estimate).chain(both) {
+            let rms = |v: &ParameterVector| group.rms(v, of);
+            row.push(with_unit(rms(&of.sigma())));
+            row.extend(truth.map(|truth| with_unit(rms(&(of.vector() - truth)))));
+        }
+        row.extend(report.predicted.map(|predicted| {
+            let of_group = predicted.sigma.iter().find(|(of, _)| *of == group);
+            with_unit(of_group.and_then(|(_, sigma)| Some((*sigma)? / group.unit_value())))
+        }));
+        let source =
+            |of| budget::largest(of, &group.estimated(estimate)).unwrap_or(NONE.to_owned());
+        row.extend(report.budget.map(source));
+        row
+    };
+    let mut table = Table::new("", columns).section(Group::all().map(row));
+    // A narrow terminal does without the last columns, but first without the error that was not to be lowered.
+    let (first, others): (Vec<_>, Vec<_>) =
+        (2..table.columns.len()).partition(|column| table.columns[*column] == "closed form error");
+    table.optional = [others, first].concat();
+    table
+}
+
+/// The parameter with the smallest reduction of its prior σ.
+fn weakest(report: &Report) -> Option<String> {
+    let (estimate, outcome) = (report.estimate()?, report.outcome?);
+    let (sigma_of, prior) = (estimate.sigma(), &outcome.prior_sigma);
+    let left = |i: &usize| sigma_of[*i] / prior[*i];
+    let known = estimate.estimated().filter(|i| left(i).is_finite());
+    let index = known.max_by(|a, b| left(a).total_cmp(&left(b)))?;
+    let group = Group::of(index);
+    let own = sigma(sigma_of[index] / group.unit_value());
+    let axis = axis_name(estimate.form(), index);
+    Some(format!(
+        "{} {axis}, ±{own} {} (1σ)",
+        group.title(),
+        group.unit()
+    ))
+}
+
+fn navigation(report: &Report) -> Option<String> {
+    match report.navigation {
+        Ok(navigated @ [_, ..]) => Some(navigation::line(navigated)),
+        _ => None,
+    }
+}

@@ -1,0 +1,168 @@
+//! Parameters with their expanded uncertainties.
+
+use turncal::calibration::Group;
+use turncal::calibration::result::{Calibration, Provenance};
+use turncal::calibration::{PARAMETERS, ThermalRecord, parameter_name, sensor_and_parameter};
+use turncal::imu::{Nominal, ParameterKind, PerSensor, Sensor, TERM_PARAMETERS, Term};
+
+/// Default coverage factor for 95.45 %.
+const COVERAGE_FACTOR: f64 = 2.0;
+
+/// A quantity of a certificate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Parameters of a triad.
+    Parameters(Group),
+    /// Parameters of an error term.
+    Term(Term),
+}
+
+impl Quantity {
+    /// Symbol of its display unit, and the value of this unit in SI.
+    pub fn unit(self) -> (&'static str, f64) {
+        match self {
+            Self::Term(term) => term.entry().unit,
+            Self::Parameters(group) => (group.unit(), group.unit_value()),
+        }
+    }
+
+    /// Its SI unit as D-SI spells it.
+    pub fn si_unit(self) -> &'static str {
+        match self {
+            Self::Term(term) => term.entry().d_si_unit,
+            Self::Parameters(group) => match (group.kind(), group.sensor()) {
+                (ParameterKind::Scale, _) => "\\one",
+                (ParameterKind::Installation, _) => "\\radian",
+                (ParameterKind::Bias, Sensor::Gyro) => "\\radian\\second\\tothe{-1}",
+                (ParameterKind::Bias, Sensor::Accel) => "\\metre\\second\\tothe{-2}",
+            },
+        }
+    }
+}
+
+/// A parameter with its expanded uncertainty.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measured {
+    /// Its name, such as `gyro.scale.x`.
+    pub name: String,
+    /// Its quantity.
+    pub quantity: Quantity,
+    /// Value in SI: scale factors over their nominal value minus one, angles in rad, biases in rad/s or m/s²;
+    /// parameters of error terms as in the calibration's file.
+    pub value: f64,
+    /// Expanded uncertainty.
+    pub expanded: f64,
+    /// Coverage factor.
+    pub coverage_factor: f64,
+    /// Degrees of freedom; `None` if infinite.
+    pub degrees_of_freedom: Option<f64>,
+}
+
+/// The nominal scales of a calibration.
+pub fn nominal(provenance: &Provenance) -> PerSensor<Nominal> {
+    PerSensor::from_fn(|sensor| Nominal((*provenance.nominal.get(sensor)).into()))
+}
+
+/// Every estimated parameter, and their covariance in SI; `None` if the record has no covariance.
+pub fn results(
+    calibration: &Calibration,
+    provenance: &Provenance,
+) -> Option<(Vec<Measured>, Vec<Vec<f64>>)> {
+    let nominal = nominal(provenance);
+    let form = calibration.installation_form.unwrap_or_default();
+    let index =
+        |name: &String| (0..PARAMETERS).find(|&i| parameter_name(form, i).as_ref() == Some(name));
+    let indices: Vec<usize> = calibration
+        .parameters
+        .iter()
+        .map(index)
+        .collect::<Option<_>>()?;
+    let factor = |i: usize| {
+        let (sensor, of_triad) = sensor_and_parameter(i);
+        nominal.get(sensor).factor(of_triad)
+    };
+    let size = indices.len();
+    let sized = |row: &Vec<f64>| row.len() == size;
+    if size == 0
+        || calibration.covariance.len() != size
+        || !calibration.covariance.iter().all(sized)
+    {
+        return None;
+    }
+    let covariance: Vec<Vec<f64>> = (0..size)
+        .map(|m| {
+            let element =
+                |n: usize| calibration.covariance[m][n] / (factor(indices[m]) * factor(indices[n]));
+            (0..size).map(element).collect()
+        })
+        .collect();
+    let budget = calibration.budget.as_ref();
+    let results = indices.iter().zip(&calibration.parameters).enumerate();
+    let results = results.map(|(n, (&i, name))| {
+        let group = Group::of(i);
+        let value = *calibration.get(name)? / factor(i);
+        let own = budget.and_then(|budget| budget.coverage_factor.get(n));
+        let coverage_factor = own.copied().unwrap_or(COVERAGE_FACTOR);
+        Some(Measured {
+            name: name.clone(),
+            quantity: Quantity::Parameters(group),
+            value: match group.kind() {
+                ParameterKind::Scale => value - 1.0,
+                ParameterKind::Installation | ParameterKind::Bias => value,
+            },
+            expanded: coverage_factor * covariance[n][n].max(0.0).sqrt(),
+            coverage_factor,
+            degrees_of_freedom: budget.and_then(|b| *b.degrees_of_freedom.get(n)?),
+        })
+    });
+    Some((results.collect::<Option<_>>()?, covariance))
+}
+
+/// Every estimated parameter of the instrument's error terms; those of the table are not results for the instrument.
+pub fn terms(calibration: &Calibration) -> Vec<Measured> {
+    let measured = |k: usize| {
+        let name = Term::parameter_name(k)?;
+        let record = calibration.terms.get(&name)?;
+        Some(Measured {
+            name,
+            quantity: Quantity::Term(Term::of(k)?),
+            value: record.value,
+            expanded: COVERAGE_FACTOR * record.sigma?,
+            coverage_factor: COVERAGE_FACTOR,
+            degrees_of_freedom: None,
+        })
+    };
+    (0..TERM_PARAMETERS).filter_map(measured).collect()
+}
+
+/// States the temperatures at which the results are valid, and the location of their temperature coefficients.
+pub fn temperature_words(of: &ThermalRecord, number: impl Fn(f64) -> String) -> String {
+    let triad = |(name, sensor): (&str, Sensor)| {
+        let range = of.range.get(sensor);
+        format!(
+            "{name} at {} °C, valid from {} to {} °C",
+            number(range.reference),
+            number(range.lowest),
+            number(range.highest)
+        )
+    };
+    let triads = [("gyros", Sensor::Gyro), ("accelerometers", Sensor::Accel)].map(triad);
+    format!(
+        "The results apply at the reference temperature: {}. They change with temperature; the attached \
+         calibration.json contains the coefficients with their equation and covariance.",
+        triads.join("; ")
+    )
+}
+
+/// A parameter in words, such as `gyroscope scale factor x`.
+pub fn in_words(measured: &str) -> String {
+    let words = [
+        ("gyro.", "gyroscope "),
+        ("accel.", "accelerometer "),
+        ("scale.", "scale factor "),
+        ("installation.", "misalignment "),
+    ];
+    let named = |name: String, (key, word): (&str, &str)| name.replace(key, word);
+    let name = words.into_iter().fold(measured.to_owned(), named);
+    name.replace(['.', '_'], " ")
+}

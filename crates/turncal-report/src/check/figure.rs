@@ -1,0 +1,77 @@
+//! The recording: gyro and accelerometer output against time, with dwells, turns and faults.
+
+use super::super::calibration::figures::samples;
+use super::words;
+use crate::prelude::*;
+use turncal::imu::{AXES, Sensor};
+use turncal::run::Run;
+use turncal::run::motion::{Rest, Turn};
+use turncal::survey::Survey;
+
+pub fn figure(run: &Run, survey: &Survey) -> Plot {
+    let mut caption = "Gyro rates and specific force along body axes, from the file with nominal scales. Grey: \
+        dwells, with number and upward axis; above the rates: turns, with axis and angle (angle only if about \
+        several axes), where space permits."
+        .to_owned();
+    if !run.recording.imu.faults.is_empty() {
+        caption += " Crosses: log faults in the samples of the triad; missing and duplicate rows appear in both.";
+    }
+    let panels = Sensor::ALL.map(|sensor| panel(run, survey, sensor));
+    Plot::new("record.svg", "Recording", (1, 310), panels).caption(caption)
+}
+
+fn panel(run: &Run, survey: &Survey, sensor: Sensor) -> Panel {
+    let imu = &run.recording.imu;
+    let (unit, title) = match sensor {
+        Sensor::Gyro => (DEGREE, "angular rate, °/s"),
+        Sensor::Accel => (1.0, "specific force, m/s²"),
+    };
+    // Dashes would be lost in noise.
+    let line = |axis: usize| {
+        let line = samples(imu, sensor, axis, unit).nth(axis);
+        line.width(1.0).label(AXES[axis])
+    };
+    let rests = survey.rests.iter();
+    let dwells: Vec<_> = rests
+        .map(|rest| rest.dwell.times(run))
+        .map(|[from, to]| from..to)
+        .collect();
+    let tags: Vec<(f64, String)> = match sensor {
+        Sensor::Gyro => survey.turns.iter().map(|turn| of_turn(run, turn)).collect(),
+        Sensor::Accel => {
+            let rests = survey.rests.iter().enumerate();
+            rests.map(|(k, rest)| of_dwell(run, k, rest)).collect()
+        }
+    };
+    let faults = imu
+        .faults
+        .iter()
+        .filter(|fault| fault.axis.is_none_or(|(of, _)| of == sensor));
+    let faults: Vec<f64> = faults.map(|fault| imu.time(fault.samples.start)).collect();
+    let x = Axis::linear("time, s").between(imu.start(), imu.end());
+    let y = Axis::linear("").including([0.0]).room(0.1, 0.3);
+    let lines = [0, 1, 2].map(line);
+    let corners = lines.iter().flat_map(|line| line.shape.corners());
+    let foot = corners.map(|corner| corner.1).fold(0.0, f64::min);
+    let crosses = faults.into_iter().map(|time| (time, foot));
+    Panel::new(title, x, y)
+        .shaded(&dwells)
+        .tagged(3, tags)
+        .with_all(lines)
+        .with(Series::marks(Mark::Cross, crosses).color(Color::Ink))
+}
+
+fn of_turn(run: &Run, turn: &Turn) -> (f64, String) {
+    let imu = &run.recording.imu;
+    let (start, end) = (imu.time(turn.samples.start), imu.time(turn.samples.end));
+    (0.5 * (start + end), words::turn(turn))
+}
+
+fn of_dwell(run: &Run, k: usize, rest: &Rest) -> (f64, String) {
+    let [from, to] = rest.dwell.times(run);
+    let up = match rest.up.is_upright() {
+        true => format!(" {}", words::way_up(rest.up.axis, rest.up.down)),
+        false => String::new(),
+    };
+    (0.5 * (from + to), format!("{}{up}", k + 1))
+}

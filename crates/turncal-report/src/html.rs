@@ -1,0 +1,180 @@
+//! A document as files: a self-contained page, every figure, and further files.
+
+use std::path::{Path, PathBuf};
+use std::{fs, io};
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use super::document::{Block, Document, Facts, List, PageOnly, Table};
+use super::plot::Plot;
+use super::svg;
+use turncal::calibration::{Finding, FindingKind as Kind};
+
+/// The style of every page.
+const STYLE: &str = include_str!("style.css");
+
+/// A file of a report that could not be written.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write {path}: {source}. The directory must exist and be writable", path = path.display())]
+pub struct ReportError {
+    /// The file.
+    pub path: PathBuf,
+    /// The system error.
+    pub source: io::Error,
+}
+
+/// The files of a document by name: `index.html`, which contains the figures and needs no other files or network, every
+/// figure as a separate SVG file, and further files of the document.
+pub fn files(document: &Document) -> Vec<(String, String)> {
+    let drawn: Vec<String> = document.plots().map(svg::draw).collect();
+    let page = ("index.html".to_owned(), page(document, &drawn));
+    let figures = document.plots().map(|plot| plot.file.clone()).zip(drawn);
+    let further = document.files.iter().cloned();
+    figures.chain(further).chain([page]).collect()
+}
+
+/// Writes the [`files`] of a document into an existing directory.
+///
+/// # Errors
+/// [`ReportError`] if a file cannot be written.
+pub fn write(document: &Document, directory: &Path) -> Result<(), ReportError> {
+    for (name, text) in files(document) {
+        let path = directory.join(name);
+        fs::write(&path, text).map_err(|source| ReportError { path, source })?;
+    }
+    Ok(())
+}
+
+/// The page: warnings first, then conclusions, then the other parts in order. `drawn` contains the SVG document of each
+/// plot in order.
+pub fn page(document: &Document, drawn: &[String]) -> String {
+    let mut drawn = drawn.iter();
+    let parts = document
+        .blocks
+        .chunk_by(|_, (_, next)| !matches!(next, Block::Fold(_)));
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { (document.title) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                header {
+                    h1 { (document.title) }
+                    @if let Some((word, of_it)) = &document.verdict {
+                        p.verdict { strong class=(word.class()) { (word) } " " (of_it) }
+                    }
+                    @for p in &document.lead { p { (p) } }
+                }
+                @if !document.findings.is_empty() {
+                    section.findings {
+                        h2 { "What to look at" }
+                        @for finding in &document.findings { (of_finding(finding)) }
+                    }
+                }
+                @for block in &document.brief { (of_block(block, &mut drawn)) }
+                @if !document.warnings.items.is_empty() {
+                    section.warnings { (list(&document.warnings)) }
+                }
+                @if !document.conclusions.items.is_empty() {
+                    section { (list(&document.conclusions)) }
+                }
+                @for part in parts { (of_part(part, &mut drawn)) }
+                footer { "turncal " (env!("CARGO_PKG_VERSION")) }
+            }
+        }
+    };
+    page.into_string()
+}
+
+/// Problem and remedy, with details collapsed.
+fn of_finding(finding: &Finding) -> Markup {
+    let (what, next) = finding.headline();
+    let explanation = Kind::named(&finding.kind).map(Kind::explanation);
+    html! {
+        details {
+            summary {
+                code { (finding.code) } " " (what)
+                @if let Some(next) = next { span.next { "→ " (next) } }
+            }
+            p { (finding) }
+            @if let Some(explanation) = explanation { p.note { (explanation) } }
+        }
+    }
+}
+
+/// Blocks below the heading of a collapsed section; those before the first have none.
+fn of_part<'a>(part: &[(PageOnly, Block)], drawn: &mut impl Iterator<Item = &'a String>) -> Markup {
+    let blocks = html! { @for (_, block) in part { (of_block(block, drawn)) } };
+    match part {
+        [(_, Block::Fold(_))] => html! {},
+        [(_, Block::Fold(heading)), ..] => html! { details { summary { (heading) } (blocks) } },
+        _ => blocks,
+    }
+}
+
+fn of_block<'a>(block: &Block, drawn: &mut impl Iterator<Item = &'a String>) -> Markup {
+    match block {
+        Block::Facts(of) => html! {
+            section { @if !of.heading.is_empty() { h2 { (of.heading) } } (facts(of)) }
+        },
+        Block::Table(of) => table(of),
+        Block::List(of) => html! { section { (list(of)) } },
+        Block::Plot(of) => drawn.next().map_or_else(|| html! {}, |svg| plot(of, svg)),
+        Block::Text(heading, text) => html! {
+            section { @if !heading.is_empty() { h2 { (heading) } } p.note { (text) } }
+        },
+        Block::Code(heading, code) => html! { section { h2 { (heading) } pre { (code) } } },
+        Block::Fold(_) => html! {},
+    }
+}
+
+fn list(of: &List) -> Markup {
+    html! { h2 { (of.heading) } ul { @for item in &of.items { li { (item) } } } }
+}
+
+fn facts(of: &Facts) -> Markup {
+    html! { dl { @for (name, value) in &of.rows { div { dt { (name) } dd { (value) } } } } }
+}
+
+fn table(of: &Table) -> Markup {
+    html! {
+        section {
+            h2 { (of.heading) }
+            div.wide {
+                table {
+                    thead { tr { @for heading in &of.columns { th scope="col" { (heading) } } } }
+                    @for section in &of.sections {
+                        tbody { @for row in section { (row_of(row)) } }
+                    }
+                }
+            }
+            @if !of.notes.is_empty() { p.note { (of.notes.join(" ")) } }
+        }
+    }
+}
+
+fn row_of(row: &[String]) -> Markup {
+    html! {
+        tr {
+            @for (place, cell) in row.iter().enumerate() {
+                @if place == 0 { th scope="row" { (cell) } } @else { td { (cell) } }
+            }
+        }
+    }
+}
+
+fn plot(of: &Plot, svg: &str) -> Markup {
+    // The namespace is needed in a file of its own only.
+    let svg = svg.replacen(r#" xmlns="http://www.w3.org/2000/svg""#, "", 1);
+    html! {
+        figure {
+            h2 { (of.heading) }
+            div role="img" aria-label=(of.heading) { (PreEscaped(svg)) }
+            figcaption { (of.caption) " (" code { (of.file) } ")" }
+        }
+    }
+}

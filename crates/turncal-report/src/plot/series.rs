@@ -1,0 +1,343 @@
+//! Series in a panel.
+
+/// A series drawn with one pen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Its shape.
+    pub shape: Shape,
+    /// Its pen.
+    pub pen: Pen,
+    /// Name at the right end of the panel.
+    pub label: Option<String>,
+    /// Name in the title line.
+    pub key: Option<String>,
+}
+
+/// Abscissa and ordinate. A line is interrupted if one of them is not a number.
+pub type Point = (f64, f64);
+
+/// Abscissa, lower and upper end.
+pub type Upright = (f64, f64, f64);
+
+/// Geometry of a series.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Shape {
+    /// Points joined in order.
+    Line(Vec<Point>),
+    /// The area between two lines over the same abscissae.
+    Band(Vec<Point>, Vec<Point>),
+    /// A mark at each point, on a vertical error bar with caps if its ends differ.
+    Marks(Mark, Vec<(Point, (f64, f64))>),
+    /// Bars of this half width; a bar that starts at −∞ starts at the lower end of the axis.
+    Bars(f64, Fill, Vec<Upright>),
+    /// A line across the panel at this height.
+    Level(f64),
+    /// A line from bottom to top.
+    Upright(f64),
+    /// Text next to a point.
+    Words(Point, Anchor, String),
+}
+
+/// A mark at a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mark {
+    /// A filled circle.
+    Dot,
+    /// An open circle.
+    Ring,
+    /// A cross.
+    Cross,
+}
+
+/// Fill style of a bar.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fill {
+    /// With the colour of the pen, without an outline.
+    Solid,
+    /// Pale with an outline.
+    Pale,
+}
+
+/// Position of a text.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Anchor {
+    /// In the middle above its point.
+    Above,
+    /// In the middle below it.
+    Below,
+    /// To the left above it.
+    AboveLeft,
+    /// In the middle of it.
+    Middle,
+}
+
+/// Line style.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pen {
+    /// Colour.
+    pub color: Color,
+    /// Width in pixels.
+    pub width: f64,
+    /// Dashes.
+    pub dash: Dash,
+}
+
+/// Colours that also differ in lightness.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Color {
+    /// Of text.
+    Ink,
+    /// Colour of unobtrusive elements.
+    Quiet,
+    /// The n-th of six.
+    Nth(usize),
+}
+
+/// Dashes of a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dash {
+    /// None.
+    Solid,
+    /// Long dashes.
+    Dashed,
+    /// Short dashes.
+    Dotted,
+}
+
+impl Shape {
+    /// Points that the axes must include.
+    pub(crate) fn corners(&self) -> Vec<Point> {
+        match self {
+            Self::Line(points) => points.clone(),
+            Self::Marks(_, points) => points
+                .iter()
+                .flat_map(|&((x, y), (low, high))| [(x, y), (x, low), (x, high)])
+                .collect(),
+            Self::Band(lower, upper) => [&lower[..], upper].concat(),
+            Self::Bars(half, _, bars) => bars
+                .iter()
+                .flat_map(|&(x, low, high)| [(x - half, low), (x + half, high)])
+                .collect(),
+            Self::Level(_) | Self::Upright(_) | Self::Words(..) => Vec::new(),
+        }
+    }
+
+    /// Its right end.
+    pub(crate) fn end(&self) -> Option<Point> {
+        let is_known = |point: &Point| point.1.is_finite();
+        match self {
+            Self::Line(points) | Self::Band(_, points) => {
+                points.iter().rev().copied().find(is_known)
+            }
+            Self::Marks(_, points) => points.iter().rev().map(|of| of.0).find(is_known),
+            Self::Level(y) => Some((f64::INFINITY, *y)),
+            _ => None,
+        }
+    }
+}
+
+impl Series {
+    /// A shape with a thin pen of the first colour.
+    pub fn new(shape: Shape) -> Self {
+        let pen = Pen {
+            color: Color::Nth(0),
+            width: 1.5,
+            dash: Dash::Solid,
+        };
+        Self {
+            shape,
+            pen,
+            label: None,
+            key: None,
+        }
+    }
+
+    /// Points joined in order; dense data are reduced to the lowest and highest.
+    pub fn line(points: impl IntoIterator<Item = Point>) -> Self {
+        Self::new(Shape::Line(thinned(points, MOST)))
+    }
+
+    /// The area between two lines.
+    pub fn band(lower: Vec<Point>, upper: Vec<Point>) -> Self {
+        Self::new(Shape::Band(lower, upper)).color(Color::Quiet)
+    }
+
+    /// A line through values with their σ, and the band of ±σ behind it.
+    pub fn curve(points: &[(f64, f64, f64)]) -> [Self; 2] {
+        let edge = |factor: f64| points.iter().map(move |&(x, y, own)| (x, y + factor * own));
+        let band = Self::band(edge(-1.0).collect(), edge(1.0).collect());
+        [band, Self::line(edge(0.0))]
+    }
+
+    /// A mark at each point.
+    pub fn marks(mark: Mark, points: impl IntoIterator<Item = Point>) -> Self {
+        Self::whiskers(mark, points.into_iter().map(|at| (at, (at.1, at.1))))
+    }
+
+    /// The same with an interval at each point.
+    pub fn whiskers(mark: Mark, points: impl IntoIterator<Item = (Point, (f64, f64))>) -> Self {
+        Self::new(Shape::Marks(mark, points.into_iter().collect()))
+    }
+
+    /// The same for values with σ, one standard deviation on both sides.
+    pub fn measured(mark: Mark, points: impl IntoIterator<Item = (f64, f64, f64)>) -> Self {
+        let points = points.into_iter();
+        Self::whiskers(mark, points.map(|(x, y, own)| ((x, y), (y - own, y + own))))
+    }
+
+    /// Bars of this half width.
+    pub fn bars(half: f64, fill: Fill, bars: impl IntoIterator<Item = Upright>) -> Self {
+        Self::new(Shape::Bars(half, fill, bars.into_iter().collect()))
+    }
+
+    /// A line across the panel.
+    pub fn level(y: f64) -> Self {
+        Self::new(Shape::Level(y)).color(Color::Ink).width(1.25)
+    }
+
+    /// The faint line at zero.
+    pub fn zero() -> Self {
+        Self::level(0.0).color(Color::Quiet).width(0.75)
+    }
+
+    /// Text next to a point.
+    pub fn words(at: Point, anchor: Anchor, text: impl Into<String>) -> Self {
+        Self::new(Shape::Words(at, anchor, text.into())).color(Color::Ink)
+    }
+
+    /// The colour.
+    pub fn color(mut self, color: Color) -> Self {
+        self.pen.color = color;
+        self
+    }
+
+    /// The n-th colour.
+    pub fn nth(self, n: usize) -> Self {
+        self.color(Color::Nth(n))
+    }
+
+    /// The pen of the n-th body axis, which also differs in its dashes.
+    pub fn axis(self, n: usize) -> Self {
+        let dash = [Dash::Solid, Dash::Dashed, Dash::Dotted][n % 3];
+        self.nth(n).dash(dash)
+    }
+
+    /// Width of the pen.
+    pub fn width(mut self, width: f64) -> Self {
+        self.pen.width = width;
+        self
+    }
+
+    /// Dashes.
+    pub fn dash(mut self, dash: Dash) -> Self {
+        self.pen.dash = dash;
+        self
+    }
+
+    /// Long dashes.
+    pub fn dashed(self) -> Self {
+        self.dash(Dash::Dashed)
+    }
+
+    /// Names its right end.
+    pub fn label(mut self, text: impl Into<String>) -> Self {
+        self.label = Some(text.into());
+        self
+    }
+
+    /// Names only a height.
+    pub fn name(y: f64, text: impl Into<String>) -> Self {
+        Self::line([(f64::INFINITY, y)])
+            .color(Color::Quiet)
+            .label(text)
+    }
+
+    /// Names it in the title line.
+    pub fn key(mut self, text: impl Into<String>) -> Self {
+        self.key = Some(text.into());
+        self
+    }
+}
+
+/// Maximum number of points of a line; a panel is a hundredth as wide in pixels.
+const MOST: usize = 1 << 17;
+
+/// About `most` points of a line: the lowest and highest of each interval, every gap, and the end, to which the name of
+/// the line refers.
+pub fn thinned(points: impl IntoIterator<Item = Point>, most: usize) -> Vec<Point> {
+    let points = points.into_iter();
+    let (least, greatest) = points.size_hint();
+    let together = (2 * greatest.unwrap_or(least)).div_ceil(most.max(2));
+    let (mut line, mut stretch) = (Vec::new(), Vec::new());
+    for point in points {
+        let is_gap = !(point.0.is_finite() && point.1.is_finite());
+        if is_gap || stretch.len() >= together {
+            line.extend(ends(&stretch));
+            stretch.clear();
+        }
+        match is_gap {
+            true => line.push(point),
+            false => stretch.push(point),
+        }
+    }
+    line.extend(ends(&stretch));
+    let last = stretch.last().filter(|last| line.last() != Some(last));
+    line.extend(last.copied());
+    line
+}
+
+/// All points if few; otherwise the lowest and the highest, in order.
+fn ends(stretch: &[Point]) -> Vec<Point> {
+    if stretch.len() <= 2 {
+        return stretch.to_vec();
+    }
+    let by_height = |a: &&Point, b: &&Point| a.1.total_cmp(&b.1);
+    let ends = [
+        stretch.iter().min_by(by_height),
+        stretch.iter().max_by(by_height),
+    ];
+    let mut ends: Vec<Point> = ends.into_iter().flatten().copied().collect();
+    ends.sort_by(|a, b| a.0.total_cmp(&b.0));
+    ends.dedup();
+    ends
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_line_keeps_its_extremes_its_gaps_and_its_order_in_few_points() {
+        let point = |k: usize| {
+            let height = match k {
+                700_001 => 50.0,
+                2_000_002 => -70.0,
+                _ => (k as f64).sin(),
+            };
+            (k as f64, if k == 1_000_000 { f64::NAN } else { height })
+        };
+        let line = thinned((0..3_000_000).map(point), MOST);
+        assert!(
+            line.len() <= MOST && line.len() > MOST / 8,
+            "{}",
+            line.len()
+        );
+        assert!(line.is_sorted_by(|a, b| a.0 < b.0));
+        for extreme in [700_001, 2_000_002] {
+            assert!(line.contains(&point(extreme)), "{extreme}");
+        }
+        assert_eq!(line.iter().filter(|point| point.1.is_nan()).count(), 1);
+        // The picture is uniform: nearly every piece has its own oscillation.
+        let swing =
+            |piece: &[Point]| piece.iter().any(|p| p.1 > 0.9) && piece.iter().any(|p| p.1 < -0.9);
+        assert!(line.chunks(64).all(swing));
+    }
+
+    #[test]
+    fn a_short_line_stays_as_it_is() {
+        let line: Vec<Point> = (0..1000)
+            .map(|k| (f64::from(k), f64::from(k % 7)))
+            .collect();
+        assert_eq!(thinned(line.iter().copied(), MOST), line);
+    }
+}

@@ -1,0 +1,261 @@
+//! Status of a calibration in progress, as a screen that is redrawn or as lines.
+
+use std::collections::BTreeSet;
+
+use super::check;
+use super::prelude::*;
+use turncal::calibration::{Finding, Verdict};
+use turncal::imu::AXES;
+use turncal::lot;
+use turncal::lot::Specification;
+use turncal::run::Run;
+use turncal::survey::{
+    Attained, Attitude, InterimCalibration, Move, Status, nearest_attitude, needed,
+};
+
+/// Minimum turn about a body axis that counts, rad.
+const TURNED: f64 = 60.0 * DEGREE;
+/// Maximum number of findings on a screen.
+const SHOWN: usize = 3;
+
+/// A move in words.
+pub fn words(next: Move) -> String {
+    let up = match next {
+        Move::HalfTurn { axis, is_negative } => {
+            let sign = if is_negative { "−" } else { "" };
+            return format!(
+                "turn it slowly by 180° about {sign}{} (right-handed)",
+                AXES[axis]
+            );
+        }
+        Move::Up(up) => up,
+    };
+    let axes = AXES.iter().zip(&up).filter(|(_, part)| **part != 0.0);
+    let axes: Vec<String> = axes
+        .map(|(axis, part)| format!("{}{axis}", if *part < 0.0 { "−" } else { "" }))
+        .collect();
+    match axes.iter().map(String::as_str).collect::<Vec<_>>()[..] {
+        ["x"] => "put it on its left side (x up)".to_owned(),
+        ["−x"] => "put it on its right side (x down)".to_owned(),
+        ["y"] => "stand it on its rear end (y up)".to_owned(),
+        ["−y"] => "stand it on its front end (y down)".to_owned(),
+        ["z"] => "lay it flat, top up (z up)".to_owned(),
+        ["−z"] => "lay it flat, upside down (z down)".to_owned(),
+        [_, _] => format!("hold it on an edge, {} both 45° up", axes.join(" and ")),
+        _ => format!("hold it on a corner, {} equally far up", axes.join(", ")),
+    }
+}
+
+/// The screen: at most 80 columns, the state first, the next move last.
+pub fn screen(run: &Run, status: &Status, specification: Option<&Specification>) -> Vec<String> {
+    let mut lines = vec![
+        format!("{}; {}", so_far(status), moving(status)),
+        String::new(),
+    ];
+    match &status.expected {
+        Err(error) => lines.push(format!("no calibration yet: {error}")),
+        Ok(attained) => lines.extend(groups(attained, specification)),
+    }
+    lines.extend(status.calibrated.as_ref().map(calibrated));
+    lines.push(String::new());
+    lines.extend(coverage(status));
+    lines.push(String::new());
+    lines.extend(notes(run, status).into_iter().take(SHOWN));
+    if let Ok(Some(left)) = status
+        .expected
+        .as_ref()
+        .map(|of| of.time_left(specification))
+    {
+        lines.push(format!("about {} left", super::path::minutes(left)));
+    }
+    lines.push(match status.next {
+        Some(next) => format!("next: {}, then keep still for 5 s", words(next)),
+        None => "σ are small enough to decide every limit of the specification".to_owned(),
+    });
+    lines
+}
+
+/// The state after a dwell in one line.
+pub fn line(status: &Status, dwell: usize) -> Option<String> {
+    let rest = status.survey.rests.get(dwell)?;
+    let up = check::way_up(rest.up.axis, rest.up.down);
+    let mut line = format!(
+        "dwell {}: {up}, tilt {}°",
+        dwell + 1,
+        three_digits(rest.up.tilt / DEGREE)
+    );
+    let Ok(attained) = &status.expected else {
+        return Some(line + "; no calibration yet");
+    };
+    // The history may lack the first dwells, when no initial estimate exists yet.
+    let behind = status.survey.rests.len() - dwell;
+    let of_dwell = attained
+        .history
+        .len()
+        .checked_sub(behind)
+        .map(|k| &attained.history[k]);
+    if let Some((time, groups)) = of_dwell {
+        let sigma = groups.iter().filter_map(|(group, sigma)| {
+            let sigma = three_digits((*sigma)? / group.unit_value());
+            Some(format!("{} {sigma} {}", group.short(), group.unit()))
+        });
+        line += &format!(
+            "; {} s; 1σ {}",
+            value(*time, 1.0),
+            sigma.collect::<Vec<_>>().join(", ")
+        );
+    }
+    Some(line)
+}
+
+fn so_far(status: &Status) -> String {
+    let dwells = status.survey.rests.len();
+    format!("{} s, {dwells} dwells", value(status.duration, 1.0))
+}
+
+fn moving(status: &Status) -> String {
+    match status.still > 0.0 {
+        true => format!("still for {} s", value(status.still, 1.0)),
+        false => "moving".to_owned(),
+    }
+}
+
+/// σ of each group, and the σ that the specification requires.
+fn groups(attained: &Attained, specification: Option<&Specification>) -> Vec<String> {
+    let row = |(group, sigma): &(Group, Option<f64>)| {
+        let shown = |sigma: f64| {
+            format!(
+                "{} {}",
+                three_digits(sigma / group.unit_value()),
+                group.unit()
+            )
+        };
+        let asked = specification.and_then(|of| needed(of, *group));
+        let open = attained.checks.iter().any(|check| {
+            Group::of(check.limit.parameter) == *group && check.verdict != lot::Verdict::Pass
+        });
+        let state = match (asked, open) {
+            (None, _) => "",
+            (Some(_), true) => "not yet",
+            (Some(_), false) => "reached",
+        };
+        let row = format!(
+            "{:<24}{:>14}{:>14}  {state}",
+            group.title(),
+            or_dash(*sigma, shown),
+            asked.map_or(String::new(), shown)
+        );
+        row.trim_end().to_owned()
+    };
+    let asked = if specification.is_some() {
+        "required"
+    } else {
+        ""
+    };
+    let heading = format!("{:<24}{:>14}{asked:>14}", "", "expected 1σ");
+    let last = attained.history.last();
+    let rows = last.into_iter().flat_map(|(_, groups)| groups).map(row);
+    std::iter::once(heading.trim_end().to_owned())
+        .chain(rows)
+        .collect()
+}
+
+/// The last calibration in one line.
+fn calibrated(last: &InterimCalibration) -> String {
+    let Verdict { word, reasons } = &last.verdict;
+    let codes = if reasons.is_empty() {
+        String::new()
+    } else {
+        format!(" ({})", reasons.join(", "))
+    };
+    let time = value(last.duration, 1.0);
+    format!("calibration of the first {time} s: {word}{codes}")
+}
+
+/// Findings about the rows, then those that restrict the use of the last calibration: the first sentence of each.
+pub fn notes(run: &Run, status: &Status) -> Vec<String> {
+    let mut findings = run.recording.doubts.clone();
+    findings.extend(check::of_survey(&status.survey));
+    if let Some(last) = &status.calibrated {
+        let is_reason = |of: &&Finding| last.verdict.reasons.contains(&of.code);
+        let reasons = last.findings.iter().filter(is_reason);
+        findings.extend(reasons.map(|of| format!("{}: {}", of.code, of.text)));
+    }
+    let first = |finding: &String| {
+        let sentence = finding.split_inclusive(". ").next().unwrap_or_default();
+        format!("note: {}", sentence.trim_end())
+    };
+    findings.iter().map(first).collect()
+}
+
+/// Upward directions seen from above the sensor: three layers of nine directions, those with z up, level, down; then the
+/// turns about both directions of each axis.
+fn coverage(status: &Status) -> Vec<String> {
+    let mark = |done: bool| if done { '●' } else { '○' };
+    let rests = status.survey.rests.iter();
+    let tried: BTreeSet<Attitude> = rests.map(|rest| nearest_attitude(&rest.force)).collect();
+    let layer = |y, z| {
+        let cell = |x| match [x, y, z] {
+            [0, 0, 0] => ' ',
+            of => mark(tried.contains(&of)),
+        };
+        format!("{} {} {}", cell(-1), cell(0), cell(1))
+    };
+    let row = |(y, name): (i8, &str)| {
+        format!(
+            "{name:<8}{}    {}    {}",
+            layer(y, 1),
+            layer(y, 0),
+            layer(y, -1)
+        )
+    };
+    let mut lines = vec!["up      z up     level    z down".to_owned()];
+    lines.extend([(1, "y up"), (0, "level"), (-1, "y down")].map(row));
+    let turned = AXES.iter().enumerate().map(|(axis, name)| {
+        let by = |sign: f64| {
+            let mut turns = status.survey.turns.iter();
+            mark(turns.any(|turn| sign * turn.sum[axis] > TURNED))
+        };
+        format!("{name} {} −{name} {}", by(1.0), by(-1.0))
+    });
+    lines.push(format!(
+        "turned  {}",
+        turned.collect::<Vec<_>>().join("   ")
+    ));
+    lines
+}
+
+/// The state as data: σ of each group, unobserved parameters and the next move.
+pub fn data(status: &Status) -> Value {
+    let attained = status.expected.as_ref().ok();
+    let last = attained.and_then(|attained| attained.history.last());
+    let sigma = last.into_iter().flat_map(|(_, groups)| groups);
+    let sigma =
+        sigma.map(|(group, sigma)| (group.key(), sigma.map(|s| s / group.unit_value()).into()));
+    json!({
+        "duration_s": status.duration,
+        "dwells": status.survey.rests.len(),
+        "still_s": status.still,
+        "sigma": sigma.collect::<Map<_, _>>(),
+        "not_observed": attained.map(|attained| &attained.unobserved),
+        "next": status.next.map(words),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_move_is_told_in_words_of_its_own() {
+        let mut all: Vec<String> = Move::all().map(words).collect();
+        assert_eq!(all.len(), 32);
+        assert!(all[..6].iter().all(|words| words.contains("put")
+            || words.contains("lay")
+            || words.contains("stand")));
+        all.sort_unstable();
+        all.dedup();
+        assert_eq!(all.len(), 32);
+        assert!(all.iter().all(|words| words.chars().count() < 60));
+    }
+}

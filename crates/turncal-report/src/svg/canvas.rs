@@ -1,0 +1,205 @@
+//! The canvas for figures, with colours, pens and fonts: plotters draws each mark, and the canvas keeps them in order
+//! with their hover texts.
+//!
+//! Plotters rounds every coordinate to a whole pixel, so a mark is drawn [`FINE`] times larger and shown at its size.
+//! Sizes here are in shown pixels.
+
+use maud::{PreEscaped, html};
+use plotters::element::{DashedPathElement, Drawable, PointCollection};
+use plotters::prelude::*;
+use plotters::style::Color as _;
+use plotters::style::text_anchor::Pos;
+
+use crate::plot::{Color, Dash, Panel, Pen, Point, Scale};
+
+pub use plotters::style::text_anchor::{HPos, VPos};
+
+/// Width of every figure in pixels.
+pub const WIDTH: u32 = 1200;
+/// Drawn pixels in one shown pixel.
+pub const FINE: f64 = 8.0;
+/// Drawn pixels of the widest and of the highest figure.
+const MOST: u32 = 1 << 20;
+/// Divisor that plotters applies to font sizes in SVG.
+const FONT_RATIO: f64 = 1.24;
+/// Font size.
+pub const LETTER: f64 = 14.0;
+/// Font size of ticks, labels and notes.
+pub const SMALL: f64 = 0.95;
+
+/// Text and axes.
+pub const INK: RGBColor = RGBColor(34, 34, 34);
+/// Colour of unobtrusive elements.
+pub const QUIET: RGBColor = RGBColor(110, 110, 110);
+const COLORS: [RGBColor; 6] = [
+    RGBColor(0, 84, 147),
+    RGBColor(200, 80, 0),
+    RGBColor(0, 128, 96),
+    RGBColor(86, 160, 211),
+    RGBColor(150, 60, 110),
+    RGBColor(140, 120, 20),
+];
+
+/// The colour of a pen.
+pub fn rgb(color: Color) -> RGBColor {
+    match color {
+        Color::Ink => INK,
+        Color::Quiet => QUIET,
+        Color::Nth(n) => COLORS[n % COLORS.len()],
+    }
+}
+
+/// Approximate width of a text, in one of the wider fonts.
+pub fn width(text: &str, scale: f64) -> f64 {
+    let of = |letter: char| match letter {
+        'i' | 'j' | 'l' | '\'' | '|' | 'I' => 0.29,
+        ' ' | '.' | ',' | ':' | ';' | '\u{202f}' => 0.32,
+        'f' | 't' | 'r' | '(' | ')' | '-' | '/' | '″' | '′' => 0.4,
+        's' | 'c' | 'z' | '°' => 0.54,
+        'm' | 'w' | 'W' | 'M' | '−' | '±' | '+' | '=' | '<' | '>' | '%' | '…' => 0.88,
+        letter if letter.is_uppercase() => 0.72,
+        _ => 0.63,
+    };
+    text.chars().map(of).sum::<f64>() * LETTER * scale
+}
+
+/// A text cut to a width.
+pub fn shortened(text: &str, room: f64) -> String {
+    if width(text, SMALL) <= room {
+        return text.to_owned();
+    }
+    let mut short = text.to_owned();
+    while !short.is_empty() && width(&short, SMALL) + 0.9 * LETTER > room {
+        short.pop();
+    }
+    short + "…"
+}
+
+/// Content of an SVG document under construction.
+#[derive(Default)]
+pub struct Canvas(String);
+
+fn px(shown: f64) -> i32 {
+    (shown * FINE).round() as i32
+}
+
+fn place((x, y): Point) -> (i32, i32) {
+    (px(x), px(y))
+}
+
+impl Canvas {
+    /// All marks, at display size.
+    pub fn inside(&self) -> String {
+        let shown = format!("scale({})", FINE.recip());
+        html! { g transform=(shown) { (PreEscaped(&self.0)) } }.into_string()
+    }
+
+    fn put<E>(&mut self, element: E)
+    where
+        for<'e> &'e E: PointCollection<'e, (i32, i32)>,
+        E: for<'b> Drawable<SVGBackend<'b>>,
+    {
+        let mut document = String::new();
+        let area = SVGBackend::with_string(&mut document, (MOST, MOST)).into_drawing_area();
+        // Writing into a text does not fail.
+        let _ = area.draw(&element);
+        drop(area);
+        let inside = document.split_once(">\n").map_or("", |(_, inside)| inside);
+        self.0 += inside.trim_end().trim_end_matches("</svg>");
+    }
+
+    /// Draws a mark with this hover text.
+    pub fn titled(&mut self, text: &str, drawn: impl FnOnce(&mut Self)) {
+        let mut inside = Self::default();
+        drawn(&mut inside);
+        self.0 += &html! { g { title { (text) } (PreEscaped(inside.0)) } }.into_string();
+    }
+
+    /// Joins points.
+    pub fn line(&mut self, points: &[Point], pen: Pen) {
+        let (dash, gap) = match pen.dash {
+            Dash::Solid => return self.stroke(points, rgb(pen.color), pen.width),
+            Dash::Dashed => (6.0, 4.0),
+            Dash::Dotted => (2.0, 2.5),
+        };
+        let style = rgb(pen.color).stroke_width(px(pen.width) as u32);
+        let points: Vec<_> = points.iter().copied().map(place).collect();
+        self.put(DashedPathElement::new(points, px(dash), px(gap), style));
+    }
+
+    /// The same without dashes in any colour.
+    pub fn stroke(&mut self, points: &[Point], color: RGBColor, width: f64) {
+        let points: Vec<_> = points.iter().copied().map(place).collect();
+        self.put(PathElement::new(
+            points,
+            color.stroke_width(px(width) as u32),
+        ));
+    }
+
+    /// Fills an outline.
+    pub fn area(&mut self, outline: &[Point], color: RGBColor) {
+        let outline: Vec<_> = outline.iter().copied().map(place).collect();
+        self.put(Polygon::new(outline, color.filled()));
+    }
+
+    /// Fills a rectangle.
+    pub fn rectangle(&mut self, corners: [Point; 2], color: RGBColor) {
+        self.put(Rectangle::new(corners.map(place), color.filled()));
+    }
+
+    /// A circle, filled or open with a line of this width.
+    pub fn circle(&mut self, at: Point, radius: f64, color: RGBColor, line: Option<f64>) {
+        let style = line.map_or(color.filled(), |width| color.stroke_width(px(width) as u32));
+        self.put(Circle::new(place(at), px(radius), style));
+    }
+
+    /// Writes text, the point at this part of it; `scale` 1 is the usual size.
+    pub fn text(
+        &mut self,
+        text: &str,
+        at: Point,
+        (across, height): (HPos, VPos),
+        color: RGBColor,
+        scale: f64,
+    ) {
+        let style = font(scale).color(&color).pos(Pos::new(across, height));
+        self.put(Text::new(text.to_owned(), place(at), style));
+    }
+}
+
+fn font(scale: f64) -> FontDesc<'static> {
+    ("sans-serif", LETTER * FONT_RATIO * FINE * scale).into_font()
+}
+
+/// Layout of a panel: positions of its axes.
+pub struct Frame<'p> {
+    /// The panel.
+    pub panel: &'p Panel,
+    /// Horizontal scale.
+    pub x: Scale,
+    /// Vertical scale.
+    pub y: Scale,
+    /// Left and right end of the axes.
+    pub across: (f64, f64),
+    /// Upper and lower end.
+    pub down: (f64, f64),
+    /// Right end of the panel.
+    pub end: f64,
+}
+
+impl Frame<'_> {
+    /// Position of a point.
+    pub fn at(&self, (x, y): Point) -> Point {
+        (self.at_x(x), self.at_y(y))
+    }
+
+    /// Position of an abscissa.
+    pub fn at_x(&self, x: f64) -> f64 {
+        self.across.0 + self.x.part(x) * (self.across.1 - self.across.0)
+    }
+
+    /// Position of a height.
+    pub fn at_y(&self, y: f64) -> f64 {
+        self.down.1 - self.y.part(y) * (self.down.1 - self.down.0)
+    }
+}

@@ -1,9 +1,0 @@
-//! Commands that use or show a calibration.
-
-pub mod apply;
-#[cfg(feature = "certificate")]
-pub mod certificate;
-pub mod compare;
-pub mod explain;
-pub mod export;
-pub mod navigate;
