@@ -30,10 +30,18 @@ impl Equations {
         let singular = |index: usize| CalibrationError::Singular {
             sensor: sensor_and_parameter(index).0,
         };
-        let (step, _) = self
-            .with_prior(&self.weighted_factor(), 1.0)
-            .ok_or_else(|| singular(first))?;
-        let step = self.expanded(&step);
+        let (design, residual) = self.scaled();
+        let (count, unknown) = design.shape();
+        let mut all = DMatrix::from_diagonal(&self.sigma.map(f64::recip));
+        all = all.resize_vertically(unknown + count, 0.0);
+        all.rows_mut(unknown, count).copy_from(&design);
+        let qr = all.qr();
+        let gain = qr.r().solve_upper_triangular(&qr.q().transpose());
+        let gain = gain.ok_or_else(|| singular(first))?;
+        let of_prior = gain.columns(0, unknown).into_owned();
+        let of_rows = gain.columns(unknown, count).into_owned();
+        let step = of_prior * &self.mean + of_rows * residual;
+        let step = self.expanded(&DMatrix::from_column_slice(unknown, 1, step.as_slice()));
         let lost = step.iter().position(|value| !value.is_finite());
         lost.map_or(Ok(step), |index| Err(singular(index)))
     }
