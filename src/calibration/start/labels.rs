@@ -394,8 +394,13 @@ mod tests {
                 known: known.collect(),
             };
             let Fit {
-                triad, covariance, ..
+                triad,
+                covariance,
+                residuals,
+                ..
             } = observed.determined(form).unwrap();
+            // As the statements say, before residuals widen it.
+            let covariance = covariance / residuals.growth().powi(2);
             let error = triad.to_vector() - truth.to_vector();
             for (k, e) in error.iter().enumerate() {
                 let place = match Triad::kind(k) {
