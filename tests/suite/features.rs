@@ -19,8 +19,18 @@ fn needed_by(package: &str) -> Vec<String> {
 #[test]
 fn the_science_compiles_no_interface_no_log_format_and_no_page() {
     let above = [
-        "anyhow", "clap", "csv", "flate2", "hdf5-pure", "indicatif", "krilla", "maud", "plotters",
-        "ruzstd", "tempfile", "zip",
+        "anyhow",
+        "clap",
+        "csv",
+        "flate2",
+        "hdf5-pure",
+        "indicatif",
+        "krilla",
+        "maud",
+        "plotters",
+        "ruzstd",
+        "tempfile",
+        "zip",
     ];
     let of_all = needed_by("turncal-cli");
     let of_science = needed_by("turncal");

@@ -90,9 +90,9 @@ fn a_gyro_that_is_half_as_sensitive_as_stated_is_named_with_its_axis() {
     let directory = tempfile::tempdir().unwrap();
     let run = simulated(directory.path());
     let right = fs::read_to_string(&run).unwrap();
-    let stated = "[imu.prior.gyro]\nscale = [1.0, ";
+    let stated = "[imu.prior.gyro]\nscale = 1.0\n";
     assert!(right.contains(stated), "{right}");
-    let twice = right.replace(stated, "[imu.prior.gyro]\nscale = [2.0, ");
+    let twice = right.replace(stated, "[imu.prior.gyro]\nscale = [2.0, 1.0, 1.0]\n");
     fs::write(&run, twice).unwrap();
     for method in ["ekf", "six-position"] {
         let said = turncal(&["calibrate", run.to_str().unwrap(), "--method", method]);

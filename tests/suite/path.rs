@@ -18,10 +18,9 @@ fn sigma(of: &Value, group: &str) -> f64 {
     of["sigma"][group].as_f64().unwrap()
 }
 
-/// A full turn leads back, so the path without it has the same positions: what the other moves show is then nearly the
-/// same as without what the dwell after the turn says.
+/// Nothing is gained by leaving out what a dwell says, and most is lost with the only turn that shows a scale factor.
 #[test]
-fn a_move_is_worth_what_the_path_without_it_lacks() {
+fn a_move_that_alone_shows_a_parameter_is_worth_most() {
     let steps = [
         "{ turn_deg = [0, 0, 720] }",
         "{ turn_deg = [0, -720, 0] }",
@@ -43,11 +42,9 @@ fn a_move_is_worth_what_the_path_without_it_lacks() {
     });
     let first = &whole["without"][0];
     for group in ["gyro.scale_ppm", "gyro.bias_deg_per_h", "accel.bias_ug"] {
-        let ratio = sigma(first, group) / sigma(&without, group);
-        println!("{group}: {ratio}");
-        assert!((ratio - 1.0).abs() < 0.05, "{group}: {ratio}");
+        assert!(sigma(first, group) > sigma(&whole, group), "{group}");
     }
-    // Only the two full turns about y reveal its scale factor.
+    // No other turn about the inner axis reveals the scale factor of its gyro.
     assert!(sigma(first, "gyro.scale_ppm") > 10.0 * sigma(&whole, "gyro.scale_ppm"));
     let time = |of: &Value| of["duration_s"].as_f64().unwrap();
     let saved = first["time_s"].as_f64().unwrap();
@@ -66,7 +63,8 @@ fn a_path_with_the_moves_that_show_a_term_shows_it() {
         all.iter().map(name).collect()
     };
     let hidden = not_shown(level);
-    let turns = "turn x 360, turn x -360, turn y 360, turn y -360, turn z 360, turn z -360";
+    // A turn about the vertical changes nothing that gravity shows.
+    let turns = "turn x 360, turn x -360, turn y 360, turn y -360, x_up, turn z 360, turn z -360";
     let both_ways = not_shown(&format!("{level}, {turns}"));
     let term = "gyro-asymmetry".to_owned();
     assert!(

@@ -86,7 +86,7 @@ fn from_body_axes_along_east_north_and_up_the_nineteen_positions_hardly_see_gyro
     let published = scenario("nineteen-position");
     let models = concat!(
         env!("CARGO_MANIFEST_DIR"),
-        "/models/path/nineteen-position.toml"
+        "/../../models/path/nineteen-position.toml"
     );
     let text = std::fs::read_to_string(models).unwrap();
     let start = "start_pitch_roll_heading_deg = [1.0, -91.0, 91.0]";

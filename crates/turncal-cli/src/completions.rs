@@ -1,9 +1,7 @@
 //! `turncal completions`
 
-use clap::CommandFactory;
 use clap_complete::Shell;
 
-use super::Cli;
 use crate::terminal::print;
 
 /// Prints a shell-completion script
@@ -22,9 +20,9 @@ pub struct Completions {
 }
 
 impl Completions {
-    pub fn run(&self) -> anyhow::Result<()> {
+    pub fn run(&self, mut command: clap::Command) -> anyhow::Result<()> {
         let mut script = Vec::new();
-        clap_complete::generate(self.shell, &mut Cli::command(), "turncal", &mut script);
+        clap_complete::generate(self.shell, &mut command, "turncal", &mut script);
         print(&script)
     }
 }

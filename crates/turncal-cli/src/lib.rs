@@ -25,7 +25,7 @@ mod tests;
 
 use std::ffi::OsString;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 use turncal_report::terminal::printable;
 
@@ -35,6 +35,7 @@ use terminal::{leave_nothing_behind, with_threads};
 /// Calibrates an inertial measurement unit on a turntable or by hand, with realistic uncertainties.
 #[derive(Debug, Parser)]
 #[command(
+    name = "turncal",
     version,
     arg_required_else_help = true,
     after_help = "\
@@ -129,8 +130,8 @@ impl Cli {
             Command::Noise(noise) => noise.run(),
             Command::List(list) => list.run(),
             Command::Schema(schema) => schema.run(),
-            Command::Completions(completions) => completions.run(),
-            Command::Man(manual) => manual.run(),
+            Command::Completions(completions) => completions.run(Self::command()),
+            Command::Man(manual) => manual.run(Self::command()),
         }
     }
 }

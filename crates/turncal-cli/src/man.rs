@@ -2,10 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::CommandFactory;
 use clap_mangen::Man;
 
-use super::Cli;
 use crate::terminal::print;
 use turncal_files::write_whole;
 
@@ -27,8 +25,8 @@ pub struct Manual {
 }
 
 impl Manual {
-    pub fn run(&self) -> anyhow::Result<()> {
-        let mut command = Cli::command().disable_help_subcommand(true);
+    pub fn run(&self, command: clap::Command) -> anyhow::Result<()> {
+        let mut command = command.disable_help_subcommand(true);
         command.build();
         let Some(directory) = &self.output else {
             return print(&page(&command)?);

@@ -93,7 +93,7 @@ fn other_body_axes_describe_the_same_run() {
                 for (x, y, z, sign) in [
                     ("1000.0", "2000.0", "3000.0", none),
                     ("0.00001", "-0.00002", "0.00003", minus),
-                    ("0.000001", "0.000002", "0.000003", none),
+                    ("1e-6", "2e-6", "3e-6", none),
                 ] {
                     let from = format!("[{x}, {y}, {z}]");
                     assert!(out.contains(&from), "{from} in {out}");

@@ -3,7 +3,7 @@
 use crate::arguments::{AIDINGS, FORMS, NOISE, one_of};
 use std::path::Path;
 
-use super::carry_out;
+use super::carry_out::carry_out;
 use crate::arguments::{Delivery, Sharding, at_least_two, error_term, needs_table, seed};
 use turncal::calibration::{ErrorTerm, NoisePolicy};
 use turncal::imu::InstallationForm;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::carry_out;
+use super::carry_out::carry_out;
 use crate::arguments::{Delivery, Sharding, at_least_two, hours, seed};
 use turncal::models;
 use turncal::models::Place;

@@ -1,18 +1,11 @@
 //! `turncal study`
 
 mod accuracy;
+mod carry_out;
 mod experiment;
 mod table1;
 
-use std::ops::ControlFlow;
-use std::path::Path;
-
 use clap::Subcommand;
-
-use crate::arguments::Delivery;
-use crate::terminal::Runs;
-use turncal::study;
-use turncal_report::Document;
 
 /// Runs a Monte Carlo study
 #[derive(Debug, clap::Args)]
@@ -38,21 +31,4 @@ impl Study {
             Question::Table1(table1) => table1.run(),
         }
     }
-}
-
-/// Makes a whole study and delivers the document of its outcome.
-fn carry_out<S: study::Study>(
-    study: &S,
-    delivery: &Delivery,
-    inputs: &[&Path],
-    document: fn(&S::Outcome) -> Document,
-) -> anyhow::Result<()> {
-    let begun = delivery.begin(inputs)?;
-    let runs = Runs::new(study.runs());
-    let outcome = study.run(&|| {
-        runs.one_done();
-        ControlFlow::Continue(())
-    })?;
-    drop(runs);
-    begun.deliver(&document(&outcome))
 }
