@@ -34,7 +34,7 @@ fn calibration() -> Calibration {
 }
 
 fn laboratory() -> Laboratory {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/lab.toml");
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/lab.toml");
     read_laboratory(&path, |_| None).unwrap()
 }
 
