@@ -9,15 +9,12 @@ use crate::joined::Part;
 use crate::schema::page::Remarks;
 use crate::schema::{AccelFromFile, ImuFile, TimeColumn, TimeUnitField};
 use turncal::imu::{Output, PerSensor, Sensor};
-use turncal_input::FileError;
-use turncal_input::{choice, list, suggestion};
-use turncal_logs::DataFile;
-use turncal_logs::Source;
+use turncal_input::{FileError, choice, list, suggestion};
 use turncal_logs::clock::{Breaks, Clock, TimeUnit};
 use turncal_logs::csv_file::CsvFile;
 use turncal_logs::rows::LogRows;
-use turncal_logs::streams;
 use turncal_logs::streams::{Column, Found, Stream};
+use turncal_logs::{DataFile, Source, streams};
 
 /// The gyro and accelerometer streams.
 #[derive(Debug, Clone, PartialEq)]

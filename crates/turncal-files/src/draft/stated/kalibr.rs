@@ -6,8 +6,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use turncal::imu::{GaussMarkov, Noise, PerSensor, Sensor};
-use turncal_input::small_file;
-use turncal_input::{FileError, Place, nearest};
+use turncal_input::{FileError, Place, nearest, small_file};
 
 const RATE: &str = "update_rate";
 /// Correlation time of the Gauss–Markov bias that represents a random walk, s; longer than most recordings.

@@ -13,11 +13,8 @@ use turncal::earth::Site;
 use turncal::imu::{Noise, PerSensor, Sensor};
 use turncal::models::{Instrument, ModelError, Place, Tolerances};
 use turncal::units::DEGREE;
-use turncal_input::FileError;
-use turncal_input::stated_gravity_sigma;
-use turncal_input::{choice, suggestion};
-use turncal_logs::DataFile;
-use turncal_logs::Table;
+use turncal_input::{FileError, choice, stated_gravity_sigma, suggestion};
+use turncal_logs::{DataFile, Table};
 
 /// User statements about a log without a `run.toml`; other fields are detected or have a wide prior.
 #[derive(Debug, Clone, PartialEq, Default)]
