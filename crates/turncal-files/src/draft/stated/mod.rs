@@ -55,13 +55,8 @@ pub enum DataSheetError {
 impl Stated {
     /// The stated units.
     pub fn units(&self) -> impl Iterator<Item = (Sensor, StatedUnit)> {
-        let of_triads = [
-            (Sensor::Gyro, self.gyro_unit),
-            (Sensor::Accel, self.accel_unit),
-        ];
-        of_triads
-            .into_iter()
-            .filter_map(|(sensor, of)| Some((sensor, of?)))
+        let of = |sensor: Sensor| Some((sensor, sensor.pick(self.gyro_unit, self.accel_unit)?));
+        Sensor::ALL.into_iter().filter_map(of)
     }
 
     /// The site, with wide σ of what is not stated.
