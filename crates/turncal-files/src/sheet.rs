@@ -1,9 +1,8 @@
 //! The columns of a file of rows, unchanged.
 
 use turncal_input::FileError;
-use turncal_logs::DataFile;
-use turncal_logs::Source;
 use turncal_logs::rows::LogRows;
+use turncal_logs::{DataFile, Source};
 
 /// The columns of an unknown file.
 #[derive(Debug, Clone, PartialEq)]

@@ -8,8 +8,7 @@ use serde_json::Value;
 
 use super::digest::digest_of;
 use turncal::study::Shard;
-use turncal_input::FileError;
-use turncal_input::small_file;
+use turncal_input::{FileError, small_file};
 
 /// The name of the file in its directory.
 pub const JOB_FILE: &str = "job.json";

@@ -13,8 +13,7 @@ use super::job::{JOB_FILE, Part};
 use super::whole::{WholeDirectory, clear_abandoned, list_anew, write_whole};
 use turncal::lot::{Calibrated, Unit};
 use turncal::noise::RestNoise;
-use turncal_input::FileError;
-use turncal_input::small_file;
+use turncal_input::{FileError, small_file};
 
 /// The directory of the units in that of the lot.
 const UNITS: &str = "units";

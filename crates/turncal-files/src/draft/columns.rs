@@ -56,9 +56,8 @@ impl Columns {
         let is_bare =
             |triad: &[usize; 3]| names[triad[0]].unit.is_none_or(|unit| unit.word == "count");
         found.gyro.sort_by_key(is_bare);
-        found
-            .accel
-            .sort_by_key(|triad| (magnitude(sheet, triad).0 > UNEVEN, is_bare(triad)));
+        let rank = |triad: &[usize; 3]| (magnitude(sheet, triad).0 > UNEVEN, is_bare(triad));
+        found.accel.sort_by_key(rank);
         let of_triads = found.gyro.iter().chain(&found.accel).flatten();
         let of_triads: Vec<usize> = of_triads.copied().collect();
         // Rows of another sensor may have other times.
@@ -66,35 +65,29 @@ impl Columns {
         let rows: Vec<usize> = (0..sheet.rows()).filter(is_sample).collect();
         let forward = |k: usize| forward(rows.iter().map(|&row| sheet.columns[k][row]));
         let split = split_time(sheet, &names);
-        let time = split
-            .map(|pair| pair[0])
-            .or_else(|| time(sheet, &names, forward));
-        let temperature =
-            (0..names.len()).find(|&k| names[k].is_temperature() && is_numeric(sheet, k));
+        let nanoseconds = split.map(|pair| pair[1]);
+        let time = (split.map(|pair| pair[0])).or_else(|| time(sheet, &names, forward));
+        let is_temperature = |k: &usize| names[*k].is_temperature() && is_numeric(sheet, *k);
+        let temperature = (0..names.len()).find(is_temperature);
         let quaternion = quaternion(sheet, time);
-        let lacks = |found: &PerSensor<Vec<_>>, sensor: Sensor| found.get(sensor).is_empty();
-        let lacked = PerSensor::from_fn(|sensor| lacks(&found, sensor));
-        if lacked.gyro || lacked.accel {
-            let taken = [time, split.map(|pair| pair[1]), temperature]
-                .into_iter()
-                .flatten();
+        let by_name = PerSensor::from_fn(|sensor| found.get(sensor).len());
+        if by_name.gyro == 0 || by_name.accel == 0 {
+            let taken = [time, nanoseconds, temperature].into_iter().flatten();
             let taken = taken
                 .chain(of_triads)
                 .chain(quaternion.into_iter().flatten());
             by_numbers(sheet, &names, &taken.collect::<Vec<_>>(), &mut found);
         }
-        let is_new = |&sensor: &Sensor| *lacked.get(sensor) && !lacks(&found, sensor);
-        let first = |triads: &Vec<[usize; 3]>| triads.first().copied();
+        let is_new = |&of: &Sensor| *by_name.get(of) == 0 && !found.get(of).is_empty();
+        let others = |of| found.get(of).iter().skip(1).copied().collect();
         Self {
             names: (0..names.len())
                 .map(|k| distinct(&sheet.names, k))
                 .collect(),
             time,
-            nanoseconds: split.map(|pair| pair[1]),
-            triads: PerSensor::from_fn(|sensor| first(found.get(sensor))),
-            others: PerSensor::from_fn(|sensor| {
-                found.get(sensor).iter().skip(1).copied().collect()
-            }),
+            nanoseconds,
+            triads: PerSensor::from_fn(|sensor| found.get(sensor).first().copied()),
+            others: PerSensor::from_fn(others),
             by_size: Sensor::ALL.iter().any(is_new),
             temperature,
             quaternion,
@@ -147,14 +140,10 @@ impl Columns {
         let any = self.triads.gyro.or(self.triads.accel)?;
         for row in 0..sheet.columns[any[0]].len() {
             let both = PerSensor::from_fn(|sensor| at(sensor, row));
-            if (both.gyro + both.accel)
-                .iter()
-                .all(|value| value.is_finite())
-            {
+            if (both.gyro + both.accel).sum().is_finite() {
                 rows.push(row);
-                Sensor::ALL
-                    .iter()
-                    .for_each(|&sensor| samples.get_mut(sensor).push(*both.get(sensor)));
+                samples.gyro.push(both.gyro);
+                samples.accel.push(both.accel);
             }
         }
         (rows.len() > 1).then_some((rows, samples))
@@ -227,11 +216,8 @@ fn split_time(sheet: &Sheet, names: &[Name]) -> Option<[usize; 2]> {
     let is_pair = |k: &usize| {
         let is_named = names[*k].is_part_of_time("s") && names[k + 1].is_part_of_time("ns");
         let is_numbered = sheet.names[*k] == (k + 1).to_string();
-        let are_nanoseconds = || {
-            sheet.columns[k + 1]
-                .iter()
-                .all(|value| (0.0..1e9).contains(value))
-        };
+        let mut rest = sheet.columns[k + 1].iter();
+        let mut are_nanoseconds = || rest.all(|value| (0.0..1e9).contains(value));
         (is_named || is_numbered && are_nanoseconds()) && is_whole(*k) && is_whole(k + 1)
     };
     let goes_on = |k: &usize| {
@@ -239,9 +225,8 @@ fn split_time(sheet: &Sheet, names: &[Name]) -> Option<[usize; 2]> {
         let times = both(&sheet.columns[*k], &sheet.columns[k + 1]);
         seconds.0 > 0.0 && seconds.0 < FORWARD && forward(times.into_iter()).0 >= FORWARD
     };
-    let pair = (0..names.len().saturating_sub(1))
-        .filter(is_pair)
-        .find(goes_on)?;
+    let mut pairs = (0..names.len().saturating_sub(1)).filter(is_pair);
+    let pair = pairs.find(goes_on)?;
     Some([pair, pair + 1])
 }
 
@@ -301,10 +286,8 @@ fn time(sheet: &Sheet, names: &[Name], forward: impl Fn(usize) -> (f64, f64)) ->
 /// Complete triads of a sensor, in order of their columns.
 fn by_name(names: &[Name], sheet: &Sheet, sensor: Sensor) -> Vec<[usize; 3]> {
     let of_sensor = |k: &usize| names[*k].sensor() == Some(sensor) && is_numeric(sheet, *k);
-    by_stem(
-        names,
-        &(0..names.len()).filter(of_sensor).collect::<Vec<_>>(),
-    )
+    let candidates: Vec<usize> = (0..names.len()).filter(of_sensor).collect();
+    by_stem(names, &candidates)
 }
 
 /// Groups of three columns whose names differ only in the axis.
@@ -347,17 +330,14 @@ fn by_numbers(
         triads.retain(|triad| triad.iter().any(varies));
         if triads.is_empty() {
             let side_by_side = free.chunks_exact(3).map(|of| [of[0], of[1], of[2]]);
-            triads = side_by_side
-                .filter(|triad| triad.iter().all(varies))
-                .collect();
+            triads.extend(side_by_side.filter(|triad| triad.iter().all(varies)));
         }
         let with_size = |triad| (triad, magnitude(sheet, &triad));
         triads.into_iter().map(with_size).collect::<Vec<_>>()
     };
     let even = |sizes: &[([usize; 3], (f64, f64))], limit: f64| {
-        sizes
-            .iter()
-            .position(|&(_, (uneven, lively))| uneven < limit && lively < LIVELY)
+        let is_even = |(_, (uneven, lively)): &(_, _)| *uneven < limit && *lively < LIVELY;
+        sizes.iter().position(is_even)
     };
     let mut free: Vec<usize> = (0..names.len()).filter(is_free).collect();
     let mut sizes = magnitudes(&free);
@@ -369,11 +349,8 @@ fn by_numbers(
     if found.accel.is_empty() {
         let is_pair = found.gyro.is_empty() && sizes.len() > 1;
         let of = |k: &usize| sizes[*k].1.0;
-        let least = || {
-            (0..sizes.len())
-                .min_by(|a, b| of(a).total_cmp(&of(b)))
-                .filter(|_| is_pair)
-        };
+        let all = (0..sizes.len()).filter(|_| is_pair);
+        let least = || all.min_by(|a, b| of(a).total_cmp(&of(b)));
         // A compass usually stands behind them.
         let best = even(&sizes, EVEN).or_else(least).or(even(&sizes, UNEVEN));
         found.accel.extend(best.map(|k| sizes.remove(k).0));

@@ -5,10 +5,11 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use super::Draft;
-use super::streams::{Streams, Written};
+use super::streams::Written;
 use crate::write_rows;
 use turncal_input::FileError;
 use turncal_logs::Source;
+use turncal_logs::rows::LogRows;
 
 /// File of the gyros, and of accelerometers in the same stream.
 const GYRO_FILE: &str = "imu.csv.gz";
@@ -21,17 +22,12 @@ impl Draft {
     /// # Errors
     /// [`FileError`] if the log is text already, is damaged, or cannot be read or written.
     pub fn convert(mut self, log: &Path, directory: &Path, salvage: bool) -> Result<(), FileError> {
-        let of_text = |streams: &Streams| streams.written.is_some();
-        let streams = self.streams.as_mut().filter(|streams| !of_text(streams));
+        let streams = self.streams.as_mut().filter(|of| of.written.is_none());
         let Some(streams) = streams else {
             let advice = "`turncal init` can draft a run.toml for it without conversion.";
             let expected = "a log of another program, which needs no conversion";
-            return Err(FileError::of(
-                log,
-                "a text file with rows",
-                expected,
-                advice,
-            ));
+            let found = "a text file with rows";
+            return Err(FileError::of(log, found, expected, advice));
         };
         let source = |stream| Source {
             stream: Some(stream),
@@ -58,20 +54,16 @@ fn rows_as_text(source: &Source, path: &Path) -> Result<(), FileError> {
         let mut csv = csv::Writer::from_writer(file);
         csv.write_record(rows.header())?;
         let columns = rows.header().len();
-        loop {
-            match rows.advance() {
-                Ok(true) => {}
-                Ok(false) => break,
-                Err(error) => {
-                    stopped = Err(error);
-                    break;
-                }
-            }
-            let field = |k| match rows.number(k) {
-                Ok(_) => rows.shown(k).into_owned(),
-                Err(_) => String::new(),
-            };
-            csv.write_record((0..columns).map(field))?;
+        let mut advance = |rows: &mut LogRows| {
+            let advanced = rows.advance();
+            advanced.unwrap_or_else(|error| {
+                stopped = Err(error);
+                false
+            })
+        };
+        while advance(&mut rows) {
+            let field = |k| (rows.number(k)).map_or_else(|_| "".into(), |_| rows.shown(k));
+            csv.write_record((0..columns).map(|k| field(k).into_owned()))?;
         }
         csv.flush()
     };

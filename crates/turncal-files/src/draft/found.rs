@@ -38,9 +38,9 @@ impl Draft {
     pub(crate) fn check(&self, file: &Path) -> Result<(), FileError> {
         let damage = self.streams.as_ref().and_then(|of| of.damage.clone());
         let question = self.contradiction.clone().or_else(|| self.open_question());
-        let open =
-            question.map(|[found, expected, advice]| FileError::of(file, found, expected, advice));
-        damage.or(open).map_or(Ok(()), Err)
+        let wrong =
+            |[found, expected, advice]: [String; 3]| FileError::of(file, found, expected, advice);
+        damage.or(question.map(wrong)).map_or(Ok(()), Err)
     }
 
     /// The first open field that prevents a run: evidence in the log, requirement, remedy.

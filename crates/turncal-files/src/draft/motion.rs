@@ -66,9 +66,8 @@ pub fn means(samples: &[Vector3<f64>], length: usize) -> Vec<Vector3<f64>> {
 /// 1σ noise of window means, from successive differences.
 fn noise(means: &[Vector3<f64>]) -> f64 {
     let differences = means.windows(2).map(|pair| pair[1] - pair[0]);
-    let mut changes: Vec<f64> = differences
-        .flat_map(|d| <[f64; 3]>::from(d.abs()))
-        .collect();
+    let changes = differences.flat_map(|d| <[f64; 3]>::from(d.abs()));
+    let mut changes: Vec<f64> = changes.collect();
     SIGMA_OF_MEDIAN * std::f64::consts::FRAC_1_SQRT_2 * median(&mut changes).unwrap_or(0.0)
 }
 
@@ -81,38 +80,25 @@ impl Motion {
         let mut sizes: Vec<f64> = accel.iter().map(|f| f.norm()).collect();
         let usual = median(&mut sizes).unwrap_or(0.0);
         let force = SIGMAS * noise(&accel) + PART * usual;
-        let steady = |k: usize| {
-            let near =
-                |other: Option<&Vector3<f64>>| other.is_none_or(|f| (f - accel[k]).norm() <= force);
-            near(k.checked_sub(1).and_then(|k| accel.get(k))) && near(accel.get(k + 1))
-        };
+        let near = |k: usize| (accel[k] - accel[k - 1]).norm() <= force;
+        let steady = |k: usize| (k == 0 || near(k)) && (k + 1 == accel.len() || near(k + 1));
         let standing = (0..accel.len()).filter(|&k| steady(k));
         let standing: Vec<Vector3<f64>> = standing.map(|k| gyro[k]).collect();
         let rest = median_of_axes(&standing).unwrap_or_default();
-        let fastest = gyro
-            .iter()
-            .map(|rate| (rate - rest).norm())
-            .fold(0.0, f64::max);
+        let turned = |k: usize| (gyro[k] - rest).norm();
+        let fastest = (0..gyro.len()).map(turned).fold(0.0, f64::max);
         let rate = SIGMAS * noise(&gyro) + PART * fastest;
-        let at_rest: Vec<bool> = (0..gyro.len())
-            .map(|k| steady(k) && (gyro[k] - rest).norm() <= rate)
-            .collect();
-        let mut sizes: Vec<f64> = (0..accel.len())
-            .filter(|&k| at_rest[k])
-            .map(|k| accel[k].norm())
-            .collect();
+        let at_rest = (0..gyro.len()).map(|k| steady(k) && turned(k) <= rate);
+        let at_rest: Vec<bool> = at_rest.collect();
+        let standing = (0..accel.len()).filter(|&k| at_rest[k]);
+        let mut sizes: Vec<f64> = standing.map(|k| accel[k].norm()).collect();
         let stretches = stretches(&at_rest);
-        let longest = stretches
-            .iter()
-            .max_by_key(|stretch| stretch.len())
-            .cloned()
-            .unwrap_or(0..0);
+        let longest = stretches.iter().max_by_key(|of| of.len());
+        let longest = longest.cloned().unwrap_or(0..0);
         // At its ends a rest is already or still a motion.
-        let settled: Vec<Range<usize>> = stretches
-            .iter()
-            .filter(|stretch| stretch.len() > 3)
-            .map(|stretch| (stretch.start + 1) * length..(stretch.end - 1) * length)
-            .collect();
+        let long = stretches.iter().filter(|of| of.len() > 3);
+        let settled = long.map(|of| (of.start + 1) * length..(of.end - 1) * length);
+        let settled: Vec<Range<usize>> = settled.collect();
         let cuts = cuts(samples, breaks);
         let step = ((FOLLOWED / period).round() as usize).max(1);
         let followed = Followed::new(samples, breaks, rest, usual, step);
@@ -216,10 +202,10 @@ fn cuts(samples: &PerSensor<Vec<Vector3<f64>>>, breaks: &[usize]) -> Vec<usize> 
             && part(next - 2 * BESIDE).angle(&before) < STEADY
             && after.angle(&part(next + BESIDE)) < STEADY
             && !is_broken(breaks, &(next - BESIDE..next + BESIDE))
-            && !turn_about(
-                &before.cross(&after).normalize(),
-                &samples.gyro[next - 2 * BESIDE..next + 2 * BESIDE],
-            );
+            && {
+                let gyro = &samples.gyro[next - 2 * BESIDE..next + 2 * BESIDE];
+                !turn_about(&before.cross(&after).normalize(), gyro)
+            };
         cuts.extend(cut.then_some(next));
         next += if cut { 2 * BESIDE } else { 1 };
     }
@@ -246,16 +232,12 @@ fn sum_variance(samples: &PerSensor<Vec<Vector3<f64>>>, settled: &[Range<usize>]
         let (mut of_sums, mut of_one) = (0.0, 0.0);
         for stretch in settled {
             let values: Vec<f64> = triad[stretch.clone()].iter().map(|row| row[axis]).collect();
-            let sums: Vec<f64> = values
-                .chunks_exact(SUM)
-                .map(|part| part.iter().sum())
-                .collect();
+            let sums = values.chunks_exact(SUM).map(|part| part.iter().sum());
+            let sums: Vec<f64> = sums.collect();
             // Differences of neighbours are free of what wanders.
             let differences = sums.windows(2).map(|pair| pair[1] - pair[0]);
             of_one += differences.len() as f64 * values.population_variance();
-            of_sums += differences
-                .map(|difference| difference.powi(2))
-                .sum::<f64>();
+            of_sums += differences.map(|of| of.powi(2)).sum::<f64>();
         }
         of_sums / (2.0 * SUM as f64 * of_one)
     };

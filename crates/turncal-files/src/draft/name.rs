@@ -118,47 +118,42 @@ impl Name {
             words.truncate(words.len() - count);
         }
         // `Gyroscope X CAL`
-        let single = words
-            .iter()
-            .position(|word| matches!(word.as_str(), "x" | "y" | "z"));
-        let axis = match single {
-            Some(place) if words.len() > 1 => words.remove(place).chars().next(),
-            _ => None,
-        };
+        let is_axis = |word: &String| ["x", "y", "z"].contains(&&**word);
+        let single = words.iter().position(is_axis).filter(|_| words.len() > 1);
+        let axis = single.and_then(|place| words.remove(place).chars().next());
         let whole = words.concat();
-        let apart = || axis_at_end(&whole).or(axis_at_start(&whole));
-        let (stem, axis) = match axis {
-            Some(axis) => (&*whole, Some(axis)),
-            None => apart().map_or((&*whole, None), |(stem, axis)| (stem, Some(axis))),
+        let apart = match axis {
+            Some(axis) => Some((&*whole, axis)),
+            None => axis_at_end(&whole).or(axis_at_start(&whole)),
         };
         Self {
-            stem: stem.to_owned(),
-            axis,
+            stem: apart.map_or(&*whole, |(stem, _)| stem).to_owned(),
+            axis: apart.map(|(_, axis)| axis),
             unit: found,
         }
     }
 
     /// The triad that the stem names; a unit of the other triad decides between them.
     pub fn sensor(&self) -> Option<Sensor> {
+        if self.is_of_another_sensor() {
+            return None;
+        }
         let names = |(_, parts, all): &&(Sensor, &[&str], &[&str])| {
             parts.iter().any(|part| self.stem.contains(part)) || all.contains(&&*self.stem)
         };
-        let triad = TRIADS
+        TRIADS
             .iter()
             .find(names)
-            .filter(|_| !self.is_of_another_sensor());
-        triad.map(|(sensor, ..)| match self.unit.map(|unit| unit.of) {
-            Some(Of::Rows(of_unit, _)) => of_unit,
-            _ => *sensor,
-        })
+            .map(|(sensor, ..)| match self.unit.map(|unit| unit.of) {
+                Some(Of::Rows(of_unit, _)) => of_unit,
+                _ => *sensor,
+            })
     }
 
     /// Whether its name belongs to neither gyro nor accelerometer.
     pub fn is_of_another_sensor(&self) -> bool {
-        let is_magnetic = self
-            .unit
-            .is_some_and(|unit| ["uT", "gauss"].contains(&unit.word));
-        is_magnetic || OTHERS.iter().any(|other| self.stem.contains(other))
+        let is_magnetic = |unit: Unit| ["uT", "gauss"].contains(&unit.word);
+        self.unit.is_some_and(is_magnetic) || OTHERS.iter().any(|other| self.stem.contains(other))
     }
 
     /// Similarity to a time column; larger is more similar.
@@ -196,9 +191,8 @@ impl Name {
 
     /// Whether this column contains one part of a time split into two columns: whole seconds or fraction.
     pub fn is_part_of_time(&self, word: &str) -> bool {
-        self.unit
-            .or_else(|| unit(&self.whole()))
-            .is_some_and(|unit| unit.word == word)
+        let unit = self.unit.or_else(|| unit(&self.whole()));
+        unit.is_some_and(|unit| unit.word == word)
     }
 
     /// Whether it distinguishes several instruments.

@@ -72,15 +72,13 @@ impl Stated {
         let noise = self.noise?;
         let class = Class::of(|sensor| Some(noise.get(sensor).random_walk));
         let stated = self.tolerances.as_ref();
+        let scale = |of_it| stated.map_or(class.scale_ppm * PPM, |of| *of.scale.get(of_it));
+        let bias = |of_it| stated.map_or(class.bias(of_it), |of| *of.bias.get(of_it));
         let prior = |sensor: Sensor| Prior {
-            scale_sigma: Vector3::repeat(
-                stated.map_or(class.scale_ppm * PPM, |of| *of.scale.get(sensor)),
-            ),
+            scale_sigma: Vector3::repeat(scale(sensor)),
             installation_sigma: Vector3::repeat(class.installation),
             bias: Vector3::zeros(),
-            bias_sigma: Vector3::repeat(
-                stated.map_or(class.bias(sensor), |of| *of.bias.get(sensor)),
-            ),
+            bias_sigma: Vector3::repeat(bias(sensor)),
         };
         Some(Instrument::new(PerSensor::from_fn(prior), noise))
     }
@@ -96,10 +94,10 @@ impl Draft {
         let bias_sigma = stated.map_or(class.bias(sensor), |of| *of.bias.get(sensor));
         let from = match stated {
             Some(of) => format!("from the data sheet of {}", of.of),
-            None => format!(
-                "typical for {} instrument; check against the data sheet",
-                class.name
-            ),
+            None => {
+                let class = class.name;
+                format!("typical for {class} instrument; check against the data sheet")
+            }
         };
         let table = format!("imu.prior.{}", sensor.name());
         let remark = format_args!("{from}; N = scale * installation * u + bias");
@@ -152,10 +150,8 @@ impl Draft {
     ) -> (Option<Vector3<f64>>, Option<f64>) {
         let offset = *self.offset.get(sensor);
         let per_second = self.quantities.per_second(self.clock.period.unwrap_or(1.0));
-        let usual = self
-            .quantities
-            .scale(sensor)
-            .map(|scale| usual * scale.abs());
+        let scale = self.quantities.scale(sensor);
+        let usual = scale.map(|scale| usual * scale.abs());
         let path = format!("{table}.bias");
         let own = self.own_zero(sensor, usual.map(|usual| usual / per_second));
         let (bias, off) = match own {

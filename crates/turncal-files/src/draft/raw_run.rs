@@ -179,15 +179,11 @@ impl RawRun {
             random_walk: white_noise(imu, sensor),
             gauss_markov: (sensor == Sensor::Accel).then(|| wanders(PART * STANDARD_GRAVITY)),
         });
-        let prior = PerSensor {
-            gyro: ANY_RATE,
-            accel: ABOUT_ZERO,
-        };
-        let prior = PerSensor::from_fn(|sensor| Prior {
+        let prior = PerSensor::from_fn(|sensor: Sensor| Prior {
             scale_sigma: Vector3::repeat(ANY_SCALE),
             installation_sigma: Vector3::repeat(ASKEW),
             bias: Vector3::zeros(),
-            bias_sigma: Vector3::repeat(*prior.get(sensor)),
+            bias_sigma: Vector3::repeat(sensor.pick(ANY_RATE, ABOUT_ZERO)),
         });
         let site = Site::unknown().with_gravity(STANDARD_GRAVITY, 0.0);
         Some(Run::new(recording, Instrument::new(prior, noise), site))
@@ -214,17 +210,11 @@ impl RawRun {
     pub fn gravity(&mut self) -> Option<Gravity> {
         let (_, dwells) = self.at_rest()?;
         let rows = &self.rows.accel;
-        let at_rest: Vec<_> = dwells
-            .iter()
-            .map(|of| mean(&rows[of.samples.clone()]))
-            .collect();
+        let at_rest = dwells.iter().map(|of| mean(&rows[of.samples.clone()]));
+        let at_rest: Vec<_> = at_rest.collect();
         let size = |zero: &Vector3<f64>| {
-            median(
-                &mut at_rest
-                    .iter()
-                    .map(|rest| (rest - zero).norm())
-                    .collect::<Vec<_>>(),
-            )
+            let sizes = at_rest.iter().map(|rest| (rest - zero).norm());
+            median(&mut sizes.collect::<Vec<_>>())
         };
         let own_zero = centre(&at_rest).filter(|(zero, sigma)| {
             let about_zero = size(zero).unwrap_or(0.0) * ABOUT_ZERO / STANDARD_GRAVITY;
@@ -269,23 +259,20 @@ impl RawRun {
         }
         let &(most, none, order, unit) = tried.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
         let is_same = |unit: f64, other: f64| (SAME.recip()..SAME).contains(&(other / unit));
-        let rivals = tried
+        let mut rivals = tried.clone();
+        rivals.retain(|of| of.2 != order || !is_same(unit, of.3));
+        let rival = rivals
             .iter()
-            .filter(|of| of.2 != order || !is_same(unit, of.3));
-        let rival = rivals.map(|of| of.0).fold(f64::NEG_INFINITY, f64::max);
+            .map(|of| of.0)
+            .fold(f64::NEG_INFINITY, f64::max);
         if most < none || most < rival + TOLD_APART.ln() {
             return None;
         }
         (self.guess.order, self.guess.unit.gyro) = (order, unit);
         let estimate = calibrated(&self.run(&self.guess, &self.breaks)?)?;
-        let mut axes = Axes::of(
-            &estimate,
-            Sensor::Gyro,
-            (unit * self.period_of_log).recip(),
-            LINEAR,
-        );
-        let found = Vector3::from_fn(|axis, _| order.sign(axis) * axes.scale[axis]);
-        axes.scale = found;
+        let guessed = (unit * self.period_of_log).recip();
+        let mut axes = Axes::of(&estimate, Sensor::Gyro, guessed, LINEAR);
+        axes.scale = Vector3::from_fn(|axis, _| order.sign(axis) * axes.scale[axis]);
         Some(Turns {
             columns: order.source,
             axes,
@@ -302,10 +289,8 @@ impl Axes {
         let sigma = Vector3::from_fn(|axis, _| sigma[parameter(sensor, axis)].max(f64::EPSILON));
         let weight = sigma.map(|sigma| sigma.powi(-2));
         let common = weight.dot(&found) / weight.sum();
-        let is_another = |axis: usize| {
-            (found[axis] / common - 1.0).abs() > (2.0 * TOLERANCE).max(3.0 * sigma[axis])
-        };
-        let by_axis = (0..3).any(is_another);
+        let off = found.map(|scale| (scale / common - 1.0).abs());
+        let by_axis = (0..3).any(|axis| off[axis] > (2.0 * TOLERANCE).max(3.0 * sigma[axis]));
         let scatter = weight.dot(&found.map(|scale| (scale - common).powi(2))) / weight.sum();
         Self {
             scale: match by_axis {
@@ -352,15 +337,9 @@ fn centre(points: &[Vector3<f64>]) -> Option<(Vector3<f64>, f64)> {
     let solved = covariance * right;
     let centre = solved.xyz();
     let size = (solved.w + centre.norm_squared()).sqrt();
-    let off = points
-        .iter()
-        .map(|point| (point - middle - centre).norm() - size);
+    let off = points.iter().map(|of| (of - middle - centre).norm() - size);
     let scatter = off.map(|off| off * off).sum::<f64>() / (points.len() as f64 - 4.0).max(1.0);
-    let sigma = 2.0 * size * (PART * size).hypot(scatter.sqrt());
-    let sigma = sigma
-        * (0..3)
-            .map(|axis| covariance[(axis, axis)])
-            .fold(0.0, f64::max)
-            .sqrt();
+    let largest = covariance.diagonal().xyz().max();
+    let sigma = 2.0 * size * (PART * size).hypot(scatter.sqrt()) * largest.max(0.0).sqrt();
     (sigma.is_finite()).then_some((middle + centre, sigma))
 }

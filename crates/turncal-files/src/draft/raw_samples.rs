@@ -30,9 +30,7 @@ impl RawSamples {
         let offset = PerSensor::from_fn(|sensor| {
             let samples = triads.get_mut(sensor);
             let zero = offset(samples).unwrap_or(0.0);
-            samples
-                .iter_mut()
-                .for_each(|sample| sample.add_scalar_mut(-zero));
+            samples.iter_mut().for_each(|of| of.add_scalar_mut(-zero));
             zero
         });
         Self {
@@ -59,9 +57,8 @@ impl RawSamples {
 
     /// Reasons why count columns cannot be used unchanged.
     pub fn unfit(&self) -> Vec<String> {
-        let wrapped = Sensor::ALL
-            .into_iter()
-            .filter(|&sensor| *self.wrapped.get(sensor));
+        let mut wrapped = Sensor::ALL.to_vec();
+        wrapped.retain(|&sensor| *self.wrapped.get(sensor));
         let why = |sensor: Sensor| {
             format!(
                 "the columns of {} contain signed 16-bit values written as unsigned: subtract 65536 from values of \
@@ -69,7 +66,7 @@ impl RawSamples {
                 sensor.name()
             )
         };
-        wrapped.map(why).collect()
+        wrapped.into_iter().map(why).collect()
     }
 }
 
@@ -79,9 +76,10 @@ pub fn offset(samples: &[Vector3<f64>]) -> Option<f64> {
     if values().any(|value| value.fract() != 0.0) {
         return None;
     }
-    let (low, high) = values().fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), v| {
-        (low.min(v), high.max(v))
-    });
+    let (low, high) = (
+        values().fold(f64::INFINITY, f64::min),
+        values().fold(0.0, f64::max),
+    );
     // Of 12, 14, 16, 20, 24 and 32 bits.
     let halves = [11, 13, 15, 19, 23, 31].map(|bits| 2f64.powi(bits));
     let lies_about = |half: &f64| low >= 0.0 && low < *half && high > *half && high < 2.0 * half;
@@ -98,19 +96,15 @@ fn unwrap(samples: &mut [Vector3<f64>]) -> bool {
         return false;
     }
     let changes = |of: fn(&Vector3<f64>) -> Vector3<f64>| -> f64 {
-        let pairs = samples.windows(2);
-        pairs
-            .map(|pair| (of(&pair[1]) - of(&pair[0])).abs().sum())
-            .sum()
+        let change = |pair: &[Vector3<f64>]| (of(&pair[1]) - of(&pair[0])).abs().sum();
+        samples.windows(2).map(change).sum()
     };
     let signed = |sample: &Vector3<f64>| {
         sample.map(|value| value - if value >= 0.5 * CODES { CODES } else { 0.0 })
     };
     let wrapped = 2.0 * changes(signed) < changes(|sample| *sample);
     if wrapped {
-        samples
-            .iter_mut()
-            .for_each(|sample| *sample = signed(sample));
+        samples.iter_mut().for_each(|of| *of = signed(of));
     }
     wrapped
 }

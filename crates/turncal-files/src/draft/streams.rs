@@ -8,16 +8,13 @@ use crate::joined;
 use crate::joined::Part;
 use crate::schema::page::Remarks;
 use crate::schema::{AccelFromFile, ImuFile, TimeColumn, TimeUnitField};
-use turncal::imu::{Output, PerSensor, Sensor};
-use turncal_input::FileError;
-use turncal_input::{choice, list, suggestion};
-use turncal_logs::DataFile;
-use turncal_logs::Source;
+use turncal::imu::{AXES, Output, PerSensor, Sensor};
+use turncal_input::{FileError, choice, list, suggestion};
 use turncal_logs::clock::{Breaks, Clock, TimeUnit};
 use turncal_logs::csv_file::CsvFile;
 use turncal_logs::rows::LogRows;
-use turncal_logs::streams;
 use turncal_logs::streams::{Column, Found, Stream};
+use turncal_logs::{DataFile, Source, streams};
 
 /// The gyro and accelerometer streams.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,10 +72,8 @@ impl Streams {
         let (members, mut damage) = match streams::open(file)? {
             Some(log) => {
                 let (found, damage) = streams::survey(file, log);
-                let members = found
-                    .into_iter()
-                    .map(|found| Member::of_stream(file, found));
-                (members.collect(), damage)
+                let member = |found| Member::of_stream(file, found);
+                (found.into_iter().map(member).collect(), damage)
             }
             None => (tagged(file)?, None),
         };
@@ -87,24 +82,20 @@ impl Streams {
             return Err(damage);
         }
         if let Some(wanted) = wanted.filter(|wanted| !all().any(|name| name == *wanted)) {
-            let found = match members.is_empty() {
-                true => "one stream without a name".to_owned(),
-                false => format!("the streams {}", choice(wanted, all())),
+            let found = if members.is_empty() {
+                "one stream without a name".to_owned()
+            } else {
+                format!("the streams {}", choice(wanted, all()))
             };
+            let expected = format_args!("a stream `{wanted}`");
             let advice = suggestion(wanted, all(), "Correct or omit --stream.");
-            return Err(FileError::of(
-                file,
-                found,
-                format_args!("a stream `{wanted}`"),
-                advice,
-            ));
+            return Err(FileError::of(file, found, expected, advice));
         }
         if members.is_empty() {
             return Ok(None);
         }
         let Some((gyro, accel)) = chosen(&members, wanted) else {
-            let advice = "Record the file again.";
-            let expected = "at least one stream of samples";
+            let (expected, advice) = ("at least one stream of samples", "Record the file again.");
             return Err(FileError::of(file, "no samples", expected, advice));
         };
         let salvage = damage.is_some();
@@ -131,11 +122,8 @@ impl Streams {
     ) -> Result<(Self, Sheet), FileError> {
         let gyro = Member::of_rows(gyro, Sensor::Gyro)?;
         let accel = Member::of_rows(accel, Sensor::Accel)?;
-        let pair = PerSensor {
-            gyro: &gyro,
-            accel: &accel,
-        };
-        let (mut streams, sheet) = Self::of_pair(&pair, false)?;
+        let [gyro, accel] = [&gyro, &accel];
+        let (mut streams, sheet) = Self::of_pair(&PerSensor { gyro, accel }, false)?;
         streams.written = Some(Written {
             accel: accel_name.map(str::to_owned),
         });
@@ -164,17 +152,13 @@ impl Streams {
         };
         let joined = joined::read(&PerSensor::from_fn(part), Output::Rate, 1.0)?;
         let mut sheet = Sheet::of(LogRows::new(joined), FEWEST_ROWS)?;
-        let plain =
-            |sensor: Sensor| ["x", "y", "z"].map(|axis| format!("{}_{axis}", sensor.name()));
-        let columns = |time: &str, of: [[String; 3]; 2]| -> Vec<String> {
-            std::iter::once(time.to_owned())
-                .chain(of.into_iter().flatten())
-                .collect()
-        };
-        sheet.names = columns("time", Sensor::ALL.map(plain));
-        let own = [triads.gyro, triads.accel].map(|triad| triad.map(str::to_owned));
+        let plain = |sensor: Sensor| AXES.map(|axis| format!("{}_{axis}", sensor.name()));
+        let plain = Sensor::ALL.into_iter().flat_map(plain);
+        sheet.names = std::iter::once("time".to_owned()).chain(plain).collect();
         let mut streams = Self::of(pair.gyro, Some(pair.accel));
-        streams.names = columns(&time.gyro.0, own);
+        let own = [triads.gyro, triads.accel].into_iter().flatten();
+        let own = std::iter::once(&*time.gyro.0).chain(own);
+        streams.names = own.map(str::to_owned).collect();
         streams.time = Some(time);
         Ok((streams, sheet))
     }
@@ -301,10 +285,8 @@ impl Member {
     /// The names of a triad's columns.
     fn triad(&self, sensor: Sensor) -> Result<[&str; 3], FileError> {
         let expected = sensor.pick("three gyro columns", "three accelerometer columns");
-        let triad = self
-            .triads
-            .get(sensor)
-            .ok_or_else(|| self.missing(expected))?;
+        let triad = self.triads.get(sensor);
+        let triad = triad.ok_or_else(|| self.missing(expected))?;
         Ok(triad.map(|k| &*self.found.stream.columns[k].name))
     }
 
@@ -333,18 +315,10 @@ fn listed(members: &[Member]) -> Vec<String> {
             continue;
         }
         let columns = &found.stream.columns;
-        let more = if columns.len() > MOST_SHOWN {
-            ", …"
-        } else {
-            ""
-        };
-        let shown: Vec<&str> = columns
-            .iter()
-            .take(MOST_SHOWN)
-            .map(|of| &*of.name)
-            .collect();
-        let shown = one_line(&shown.join(", "));
-        lines.push(format!("{name}: {samples} samples of {shown}{more}"));
+        let shown = columns.iter().take(MOST_SHOWN).map(|of| &*of.name);
+        let more = (columns.len() > MOST_SHOWN).then_some("…");
+        let shown = one_line(&shown.chain(more).collect::<Vec<_>>().join(", "));
+        lines.push(format!("{name}: {samples} samples of {shown}"));
     }
     if !others.is_empty() {
         lines.push(format!("other streams: {}", others.join(", ")));
@@ -365,11 +339,8 @@ fn chosen(members: &[Member], wanted: Option<&str>) -> Option<(usize, Option<usi
         all.max_by_key(|&k| samples(Some(k)))
     };
     // Streams are put together by their times.
-    let with = |sensor: Sensor| {
-        longest(&|k| {
-            is_meant(k) && members[k].time.is_some() && members[k].triads.get(sensor).is_some()
-        })
-    };
+    let has = |of: &Member, sensor| of.time.is_some() && of.triads.get(sensor).is_some();
+    let with = |sensor| longest(&|k| is_meant(k) && has(&members[k], sensor));
     let both = longest(&|k| is_meant(k) && members[k].is_of_both());
     let (gyro, accel) = (with(Sensor::Gyro), with(Sensor::Accel));
     match (both, gyro, accel) {
@@ -386,12 +357,8 @@ fn chosen(members: &[Member], wanted: Option<&str>) -> Option<(usize, Option<usi
 
 /// Column names of a stream, prefixed with the stream name if not descriptive.
 fn names(found: &Found) -> Vec<String> {
-    let bare = found
-        .stream
-        .columns
-        .iter()
-        .map(|column| column.name.clone());
-    let bare: Vec<String> = bare.collect();
+    let columns = found.stream.columns.iter();
+    let bare: Vec<String> = columns.map(|column| column.name.clone()).collect();
     // Numbers of columns behind the name of a stream would be numbers of axes.
     let is_number = |name: &String| name.bytes().all(|of| of.is_ascii_digit());
     if bare.iter().any(|name| Name::of(name).sensor().is_some()) || bare.iter().all(is_number) {
@@ -433,13 +400,10 @@ fn tagged(file: &DataFile) -> Result<Vec<Member>, FileError> {
 /// Rows of a text as a stream.
 fn rows_as_stream(name: &str, sheet: &Sheet) -> Found {
     let column = |(name, unit): (&String, &String)| {
-        let unit = Name::of_column(name, unit)
-            .unit
-            .filter(|unit| unit.times == 1.0);
-        Column {
-            name: name.clone(),
-            unit: unit.map_or("", |unit| unit.word),
-        }
+        let unit = Name::of_column(name, unit).unit;
+        let unit = unit.filter(|unit| unit.times == 1.0);
+        let (name, unit) = (name.clone(), unit.map_or("", |unit| unit.word));
+        Column { name, unit }
     };
     Found {
         stream: Stream {

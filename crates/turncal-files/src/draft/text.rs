@@ -7,8 +7,8 @@ use super::{AXES_OF_PROGRAM, Draft, NO_COLUMNS};
 use crate::schema::page;
 use crate::schema::page::Remarks;
 use crate::schema::{
-    BodyAxes, FORMAT, ImuColumns, ImuFile, InstanceFile, Names, PriorFile, PriorsFile, RunFile,
-    SiteFile, TemperatureColumn, TimeColumn, TimeStamp, TimeUnitField,
+    BodyAxes, FORMAT, ImuColumns, ImuFile, InstanceFile, Names, PriorsFile, RunFile, SiteFile,
+    TemperatureColumn, TimeColumn, TimeStamp, TimeUnitField,
 };
 use turncal::imu::{Noise, NoiseKeys, Output, Sensor};
 use turncal::number::rounded;
@@ -32,33 +32,27 @@ impl Draft {
             Some(rows) => format!("the first {rows} rows of the log"),
             None => "the log alone".to_owned(),
         };
-        remarks.before(
-            "format",
-            format_args!(
-                "Draft made from {of_it}. Check the guesses and complete the open fields, then run `turncal check`."
-            ),
+        let remark = format_args!(
+            "Draft made from {of_it}. Check the guesses and complete the open fields, then run `turncal check`."
         );
+        remarks.before("format", remark);
         let run = RunFile {
             site: self.site(&mut remarks),
             imu: self.imu(file, &mut remarks),
             ..RunFile::default()
         };
-        match &self.columns.quaternion {
-            Some(four) => remarks.before(
-                "turntable",
-                format_args!(
-                    "{} form a quaternion. If it comes from a turntable (body right-front-up to East-North-Up, order \
-                     w, x, y, z), add a [turntable] that reads this file. Do not use an attitude computed by the \
-                     instrument itself.",
-                    self.list(four)
-                ),
+        let of_table = match &self.columns.quaternion {
+            Some(four) => format!(
+                "{} form a quaternion. If it comes from a turntable (body right-front-up to East-North-Up, order w, \
+                 x, y, z), add a [turntable] that reads this file. Do not use an attitude computed by the instrument \
+                 itself.",
+                self.list(four)
             ),
-            None => remarks.before(
-                "turntable",
-                "If you have a turntable log, add [turntable] with file, columns, position_sigma_arcsec and \
-                 reading_sigma_arcsec.",
-            ),
-        }
+            None => "If you have a turntable log, add [turntable] with file, columns, position_sigma_arcsec and \
+                     reading_sigma_arcsec."
+                .to_owned(),
+        };
+        remarks.before("turntable", of_table);
         (run, remarks)
     }
 
@@ -131,12 +125,13 @@ impl Draft {
             return None;
         }
         let path = format!("imu.{}_unit", sensor.name());
+        let why = &unit.why;
         match unit.word {
-            Some(_) => remarks.reason(&path, &unit.why),
-            None => {
-                let why = format!("{}; see the data sheet or the logger", unit.why);
-                remarks.open(&path, why);
-            }
+            Some(_) => remarks.reason(&path, why),
+            None => remarks.open(
+                &path,
+                format_args!("{why}; see the data sheet or the logger"),
+            ),
         }
         unit.word.map(str::to_owned)
     }
@@ -170,10 +165,8 @@ impl Draft {
         match (self.cuts(), clock.gaps.len(), clock.repeated) {
             (0, 0, 0) => "no gaps".to_owned(),
             (0, 0, repeated) => {
-                format!(
-                    "no gaps, but time repeats or steps back in {}",
-                    places(repeated)
-                )
+                let repeated = places(repeated);
+                format!("no gaps, but time repeats or steps back in {repeated}")
             }
             (0, gaps, _) => format!("rows are missing in {}", places(gaps)),
             (cuts, ..) => format!(
@@ -287,18 +280,15 @@ impl Draft {
     /// Substitute for a time column.
     fn without_time(&self, remarks: &mut Remarks) {
         let (path, why) = ("imu.columns", &self.clock.why);
-        if self.clock.is_stated {
-            let words = format_args!("{why}; rows are taken as consecutive.");
-            remarks.before(path, words);
+        let instead = if self.clock.is_stated {
+            "rows are taken as consecutive."
         } else if self.rows_show_period() {
-            let words = format_args!(
-                "{why}; the sample period is estimated from the turns unless sample_period_s is set."
-            );
-            remarks.before(path, words);
+            "the sample period is estimated from the turns unless sample_period_s is set."
         } else {
             let words = format_args!("{why}; name a time column or set sample_period_s.");
-            remarks.open_before(path, words);
-        }
+            return remarks.open_before(path, words);
+        };
+        remarks.before(path, format_args!("{why}; {instead}"));
     }
 
     /// Remark that an axis points down or that the accelerometers output gravity.
@@ -312,10 +302,8 @@ impl Draft {
 
     /// Remark on gyro columns that do not match the accelerometer axes.
     fn turned_axes(&self, remarks: &mut Remarks) {
-        let turns = self
-            .registers
-            .as_ref()
-            .and_then(|found| found.turns.as_ref());
+        let registers = self.registers.as_ref();
+        let turns = registers.and_then(|found| found.turns.as_ref());
         let turns = turns.filter(|of| !of.agree() && self.quantities.is_count(Sensor::Gyro));
         let Some((turns, triad)) = turns.zip(self.columns.triads.gyro) else {
             return;
@@ -358,14 +346,14 @@ impl Draft {
     }
 
     fn priors(&self, remarks: &mut Remarks) -> PriorsFile {
-        let mut prior = |sensor| match self.is_present(sensor) {
-            true => self.prior(sensor, remarks),
-            false => PriorFile::default(),
-        };
-        PriorsFile {
-            gyro: prior(Sensor::Gyro),
-            accel: prior(Sensor::Accel),
+        let mut priors = PriorsFile::default();
+        if self.is_present(Sensor::Gyro) {
+            priors.gyro = self.prior(Sensor::Gyro, remarks);
         }
+        if self.is_present(Sensor::Accel) {
+            priors.accel = self.prior(Sensor::Accel, remarks);
+        }
+        priors
     }
 
     /// White noise of a triad, stated or at rest, (rad/s)√s or (m/s²)√s.

@@ -48,9 +48,7 @@ impl Clock {
             return Self::without(stated, "a counter shared with other packets is not a time");
         }
         let second = |word: &str| units_of_time().find(|of| of.0 == word);
-        let named = name
-            .unit
-            .and_then(|unit| Some(unit.times * second(unit.word)?.1));
+        let named = (name.unit).and_then(|unit| Some(unit.times * second(unit.word)?.1));
         let tick = name.tick().map(|tick| tick * steps.mean);
         let known = stated.or(tick.filter(|period| PERIODS.contains(period)));
         let seconds = || units_of_time().map(|(_, second)| second);
@@ -103,14 +101,10 @@ impl Clock {
     /// Evidence, statement and remedy if the steps of a time contradict a stated rate.
     pub fn contradiction(&self, rate: f64) -> Option<[String; 3]> {
         let found = self.period?.recip();
+        let (hertz, unit, why) = (rounded(found, 6), &self.unit, &self.why);
         ((found / rate).ln().abs() > STATED.ln()).then(|| {
             [
-                format!(
-                    "time stamps at {} Hz ({}; {})",
-                    rounded(found, 6),
-                    self.unit,
-                    self.why
-                ),
+                format!("time stamps at {hertz} Hz ({unit}; {why})"),
                 format!("{rate} Hz, as stated"),
                 "Correct or omit --rate, or update_rate in --noise-file.".to_owned(),
             ]
@@ -160,18 +154,13 @@ impl Steps {
         let usual = median(&mut forward).unwrap_or(1.0);
         // A clock that goes back begins again, or was set.
         let goes_on = |time: &mut f64, step: f64| {
-            *time += match step {
-                _ if step.is_nan() => 0.0,
-                _ if step < 0.0 => usual,
-                _ => step,
-            };
+            *time += if step < 0.0 { usual } else { step.max(0.0) };
             Some(*time)
         };
         let times = std::iter::once(0.0).chain(steps().scan(0.0, goes_on));
         let rows: Vec<(f64, u64)> = times.zip(1..).collect();
-        let is_clock = !forward.is_empty();
-        let clock = is_clock.then(|| Uniform::new(Path::new(""), &rows, None).ok());
-        let clock = clock.flatten();
+        let clock = || Uniform::new(Path::new(""), &rows, None).ok();
+        let clock = (!forward.is_empty()).then(clock).flatten();
         let numbers = clock.as_ref().map_or(&[][..], |clock| &clock.numbers);
         let gap = |(row, pair): (usize, &[usize])| {
             let missing = pair[1].saturating_sub(pair[0] + 1) as f64;

@@ -149,14 +149,14 @@ impl Quantities {
         self.output = output;
         self.output_why = match output {
             Output::Pulse => {
-                "integer counts that carry their remainder, as pulse outputs do".to_owned()
+                "integer counts that carry their remainder, as pulse outputs do".into()
             }
-            Output::Increment => format!(
-                "specific force at rest is g times {} s per row",
-                rounded(rows.period, 4)
-            ),
+            Output::Increment => {
+                let period = rounded(rows.period, 4);
+                format!("specific force at rest is g times {period} s per row")
+            }
             Output::Rate => {
-                "specific force at rest is g itself, not g times the sample period".to_owned()
+                "specific force at rest is g itself, not g times the sample period".into()
             }
         };
     }
@@ -164,18 +164,17 @@ impl Quantities {
     fn counts_of_accelerometers(&mut self, rows: &TriadRows) -> Unit {
         let gravity = rows.motion.gravity;
         let is_carried = |ratio: f64| rows.whole && ratio < PULSE_SUMS;
-        let output = match rows.motion.sum_variance.is_some_and(is_carried) {
-            true => Output::Pulse,
-            false => Output::Rate,
+        let output = if rows.motion.sum_variance.is_some_and(is_carried) {
+            Output::Pulse
+        } else {
+            Output::Rate
         };
         self.hold(output, rows);
         let per_g = gravity * self.per_second(rows.period);
+        let unfit = format!("no known unit gives {} at rest", rounded(gravity, 4));
         Unit {
             word: Some("count"),
-            why: why_count(
-                rows,
-                &format!("no known unit gives {} at rest", rounded(gravity, 4)),
-            ),
+            why: why_count(rows, &unfit),
             is_unfit: !rows.whole,
             likely: per_g.is_finite().then(|| likely_for_g(per_g)),
             ..Unit::default()
@@ -198,28 +197,28 @@ impl Quantities {
                     return Unit::open("cannot be estimated from turns without time stamps");
                 };
                 let rate = rounded(period.recip(), 4);
+                let why = format!(
+                    "integrated gyro angles match the change of gravity direction at about {rate} Hz"
+                );
                 return Unit {
                     word: Some(word),
-                    ..Unit::open(&format!(
-                        "integrated gyro angles match the change of gravity direction at about \
-                        {rate} Hz"
-                    ))
+                    ..Unit::open(&why)
                 };
             }
             None if is_bare && self.output != Output::Pulse => {
-                return Unit::open(match rows.motion.is_turned {
-                    true => "too few usable turns of gravity to estimate it",
-                    false => "gravity direction does not change, so it cannot be estimated",
+                return Unit::open(if rows.motion.is_turned {
+                    "too few usable turns of gravity to estimate it"
+                } else {
+                    "gravity direction does not change, so it cannot be estimated"
                 });
             }
             _ => {}
         }
         let why = match by_name {
-            Some(name) => format!(
-                "{} {}",
-                name.word,
-                name.why_named(Sensor::Gyro, rows.motion)
-            ),
+            Some(name) => {
+                let why = name.why_named(Sensor::Gyro, rows.motion);
+                format!("{} {why}", name.word)
+            }
             None => why_count(rows, "no known unit fits the change of gravity direction"),
         };
         // Rows add up to the angle.
@@ -230,9 +229,10 @@ impl Quantities {
             is_shown: measured.is_some() && rows.whole,
             is_unfit: measured.is_some() && !rows.whole,
             scale: measured.map(|value| {
+                let (scale, sigma) = (Vector3::repeat(value), TOLERANCE);
                 let axes = Axes {
-                    scale: Vector3::repeat(value),
-                    sigma: TOLERANCE,
+                    scale,
+                    sigma,
                     by_axis: false,
                 };
                 Scale::of_turns(&axes, None, 1.0, self.output)
@@ -264,11 +264,8 @@ impl Quantities {
             let shown = found.word.filter(|_| found.is_shown)?;
             let is_contradicted = Hypothesis::new(sensor, unit, output, &rows).is_contradicted();
             let (name, times) = (sensor.name(), of.times);
-            let multiple = if times == 1.0 {
-                String::new()
-            } else {
-                format!("{} ", rounded(times, 4))
-            };
+            let multiple = (times != 1.0).then(|| format!("{} ", rounded(times, 4)));
+            let multiple = multiple.unwrap_or_default();
             is_contradicted.then(|| {
                 [
                     format!("{name} rows in {shown} ({})", found.why),
@@ -324,12 +321,8 @@ impl Quantities {
                 gyro.is_unfit = true;
                 gyro.why = "no known unit fits the change of gravity direction".to_owned();
             }
-            gyro.scale = Some(Scale::of_turns(
-                &turns.axes,
-                Some(turns.moves),
-                row,
-                self.output,
-            ));
+            let moves = Some(turns.moves);
+            gyro.scale = Some(Scale::of_turns(&turns.axes, moves, row, self.output));
             self.opposed = false;
         }
     }
@@ -361,13 +354,11 @@ fn scaled(sensor: Sensor, rows: &TriadRows) -> Option<Unit> {
     let scale = Scale::of_unit(sensor, unit)?;
     let per_si = scale.value.x;
     let of_it = Hypothesis::new(sensor, (unit.word, per_si), Output::Rate, rows);
-    (of_it.factor.is_none() || of_it.fits()).then(|| Unit {
+    (!of_it.is_contradicted()).then(|| Unit {
         word: Some("count"),
-        why: "stated in the file".to_owned(),
         is_shown: true,
-        is_unfit: false,
         scale: Some(scale),
-        likely: None,
+        ..Unit::open("stated in the file")
     })
 }
 
@@ -375,10 +366,10 @@ fn scaled(sensor: Sensor, rows: &TriadRows) -> Option<Unit> {
 fn why_count(rows: &TriadRows, unfit: &str) -> String {
     match rows.named {
         _ if rows.whole => "whole numbers".to_owned(),
-        Some(unit) => format!(
-            "{} is not a built-in unit, so it is a count with a scale",
-            unit.word
-        ),
+        Some(unit) => {
+            let unit = unit.word;
+            format!("{unit} is not a built-in unit, so it is a count with a scale")
+        }
         None => unfit.to_owned(),
     }
 }

@@ -57,9 +57,8 @@ impl Residual {
                 constant: program.matrix * (triad.bias - program.offset),
             }
         };
-        let all = Sensor::ALL.into_iter().map(of);
-        all.filter(|residual| residual.errors.amax().max(residual.constant.amax()) >= 1e-12)
-            .collect()
+        let exceeds = |of: &Self| of.errors.amax().max(of.constant.amax()) >= 1e-12;
+        Sensor::ALL.into_iter().map(of).filter(exceeds).collect()
     }
 
     /// Its size, in a sentence.

@@ -47,13 +47,10 @@ fn parameters(program: &PerSensor<Affine>, [gyro, offset, scale]: [&str; 3]) -> 
     let PerSensor { gyro: g, accel: a } = program;
     let of_axis = |name: &str, k: usize, value: f64| (name.replace('#', UPPER[k]), value);
     let gyros = (0..3).map(|k| of_axis(gyro, k, g.offset[k]));
-    let accel = |k| {
-        [
-            of_axis(offset, k, a.offset[k]),
-            of_axis(scale, k, a.matrix[(k, k)]),
-        ]
-    };
-    gyros.chain((0..3).flat_map(accel)).collect()
+    let offset = |k| of_axis(offset, k, a.offset[k]);
+    let scale = |k| of_axis(scale, k, a.matrix[(k, k)]);
+    let accel = (0..3).flat_map(|k| [offset(k), scale(k)]);
+    gyros.chain(accel).collect()
 }
 
 /// Vehicle, component, name, value, type: 9 is a number of 32 bits, 6 a whole number.
@@ -79,13 +76,8 @@ pub fn px4(values: &Values) -> Exported {
             (format!("{all}0_TMIN"), range.lowest),
             (format!("{all}0_TMAX"), range.highest),
         ];
-        for (axis, [a, b, c]) in values
-            .triads
-            .get(sensor)
-            .bias_powers
-            .into_iter()
-            .enumerate()
-        {
+        let powers = values.triads.get(sensor).bias_powers;
+        for (axis, [a, b, c]) in powers.into_iter().enumerate() {
             // The constant part is in CAL_*.
             let powers = [0.0, a, b, c].into_iter().enumerate();
             parameters.extend(powers.map(|(k, power)| (format!("{all}0_X{k}_{axis}"), power)));
@@ -125,11 +117,8 @@ pub fn ardupilot(values: &Values) -> Exported {
                 let s = ARDUPILOT_REFERENCE - reference;
                 let about = [a + 2.0 * b * s + 3.0 * c * s * s, b + 3.0 * c * s, c];
                 let name = |k: usize| format!("INS_TCAL1_{kind}{k}_{axis}");
-                parameters.extend(
-                    (1..)
-                        .map(name)
-                        .zip(about.map(|power| power * ARDUPILOT_FACTOR)),
-                );
+                let about = about.map(|power| power * ARDUPILOT_FACTOR);
+                parameters.extend((1..).map(name).zip(about));
             }
             parameters.push((format!("INS_{kind}1_CALTEMP"), reference));
         }
@@ -180,22 +169,20 @@ pub fn inav(values: &Values) -> Exported {
         accel: Affine::diagonal(gain / INAV_ONE, zero / per_unit),
     };
     let set = |name: &str, values: &Vector3<f64>| -> String {
-        let lines = AXES.iter().zip(values);
-        lines
-            .map(|(axis, value)| format!("set {name}_{axis} = {value:.0}\n"))
-            .collect()
+        let line = |(axis, value)| format!("set {name}_{axis} = {value:.0}\n");
+        AXES.iter().zip(values).map(line).collect()
     };
-    let text = [
-        set("acczero", &zero),
-        set("accgain", &gain),
-        set("gyro_zero", &gyro_zero),
-        "set init_gyro_cal = OFF\nsave\n".to_owned(),
+    let all = [
+        ("acczero", &zero),
+        ("accgain", &gain),
+        ("gyro_zero", &gyro_zero),
     ];
+    let text = all.map(|(name, values)| set(name, values)).concat();
     let reads = ("#", "commands for its command line,");
     Remarks::of_program(values, reads, &program, &[UNCORRECTED])
         .defines([
             of_counts("an accelerometer", COUNTS_PER_G, "g"),
             of_counts("gyros", COUNTS_PER_RAD_S, "rad/s"),
         ])
-        .above(&text.concat())
+        .above(&(text + "set init_gyro_cal = OFF\nsave\n"))
 }

@@ -87,10 +87,8 @@ fn polynomials(values: &Values, sensor: Sensor) -> String {
     };
     let places = (0..9).map(|k| (k / 3, k % 3));
     let entry = |(i, j): (usize, usize)| {
-        (
-            triad.installation[i][j],
-            format!("installation.{}{}", AXES[i], AXES[j]),
-        )
+        let name = format!("installation.{}{}", AXES[i], AXES[j]);
+        (triad.installation[i][j], name)
     };
     let (reference, lowest, highest) = (range.reference, range.lowest, range.highest);
     [

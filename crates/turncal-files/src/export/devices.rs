@@ -14,13 +14,11 @@ use turncal::imu::PerSensor;
 fn table([major, minor]: [u8; 2], kind: u16, content: &[u8]) -> Vec<u8> {
     let mut sum = flate2::Crc::new();
     sum.update(content);
-    let mut table = vec![major, minor];
-    table.extend(kind.to_le_bytes());
-    table.extend((content.len() as u32).to_le_bytes());
-    table.extend([0xff; 4]);
-    table.extend(sum.sum().to_le_bytes());
-    table.extend(content);
-    table
+    let (length, sum) = (content.len() as u32, sum.sum());
+    let [kind_low, kind_high] = kind.to_le_bytes();
+    let start = [major, minor, kind_low, kind_high];
+    let words = [start, length.to_le_bytes(), [0xff; 4], sum.to_le_bytes()];
+    [words.as_flattened(), content].concat()
 }
 
 /// The 520 bytes of the memory of the motion module, as `rs-imu-calibration` writes them.
@@ -45,11 +43,8 @@ pub fn realsense(values: &Values) -> Exported {
     tables.extend([0xff; 32]);
     let mut memory = table([2, 0], 0x20, &tables);
     memory.resize(520 - 16, 0xff);
-    Remarks::of_program(values, ("#", "in memory"), &program, &notes).of_file(table(
-        [1, 1],
-        0x09,
-        &memory,
-    ))
+    let memory = table([1, 1], 0x09, &memory);
+    Remarks::of_program(values, ("#", "in memory"), &program, &notes).of_file(memory)
 }
 
 /// The fields of SlimeVR's `SoftFusionSensorConfig`.

@@ -43,28 +43,22 @@ pub fn write(values: &Values) -> Exported {
 }
 
 fn axes(triad: &Normalised, period: Option<f64>) -> String {
-    let stddev = triad
-        .density()
-        .zip(period)
-        .map(|(density, period)| density / period.sqrt());
+    let white = triad.density().zip(period);
+    let stddev = white.map_or(0.0, |(density, period)| density / period.sqrt());
+    let bias_stddev = triad.bias_sigma.unwrap_or_default();
     let axis = |k: usize| {
         let mut all = vec![
             ("mean", 0.0),
-            ("stddev", stddev.unwrap_or(0.0)),
+            ("stddev", stddev),
             ("bias_mean", triad.bias[k]),
-            (
-                "bias_stddev",
-                triad.bias_sigma.map_or(0.0, |sigma| sigma[k]),
-            ),
+            ("bias_stddev", bias_stddev[k]),
         ];
         if let Some(bias) = triad.varying() {
             all.push(("dynamic_bias_stddev", bias.walk()));
             all.push(("dynamic_bias_correlation_time", bias.correlation_time));
         }
-        let lines = all
-            .iter()
-            .map(|(key, value)| format!("        <{key}>{value:e}</{key}>\n"));
-        let (lines, axis) = (lines.collect::<String>(), AXES[k]);
+        let line = |(key, value)| format!("        <{key}>{value:e}</{key}>\n");
+        let (lines, axis) = (all.into_iter().map(line).collect::<String>(), AXES[k]);
         format!(
             "    <{axis}>\n      <noise type=\"gaussian\">\n{lines}      </noise>\n    </{axis}>\n"
         )

@@ -75,15 +75,9 @@ fn noise(values: &Values) -> String {
     let triad = |sensor, name: &str| {
         let (triad, unit) = (values.triads.get(sensor), Values::input(sensor));
         let walk = triad.varying().map(|bias| bias.walk());
-        key(
-            &format!("{name}_noise_density"),
-            triad.density(),
-            &format!("{unit}/sqrt(Hz)"),
-        ) + &key(
-            &format!("{name}_random_walk"),
-            walk,
-            &format!("{unit}/s/sqrt(Hz)"),
-        )
+        let key = |what: &str, value, unit: String| key(&format!("{name}_{what}"), value, &unit);
+        key("noise_density", triad.density(), format!("{unit}/sqrt(Hz)"))
+            + &key("random_walk", walk, format!("{unit}/s/sqrt(Hz)"))
     };
     triad(Sensor::Gyro, "gyroscope")
         + &triad(Sensor::Accel, "accelerometer")

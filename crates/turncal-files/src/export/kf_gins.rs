@@ -34,15 +34,13 @@ pub fn write(values: &Values) -> Exported {
         "sigma of misalignment, and covariance; they are in calibration.json",
     ];
     let lost = Sensor::ALL.into_iter().flat_map(|sensor| {
-        let rows = misalignment
-            .get(sensor)
-            .row_iter()
-            .zip(["front", "right", "down"]);
-        rows.map(move |(row, axis)| {
-            let [x, y, z] = [row[0], row[1], row[2]].map(|part| part / ARCSEC);
-            let name = sensor.name();
-            format!("lost, {name} {axis}: {x:.3} {y:.3} {z:.3} arcsec of front, right, down")
-        })
+        let rows = misalignment.get(sensor).row_iter();
+        rows.zip(["front", "right", "down"])
+            .map(move |(row, axis)| {
+                let [x, y, z] = [row[0], row[1], row[2]].map(|part| part / ARCSEC);
+                let name = sensor.name();
+                format!("lost, {name} {axis}: {x:.3} {y:.3} {z:.3} arcsec of front, right, down")
+            })
     });
     let PerSensor { gyro, accel } = &values.triads;
     let error = |triad: &Normalised| triad.sensitivity.diagonal().add_scalar(-1.0);
@@ -71,10 +69,9 @@ initaccscale: {}  # ppm
 fn sigma(values: &Values) -> String {
     let PerSensor { gyro, accel } = &values.triads;
     let line = |key: &str, sigma: Option<Vector3<f64>>, unit: f64, name: &str| match sigma
-        .map(|sigma| sigma / unit)
-        .filter(|sigma| sigma.iter().all(|&s| s > 0.0))
+        .filter(|sigma| sigma.min() > 0.0)
     {
-        Some(sigma) => format!("{key}: {}  # {name}\n", list(&sigma)),
+        Some(sigma) => format!("{key}: {}  # {name}\n", list(&(sigma / unit))),
         None => format!("# {key}: the calibration does not state sigma for all three axes\n"),
     };
     [

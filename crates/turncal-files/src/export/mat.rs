@@ -24,15 +24,15 @@ const NAME: usize = 32;
 
 pub fn write(values: &Values) -> Exported {
     let mut fields = vec![
-        ("equation", text("", EQUATION)),
-        ("axes", text("", "right, front, up")),
-        ("about", text("", &about(values).join("; "))),
+        ("equation", text(EQUATION)),
+        ("axes", text("right, front, up")),
+        ("about", text(&about(values).join("; "))),
     ];
     for sensor in Sensor::ALL {
         let mut of_triad = triad(values.record.triad(sensor));
         let matrix = values.correction.matrix.get(sensor);
-        of_triad.push(("correction", numbers("", 3, matrix.as_slice())));
-        of_triad.push(("unit", text("", &values.unit(sensor))));
+        of_triad.push(("correction", numbers(3, matrix.as_slice())));
+        of_triad.push(("unit", text(&values.unit(sensor))));
         if let Some(sigma) = values.sigma(sensor) {
             of_triad.push(("sigma", structure("", &triad(sigma))));
         }
@@ -41,8 +41,8 @@ pub fn write(values: &Values) -> Exported {
     // It is symmetric, so rows are columns.
     let covariance = values.record.covariance.concat();
     let size = values.record.covariance.len();
-    fields.push(("covariance", numbers("", size, &covariance)));
-    fields.push(("parameters", text("", &values.record.parameters.join(" "))));
+    fields.push(("covariance", numbers(size, &covariance)));
+    fields.push(("parameters", text(&values.record.parameters.join(" "))));
     let mut file = vec![b' '; 124];
     let title = b"MATLAB 5.0 MAT-file, a calibration by turncal";
     file[..title.len()].copy_from_slice(title);
@@ -56,16 +56,18 @@ pub fn write(values: &Values) -> Exported {
 fn triad(record: &TriadRecord) -> Vec<(&'static str, Vec<u8>)> {
     let installation = Matrix3::from_fn(|i, j| record.installation[i][j]);
     vec![
-        ("scale", numbers("", 3, &record.scale)),
-        ("installation", numbers("", 3, installation.as_slice())),
-        ("bias", numbers("", 3, &record.bias)),
+        ("scale", numbers(3, &record.scale)),
+        ("installation", numbers(3, installation.as_slice())),
+        ("bias", numbers(3, &record.bias)),
     ]
 }
 
+fn bytes<const N: usize>(parts: impl IntoIterator<Item = [u8; N]>) -> Vec<u8> {
+    parts.into_iter().flatten().collect()
+}
+
 fn element(kind: u32, content: &[u8]) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(content.len() + 16);
-    bytes.extend(kind.to_le_bytes());
-    bytes.extend((content.len() as u32).to_le_bytes());
+    let mut bytes = bytes([kind, content.len() as u32].map(u32::to_le_bytes));
     bytes.extend(content);
     bytes.resize(bytes.len().next_multiple_of(8), 0);
     bytes
@@ -73,14 +75,10 @@ fn element(kind: u32, content: &[u8]) -> Vec<u8> {
 
 /// Start of an array: class, size and name.
 fn array(class: u32, name: &str, rows: usize, columns: usize, rest: &[u8]) -> Vec<u8> {
-    let flags: Vec<u8> = [class, 0].into_iter().flat_map(u32::to_le_bytes).collect();
-    let size: Vec<u8> = [rows, columns]
-        .into_iter()
-        .flat_map(|n| (n as i32).to_le_bytes())
-        .collect();
+    let size = [rows as u32, columns as u32];
     let parts = [
-        element(UINT32, &flags),
-        element(INT32, &size),
+        element(UINT32, &bytes([class, 0].map(u32::to_le_bytes))),
+        element(INT32, &bytes(size.map(u32::to_le_bytes))),
         element(INT8, name.as_bytes()),
         rest.to_vec(),
     ];
@@ -88,30 +86,20 @@ fn array(class: u32, name: &str, rows: usize, columns: usize, rest: &[u8]) -> Ve
 }
 
 /// A matrix with this number of rows, column by column.
-fn numbers(name: &str, rows: usize, values: &[f64]) -> Vec<u8> {
-    let bytes: Vec<u8> = values
-        .iter()
-        .flat_map(|value| value.to_le_bytes())
-        .collect();
+fn numbers(rows: usize, values: &[f64]) -> Vec<u8> {
+    let bytes = bytes(values.iter().map(|value| value.to_le_bytes()));
     let columns = values.len().checked_div(rows).unwrap_or(0);
-    array(NUMBERS, name, rows, columns, &element(DOUBLE, &bytes))
+    array(NUMBERS, "", rows, columns, &element(DOUBLE, &bytes))
 }
 
-fn text(name: &str, text: &str) -> Vec<u8> {
-    let letters: Vec<u16> = text.encode_utf16().collect();
-    let bytes: Vec<u8> = letters
-        .iter()
-        .flat_map(|letter| letter.to_le_bytes())
-        .collect();
-    array(CHAR, name, 1, letters.len(), &element(UINT16, &bytes))
+fn text(text: &str) -> Vec<u8> {
+    let letters = bytes(text.encode_utf16().map(u16::to_le_bytes));
+    array(CHAR, "", 1, letters.len() / 2, &element(UINT16, &letters))
 }
 
 fn structure(name: &str, fields: &[(&str, Vec<u8>)]) -> Vec<u8> {
     // A short element: its size in the upper half of its type.
-    let mut rest: Vec<u8> = [INT32 | 4 << 16, NAME as u32]
-        .into_iter()
-        .flat_map(u32::to_le_bytes)
-        .collect();
+    let mut rest = bytes([INT32 | 4 << 16, NAME as u32].map(u32::to_le_bytes));
     let mut names = Vec::new();
     for (field, _) in fields {
         let end = names.len() + NAME;

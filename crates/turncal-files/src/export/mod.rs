@@ -126,9 +126,8 @@ pub fn write(
                  another temperature)"
             ),
         };
-        exported
-            .notes
-            .extend(Some(omitted).filter(|note| !note.is_empty()));
+        let omitted = Some(omitted).filter(|note| !note.is_empty());
+        exported.notes.extend(omitted);
     }
     Ok(exported)
 }

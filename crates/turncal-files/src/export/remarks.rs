@@ -97,13 +97,9 @@ impl<'a> Remarks<'a> {
 
     /// The omissions, and the error terms that the format omits.
     fn omitted(&self) -> Vec<String> {
-        let is_omitted =
-            |term: &Term| !(self.is_included)(*term) && self.values.correction.has(*term);
-        let terms: Vec<&str> = Term::ALL
-            .into_iter()
-            .filter(is_omitted)
-            .map(Term::name)
-            .collect();
+        let mut terms = Term::ALL.to_vec();
+        terms.retain(|&term| !(self.is_included)(term) && self.values.correction.has(term));
+        let terms: Vec<&str> = terms.into_iter().map(Term::name).collect();
         let note = (!terms.is_empty()).then(|| {
             let terms = terms.join(", ");
             format!("this format does not correct error terms ({terms}); `turncal apply` does")
@@ -118,24 +114,19 @@ impl<'a> Remarks<'a> {
             let term = Term::of(k).filter(|&term| !(self.is_included)(term))?;
             let (name, value, entry) =
                 (Term::parameter_name(k)?, correction.terms[k], term.entry());
-            Some(format!(
-                "{name} = {value:e} {}, adds {}",
-                entry.si_unit, entry.adds
-            ))
+            let (unit, adds) = (entry.si_unit, entry.adds);
+            Some(format!("{name} = {value:e} {unit}, adds {adds}"))
         })
     }
 
     /// All lines as comments.
     pub fn text(&self) -> String {
-        let omitted = self
-            .omitted()
-            .into_iter()
-            .map(|note| format!("not included: {note}"));
-        let lines = about(self.values)
-            .into_iter()
-            .chain(omitted)
-            .chain(self.terms());
-        let lines = lines.chain(self.definitions.iter().cloned());
+        let omitted = self.omitted().into_iter();
+        let omitted = omitted.map(|note| format!("not included: {note}"));
+        let lines = about(self.values).into_iter().chain(omitted);
+        let lines = lines
+            .chain(self.terms())
+            .chain(self.definitions.iter().cloned());
         lines.map(|line| comment(self.mark, &line)).collect()
     }
 
@@ -162,19 +153,13 @@ pub fn about(values: &Values) -> Vec<String> {
         (Some(Method::SixPosition), _) => "closed form from static positions",
         (None, _) => "not stated",
     };
+    let version = env!("CARGO_PKG_VERSION");
     let mut lines = vec![
-        format!(
-            "IMU calibration, exported by turncal {}",
-            env!("CARGO_PKG_VERSION")
-        ),
+        format!("IMU calibration, exported by turncal {version}"),
         format!("method: {method}"),
     ];
-    lines.extend(
-        record
-            .meta
-            .iter()
-            .map(|(name, value)| format!("{name}: {value}")),
-    );
+    let meta = record.meta.iter();
+    lines.extend(meta.map(|(name, value)| format!("{name}: {value}")));
     if record.is_failed() {
         lines.push("WARNING: verdict FAILED: do not use these values".to_owned());
     }

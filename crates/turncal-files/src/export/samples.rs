@@ -35,23 +35,18 @@ pub fn sample_rows(
     run: &Run,
     fill: bool,
 ) -> io::Result<()> {
-    let in_range = if correction.changes() {
-        ",in_range"
-    } else {
-        ""
-    };
-    let filled = if fill { ",filled" } else { "" };
+    let optional = |is_there: bool, column| if is_there { column } else { "" };
+    let in_range = optional(correction.changes(), ",in_range");
+    let filled = optional(fill, ",filled");
     writeln!(file, "{HEADER}{in_range}{filled}")?;
     let (samples, lost) = (run.recording.imu.len(), run.recording.imu.lost());
-    let parts: Vec<Range<usize>> = (0..samples)
-        .step_by(ROWS)
+    let parts = (0..samples).step_by(ROWS);
+    let parts: Vec<_> = parts
         .map(|first| first..samples.min(first + ROWS))
         .collect();
     for parts in parts.chunks(TASKS) {
-        let texts = parts
-            .par_iter()
-            .map(|part| rows(correction, run, part.clone(), &lost, fill));
-        for text in texts.collect::<Vec<_>>() {
+        let text = |part: &Range<usize>| rows(correction, run, part.clone(), &lost, fill);
+        for text in parts.par_iter().map(text).collect::<Vec<_>>() {
             file.write_all(&text)?;
         }
     }
@@ -68,9 +63,8 @@ fn rows(
 ) -> Vec<u8> {
     let mut text = Vec::with_capacity(samples.len() * ROW_LENGTH);
     let mut number = zmij::Buffer::new();
-    let mut lost = lost[lost.partition_point(|lost| lost.end <= samples.start)..]
-        .iter()
-        .peekable();
+    let lost = &lost[lost.partition_point(|lost| lost.end <= samples.start)..];
+    let mut lost = lost.iter().peekable();
     for (k, sample) in samples.clone().zip(correction.samples(run, samples)) {
         while lost.next_if(|lost| lost.end <= k).is_some() {}
         let is_lost = lost.peek().is_some_and(|lost| lost.contains(&k));

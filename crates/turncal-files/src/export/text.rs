@@ -51,39 +51,28 @@ fn triad(values: &Values, sensor: Sensor) -> Vec<String> {
     let (name, unit) = (sensor.name(), values.unit(sensor));
     let (in_words, factor) = sensor.pick(("deg/h", DEG_PER_H), ("ug", MICRO_G));
     let in_input = Vector3::from(of.bias).component_div(&Vector3::from(of.scale)) / factor;
-    let scale = |k: usize| {
-        let unit = format!("{unit} per {}", Values::input(sensor));
-        let sigma = sigma.map(|sigma| sigma.scale[k]);
-        row(
-            &format!("{name}.scale.{}", AXES[k]),
-            of.scale[k],
-            sigma,
-            &unit,
-        )
-    };
-    let installation = |(i, j, place): (usize, usize, String)| {
-        let sigma = sigma
-            .map(|sigma| sigma.installation[i][j])
-            .filter(|_| i != j);
-        row(
-            &format!("{name}.installation.{place}"),
-            of.installation[i][j],
-            sigma,
-            "1",
-        )
-    };
-    let bias = |k: usize| {
+    let per_input = format!("{unit} per {}", Values::input(sensor));
+    let scale = (0..3).map(|k| {
+        let (name, sigma) = (
+            format!("{name}.scale.{}", AXES[k]),
+            sigma.map(|of| of.scale[k]),
+        );
+        row(&name, of.scale[k], sigma, &per_input)
+    });
+    let installation = places().map(|(i, j, place)| {
+        let name = format!("{name}.installation.{place}");
+        let sigma = sigma.filter(|_| i != j).map(|of| of.installation[i][j]);
+        row(&name, of.installation[i][j], sigma, "1")
+    });
+    let bias = (0..3).map(|k| {
+        let (name, sigma) = (
+            format!("{name}.bias.{}", AXES[k]),
+            sigma.map(|of| of.bias[k]),
+        );
         let unit = format!("{unit}, {:.6} {in_words}", in_input[k]);
-        let sigma = sigma.map(|sigma| sigma.bias[k]);
-        row(
-            &format!("{name}.bias.{}", AXES[k]),
-            of.bias[k],
-            sigma,
-            &unit,
-        )
-    };
-    let rows = (0..3).map(scale).chain(places().map(installation));
-    rows.chain((0..3).map(bias)).collect()
+        row(&name, of.bias[k], sigma, &unit)
+    });
+    scale.chain(installation).chain(bias).collect()
 }
 
 /// A σ of zero means that the value was not estimated.

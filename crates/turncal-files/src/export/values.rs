@@ -88,12 +88,8 @@ impl<'a> Values<'a> {
     /// The unit of `N`. A count is that of a rate or, per second, of an increment; the record does not distinguish
     /// them.
     pub fn unit(&self, sensor: Sensor) -> String {
-        match self
-            .record
-            .unit
-            .as_ref()
-            .map(|unit| unit.get(sensor).as_str())
-        {
+        let unit = self.record.unit.as_ref();
+        match unit.map(|unit| unit.get(sensor).as_str()) {
             None => "an unnamed unit".to_owned(),
             Some(unit @ ("rad" | "deg" | "arcsec" | "m/s" | "g*s")) => format!("{unit}/s"),
             Some(unit) => unit.to_owned(),

@@ -7,8 +7,7 @@ use super::held::Sizes;
 use super::*;
 use crate::schema::TimeStamp;
 use turncal::imu::{AxisOrder, Nominal, Output, PerSensor, Sensor};
-use turncal::recording::FaultKind;
-use turncal::recording::ImuSamples;
+use turncal::recording::{FaultKind, ImuSamples};
 use turncal_logs::Source;
 use turncal_logs::clock::{Breaks, Clock, TimeUnit};
 

@@ -9,9 +9,8 @@ use std::path::Path;
 use super::course::{Course, Resampled};
 use turncal::imu::{Output, PerSensor};
 use turncal_input::FileError;
-use turncal_logs::Source;
 use turncal_logs::clock::{Breaks, Clock, Stamp, TimeUnit, Uniform};
-use turncal_logs::{Table, TableRows};
+use turncal_logs::{Source, Table, TableRows};
 
 /// The time column, in s.
 pub const TIME: &str = "time";

@@ -3,8 +3,7 @@
 use turncal::imu::AxisOrder;
 use turncal::recording::{ImuSamples, LabelledMotion, Segment};
 use turncal_input::FileError;
-use turncal_logs::DataFile;
-use turncal_logs::Source;
+use turncal_logs::{DataFile, Source};
 
 /// Reads the sections of a run with these samples, with stamps `lag` samples after their start; `notes` receives
 /// remarks about the file.

@@ -2,11 +2,9 @@
 
 use crate::schema::instrument::Fields;
 use crate::schema::{TimeColumn, TimeUnitField};
-use turncal_input::Positive;
-use turncal_input::{FileError, list, suggestion};
-use turncal_logs::DataFile;
-use turncal_logs::Source;
+use turncal_input::{FileError, Positive, list, suggestion};
 use turncal_logs::clock::{Breaks, Clock, TimeUnit};
+use turncal_logs::{DataFile, Source};
 
 impl<'a> Fields<'a> {
     /// The file of this name in `run.toml`.

@@ -3,8 +3,7 @@
 use crate::schema::{TemperatureColumn, TemperatureUnit};
 use turncal::imu::PerSensor;
 use turncal::recording::{TEMPERATURE_SPACING, Temperature, TemperatureFacts};
-use turncal_input::FileError;
-use turncal_input::OneOrThree;
+use turncal_input::{FileError, OneOrThree};
 use turncal_logs::rows::LogRows;
 
 /// Values beyond this limit, °C, mean that the column has another unit or is not a temperature.

@@ -13,8 +13,7 @@ use crate::directories::write_whole;
 use turncal::calibration::result::{Calibration, FORMAT, FORMAT_WITH_TEMPERATURE, TriadRecord};
 use turncal::imu::{AXES, PARAMETERS, PerSensor, Sensor, Term, ThermalRange, Triad};
 use turncal::units::{DEGREE, STANDARD_GRAVITY};
-use turncal_input::small_file;
-use turncal_input::{FileError, Place, excerpt, suggestion};
+use turncal_input::{FileError, Place, excerpt, small_file, suggestion};
 
 /// A larger entry of an installation matrix belongs to an axis perpendicular to its name.
 const INSTALLATION: f64 = 100.0;

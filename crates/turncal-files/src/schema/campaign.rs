@@ -13,9 +13,7 @@ use turncal::imu::{HIGHEST_ORDER, InstallationForm, ParameterKind};
 use turncal::number::rounded;
 use turncal::recording::Temperature;
 use turncal::run::Run;
-use turncal_input::FileError;
-use turncal_input::small_file;
-use turncal_input::{Celsius, Document, NonNegative};
+use turncal_input::{Celsius, Document, FileError, NonNegative, small_file};
 
 /// The version of the format.
 const FORMAT: &str = "turncal-campaign/1";

@@ -14,8 +14,7 @@ use turncal::imu::{
 };
 use turncal::models::term_sigma;
 use turncal::units::{ARCSEC, DEGREE, PPM};
-use turncal_input::{Document, OneOrThree};
-use turncal_input::{FileError, list, suggestion};
+use turncal_input::{Document, FileError, OneOrThree, list, suggestion};
 use turncal_logs::DataFile;
 use turncal_logs::clock::{Breaks, Clock};
 

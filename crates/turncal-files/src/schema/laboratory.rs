@@ -6,9 +6,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use turncal::laboratory::{Condition, Laboratory};
-use turncal_input::Document;
-use turncal_input::small_file;
-use turncal_input::{FileError, list};
+use turncal_input::{Document, FileError, list, small_file};
 
 /// The version of the format.
 const FORMAT: &str = "turncal-laboratory/1";

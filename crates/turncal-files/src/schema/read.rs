@@ -18,10 +18,7 @@ use turncal::noise;
 use turncal::recording::{ImuSamples, Recording, faults, nanoseconds};
 use turncal::run::{Run, SET_BY_HAND, Standstill};
 use turncal::units::{ARCSEC, DEGREE, MILLIGAL, PPM};
-use turncal_input::Document;
-use turncal_input::FileError;
-use turncal_input::small_file;
-use turncal_input::stated_gravity_sigma;
+use turncal_input::{Document, FileError, small_file, stated_gravity_sigma};
 use turncal_logs::DataFile;
 
 /// Reads `run.toml` and the files that it names, relative to itself.

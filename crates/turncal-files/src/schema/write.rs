@@ -26,10 +26,9 @@ use turncal::recording::{ImuSamples, Segment, TableLog, nanoseconds};
 use turncal::run::Run;
 use turncal::turntable::AxisError;
 use turncal::units::{ARCSEC, DEGREE, MILLIGAL, PPM};
-use turncal_input::Document;
-use turncal_input::FileError;
 use turncal_input::{
-    Angle, Gravity, Height, Latitude, Longitude, Milligals, NonNegative, Positive,
+    Angle, Document, FileError, Gravity, Height, Latitude, Longitude, Milligals, NonNegative,
+    Positive,
 };
 
 /// Columns of the table axis angles, outermost first.

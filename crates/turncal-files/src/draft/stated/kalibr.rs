@@ -6,8 +6,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use turncal::imu::{GaussMarkov, Noise, PerSensor, Sensor};
-use turncal_input::small_file;
-use turncal_input::{FileError, Place, nearest};
+use turncal_input::{FileError, Place, nearest, small_file};
 
 const RATE: &str = "update_rate";
 /// Correlation time of the Gauss–Markov bias that represents a random walk, s; longer than most recordings.
@@ -47,13 +46,8 @@ impl KalibrImu {
                 continue;
             };
             let wrong = |found: String, expected, advice| {
-                Err(FileError::new(
-                    path,
-                    Place::Line(line),
-                    found,
-                    expected,
-                    advice,
-                ))
+                let place = Place::Line(line);
+                Err(FileError::new(path, place, found, expected, advice))
             };
             let number = value.parse().ok();
             let Some(number) = number.filter(|of: &f64| of.is_finite() && *of > 0.0) else {
@@ -73,10 +67,7 @@ impl KalibrImu {
                 gauss_markov: figures.get(walk).copied().map(bias_of),
             })
         };
-        let noise = PerSensor {
-            gyro: noise(Sensor::Gyro)?,
-            accel: noise(Sensor::Accel)?,
-        };
+        let noise = PerSensor::try_from_fn(noise)?;
         let rate_hz = figures.get(RATE).copied();
         Ok(Self { rate_hz, noise })
     }

@@ -13,11 +13,8 @@ use turncal::earth::Site;
 use turncal::imu::{Noise, PerSensor, Sensor};
 use turncal::models::{Instrument, ModelError, Place, Tolerances};
 use turncal::units::DEGREE;
-use turncal_input::FileError;
-use turncal_input::stated_gravity_sigma;
-use turncal_input::{choice, suggestion};
-use turncal_logs::DataFile;
-use turncal_logs::Table;
+use turncal_input::{FileError, choice, stated_gravity_sigma, suggestion};
+use turncal_logs::{DataFile, Table};
 
 /// User statements about a log without a `run.toml`; other fields are detected or have a wide prior.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -58,13 +55,8 @@ pub enum DataSheetError {
 impl Stated {
     /// The stated units.
     pub fn units(&self) -> impl Iterator<Item = (Sensor, StatedUnit)> {
-        let of_triads = [
-            (Sensor::Gyro, self.gyro_unit),
-            (Sensor::Accel, self.accel_unit),
-        ];
-        of_triads
-            .into_iter()
-            .filter_map(|(sensor, of)| Some((sensor, of?)))
+        let of = |sensor: Sensor| Some((sensor, sensor.pick(self.gyro_unit, self.accel_unit)?));
+        Sensor::ALL.into_iter().filter_map(of)
     }
 
     /// The site, with wide σ of what is not stated.

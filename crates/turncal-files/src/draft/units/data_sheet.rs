@@ -36,15 +36,12 @@ impl Scale {
     /// For a named unit that is a multiple of one in `run.toml`.
     pub fn of_unit(sensor: Sensor, unit: Unit) -> Option<Self> {
         let of_one = unit_scale(sensor, unit.word).filter(|_| unit.times != 1.0)?;
+        let times = rounded(unit.times, 4);
         Some(Self {
             value: Vector3::repeat(of_one / unit.times),
             off: 0.0,
             is_named: true,
-            why: format!(
-                "1 unit of the file is {} {}",
-                rounded(unit.times, 4),
-                unit.word
-            ),
+            why: format!("1 unit of the file is {times} {}", unit.word),
         })
     }
 
@@ -54,11 +51,7 @@ impl Scale {
         let is_sure = sigma < TOLERANCE;
         let mut by = match gravity.rests {
             1 => " in one dwell".to_owned(),
-            rests => format!(
-                " ± {} %, from gravity in {rests} \
-                dwells",
-                percent(sigma)
-            ),
+            rests => format!(" ± {} %, from gravity in {rests} dwells", percent(sigma)),
         };
         if !is_sure {
             by += ", if the zero offset is zero, which too few directions of gravity can verify";
@@ -99,34 +92,28 @@ impl Scale {
         [by, often]: [&str; 2],
     ) -> Self {
         let sizes = times * axes.scale.abs();
-        let sizes = match axes.by_axis {
-            true => sizes,
-            false => Vector3::repeat(sizes.map(f64::ln).mean().exp()),
+        let sizes = if axes.by_axis {
+            sizes
+        } else {
+            Vector3::repeat(sizes.map(f64::ln).mean().exp())
         };
         let stated = sizes.map(|size| nearest(&sheet(size), size).unwrap_or(f64::NAN));
         let is_stated = !stated.iter().any(|stated| stated.is_nan());
-        let value = if is_stated {
-            stated
+        let plain = sizes.map(|size| rounded(size, 4));
+        let (value, least) = if is_stated {
+            (stated, 0.0)
         } else {
-            sizes.map(|size| rounded(size, 4))
+            (plain, 2.0 * axes.sigma)
         };
         let off = value.component_div(&sizes).add_scalar(-1.0).amax();
-        let measured = axes.words(&sizes.map(|size| rounded(size, 4)));
+        let [words, measured] = [value, plain].map(|figures| axes.words(&figures));
         Self {
-            off: if is_stated {
-                off
-            } else {
-                off.max(2.0 * axes.sigma)
-            },
+            off: off.max(least),
             is_named: false,
-            why: match is_stated {
-                true => format!(
-                    "{} counts per {of}; measured {measured}{by}",
-                    axes.words(&stated)
-                ),
-                false => {
-                    format!("{measured} counts per {of}{by}; {often}prefer the data-sheet value")
-                }
+            why: if is_stated {
+                format!("{words} counts per {of}; measured {measured}{by}")
+            } else {
+                format!("{measured} counts per {of}{by}; {often}prefer the data-sheet value")
             },
             value: value.zip_map(&axes.scale, f64::copysign) / one,
         }
@@ -158,8 +145,6 @@ fn nearest(sheet: &[f64], measured: f64) -> Option<f64> {
 /// Typical counts per g for a register with this output and an unknown zero.
 pub fn likely_for_g(per_g: f64) -> String {
     let power = 2f64.powf(per_g.log2().floor());
-    format!(
-        "typical values are {power} and {} counts per g",
-        2.0 * power
-    )
+    let next = 2.0 * power;
+    format!("typical values are {power} and {next} counts per g")
 }

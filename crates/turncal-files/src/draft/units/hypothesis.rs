@@ -69,22 +69,18 @@ impl Hypothesis {
 
     /// Evidence from motion.
     pub fn evidence(&self, sensor: Sensor, motion: &Motion) -> String {
-        match (sensor, self.factor) {
-            (_, None) => String::new(),
-            (Sensor::Accel, _) if self.fits() => format!("{} at rest", rounded(motion.gravity, 4)),
-            (Sensor::Accel, Some(factor)) => {
-                format!("magnitude at rest is {} times gravity", rounded(factor, 4))
+        let Some(factor) = self.factor.map(|factor| rounded(factor, 4)) else {
+            return String::new();
+        };
+        match (sensor, self.fits()) {
+            (Sensor::Accel, true) => format!("{} at rest", rounded(motion.gravity, 4)),
+            (Sensor::Accel, false) => format!("magnitude at rest is {factor} times gravity"),
+            (Sensor::Gyro, true) => {
+                "integrated gyro angles match the change of gravity direction".to_owned()
             }
-            (Sensor::Gyro, _) if self.fits() => {
-                "integrated gyro angles match the change of gravity \
-                direction"
-                    .to_owned()
+            (Sensor::Gyro, false) => {
+                format!("gravity direction changes by {factor} times the integrated gyro angle")
             }
-            (Sensor::Gyro, Some(factor)) => format!(
-                "gravity direction changes by {} times the integrated gyro \
-                angle",
-                rounded(factor, 4)
-            ),
         }
     }
 
