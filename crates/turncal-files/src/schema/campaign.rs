@@ -91,19 +91,17 @@ impl Campaign {
         }
         let directory = path.parent().unwrap_or(Path::new(""));
         let named = &mut file.recording;
-        named
-            .iter_mut()
-            .for_each(|one| one.run = directory.join(&one.run));
+        for recording in named.iter_mut() {
+            recording.run = directory.join(&recording.run);
+        }
         named.sort_by(|a, b| a.run.cmp(&b.run));
         if let Some(pair) = named.windows(2).find(|pair| pair[0].run == pair[1].run) {
             let advice = "List each recording once.";
             let found = format_args!("{} twice", pair[0].run.display());
             return Err(FileError::of(path, found, "each recording once", advice));
         }
-        let temperature = file
-            .temperature
-            .map(|of| temperature(document, of))
-            .transpose()?;
+        let temperature = file.temperature.map(|of| temperature(document, of));
+        let temperature = temperature.transpose()?;
         let runs = named.par_iter().map(|named| {
             let mut run = crate::read_run(&named.run)?;
             let of_meta = run.recording.meta.get("temperature_degc");
@@ -143,14 +141,13 @@ pub fn campaign_text(paths: &[String], day_to_day: &DayToDay) -> String {
         run: path.into(),
         temperature_degc: None,
     };
+    let rounded_sigma = |(key, sigma)| (key, NonNegative(rounded(sigma, 3)));
     let differing = day_to_day.values().filter(|(_, sigma)| *sigma > 0.0);
     let file = CampaignFile {
         own: Vec::new(),
         temperature: None,
         recording: paths.iter().map(recording).collect(),
-        day_to_day: differing
-            .map(|(key, sigma)| (key, NonNegative(rounded(sigma, 3))))
-            .collect(),
+        day_to_day: differing.map(rounded_sigma).collect(),
     };
     let mut remarks = Remarks::default();
     remarks.before("day_to_day", "1σ from one recording to the next");
@@ -163,26 +160,25 @@ fn temperature(
     stated: TemperatureFile,
 ) -> Result<Option<TemperatureOptions>, FileError> {
     let usual = TemperatureOptions::default();
-    match stated {
-        TemperatureFile::Follows(follows) => Ok(follows.then_some(usual)),
-        TemperatureFile::With {
-            highest_order: Some(order),
-            ..
-        } if !(1..=HIGHEST_ORDER).contains(&usize::from(order)) => {
-            let expected = format_args!("a whole number from 1 to {HIGHEST_ORDER}");
-            let path = "temperature.highest_order";
-            Err(document.wrong(path, expected, "Correct this value."))
-        }
+    let (highest_order, rate, reference) = match stated {
+        TemperatureFile::Follows(follows) => return Ok(follows.then_some(usual)),
         TemperatureFile::With {
             highest_order,
             rate,
             reference_degc,
-        } => Ok(Some(TemperatureOptions {
-            highest_order: highest_order.map_or(usual.highest_order, usize::from),
-            rate: rate.unwrap_or(usual.rate),
-            reference: reference_degc.map(|of| of.0).or(usual.reference),
-        })),
+        } => (highest_order, rate, reference_degc),
+    };
+    let highest_order = highest_order.map_or(usual.highest_order, usize::from);
+    if !(1..=HIGHEST_ORDER).contains(&highest_order) {
+        let expected = format_args!("a whole number from 1 to {HIGHEST_ORDER}");
+        let path = "temperature.highest_order";
+        return Err(document.wrong(path, expected, "Correct this value."));
     }
+    Ok(Some(TemperatureOptions {
+        highest_order,
+        rate: rate.unwrap_or(usual.rate),
+        reference: reference.map(|of| of.0).or(usual.reference),
+    }))
 }
 
 /// The name of a group in `own`.
@@ -206,18 +202,14 @@ fn own_parameters(
     for name in own {
         let Some(group) = Group::all().find(|&group| own_name(group) == *name) else {
             let known: Vec<String> = Group::all().map(own_name).collect();
-            return Err(document.wrong(
-                "own",
-                format_args!("names from the list {}", known.join(", ")),
-                "Name parameter groups that differ freely between recordings.",
-            ));
+            let expected = format_args!("names from the list {}", known.join(", "));
+            let advice = "Name parameter groups that differ freely between recordings.";
+            return Err(document.wrong("own", expected, advice));
         };
         for i in group.parameters(form) {
             let (sensor, of_triad) = turncal::calibration::sensor_and_parameter(i);
-            let prior = runs
-                .first()
-                .map(|run| run.instrument.prior.get(sensor).sigma(form));
-            day_to_day.parameters[i] = prior.map_or(0.0, |prior| prior[of_triad]);
+            let sigma = |run: &Run| run.instrument.prior.get(sensor).sigma(form)[of_triad];
+            day_to_day.parameters[i] = runs.first().map_or(0.0, sigma);
         }
     }
     Ok(())

@@ -54,6 +54,17 @@ pub struct InstrumentFields<'a> {
 }
 
 impl<'a> Fields<'a> {
+    /// Those of a document whose directory holds the files that it names.
+    pub fn new(document: Document<'a>, run: &'a RunFile, in_memory: &'a [DataFile]) -> Self {
+        Self {
+            document,
+            run,
+            directory: document.file.parent().unwrap_or(Path::new("")),
+            in_memory,
+            notes: Vec::new(),
+        }
+    }
+
     pub fn instrument(&mut self) -> Result<InstrumentFields<'a>, FileError> {
         let imu = &self.run.imu;
         let known = self.knowledge()?;
@@ -146,26 +157,22 @@ impl<'a> Fields<'a> {
         let ((key, sigma_unit), time) = (keys.gauss_markov, keys.correlation_time);
         let key = get(keys.former).map_or(key, |_| keys.former);
         let path = |name: &str| format!("imu.noise.{name}");
+        let missing = |name, meaning| Err(self.document.missing(&path(name), meaning));
         let gauss_markov = match (get(key), get(time)) {
             (None, None) => None,
+            (Some(_), None) => return missing(time, "its correlation time"),
+            (None, Some(_)) => return missing(key, "the 1σ of the Gauss–Markov bias"),
             (Some(sigma), Some(correlation_time)) => {
-                for (name, value) in [(key, sigma), (time, correlation_time)] {
-                    if value <= 0.0 {
-                        let (expected, advice) = ("a number above zero", "Correct this value.");
-                        return Err(self.document.wrong(&path(name), expected, advice));
-                    }
+                let all = [(key, sigma), (time, correlation_time)];
+                if let Some((name, _)) = all.into_iter().find(|(_, value)| *value <= 0.0) {
+                    let (expected, advice) = ("a number above zero", "Correct this value.");
+                    return Err(self.document.wrong(&path(name), expected, advice));
                 }
+                let sigma = sigma * sigma_unit;
                 Some(GaussMarkov {
-                    sigma: sigma * sigma_unit,
+                    sigma,
                     correlation_time,
                 })
-            }
-            (Some(_), None) => {
-                return Err(self.document.missing(&path(time), "its correlation time"));
-            }
-            (None, Some(_)) => {
-                let meaning = "the 1σ of the Gauss–Markov bias";
-                return Err(self.document.missing(&path(key), meaning));
             }
         };
         let or_zero = |(name, unit): (&str, f64)| get(name).unwrap_or(0.0) * unit;
@@ -185,13 +192,12 @@ impl<'a> Fields<'a> {
         let (imu, name) = (&self.run.imu, sensor.name());
         let is_there = |sensor| imu.of(sensor).columns.is_some();
         if is_there(sensor) {
+            let (path, meaning) = (
+                format!("imu.{name}_unit"),
+                "the unit of the values in the file",
+            );
             let unit = imu.of(sensor).unit.map(str::to_owned);
-            let path = format!("imu.{name}_unit");
-            let missing = || {
-                self.document
-                    .missing(&path, "the unit of the values in the file")
-            };
-            return unit.ok_or_else(missing);
+            return unit.ok_or_else(|| self.document.missing(&path, meaning));
         }
         if imu.accel_from.is_some() || !Sensor::ALL.into_iter().any(is_there) {
             let path = format!("imu.columns.{name}");
@@ -229,16 +235,15 @@ impl<'a> Fields<'a> {
                 let meaning = "the counts per second for 1 rad/s or 1 m/s², because the size of a count varies by instrument";
                 Err(document.missing(&path, meaning))
             }
-            (Some(scale), _) if scale.iter().any(|&s| s == 0.0) => Err(document.wrong(
-                &path,
-                "non-zero values",
-                "Set the scale factor from the data sheet.",
-            )),
-            (Some(scale), Some(of_unit)) if !is_near(&scale, of_unit) => Err(document.wrong(
-                &path,
-                format_args!("about {of_unit} (1 rad/s or 1 m/s² in this unit)"),
-                "Correct the scale or the unit, or remove the scale.",
-            )),
+            (Some(scale), _) if scale.iter().any(|&s| s == 0.0) => {
+                let advice = "Set the scale factor from the data sheet.";
+                Err(document.wrong(&path, "non-zero values", advice))
+            }
+            (Some(scale), Some(of_unit)) if !is_near(&scale, of_unit) => {
+                let expected = format_args!("about {of_unit} (1 rad/s or 1 m/s² in this unit)");
+                let advice = "Correct the scale or the unit, or remove the scale.";
+                Err(document.wrong(&path, expected, advice))
+            }
             (Some(scale), _) => Ok(scale),
         }
     }
@@ -247,38 +252,36 @@ impl<'a> Fields<'a> {
     fn prior(&mut self, sensor: Sensor, nominal: Vector3<f64>) -> Result<Prior, FileError> {
         let (of, axes) = (self.run.imu.of(sensor), self.run.imu.axes());
         let bias_words = sensor.pick("bias ± 2 °/s", "bias ± 1 m/s²");
+        let (scale, angle) = (of.prior.scale_sigma_ppm, of.prior.installation_sigma_arcsec);
+        let stated = [
+            ("scale_sigma_ppm", scale, WIDEST_SCALE / PPM),
+            ("installation_sigma_arcsec", angle, HALF_TURN),
+            (
+                "bias_sigma",
+                of.prior.bias_sigma,
+                WIDEST_BIAS * nominal.amax(),
+            ),
+        ];
+        let mut sigma = [
+            Vector3::repeat(USUAL_SCALE / PPM),
+            Vector3::repeat(USUAL_INSTALLATION / ARCSEC),
+            nominal.abs() * *USUAL_BIAS.get(sensor),
+        ];
+        let words = ["scale factor ± 5 %", "misalignment ± 2°", bias_words];
         let mut assumed = Vec::new();
-        let mut sigma = |key: &str, stated: Option<OneOrThree>, most: f64, usual, words| {
-            let stated = stated.map(OneOrThree::vector);
-            assumed.extend(stated.is_none().then_some(words));
-            if !stated.iter().flatten().all(|&s| s > 0.0 && s <= most) {
+        for (k, (key, stated, most)) in stated.into_iter().enumerate() {
+            let Some(stated) = stated.map(OneOrThree::vector) else {
+                assumed.push(words[k]);
+                continue;
+            };
+            if !stated.iter().all(|&s| s > 0.0 && s <= most) {
                 let path = format!("imu.prior.{}.{key}", sensor.name());
                 let expected = format_args!("numbers above zero and at most {most}");
                 return Err(self.document.wrong(&path, expected, "Correct this value."));
             }
-            Ok(stated.unwrap_or(usual))
-        };
-        let scale_sigma = sigma(
-            "scale_sigma_ppm",
-            of.prior.scale_sigma_ppm,
-            WIDEST_SCALE / PPM,
-            Vector3::repeat(USUAL_SCALE / PPM),
-            "scale factor ± 5 %",
-        )?;
-        let installation_sigma = sigma(
-            "installation_sigma_arcsec",
-            of.prior.installation_sigma_arcsec,
-            HALF_TURN,
-            Vector3::repeat(USUAL_INSTALLATION / ARCSEC),
-            "misalignment ± 2°",
-        )?;
-        let bias_sigma = sigma(
-            "bias_sigma",
-            of.prior.bias_sigma,
-            WIDEST_BIAS * nominal.amax(),
-            nominal.abs() * *USUAL_BIAS.get(sensor),
-            bias_words,
-        )?;
+            sigma[k] = stated;
+        }
+        let [scale_sigma, installation_sigma, bias_sigma] = sigma;
         if !assumed.is_empty() && of.columns.is_some() {
             self.notes.push(format!(
                 "[imu.prior.{}] in run.toml is incomplete. turncal assumed (1σ): {}.",

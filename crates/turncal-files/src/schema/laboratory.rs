@@ -101,11 +101,10 @@ fn check_complete(
     of_item: &[(&str, Option<String>)],
 ) -> Result<(), FileError> {
     let is_there = |of: &str, name: &str| {
-        let of_run = of_item
-            .iter()
-            .any(|(item, of_run)| *item == name && of_run.is_some());
+        let mut of_run = of_item.iter().filter(|(_, of_run)| of_run.is_some());
         let fields = table.get(of).and_then(|fields| fields.get_ref().as_table());
-        fields.is_some_and(|fields| fields.contains_key(name)) || (of == "item" && of_run)
+        fields.is_some_and(|fields| fields.contains_key(name))
+            || (of == "item" && of_run.any(|(item, _)| *item == name))
     };
     let missing = REQUIRED.iter().flat_map(|(of, names)| {
         let names = names.iter().filter(|name| !is_there(of, name));

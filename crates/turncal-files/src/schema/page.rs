@@ -60,11 +60,8 @@ impl Remarks {
     }
 
     fn at(&self, path: &str, place: Place) -> impl Iterator<Item = &str> {
-        let at = self
-            .all
-            .iter()
-            .filter(move |of| (&*of.0, of.1) == (path, place));
-        at.map(|(.., words)| words.as_str())
+        let at = move |of: &&(String, Place, String)| (&*of.0, of.1) == (path, place);
+        self.all.iter().filter(at).map(|(.., words)| words.as_str())
     }
 }
 

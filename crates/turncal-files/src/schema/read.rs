@@ -40,14 +40,7 @@ pub fn run_of_text(
 ) -> Result<Run, FileError> {
     let document = Document::of(path, text);
     let file = run_file(document)?;
-    let directory = path.parent().unwrap_or(Path::new(""));
-    let mut fields = Fields {
-        document,
-        run: &file,
-        directory,
-        in_memory,
-        notes: Vec::new(),
-    };
+    let mut fields = Fields::new(document, &file, in_memory);
     let site = fields.site()?;
     let instrument = fields.instrument()?;
     let table_log = fields.table_log()?;
@@ -120,13 +113,7 @@ pub fn read_meta(path: &Path) -> Result<BTreeMap<String, String>, FileError> {
 /// Refuses a `run.toml` that [`crate::read_run`] would refuse for any content of the named files.
 pub fn check(document: Document) -> Result<(), FileError> {
     let run = run_file(document)?;
-    let mut fields = Fields {
-        document,
-        run: &run,
-        directory: Path::new(""),
-        in_memory: &[],
-        notes: Vec::new(),
-    };
+    let mut fields = Fields::new(document, &run, &[]);
     fields.site()?;
     fields.instrument()?;
     fields.table_log().map(drop)
@@ -144,12 +131,9 @@ fn fill<'a, T: Deserialize<'a>>(
 ) -> Result<T, FileError> {
     if let Some(meta) = table.get_mut().get_mut("meta") {
         document.as_written(meta);
-        let names = meta
-            .get_ref()
-            .as_table()
-            .into_iter()
-            .flat_map(DeTable::keys);
-        document.only("meta", names.map(|name| name.get_ref().as_ref()), &META)?;
+        let names = meta.get_ref().as_table().into_iter();
+        let names = names.flat_map(|of| of.keys().map(|name| &**name.get_ref()));
+        document.only("meta", names, &META)?;
     }
     document.fill(table)
 }
@@ -239,16 +223,18 @@ impl InstrumentFields<'_> {
         let (ppm, sigma) = (off.abs() / PPM, prior / PPM);
         let period = nanoseconds(imu.period);
         let way = if off > 0.0 { "more" } else { "less" };
-        let judged = match off.abs() <= prior {
-            true => format!("within its prior σ of {sigma:.2} ppm."),
-            false => format!(
-                "beyond its prior σ of {sigma:.2} ppm. If the instrument clock is right and the time stamps are \
-                 wrong, omit the time column."
-            ),
+        let (judged, advice) = if off.abs() <= prior {
+            ("within", "")
+        } else {
+            (
+                "beyond",
+                " If the instrument clock is right and the time stamps are wrong, omit the time column.",
+            )
         };
         Some(format!(
             "The time stamps are {period} s apart, {ppm:.2} ppm {way} than sample_period_s. turncal used the time \
-             stamps, which changes the scale factor of the {triad} by the same amount, {judged}"
+             stamps, which changes the scale factor of the {triad} by the same amount, {judged} \
+             its prior σ of {sigma:.2} ppm.{advice}"
         ))
     }
 }
@@ -263,10 +249,8 @@ pub fn name(path: &Path) -> String {
         Some(file) if file == "run.toml" => full.parent().and_then(Path::file_name),
         _ => full.file_stem(),
     };
-    named.map_or_else(
-        || "run".to_owned(),
-        |name| name.to_string_lossy().into_owned(),
-    )
+    let named = named.unwrap_or("run".as_ref());
+    named.to_string_lossy().into_owned()
 }
 
 impl Fields<'_> {
@@ -306,24 +290,26 @@ fn place_note(site: &Site, has_gravity: bool, has_height: bool) -> Option<String
         (true, false) => ("height", "height_m (--height)"),
         (true, true) => return None,
     };
-    let mut costs = Vec::new();
-    if !site.is_known {
-        let words =
-            "estimated Earth rate as an unknown vector, which widens the σ of the gyro biases";
-        costs.push(words.to_owned());
-    }
-    let mut or_gravity = "";
-    if !has_gravity {
-        costs.push(format!(
-            "assumed a gravity of {:.4} ± {:.4} m/s², which widens the σ of the accelerometer scale factors",
-            site.gravity, site.gravity_sigma
-        ));
-        or_gravity = ", or gravity_m_s2 (--gravity)";
-    }
-    let costs = costs.join("; it ");
-    (!costs.is_empty()).then(|| {
-        format!("You stated no {missing}. turncal {costs}. Set {fields} in [site]{or_gravity}.")
-    })
+    let of_rate =
+        "estimated Earth rate as an unknown vector, which widens the σ of the gyro biases";
+    let of_gravity = format!(
+        "assumed a gravity of {:.4} ± {:.4} m/s², which widens the σ of the accelerometer scale factors",
+        site.gravity, site.gravity_sigma
+    );
+    let costs = match (site.is_known, has_gravity) {
+        (true, true) => return None,
+        (true, false) => of_gravity,
+        (false, true) => of_rate.to_owned(),
+        (false, false) => format!("{of_rate}; it {of_gravity}"),
+    };
+    let or_gravity = if has_gravity {
+        ""
+    } else {
+        ", or gravity_m_s2 (--gravity)"
+    };
+    Some(format!(
+        "You stated no {missing}. turncal {costs}. Set {fields} in [site]{or_gravity}."
+    ))
 }
 
 fn standstill(file: &StandstillFile) -> Standstill {

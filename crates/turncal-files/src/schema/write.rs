@@ -22,7 +22,7 @@ use turncal::calibration::Calibration;
 use turncal::imu::{Instrument, NoiseKeys, Output, Sensor, Term};
 use turncal::models::TermFile;
 use turncal::number::rounded;
-use turncal::recording::{ImuSamples, Segment, TableLog, nanoseconds};
+use turncal::recording::{Segment, TableLog, nanoseconds};
 use turncal::run::Run;
 use turncal::turntable::AxisError;
 use turncal::units::{ARCSEC, DEGREE, MILLIGAL, PPM};
@@ -58,9 +58,8 @@ pub fn write_run(
         write("table.csv.gz", &|file| table_rows(file, run, table))?;
     }
     if !run.recording.segments.is_empty() {
-        write("segments.csv", &|file| {
-            segment_rows(file, &run.recording.segments)
-        })?;
+        let segments = &run.recording.segments;
+        write("segments.csv", &|file| segment_rows(file, segments))?;
     }
     if let Some(truth) = truth {
         let path = directory.join("truth.json");
@@ -93,21 +92,12 @@ pub fn write_rows(
 }
 
 fn imu_rows(file: &mut dyn Write, run: &Run, output: Output) -> io::Result<()> {
-    let ImuSamples {
-        gyro,
-        accel,
-        period,
-        ..
-    } = &run.recording.imu;
-    let temperature = run.recording.imu.temperature.as_ref();
-    let further = if temperature.is_some() {
-        ",temperature"
-    } else {
-        ""
-    };
+    let imu = &run.recording.imu;
+    let (period, temperature) = (imu.period, imu.temperature.as_ref());
+    let further = temperature.map_or("", |_| ",temperature");
     writeln!(file, "t,gx,gy,gz,ax,ay,az{further}")?;
-    for (k, samples) in gyro.iter().zip(accel.iter()).enumerate() {
-        write!(file, "{}", nanoseconds(run.recording.imu.time(k)))?;
+    for (k, samples) in imu.gyro.iter().zip(imu.accel.iter()).enumerate() {
+        write!(file, "{}", nanoseconds(imu.time(k)))?;
         for (sensor, sample) in [(Sensor::Gyro, samples.0), (Sensor::Accel, samples.1)] {
             let quantity = sample.component_mul(&run.instrument.nominal.get(sensor).0);
             for value in &quantity {
@@ -120,7 +110,7 @@ fn imu_rows(file: &mut dyn Write, run: &Run, output: Output) -> io::Result<()> {
             }
         }
         if let Some(temperature) = temperature {
-            let middle = run.recording.imu.time(k) + 0.5 * period;
+            let middle = imu.time(k) + 0.5 * period;
             write!(file, ",{:.4}", temperature.at(middle).gyro[0])?;
         }
         writeln!(file)?;
@@ -130,22 +120,13 @@ fn imu_rows(file: &mut dyn Write, run: &Run, output: Output) -> io::Result<()> {
 
 fn table_rows(file: &mut dyn Write, run: &Run, table: &TableLog) -> io::Result<()> {
     let axes = axis_letters(run).map_or(0, |letters| letters.len());
-    let angles: String = ANGLES[..axes]
-        .iter()
-        .map(|name| format!(",{name}"))
-        .collect();
-    writeln!(file, "t,qw,qx,qy,qz{angles}")?;
+    let columns = [&["t", "qw", "qx", "qy", "qz"], &ANGLES[..axes]].concat();
+    writeln!(file, "{}", columns.join(","))?;
     for (row, (&time, q)) in table.time.iter().zip(&table.attitude).enumerate() {
         let time = nanoseconds(time);
         write!(file, "{time},{:e},{:e},{:e},{:e}", q.w, q.i, q.j, q.k)?;
-        for (_, angle) in table
-            .axes
-            .get(row)
-            .into_iter()
-            .flatten()
-            .flatten()
-            .take(axes)
-        {
+        let angles = table.axes.get(row).into_iter().flatten().flatten();
+        for (_, angle) in angles.take(axes) {
             write!(file, ",{:e}", angle / DEGREE)?;
         }
         writeln!(file)?;
@@ -156,16 +137,11 @@ fn table_rows(file: &mut dyn Write, run: &Run, table: &TableLog) -> io::Result<(
 /// The axes of a table with stated errors, by their letters in files; `None` if no error is stated, or if an axis has
 /// no letter.
 fn axis_letters(run: &Run) -> Option<Vec<&'static str>> {
-    let stated = AxisError::ALL
-        .iter()
-        .any(|&kind| run.table.geometry.has(kind));
-    let axes = run
-        .recording
-        .table
-        .as_ref()?
-        .axes
-        .first()
-        .filter(|_| stated)?;
+    let is_stated = |&kind: &AxisError| run.table.geometry.has(kind);
+    let axes = run.recording.table.as_ref()?.axes.first()?;
+    if !AxisError::ALL.iter().any(is_stated) {
+        return None;
+    }
     let letter = |(direction, _): &(Vector3<f64>, f64)| {
         let known = LETTERS.iter().find(|(_, known)| known == direction);
         known.map(|(letter, _)| *letter)
@@ -266,10 +242,7 @@ fn noise_fields(instrument: &Instrument) -> BTreeMap<String, Option<NonNegative>
         for (key, value) in [
             (walk, Some(in_unit(noise.random_walk, of_walk))),
             (sigma, bias.map(|bias| in_unit(bias.sigma, of_sigma))),
-            (
-                keys.correlation_time,
-                bias.map(|bias| bias.correlation_time),
-            ),
+            (keys.correlation_time, bias.map(|of| of.correlation_time)),
             (keys.by_motion, above_zero(moves.by_motion, 1.0)),
             (by_duration, above_zero(moves.by_duration, of_duration)),
         ] {
