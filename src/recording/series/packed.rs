@@ -28,6 +28,8 @@ pub struct Packed {
 impl Packed {
     /// Number of samples so far.
     #[allow(clippy::len_without_is_empty)]
+    /// Number of samples so far.
+    #[allow(clippy::len_without_is_empty)]
     pub fn len(&self) -> usize {
         self.len
     }
