@@ -26,10 +26,7 @@ pub struct Packed {
 }
 
 impl Packed {
-    /// Number of samples so far.
-    #[allow(clippy::len_without_is_empty)]
-    /// Number of samples so far.
-    #[allow(clippy::len_without_is_empty)]
+    /// Number of samples.
     pub fn len(&self) -> usize {
         self.len
     }
@@ -88,6 +85,8 @@ impl Packer {
         }
     }
 
+    /// Number of samples so far.
+    #[allow(clippy::len_without_is_empty)]
     pub fn len(&self) -> usize {
         self.len
     }
