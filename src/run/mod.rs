@@ -1,7 +1,7 @@
 //! A run: one recording, and prior knowledge of the instrument, the site and the table.
 //!
 //! Everything is in SI, on right-front-up body axes and in normalised outputs (see [`crate::imu::Nominal`]);
-//! [`turncal_files`] converts the units and axes of files.
+//! `turncal-files` converts the units and axes of files.
 
 mod doubts;
 mod dwell;
