@@ -64,7 +64,8 @@ fn a_path_with_the_moves_that_show_a_term_shows_it() {
     };
     let hidden = not_shown(level);
     // A turn about the vertical changes nothing that gravity shows.
-    let turns = "turn x 360, turn x -360, turn y 360, turn y -360, x_up, turn z 360, turn z -360";
+    let turns =
+        "turn x 3600, turn x -3600, turn y 3600, turn y -3600, x_up, turn z 3600, turn z -3600";
     let both_ways = not_shown(&format!("{level}, {turns}"));
     let term = "gyro-asymmetry".to_owned();
     assert!(
