@@ -11,7 +11,7 @@ use turncal::calibration::{Finding, FindingKind, Progress as Passes};
 use turncal::imu::{Output, Sensor, Term};
 use turncal::lot::{Lot, Specification, Unit};
 use turncal::study::CheckedCalibration;
-use turncal_files::record_inputs;
+use turncal_files::{calibration_json, read_calibration, record_inputs, write_calibration};
 use turncal_report::calibration as of_calibration;
 use turncal_report::document::Table;
 use turncal_report::{Document, at_rest, lot as of_lot, write};
@@ -248,9 +248,7 @@ impl Calibration {
     /// Calibration
     #[staticmethod]
     fn read(path: PathBuf) -> PyResult<Self> {
-        calibration::turncal_files::read_calibration(&path)
-            .map(Self::of_record)
-            .map_err(raise)
+        read_calibration(&path).map(Self::of_record).map_err(raise)
     }
 
     /// The calibration in the text of ``to_json``, for pickle.
@@ -383,15 +381,14 @@ impl Calibration {
     fn report(&self, py: Python, directory: PathBuf) -> PyResult<()> {
         let document = self.document(py)?;
         std::fs::create_dir_all(&directory)?;
-        self.record
-            .write(&directory.join("calibration.json"), true)
-            .map_err(raise)?;
+        let file = directory.join("calibration.json");
+        write_calibration(&self.record, &file, true).map_err(raise)?;
         write(document, &directory).map_err(raise)
     }
 
     /// The calibration as text, byte for byte the calibration.json of the command.
     fn to_json(&self) -> PyResult<String> {
-        let bytes = self.record.to_json(Path::new("to_json")).map_err(raise)?;
+        let bytes = calibration_json(&self.record, Path::new("to_json")).map_err(raise)?;
         String::from_utf8(bytes).map_err(raise)
     }
 

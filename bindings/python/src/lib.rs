@@ -21,7 +21,7 @@ use pyo3::prelude::*;
 /// Runs the command `turncal` with these arguments, the first of which is its name, and returns its exit status.
 #[pyfunction]
 fn command(py: Python, arguments: Vec<OsString>) -> u8 {
-    py.detach(|| turncal::command(arguments))
+    py.detach(|| turncal_cli::command(arguments))
 }
 
 #[pymodule]

@@ -10,7 +10,7 @@ use turncal::study::navigation::{
     INTERVAL, MethodOutlook, Mission, Motion, NavigationStudyError, Pair,
 };
 use turncal::units::DEGREE;
-use turncal_files::{digest_of_bytes, export as formats, read_laboratory};
+use turncal_files::{calibration_json, digest_of_bytes, export as formats, read_laboratory};
 use turncal_report::certificate::Certificate;
 use turncal_report::certificate::document as of_certificate;
 use turncal_report::lot as of_lot;
@@ -68,9 +68,7 @@ pub fn certificate(
     as_found: Option<PathBuf>,
 ) -> PyResult<()> {
     let record = &calibration.record;
-    let bytes = record
-        .to_json(Path::new("calibration.json"))
-        .map_err(raise)?;
+    let bytes = calibration_json(record, Path::new("calibration.json")).map_err(raise)?;
     let laboratory = read_laboratory(&laboratory, |key| record.meta.get(key).cloned());
     let laboratory = laboratory.map_err(raise)?;
     let limits = specification.as_deref().map(limits).transpose()?;

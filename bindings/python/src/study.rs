@@ -220,7 +220,8 @@ fn trials<S: Makes<Trial: Serialize>>(
     _: fn(&S::Outcome) -> Document,
     shard: Shard,
 ) -> Result<Vec<u8>, String> {
-    let made = study.trials(&shard.runs(study.runs()), UNWATCHED);
+    let runs: Vec<u64> = shard.runs(study.runs()).collect();
+    let made = study.trials(&runs, UNWATCHED);
     // MessagePack preserves every bit of a number.
     let bytes = made.map(|made| rmp_serde::to_vec(&made));
     bytes
