@@ -76,7 +76,7 @@ pub fn all(
     let name = format!("{log}-report.html");
     let page = page.map(|(_, page)| Output::new(&name, "Report with all figures", page));
     let name = format!("{log}-calibration.json");
-    let json = calibration.to_json(Path::new(&name))?;
+    let json = turncal_files::calibration_json(calibration, Path::new(&name))?;
     let about = "Values, σ and covariance, for turncal apply, export and certificate";
     let exported = |format: &export::Format| {
         let exported = export::write(calibration, format, Some(run)).ok()?;
