@@ -60,11 +60,11 @@ pub struct Evaluation {
     pub navigation: Vec<Outlook>,
 }
 
-/// What a calibration would know without one of the moves.
+/// What a calibration would know without the rows of the dwell after a move.
 ///
-/// The observations of the dwell after the move then say nothing about the parameters. Their effect on attitude and
-/// velocity stays, so the move before and the move after it keep their values. With the likelihood as a product of
-/// factors, each dwell given those before it, this factor is left out (partial likelihood: Cox 1975, Biometrika 62(2)).
+/// With the likelihood as a product of factors, each dwell given those before it, this factor is left out (partial
+/// likelihood: Cox 1975, Biometrika 62(2)). The next dwell still shows a part of the move, so σ is a lower limit of that
+/// of a path without the move.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Without {
     /// Time of the move and the dwell after it, s.

@@ -140,7 +140,7 @@ impl Report<'_> {
         facts
     }
 
-    /// σ of each group without each move, divided by σ with all moves.
+    /// σ of each group without what the dwell after each move says, divided by σ with all dwells.
     fn moves(&self) -> Table {
         let (estimate, all) = (
             &self.evaluation.bound.estimate,
@@ -158,11 +158,11 @@ impl Report<'_> {
         };
         let columns = cells!["", "move", "s"].into_iter();
         let columns = columns.chain(Group::all().map(Group::short));
-        let mut table = Table::new("σ without each move, divided by σ with all moves", columns)
+        let mut table = Table::new("σ without the dwell after each move, divided by σ with all dwells", columns)
             .section(self.evaluation.without.iter().enumerate().map(row))
             .note(
-                "Without a move, the dwell after it says nothing about the parameters, and all other moves stay as \
-                 they are. 1.00: the move and the dwell after it can be left out. Of two equal moves, one can.",
+                "The next dwell still shows a part of the move, so a path without the move can lose more. Evaluate that \
+                 path before you use it.",
             );
         table.optional = vec![2];
         table
