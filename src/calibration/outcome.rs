@@ -44,8 +44,6 @@ pub struct Outcome {
     pub own: Vec<Own>,
     /// Each recording calibrated alone, if something differs between recordings or temperatures.
     pub alone: Vec<SeparateEstimate>,
-    /// Mean temperature of each dwell, °C, and its rate, K/s; empty if nothing depends on temperature.
-    pub warming: Vec<(f64, f64)>,
     /// Gravity and its 1σ after the run, m/s².
     pub gravity: (f64, f64),
     /// Observability of the parameters in the run.
@@ -120,7 +118,6 @@ impl Outcome {
             auxiliary: held.auxiliary(model),
             thermal: held.posterior.thermal(&held.at, model),
             own: held.reduction.own(&held.at, &held.posterior),
-            warming: problem.warming(),
             alone: solved.alone,
             gravity: (problem.run().site.gravity + gravity.0, gravity.1),
             converged,

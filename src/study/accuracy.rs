@@ -80,8 +80,6 @@ pub struct Anees {
     pub interval_95: (f64, f64),
     /// 99.8 % interval.
     pub interval_998: (f64, f64),
-    /// 95 % interval of a single run.
-    pub interval_of_one: (f64, f64),
 }
 
 impl Study for AccuracyStudy {
@@ -175,7 +173,6 @@ fn anees(trials: &[Trial]) -> Option<Anees> {
         directions: first.count,
         interval_95: mean_square_interval(count, 0.05),
         interval_998: mean_square_interval(count, 0.002),
-        interval_of_one: first.interval,
     })
 }
 

@@ -32,8 +32,6 @@ pub use noise::ALIGNMENT_TIME;
 const POSITIONS: &str = "six-position";
 /// A filter path with the table time of the closed form.
 const HOUR_PATH: &str = "three-axis-hour";
-/// Minutes between two points of a curve against time.
-const EVERY: usize = 10;
 
 /// Configuration of the study.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -108,8 +106,6 @@ pub struct Worth {
     pub largest: Spread,
     /// At the end, due to the errors of one triad alone.
     pub by_one: PerSensor<Spread>,
-    /// Time in s against the median.
-    pub against_time: Vec<(f64, f64)>,
     /// Final median of the closed form in the same installation form divided by that of this method; `None` for the
     /// closed form.
     pub gain: Option<Ratio>,
@@ -251,13 +247,6 @@ impl Way {
         let calibrated: Vec<&Calibrated> = trials.iter().filter_map(|t| t.of(place)).collect();
         let all = || calibrated.iter().map(|c| &c.error);
         let errors: Vec<f64> = all().map(|error| self.at_end(error)).collect();
-        let every: Vec<usize> = (0..errors.len()).collect();
-        let median_at = |by: &ByParameter| {
-            median(
-                &Vec::from_iter(all().map(|error| (by * error).norm())),
-                &every,
-            )
-        };
         let largest = |error: &ParameterVector| {
             let lengths = self.minutes.iter().map(|(_, by)| (by * error).norm());
             lengths.fold(0.0, f64::max)
@@ -271,12 +260,6 @@ impl Way {
             by_one: PerSensor::from_fn(|sensor| {
                 Spread::of(all().map(|error| self.at_end(&of_triad(error, sensor))))
             }),
-            against_time: self
-                .minutes
-                .iter()
-                .step_by(EVERY)
-                .map(|(t, by)| (*t, median_at(by)))
-                .collect(),
             gain: self.gain(place, method, trials),
             budget: Budget::new(self.end(), &calibrated),
             errors,

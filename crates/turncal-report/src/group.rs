@@ -2,7 +2,7 @@
 
 use turncal::calibration::parameter_name;
 use turncal::imu::{InstallationForm, RATE, Sensor};
-use turncal::number::stated_axes;
+use turncal::number::{TIMES, readable, stated_axes, three_digits};
 
 pub use turncal::calibration::Group;
 
@@ -12,6 +12,27 @@ pub fn triad_name(sensor: Sensor) -> &'static str {
         Sensor::Gyro => "gyros",
         Sensor::Accel => "accelerometers",
     }
+}
+
+/// Such as `3 turns` or `no findings`.
+pub fn several(count: usize, name: &str) -> String {
+    match count {
+        0 => format!("no {name}s"),
+        1 => format!("one {name}"),
+        n => format!("{n} {name}s"),
+    }
+}
+
+/// A time in a readable unit.
+pub fn duration(seconds: f64) -> String {
+    let (unit, size) = readable(&TIMES, seconds);
+    format!("{} {unit}", three_digits(seconds / size))
+}
+
+/// A body axis in the direction of this component, such as `−x`.
+pub fn signed_axis(axis: char, component: f64) -> String {
+    let minus = if component < 0.0 { "−" } else { "" };
+    format!("{minus}{axis}")
 }
 
 /// Headings of a table with one column per group, after the row heading.
@@ -46,9 +67,10 @@ pub fn short_name(form: InstallationForm, index: usize) -> String {
 /// The nominal scale factors of a triad, such as `2 062 648 count per second for 1 rad/s`.
 pub fn nominal_scale(of: [f64; 3], unit: &str, input: &str) -> String {
     // Outputs that are not rates are stated per second.
-    let per = match unit.contains('/') || unit == "g" {
-        true => "",
-        false => " per second",
+    let per = if unit.contains('/') || unit == "g" {
+        ""
+    } else {
+        " per second"
     };
     format!("{} {unit}{per} for 1 {input}", stated_axes(of))
 }

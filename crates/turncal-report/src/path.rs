@@ -73,7 +73,7 @@ impl Report<'_> {
     }
 
     fn verdict(&self) -> (Word, String) {
-        let time = minutes(self.evaluation.duration);
+        let time = duration(self.evaluation.duration);
         let unobserved = self.evaluation.bound.observability.unobserved().count();
         let (word, text) = match (self.checks, self.not_decided().len(), unobserved) {
             (Some(_), 0, _) => (
@@ -128,10 +128,9 @@ impl Report<'_> {
     }
 
     fn facts(&self, navigated: &[MethodOutlook]) -> Facts {
-        let [duration, standing] =
-            [self.evaluation.duration, self.evaluation.standing].map(minutes);
+        let [time, standing] = [self.evaluation.duration, self.evaluation.standing].map(duration);
         let mut facts = Facts::default();
-        facts.push("time", format!("{duration}, including {standing} at rest"));
+        facts.push("time", format!("{time}, including {standing} at rest"));
         let not_decided = self.not_decided();
         if !not_decided.is_empty() {
             facts.push("not decided", not_decided.join(", "));
@@ -233,7 +232,7 @@ impl Report<'_> {
         let without = evaluation.without.iter().enumerate().map(|(k, of)| {
             json!({ "move": self.moves.get(k), "time_s": of.time, "sigma": self.by_group(&of.sigma) })
         });
-        let mut data = json!({
+        json!({
             "path": self.name,
             "verdict": verdict,
             "aiding": evaluation.aiding,
@@ -244,11 +243,8 @@ impl Report<'_> {
             "weakest": directions.take(LISTED).collect::<Vec<_>>(),
             "without": without.collect::<Value>(),
             "not_shown": not_shown,
-        });
-        if self.checks.is_some() {
-            data["not_decided"] = self.not_decided().into();
-        }
-        data
+            "not_decided": self.checks.map(|_| self.not_decided()),
+        })
     }
 }
 
@@ -294,15 +290,6 @@ fn decided(group: Group, checks: &[Check]) -> String {
     match of_group.clone().count() {
         0 => NONE.to_owned(),
         all => format!("{} of {all}", of_group.filter(passed).count()),
-    }
-}
-
-/// A time with its unit: seconds below two minutes.
-pub fn minutes(seconds: f64) -> String {
-    if seconds < 120.0 {
-        format!("{} s", value(seconds, 1.0))
-    } else {
-        format!("{} min", value(seconds / 60.0, 0.1))
     }
 }
 
@@ -353,10 +340,7 @@ fn rotation(rotation: &Rotation) -> String {
             format!("turn {}", words.collect::<Vec<_>>().join(", "))
         }
         Rotation::Point { along: to, .. } => {
-            let words = along.map(|(axis, sign)| {
-                let minus = if *sign < 0.0 { "−" } else { "" };
-                format!("{minus}{axis}")
-            });
+            let words = along.map(|(axis, part)| signed_axis(axis, *part));
             let words = words.collect::<String>();
             if to.z > 0.999 {
                 format!("{words} up")

@@ -31,9 +31,7 @@ pub fn words(next: Move) -> String {
         Move::Up(up) => up,
     };
     let axes = AXES.iter().zip(&up).filter(|(_, part)| **part != 0.0);
-    let axes: Vec<String> = axes
-        .map(|(axis, part)| format!("{}{axis}", if *part < 0.0 { "−" } else { "" }))
-        .collect();
+    let axes: Vec<String> = axes.map(|(axis, part)| signed_axis(*axis, *part)).collect();
     match axes.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["x"] => "put it on its left side (x up)".to_owned(),
         ["−x"] => "put it on its right side (x down)".to_owned(),
@@ -66,7 +64,7 @@ pub fn screen(run: &Run, status: &Status, specification: Option<&Specification>)
         .as_ref()
         .map(|of| of.time_left(specification))
     {
-        lines.push(format!("about {} left", super::path::minutes(left)));
+        lines.push(format!("about {} left", duration(left)));
     }
     lines.push(match status.next {
         Some(next) => format!("next: {}, then keep still for 5 s", words(next)),
@@ -109,14 +107,15 @@ pub fn line(status: &Status, dwell: usize) -> Option<String> {
 }
 
 fn so_far(status: &Status) -> String {
-    let dwells = status.survey.rests.len();
-    format!("{} s, {dwells} dwells", value(status.duration, 1.0))
+    let dwells = several(status.survey.rests.len(), "dwell");
+    format!("{} s, {dwells}", value(status.duration, 1.0))
 }
 
 fn moving(status: &Status) -> String {
-    match status.still > 0.0 {
-        true => format!("still for {} s", value(status.still, 1.0)),
-        false => "moving".to_owned(),
+    if status.still > 0.0 {
+        format!("still for {} s", value(status.still, 1.0))
+    } else {
+        "moving".to_owned()
     }
 }
 

@@ -64,14 +64,18 @@ pub fn parameter_row(
     error: Option<Option<f64>>,
 ) -> Vec<String> {
     let fixed = own <= 0.0;
-    let shown = match fixed {
-        true => format!("{} (fixed)", value(of, own)),
-        false => plus_minus(of, own),
+    let shown = if fixed {
+        format!("{} (fixed)", value(of, own))
+    } else {
+        plus_minus(of, own)
     };
     let mut row = cells![name, shown, unit];
-    row.extend(prior.iter().flat_map(|prior| match fixed {
-        true => [NONE; 2].map(str::to_owned),
-        false => [three_digits(*prior), improvement(*prior, own)],
+    row.extend(prior.iter().flat_map(|prior| {
+        if fixed {
+            [NONE; 2].map(str::to_owned)
+        } else {
+            [three_digits(*prior), improvement(*prior, own)]
+        }
     }));
     row.extend(error.iter().flat_map(|error| {
         let in_sigma = error.filter(|_| !fixed).map(|error| error / own);
@@ -95,34 +99,17 @@ pub fn improvement(prior: f64, posterior: f64) -> String {
     }
 }
 
-/// Costs of the error terms that were on.
-pub fn costs(effects: &[ErrorTermTest]) -> Table {
-    let row = |effect: &ErrorTermTest| {
-        let cells = effect.sigma_factors.iter();
-        let cells = cells.map(|cost| cost.map_or(NONE.to_owned(), |cost| value(cost, 0.1)));
-        let name = title(effect.term).to_owned();
-        std::iter::once(name).chain(cells).collect()
-    };
-    let columns = std::iter::once("term".to_owned()).chain(Group::all().map(Group::short));
-    Table::new(
-        "Cost of each error term: σ with the term divided by σ without it",
-        columns,
-    )
-    .section(effects.iter().filter(|effect| effect.on).map(row))
-    .note("RMS over the parameters of a group, with the other terms unchanged.")
-}
-
 /// Effect of the terms that were on or are significant.
 pub fn explained(effects: &[ErrorTermTest]) -> Table {
     let row = |effect: &ErrorTermTest| {
-        let yes_no = |yes: bool, words: [&str; 2]| words[usize::from(!yes)].to_owned();
         cells![
             title(effect.term),
-            yes_no(effect.on, ["on", "off"]),
+            if effect.on { "on" } else { "off" },
             nis(effect),
             three_digits(effect.gain),
             format!("< {}", three_digits(effect.limit)),
-            yes_no(effect.significant(), ["yes", "no"]),
+            if effect.significant() { "yes" } else { "no" },
+            growth(effect),
         ]
     };
     let shown = |on| {
@@ -130,19 +117,35 @@ pub fn explained(effects: &[ErrorTermTest]) -> Table {
             .iter()
             .filter(move |e| e.on == on && (e.on || e.significant()))
     };
-    Table::new("Effect of each error term", columns("term | | NIS | cost falls by | by chance | significant"))
+    Table::new("Effect of each error term", columns("term | | NIS | cost falls by | by chance | significant | σ grows"))
         .sections([shown(true).map(row), shown(false).map(row)])
         .note(
             "NIS of all observations without → with the term. Cost: −2 ln of likelihood and prior. By chance: limit \
              of the fall by chance, at a total false-alarm rate of 1 in 1000 runs.",
         )
+        .note(
+            "σ grows: σ with the term divided by σ without it, RMS over the parameters of the group where it is largest.",
+        )
         .note("Terms that are off are tested with their usual σ and shown if significant.")
 }
 
+/// The group whose σ grows most.
+fn growth(effect: &ErrorTermTest) -> String {
+    let groups = Group::all().zip(effect.sigma_factors);
+    let known = groups.filter_map(|(group, factor)| Some((group, factor?)));
+    let largest = known.max_by(|a, b| a.1.total_cmp(&b.1));
+    largest.map_or(NONE.to_owned(), |(group, factor)| {
+        format!("{}: {}", group.short(), value(factor, 0.1))
+    })
+}
+
 fn nis(effect: &ErrorTermTest) -> String {
-    let digits = |nis: f64| match nis < 10.0 {
-        true => value(nis, 0.01),
-        false => three_digits(nis),
+    let digits = |nis: f64| {
+        if nis < 10.0 {
+            value(nis, 0.01)
+        } else {
+            three_digits(nis)
+        }
     };
     format!("{} → {}", digits(effect.without), digits(effect.with))
 }

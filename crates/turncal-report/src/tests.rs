@@ -223,7 +223,6 @@ fn outcome(
         thermal: None,
         own: Vec::new(),
         alone: Vec::new(),
-        warming: Vec::new(),
         gravity: (run.site.gravity, 0.0),
         prior_attitudes: vec![AttitudePrior {
             mean: Matrix3::identity(),

@@ -19,7 +19,7 @@ use std::sync::Arc;
 
 use crate::calibration::{
     AttitudePrior, CalibrationError, DayToDay, Difference, Gate, Linearisation, NoisePolicy,
-    Options, PARAMETERS, Problem, Progress, SeparateEstimate, Solved, Stretch, from_vector,
+    Options, PARAMETERS, Problem, Progress, SeparateEstimate, Solved, from_vector,
     sensor_and_parameter, to_vector,
 };
 use crate::imu::{PerSensor, ThermalCoefficients, Triad};
@@ -71,30 +71,6 @@ impl<'a> Problem<'a> {
             model.thermal = temperatures::model(&problem, options)?.map(Arc::new);
         }
         Ok(problem.with_model(model))
-    }
-
-    /// Mean temperature of each dwell over all axes, °C, and its rate, K/s; NaN if unknown. Empty if nothing depends on
-    /// temperature.
-    pub(in crate::calibration) fn warming(&self) -> Vec<(f64, f64)> {
-        if self.model.thermal.is_none() {
-            return Vec::new();
-        }
-        let of_stretch = |stretch: &Stretch| {
-            let imu = &stretch.run.recording.imu;
-            let mean =
-                |all: PerSensor<[f64; 3]>| all.gyro.iter().chain(&all.accel).sum::<f64>() / 6.0;
-            let dwells = stretch.dwells.iter();
-            dwells
-                .map(|dwell| {
-                    let (from, to) = (imu.time(dwell.samples.start), imu.time(dwell.samples.end));
-                    let middle = 0.5 * (from + to);
-                    imu.temperature.as_ref().map_or((f64::NAN, f64::NAN), |t| {
-                        (mean(t.at(middle)), mean(t.rate(middle)))
-                    })
-                })
-                .collect::<Vec<_>>()
-        };
-        self.stretches().iter().flat_map(of_stretch).collect()
     }
 
     /// Whether any quantity differs between recordings or temperatures.

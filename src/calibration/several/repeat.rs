@@ -3,9 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::day_to_day::Difference;
-use crate::calibration::{
-    Innovation, Observation, Outcome, PARAMETERS, ParameterVector, SeparateEstimate, to_vector,
-};
+use crate::calibration::{Outcome, PARAMETERS, ParameterVector, SeparateEstimate, to_vector};
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
 
 /// Repeatability of a parameter between recordings.
@@ -109,22 +107,5 @@ impl Outcome {
             })
         };
         (0..PARAMETERS).filter_map(of).collect()
-    }
-
-    /// Sums of the whitened velocity innovations over the root of their number, for each dwell that has any, with the
-    /// number of the dwell.
-    pub fn by_dwell(&self) -> Vec<(usize, [f64; 3])> {
-        let seen = self.innovations.iter();
-        let seen = seen.filter(|i| i.accepted && i.observation == Observation::Velocity);
-        let seen: Vec<&Innovation> = seen.collect();
-        let of_dwell = |of: &[&Innovation]| {
-            let sum = |axis: usize| of.iter().map(|i| i.whitened[axis]).sum::<f64>();
-            (
-                of[0].dwell,
-                [0, 1, 2].map(|axis| sum(axis) / (of.len() as f64).sqrt()),
-            )
-        };
-        let dwells = seen.chunk_by(|a, b| a.dwell == b.dwell);
-        dwells.map(of_dwell).collect()
     }
 }

@@ -166,13 +166,6 @@ impl Position {
             closed_form_in_equal_time: self.closed_form_in_equal_time.map(square),
         }
     }
-
-    /// The filter's error in units of its predicted σ: east, and the deviation of north from its expectation
-    /// given east. Both are independent and standard normal if the covariance is correct.
-    pub fn whitened(&self) -> Option<Vector2<f64>> {
-        let (error, covariance) = self.filter?;
-        whitened(&error, &covariance)
-    }
 }
 
 fn whitened(error: &Vector2<f64>, covariance: &Matrix2<f64>) -> Option<Vector2<f64>> {

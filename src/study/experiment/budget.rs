@@ -18,8 +18,6 @@ use crate::calibration::{Group, PARAMETERS, ParameterMatrix};
 pub struct Budget {
     /// Stated RMS position error, nmile.
     pub claimed: f64,
-    /// Actual RMS position error, nmile.
-    pub actual: f64,
     /// The part of each of [`Group::all`].
     pub parts: Vec<Part>,
 }
@@ -40,9 +38,6 @@ impl Budget {
         let count = calibrated.len() as f64;
         let sum: ParameterMatrix = calibrated.iter().map(|c| c.covariance).sum();
         let covariance = sum / count;
-        let squares = calibrated
-            .iter()
-            .map(|c| (by_parameter * c.error).norm_squared());
         let variance = (by_parameter * covariance * by_parameter.transpose()).trace();
         let part = |group| {
             let mut of_group = by_parameter;
@@ -60,7 +55,6 @@ impl Budget {
         };
         Self {
             claimed: variance.sqrt(),
-            actual: (squares.sum::<f64>() / count).sqrt(),
             parts: Group::all().map(part).collect(),
         }
     }

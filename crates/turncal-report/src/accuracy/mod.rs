@@ -14,7 +14,7 @@ use turncal::calibration::result::BlockRecord;
 use turncal::calibration::{ErrorTerm, Nis};
 use turncal::study::accuracy::{Containment, Journey, Region};
 use turncal::study::navigation::{FORTY_HOURS, INTERVAL};
-use turncal::study::{Accuracy, Figures};
+use turncal::study::{Accuracy, Figures, NavigationAccuracy};
 
 /// The complete report of the study.
 pub fn document(accuracy: &Accuracy) -> Document {
@@ -29,16 +29,11 @@ pub fn document(accuracy: &Accuracy) -> Document {
     document.both(tables::gain(accuracy));
     document.both(tables::consistency(accuracy));
     document.both(tables::auxiliary(accuracy));
-    document.both(terms::costs(&accuracy.effects));
     document.both(terms::explained(&accuracy.effects));
-    document.both(tables::containment(accuracy));
     document.pages(figures::figures(accuracy));
     document.data = data(accuracy);
     document
 }
-
-/// Number of reasons for failure shown.
-const REASONS: usize = 3;
 
 /// What was studied.
 pub fn facts(accuracy: &Accuracy) -> Facts {
@@ -66,15 +61,6 @@ pub fn facts(accuracy: &Accuracy) -> Facts {
     facts.push("error terms", terms(accuracy));
     facts.push("table time", table_time(accuracy));
     facts.push("failures", failures(accuracy));
-    if let Some((median, most)) = passes(accuracy) {
-        let median = value(median, if median.fract() == 0.0 { 10.0 } else { 1.0 });
-        facts.push("passes", format!("median {median}, most {most}"));
-    }
-    let rejected = match rejected(accuracy) {
-        (0, _) => "none".to_owned(),
-        (of, runs) => format!("{} in {} of the runs", count(of), count(runs)),
-    };
-    facts.push("rejected observations", rejected);
     facts
 }
 
@@ -83,34 +69,29 @@ fn terms(accuracy: &Accuracy) -> String {
     let (scenario, unmodelled) = (&accuracy.study.scenario, &accuracy.study.unmodelled);
     let there = ErrorTerm::ALL.into_iter().filter(|&b| scenario.has(b));
     let (left_out, on): (Vec<_>, Vec<_>) = there.partition(|block| unmodelled.contains(block));
-    let named = |blocks: &[ErrorTerm]| match blocks {
-        [] => "none".to_owned(),
-        blocks => blocks
-            .iter()
-            .map(|&block| title(block))
-            .collect::<Vec<_>>()
-            .join(", "),
+    let named = |blocks: Vec<ErrorTerm>| {
+        let names: Vec<&str> = blocks.into_iter().map(title).collect();
+        if names.is_empty() {
+            "none".to_owned()
+        } else {
+            names.join(", ")
+        }
     };
-    let mut text = format!("in addition to K, E and D: {}", named(&on));
-    if !left_out.is_empty() {
-        text += &format!("; simulated but not modelled: {}", named(&left_out));
+    let is_complete = left_out.is_empty();
+    let mut text = format!("in addition to K, E and D: {}", named(on));
+    if !is_complete {
+        text += &format!("; simulated but not modelled: {}", named(left_out));
     }
     text
 }
 
 /// Median and largest number of passes; `None` if no run gave an estimate.
-pub fn passes(accuracy: &Accuracy) -> Option<(f64, usize)> {
+fn passes(accuracy: &Accuracy) -> Option<(f64, usize)> {
     let mut passes: Vec<usize> = accuracy.filtered().map(|of| of.passes).collect();
     passes.sort_unstable();
     let most = *passes.last()?;
     let [low, high] = [(passes.len() - 1) / 2, passes.len() / 2].map(|k| passes[k] as f64);
     Some((0.5 * (low + high), most))
-}
-
-/// Number of observations that the gate rejected, and in how many runs.
-pub fn rejected(accuracy: &Accuracy) -> (usize, usize) {
-    let rejected = || accuracy.filtered().map(|filtered| filtered.rejected);
-    (rejected().sum(), rejected().filter(|of| *of > 0).count())
 }
 
 fn table_time(accuracy: &Accuracy) -> String {
@@ -125,14 +106,12 @@ fn table_time(accuracy: &Accuracy) -> String {
 }
 
 fn failures(accuracy: &Accuracy) -> String {
-    let failed = accuracy.failures().count();
-    let reasons = accuracy.failures().take(REASONS);
-    let reasons = reasons.map(|(run, reason)| format!("run {run}: {reason}"));
-    let more = if failed > REASONS { "; …" } else { "" };
-    let reasons = reasons.collect::<Vec<_>>().join("; ");
-    match failed {
-        0 => "none".to_owned(),
-        _ => format!("{} ({reasons}{more})", count(failed)),
+    match accuracy.failures().next() {
+        None => "none".to_owned(),
+        Some((run, reason)) => {
+            let failed = count(accuracy.failures().count());
+            format!("{failed}, the first in run {run}: {reason}")
+        }
     }
 }
 
@@ -160,7 +139,7 @@ pub fn data(accuracy: &Accuracy) -> Value {
         "anees_directions": accuracy.anees.map(|anees| anees.directions),
         "nis": { "velocity": nis(&accuracy.velocity), "table": nis(&accuracy.table) },
         "passes": passes(accuracy).map(|(median, most)| json!({ "median": median, "largest": most })),
-        "rejected_observations": rejected(accuracy).0,
+        "rejected_observations": accuracy.filtered().map(|filtered| filtered.rejected).sum::<usize>(),
         "form_rejections":
             (tested > 0).then(|| json!({ "rejected": rejections, "tested": tested })),
     });
@@ -191,7 +170,11 @@ fn nis(nis: &Nis) -> Option<Value> {
 
 /// One per mission, or the reason why it cannot be navigated from the site of the scenario.
 fn navigation(accuracy: &Accuracy) -> Value {
-    let mission = |journey| {
+    let mission = |journey, of: Option<&NavigationAccuracy>, reason: Option<String>| {
+        let containment = of
+            .into_iter()
+            .flat_map(|of| &of.containment)
+            .map(containment);
         json!({
             "mission": match journey {
                 Journey::Standing => "standing",
@@ -199,22 +182,15 @@ fn navigation(accuracy: &Accuracy) -> Value {
             },
             "hours": f64::from(FORTY_HOURS) * INTERVAL / 3600.0,
             "latitude_deg": accuracy.study.scenario.site.latitude / DEGREE,
-            "not_navigated": null,
-            "position_nmile": null,
-            "containment": [],
+            "not_navigated": reason,
+            "position_nmile": of.map(|of| figures(accuracy, &of.figures, NAUTICAL_MILE)),
+            "containment": containment.collect::<Value>(),
         })
     };
-    let navigated = accuracy.navigation.iter().map(|of| {
-        let mut data = mission(of.journey);
-        data["position_nmile"] = figures(accuracy, &of.figures, NAUTICAL_MILE);
-        data["containment"] = of.containment.iter().map(containment).collect();
-        data
-    });
-    let others = accuracy.not_navigated.iter().map(|(journey, reason)| {
-        let mut data = mission(*journey);
-        data["not_navigated"] = reason.to_string().into();
-        data
-    });
+    let navigated = accuracy.navigation.iter();
+    let navigated = navigated.map(|of| mission(of.journey, Some(of), None));
+    let others = accuracy.not_navigated.iter();
+    let others = others.map(|(journey, reason)| mission(*journey, None, Some(reason.to_string())));
     navigated.chain(others).collect()
 }
 

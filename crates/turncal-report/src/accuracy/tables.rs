@@ -152,31 +152,6 @@ pub fn held(of: &Containment) -> String {
     format!("{} {found} % (claimed {claimed} %)", region_name(of.region))
 }
 
-/// Whether position errors lie within their predicted σ.
-pub fn containment(accuracy: &Accuracy) -> Table {
-    let sections = accuracy.navigation.iter().map(|of| {
-        of.containment.iter().map(|held: &Containment| {
-            let share = |hits: usize| percent(hits as f64 / held.runs as f64);
-            let (low, high) = held.interval;
-            cells![
-                format!("{}: {}", journey_name(of.journey), region_name(held.region)),
-                count(held.runs),
-                format!("{} %", share(held.within)),
-                format!("{} %", percent(held.region.probability())),
-                format!("{}…{} %", share(low), share(high)),
-                if held.as_claimed() { "yes" } else { "NO" },
-            ]
-        })
-    });
-    Table::new(
-        "Position error after 40 h within its predicted σ",
-        columns("| runs | within | claimed | 99 % interval | as claimed"),
-    )
-    .sections(sections)
-    .note("σ and ellipses: predicted from the filter covariance with the linear error model.")
-    .note("Interval: binomial, for the share of runs if the covariance is correct.")
-}
-
 /// 99 % of a normal distribution lie within this many σ.
 const SIGMAS_99: f64 = 2.576;
 

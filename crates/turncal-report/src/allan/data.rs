@@ -4,7 +4,7 @@ use crate::allan::quantity::{deviation_unit, quantity};
 use crate::allan::words;
 use crate::prelude::*;
 use turncal::imu::{NoiseKeys, Sensor};
-use turncal::noise::{AxisNoise, NoiseAnalysis, Process, of_kind};
+use turncal::noise::{AxisNoise, NoiseAnalysis, Process};
 
 const PROBABILITY: f64 = 0.95;
 
@@ -103,7 +103,7 @@ pub fn noise_table(analysis: &NoiseAnalysis) -> String {
         }
         for (key, value, comment) in fields {
             let mark = if comment.is_empty() { "" } else { "  # " };
-            text += &format!("{key} = {}{mark}{comment}\n", four_digits(value));
+            text += &format!("{key} = {:?}{mark}{comment}\n", rounded(value, 4));
         }
     }
     text
@@ -122,9 +122,10 @@ fn of_triad(analysis: &NoiseAnalysis, sensor: Sensor) -> Vec<Field> {
         return Vec::new();
     };
     let walk = quantity(Process::RandomWalk, sensor);
-    let comment = match figures.random_walk_is_limit {
-        true => "upper limit; its slope was not detected",
-        false => "RMS of the axes",
+    let comment = if figures.random_walk_is_limit {
+        "upper limit; its slope was not detected"
+    } else {
+        "RMS of the axes"
     };
     let of_walk = figures.noise.random_walk / walk.value;
     let mut fields = vec![(walk.key, of_walk, comment.to_owned())];
@@ -136,39 +137,13 @@ fn of_triad(analysis: &NoiseAnalysis, sensor: Sensor) -> Vec<Field> {
         correlation_time: time_key,
         ..
     } = NoiseKeys::of(sensor);
-    let stands_for = in_place_of(analysis, sensor);
-    let comment = format!("1σ of a Gauss–Markov process{stands_for}");
-    fields.push((key, of.sigma / unit, comment));
-    let open = match figures.correlation_is_open {
-        true => "longest that the recording can show; σ grows with its square root",
-        false => "",
+    let comment = "1σ of a Gauss–Markov process fitted to the deviations";
+    fields.push((key, of.sigma / unit, comment.to_owned()));
+    let open = if figures.correlation_is_open {
+        "longest that the recording can show; σ grows with its square root"
+    } else {
+        ""
     };
     fields.push((time_key, of.correlation_time, open.to_owned()));
     fields
-}
-
-/// The process that it represents, if not detected as such.
-fn in_place_of(analysis: &NoiseAnalysis, sensor: Sensor) -> String {
-    let found = analysis.triads.get(sensor).mean.found();
-    let stands_for = [Process::BiasInstability, Process::RateRandomWalk].into_iter();
-    let stands_for: Vec<String> = stands_for
-        .filter_map(|process| {
-            let of = quantity(process, sensor);
-            let strength = three_digits(of_kind(found, process)?.strength / of.value);
-            Some(format!("{} = {strength} {}", of.letter(), of.unit))
-        })
-        .collect();
-    match stands_for.is_empty() {
-        true => String::new(),
-        false => format!(
-            " fitted to the same deviations instead of {}",
-            stands_for.join(" and ")
-        ),
-    }
-}
-
-/// A TOML number.
-fn four_digits(value: f64) -> String {
-    let rounded: f64 = format!("{value:.3e}").parse().unwrap_or(value);
-    format!("{rounded:?}")
 }

@@ -23,8 +23,7 @@ pub fn figure(analysis: &NoiseAnalysis, sensor: Sensor) -> Plot {
     Plot::new(&file, &heading, (3, 440), panels).caption(
         "Overlapping Allan deviation against cluster time, both logarithmic, the same axes for all three. Dots with \
          band: measured values with their 95 % interval; black: sum of the detected processes; dashed: each detected \
-         process, with its slope and coefficient. Vertical line: 1 s, where random walk is read; ring: lowest \
-         deviation.",
+         process, with its coefficient; random walk N is read at 1 s. Ring: lowest deviation.",
     )
 }
 
@@ -64,34 +63,18 @@ fn panel(axis: &AxisNoise, letter: char, sensor: Sensor, (low, high): Point) -> 
     let dots = curve.tau.iter().zip(&curve.variance);
     let dots = dots.map(|(&tau, &variance)| (tau, shown(variance)));
     panel = panel.with(Series::marks(Mark::Dot, dots.filter(|(_, y)| *y > 0.0)).width(1.25));
-    let second = curve.tau.partition_point(|&tau| tau < 1.0);
-    if second > 0 && second < curve.tau.len() {
-        panel = panel
-            .with(
-                Series::new(Shape::Upright(1.0))
-                    .color(Color::Quiet)
-                    .width(0.75),
-            )
-            .with(Series::words((1.0, low), Anchor::AboveLeft, "1 s").color(Color::Quiet));
-    }
     panel.with_all(lowest.map(|at| Series::marks(Mark::Ring, [at]).color(Color::Ink)))
 }
 
-/// Such as `N = 0.448 °/√h, slope −½`.
+/// Such as `N = 0.448 °/√h`.
 fn coefficient(found: &Found, sensor: Sensor) -> String {
     let of = quantity(found.process, sensor);
-    let slope = match found.process {
-        Process::Quantisation => "slope −1".to_owned(),
-        Process::RandomWalk => "slope −½".to_owned(),
-        Process::BiasInstability => "slope 0".to_owned(),
-        Process::RateRandomWalk => "slope +½".to_owned(),
-        Process::RateRamp => "slope +1".to_owned(),
-        Process::GaussMarkov { correlation_time } => {
-            format!("Gauss–Markov, {} s", three_digits(correlation_time))
-        }
-    };
     let strength = three_digits(found.strength / of.value);
-    format!("{} = {strength} {}, {slope}", of.letter(), of.unit)
+    let mut text = format!("{} = {strength} {}", of.letter(), of.unit);
+    if let Process::GaussMarkov { correlation_time } = found.process {
+        text += &format!(", Gauss–Markov, {} s", three_digits(correlation_time));
+    }
+    text
 }
 
 /// Cluster times close enough for a smooth line.

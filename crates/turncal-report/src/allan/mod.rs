@@ -17,7 +17,7 @@ pub fn document(run: &str, analysis: &NoiseAnalysis) -> Document {
     let mut document = Document::new(format!(
         "Noise of {run}: {}, {}, {} samples at {} Hz",
         stretch.name,
-        words::duration(analysis.duration()),
+        duration(analysis.duration()),
         count(stretch.samples.len()),
         three_digits(period.recip())
     ));
@@ -28,7 +28,6 @@ pub fn document(run: &str, analysis: &NoiseAnalysis) -> Document {
     for &sensor in &analysis.sensors {
         document.both(tables::coefficients(analysis, sensor));
     }
-    document.both(tables::deviations(analysis));
     document.both(List::new("Not found", words::advice(analysis)));
     let toml = data::noise_table(analysis);
     document.both(Block::Code("For run.toml".to_owned(), toml));

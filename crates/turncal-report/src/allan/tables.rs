@@ -1,10 +1,9 @@
-//! The coefficients and the deviations as tables.
+//! The coefficients as tables.
 
 use super::quantity::{deviation_unit, quantity};
-use super::words;
 use crate::prelude::*;
 use turncal::imu::{AXES, Sensor};
-use turncal::noise::{AxisNoise, Found, NoiseAnalysis, Process, TriadNoise, of_kind};
+use turncal::noise::{AxisNoise, Found, NoiseAnalysis, Process, of_kind};
 
 /// Results for a triad: one row per process, one column per axis and one for their mean.
 pub fn coefficients(analysis: &NoiseAnalysis, sensor: Sensor) -> Table {
@@ -95,42 +94,4 @@ fn correlation_time(found: Found) -> String {
         Some(of) => plus_minus(correlation_time, of * correlation_time),
         None => three_digits(correlation_time),
     }
-}
-
-/// Allan deviations of all axes at every cluster time.
-pub fn deviations(analysis: &NoiseAnalysis) -> Table {
-    let freedom = |triad: &TriadNoise, point: usize| {
-        let of = |axis: &AxisNoise| Some(*axis.identified.as_ref()?.freedom.get(point)?);
-        triad.axes.iter().filter_map(of).fold(f64::NAN, f64::min)
-    };
-    let triads = &analysis.triads;
-    let row = |(point, tau): (usize, &f64)| {
-        let mut row = vec![three_digits(*tau)];
-        for &sensor in &analysis.sensors {
-            let unit = deviation_unit(sensor).1;
-            for axis in &triads.get(sensor).axes {
-                let variance = axis.curve.variance.get(point).copied();
-                row.push(three_digits(variance.unwrap_or(f64::NAN).sqrt() / unit));
-            }
-        }
-        let least = freedom(&triads.gyro, point).min(freedom(&triads.accel, point));
-        let least = Some(least).filter(|least| least.is_finite());
-        row.push(or_dash(least, |least| count(least.round() as usize)));
-        row
-    };
-    let axes = analysis.sensors.iter().flat_map(|&sensor| {
-        let symbol = deviation_unit(sensor).0;
-        AXES.map(|axis| format!("{} {axis}, {symbol}", sensor.name()))
-    });
-    let columns = std::iter::once("τ, s".to_owned()).chain(axes);
-    let columns = columns.chain(["degrees of freedom".to_owned()]);
-    let taus = triads.gyro.mean.curve.tau.iter().enumerate();
-    let mut table = Table::new("Overlapping Allan deviation", columns)
-        .section(taus.map(row))
-        .note(format!(
-            "Degrees of freedom: the smallest of the six. {}",
-            words::INTERVALS
-        ));
-    table.optional = vec![7];
-    table
 }

@@ -10,9 +10,6 @@ const UNLIKE: f64 = 1.5;
 /// Deviations of the variance from all models below this fraction are not reported.
 const SMALL: f64 = 0.02;
 
-pub const INTERVALS: &str = "The 95 % interval of a deviation s with ν degrees of freedom is s √(ν/χ²₀.₉₇₅) to s \
-    √(ν/χ²₀.₀₂₅) (NIST SP 1065, 5.3).";
-
 /// Excluded short cluster times, in a sentence.
 fn left_out(of: &Identified, taus: &[f64]) -> Option<String> {
     let from = taus.get(of.first).filter(|_| of.first > 0)?;
@@ -151,10 +148,4 @@ pub fn advice(analysis: &NoiseAnalysis) -> Vec<String> {
         }
     }
     sentences
-}
-
-/// A time in a readable unit.
-pub fn duration(seconds: f64) -> String {
-    let (unit, size) = readable(&TIMES, seconds);
-    format!("{} {unit}", three_digits(seconds / size))
 }

@@ -12,11 +12,12 @@ pub fn add(document: &mut Document, report: &Report) {
         return;
     };
     document.brief.push(accuracy(report, estimate).into());
+    let navigated = report.navigation.ok().filter(|of| !of.is_empty());
     let mut facts = Facts::default();
     for (name, value) in [
         ("weakest", weakest(report)),
         ("excluded from fit", tables::cross_validation(report)),
-        ("navigation", navigation(report)),
+        ("navigation", navigated.map(navigation::line)),
         ("not covered", budget::unseen(report, estimate)),
     ] {
         if let Some(value) = value {
@@ -28,10 +29,8 @@ pub fn add(document: &mut Document, report: &Report) {
 
 /// RMS σ and error of each group, with the predicted σ and the largest source.
 fn accuracy(report: &Report, estimate: &Estimate) -> Table {
-    let both = match report.methods()[..] {
-        [(_, closed), (_, _)] => Some(closed),
-        _ => None,
-    };
+    let closed_form = report.closed_form.map(|closed| closed.estimate);
+    let both = report.outcome.and(closed_form);
     let truth = report.truth_vector();
     let mut columns = vec!["Accuracy (group RMS)", "1σ"];
     columns.extend(truth.map(|_| "error"));
@@ -81,11 +80,4 @@ fn weakest(report: &Report) -> Option<String> {
         group.title(),
         group.unit()
     ))
-}
-
-fn navigation(report: &Report) -> Option<String> {
-    match report.navigation {
-        Ok(navigated @ [_, ..]) => Some(navigation::line(navigated)),
-        _ => None,
-    }
 }

@@ -113,7 +113,7 @@ pub fn figure(budget: &Budget, estimate: &Estimate) -> Plot {
                 *floor += 100.0 * heights(i);
                 (n as f64, low, *floor)
             });
-            let bars = Series::bars(0.35, Fill::Solid, blocks);
+            let bars = Series::bars(0.35, blocks);
             bars.color(color).key(key)
         };
         for (n, part) in own.iter().enumerate() {
@@ -170,18 +170,17 @@ pub fn unseen(report: &Report, estimate: &Estimate) -> Option<String> {
 
 /// Effects not included in any sum: error terms that are not estimated.
 pub fn left_off(report: &Report, estimate: &Estimate) -> Table {
-    let cell = |group: Group, of: &ParameterVector| or_dash(group.rms(of, estimate), sigma);
     let row = |test: &ErrorTermTest| {
         let left_off = test.left_off?;
         let mut row = cells![title(test.term)];
-        row.extend(Group::all().map(|group| {
-            let [usual, shown] = [&left_off.usual, &left_off.shown].map(|of| cell(group, of));
-            match usual == NONE {
-                true => usual,
-                false => format!("{shown} ({usual})"),
-            }
-        }));
+        let changes = Group::all().map(|group| group.rms(&left_off.shown, estimate));
+        row.extend(changes.map(|change| or_dash(change, sigma)));
         Some(row)
+    };
+    let gravity = if report.run.site.gravity_sigma > 0.0 {
+        ""
+    } else {
+        " and gravity (1 mGal changes every accelerometer scale factor by 1.02 ppm)"
     };
     Table::new(
         "Possible effect of error terms that are not estimated",
@@ -191,13 +190,10 @@ pub fn left_off(report: &Report, estimate: &Estimate) -> Table {
     .note(format!(
         "Taken as exact: the latitude of the site (0.001° changes gyro biases by up to {} °/h){}.",
         three_digits(ROTATION_RATE * LATITUDE / DEG_PER_H),
-        match report.run.site.gravity_sigma > 0.0 {
-            true => "",
-            false => " and gravity (1 mGal changes every accelerometer scale factor by 1.02 ppm)",
-        }
+        gravity
     ))
     .note(
         "Not included in the sums above. RMS change of the parameters of a group if the term is as large as the data \
-         allow (in brackets: as large as its usual σ). If it matters, estimate the term with --with.",
+         allow. If it matters, estimate the term with --with.",
     )
 }

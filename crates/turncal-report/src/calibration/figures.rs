@@ -1,16 +1,11 @@
 //! The figures.
 
-use nalgebra::Matrix3;
-
 use crate::calibration::report::Report;
 use crate::prelude::*;
-use turncal::attitude::matrix;
-use turncal::calibration::{Epoch, Estimate, Innovation, Observation, Outcome, ParameterVector};
+use turncal::calibration::{Epoch, Estimate, Innovation, Observation, Outcome};
 use turncal::imu::{AXES, Sensor};
-use turncal::recording::{ImuSamples, TableLog};
+use turncal::recording::ImuSamples;
 
-/// End of the axis of estimates, in final σ; with the prior included, the final values would be unreadable.
-const EXTENT: f64 = 300.0;
 /// Beyond this an innovation is drawn at the edge.
 const EDGE: f64 = 6.0;
 /// Up to this many innovations are drawn as dots, more as a line through the extremes.
@@ -24,12 +19,7 @@ impl Report<'_> {
     /// All figures with data.
     pub fn figures(&self) -> Vec<Plot> {
         let mut plots = Vec::new();
-        plots.extend(match (self.truth_vector(), self.methods().as_slice()) {
-            (Some(truth), methods @ [_, ..]) => Some(errors(methods, &truth)),
-            _ => None,
-        });
         if let Some(outcome) = self.against_time() {
-            plots.extend(self.estimates(outcome));
             plots.extend(self.innovations(outcome));
         }
         if self.outcome.is_none() || self.against_time().is_some() {
@@ -55,9 +45,6 @@ impl Report<'_> {
         let truth = self.truth_vector();
         let panel = |group: Group| {
             let indices = group.estimated(&outcome.estimate);
-            if indices.is_empty() {
-                return Panel::blank(format!("{}: all fixed", group.title()));
-            }
             let line = |(n, &i): (usize, &usize)| {
                 let points = history.iter();
                 let points = points.map(|m| (m.time, m.sigma[i] / group.unit_value()));
@@ -70,10 +57,11 @@ impl Report<'_> {
                 let line = Series::line(points).color(Color::Ink);
                 line.dashed().label("error")
             });
-            Panel::new(group.titled(), self.time(), Axis::log(""))
+            let panel = Panel::new(group.titled(), self.time(), Axis::log(""))
                 .shaded(self.dwells)
                 .with_all(indices.iter().enumerate().map(line))
-                .with_all(error)
+                .with_all(error);
+            (!indices.is_empty()).then_some(panel)
         };
         let mut caption =
             "1σ of every parameter during the last pass, one panel per group, logarithmic. Grey: dwells; white: \
@@ -82,49 +70,9 @@ impl Report<'_> {
         if truth.is_some() {
             caption += " Dashed: the largest true error in the group; it should end within a few σ of the lines.";
         }
-        let (heading, panels) = ("Accuracy against time", Group::all().map(panel));
+        let (heading, panels) = ("Accuracy against time", Group::all().filter_map(panel));
         let plot = Plot::new("sigma.svg", heading, (3, 330), panels);
         (!history.is_empty()).then(|| plot.caption(caption))
-    }
-
-    /// Estimate minus truth, or minus the final estimate, within ±3σ: a small panel for each parameter.
-    fn estimates(&self, outcome: &Outcome) -> Option<Plot> {
-        let estimate = &outcome.estimate;
-        let (reference, minus) = match self.truth_vector() {
-            Some(truth) => (truth, "truth"),
-            None => (estimate.vector(), "final value"),
-        };
-        let panel = |group: Group, index: usize| {
-            let unit = group.unit_value();
-            let of = |of: &dyn Fn(&Epoch) -> f64| -> Vec<Point> {
-                let history = outcome.history.iter();
-                history.map(|m| (m.time, of(m) / unit)).collect()
-            };
-            let error = |m: &Epoch| m.estimate[index] - reference[index];
-            let [low, high] = [-3.0, 3.0].map(|factor| of(&|m| factor * m.sigma[index]));
-            let sigma = group.rms(&estimate.sigma(), estimate).unwrap_or(1.0);
-            let title = format!("{} {}", group.title(), axis_name(estimate.form(), index));
-            let y = Axis::symlog(sigma).between(-EXTENT * sigma, EXTENT * sigma);
-            Panel::new(format!("{title}, {}", group.unit()), self.time(), y)
-                .shaded(self.dwells)
-                .with(Series::band(low, high))
-                .with(Series::zero())
-                .with(Series::line(of(&error)).color(Color::Ink).width(1.75))
-        };
-        let mut panels: Vec<Panel> = Vec::new();
-        for group in Group::all() {
-            let indices = group.estimated(estimate);
-            panels.extend(indices.into_iter().map(|index| panel(group, index)));
-            panels.resize(panels.len().next_multiple_of(3), Panel::blank(""));
-        }
-        let caption = format!(
-            "Line: estimate over time, minus {minus}; band: its ±3σ. The vertical axis is linear within the final σ \
-             of the group, logarithmic beyond, and ends at {EXTENT} times that σ; larger values are drawn at the \
-             edge. The line should stay in its band."
-        );
-        let drawn = !outcome.history.is_empty() && !panels.is_empty();
-        let heading = "Estimates and their ±3σ bands";
-        drawn.then(|| Plot::new("estimates.svg", heading, (3, 185), panels).caption(caption))
     }
 
     /// Whitened innovations with their bounds: velocity above, table attitude below.
@@ -148,12 +96,13 @@ impl Report<'_> {
                 those.map(point)
             };
             let accepted: Vec<_> = of(true).collect();
-            let shown = match accepted.len() <= DOTS {
-                true => Series::marks(Mark::Dot, accepted),
-                false => Series::line(self.interrupted_by_turns(&accepted)),
+            let shown = if accepted.len() <= DOTS {
+                Series::marks(Mark::Dot, accepted)
+            } else {
+                Series::line(self.interrupted_by_turns(&accepted))
             };
             let title = format!("{}, {}, σ", kind.name(), ["east", "north", "up"][direction]);
-            let y = Axis::linear("").between(-EDGE, EDGE).step(2.0);
+            let y = Axis::linear("").between(-EDGE, EDGE);
             Panel::new(title, self.time(), y)
                 .shaded(self.dwells)
                 .with(shown.width(1.0))
@@ -204,7 +153,7 @@ fn correlation(estimate: &Estimate) -> Option<Plot> {
             let (x, y) = (column as f64, (indices.len() - 1 - row) as f64);
             let half = 0.45 * r.abs().min(1.0);
             if row > column && half > FAINT {
-                let square = Series::bars(half, Fill::Solid, [(x, y - half, y + half)]);
+                let square = Series::bars(half, [(x, y - half, y + half)]);
                 series.push(square.nth(usize::from(r < 0.0)));
             } else if row < column && r.abs() >= WRITTEN {
                 series.push(Series::words(
@@ -227,134 +176,30 @@ fn correlation(estimate: &Estimate) -> Option<Plot> {
     (!indices.is_empty()).then_some(plot)
 }
 
-/// Magnitude of the error of each parameter for each method, with its stated σ.
-fn errors(methods: &[(&str, &Estimate)], truth: &ParameterVector) -> Plot {
-    let form = methods[0].1.form();
-    let panel = |group: Group| {
-        let mut indices = group.parameters(form);
-        indices.retain(|&i| methods.iter().any(|(_, m)| m.covariance[(i, i)] > 0.0));
-        if indices.is_empty() {
-            return Panel::blank(format!("{}: all fixed", group.title()));
-        }
-        let series = methods.iter().enumerate().map(|(n, (name, estimate))| {
-            let unit = group.unit_value();
-            let (error, sigma) = (estimate.vector() - truth, estimate.sigma() / unit);
-            let offset = beside(n, methods.len(), 0.52);
-            let points = indices.iter().enumerate().map(|(k, &i)| {
-                let at = (k as f64 + offset, error[i].abs() / unit);
-                (at, (0.0, sigma[i]))
-            });
-            let (mark, color) = method_mark(name);
-            let marks = Series::whiskers(mark, points).color(color);
-            marks.width(2.0).key(*name)
-        });
-        let x = Axis::places(indices.iter().map(|&i| axis_name(form, i)));
-        Panel::new(group.titled(), x, Axis::log("")).with_all(series)
-    };
-    let mut caption = "Magnitude of the true error of each parameter, logarithmic. The whisker ends at the stated \
-        1σ; about two marks in three should be below its top."
-        .to_owned();
-    if methods.len() == 2 {
-        caption += " Open rings: closed form; filled dots: EKF.";
-    }
-    let heading = "Errors against the truth";
-    Plot::new("comparison.svg", heading, (3, 300), Group::all().map(panel)).caption(caption)
-}
-
-/// Mark and colour of a method, the same in every figure.
-fn method_mark(name: &str) -> (Mark, Color) {
-    match name {
-        "EKF" => (Mark::Dot, Color::Nth(0)),
-        _ => (Mark::Ring, Color::Nth(1)),
-    }
-}
-
-/// Closer to the vertical than this, the azimuth of an axis is not drawn.
-const STEEP: f64 = 80.0 * DEGREE;
-/// Azimuth up to which a curve may exceed ±180° before it wraps, °.
-const PAST: f64 = 190.0;
-
-/// Elevation and azimuth of the body axes from the table, and body rates from the gyros.
+/// Rates about the body axes.
 fn path(report: &Report) -> Plot {
-    let (start, end) = report.time_span();
-    let numbers = || {
-        let dwells = report.dwells.iter().enumerate();
-        dwells.map(|(n, dwell)| (0.5 * (dwell.start + dwell.end), (n + 1).to_string()))
-    };
-    let panel = |title: &str, y: Axis, line: &dyn Fn(usize) -> Series| {
-        let lines = [0, 1, 2].map(|axis| line(axis).axis(axis).label(AXES[axis]));
-        Panel::new(title, Axis::linear("time, s").between(start, end), y)
-            .shaded(report.dwells)
-            .tagged(1, numbers())
-            .with_all(lines)
-    };
-    let table = report.table().filter(|table| !table.time.is_empty());
-    let mut panels = Vec::new();
-    let mut caption = String::new();
-    if let Some(table) = table {
-        let y = Axis::linear("").between(-95.0, 130.0).step(45.0);
-        panels.push(panel("elevation of the body axes, °", y, &|axis| {
-            elevation(table, axis)
-        }));
-        let y = Axis::linear("").between(-200.0, 260.0).step(90.0);
-        panels.push(panel("azimuth of the body axes, °", y, &|axis| {
-            azimuth(table, axis)
-        }));
-        caption += "Elevation of each body axis above the horizon and azimuth clockwise from North, from the \
-            turntable readings. Unlike heading, pitch and roll these have no singularity; azimuth is not drawn \
-            within 10° of the vertical. ";
-    }
-    caption +=
-        "Rates: raw gyro output about the body axes. Grey: dwells, numbered where space permits.";
+    let numbers = report.dwells.iter().enumerate();
+    let numbers = numbers.map(|(n, dwell)| (0.5 * (dwell.start + dwell.end), (n + 1).to_string()));
+    let imu = &report.run.recording.imu;
     let y = Axis::linear("").including([0.0]).room(0.05, 0.16);
-    panels.push(panel("rate about the body axes, °/s", y, &|axis| {
-        samples(&report.run.recording.imu, Sensor::Gyro, axis, DEGREE)
-    }));
-    Plot::new("path.svg", "Path", (1, 240), panels).caption(caption)
+    let panel = Panel::new("rate about the body axes, °/s", report.time(), y)
+        .shaded(report.dwells)
+        .tagged(numbers)
+        .with_all(samples(imu, Sensor::Gyro, DEGREE));
+    Plot::new("path.svg", "Path", (1, 310), [panel])
+        .caption("Raw gyro output about the body axes. Grey: dwells, numbered where space permits.")
 }
 
-/// Elevation of a body axis above the horizon in degrees.
-fn elevation(table: &TableLog, axis: usize) -> Series {
-    let line = table.time.iter().zip(&table.attitude);
-    Series::line(line.map(|(&t, attitude)| (t, axis_elevation(&matrix(attitude), axis) / DEGREE)))
-}
-
-/// Azimuth of a body axis clockwise from North in degrees, interrupted at jumps and near the vertical.
-fn azimuth(table: &TableLog, axis: usize) -> Series {
-    let gap = (f64::NAN, f64::NAN);
-    let (mut last, mut line) = (f64::NAN, Vec::new());
-    for (&t, attitude) in table.time.iter().zip(&table.attitude) {
-        let c = matrix(attitude);
-        if axis_elevation(&c, axis).abs() > STEEP {
-            last = f64::NAN;
-            line.push(gap);
-            continue;
-        }
-        let angle = c[(0, axis)].atan2(c[(1, axis)]) / DEGREE;
-        let near = [angle, angle - 360.0, angle + 360.0];
-        let near = near.into_iter().filter(|a| a.abs() <= PAST);
-        let next = near.min_by(|a, b| (a - last).abs().total_cmp(&(b - last).abs()));
-        let next = next.filter(|_| last.is_finite()).unwrap_or(angle);
-        if (next - last).abs() > 180.0 {
-            line.push(gap);
-        }
-        line.push((t, next));
-        last = next;
-    }
-    Series::line(line)
-}
-
-fn axis_elevation(c: &Matrix3<f64>, axis: usize) -> f64 {
-    c[(2, axis)].clamp(-1.0, 1.0).asin()
-}
-
-/// Mean of each sample of a triad along a body axis, in a unit per second.
-pub fn samples(imu: &ImuSamples, sensor: Sensor, axis: usize, unit: f64) -> Series {
+/// Mean of each sample of a triad along each body axis, in a unit per second.
+pub fn samples(imu: &ImuSamples, sensor: Sensor, unit: f64) -> [Series; 3] {
     let of = match sensor {
         Sensor::Gyro => &imu.gyro,
         Sensor::Accel => &imu.accel,
     };
     let middle = |k: usize| imu.time(k) + 0.5 * imu.period;
-    let points = (0..of.len()).zip(of.iter());
-    Series::line(points.map(|(k, sample)| (middle(k), sample[axis] / imu.period / unit)))
+    [0, 1, 2].map(|axis| {
+        let points = (0..of.len()).zip(of.iter());
+        let points = points.map(|(k, sample)| (middle(k), sample[axis] / imu.period / unit));
+        Series::line(points).nth(axis).width(1.0).label(AXES[axis])
+    })
 }

@@ -45,7 +45,7 @@ impl Report<'_> {
         document.pages(self.against_time().and_then(|outcome| self.sigma(outcome)));
         let quality = self.quality.filter(|of| !of.dwells.is_empty());
         document.pages(quality.map(residuals::figure));
-        document.pages(self.outcome.map_or_else(Vec::new, temperature::figures));
+        document.pages(self.outcome.and_then(temperature::figure));
         document.fold("Every parameter");
         if let Some(estimate) = self.estimate() {
             document.both(self.parameters(estimate));
@@ -57,8 +57,6 @@ impl Report<'_> {
         if let Some(outcome) = self.outcome {
             temperature::add(&mut document, outcome);
             document.page(tables::consistency(outcome));
-            document.page(tables::passes(outcome));
-            document.both(terms::costs(self.effects));
             document.both(terms::explained(self.effects));
         }
         if let (Some(of), Some(estimate)) = (self.budget, self.estimate()) {
@@ -87,10 +85,7 @@ impl Report<'_> {
             Some(_) => "with a table",
             None => "without a table",
         };
-        let dwells = match self.dwells.len() {
-            1 => "one dwell".to_owned(),
-            n => format!("{n} dwells"),
-        };
+        let dwells = several(self.dwells.len(), "dwell");
         let mut lead = vec![
             match self.outcome.map_or(0, |outcome| outcome.alone.len()) {
                 0 | 1 => format!(
@@ -102,9 +97,10 @@ impl Report<'_> {
             },
         ];
         lead.extend(self.outcome.map(|outcome| {
-            let converged = match outcome.converged {
-                true => "converged",
-                false => "NOT CONVERGED",
+            let converged = if outcome.converged {
+                "converged"
+            } else {
+                "NOT CONVERGED"
             };
             let (passes, nis) = (outcome.passes.len(), tables::nis(outcome).join(", "));
             format!("EKF {converged} after {passes} passes; NIS with its 95 % interval: {nis}.")
@@ -127,11 +123,7 @@ impl Report<'_> {
             Word::Failed => "do not use values or σ",
             _ => &format!("{determined} of {estimated} parameters determined"),
         };
-        let findings = match self.findings.len() {
-            0 => "no findings",
-            1 => "one finding",
-            n => &format!("{n} findings"),
-        };
+        let findings = several(self.findings.len(), "finding");
         Some((word, format!("{of_it}, {findings}")))
     }
 }
@@ -152,14 +144,15 @@ pub fn run(report: &Report) -> Facts {
     let run = report.run;
     let (imu, site) = (&run.recording.imu, &run.site);
     let mut facts = Facts::new("Run", [("run", run.recording.name.clone())]);
-    let place = match site.is_known {
-        true => format!(
+    let place = if site.is_known {
+        format!(
             "latitude {}°, longitude {}°, height {} m",
             value(site.latitude / DEGREE, 1e-4),
             value(site.longitude / DEGREE, 1e-4),
             value(site.height, 1.0),
-        ),
-        false => "not stated".to_owned(),
+        )
+    } else {
+        "not stated".to_owned()
     };
     let gravity = value(site.gravity, 1e-5);
     facts.push("site", format!("{place}, gravity {gravity} m/s²"));

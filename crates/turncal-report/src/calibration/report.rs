@@ -79,13 +79,4 @@ impl Report<'_> {
         let imu = &self.run.recording.imu;
         (imu.start(), imu.end())
     }
-
-    /// Both methods that ran, the closed form first.
-    pub fn methods(&self) -> Vec<(&'static str, &Estimate)> {
-        let closed = self
-            .closed_form
-            .map(|closed| ("closed form", closed.estimate));
-        let filter = self.outcome.map(|outcome| ("EKF", &outcome.estimate));
-        closed.into_iter().chain(filter).collect()
-    }
 }

@@ -71,25 +71,6 @@ pub fn weakest(outcome: &Outcome) -> Table {
         )
 }
 
-/// The passes of the filter.
-pub fn passes(outcome: &Outcome) -> Table {
-    let rows = outcome.passes.iter().enumerate().map(|(n, pass)| {
-        cells![
-            (n + 1).to_string(),
-            three_digits(pass.largest_step),
-            whole(pass.cost),
-            count(pass.observations),
-            three_digits(pass.cost / pass.observations as f64),
-            count(pass.rejected),
-        ]
-    });
-    Table::new(
-        "Passes",
-        columns("pass | largest step, σ | cost | scalars | cost / scalars | rejected"),
-    )
-    .section(rows)
-}
-
 fn observed(outcome: &Outcome) -> impl Iterator<Item = (&'static str, Nis)> {
     let kinds = outcome.consistency.kinds();
     kinds.map(|(observation, nis)| (observation.name(), nis))
@@ -178,11 +159,12 @@ pub fn residuals(quality: &Quality, table: Option<&TableLog>) -> Table {
         columns.extend(["cross-validation: number", "RMS", "largest"]);
     }
     let table = Table::new("Residuals at rest and after turns", columns).section(rows);
-    match quality.held_out.is_some() {
-        true => table.note(
+    if quality.held_out.is_some() {
+        table.note(
             "Cross-validation: residuals in dwells excluded from the fit, and over the turns that end in them.",
-        ),
-        false => table,
+        )
+    } else {
+        table
     }
 }
 

@@ -2,30 +2,28 @@
 
 use crate::prelude::*;
 use turncal::calibration::{
-    Estimate, Outcome, ParameterMatrix, ParameterVector, SeparateEstimate, Thermal, parameter_name,
-    sensor_and_parameter,
+    Estimate, Outcome, SeparateEstimate, Thermal, parameter_name, sensor_and_parameter,
 };
 use turncal::imu::{InstallationForm, RATE, Sensor};
 
 /// Points of a curve.
 const POINTS: usize = 81;
 
-/// Change of parameters with temperature, and any remaining effect of temperature.
-pub fn figures(outcome: &Outcome) -> Vec<Plot> {
-    let Some(thermal) = &outcome.thermal else {
-        return Vec::new();
-    };
+/// Change of parameters with temperature, if they depend on it.
+pub fn figure(outcome: &Outcome) -> Option<Plot> {
+    let thermal = outcome.thermal.as_ref()?;
     let reference = outcome.estimate.vector();
     let alone = |index: usize| {
-        let alone = alone(outcome, index);
-        let changes = alone.map(|(t, value, _)| (t, value - reference[index]));
-        changes.collect()
+        let (sensor, _) = sensor_and_parameter(index);
+        let change = |alone: &SeparateEstimate| {
+            let axes = alone.temperature.as_ref()?.get(sensor);
+            let value = alone.estimate.as_ref()?.vector()[index];
+            Some((axes.iter().sum::<f64>() / 3.0, value - reference[index]))
+        };
+        outcome.alone.iter().filter_map(change).collect()
     };
     let marks = "each recording alone, with stated noise";
-    vec![
-        curves(&outcome.estimate, thermal, marks, alone),
-        residuals(outcome),
-    ]
+    Some(curves(&outcome.estimate, thermal, marks, alone))
 }
 
 /// Adds tables and figures, if anything changes or differs.
@@ -34,23 +32,9 @@ pub fn add(document: &mut Document, outcome: &Outcome) {
         let form = outcome.estimate.form();
         document.both(orders(form, thermal));
         document.both(hysteresis(form, thermal));
-        let known = outcome.alone.iter().filter(|a| a.estimate.is_some());
-        if known.count() > 1 {
-            document.page(departures(outcome, thermal));
-        }
     }
     document.both(recordings(outcome));
     document.both(differences(outcome));
-}
-
-/// Change of all parameters from those at the reference, and σ of the resulting values.
-fn there(
-    estimate: &Estimate,
-    thermal: &Thermal,
-    temperature: f64,
-) -> (ParameterVector, ParameterMatrix) {
-    let state = turncal::imu::thermal_state_everywhere(&thermal.model.range, temperature, 0.0);
-    thermal.at(&state, &estimate.covariance)
 }
 
 /// Order and coefficients of each parameter.
@@ -84,12 +68,8 @@ pub fn orders(form: InstallationForm, thermal: &Thermal) -> Table {
             three_digits(range.reference)
         )
     };
-    let ranges = match range(Sensor::Gyro) == range(Sensor::Accel) {
-        true => range(Sensor::Gyro),
-        false => Sensor::ALL
-            .map(|of| format!("{}s {}", of.name(), range(of)))
-            .join("; "),
-    };
+    let ranges = Sensor::ALL.map(|of| format!("{} (axes of {})", range(of), triad_name(of)));
+    let ranges = ranges.join(" and ");
     Table::new("Change with temperature", columns)
         .sections(Group::all().map(|group| {
             let rows = group.parameters(form).into_iter();
@@ -124,133 +104,44 @@ pub fn hysteresis(form: InstallationForm, thermal: &Thermal) -> Table {
     .section(rows)
 }
 
-/// A panel for each estimated group: its parameters against temperature, with a margin of this part of the range at both
-/// ends.
-fn against_temperature(
-    estimate: &Estimate,
-    thermal: &Thermal,
-    room: f64,
-    series: impl Fn(Group, &[usize]) -> Vec<Series>,
-) -> Vec<Panel> {
-    let panel = |group: Group| {
-        let indices = group.estimated(estimate);
-        let range = thermal.model.range.get(group.sensor());
-        let room = room * (range.highest - range.lowest);
-        let x = Axis::linear("temperature, °C").between(range.lowest - room, range.highest + room);
-        let y = Axis::linear("").room(0.05, 0.05);
-        let panel = Panel::new(group.titled(), x, y).with_all(series(group, &indices));
-        (!indices.is_empty()).then_some(panel)
-    };
-    Group::all().filter_map(panel).collect()
-}
-
-/// Estimate of a parameter from each recording alone: temperature at its axis, value and σ.
-fn alone(outcome: &Outcome, index: usize) -> impl Iterator<Item = (f64, f64, f64)> {
-    let (sensor, _) = sensor_and_parameter(index);
-    outcome.alone.iter().filter_map(move |alone| {
-        let estimate = alone.estimate.as_ref()?;
-        let axes = alone.temperature.as_ref()?.get(sensor);
-        let temperature = axes.iter().sum::<f64>() / 3.0;
-        Some((
-            temperature,
-            estimate.vector()[index],
-            estimate.sigma()[index],
-        ))
-    })
-}
-
 /// Every parameter against temperature, with marks of this meaning: temperature and change of the parameter from the
 /// reference.
 pub fn curves(
     estimate: &Estimate,
     thermal: &Thermal,
     meaning: &str,
-    marks: impl Fn(usize) -> Vec<(f64, f64)>,
+    marks: impl Fn(usize) -> Vec<Point>,
 ) -> Plot {
-    let form = estimate.form();
-    let series = |group: Group, indices: &[usize]| {
+    let panel = |group: Group| {
         let (range, unit) = (thermal.model.range.get(group.sensor()), group.unit_value());
         let temperatures = steps(range.lowest, range.highest, POINTS);
-        let curve = temperatures.map(|t| (t, there(estimate, thermal, t)));
-        let curve: Vec<(f64, (ParameterVector, ParameterMatrix))> = curve.collect();
-        let of_parameter = |(n, &i): (usize, &usize)| {
+        let curve = temperatures.map(|t| {
+            let state = turncal::imu::thermal_state_everywhere(&thermal.model.range, t, 0.0);
+            (t, thermal.at(&state, &estimate.covariance))
+        });
+        let curve: Vec<_> = curve.collect();
+        let indices = group.estimated(estimate);
+        let series = indices.iter().enumerate().flat_map(|(n, &i)| {
             let points = curve.iter().map(|(t, (change, covariance))| {
-                (
-                    *t,
-                    change[i] / unit,
-                    covariance[(i, i)].max(0.0).sqrt() / unit,
-                )
+                let sigma = covariance[(i, i)].max(0.0).sqrt();
+                (*t, change[i] / unit, sigma / unit)
             });
             let [band, line] = Series::curve(&points.collect::<Vec<_>>());
             let marks = marks(i).into_iter().map(|(t, change)| (t, change / unit));
-            let line = line.nth(n).label(axis_name(form, i));
+            let line = line.nth(n).label(axis_name(estimate.form(), i));
             [band, line, Series::marks(Mark::Ring, marks).nth(n)]
-        };
-        indices.iter().enumerate().flat_map(of_parameter).collect()
+        });
+        let room = 0.03 * (range.highest - range.lowest);
+        let x = Axis::linear("temperature, °C").between(range.lowest - room, range.highest + room);
+        let y = Axis::linear("").room(0.05, 0.05);
+        let panel = Panel::new(group.titled(), x, y).with_all(series);
+        (!indices.is_empty()).then_some(panel)
     };
-    let panels = against_temperature(estimate, thermal, 0.03, series);
     let heading = "Parameters against temperature";
+    let panels = Group::all().filter_map(panel);
     Plot::new("temperature.svg", heading, (3, 330), panels).caption(format!(
         "Change of each parameter from its value at the reference temperature, with its ±1σ band. Rings: {meaning}."
     ))
-}
-
-/// Estimate of each recording alone minus the curve.
-fn departures(outcome: &Outcome, thermal: &Thermal) -> Plot {
-    let (form, reference) = (outcome.estimate.form(), outcome.estimate.vector());
-    let series = |group: Group, indices: &[usize]| {
-        let (range, unit) = (thermal.model.range.get(group.sensor()), group.unit_value());
-        let of_parameter = |(n, &i): (usize, &usize)| {
-            // Side by side, so that their intervals do not hide each other.
-            let shift = beside(n, indices.len(), 0.06 * (range.highest - range.lowest));
-            let points = alone(outcome, i).map(|(t, value, sigma)| {
-                let (change, _) = there(&outcome.estimate, thermal, t);
-                (
-                    t + shift,
-                    (value - reference[i] - change[i]) / unit,
-                    sigma / unit,
-                )
-            });
-            Series::measured(Mark::Dot, points)
-                .nth(n)
-                .key(axis_name(form, i))
-        };
-        let marks = indices.iter().enumerate().map(of_parameter);
-        std::iter::once(Series::zero()).chain(marks).collect()
-    };
-    let heading = "Each recording alone, minus the joint estimate";
-    let panels = against_temperature(&outcome.estimate, thermal, 0.06, series);
-    Plot::new("recordings.svg", heading, (3, 330), panels).caption(
-        "Estimate from each recording alone, ±1σ, minus the joint estimate at its temperature. Two thirds of the \
-         intervals should include zero.",
-    )
-}
-
-/// Innovations of each dwell against temperature and its rate.
-fn residuals(outcome: &Outcome) -> Plot {
-    let names = ["East", "North", "Up"];
-    let panel = |x: &str, of: &dyn Fn((f64, f64)) -> f64| {
-        let x = Axis::linear(x).room(0.03, 0.03);
-        let marks = names.into_iter().enumerate().map(|(axis, name)| {
-            let points = outcome.by_dwell().into_iter().filter_map(|(dwell, sums)| {
-                let at = outcome.warming.get(dwell).map(|&at| of(at))?;
-                at.is_finite().then_some((at, sums[axis]))
-            });
-            Series::marks(Mark::Ring, points).nth(axis).key(name)
-        });
-        Panel::new("sum over a dwell, σ", x, Axis::linear(""))
-            .with(Series::zero())
-            .with_all(marks)
-    };
-    let panels = [
-        panel("temperature, °C", &|(temperature, _)| temperature),
-        panel("rate of temperature, K/min", &|(_, rate)| rate * MINUTE),
-    ];
-    let heading = "Innovations of dwells against temperature";
-    Plot::new("residuals-temperature.svg", heading, (2, 300), panels).caption(
-        "Sum of the whitened velocity innovations in each dwell, divided by the square root of their number. No \
-         trend and values mostly within ±2 mean that no temperature effect remains.",
-    )
 }
 
 /// Each recording with its temperature and its distance from the joint estimate.

@@ -121,9 +121,7 @@ fn a_report_has_every_figure_and_names_every_parameter_in_every_form() {
         assert_eq!(
             names(&files),
             [
-                "comparison.svg",
                 "correlation.svg",
-                "estimates.svg",
                 "index.html",
                 "innovations.svg",
                 "navigation.svg",
@@ -131,7 +129,7 @@ fn a_report_has_every_figure_and_names_every_parameter_in_every_form() {
                 "sigma.svg"
             ]
         );
-        let (_, page) = &files[3];
+        let (_, page) = &files[1];
         for name in (0..PARAMETERS).filter_map(|i| parameter_name(form, i)) {
             assert!(page.contains(&name), "{name}");
         }
@@ -179,7 +177,6 @@ fn without_truth_or_baseline_no_error_is_claimed() {
     report.navigation = Ok(&navigation);
     let files = written(&report);
     assert_sound(&files);
-    assert!(!names(&files).contains(&"comparison.svg"));
     let page = page(&report);
     assert!(!page.contains("error / σ") && !page.contains("EKF: largest"));
     assert!(page.contains("The truth is not known"));
@@ -199,7 +196,6 @@ fn a_closed_form_alone_is_reported() {
     assert_eq!(
         names(&files),
         [
-            "comparison.svg",
             "correlation.svg",
             "index.html",
             "navigation.svg",
@@ -231,7 +227,7 @@ fn a_run_without_a_table_is_reported() {
 }
 
 #[test]
-fn a_group_of_fixed_parameters_has_neither_error_nor_axes() {
+fn a_group_of_fixed_parameters_has_neither_error_nor_figure() {
     let mut made_up = synthetic(InstallationForm::ThreeAngle);
     let mut groups = Group::all();
     let installation = groups.find(|group| group.title() == "accel misalignment E");
@@ -250,10 +246,8 @@ fn a_group_of_fixed_parameters_has_neither_error_nor_axes() {
     let report = made_up.report();
     let files = written(&report);
     assert_sound(&files);
-    for name in ["sigma.svg", "comparison.svg"] {
-        let (_, text) = files.iter().find(|(file, _)| file == name).unwrap();
-        assert!(text.contains("accel misalignment E: all fixed"), "{name}");
-    }
+    let (_, text) = files.iter().find(|(file, _)| file == "sigma.svg").unwrap();
+    assert!(text.contains("accel scale factor K") && !text.contains("accel misalignment E"));
     let row = summary(&report);
     let row = row
         .lines()
@@ -262,7 +256,7 @@ fn a_group_of_fixed_parameters_has_neither_error_nor_axes() {
 }
 
 #[test]
-fn a_parameter_held_fixed_has_no_sigma_and_no_band() {
+fn a_parameter_held_fixed_has_no_sigma_and_no_correlation() {
     let mut made_up = synthetic(InstallationForm::General);
     let fixed = PARAMETERS - 1;
     let covariance = &mut made_up.outcome.estimate.covariance;
@@ -272,8 +266,8 @@ fn a_parameter_held_fixed_has_no_sigma_and_no_band() {
     assert_sound(&files);
     let text = |name: &str| &files.iter().find(|(file, _)| file == name).unwrap().1;
     assert!(text("index.html").contains("(fixed)"));
-    assert!(text("estimates.svg").contains("accel bias D y"));
-    assert!(!text("estimates.svg").contains("accel bias D z"));
+    assert!(text("correlation.svg").contains("accel D y"));
+    assert!(!text("correlation.svg").contains("accel D z"));
 }
 
 #[test]
@@ -351,19 +345,11 @@ fn what_a_record_would_not_show_is_said_where_it_is_more_than_sigma() {
         })
     };
     let effect = |term: Term, times: f64, gain: f64| ErrorTermTest {
-        term: ErrorTerm::Instrument(term),
-        on: false,
-        sigma_factors: [None; 6],
-        gain,
-        limit: 10.0,
-        significance: gain,
-        role: Role::None,
-        without: 1.0,
-        with: 1.0,
         left_off: Some(UnmodelledEffect {
             usual: off(times),
             shown: off(times),
         }),
+        ..tested(term, gain)
     };
     let effects = [
         effect(Term::GyroSecondOrder, 0.9, 1.0),
@@ -381,4 +367,33 @@ fn what_a_record_would_not_show_is_said_where_it_is_more_than_sigma() {
         "{said}"
     );
     assert!(!summary(&made_up.report()).contains("not visible"));
+}
+
+/// A test of a term that is off.
+fn tested(term: Term, gain: f64) -> ErrorTermTest {
+    ErrorTermTest {
+        term: ErrorTerm::Instrument(term),
+        on: false,
+        sigma_factors: [None; 6],
+        gain,
+        limit: 10.0,
+        significance: gain,
+        role: Role::None,
+        without: 1.0,
+        with: 1.0,
+        left_off: None,
+    }
+}
+
+#[test]
+fn the_group_whose_sigma_grows_most_with_a_term_is_named() {
+    let test = ErrorTermTest {
+        on: true,
+        sigma_factors: [Some(1.1), None, Some(1.7), None, Some(1.2), None],
+        ..tested(Term::GyroAsymmetry, 20.0)
+    };
+    let table = terms::explained(&[test]);
+    let cells = &table.sections[0][0];
+    assert_eq!(cells.last().map(String::as_str), Some("gyro D: 1.70"));
+    assert_eq!(cells.len(), table.columns.len());
 }

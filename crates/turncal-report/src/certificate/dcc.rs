@@ -267,7 +267,7 @@ fn description(certificate: &Certificate) -> String {
         "Scale factors divided by their nominal value, minus one; entries of the installation matrix in rad; biases \
          in rad/s and m/s². Nominal scale: gyros {for_gyros} {gyro} per second for 1 rad/s, accelerometers \
          {for_accels} {accel} per second for 1 m/s². Body frame: {}.",
-        certificate.body_frame().words(),
+        certificate.calibration.body_frame.words(),
     );
     if let Some(temperature) = &certificate.calibration.temperature {
         text.push(' ');

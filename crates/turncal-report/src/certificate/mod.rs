@@ -9,7 +9,6 @@ mod results;
 
 use turncal::calibration::result::{Calibration, Provenance};
 use turncal::calibration::{ComparisonError, Correction, CorrectionError};
-use turncal::imu::BodyFrame;
 use turncal::laboratory::Laboratory;
 use turncal::lot::Specification;
 
@@ -120,11 +119,6 @@ impl Certificate {
             as_found,
             calibration,
         })
-    }
-
-    /// The body frame.
-    pub fn body_frame(&self) -> BodyFrame {
-        self.calibration.body_frame
     }
 }
 

@@ -20,7 +20,7 @@ pub fn data(run: &Run, survey: &Survey) -> Value {
     let ways = survey.ways_up().into_iter().enumerate();
     let ways = ways.map(|(way, rests)| (words::way_up(way / 2, way % 2 == 1), rests));
     let ways: BTreeMap<String, usize> = ways.collect();
-    let mut data = json!({
+    json!({
         "run": run.recording.name,
         "samples": imu.len(),
         "sample_period_s": imu.period,
@@ -29,29 +29,19 @@ pub fn data(run: &Run, survey: &Survey) -> Value {
         "continuous": imu.continuous,
         "table_readings": run.recording.table.as_ref().map_or(0, |table| table.time.len()),
         "unit": run.instrument.unit,
-    });
-    if let Some(log) = log(run) {
-        data["log"] = log;
-    }
-    data["faults"] = imu.faults.iter().map(|of| fault(run, of)).collect();
-    data["fault_samples"] = json!(fault_samples);
-    data["standing_s"] = survey.standing.into();
-    data["longest_dwell_s"] = survey.longest.into();
-    data["dwells"] = survey.rests.iter().map(|rest| dwell(run, rest)).collect();
-    data["turns"] = survey.turns.iter().map(|of| turn(run, of)).collect();
-    data["ways_up"] = json!(ways);
-    data["up_directions"] = survey.directions.into();
-    data["segments"] = survey.labels.iter().map(section).collect();
-    data["methods"] = survey.methods.iter().map(method).collect();
-    data["findings"] = words::findings(run, survey).into();
-    data
-}
-
-/// Adds an optional number.
-fn put(data: &mut Value, key: &str, value: Option<impl Into<Value>>) {
-    if let Some(value) = value {
-        data[key] = value.into();
-    }
+        "log": log(run),
+        "faults": imu.faults.iter().map(|of| fault(run, of)).collect::<Value>(),
+        "fault_samples": fault_samples,
+        "standing_s": survey.standing,
+        "longest_dwell_s": survey.longest,
+        "dwells": survey.rests.iter().map(|rest| dwell(run, rest)).collect::<Value>(),
+        "turns": survey.turns.iter().map(|of| turn(run, of)).collect::<Value>(),
+        "ways_up": ways,
+        "up_directions": survey.directions,
+        "segments": survey.labels.iter().map(section).collect::<Value>(),
+        "methods": survey.methods.iter().map(method).collect::<Value>(),
+        "findings": words::findings(run, survey),
+    })
 }
 
 fn degrees(angle: f64) -> f64 {
@@ -65,20 +55,21 @@ fn log(run: &Run) -> Option<Value> {
         let further = json!({ "sensor": sensor.name(), "axis": axis, "step_si": step_si });
         joined(json!(column), further)
     });
-    let mut data = json!({
+    let temperature = log.temperature.as_ref().map(|of| {
+        let recorded = run.recording.imu.temperature.as_ref();
+        let rate = recorded.map(|of| {
+            let rates = Sensor::ALL.map(|sensor| of.largest_rate(sensor));
+            rates[0].max(rates[1])
+        });
+        joined(json!(of), json!({ "largest_rate_k_per_s": rate }))
+    });
+    Some(json!({
         "rows": log.rows,
         "jitter_rms_s": log.jitter_rms,
         "jitter_max_s": log.jitter_max,
         "columns": columns.collect::<Value>(),
-    });
-    if let Some(of) = &log.temperature {
-        data["temperature"] = json!(of);
-        if let Some(temperature) = &run.recording.imu.temperature {
-            let rates = Sensor::ALL.map(|sensor| temperature.largest_rate(sensor));
-            data["temperature"]["largest_rate_k_per_s"] = json!(rates[0].max(rates[1]));
-        }
-    }
-    Some(data)
+        "temperature": temperature,
+    }))
 }
 
 fn fault(run: &Run, fault: &Fault) -> Value {
@@ -94,21 +85,20 @@ fn fault(run: &Run, fault: &Fault) -> Value {
 
 fn dwell(run: &Run, rest: &Rest) -> Value {
     let [start, end] = rest.dwell.times(run);
-    let mut data = json!({
+    json!({
         "start_s": start,
         "end_s": end,
         "samples": rest.dwell.samples.len(),
         "force_m_s2": rest.force.norm(),
         "up": words::way_up(rest.up.axis, rest.up.down),
         "tilt_deg": degrees(rest.up.tilt),
-    });
-    put(&mut data, "off_table_deg", rest.off_table().map(degrees));
-    data
+        "off_table_deg": rest.off_table().map(degrees),
+    })
 }
 
 fn turn(run: &Run, turn: &Turn) -> Value {
     let imu = &run.recording.imu;
-    let mut data = json!({
+    json!({
         "start_s": imu.time(turn.samples.start),
         "end_s": imu.time(turn.samples.end),
         "after_dwell": turn.from.map(|k| k + 1),
@@ -117,9 +107,8 @@ fn turn(run: &Run, turn: &Turn) -> Value {
         "angle_deg": degrees(turn.angle),
         "fastest_deg_s": degrees(turn.fastest),
         "off_gravity_deg": turn.off_gravity.map(degrees),
-    });
-    put(&mut data, "off_table_deg", turn.off_table.map(degrees));
-    data
+        "off_table_deg": turn.off_table.map(degrees),
+    })
 }
 
 fn section(check: &LabelCheck) -> Value {
@@ -132,17 +121,16 @@ fn section(check: &LabelCheck) -> Value {
         Some(LabelledMotion::Turns { angle, .. }) => Some(angle),
         _ => None,
     };
-    let mut data = json!({
+    json!({
         "label": check.segment.label,
         "start_s": check.segment.start,
         "end_s": check.segment.end,
         "agrees": check.disagreement.is_none(),
-    });
-    put(&mut data, "off_deg", off.map(degrees));
-    put(&mut data, "moving_s", moving);
-    put(&mut data, "angle_deg", found.map(degrees));
-    put(&mut data, "labelled_angle_deg", labelled.map(degrees));
-    data
+        "off_deg": off.map(degrees),
+        "moving_s": moving,
+        "angle_deg": found.map(degrees),
+        "labelled_angle_deg": labelled.map(degrees),
+    })
 }
 
 /// RMS 1σ by group, or the reason why there is none.

@@ -3,7 +3,7 @@
 use super::super::calibration::figures::samples;
 use super::words;
 use crate::prelude::*;
-use turncal::imu::{AXES, Sensor};
+use turncal::imu::Sensor;
 use turncal::run::Run;
 use turncal::run::motion::{Rest, Turn};
 use turncal::survey::Survey;
@@ -26,11 +26,6 @@ fn panel(run: &Run, survey: &Survey, sensor: Sensor) -> Panel {
         Sensor::Gyro => (DEGREE, "angular rate, °/s"),
         Sensor::Accel => (1.0, "specific force, m/s²"),
     };
-    // Dashes would be lost in noise.
-    let line = |axis: usize| {
-        let line = samples(imu, sensor, axis, unit).nth(axis);
-        line.width(1.0).label(AXES[axis])
-    };
     let rests = survey.rests.iter();
     let dwells: Vec<_> = rests
         .map(|rest| rest.dwell.times(run))
@@ -43,20 +38,17 @@ fn panel(run: &Run, survey: &Survey, sensor: Sensor) -> Panel {
             rests.map(|(k, rest)| of_dwell(run, k, rest)).collect()
         }
     };
-    let faults = imu
-        .faults
-        .iter()
-        .filter(|fault| fault.axis.is_none_or(|(of, _)| of == sensor));
-    let faults: Vec<f64> = faults.map(|fault| imu.time(fault.samples.start)).collect();
+    let faults = imu.faults.iter();
+    let faults = faults.filter(|fault| fault.axis.is_none_or(|(of, _)| of == sensor));
     let x = Axis::linear("time, s").between(imu.start(), imu.end());
     let y = Axis::linear("").including([0.0]).room(0.1, 0.3);
-    let lines = [0, 1, 2].map(line);
+    let lines = samples(imu, sensor, unit);
     let corners = lines.iter().flat_map(|line| line.shape.corners());
     let foot = corners.map(|corner| corner.1).fold(0.0, f64::min);
-    let crosses = faults.into_iter().map(|time| (time, foot));
+    let crosses = faults.map(|fault| (imu.time(fault.samples.start), foot));
     Panel::new(title, x, y)
         .shaded(&dwells)
-        .tagged(3, tags)
+        .tagged(tags)
         .with_all(lines)
         .with(Series::marks(Mark::Cross, crosses).color(Color::Ink))
 }
@@ -69,9 +61,9 @@ fn of_turn(run: &Run, turn: &Turn) -> (f64, String) {
 
 fn of_dwell(run: &Run, k: usize, rest: &Rest) -> (f64, String) {
     let [from, to] = rest.dwell.times(run);
-    let up = match rest.up.is_upright() {
-        true => format!(" {}", words::way_up(rest.up.axis, rest.up.down)),
-        false => String::new(),
-    };
-    (0.5 * (from + to), format!("{}{up}", k + 1))
+    let mut text = (k + 1).to_string();
+    if rest.up.is_upright() {
+        text += &format!(" {}", words::way_up(rest.up.axis, rest.up.down));
+    }
+    (0.5 * (from + to), text)
 }

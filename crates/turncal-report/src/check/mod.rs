@@ -36,12 +36,6 @@ pub fn document(run: &Run, survey: &Survey) -> Document {
     document
 }
 
-/// Such as `3 turns`.
-fn several(count: usize, name: &str) -> String {
-    let plural = if count == 1 { "" } else { "s" };
-    format!("{count} {name}{plural}")
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::{svg, terminal};

@@ -92,10 +92,10 @@ fn warming(run: &Run) -> String {
         " It changes by {} K/min at most and {} K/min at the end: {}.",
         three_digits(largest * MINUTE),
         three_digits(last * MINUTE),
-        match span < SOAKED {
-            true => "soaked within 1 K",
-            false =>
-                "not soaked, so parameters may change during the recording (see calibrate --temperature)",
+        if span < SOAKED {
+            "soaked within 1 K"
+        } else {
+            "not soaked, so parameters may change during the recording (see calibrate --temperature)"
         }
     )
 }
@@ -169,11 +169,12 @@ fn of_methods(survey: &Survey) -> Vec<String> {
     let by_none = |name: &&String| others.iter().all(|other| other.unobserved.contains(name));
     let always = first.unobserved.iter().filter(by_none);
     let always: Vec<&str> = always.map(String::as_str).collect();
-    match always.is_empty() {
-        true => Vec::new(),
-        false => vec![format!(
+    if always.is_empty() {
+        Vec::new()
+    } else {
+        vec![format!(
             "With every method, σ of {} would stay above half of the prior. Add positions and turns.",
             always.join(", ")
-        )],
+        )]
     }
 }

@@ -22,7 +22,7 @@ pub fn document(experiment: &Experiment) -> Document {
     tables::tables(experiment)
         .into_iter()
         .for_each(|table| document.both(table));
-    document.pages(figures::figures(experiment));
+    document.page(figures::distribution(experiment));
     document.data = data(experiment);
     document
 }
@@ -106,19 +106,12 @@ pub fn data(experiment: &Experiment) -> Value {
 
 /// Intervals are 99 %, by bootstrap over instruments.
 fn method(experiment: &Experiment, place: usize, worth: &Worth) -> Value {
-    let calibrations = || {
-        experiment
-            .trials
-            .iter()
-            .filter_map(|t| t.calibrations.get(place))
-    };
+    let trials = experiment.trials.iter();
+    let calibrations = || trials.clone().filter_map(|t| t.calibrations.get(place));
     let budget = worth.budget.parts.iter().map(|part| {
         let data = json!({ "alone_rms_nmile": part.alone, "share": part.share });
         (part.group.key(), data)
     });
-    let against_time = worth.against_time.iter();
-    let against_time =
-        against_time.map(|&(time, median)| json!({ "t_h": time / HOUR, "position_nmile": median }));
     json!({
         "method": worth.method.estimator,
         "installation_form": worth.method.form,
@@ -135,7 +128,6 @@ fn method(experiment: &Experiment, place: usize, worth: &Worth) -> Value {
         "closed_form_over_ekf_interval": worth.gain.map(|gain| gain.interval),
         "claimed_rms_nmile": worth.budget.claimed,
         "budget": budget.collect::<Map<_, _>>(),
-        "median_against_time": against_time.collect::<Value>(),
         "positions_nmile": worth.errors,
     })
 }
@@ -224,30 +216,25 @@ fn failures(experiment: &Experiment) -> Vec<String> {
     let mut sentences = Vec::new();
     for (place, method) in Method::all().enumerate() {
         let all = || trials.iter().filter_map(|t| t.calibrations.get(place));
-        let failed = all().filter(|c| c.is_err()).count();
-        let diverged = all().flatten().filter(|c| !c.converged).count();
+        let failed: Vec<&String> = all().filter_map(|c| c.as_ref().err()).collect();
         let rejected = all().flatten().filter(|c| c.rejects_form).count();
+        let diverged = all().flatten().filter(|c| !c.converged).count();
         let (name, of) = (method_name(experiment, method), count(trials.len()));
-        let reason = all().find_map(|c| c.as_ref().err());
-        let reason = reason.map_or("", String::as_str);
-        for (number, what) in [
-            (
-                failed,
-                format!("calibrations failed, the first because: {reason}"),
-            ),
-            (
-                rejected,
-                "instruments have data that do not fit the form.".to_owned(),
-            ),
-            (
-                diverged,
-                "calibrations did not converge; the figures include them.".to_owned(),
-            ),
-        ] {
+        let mut say = |number: usize, what: &str| {
             if number > 0 {
                 sentences.push(format!("{name}: {} of {of} {what}", count(number)));
             }
-        }
+        };
+        let first = failed.first().map_or("", |reason| reason.as_str());
+        say(
+            failed.len(),
+            &format!("calibrations failed, the first because: {first}"),
+        );
+        say(rejected, "instruments have data that do not fit the form.");
+        say(
+            diverged,
+            "calibrations did not converge; the figures include them.",
+        );
     }
     sentences
 }
@@ -283,7 +270,7 @@ mod tests {
         for experiment in [&with_two, &none.run(UNWATCHED).unwrap()] {
             let document = document(experiment);
             let drawn = svg::drawn(document.plots());
-            assert_eq!(drawn.len(), 2);
+            assert_eq!(drawn.len(), 1);
             let text = terminal::text(&document, Some(100));
             assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
         }

@@ -1,7 +1,6 @@
 //! The tables, the same for terminal and page.
 
 use crate::prelude::*;
-use turncal::calibration::Group;
 use turncal::imu::{InstallationForm, Sensor};
 use turncal::study::Experiment;
 use turncal::study::experiment::{Estimator, Method, Navigated, Situation, Worth};
@@ -16,21 +15,11 @@ pub const PAPER: [(Sensor, InstallationForm, f64); 4] = [
 ];
 
 pub fn tables(experiment: &Experiment) -> Vec<Table> {
-    use Situation::{Aligned, Moving, SelfAligned};
-    let with = |table: fn(&Experiment, &Navigated) -> Table, situation| {
-        Some(table(experiment, navigated(experiment, situation)?))
-    };
-    let errors = experiment
-        .navigations
-        .iter()
-        .map(|navigated| errors(experiment, navigated));
-    let others = [
-        with(paper, SelfAligned),
-        with(budget, SelfAligned),
-        with(paper, Aligned),
-        with(budget, Moving),
-    ];
-    errors.chain(others.into_iter().flatten()).collect()
+    let all = &experiment.navigations;
+    let errors = all.iter().map(|of| errors(experiment, of));
+    let stationary = all.iter().filter(|of| of.situation != Situation::Moving);
+    let paper = stationary.map(|of| paper(experiment, of));
+    errors.chain(paper).collect()
 }
 
 fn errors(experiment: &Experiment, navigated: &Navigated) -> Table {
@@ -96,63 +85,13 @@ fn paper(experiment: &Experiment, navigated: &Navigated) -> Table {
     });
     let situation = situation_name(navigated.situation);
     let title = format!("Comparison with the paper: errors of one triad alone, {situation}");
-    let table = Table::new(title, columns).section(general).sections(of_paper).note(
-        "Position error at the end; the other triad is exact. Paper: one instrument on one table, closed form \
-         (Zhao, Jiang, Li 2016, Figure 10), neither noise nor latitude stated.",
-    );
-    match hours(experiment) {
-        PAPER_HOURS => table,
-        hours => table.note(format!(
-            "The paper navigates for {PAPER_HOURS} h, this study for {} h.",
-            three_digits(hours)
-        )),
-    }
+    Table::new(title, columns).section(general).sections(of_paper).note(
+        "Position error at the end; the other triad is exact. Paper: after 40 h, one instrument on one table, closed \
+         form (Zhao, Jiang, Li 2016, Figure 10), neither noise nor latitude stated.",
+    )
 }
 
-fn budget(experiment: &Experiment, navigated: &Navigated) -> Table {
-    let worths = Estimator::ALL.into_iter().filter_map(|estimator| {
-        let worth = in_general(navigated, estimator)?;
-        Some((estimator_name(experiment, estimator), worth))
-    });
-    let worths: Vec<(String, &Worth)> = worths.collect();
-    let mut columns = vec!["nmile, RMS".to_owned()];
-    for (name, _) in &worths {
-        columns.extend([format!("{name}: alone"), "share".to_owned()]);
-    }
-    let row = |(place, group): (usize, Group)| {
-        let mut row = vec![group.title()];
-        for (_, worth) in &worths {
-            let part = worth.budget.parts.get(place);
-            row.push(or_dash(part.map(|part| part.alone), three_digits));
-            let share = part.map(|part| 100.0 * part.share);
-            row.push(or_dash(share, |share| format!("{} %", value(share, 10.0))));
-        }
-        row
-    };
-    let total = |name: &str, of: &dyn Fn(&Worth) -> f64| {
-        let mut row = vec![name.to_owned()];
-        for (_, worth) in &worths {
-            row.extend([three_digits(of(worth)), String::new()]);
-        }
-        row
-    };
-    let situation = situation_name(navigated.situation);
-    Table::new(format!("Error budget, {situation}"), columns)
-        .section(Group::all().enumerate().map(row))
-        .section([
-            total("all, claimed", &|w| w.budget.claimed),
-            total("all, actual", &|w| w.budget.actual),
-        ])
-        .note(
-            "General form, from the stated covariance averaged over all instruments. Alone: effect of the group by \
-             itself. Share: part of the variance, with the covariance of two groups split equally; negative if a \
-             group compensates another.",
-        )
-}
-
-/// Hours of the paper's experiment.
-pub const PAPER_HOURS: f64 = 40.0;
-
+/// Duration of the navigation.
 pub fn hours(experiment: &Experiment) -> f64 {
     f64::from(experiment.study.intervals) * INTERVAL / HOUR
 }

@@ -6,7 +6,8 @@ use turncal::imu::InstallationForm;
 use turncal::lot::{Check, ChiSquare, FALSE_ALARM, Lot, Quantity, Row, Statistics, Verdict};
 
 pub fn data(lot: &Lot) -> Value {
-    let data = json!({
+    let reference = lot.reference();
+    json!({
         "format": "turncal-lot/1",
         "body_frame": lot.body_frame,
         "installation_form": InstallationForm::General,
@@ -16,17 +17,11 @@ pub fn data(lot: &Lot) -> Value {
         "confidence": lot.specification.as_ref().map(|s| s.confidence),
         "units": lot.rows.iter().enumerate().map(|(place, row)| unit(lot, place, row)).collect::<Value>(),
         "quantities": lot.statistics.iter().map(|of| quantity(lot, of)).collect::<Value>(),
-        "all_parameters": lot.joint.map(chi2),
-    });
-    let Some(reference) = lot.reference() else {
-        return data;
-    };
-    let of_reference = json!({
-        "reference": reference.unit.name,
+        "all_parameters": lot.joint.map(|of| chi2(Some(of))),
+        "reference": reference.map(|of| &of.unit.name),
         "reference_is_truth": lot.truth.is_some(),
-        "reference_values": values(lot, reference),
-    });
-    joined(data, of_reference)
+        "reference_values": reference.map(|of| values(lot, of)),
+    })
 }
 
 /// Limits exceeded or undecided, by unit and parameter.
@@ -52,7 +47,7 @@ fn unit(lot: &Lot, place: usize, row: &Row) -> Value {
         .map(|of| of.quantity.name())
         .collect();
     let failing = { row.checks.iter() }.filter(|check| check.verdict == Verdict::Fail);
-    let unit = json!({
+    json!({
         "name": row.unit.name,
         "meta": row.unit.meta,
         "failure": row.canonical.as_ref().err(),
@@ -63,16 +58,10 @@ fn unit(lot: &Lot, place: usize, row: &Row) -> Value {
         "outside": failing.map(|check| check.quantity().name()).collect::<Vec<_>>(),
         "apart": outliers,
         "values": values(lot, row),
-    });
-    if lot.truth.is_none() {
-        return unit;
-    }
-    let of_truth = json!({
         "nees_per_n": row.nees.map(|nees| nees.mean),
         "n": row.nees.map(|nees| nees.count),
         "nees_interval": row.nees.map(|nees| nees.interval),
-    });
-    joined(unit, of_truth)
+    })
 }
 
 /// Values by name, with the difference from the reference if there is one.
@@ -111,16 +100,15 @@ fn quantity(lot: &Lot, of: &Statistics) -> Value {
         "spread_interval": [spread(interval.0), spread(interval.1)],
         "spread_is_real": of.real,
     });
-    let chi2 = of.scatter.chi_square.map_or_else(no_chi2, chi2);
-    joined(data, chi2)
+    joined(data, chi2(of.scatter.chi_square))
 }
 
-fn chi2(of: ChiSquare) -> Value {
-    json!({ "chi2": of.value, "degrees_of_freedom": of.freedom, "p": of.p })
-}
-
-fn no_chi2() -> Value {
-    json!({ "chi2": null, "degrees_of_freedom": null, "p": null })
+fn chi2(of: Option<ChiSquare>) -> Value {
+    json!({
+        "chi2": of.map(|of| of.value),
+        "degrees_of_freedom": of.map(|of| of.freedom),
+        "p": of.map(|of| of.p),
+    })
 }
 
 #[rustfmt::skip]

@@ -8,7 +8,7 @@ use turncal::lot::{Lot, Quantity, Row, Sample};
 pub fn values(lot: &Lot) -> Plot {
     let panels = together(lot).into_iter().map(|of| panel(lot, &of));
     let what = match (&lot.specification, &lot.truth) {
-        (Some(_), _) => "Calibrations in the given order. Long lines: limits common to all axes",
+        (Some(_), _) => "Calibrations in the given order. Dashed: limits",
         (None, Some(_)) => "Differences of the calibrations from the truth",
         (None, None) => "Differences of the calibrations from their mean",
     };
@@ -27,22 +27,12 @@ fn panel(lot: &Lot, of: &Together) -> Panel {
         };
         all.filter_map(point).collect()
     };
-    let all: Vec<_> = of.quantities.iter().map(|q| points(*q)).collect();
-    let reaches = lot.rows.iter().enumerate().map(|(place, _)| {
-        let of_row = all.iter().flatten().filter(|point| point.0 == place);
-        let reaches = of_row.map(|(_, value, sigma)| value.abs() + sigma);
-        reaches.fold(0.0, f64::max)
-    });
-    let (y, kind) = match lot.specification {
-        Some(_) => (Axis::linear("").room(0.05, 0.05), ""),
-        None => Axis::about_zero(reaches),
-    };
-    let series = of.quantities.iter().zip(&of.names).zip(all).enumerate();
-    let series = series.flat_map(|(n, ((quantity, name), points))| {
+    let series = of.quantities.iter().zip(&of.names).enumerate();
+    let series = series.flat_map(|(n, (quantity, name))| {
         let shift = beside(n, count, 0.7);
         let outliers = lot.statistics_of(*quantity).map(|of| &of.outliers[..]);
         let outliers = outliers.unwrap_or_default();
-        let (crosses, dots): (Vec<_>, Vec<_>) = points
+        let (crosses, dots): (Vec<_>, Vec<_>) = points(*quantity)
             .into_iter()
             .partition(|point| outliers.contains(&point.0));
         let place = |(place, value, sigma)| (place as f64 + shift, value, sigma);
@@ -50,12 +40,16 @@ fn panel(lot: &Lot, of: &Together) -> Panel {
         let crosses = Series::measured(Mark::Cross, crosses.into_iter().map(place)).width(2.5);
         [dots, crosses].map(|marks| marks.nth(n))
     });
-    let limits = limits(lot, &of.quantities);
+    let limits = of.quantities.iter().enumerate().flat_map(|(n, &quantity)| {
+        let limits = limits(lot, quantity).into_iter();
+        limits.map(move |y| (y, Series::level(y).dashed().nth(n)))
+    });
+    let (limits, lines): (Vec<f64>, Vec<Series>) = limits.unzip();
     let units = Axis::places(lot.rows.iter().map(|row| row.unit.name.clone()));
-    let heading = format!("{}{kind}", of.heading);
-    Panel::new(heading, units, y.including(limits.iter().copied()))
+    let y = Axis::linear("").room(0.05, 0.05).including(limits);
+    Panel::new(&of.heading, units, y)
         .with_all(series)
-        .with_all(limits.into_iter().map(|y| Series::level(y).dashed()))
+        .with_all(lines)
 }
 
 /// Value and σ in a figure: with limits the value itself; otherwise the difference from the truth or from the mean.
@@ -72,23 +66,11 @@ fn plotted(lot: &Lot, row: &Row, quantity: Quantity) -> Option<(f64, f64)> {
     Some((off, in_unit(quantity, sample.sigma)))
 }
 
-/// Limits common to all parameters of a group.
-fn limits(lot: &Lot, quantities: &[Quantity]) -> Vec<f64> {
-    let Some(specification) = &lot.specification else {
-        return Vec::new();
-    };
-    let of = |quantity: &Quantity| {
-        let mut limits = specification.limits.iter();
-        let limit = limits.find(|of| Quantity::Parameter(of.parameter) == *quantity)?;
-        let at = |sign: f64| {
-            let value = limit.nominal + sign * limit.within;
-            shown(*quantity, Sample { value, sigma: 0.0 }).0
-        };
-        Some([at(-1.0), at(1.0)])
-    };
-    let all: Option<Vec<[f64; 2]>> = quantities.iter().map(of).collect();
-    match all.as_deref() {
-        Some([first, rest @ ..]) if rest.iter().all(|other| other == first) => first.to_vec(),
-        _ => Vec::new(),
-    }
+/// Lower and upper limit of a parameter, if the specification has them.
+fn limits(lot: &Lot, quantity: Quantity) -> Vec<f64> {
+    let limits = lot.specification.iter().flat_map(|of| &of.limits);
+    let own = limits.filter(|of| Quantity::Parameter(of.parameter) == quantity);
+    let ends = own.flat_map(|of| [of.nominal - of.within, of.nominal + of.within]);
+    ends.map(|value| shown(quantity, Sample { value, sigma: 0.0 }).0)
+        .collect()
 }

@@ -32,7 +32,6 @@ pub fn document(lot: &Lot) -> Document {
         document.both(tables::units(lot));
         document.page(figures::values(lot));
         document.both(tables::quantities(lot));
-        document.pages(tables::values(lot));
     }
     document.data = data::data(lot);
     document.files = vec![("lot.csv".to_owned(), data::csv(&document.data))];

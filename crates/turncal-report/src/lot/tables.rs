@@ -1,6 +1,6 @@
 //! Tables of a comparison.
 
-use super::shown::{Together, difference, in_unit, shown, spread, symbol, title, together};
+use super::shown::{difference, in_unit, shown, spread, symbol, title};
 use crate::prelude::*;
 use turncal::calibration::Nees;
 use turncal::imu::Sensor;
@@ -282,31 +282,6 @@ fn notes(lot: &Lot, mut table: Table) -> Table {
         )),
         None => table,
     }
-}
-
-/// Every parameter of many calibrations, one table per group, and one of noise per triad.
-pub fn values(lot: &Lot) -> Vec<Table> {
-    let groups = together(lot).into_iter();
-    let groups = groups.filter(|_| lot.rows.len() > SIDE_BY_SIDE);
-    let table = |of: Together| {
-        let row = |(place, row): (usize, &Row)| {
-            let cells = of.quantities.iter().map(|&quantity| {
-                let outlier = lot.outliers_of(place).any(|of| of.quantity == quantity);
-                let check = row.check_of(quantity);
-                let fails = check.is_some_and(|check| check.verdict == Verdict::Fail);
-                let mark = if outlier || fails { "! " } else { "" };
-                format!("{mark}{}", one(lot, row, quantity))
-            });
-            std::iter::once(row.unit.name.clone())
-                .chain(cells)
-                .collect::<Vec<String>>()
-        };
-        let columns = std::iter::once("").chain(of.names.iter().map(String::as_str));
-        Table::new(&of.heading, columns)
-            .section(lot.rows.iter().enumerate().map(row))
-            .note("± 1σ; ! outlier or outside its limit.")
-    };
-    groups.map(table).collect()
 }
 
 /// Every limit of a single unit, those that are not kept first; of several those that are not kept, or not certainly.

@@ -5,8 +5,6 @@ mod outlook;
 #[cfg(test)]
 mod tests;
 
-use std::fmt::Write;
-
 use crate::prelude::*;
 use turncal::attitude::to_pitch_roll_heading;
 use turncal::imu::{BodyFrame, Sensor};
@@ -158,33 +156,27 @@ impl Navigation<'_> {
 
     /// One row per minute: time, errors, and predicted σ if available.
     fn csv(&self) -> String {
-        let with_sigma = self.navigated.outlook.iter().all(|m| m.sigma.is_some());
-        let keys = Quantity::ALL.map(|quantity| quantity.key);
-        let mut text = format!("t_h,{}", keys.join(","));
-        if with_sigma {
-            text.extend(keys.iter().map(|key| format!(",sigma_{key}")));
+        let moments = &self.navigated.outlook;
+        let keys = Quantity::ALL.map(|quantity| quantity.key.to_owned());
+        let mut heading = [&["t_h".to_owned()][..], &keys].concat();
+        if moments.iter().all(|moment| moment.sigma.is_some()) {
+            heading.extend(keys.map(|key| format!("sigma_{key}")));
         }
-        text.push('\n');
-        for moment in &self.navigated.outlook {
-            // Writing to a string cannot fail.
-            let _ = write!(text, "{}", moment.time / HOUR);
-            let errors = Quantity::ALL.map(|q| q.error(moment));
-            let sigmas = Quantity::ALL.map(|q| q.sigma(moment));
-            for value in errors.into_iter().chain(sigmas).flatten() {
-                let _ = write!(text, ",{value:e}");
-            }
-            text.push('\n');
-        }
-        text
+        let row = |moment: &Outlook| {
+            let errors = Quantity::ALL.map(|of| of.error(moment));
+            let sigmas = Quantity::ALL.map(|of| of.sigma(moment));
+            let numbers = errors.into_iter().chain(sigmas).flatten();
+            let numbers = numbers.map(|number| format!("{number:e}"));
+            let time = (moment.time / HOUR).to_string();
+            std::iter::once(time).chain(numbers).collect::<Vec<_>>()
+        };
+        let rows = std::iter::once(heading).chain(moments.iter().map(row));
+        rows.map(|row| row.join(",") + "\n").collect()
     }
 
     fn data(&self) -> Value {
-        let hourly = || {
-            self.navigated
-                .outlook
-                .iter()
-                .filter(|moment| moment.time % HOUR == 0.0)
-        };
+        let moments = || self.navigated.outlook.iter();
+        let hourly = || moments().filter(|moment| moment.time % HOUR == 0.0);
         let (latitude, height, attitude) = match &self.mission.motion {
             Motion::Standing(at) => (
                 at.latitude,
@@ -193,28 +185,23 @@ impl Navigation<'_> {
             ),
             Motion::Moving(path) => (path.start().latitude, path.start().height, None),
         };
-        let mut data = json!({
+        json!({
             "calibration": self.calibration,
             "truth": self.truth,
             "body_frame": self.body_frame,
             "errors": self.only.map_or("both", |sensor| sensor.name()),
-        });
-        if let Some(name) = self.trajectory {
-            data["trajectory"] = name.into();
-        }
-        data["latitude_deg"] = (latitude / DEGREE).into();
-        data["height_m"] = height.into();
-        if let Some(angles) = attitude {
-            data["attitude_deg"] = json!(angles.map(|angle| angle / DEGREE));
-        }
-        data["hours"] = self.hours().into();
-        data["series"] = hourly().map(at).collect();
-        data["max_abs"] = largest(hourly());
-        data["max_abs_by_minute"] = largest(self.navigated.outlook.iter());
-        data["final"] = self.navigated.outlook.last().map(at).into();
-        data["drift_nmile_per_h"] = self.drift().into();
-        data["drift_nmile_per_40_h"] = self.drift().map(|drift| drift * PAPER_HOURS).into();
-        data
+            "trajectory": self.trajectory,
+            "latitude_deg": latitude / DEGREE,
+            "height_m": height,
+            "attitude_deg": attitude.map(|angles| angles.map(|angle| angle / DEGREE)),
+            "hours": self.hours(),
+            "series": hourly().map(at).collect::<Value>(),
+            "max_abs": largest(hourly()),
+            "max_abs_by_minute": largest(moments()),
+            "final": moments().last().map(at),
+            "drift_nmile_per_h": self.drift(),
+            "drift_nmile_per_40_h": self.drift().map(|drift| drift * PAPER_HOURS),
+        })
     }
 }
 

@@ -101,124 +101,93 @@ pub fn line(navigated: &[MethodOutlook]) -> String {
     )
 }
 
-/// One quantity with one calibration: the largest error with its time, the error at the end, its σ, and the ratio of
-/// error to σ.
-struct Figures {
-    largest: Option<Point>,
-    at_end: Option<f64>,
-    sigma: Option<f64>,
-    ratio: Option<f64>,
-}
-
-impl Figures {
-    fn of(quantity: Quantity, navigated: &MethodOutlook) -> Self {
-        let moments = &navigated.outlook;
-        let errors = moments
-            .iter()
-            .filter_map(|m| Some((m.time, quantity.error(m)?)));
-        let at_end = moments.last().and_then(|end| quantity.error(end));
-        let sigma = moments.last().and_then(|end| quantity.sigma(end));
-        let sigma = sigma.filter(|sigma| *sigma > 0.0);
-        let ratio = at_end.zip(sigma).filter(|_| quantity.is_component);
-        Self {
-            largest: errors.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())),
-            at_end,
-            sigma,
-            ratio: ratio.map(|(error, sigma)| error / sigma),
-        }
-    }
-
-    fn cells(&self, scale: f64, second: f64, known: bool) -> Vec<String> {
-        let shown = |x: Option<f64>| or_dash(x, |x| three_digits(x * scale));
-        if !known {
-            return vec![shown(self.sigma)];
-        }
-        let (after, largest) = self.largest.unzip();
-        vec![
-            shown(largest),
-            or_dash(after, |time| value(time / second, 1.0)),
-            shown(self.at_end),
-            shown(self.sigma),
-            or_dash(self.ratio, |z| value(z, 1.0)),
-        ]
-    }
-}
-
 /// Every quantity at the end of navigation, and its maximum if errors are known.
 pub fn table(heading: &str, navigated: &[MethodOutlook]) -> Table {
     let known = is_known(navigated);
     let (unit_of_time, second) = clock(navigated);
+    let after = format!("after, {unit_of_time}");
     let mut columns = cells!["", "unit"];
     for of in navigated {
-        let name = match navigated {
-            [_] => String::new(),
-            _ => format!("{}: ", of.method),
+        let name = if navigated.len() > 1 {
+            format!("{}: ", of.method)
+        } else {
+            String::new()
         };
-        let after = format!("after, {unit_of_time}");
-        columns.extend(match known {
-            true => cells![
-                format!("{name}largest"),
-                after,
-                "at the end",
-                "σ",
-                "error/σ"
-            ],
-            false => cells![format!("{name}σ")],
-        });
+        let first = if known { "largest" } else { "σ" };
+        columns.push(format!("{name}{first}"));
+        if known {
+            columns.extend(cells![after.as_str(), "at the end", "σ", "error/σ"]);
+        }
     }
-    let row = |name: &str, unit: &str, scale: f64, all: &[Figures]| {
-        let cells = all.iter().flat_map(|of| of.cells(scale, second, known));
-        cells![name, unit].into_iter().chain(cells).collect()
+    let row = |quantity: Quantity| {
+        let (unit, scale) = quantity.readable_unit(greatest(quantity, navigated));
+        let shown = |x: Option<f64>| or_dash(x, |x| three_digits(x * scale));
+        let mut row = cells![quantity.name, unit];
+        for MethodOutlook { outlook, .. } in navigated {
+            let end = outlook.last();
+            let sigma = end.and_then(|end| quantity.sigma(end));
+            if known {
+                let error = end.and_then(|end| quantity.error(end));
+                let largest = largest(quantity, outlook);
+                let after = largest.map(|(time, _)| time / second);
+                let of_both = error.zip(sigma).filter(|_| quantity.is_component);
+                let ratio = of_both.map(|(error, sigma)| error / sigma);
+                row.push(shown(largest.map(|of| of.1)));
+                row.push(or_dash(after, |time| value(time, 1.0)));
+                row.extend([shown(error), shown(sigma)]);
+                row.push(or_dash(ratio, |z| value(z, 1.0)));
+            } else {
+                row.push(shown(sigma));
+            }
+        }
+        row
     };
-    let of = |quantity: Quantity| {
-        let all = navigated.iter().map(|of| Figures::of(quantity, of));
-        let all: Vec<Figures> = all.collect();
-        let sizes = all
-            .iter()
-            .flat_map(|of| [of.largest.map(|of| of.1), of.sigma]);
-        let size = sizes.flatten().map(f64::abs).fold(0.0, f64::max);
-        (all, quantity.readable_unit(size))
-    };
-    let rows = Quantity::ALL.map(|quantity| {
-        let (all, (unit, scale)) = of(quantity);
-        row(quantity.name, unit, scale, &all)
-    });
-    let [.., horizontal] = Quantity::ALL;
-    let (mut all, (unit, scale)) = of(horizontal);
-    for of in &mut all {
-        (of.largest, of.ratio) = (None, None);
-    }
-    let unit = format!("{unit}/{unit_of_time}");
-    let drift = row("drift", &unit, scale * second / duration(navigated), &all);
-    let what = match known {
-        true => "Computed minus true. σ: of the error at the end, predicted",
-        false => "The truth is not known, so no error is shown. σ: at the end, predicted",
+    let what = if known {
+        "Computed minus true. σ: of the error at the end, predicted"
+    } else {
+        "The truth is not known, so no error is shown. σ: at the end, predicted"
     };
     Table::new(heading, columns)
-        .sections(rows.chunks(3).map(<[_]>::to_vec))
-        .section([drift])
+        .sections(Quantity::ALL.chunks(3).map(|of| of.iter().map(|&of| row(of))))
         .note(format!(
             "{what} from the calibration's covariance by the linear error model; of horizontal errors the root of the \
-             mean square. Drift: position at the end over the time."
+             mean square."
         ))
+}
+
+/// The largest error with its time.
+fn largest(quantity: Quantity, moments: &[Outlook]) -> Option<Point> {
+    let errors = moments.iter();
+    let errors = errors.filter_map(|of| Some((of.time, quantity.error(of)?)));
+    errors.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+}
+
+/// Magnitude of the largest error and of the σ at the end, over all calibrations.
+fn greatest(quantity: Quantity, navigated: &[MethodOutlook]) -> f64 {
+    let sizes = navigated.iter().flat_map(|of| {
+        let sigma = of.outlook.last().and_then(|end| quantity.sigma(end));
+        [largest(quantity, &of.outlook).map(|of| of.1.abs()), sigma]
+    });
+    sizes.flatten().fold(0.0, f64::max)
 }
 
 /// Position error east and north against time.
 fn figure(navigated: &[MethodOutlook], last: &str) -> Plot {
-    let (heading, mut caption) = match is_known(navigated) {
-        true => (
+    let (heading, mut caption) = if is_known(navigated) {
+        (
             "Position error in navigation",
             format!(
                 "Computed minus true, from full navigation with perfect alignment, stationary and level, with fixed \
                  height. Band: ±1σ of the {last} predicted from its covariance."
             ),
-        ),
-        false => (
+        )
+    } else {
+        (
             "Predicted position error in navigation",
             "±1σ of the error predicted from the covariance of the calibration, with perfect alignment, stationary \
              and level, with fixed height."
                 .to_owned(),
-        ),
+        )
     };
     if navigated.len() > 1 {
         caption += " Solid: EKF; dashed: closed form.";
@@ -227,59 +196,37 @@ fn figure(navigated: &[MethodOutlook], last: &str) -> Plot {
     Plot::new("navigation.svg", heading, (1, 250), panels).caption(caption)
 }
 
-/// Errors against time in a readable unit, over the ±σ band of the last calibration; only ±σ if no error is known.
+/// Errors against time in a readable unit, over the ±σ band of the last calibration; only σ if no error is known.
 pub fn panel(quantity: Quantity, navigated: &[MethodOutlook]) -> Panel {
     let (unit_of_time, second) = clock(navigated);
-    let time = Axis::time(unit_of_time, duration(navigated) / second);
+    let (unit, scale) = quantity.readable_unit(greatest(quantity, navigated));
     let curve = |moments: &[Outlook], of: &dyn Fn(&Outlook) -> Option<f64>| -> Vec<Point> {
         let points = moments.iter();
-        let points = points.filter_map(|m| Some((m.time / second, of(m)?)));
+        let points = points.filter_map(|m| Some((m.time / second, of(m)? * scale)));
         points.collect()
     };
-    let mut lines = Vec::new();
-    for MethodOutlook {
-        method: name,
-        outlook: moments,
-    } in navigated
-    {
-        let name = *name;
-        let errors = curve(moments, &|m| quantity.error(m));
-        if !errors.is_empty() {
-            lines.push((name, Some(name.to_owned()), errors));
-            continue;
-        }
-        let upper = curve(moments, &|m| quantity.sigma(m));
-        lines.push((name, Some(format!("σ of {name}")), upper));
-        lines.push((name, None, curve(moments, &|m| Some(-quantity.sigma(m)?))));
-    }
-    let last = navigated.last().map_or(&[][..], |last| &last.outlook);
-    let sigma = |sign: f64| curve(last, &|m| Some(sign * quantity.sigma(m)?));
-    let size = |points: &[Point]| points.iter().map(|p| p.1.abs()).fold(0.0, f64::max);
-    let sizes = lines.iter().map(|(.., points)| size(points));
-    let sizes: Vec<f64> = sizes.chain([size(&sigma(1.0))]).collect();
-    let (unit, scale) = quantity.readable_unit(sizes.iter().copied().fold(0.0, f64::max));
-    let (y, kind) = Axis::about_zero(sizes.into_iter().map(|size| size * scale));
-    let scaled = |points: Vec<Point>| -> Vec<Point> {
-        points.into_iter().map(|(t, y)| (t, y * scale)).collect()
-    };
-    let lines = lines.into_iter().map(|(name, label, points)| {
-        let mut line = Series::line(scaled(points));
-        line.label = label;
-        match name {
-            "closed form" => line.nth(1).dashed(),
-            _ => line,
+    let lines = navigated.iter().map(|of| {
+        let errors = curve(&of.outlook, &|m| quantity.error(m));
+        let line = if errors.is_empty() {
+            let sigma = curve(&of.outlook, &|m| quantity.sigma(m));
+            Series::line(sigma).label(format!("σ of {}", of.method))
+        } else {
+            Series::line(errors).label(of.method)
+        };
+        if of.method == "closed form" {
+            line.nth(1).dashed()
+        } else {
+            line
         }
     });
+    let last = navigated.last().map_or(&[][..], |last| &last.outlook);
     let lowest = if quantity.is_component { -1.0 } else { 0.0 };
-    let [low, high] = [lowest, 1.0].map(|sign| scaled(sigma(sign)));
-    let mut names = vec![(&high, "+σ")];
-    names.extend(quantity.is_component.then_some((&low, "−σ")));
-    let names = names.into_iter();
-    let names = names.filter_map(|(edge, name)| Some(Series::name(edge.last()?.1, name)));
-    let names: Vec<Series> = names.collect();
-    Panel::new(format!("{}, {unit}{kind}", quantity.name), time, y)
+    let [low, high] = [lowest, 1.0].map(|sign| curve(last, &|m| Some(sign * quantity.sigma(m)?)));
+    let time = Axis::linear(&format!("time, {unit_of_time}"));
+    let time = time.between(0.0, duration(navigated) / second);
+    let y = Axis::linear("").including([0.0]).room(0.06, 0.06);
+    Panel::new(format!("{}, {unit}", quantity.name), time, y)
         .with(Series::band(low, high))
         .with(Series::zero())
-        .with_all(names)
         .with_all(lines)
 }

@@ -12,7 +12,6 @@ const BOTTOM: f32 = HEIGHT - 62.0;
 const TITLE: f32 = 19.0;
 const HEADING: f32 = 10.5;
 const BODY: f32 = 9.0;
-const SMALL: f32 = 7.5;
 const NOTE: u8 = 85;
 const INK: u8 = 20;
 /// Line spacing divided by font size.
@@ -54,11 +53,14 @@ const STRONG: Style = Style {
     bold: true,
     ..PLAIN
 };
-const REMARK: Style = Style {
-    size: 8.0,
+const FAINT: Style = Style {
     grey: NOTE,
     ..PLAIN
 };
+const REMARK: Style = Style { size: 8.0, ..FAINT };
+const MARGINAL: Style = Style { size: 7.5, ..FAINT };
+/// Width of a line of text.
+const LINE: f32 = WIDTH - 2.0 * MARGIN;
 
 /// Pages under construction.
 pub struct Layout<'a> {
@@ -81,7 +83,8 @@ impl<'a> Layout<'a> {
 
     /// All of a document's pages.
     pub fn pages(mut self, document: &Document) -> Result<Vec<Vec<Drawn>>, PdfError> {
-        self.title(&document.title);
+        self.strong(&document.title, TITLE);
+        self.y += 0.6 * TITLE;
         for text in &document.lead {
             self.paragraph(text, PLAIN);
         }
@@ -93,23 +96,12 @@ impl<'a> Layout<'a> {
         }
         self.y += 10.0;
         self.need(2.0 * BODY);
-        let end = self.shortened(&self.frame.end, REMARK, WIDTH - 2.0 * MARGIN);
+        let end = self.shortened(&self.frame.end, REMARK, LINE);
         let at = 0.5 * (WIDTH - self.width(&end, REMARK));
         self.text(at, &end, REMARK);
         self.frames();
         self.check()?;
         Ok(self.pages)
-    }
-
-    fn title(&mut self, title: &str) {
-        let style = Style {
-            size: TITLE,
-            bold: true,
-            grey: INK,
-        };
-        self.y += TITLE;
-        self.text(MARGIN, title, style);
-        self.y += 0.6 * TITLE;
     }
 
     fn block(&mut self, block: &Block) {
@@ -132,26 +124,21 @@ impl<'a> Layout<'a> {
         }
         self.y += 9.0;
         self.need(HEADING * LEADING + follows);
-        let style = Style {
-            size: HEADING,
-            ..STRONG
-        };
-        self.y += HEADING;
-        self.text(MARGIN, heading, style);
+        self.strong(heading, HEADING);
         self.y += 4.0;
+    }
+
+    fn strong(&mut self, text: &str, size: f32) {
+        self.y += size;
+        self.text(MARGIN, text, Style { size, ..STRONG });
     }
 
     fn facts(&mut self, facts: &Facts) {
         self.heading(&facts.heading, 2.0 * BODY * LEADING);
         for (name, value) in &facts.rows {
-            let room = WIDTH - 2.0 * MARGIN - NAMES;
-            let style = Style {
-                grey: NOTE,
-                ..PLAIN
-            };
-            for (n, line) in self.broken(value, PLAIN, room).enumerate() {
+            for (n, line) in self.broken(value, PLAIN, LINE - NAMES).enumerate() {
                 let name = if n == 0 { name } else { "" };
-                self.line(&[(MARGIN, name, style), (MARGIN + NAMES, line, PLAIN)]);
+                self.line(&[(MARGIN, name, FAINT), (MARGIN + NAMES, line, PLAIN)]);
             }
         }
     }
@@ -164,7 +151,7 @@ impl<'a> Layout<'a> {
     }
 
     fn paragraph(&mut self, text: &str, style: Style) {
-        for line in self.broken(text, style, WIDTH - 2.0 * MARGIN) {
+        for line in self.broken(text, style, LINE) {
             self.line(&[(MARGIN, line, style)]);
         }
         self.y += 2.0;
@@ -181,51 +168,46 @@ impl<'a> Layout<'a> {
         self.y += size * (LEADING - 1.0);
     }
 
+    /// A table on one page if it fits; if it is too wide, in smaller letters.
     fn table(&mut self, table: &Table) {
         let rows = || table.sections.iter().flatten();
-        let size = |text: &str, style: Style| self.width(text, style);
-        let widths: Vec<f32> = (0..table.columns.len())
-            .map(|k| {
-                let cells = rows().filter_map(|row| row.get(k));
-                let widest = cells.map(|cell| size(cell, PLAIN)).fold(0.0, f32::max);
-                widest.max(size(&table.columns[k], STRONG))
-            })
-            .collect();
+        let widths = table.columns.iter().enumerate().map(|(k, heading)| {
+            let cells = rows().filter_map(|row| row.get(k));
+            let widest = cells
+                .map(|cell| self.width(cell, PLAIN))
+                .fold(0.0, f32::max);
+            widest.max(self.width(heading, STRONG))
+        });
+        let widths: Vec<f32> = widths.collect();
         let all = widths.iter().sum::<f32>() + GAP * (widths.len().max(1) - 1) as f32;
-        let room = WIDTH - 2.0 * MARGIN;
-        // A table that is too wide is set in smaller letters.
-        let shrink = (room / all).min(1.0);
-        let style = |bold: bool| Style {
-            size: BODY * shrink,
-            ..(if bold { STRONG } else { PLAIN })
-        };
+        let shrink = (LINE / all).min(1.0);
+        let mut columns = Vec::new();
+        let mut left = MARGIN;
+        for width in widths {
+            columns.push((left, left + width * shrink));
+            left += (width + GAP) * shrink;
+        }
+        let right = columns.last().map_or(MARGIN, |column| column.1);
         let leading = BODY * shrink * LEADING;
-        let rights: Vec<f32> = widths
-            .iter()
-            .scan(MARGIN - GAP * shrink, |x, width| {
-                *x += (width + GAP) * shrink;
-                Some(*x)
-            })
-            .collect();
-        let right = rights.last().copied().unwrap_or(MARGIN);
-        let rules = 2.0 * table.sections.len() as f32;
-        let whole = leading * (rows().count() + 1) as f32 + rules;
-        let first = leading * (table.sections.first().map_or(1, Vec::len).min(4) as f32 + 1.5);
-        // A table that fits on a page stands on one.
-        let together = whole + HEADING * LEADING < BOTTOM - TOP;
-        self.heading(&table.heading, if together { whole } else { first });
-        let mut header = true;
+        let whole = leading * (rows().count() + 1) as f32 + 2.0 * table.sections.len() as f32;
+        let fits = whole + HEADING * LEADING < BOTTOM - TOP;
+        self.heading(&table.heading, if fits { whole } else { 5.5 * leading });
+        let style = |style: Style| Style {
+            size: BODY * shrink,
+            ..style
+        };
+        let mut needs_heading = true;
         for section in &table.sections {
             for row in section {
                 if self.y + leading > BOTTOM {
                     self.next_page();
-                    header = true;
+                    needs_heading = true;
                 }
-                if std::mem::take(&mut header) {
-                    self.row(&table.columns, &widths, &rights, shrink, style(true));
+                if std::mem::take(&mut needs_heading) {
+                    self.row(&table.columns, &columns, style(STRONG));
                     self.rule(right, 0.7);
                 }
-                self.row(row, &widths, &rights, shrink, style(false));
+                self.row(row, &columns, style(PLAIN));
             }
             self.rule(right, 0.3);
         }
@@ -235,12 +217,12 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// Cells of a row: the first left-aligned, the others right-aligned.
-    fn row(&mut self, cells: &[String], widths: &[f32], rights: &[f32], shrink: f32, style: Style) {
+    /// Cells of a row between the ends of their columns: the first left-aligned, the others right-aligned.
+    fn row(&mut self, cells: &[String], columns: &[(f32, f32)], style: Style) {
         self.y += style.size;
-        for (k, (cell, right)) in cells.iter().zip(rights).enumerate() {
+        for (k, (cell, (left, right))) in cells.iter().zip(columns).enumerate() {
             let x = match k {
-                0 => right - widths[0] * shrink,
+                0 => *left,
                 _ => right - self.width(cell, style),
             };
             self.text(x, cell, style);
@@ -260,39 +242,28 @@ impl<'a> Layout<'a> {
 
     /// Adds the margins to every page, once the number of pages is known.
     fn frames(&mut self) {
-        let total = self.pages.len();
-        let style = Style {
-            size: SMALL,
-            bold: false,
-            grey: NOTE,
-        };
         let Frame {
             left, right, foot, ..
         } = self.frame;
+        let total = self.pages.len();
         for page in 0..total {
             let number = format!("Page {} of {total}", page + 1);
-            let room = WIDTH - 2.0 * MARGIN;
-            let end = |text: &str| WIDTH - MARGIN - self.width(text, style);
-            let beside = |text: &str, other: &str| {
-                self.shortened(text, style, room - self.width(other, style) - GAP)
-            };
-            let right = self.shortened(right, style, 0.5 * room);
-            let texts = [
-                (MARGIN, 44.0, beside(left, &right)),
-                (end(&right), 44.0, right),
-                (MARGIN, HEIGHT - 36.0, beside(foot, &number)),
-                (end(&number), HEIGHT - 36.0, number),
-            ];
-            let texts = texts.map(|(x, y, text)| Drawn::Text {
-                at: (x, y),
-                text,
-                style,
-            });
-            self.pages[page].extend(texts);
-            for y in [50.0, HEIGHT - 46.0] {
+            let head = (44.0, left, right, 50.0);
+            let foot = (HEIGHT - 36.0, foot, &number, HEIGHT - 46.0);
+            for (y, left, right, rule) in [head, foot] {
+                let right = self.shortened(right, MARGINAL, 0.5 * LINE);
+                let width = self.width(&right, MARGINAL);
+                let left = self.shortened(left, MARGINAL, LINE - width - GAP);
+                let end = WIDTH - MARGIN;
+                let texts = [(MARGIN, left), (end - width, right)];
+                self.pages[page].extend(texts.map(|(x, text)| Drawn::Text {
+                    at: (x, y),
+                    text,
+                    style: MARGINAL,
+                }));
                 self.pages[page].push(Drawn::Rule {
-                    from: (MARGIN, y),
-                    to: WIDTH - MARGIN,
+                    from: (MARGIN, rule),
+                    to: end,
                     width: 0.5,
                 });
             }
@@ -407,7 +378,7 @@ pub enum PdfError {
 /// Page margins and file metadata.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Frame {
-    /// Upper left.
+    /// Upper left, and author in the metadata.
     pub left: String,
     /// Upper right.
     pub right: String,
@@ -415,8 +386,6 @@ pub struct Frame {
     pub foot: String,
     /// Below the last line.
     pub end: String,
-    /// Author in the metadata.
-    pub author: String,
     /// Year, month and day of the metadata.
     pub day: (u16, u8, u8),
 }

@@ -72,7 +72,7 @@ pub fn write(
             .title(document.title.clone())
             .language("en".to_owned())
             .creator(concat!("turncal ", env!("CARGO_PKG_VERSION")).to_owned())
-            .authors(vec![frame.author.clone()])
+            .authors(vec![frame.left.clone()])
             .keywords(vec![
                 "fonts: Noto Sans, SIL Open Font License 1.1".to_owned(),
             ])
@@ -142,9 +142,10 @@ fn embedded(file: Attached, day: DateTime) -> EmbeddedFile {
         path: file.name,
         mime_type: MimeType::new(file.mime),
         description: Some(file.description),
-        association_kind: match file.alternative {
-            true => AssociationKind::Alternative,
-            false => AssociationKind::Data,
+        association_kind: if file.alternative {
+            AssociationKind::Alternative
+        } else {
+            AssociationKind::Data
         },
         data: file.bytes.into(),
         modification_date: Some(day),

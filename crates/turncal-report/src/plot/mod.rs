@@ -6,8 +6,7 @@ mod series;
 use std::ops::Range;
 
 pub use axis::{Axis, Kind, Scale, positive_range};
-pub use series::thinned;
-pub use series::{Anchor, Color, Dash, Fill, Mark, Pen, Point, Series, Shape, Upright};
+pub use series::{Anchor, Color, Mark, Pen, Point, Series, Shape, Upright};
 
 /// A figure with its file, heading and caption.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,7 +21,7 @@ pub struct Plot {
     pub columns: usize,
     /// Height of a panel in pixels; the width of the figure is fixed.
     pub height: u32,
-    /// The panels, row by row; a row may be closed by [`Panel::blank`].
+    /// The panels, row by row.
     pub panels: Vec<Panel>,
 }
 
@@ -41,14 +40,10 @@ pub struct Panel {
     pub shading: Vec<Range<f64>>,
     /// Short texts above the curves, where space permits.
     pub tags: Vec<(f64, String)>,
-    /// Number of lines over which the tags are spread.
-    pub tag_lines: usize,
     /// Lines of text in the upper right corner.
     pub notes: Vec<String>,
     /// Whether both axes have the same length.
     pub square: bool,
-    /// Whether only the title is drawn.
-    pub blank: bool,
 }
 
 impl Plot {
@@ -87,14 +82,6 @@ impl Panel {
         }
     }
 
-    /// Only a title, instead of a panel without data.
-    pub fn blank(title: impl Into<String>) -> Self {
-        Self {
-            blank: true,
-            ..Self::new(title, Axis::default(), Axis::default())
-        }
-    }
-
     /// Adds a series in front of the others.
     pub fn with(mut self, series: Series) -> Self {
         self.series.push(series);
@@ -113,9 +100,8 @@ impl Panel {
         self
     }
 
-    /// Adds short texts above the curves, in up to `lines` lines.
-    pub fn tagged(mut self, lines: usize, tags: impl IntoIterator<Item = (f64, String)>) -> Self {
-        self.tag_lines = lines;
+    /// Adds short texts above the curves.
+    pub fn tagged(mut self, tags: impl IntoIterator<Item = (f64, String)>) -> Self {
         self.tags = tags.into_iter().collect();
         self
     }

@@ -28,12 +28,10 @@ pub enum Shape {
     Band(Vec<Point>, Vec<Point>),
     /// A mark at each point, on a vertical error bar with caps if its ends differ.
     Marks(Mark, Vec<(Point, (f64, f64))>),
-    /// Bars of this half width; a bar that starts at −∞ starts at the lower end of the axis.
-    Bars(f64, Fill, Vec<Upright>),
+    /// Bars of this half width.
+    Bars(f64, Vec<Upright>),
     /// A line across the panel at this height.
     Level(f64),
-    /// A line from bottom to top.
-    Upright(f64),
     /// Text next to a point.
     Words(Point, Anchor, String),
 }
@@ -49,15 +47,6 @@ pub enum Mark {
     Cross,
 }
 
-/// Fill style of a bar.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Fill {
-    /// With the colour of the pen, without an outline.
-    Solid,
-    /// Pale with an outline.
-    Pale,
-}
-
 /// Position of a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Anchor {
@@ -65,8 +54,6 @@ pub enum Anchor {
     Above,
     /// In the middle below it.
     Below,
-    /// To the left above it.
-    AboveLeft,
     /// In the middle of it.
     Middle,
 }
@@ -78,8 +65,8 @@ pub struct Pen {
     pub color: Color,
     /// Width in pixels.
     pub width: f64,
-    /// Dashes.
-    pub dash: Dash,
+    /// Whether the line is dashed.
+    pub is_dashed: bool,
 }
 
 /// Colours that also differ in lightness.
@@ -93,17 +80,6 @@ pub enum Color {
     Nth(usize),
 }
 
-/// Dashes of a line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Dash {
-    /// None.
-    Solid,
-    /// Long dashes.
-    Dashed,
-    /// Short dashes.
-    Dotted,
-}
-
 impl Shape {
     /// Points that the axes must include.
     pub(crate) fn corners(&self) -> Vec<Point> {
@@ -114,11 +90,11 @@ impl Shape {
                 .flat_map(|&((x, y), (low, high))| [(x, y), (x, low), (x, high)])
                 .collect(),
             Self::Band(lower, upper) => [&lower[..], upper].concat(),
-            Self::Bars(half, _, bars) => bars
+            Self::Bars(half, bars) => bars
                 .iter()
                 .flat_map(|&(x, low, high)| [(x - half, low), (x + half, high)])
                 .collect(),
-            Self::Level(_) | Self::Upright(_) | Self::Words(..) => Vec::new(),
+            Self::Level(_) | Self::Words(..) => Vec::new(),
         }
     }
 
@@ -142,7 +118,7 @@ impl Series {
         let pen = Pen {
             color: Color::Nth(0),
             width: 1.5,
-            dash: Dash::Solid,
+            is_dashed: false,
         };
         Self {
             shape,
@@ -154,7 +130,7 @@ impl Series {
 
     /// Points joined in order; dense data are reduced to the lowest and highest.
     pub fn line(points: impl IntoIterator<Item = Point>) -> Self {
-        Self::new(Shape::Line(thinned(points, MOST)))
+        Self::new(Shape::Line(thinned(points)))
     }
 
     /// The area between two lines.
@@ -186,8 +162,8 @@ impl Series {
     }
 
     /// Bars of this half width.
-    pub fn bars(half: f64, fill: Fill, bars: impl IntoIterator<Item = Upright>) -> Self {
-        Self::new(Shape::Bars(half, fill, bars.into_iter().collect()))
+    pub fn bars(half: f64, bars: impl IntoIterator<Item = Upright>) -> Self {
+        Self::new(Shape::Bars(half, bars.into_iter().collect()))
     }
 
     /// A line across the panel.
@@ -216,40 +192,22 @@ impl Series {
         self.color(Color::Nth(n))
     }
 
-    /// The pen of the n-th body axis, which also differs in its dashes.
-    pub fn axis(self, n: usize) -> Self {
-        let dash = [Dash::Solid, Dash::Dashed, Dash::Dotted][n % 3];
-        self.nth(n).dash(dash)
-    }
-
     /// Width of the pen.
     pub fn width(mut self, width: f64) -> Self {
         self.pen.width = width;
         self
     }
 
-    /// Dashes.
-    pub fn dash(mut self, dash: Dash) -> Self {
-        self.pen.dash = dash;
+    /// Dashes the line.
+    pub fn dashed(mut self) -> Self {
+        self.pen.is_dashed = true;
         self
-    }
-
-    /// Long dashes.
-    pub fn dashed(self) -> Self {
-        self.dash(Dash::Dashed)
     }
 
     /// Names its right end.
     pub fn label(mut self, text: impl Into<String>) -> Self {
         self.label = Some(text.into());
         self
-    }
-
-    /// Names only a height.
-    pub fn name(y: f64, text: impl Into<String>) -> Self {
-        Self::line([(f64::INFINITY, y)])
-            .color(Color::Quiet)
-            .label(text)
     }
 
     /// Names it in the title line.
@@ -259,15 +217,15 @@ impl Series {
     }
 }
 
-/// Maximum number of points of a line; a panel is a hundredth as wide in pixels.
-const MOST: usize = 1 << 17;
+/// Maximum number of points of a line; no panel is wider in pixels.
+const MOST: usize = 1200;
 
-/// About `most` points of a line: the lowest and highest of each interval, every gap, and the end, to which the name of
-/// the line refers.
-pub fn thinned(points: impl IntoIterator<Item = Point>, most: usize) -> Vec<Point> {
+/// About [`MOST`] points of a line: the lowest and highest of each interval, every gap, and the end, to which the name
+/// of the line refers.
+fn thinned(points: impl IntoIterator<Item = Point>) -> Vec<Point> {
     let points = points.into_iter();
     let (least, greatest) = points.size_hint();
-    let together = (2 * greatest.unwrap_or(least)).div_ceil(most.max(2));
+    let together = (2 * greatest.unwrap_or(least)).div_ceil(MOST);
     let (mut line, mut stretch) = (Vec::new(), Vec::new());
     for point in points {
         let is_gap = !(point.0.is_finite() && point.1.is_finite());
@@ -275,9 +233,10 @@ pub fn thinned(points: impl IntoIterator<Item = Point>, most: usize) -> Vec<Poin
             line.extend(ends(&stretch));
             stretch.clear();
         }
-        match is_gap {
-            true => line.push(point),
-            false => stretch.push(point),
+        if is_gap {
+            line.push(point);
+        } else {
+            stretch.push(point);
         }
     }
     line.extend(ends(&stretch));
@@ -316,9 +275,9 @@ mod tests {
             };
             (k as f64, if k == 1_000_000 { f64::NAN } else { height })
         };
-        let line = thinned((0..3_000_000).map(point), MOST);
+        let line = thinned((0..3_000_000).map(point));
         assert!(
-            line.len() <= MOST && line.len() > MOST / 8,
+            line.len() < MOST + 10 && line.len() > MOST / 2,
             "{}",
             line.len()
         );
@@ -338,6 +297,6 @@ mod tests {
         let line: Vec<Point> = (0..1000)
             .map(|k| (f64::from(k), f64::from(k % 7)))
             .collect();
-        assert_eq!(thinned(line.iter().copied(), MOST), line);
+        assert_eq!(thinned(line.iter().copied()), line);
     }
 }

@@ -10,7 +10,7 @@ use plotters::prelude::*;
 use plotters::style::Color as _;
 use plotters::style::text_anchor::Pos;
 
-use crate::plot::{Color, Dash, Panel, Pen, Point, Scale};
+use crate::plot::{Color, Panel, Pen, Point, Scale};
 
 pub use plotters::style::text_anchor::{HPos, VPos};
 
@@ -117,14 +117,12 @@ impl Canvas {
 
     /// Joins points.
     pub fn line(&mut self, points: &[Point], pen: Pen) {
-        let (dash, gap) = match pen.dash {
-            Dash::Solid => return self.stroke(points, rgb(pen.color), pen.width),
-            Dash::Dashed => (6.0, 4.0),
-            Dash::Dotted => (2.0, 2.5),
-        };
+        if !pen.is_dashed {
+            return self.stroke(points, rgb(pen.color), pen.width);
+        }
         let style = rgb(pen.color).stroke_width(px(pen.width) as u32);
         let points: Vec<_> = points.iter().copied().map(place).collect();
-        self.put(DashedPathElement::new(points, px(dash), px(gap), style));
+        self.put(DashedPathElement::new(points, px(6.0), px(4.0), style));
     }
 
     /// The same without dashes in any colour.

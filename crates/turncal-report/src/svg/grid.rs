@@ -16,6 +16,8 @@ const SHADE: RGBColor = RGBColor(243, 243, 238);
 const TOP: f64 = 26.0;
 /// Distance between lines of text.
 const LINE: f64 = 17.0;
+/// Number of lines over which tags are spread.
+const TAG_LINES: usize = 3;
 /// Relative size of the letters of tags.
 const TAG: f64 = 0.85;
 /// Maximum fraction of the width of a panel for names at the ends of lines.
@@ -28,9 +30,10 @@ pub fn draw(on: &mut Canvas, plot: &Plot) -> u32 {
         let panels = plot.panels.iter().skip(column).step_by(plot.columns);
         let scaled: Vec<(&Panel, (Scale, Scale))> = panels.map(|p| (p, p.scales())).collect();
         // All panels of a column have the same margins.
-        let drawn = || scaled.iter().filter(|(panel, _)| !panel.blank);
-        let left = drawn().map(|(_, (_, y))| widest(&y.ticks) + 14.0);
-        let right = drawn().map(|(panel, (x, _))| right(panel, x, panel_width));
+        let left = scaled.iter().map(|(_, (_, y))| widest(&y.ticks) + 14.0);
+        let right = scaled
+            .iter()
+            .map(|(panel, (x, _))| right(panel, x, panel_width));
         let [left, right] = [left.fold(14.0, f64::max), right.fold(14.0, f64::max)];
         let origin = panel_width * column as f64;
         let across = (origin + left, origin + panel_width - right);
@@ -50,10 +53,7 @@ pub fn draw(on: &mut Canvas, plot: &Plot) -> u32 {
                 down,
                 end: origin + panel_width,
             };
-            match panel.blank {
-                true => title(on, &frame),
-                false => of_panel(on, &frame, &names),
-            }
+            of_panel(on, &frame, &names);
         }
     }
     plot.height * plot.panels.len().div_ceil(plot.columns).max(1) as u32
@@ -95,11 +95,6 @@ fn names(x: &Scale, room: f64) -> Vec<Vec<String>> {
     x.ticks.iter().map(|(_, label)| lines(label)).collect()
 }
 
-fn title(on: &mut Canvas, frame: &Frame) {
-    let at = (frame.across.0, frame.down.0 - TOP + 6.0);
-    on.text(&frame.panel.title, at, (HPos::Left, VPos::Top), INK, 1.0)
-}
-
 fn of_panel(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
     let (panel, (left, right), (top, bottom)) = (frame.panel, frame.across, frame.down);
     for range in &panel.shading {
@@ -111,7 +106,8 @@ fn of_panel(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
     }
     ticks(on, frame, names);
     on.stroke(&[(left, top), (left, bottom), (right, bottom)], QUIET, 0.75);
-    title(on, frame);
+    let at = (left, top - TOP + 6.0);
+    on.text(&panel.title, at, (HPos::Left, VPos::Top), INK, 1.0);
     keys(on, frame, top - TOP + 6.0);
     for series in &panel.series {
         series::draw(on, frame, series);
@@ -152,9 +148,10 @@ fn ticks(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
                 .map(|line| width(line, SMALL))
                 .fold(0.0, f64::max);
         let is_place = !frame.panel.x.places.is_empty();
-        let shown = match is_place {
-            true => x.clamp(left + half, (right - half).max(left + half)),
-            false => x,
+        let shown = if is_place {
+            x.clamp(left + half, (right - half).max(left + half))
+        } else {
+            x
         };
         let gap = if is_place { 0.0 } else { 6.0 };
         let near = |&(other, of): &(f64, f64)| (other - shown).abs() < half + of + gap;
@@ -194,7 +191,7 @@ fn keys(on: &mut Canvas, frame: &Frame, y: f64) {
 /// Tags in the first line with space; tags without space are omitted.
 fn tags(on: &mut Canvas, frame: &Frame) {
     let (left, right) = frame.across;
-    let mut taken = vec![f64::NEG_INFINITY; frame.panel.tag_lines];
+    let mut taken = [f64::NEG_INFINITY; TAG_LINES];
     for (x, text) in &frame.panel.tags {
         let half = 0.5 * width(text, TAG);
         if half > 0.5 * (right - left) {

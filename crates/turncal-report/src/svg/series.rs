@@ -2,27 +2,24 @@
 
 use plotters::style::RGBColor;
 
-use super::super::plot::{Anchor, Axis, Fill, Mark, Pen, Point, Series, Shape, Upright, thinned};
+use super::super::plot::{Anchor, Axis, Mark, Pen, Point, Series, Shape, Upright};
 use super::canvas::{Canvas, Frame, HPos, SMALL, VPos, rgb};
 use turncal::number::three_digits;
 
-/// Bands and pale bars.
+/// Bands.
 const BAND: RGBColor = RGBColor(196, 214, 228);
 /// Half the width of a cap, in pixels.
 const CAP: f64 = 4.0;
-/// Points of a line per pixel of its panel; more would be invisible.
-const POINTS: f64 = 1.5;
 /// Maximum number of marks with hover texts.
 const HOVERED: usize = 500;
 
 pub fn draw(on: &mut Canvas, frame: &Frame, series: &Series) {
     let (pen, color) = (series.pen, rgb(series.pen.color));
-    let ((left, right), (top, bottom)) = (frame.across, frame.down);
+    let (left, right) = frame.across;
     match &series.shape {
         Shape::Line(points) => line(on, frame, points, pen),
         Shape::Band(lower, upper) => {
-            let most = (POINTS * (right - left)) as usize;
-            let [lower, upper] = [lower, upper].map(|edge| thinned(visible(frame, edge), most));
+            let [lower, upper] = [lower, upper].map(|edge| visible(frame, edge));
             let outline = upper.into_iter().chain(lower.into_iter().rev());
             let outline = placed(frame, outline);
             if outline.len() > 2 {
@@ -30,14 +27,10 @@ pub fn draw(on: &mut Canvas, frame: &Frame, series: &Series) {
             }
         }
         Shape::Marks(mark, points) => marks(on, frame, series, *mark, points),
-        Shape::Bars(half, fill, of) => bars(on, frame, series, (*half, *fill), of),
+        Shape::Bars(half, of) => bars(on, frame, series, *half, of),
         Shape::Level(y) => {
             let y = frame.at_y(*y);
             on.line(&[(left, y), (right, y)], pen)
-        }
-        Shape::Upright(x) => {
-            let x = frame.at_x(*x);
-            on.line(&[(x, top), (x, bottom)], pen)
         }
         Shape::Words(at, anchor, text) => {
             let (x, y) = frame.at(*at);
@@ -45,7 +38,6 @@ pub fn draw(on: &mut Canvas, frame: &Frame, series: &Series) {
                 Anchor::Above => ((x, y - 5.0), (HPos::Center, VPos::Bottom)),
                 Anchor::Below => ((x, y + 5.0), (HPos::Center, VPos::Top)),
                 Anchor::Middle => ((x, y), (HPos::Center, VPos::Center)),
-                Anchor::AboveLeft => ((x - 4.0, y - 3.0), (HPos::Right, VPos::Bottom)),
             };
             on.text(text, at, lie, color, SMALL)
         }
@@ -70,40 +62,22 @@ fn marks(
             }
             marked(on, frame.at(at), mark, series.pen)
         };
-        match is_hovered {
-            true => on.titled(&hover(frame, series, at, ends), drawn),
-            false => drawn(on),
+        if is_hovered {
+            on.titled(&hover(frame, series, at, ends), drawn)
+        } else {
+            drawn(on)
         }
     }
 }
 
-fn bars(
-    on: &mut Canvas,
-    frame: &Frame,
-    series: &Series,
-    (half, fill): (f64, Fill),
-    bars: &[Upright],
-) {
-    let (pen, color) = (series.pen, rgb(series.pen.color));
+fn bars(on: &mut Canvas, frame: &Frame, series: &Series, half: f64, bars: &[Upright]) {
     let drawn = |of: &&Upright| of.2.is_finite() && of.1 != of.2;
     for &(x, low, high) in bars.iter().filter(drawn) {
-        let (before, after) = (x - half, x + half);
-        let corners = [(before, low), (before, high), (after, high), (after, low)];
-        let corners = corners.map(|corner| frame.at(corner));
-        // For stacked bars, the height is that of each bar alone.
-        let height = if fill == Fill::Solid {
-            high - low
-        } else {
-            high
-        };
+        let corners = [frame.at((x - half, low)), frame.at((x + half, high))];
+        // Bars are stacked, so the height is that of each bar alone.
+        let height = high - low;
         let text = hover(frame, series, (x, height), (height, height));
-        on.titled(&text, |on| match fill {
-            Fill::Solid => on.area(&corners, color),
-            Fill::Pale => {
-                on.area(&corners, BAND);
-                on.stroke(&corners, color, pen.width)
-            }
-        })
+        on.titled(&text, |on| on.rectangle(corners, rgb(series.pen.color)))
     }
 }
 
@@ -137,16 +111,12 @@ fn whisker(on: &mut Canvas, frame: &Frame, (x, (low, high)): (f64, (f64, f64)), 
 
 /// Points joined except across missing values; a single point is a dot.
 fn line(on: &mut Canvas, frame: &Frame, points: &[Point], pen: Pen) {
-    let most = POINTS * (frame.across.1 - frame.across.0);
     let is_point = |p: &Point| p.0.is_finite() && p.1.is_finite();
     for piece in points.split(|p| !is_point(p)) {
-        let piece = visible(frame, piece);
-        let share = most * piece.len() as f64 / points.len() as f64;
-        let piece = placed(frame, thinned(piece, share as usize));
-        match piece[..] {
+        match placed(frame, visible(frame, piece))[..] {
             [] => {}
             [alone] => marked(on, alone, Mark::Dot, Pen { width: 0.5, ..pen }),
-            _ => on.line(&piece, pen),
+            ref piece => on.line(piece, pen),
         }
     }
 }

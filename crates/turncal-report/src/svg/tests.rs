@@ -1,6 +1,6 @@
 //! Properties of every figure.
 
-use super::super::plot::{Axis, Mark, Panel, Plot, Series, thinned};
+use super::super::plot::{Axis, Mark, Panel, Plot, Series};
 use super::canvas::{LETTER, width};
 use super::*;
 
@@ -90,18 +90,6 @@ fn a_figure_has_its_size() {
 }
 
 #[test]
-fn thinning_a_line_keeps_its_extremes_and_its_end() {
-    let mut points: Vec<_> = (0..10_000).map(|i| (f64::from(i), 0.0)).collect();
-    points[1234].1 = 7.0;
-    points[7777].1 = -3.0;
-    let thin = thinned(points.iter().copied(), 400);
-    assert!(thin.len() <= 410);
-    assert!(thin.contains(&(1234.0, 7.0)) && thin.contains(&(7777.0, -3.0)));
-    assert!(thin.is_sorted_by(|a, b| a.0 <= b.0));
-    assert_eq!(thin.last(), points.last());
-}
-
-#[test]
 fn names_at_the_ends_of_lines_never_overlap_and_long_ones_are_cut() {
     let long = "a calibration with a name that nobody can read to its end".repeat(3);
     let line = |n: i32| Series::line([(0.0, 1.0), (1.0, 1.0 + 1e-3 * f64::from(n))]);
@@ -138,18 +126,14 @@ fn numbers_that_are_none_are_drawn_as_gaps() {
         .with(Series::marks(Mark::Ring, points))
         .with(Series::band(vec![nan; 3], vec![nan; 3]))
         .with(Series::level(2.0).label("level"));
-    assert_sound(&[of([panel, Panel::blank("nothing to show")])]);
+    assert_sound(&[of([panel])]);
 }
 
 #[test]
 fn ticks_leave_each_other_room() {
     let places = (0..40).map(|k| format!("place number {k}"));
-    let panel = Panel::new(
-        "",
-        Axis::places(places),
-        Axis::symlog(1.0).between(-1e9, 1e9),
-    )
-    .with(Series::line([(0.0, 0.0)]));
+    let panel = Panel::new("", Axis::places(places), Axis::log("").between(1.0, 1e9))
+        .with(Series::line([(0.0, 0.0)]));
     let svg = draw(&Plot::new("a.svg", "A", (1, 120), [panel]));
     let ticks: Vec<f64> = texts(&svg)
         .into_iter()

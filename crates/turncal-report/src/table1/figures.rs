@@ -5,9 +5,6 @@ use crate::prelude::*;
 use turncal::study::Table1;
 use turncal::study::table1::{Column, QUANTITIES};
 
-/// A curve within this fraction of its axis is drawn as a straight line.
-const FLAT: f64 = 1e-4;
-
 /// Places of attitude, and of velocity and position, in [`QUANTITIES`].
 const ATTITUDE: [usize; 3] = [0, 1, 2];
 const MOTION: [usize; 2] = [3, 4];
@@ -33,55 +30,41 @@ fn figure(table: &Table1, column: &Column, number: u8, quantities: &[usize]) -> 
     let heading = format!("Figure {number}: {triad}, {form} form, {errors}");
     let panels = quantities.iter().map(|&of| panel(table, column, of));
     Plot::new(&format!("figure-{number}.svg"), &heading, (1, 230), panels)
-        .caption(caption(table, column, quantities))
+        .caption(caption(table, column))
 }
 
-fn caption(table: &Table1, column: &Column, quantities: &[usize]) -> String {
+fn caption(table: &Table1, column: &Column) -> String {
     let drawn = column.courses.samples.len();
-    let samples = match drawn < table.study.samples {
-        true => format!("{drawn} of {} samples", count(table.study.samples)),
-        false => format!("all {drawn} samples"),
+    let samples = if drawn < table.study.samples {
+        format!("{drawn} of {} samples", count(table.study.samples))
+    } else {
+        format!("all {drawn} samples")
     };
-    let mut text = format!(
+    format!(
         "{}, as stated. Thin: errors of {samples}; thick: mean of all; dashed: mean ± one standard deviation. Both \
          forms of a triad have the same axes.",
         title(column.published)
-    );
-    if quantities.iter().all(|&q| flat(table, column, q)) {
-        let largest = quantities.iter().map(|&q| {
-            let of = QUANTITIES[q];
-            format!("{} {:.0e} {}", of.short(), extent(column, q), of.unit())
-        });
-        let largest = largest.collect::<Vec<_>>().join(", ");
-        text += &format!(" Only rounding errors remain; largest: {largest}.");
-    }
-    text
+    )
 }
 
-fn flat(table: &Table1, column: &Column, q: usize) -> bool {
-    extent(column, q) < FLAT * common_extent(table, column, q)
-}
-
-/// Largest drawn magnitude of a column.
-fn extent(column: &Column, q: usize) -> f64 {
-    let samples = column.courses.samples.iter().flatten().map(|e| e[q].abs());
-    let moments = column.courses.moments.iter();
-    let moments = moments.map(|m| m[q].mean.abs() + m[q].std);
-    samples.chain(moments).fold(0.0, f64::max)
-}
-
-/// The same over both forms of the triad.
-fn common_extent(table: &Table1, column: &Column, q: usize) -> f64 {
+/// Largest drawn magnitude, the same for both forms of the triad.
+fn extent(table: &Table1, column: &Column, q: usize) -> f64 {
     let sensor = column.published.sensor;
     let columns = table.columns.iter();
-    let columns = columns.filter(|column| column.published.sensor == sensor);
-    let extents = columns.map(|column| extent(column, q));
+    let courses = columns
+        .filter(|column| column.published.sensor == sensor)
+        .map(|column| &column.courses);
+    let extents = courses.flat_map(|of| {
+        let samples = of.samples.iter().flatten().map(|e| e[q].abs());
+        let moments = of.moments.iter().map(|m| m[q].mean.abs() + m[q].std);
+        samples.chain(moments)
+    });
     extents.fold(0.0, f64::max)
 }
 
 fn panel(table: &Table1, column: &Column, q: usize) -> Panel {
     let quantity = QUANTITIES[q];
-    let extent = 1.05 * common_extent(table, column, q);
+    let extent = 1.05 * extent(table, column, q);
     let signed = quantity.is_component;
     let courses = &column.courses;
     let hours: Vec<f64> = courses.times.iter().map(|t| t / HOUR).collect();
@@ -98,26 +81,24 @@ fn panel(table: &Table1, column: &Column, q: usize) -> Panel {
         let line = line(&mut sample.iter().map(|errors| errors[q]));
         line.nth(3).width(0.4)
     });
-    let flat = flat(table, column, q);
     let means = [(1.0, "mean + σ"), (-1.0, "mean − σ"), (0.0, "mean")].map(|(sign, name)| {
         let values = courses.moments.iter().map(|moments| moments[q]);
         let series = line(&mut values.map(|m| m.mean + sign * m.std)).color(Color::Ink);
-        let series = match sign == 0.0 {
-            true => series.width(2.25),
-            false => series.width(1.25).dashed(),
+        let series = if sign == 0.0 {
+            series.width(2.25)
+        } else {
+            series.width(1.25).dashed()
         };
-        match (flat, sign == 0.0) {
-            (false, _) => series.label(name),
-            (true, true) => series.label("all samples"),
-            (true, false) => series,
-        }
+        series.label(name)
     });
-    let (kind, low) = match signed {
-        true => ("error", -extent),
-        false => ("error, horizontal", 0.0),
+    let (kind, low) = if signed {
+        ("error", -extent)
+    } else {
+        ("error, horizontal", 0.0)
     };
     let title = format!("{} {kind}, {}", quantity.short(), quantity.unit());
-    let x = Axis::time("h", hours.last().copied().unwrap_or(1.0));
+    let end = hours.last().copied().unwrap_or(1.0);
+    let x = Axis::linear("time, h").between(0.0, end);
     Panel::new(title, x, Axis::linear("").between(low, extent))
         .with_all(samples)
         .with_all(means)

@@ -79,9 +79,10 @@ fn notes(table: &Table1) -> Vec<String> {
 }
 
 fn figure(of: f64) -> String {
-    match of.abs() < ZERO {
-        true => "0".to_owned(),
-        false => three_digits(of),
+    if of.abs() < ZERO {
+        "0".to_owned()
+    } else {
+        three_digits(of)
     }
 }
 

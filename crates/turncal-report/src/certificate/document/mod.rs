@@ -64,7 +64,6 @@ fn frame(certificate: &Certificate) -> Frame {
         right: format!("Calibration certificate {number}"),
         foot: format!("Certificate {number}, issued {day}"),
         end: format!("End of calibration certificate {number}"),
-        author: laboratory.contact.name.clone(),
         day: (day.year, day.month, day.day),
     }
 }
@@ -92,9 +91,10 @@ pub fn document(certificate: &Certificate) -> Document {
         general.push("received", day.to_string());
     }
     let (first, last) = (issue.begin, issue.end);
-    let performed = match first == last {
-        true => first.to_string(),
-        false => format!("{first} to {last}"),
+    let performed = if first == last {
+        first.to_string()
+    } else {
+        format!("{first} to {last}")
     };
     general.push(
         "calibrated",
@@ -200,9 +200,10 @@ fn evaluation(aiding: Option<Aiding>) -> &'static str {
 }
 
 fn of_gravity(gravity: GravityRecord) -> String {
-    let accuracy = match gravity.sigma_m_s2 > 0.0 {
-        true => format!("U = {} m/s² (k = 2)", sigma(2.0 * gravity.sigma_m_s2)),
-        false => "assumed exact".to_owned(),
+    let accuracy = if gravity.sigma_m_s2 > 0.0 {
+        format!("U = {} m/s² (k = 2)", sigma(2.0 * gravity.sigma_m_s2))
+    } else {
+        "assumed exact".to_owned()
     };
     let digits = gravity.sigma_m_s2.max(1e-6);
     format!("{} m/s², {accuracy}", value(gravity.m_s2, digits))
@@ -251,9 +252,10 @@ fn verdict(conformity: &Conformity) -> String {
 
 /// A probability, down to the smallest relevant value.
 fn probability(of: f64) -> String {
-    match of < 1e-6 {
-        true => "below 0.0001 %".to_owned(),
-        false => format!("{} %", sigma(100.0 * of)),
+    if of < 1e-6 {
+        "below 0.0001 %".to_owned()
+    } else {
+        format!("{} %", sigma(100.0 * of))
     }
 }
 

@@ -8,12 +8,13 @@ use turncal::imu::{Sensor, Term};
 /// A value and its U as EA-4/02, 6.3 wants them: U to two digits, the value to the same place.
 pub fn two_digits(of: f64, expanded: f64) -> (f64, f64) {
     let place = 10f64.powf((expanded.log10() - 1.0).floor());
-    match place > 1.0 {
-        true => (
+    if place > 1.0 {
+        (
             (of / place).round() * place,
             (expanded / place).round() * place,
-        ),
-        false => (of, expanded),
+        )
+    } else {
+        (of, expanded)
     }
 }
 
@@ -48,9 +49,10 @@ pub fn results(certificate: &Certificate) -> Table {
         let of_term = all.filter(move |of| of.quantity == Quantity::Term(term));
         of_term.map(row).collect::<Vec<_>>()
     });
-    let budget = match has_budget {
-        true => ", and calibration.json contains their uncertainty budget",
-        false => "",
+    let budget = if has_budget {
+        ", and calibration.json contains their uncertainty budget"
+    } else {
+        ""
     };
     let table = Table::new("Results", columns("parameter | value ± U | unit | k | ν"))
         .sections(groups)
@@ -67,9 +69,10 @@ pub fn results(certificate: &Certificate) -> Table {
              correlated; both attached files contain the covariance matrix of scale factors, misalignments and \
              biases{budget}.",
         ));
-    match certificate.terms.is_empty() {
-        true => table,
-        false => table.note(of_terms(certificate)),
+    if certificate.terms.is_empty() {
+        table
+    } else {
+        table.note(of_terms(certificate))
     }
 }
 
