@@ -46,10 +46,7 @@ pub fn words(next: Move) -> String {
 
 /// The screen: at most 80 columns, the state first, the next move last.
 pub fn screen(run: &Run, status: &Status, specification: Option<&Specification>) -> Vec<String> {
-    let mut lines = vec![
-        format!("{}; {}", so_far(status), moving(status)),
-        String::new(),
-    ];
+    let mut lines = vec![so_far(status), String::new()];
     match &status.expected {
         Err(error) => lines.push(format!("no calibration yet: {error}")),
         Ok(attained) => lines.extend(groups(attained, specification)),
@@ -106,16 +103,14 @@ pub fn line(status: &Status, dwell: usize) -> Option<String> {
     Some(line)
 }
 
+/// Duration, dwells and whether the sensor moves.
 fn so_far(status: &Status) -> String {
+    let [duration, still] = [status.duration, status.still].map(|time| value(time, 1.0));
     let dwells = several(status.survey.rests.len(), "dwell");
-    format!("{} s, {dwells}", value(status.duration, 1.0))
-}
-
-fn moving(status: &Status) -> String {
     if status.still > 0.0 {
-        format!("still for {} s", value(status.still, 1.0))
+        format!("{duration} s, {dwells}; still for {still} s")
     } else {
-        "moving".to_owned()
+        format!("{duration} s, {dwells}; moving")
     }
 }
 

@@ -188,9 +188,8 @@ pub fn left_off(report: &Report, estimate: &Estimate) -> Table {
     )
     .section(report.effects.iter().filter_map(row))
     .note(format!(
-        "Taken as exact: the latitude of the site (0.001° changes gyro biases by up to {} °/h){}.",
+        "Taken as exact: the latitude of the site (0.001° changes gyro biases by up to {} °/h){gravity}.",
         three_digits(ROTATION_RATE * LATITUDE / DEG_PER_H),
-        gravity
     ))
     .note(
         "Not included in the sums above. RMS change of the parameters of a group if the term is as large as the data \

@@ -154,11 +154,7 @@ fn recordings(outcome: &Outcome) -> Table {
         cells![
             alone.name.as_str(),
             or_dash(alone.mean_temperature(), |t| value(t, 0.01)),
-            if alone.estimate.is_some() {
-                "yes"
-            } else {
-                "no"
-            },
+            alone.estimate.as_ref().map_or("no", |_| "yes"),
             or_dash(distance.map(|of| of.0), three_digits),
             or_dash(distance.map(|of| of.1), three_digits),
         ]

@@ -46,8 +46,11 @@ fn panel(lot: &Lot, of: &Together) -> Panel {
     });
     let (limits, lines): (Vec<f64>, Vec<Series>) = limits.unzip();
     let units = Axis::places(lot.rows.iter().map(|row| row.unit.name.clone()));
-    let y = Axis::linear("").room(0.05, 0.05).including(limits);
+    let zero = lot.specification.is_none().then_some(0.0);
+    let y = Axis::linear("").room(0.05, 0.05);
+    let y = y.including(limits.into_iter().chain(zero));
     Panel::new(&of.heading, units, y)
+        .with_all(zero.map(|_| Series::zero()))
         .with_all(series)
         .with_all(lines)
 }
