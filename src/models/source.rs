@@ -57,7 +57,7 @@ impl Room {
     }
 
     /// Name and text of each model of the folder, in the order of their names.
-    fn embedded(self) -> impl Iterator<Item = (&'static str, &'static str)> {
+    pub(super) fn embedded(self) -> impl Iterator<Item = (&'static str, &'static str)> {
         let folder = MODELS.get_dir(self.name());
         let files = folder.into_iter().flat_map(Dir::files);
         files.filter_map(|file| Some((file.path().file_stem()?.to_str()?, file.contents_utf8()?)))

@@ -11,7 +11,7 @@ mod trial;
 
 use super::navigation::NavigationStudyError;
 use super::{Study, StudyError};
-use crate::calibration::{ErrorTermTest, Group, Nis, mean_square_interval};
+use crate::calibration::{ErrorTerm, ErrorTermTest, Group, Nis, mean_square_interval};
 use crate::imu::InstallationForm;
 use crate::simulation::Runs;
 
