@@ -184,17 +184,19 @@ impl Site {
 
     /// Earth rotation `ω_ie` in East-North-Up, rad/s; zero if the site is unknown.
     pub fn earth_rate_n(&self) -> Vector3<f64> {
-        match self.is_known {
-            true => earth_rate_n(self.latitude),
-            false => Vector3::zeros(),
+        if self.is_known {
+            earth_rate_n(self.latitude)
+        } else {
+            Vector3::zeros()
         }
     }
 
     /// 1σ of each component of Earth rotation, rad/s: if the site is unknown, its direction is arbitrary.
     pub fn earth_rate_sigma(&self) -> f64 {
-        match self.is_known {
-            true => 0.0,
-            false => ROTATION_RATE / 3f64.sqrt(),
+        if self.is_known {
+            0.0
+        } else {
+            ROTATION_RATE / 3f64.sqrt()
         }
     }
 }

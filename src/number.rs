@@ -61,9 +61,10 @@ pub fn whole(x: f64) -> String {
 
 /// A number with all its digits.
 pub fn plain(x: f64) -> String {
-    match x.fract() == 0.0 {
-        true => whole(x),
-        false => x.to_string().replace('-', "−"),
+    if x.fract() == 0.0 {
+        whole(x)
+    } else {
+        x.to_string().replace('-', "−")
     }
 }
 
@@ -136,9 +137,10 @@ pub const TIMES: [(&str, f64); 3] = [("h", HOUR), ("min", MINUTE), ("s", 1.0)];
 
 /// A probability.
 pub fn chance(p: f64) -> String {
-    match p < 1e-4 {
-        true => "< 0.0001".to_owned(),
-        false => value(p, 0.1 * p.max(0.01)),
+    if p < 1e-4 {
+        "< 0.0001".to_owned()
+    } else {
+        value(p, 0.1 * p.max(0.01))
     }
 }
 

@@ -71,9 +71,10 @@ pub fn student_limit(degrees: f64, chance: f64) -> f64 {
         if middle <= low || middle >= high {
             return high;
         }
-        match beyond(middle) {
-            true => low = middle,
-            false => high = middle,
+        if beyond(middle) {
+            low = middle
+        } else {
+            high = middle
         }
     }
 }

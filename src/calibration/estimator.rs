@@ -25,9 +25,10 @@ const DWELLS_OF_ONE: usize = 6;
 /// [`CalibrationError`] if the runs cannot give a calibration. Without convergence, the result is an
 /// [`Outcome`] with `converged = false` and a finding.
 pub fn estimate(problem: &Problem, progress: Progress) -> Result<Outcome, CalibrationError> {
-    let solved = match problem.varies() || problem.runs().nth(1).is_some() {
-        true => several::solve(problem, progress)?,
-        false => from_coarse_start(problem, progress)?,
+    let solved = if problem.varies() || problem.runs().nth(1).is_some() {
+        several::solve(problem, progress)?
+    } else {
+        from_coarse_start(problem, progress)?
     };
     let solved = with_wide_prior(solved, progress)?;
     let form_test = form_test(&solved)?;

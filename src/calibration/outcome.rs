@@ -162,9 +162,10 @@ impl Outcome {
     /// The problem as calibrated: with the estimated noise, and a prior that the data do not contradict.
     pub(in crate::calibration) fn as_calibrated<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
         let problem = self.with_prior(problem);
-        match self.noise.learnt {
-            true => problem.with_model(problem.model.with_noise_of(&self.model)),
-            false => problem,
+        if self.noise.learnt {
+            problem.with_model(problem.model.with_noise_of(&self.model))
+        } else {
+            problem
         }
     }
 

@@ -272,9 +272,12 @@ impl<'a> Problem<'a> {
             }
         }
         let count = self.runs().count();
-        let named = |(note, names): (&String, Vec<&str>)| match names.len() == count {
-            true => note.clone(),
-            false => format!("{}: {note}", names.join(", ")),
+        let named = |(note, names): (&String, Vec<&str>)| {
+            if names.len() == count {
+                note.clone()
+            } else {
+                format!("{}: {note}", names.join(", "))
+            }
         };
         found.into_iter().map(named).collect()
     }
@@ -395,9 +398,8 @@ impl<'a> Stretch<'a> {
             // Where it may point anywhere its mean is zero, whatever was taken for it.
             earth_rate: -self.run.site.earth_rate_n().zip_map(
                 &prior.earth_rate_sigma,
-                |taken, sigma| match sigma > 0.0 {
-                    true => taken,
-                    false => 0.0,
+                |taken, sigma| {
+                    if sigma > 0.0 { taken } else { 0.0 }
                 },
             ),
             earth_rate_sigma: prior.earth_rate_sigma,

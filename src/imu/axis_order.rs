@@ -65,9 +65,12 @@ impl AxisOrder {
 
     /// The order as a matrix.
     pub fn matrix(&self) -> Matrix3<f64> {
-        Matrix3::from_fn(|row, column| match column == self.source[row] {
-            true => self.sign(row),
-            false => 0.0,
+        Matrix3::from_fn(|row, column| {
+            if column == self.source[row] {
+                self.sign(row)
+            } else {
+                0.0
+            }
         })
     }
 

@@ -131,12 +131,13 @@ fn limits_of(
             Some(limit(*index, nominal, within))
         })
         .collect();
-    match limits.is_empty() {
-        true => Err(document.missing(
+    if limits.is_empty() {
+        Err(document.missing(
             &format!("{path}.within"),
             "the largest allowed deviation from nominal, or a limit for a named axis",
-        )),
-        false => Ok(limits),
+        ))
+    } else {
+        Ok(limits)
     }
 }
 

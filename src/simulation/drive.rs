@@ -2,8 +2,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Scenario, Simulated, true_increments};
-use crate::calibration::Difference;
+use super::{Scenario, true_increments};
 use crate::imu::{PerSensor, TermVector};
 use crate::turntable::{AxisAngles, Imperfection, Motion, Moves, TableError, axis_angles};
 
@@ -20,37 +19,6 @@ pub struct Drive {
     pub read: Vec<(f64, usize, Matrix3<f64>)>,
     /// Axis angles at each of these times; during a move, those of the position before it.
     pub axes: Vec<AxisAngles>,
-}
-
-/// Many runs of a scenario. With a perfect table, all of them share one drive, which is computed once.
-#[derive(Debug, Clone)]
-pub struct Runs {
-    scenario: Scenario,
-    perfect: Drive,
-}
-
-impl Runs {
-    /// For a scenario.
-    ///
-    /// # Errors If the table cannot follow the path.
-    pub fn new(scenario: &Scenario) -> Result<Self, TableError> {
-        let none = Imperfection::none(&scenario.table);
-        Ok(Self {
-            scenario: scenario.clone(),
-            perfect: Drive::new(scenario, none, TermVector::zeros())?,
-        })
-    }
-
-    /// Simulates one of them, as [`Scenario::simulate`] does.
-    ///
-    /// # Errors
-    /// If the table cannot follow the path.
-    pub fn simulate(&self, seed: u64, stream: u64) -> Result<Simulated, TableError> {
-        let own = Difference::default();
-        let shared = Some(&self.perfect);
-        self.scenario
-            .simulate_on(shared, seed, stream, stream, &own)
-    }
 }
 
 impl Drive {
@@ -98,19 +66,4 @@ fn axes(scenario: &Scenario, read: &[(f64, usize, Matrix3<f64>)]) -> Vec<AxisAng
     }
     let at = |&(_, position, _): &(f64, usize, _)| of_positions.get(position).copied();
     read.iter().filter_map(at).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_run_on_a_shared_drive_is_the_run_alone_on_perfect_tables_and_others() {
-        for name in ["demo", "real-table"] {
-            let scenario = Scenario::load(name).unwrap();
-            let runs = Runs::new(&scenario).unwrap();
-            let alone = scenario.simulate(3, 5).unwrap();
-            assert!(runs.simulate(3, 5).unwrap() == alone, "{name}");
-        }
-    }
 }

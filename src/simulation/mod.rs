@@ -6,6 +6,7 @@
 mod campaign;
 mod drive;
 mod increments;
+mod runs;
 mod scenario;
 mod thermal;
 
@@ -18,8 +19,8 @@ use rand_distr::{Distribution, StandardNormal};
 
 pub use campaign::SimulatedCampaign;
 use drive::Drive;
-pub use drive::Runs;
 pub use increments::{Integrator, true_increments};
+pub use runs::Runs;
 pub use scenario::{Given, Scenario};
 use thermal::Warming;
 pub use thermal::{Chamber, ThermalTruth};

@@ -52,9 +52,10 @@ impl Chamber {
     /// The instrument's temperature and temperature rate at every second of a duration in s.
     pub(super) fn instrument(&self, duration: f64) -> Warming {
         let steps = (duration / STEP).ceil() as usize + 1;
-        let keep = match self.time_constant > 0.0 {
-            true => (-STEP / self.time_constant).exp(),
-            false => 0.0,
+        let keep = if self.time_constant > 0.0 {
+            (-STEP / self.time_constant).exp()
+        } else {
+            0.0
         };
         let mut at = self.at(0.0);
         let mut values = vec![at];
@@ -116,9 +117,10 @@ impl ThermalTruth {
             variation.get(sensor).sigma().map(|sigma| {
                 TriadVector::from_fn(|parameter, _| {
                     let unit: f64 = StandardNormal.sample(rng);
-                    match Triad::has_parameter(form, parameter) {
-                        true => sigma[parameter] * unit,
-                        false => 0.0,
+                    if Triad::has_parameter(form, parameter) {
+                        sigma[parameter] * unit
+                    } else {
+                        0.0
                     }
                 })
             })

@@ -4,41 +4,24 @@
 //! Everything is compared in the general form and in the body frame of the table.
 
 mod baseline;
+mod configuration;
 mod figures;
 mod navigation;
 mod trial;
 
-use serde::{Deserialize, Serialize};
-
 use super::navigation::NavigationStudyError;
 use super::{Study, StudyError};
-use crate::calibration::{ErrorTerm, ErrorTermTest, Group, Nis, NoisePolicy, mean_square_interval};
+use crate::calibration::{ErrorTerm, ErrorTermTest, Group, Nis, mean_square_interval};
 use crate::imu::InstallationForm;
-use crate::simulation::{Runs, Scenario};
+use crate::simulation::Runs;
 
 use navigation::Way;
 
 pub use baseline::Baseline;
+pub use configuration::AccuracyStudy;
 pub use figures::Figures;
 pub use navigation::{Containment, Journey, NavigationAccuracy, Position, Region};
 pub use trial::{Filtered, Trial};
-
-/// Configuration of the study.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct AccuracyStudy {
-    /// The simulated scenario.
-    pub scenario: Scenario,
-    /// The filter's installation form; the truth has that of the scenario.
-    pub form: InstallationForm,
-    /// Error terms of the truth that the filter does not model.
-    pub unmodelled: Vec<ErrorTerm>,
-    /// Noise policy of the filter.
-    pub noise: NoisePolicy,
-    /// Number of runs.
-    pub runs: u64,
-    /// Seed; each run has its own random streams.
-    pub seed: u64,
-}
 
 /// Result of the study.
 #[derive(Debug, Clone)]

@@ -8,17 +8,17 @@
 mod budget;
 mod method;
 mod noise;
+mod spread;
 #[cfg(test)]
 mod tests;
 
-use nalgebra::SMatrix;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::navigation::{Mission, Motion};
-use super::ratio::{bootstrap, median, quantile};
+use super::ratio::{bootstrap, median};
 use super::{Ratio, Study, StudyError};
-use crate::calibration::{PARAMETERS, ParameterVector, parameter};
+use crate::calibration::{ParameterVector, parameter};
 use crate::imu::{InstallationForm, PARAMETERS as PER_TRIAD, PerSensor, Sensor, Triad};
 use crate::navigation::{SensedErrors, Sensitivity, Trajectory};
 use crate::simulation::Scenario;
@@ -27,11 +27,9 @@ use crate::units::NAUTICAL_MILE;
 pub use budget::{Budget, Part};
 pub use method::{Calibrated, Estimator, Method, Trial};
 pub use noise::ALIGNMENT_TIME;
+pub use spread::Spread;
 
-/// The static positions of the paper, used by the closed form.
-const POSITIONS: &str = "six-position";
-/// A filter path with the table time of the closed form.
-const HOUR_PATH: &str = "three-axis-hour";
+use budget::ByParameter;
 
 /// Configuration of the study.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -112,46 +110,6 @@ pub struct Worth {
     /// Budget of the final error from the stated covariance.
     pub budget: Budget,
 }
-
-/// Distribution of a length.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Spread {
-    /// Half of all values are below it.
-    pub median: f64,
-    /// The mean.
-    pub mean: f64,
-    /// Root of the mean square.
-    pub rms: f64,
-    /// First and third quartile.
-    #[serde(skip)]
-    pub quartiles: (f64, f64),
-    /// 68 % of all values are below it.
-    #[serde(rename = "below_68_percent")]
-    pub below_68: f64,
-    /// 95 % of all values are below it.
-    #[serde(rename = "below_95_percent")]
-    pub below_95: f64,
-}
-
-impl Spread {
-    /// Distribution of these lengths; NaN if empty.
-    fn of(lengths: impl Iterator<Item = f64>) -> Self {
-        let mut sorted: Vec<f64> = lengths.collect();
-        sorted.sort_by(f64::total_cmp);
-        let count = sorted.len() as f64;
-        Self {
-            median: quantile(&sorted, 0.5),
-            mean: sorted.iter().sum::<f64>() / count,
-            rms: (sorted.iter().map(|x| x * x).sum::<f64>() / count).sqrt(),
-            quartiles: (quantile(&sorted, 0.25), quantile(&sorted, 0.75)),
-            below_68: quantile(&sorted, 0.68),
-            below_95: quantile(&sorted, 0.95),
-        }
-    }
-}
-
-/// Horizontal position error, east and north in nmile, by parameter errors.
-type ByParameter = SMatrix<f64, 2, PARAMETERS>;
 
 impl Study for ExperimentStudy {
     type Trial = Trial;

@@ -171,9 +171,12 @@ impl InterimCalibration {
             duration: run.recording.imu.duration(),
             verdict: Verdict::of(&findings),
             findings,
-            inflation: found.zip_map(&expected, |found, expected| match expected > 0.0 {
-                true => found / expected,
-                false => 1.0,
+            inflation: found.zip_map(&expected, |found, expected| {
+                if expected > 0.0 {
+                    found / expected
+                } else {
+                    1.0
+                }
             }),
         })
     }

@@ -79,9 +79,10 @@ fn stamped(rows: Vec<Row>, period: f64, clock: Clock, stream: u64) -> Vec<Row> {
             let mut rows = rows;
             rows.retain(|_| random.random::<f64>() > 0.01);
             for (time, _) in &mut rows {
-                let busy = match random.random::<f64>() < 0.01 {
-                    true => -0.03 * random.random::<f64>().ln(),
-                    false => 0.0,
+                let busy = if random.random::<f64>() < 0.01 {
+                    -0.03 * random.random::<f64>().ln()
+                } else {
+                    0.0
                 };
                 latest = latest.max(*time + 0.3 * period * random.random::<f64>() + busy);
                 *time = latest;

@@ -133,9 +133,10 @@ fn open_vins(text: &str, is_lower: bool, n: [Vector3<f64>; 2]) -> [Vector3<f64>;
     let matrix = |key: &str| Matrix3::from_row_slice(&file[&format!("imu0.{key}")]);
     let triangle = |key: &str| {
         let mut inverse = matrix(key).try_inverse().unwrap();
-        match is_lower {
-            true => inverse.fill_upper_triangle(0.0, 1),
-            false => inverse.fill_lower_triangle(0.0, 1),
+        if is_lower {
+            inverse.fill_upper_triangle(0.0, 1)
+        } else {
+            inverse.fill_lower_triangle(0.0, 1)
         }
         inverse
     };

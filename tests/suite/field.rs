@@ -451,13 +451,14 @@ fn formats_that_read_stay_as_they_are() {
 /// Rows as they are, ended by these, in an encoding of two bytes or one.
 fn rewritten(log: &Path, end: &str, is_wide: bool) -> Vec<u8> {
     let text = fs::read_to_string(log).unwrap().replace('\n', end);
-    match is_wide {
-        true => "\u{feff}"
+    if is_wide {
+        "\u{feff}"
             .chars()
             .chain(text.chars())
             .flat_map(|c| (c as u16).to_le_bytes())
-            .collect(),
-        false => text.into_bytes(),
+            .collect()
+    } else {
+        text.into_bytes()
     }
 }
 

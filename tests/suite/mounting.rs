@@ -27,12 +27,13 @@ fn simulated(directory: &Path) -> PathBuf {
 
 fn with_columns(run: &Path, line: &str) -> String {
     let text = fs::read_to_string(run).unwrap();
-    let lines = text.lines().map(
-        |old| match old.starts_with("columns = { time = \"t\", gyro") {
-            true => line,
-            false => old,
-        },
-    );
+    let lines = text.lines().map(|old| {
+        if old.starts_with("columns = { time = \"t\", gyro") {
+            line
+        } else {
+            old
+        }
+    });
     lines.collect::<Vec<_>>().join("\n")
 }
 

@@ -331,9 +331,12 @@ fn two_runs_of_one_instrument_hold_the_information_of_both_in_either_order() {
             let unit = bounds[2].sigma();
             let [of_a, of_b, of_both] = bounds.map(|bound| information(&bound, &unit));
             let prior = a.model.prior_sigma;
-            let prior = DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| match i == j {
-                true => (unit[i] / prior[i]).powi(2),
-                false => 0.0,
+            let prior = DMatrix::from_fn(PARAMETERS, PARAMETERS, |i, j| {
+                if i == j {
+                    (unit[i] / prior[i]).powi(2)
+                } else {
+                    0.0
+                }
             });
             let off = (&of_a + &of_b - prior - &of_both).amax() / of_both.amax();
             println!("information off by {off:.1e}");

@@ -134,9 +134,10 @@ impl Calibration {
             names.any(|of| of == name)
         };
         let term = Term::ALL.into_iter().find(has);
-        let (sensor, input) = match name.starts_with(Sensor::Gyro.name()) {
-            true => (Sensor::Gyro, "rad/s"),
-            false => (Sensor::Accel, "m/s²"),
+        let (sensor, input) = if name.starts_with(Sensor::Gyro.name()) {
+            (Sensor::Gyro, "rad/s")
+        } else {
+            (Sensor::Accel, "m/s²")
         };
         let unit = self.record.unit.as_ref().map(|unit| unit.get(sensor));
         let unit = unit.map_or("output", String::as_str);
@@ -193,13 +194,14 @@ impl Calibration {
     /// Verdict, findings and, if the run is known, accuracy; then all values.
     fn page(&self, py: Python) -> PyResult<Document> {
         let verdict = self.record.verdict.as_ref();
-        let mut document = match self.solved.is_some() || self.document.get().is_some() {
-            true => brief(self.document(py)?),
-            false => Document {
+        let mut document = if self.solved.is_some() || self.document.get().is_some() {
+            brief(self.document(py)?)
+        } else {
+            Document {
                 verdict: verdict.map(|of| (of.word, self.summary())),
                 findings: self.record.findings.clone(),
                 ..Document::new("Calibration")
-            },
+            }
         };
         let values = self.values().into_iter();
         let row = |(name, value, sigma, unit)| vec![name, digits(value, 7), digits(sigma, 3), unit];

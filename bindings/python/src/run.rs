@@ -328,14 +328,17 @@ pub fn limits(path: &Path) -> PyResult<Specification> {
 #[pyfunction]
 pub fn read(py: Python, path: PathBuf, known: &Known) -> PyResult<Run> {
     let (stated, stream) = (known.stated.clone(), known.stream.clone());
-    let recorded = finish(py, move || match Campaign::is_at(&path) {
-        true => Campaign::read(&path).map(|of| Recorded {
-            path: Some(path),
-            ..Recorded::of_campaign(of.name, of.runs, of.together)
-        }),
-        false => Recorded::opened(Some(path.clone()), |show| {
-            Opened::new(&path, stream.as_deref(), &stated, show)
-        }),
+    let recorded = finish(py, move || {
+        if Campaign::is_at(&path) {
+            Campaign::read(&path).map(|of| Recorded {
+                path: Some(path),
+                ..Recorded::of_campaign(of.name, of.runs, of.together)
+            })
+        } else {
+            Recorded::opened(Some(path.clone()), |show| {
+                Opened::new(&path, stream.as_deref(), &stated, show)
+            })
+        }
     });
     Ok(Run::new(recorded?.map_err(raise)?, None))
 }

@@ -173,9 +173,10 @@ pub fn study_options(
     let name = scenario.unwrap_or(usual);
     let scenario = Scenario::load(name).map_err(raise)?;
     let seed = seed.unwrap_or(scenario.seed);
-    let study = match of {
-        true => Study::accuracy(scenario, runs, seed, &modelled, unmodelled),
-        false => Study::experiment(scenario, runs, seed)?,
+    let study = if of {
+        Study::accuracy(scenario, runs, seed, &modelled, unmodelled)
+    } else {
+        Study::experiment(scenario, runs, seed)?
     };
     serde_json::to_string(&study).map_err(raise)
 }

@@ -28,9 +28,10 @@ impl Watch {
     pub fn step(&self) -> ControlFlow<()> {
         self.steps.fetch_add(1, Ordering::Relaxed);
         self.caller.iter().for_each(thread::Thread::unpark);
-        match self.is_stopped.load(Ordering::Relaxed) {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
+        if self.is_stopped.load(Ordering::Relaxed) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
         }
     }
 }

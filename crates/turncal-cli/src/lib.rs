@@ -102,10 +102,7 @@ pub fn command(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         return 0;
     };
     tell!("turncal: {}", printable(&format!("{error:#}")));
-    match error.is::<NotMet>() {
-        true => 3,
-        false => 1,
-    }
+    if error.is::<NotMet>() { 3 } else { 1 }
 }
 
 impl Cli {

@@ -44,10 +44,7 @@ macro_rules! checked {
 
             fn try_from(value: f64) -> Result<Self, Self::Error> {
                 let holds: fn(f64) -> bool = $holds;
-                match holds(with_size(value)?) {
-                    true => Ok(Self(value)),
-                    false => Err($says),
-                }
+                if holds(with_size(value)?) { Ok(Self(value)) } else { Err($says) }
             }
         }
     )+};

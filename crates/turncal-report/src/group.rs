@@ -80,6 +80,12 @@ mod tests {
     use super::*;
 
     #[test]
+    fn nouns_agree_with_their_number() {
+        let counted = [0, 1, 2].map(|count| several(count, "dwell"));
+        assert_eq!(counted, ["no dwells", "one dwell", "2 dwells"]);
+    }
+
+    #[test]
     fn a_parameter_has_a_short_name_for_margins() {
         assert_eq!(short_name(InstallationForm::General, 3), "gyro E xy");
     }

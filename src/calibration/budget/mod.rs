@@ -190,9 +190,10 @@ impl BudgetSource {
 
 /// Coverage factor for 95.45 % and this many degrees of freedom.
 fn coverage_factor(degrees_of_freedom: f64) -> f64 {
-    match degrees_of_freedom.is_finite() {
-        true => student_limit(degrees_of_freedom, 0.5 * (1.0 - COVERAGE)),
-        false => 2.0,
+    if degrees_of_freedom.is_finite() {
+        student_limit(degrees_of_freedom, 0.5 * (1.0 - COVERAGE))
+    } else {
+        2.0
     }
 }
 

@@ -170,9 +170,10 @@ pub fn inconsistent(innovations: &[Innovation]) -> Option<Finding> {
             // The distance of the IMU from the table's centre is stated by a bound, which makes the velocity after
             // a move uncertain: smaller innovations do not contradict the model.
             let one_sided = (look, *observation) == (AFTER_MOVES, Observation::Velocity);
-            let (low, high) = match one_sided {
-                true => (0.0, mean_square_interval(count, 2.0 * chance).1),
-                false => mean_square_interval(count, chance),
+            let (low, high) = if one_sided {
+                (0.0, mean_square_interval(count, 2.0 * chance).1)
+            } else {
+                mean_square_interval(count, chance)
             };
             if nis < low || nis > high {
                 let name = observation.name();

@@ -42,9 +42,10 @@ pub fn far_from_prior(model: &Model, estimate: &Estimate) -> Option<Finding> {
     let figures = json!({
         "sigmas": CONTRADICTS, "parameters": names, "distances": distances, "causes": causes
     });
-    let kind = match far.iter().any(|&i| is_another_scale(model, estimate, i)) {
-        true => Kind::PriorContradicted,
-        false => Kind::FarFromPrior,
+    let kind = if far.iter().any(|&i| is_another_scale(model, estimate, i)) {
+        Kind::PriorContradicted
+    } else {
+        Kind::FarFromPrior
     };
     (!far.is_empty()).then(|| Finding::new(kind, text, figures))
 }

@@ -86,9 +86,10 @@ fn of_triad(
             Sensor::Gyro => Vector3::zeros(),
             Sensor::Accel => correction * (mean.output - triad.bias),
         };
-        let seen = match along_gravity {
-            true => input * input.transpose() / input.norm_squared().max(f64::MIN_POSITIVE),
-            false => Matrix3::identity(),
+        let seen = if along_gravity {
+            input * input.transpose() / input.norm_squared().max(f64::MIN_POSITIVE)
+        } else {
+            Matrix3::identity()
         };
         let common = [0, 1, 2].map(|axis| {
             let next = numbers.len();
@@ -160,9 +161,12 @@ fn of_recording(problem: &Problem, recording: usize, run: &Run, sensor: Sensor) 
     let variance = Vector3::from_fn(|axis, _| left(steps[axis], scatter[axis], stated));
     let mean = |output: Vector3<f64>| Mean {
         output,
-        step: std::array::from_fn(|axis| match steps[axis] > 0.0 {
-            true => (output[axis] / steps[axis]).round() as i64,
-            false => 0,
+        step: std::array::from_fn(|axis| {
+            if steps[axis] > 0.0 {
+                (output[axis] / steps[axis]).round() as i64
+            } else {
+                0
+            }
         }),
         variance,
     };
@@ -178,9 +182,10 @@ fn left(step: f64, scatter: f64, stated: f64) -> f64 {
     let square = step * step;
     let seen = (scatter / square - 1.0 / 12.0).max(0.0);
     // Two values scatter by a quarter of a step's square at most, however little noise takes them from one to the other.
-    let noise = match scatter > 0.25 * square {
-        true => seen,
-        false => seen.min(stated / square),
+    let noise = if scatter > 0.25 * square {
+        seen
+    } else {
+        seen.min(stated / square)
     };
     let wave = |k: u32| {
         let k = f64::from(k);

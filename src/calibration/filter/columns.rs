@@ -94,9 +94,10 @@ impl Columns {
         let rows = self.matrix(&self.rows);
         self.rows.clear();
         self.looked_at = 0;
-        match rows.nrows() > rows.ncols() {
-            true => triangle(&rows),
-            false => rows,
+        if rows.nrows() > rows.ncols() {
+            triangle(&rows)
+        } else {
+            rows
         }
     }
 

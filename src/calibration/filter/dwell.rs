@@ -4,7 +4,7 @@ use super::Filter;
 use super::at_rest::{Map, begins};
 use super::dwell_filter::{DwellFilter, Observed, Summary};
 use super::gain_cache::GainCache;
-use super::gate::{Judge, Verdict};
+use super::gate::{Decision, Judge};
 use crate::calibration::record::Rest;
 use crate::calibration::{ATTITUDE, Known, NAVIGATION, Observation, POSITION, Stretch, VELOCITY};
 
@@ -138,8 +138,8 @@ impl Filter {
                 };
                 match dwell.observe(&observed, judge) {
                     None => return Taken::Diverged,
-                    Some(Verdict::Abandoned) => return Taken::Abandoned,
-                    Some(Verdict::Accepted | Verdict::Rejected) => {}
+                    Some(Decision::Abandoned) => return Taken::Abandoned,
+                    Some(Decision::Accepted | Decision::Rejected) => {}
                 }
             }
         }

@@ -10,7 +10,7 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::gain_cache::GainCache;
-use super::gate::{Judge, Verdict};
+use super::gate::{Decision, Judge};
 use super::input_prior::InputPrior;
 use super::rows::{add, factor};
 use crate::calibration::Observation;
@@ -86,9 +86,9 @@ impl<'a, const M: usize, const G: usize> DwellFilter<'a, M, G> {
 
     /// Processes an observation if the judge accepts it; `None` if it is not finite or its covariance is not positive
     /// definite.
-    pub fn observe(&mut self, observed: &Observed, judge: &mut Judge) -> Option<Verdict> {
+    pub fn observe(&mut self, observed: &Observed, judge: &mut Judge) -> Option<Decision> {
         if self.given.is_none() && !judge.lets_in() {
-            return Some(Verdict::Rejected);
+            return Some(Decision::Rejected);
         }
         let &Observed {
             state,
@@ -105,7 +105,7 @@ impl<'a, const M: usize, const G: usize> DwellFilter<'a, M, G> {
             let sigma = [0, 1, 2].map(|k| gain.root[(k, k)] * unexpected.root[(k, k)]);
             let (time, kind) = (observed.time, observed.kind);
             match judge.judge((time, kind), unexpected.whitened, sigma) {
-                Verdict::Accepted => given.update(&unexpected),
+                Decision::Accepted => given.update(&unexpected),
                 other => return Some(other),
             }
         }
@@ -116,7 +116,7 @@ impl<'a, const M: usize, const G: usize> DwellFilter<'a, M, G> {
             add(&mut self.mean, whitened[k], &gain.of_errors[k]);
             add(&mut self.vector, whitened[k], &gain.rows[k]);
         }
-        Some(Verdict::Accepted)
+        Some(Decision::Accepted)
     }
 
     pub fn summary(self) -> Summary {

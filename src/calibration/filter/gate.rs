@@ -25,7 +25,7 @@ pub enum Gate<'a> {
 
 /// Decision on an innovation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verdict {
+pub enum Decision {
     Accepted,
     Rejected,
     /// The dwell is processed again, without the observation that closed the gate.
@@ -99,12 +99,13 @@ impl<'a> Judge<'a> {
         (time, observation): (f64, Observation),
         whitened: Vector3<f64>,
         sigma: [f64; 3],
-    ) -> Verdict {
+    ) -> Decision {
         let kind = observation as usize;
         let accepted = self.is_accepted(observation, whitened.norm_squared());
-        self.dwell.row[kind] = match accepted {
-            true => 0,
-            false => self.dwell.row[kind] + 1,
+        self.dwell.row[kind] = if accepted {
+            0
+        } else {
+            self.dwell.row[kind] + 1
         };
         self.innovations.push(Innovation {
             time,
@@ -118,9 +119,9 @@ impl<'a> Judge<'a> {
         let closing = self.closing().filter(|_| !accepted);
         self.dwell.closing.extend(closing);
         match (accepted, closing) {
-            (true, _) => Verdict::Accepted,
-            (false, Some(_)) => Verdict::Abandoned,
-            (false, None) => Verdict::Rejected,
+            (true, _) => Decision::Accepted,
+            (false, Some(_)) => Decision::Abandoned,
+            (false, None) => Decision::Rejected,
         }
     }
 

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::likelihood_ratio::{INTERVAL, limit};
 use super::report::{NoiseReport, SourceFigures};
 use super::source::Source;
-use super::variances::{Found, Slope, likeliest};
+use super::variances::{Component, Slope, likeliest};
 use crate::calibration::{Model, Problem};
 use crate::statistics::FALSE_ALARM;
 
@@ -26,7 +26,7 @@ pub type Parts = [DVector<f64>; BY_HAND.len()];
 /// noise.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ByHand {
-    found: Vec<Found>,
+    found: Vec<Component>,
 }
 
 impl ByHand {
@@ -37,7 +37,7 @@ impl ByHand {
         covariance: &DMatrix<f64>,
         parts: &Parts,
     ) -> Option<Self> {
-        let slope = |found: &[Found], place: usize| {
+        let slope = |found: &[Component], place: usize| {
             let mut sum = covariance.clone();
             for one in found {
                 add(&mut sum, &parts[one.place], one.variance);
@@ -57,7 +57,7 @@ impl ByHand {
 
     /// Whether two results agree: the same sources, with variances equal within a tenth of their uncertainty.
     pub fn is_like(&self, other: &Self) -> bool {
-        let alike = |(one, other): (&Found, &Found)| {
+        let alike = |(one, other): (&Component, &Component)| {
             let off = (one.variance / other.variance).ln().abs();
             one.place == other.place && off < 0.1 * one.spread
         };
@@ -84,7 +84,7 @@ impl ByHand {
 
     /// The noise report of a problem with this noise.
     pub fn report(&self, problem: &Problem) -> NoiseReport {
-        let figures = |one: &Found| {
+        let figures = |one: &Component| {
             let stated = BY_HAND[one.place].sigma(problem);
             let used = stated.hypot(one.variance.sqrt());
             // Of σ, half as wide as of its square.

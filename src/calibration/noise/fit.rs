@@ -166,9 +166,12 @@ impl Likelihood<'_> {
         };
         // How far each variance is from what is stated, in itself; 1σ of one is twice that of ln σ.
         let stated = |k: usize| self.scale.stated[k];
-        let mut values = DVector::from_fn(left.len(), |i, _| match stated(left[i]) {
-            true => at[left[i]].ln(),
-            false => 1.0,
+        let mut values = DVector::from_fn(left.len(), |i, _| {
+            if stated(left[i]) {
+                at[left[i]].ln()
+            } else {
+                1.0
+            }
         });
         let mut covariance = inverse * 4.0;
         let limits = [limit(0, 1, NEEDLESS), limit(1, 0, NEEDLESS)];

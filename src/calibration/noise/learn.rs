@@ -54,9 +54,10 @@ pub fn learn<'a>(
     if test.rejected || policy == NoisePolicy::Learnt {
         return with_noise(&as_stated, solved.clone(), (fit, test), &scale, progress);
     }
-    let solved = match solved.problem.model == as_stated.model {
-        true => solved,
-        false => solved.again(as_stated, progress)?,
+    let solved = if solved.problem.model == as_stated.model {
+        solved
+    } else {
+        solved.again(as_stated, progress)?
     };
     let noise = NoiseReport::stated(policy, Some(test));
     Ok(Solved { noise, ..solved })
@@ -145,9 +146,10 @@ impl Likelihood<'_> {
         let stated = self.scale.initial;
         let present = self.scale.present().into_iter();
         let (bounded, free): (Vec<usize>, Vec<usize>) = present.partition(|&k| stated[k] == 0.0);
-        let ratio = match fit.sources.is_empty() {
-            true => 0.0,
-            false => self.replay(&stated)?.deviance() - fit.deviance,
+        let ratio = if fit.sources.is_empty() {
+            0.0
+        } else {
+            self.replay(&stated)?.deviance() - fit.deviance
         };
         let limit = limit(free.len(), bounded.len(), FALSE_ALARM);
         Ok(NoiseTest {

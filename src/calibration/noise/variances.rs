@@ -9,7 +9,7 @@ const STEPS: usize = 40;
 
 /// One component.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Found {
+pub struct Component {
     /// Its number among all candidates.
     pub place: usize,
     pub variance: f64,
@@ -33,15 +33,15 @@ pub struct Slope {
 pub fn likeliest(
     count: usize,
     limit: f64,
-    slope: impl Fn(&[Found], usize) -> Option<Slope>,
-) -> Option<(Vec<Found>, f64)> {
+    slope: impl Fn(&[Component], usize) -> Option<Slope>,
+) -> Option<(Vec<Component>, f64)> {
     let none = slope(&[], 0)?.deviance;
-    let (mut found, mut here) = (Vec::<Found>::new(), none);
+    let (mut found, mut here) = (Vec::<Component>::new(), none);
     loop {
         let left = (0..count).filter(|&place| found.iter().all(|one| one.place != place));
         let more = left.filter_map(|place| {
             let mut with = found.clone();
-            with.push(Found {
+            with.push(Component {
                 place,
                 variance: 0.0,
                 spread: 0.0,
@@ -61,7 +61,10 @@ pub fn likeliest(
 ///
 /// Source: Fisher scoring of the likelihood of components of variance, Patterson and Thompson 1971, Biometrika 58(3);
 /// applied to one after the other.
-fn fitted(found: &mut [Found], slope: &impl Fn(&[Found], usize) -> Option<Slope>) -> Option<f64> {
+fn fitted(
+    found: &mut [Component],
+    slope: &impl Fn(&[Component], usize) -> Option<Slope>,
+) -> Option<f64> {
     for step in 0..STEPS {
         let mut settled = step > 0;
         for number in (0..found.len()).rev() {

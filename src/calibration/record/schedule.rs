@@ -55,9 +55,10 @@ const STEPS_OF_PACKED: usize = 10;
 pub fn steps(run: &Run, table: Option<&TableLog>, dwells: &[Dwell], together: usize) -> Vec<Step> {
     let imu = &run.recording.imu;
     let length = step_length(imu.period);
-    let longest = match imu.is_packed() {
-        true => STEPS_OF_PACKED * length,
-        false => length,
+    let longest = if imu.is_packed() {
+        STEPS_OF_PACKED * length
+    } else {
+        length
     };
     let of_dwell = |dwell: &Dwell| growing(dwell.samples.clone(), (length, longest), together);
     // Exact capacity: there may be too many steps for a vector that doubles.

@@ -55,9 +55,10 @@ fn shown(run: &Run, dwells: &[Dwell], sensor: Sensor) -> f64 {
     let excess = -covariance - pulse;
     // At a constant rate the fractions left over may alternate, which is four times as much as at random.
     let chance = SIGNIFICANT * variance / (pairs as f64).sqrt() + 3.0 * pulse;
-    match excess > chance {
-        true => excess.sqrt().max(floor),
-        false => floor,
+    if excess > chance {
+        excess.sqrt().max(floor)
+    } else {
+        floor
     }
 }
 

@@ -96,9 +96,10 @@ impl Calibration {
             test_vectors: Vec::new(),
             format: FORMAT.to_owned(),
             temperature: None,
-            covariance: match self.covariance.is_empty() {
-                true => Vec::new(),
-                false => places.iter().map(row).collect(),
+            covariance: if self.covariance.is_empty() {
+                Vec::new()
+            } else {
+                places.iter().map(row).collect()
             },
             sigma: self
                 .sigma

@@ -207,9 +207,10 @@ impl Correction {
                 None => (self, true),
             };
             let outputs = PerSensor::from_fn(|sensor| output(sensor, run, &near, k));
-            let acceleration = match plain {
-                true => Vector3::zeros(),
-                false => here.angular_acceleration(run, &near, k),
+            let acceleration = if plain {
+                Vector3::zeros()
+            } else {
+                here.angular_acceleration(run, &near, k)
             };
             let u = here.of_outputs(&outputs, &acceleration);
             Calibrated {

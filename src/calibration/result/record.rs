@@ -36,9 +36,10 @@ impl Outcome {
         quality: &Quality,
     ) -> Calibration {
         let (run, estimate) = (problem.run(), &self.estimate);
-        let equation = match self.auxiliary.has_terms() {
-            true => EQUATION_WITH_TERMS,
-            false => EQUATION,
+        let equation = if self.auxiliary.has_terms() {
+            EQUATION_WITH_TERMS
+        } else {
+            EQUATION
         };
         let format = match self.thermal {
             Some(_) => FORMAT_WITH_TEMPERATURE,

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::day_to_day::DayToDay;
 use crate::calibration::checks::recordings::recordings_differ;
-use crate::calibration::noise::variances::{Found, Slope, likeliest};
+use crate::calibration::noise::variances::{Component, Slope, likeliest};
 use crate::calibration::{
     Estimate, Finding, Group, Model, RecordingDifference, SeparateEstimate, from_vector,
     sensor_and_parameter,
@@ -170,16 +170,15 @@ impl RecordingsEvidence {
                 own[(indices[i], indices[j])] / (prior(i) * prior(j))
             }),
             // A mean that is far from what all recordings say is no difference between them.
-            prior: DVector::from_fn(n * (1 + functions), |k, _| match k < n {
-                true => widest[k].powi(-2),
-                false => 1.0,
+            prior: DVector::from_fn(n * (1 + functions), |k, _| {
+                if k < n { widest[k].powi(-2) } else { 1.0 }
             }),
         })
     }
 
     /// The likelihood with variances of some groups in excess of the stated ones, and its slope with respect to that of
     /// one; the information excludes the common quantities. `None` if rounding makes a matrix singular.
-    fn slope(&self, found: &[Found], group: usize) -> Option<Slope> {
+    fn slope(&self, found: &[Component], group: usize) -> Option<Slope> {
         let mut own = self.stated.clone();
         for (i, &(group, prior)) in self.parameters.iter().enumerate() {
             let of_group = found.iter().filter(|one| one.place == group);
@@ -232,11 +231,11 @@ impl RecordingsEvidence {
         let (found, _) = likeliest(self.groups.len(), limit, |found, group| {
             self.slope(found, group)
         })?;
-        let deviance = |found: &[Found]| Some(self.slope(found, 0)?.deviance);
+        let deviance = |found: &[Component]| Some(self.slope(found, 0)?.deviance);
         // What −2 ln of the likelihood loses by a group, the others' variances held.
-        let of_group = |one: &Found| {
+        let of_group = |one: &Component| {
             let others = found.iter().filter(|other| other.place != one.place);
-            let without: Vec<Found> = others.copied().collect();
+            let without: Vec<Component> = others.copied().collect();
             let ratio = deviance(&without)? - deviance(&found)?;
             Some((self.groups[one.place], one.variance, ratio))
         };
@@ -313,7 +312,7 @@ mod tests {
         let evidence = drawn(2.0, 1);
         let at = |variance: f64| {
             let (place, spread) = (0, 0.0);
-            let found = Found {
+            let found = Component {
                 place,
                 variance,
                 spread,

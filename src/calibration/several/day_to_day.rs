@@ -137,9 +137,10 @@ impl Difference {
     pub fn applied(&self, common: &PerSensor<Triad>) -> PerSensor<Triad> {
         let form = common.gyro.form;
         let triads = from_vector(form, &(to_vector(common) + self.parameters));
-        match self.mounting == Vector3::zeros() {
-            true => triads,
-            false => self.turned(&triads),
+        if self.mounting == Vector3::zeros() {
+            triads
+        } else {
+            self.turned(&triads)
         }
     }
 

@@ -184,9 +184,10 @@ pub fn through(
         let known = alone.estimate.as_ref();
         let variance = known.map_or(0.0, |estimate| estimate.covariance[(index, index)]);
         // Without a σ the coarse start is as good as a tenth of what was known before.
-        let variance = match variance > 0.0 {
-            true => variance * BEYOND_NOISE.powi(2) + own,
-            false => (0.1 * prior).powi(2) + own,
+        let variance = if variance > 0.0 {
+            variance * BEYOND_NOISE.powi(2) + own
+        } else {
+            (0.1 * prior).powi(2) + own
         };
         let mut row = sigma.clone();
         for function in 0..THERMAL_FUNCTIONS {

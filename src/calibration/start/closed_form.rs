@@ -174,9 +174,10 @@ fn six_of(observed: &Observed) -> Vec<usize> {
     let all = 0..observed.known.len();
     let six: Vec<usize> = all.clone().filter(|&k| along(k).is_some()).collect();
     let has = |axis, up| six.iter().any(|&k| along(k) == Some((axis, up)));
-    match (0..3).all(|axis| has(axis, true) && has(axis, false)) {
-        true => six,
-        false => all.collect(),
+    if (0..3).all(|axis| has(axis, true) && has(axis, false)) {
+        six
+    } else {
+        all.collect()
     }
 }
 
@@ -190,11 +191,12 @@ fn by_labels(problem: &Problem) -> Result<ClosedForm, CalibrationError> {
         contradicted,
     } = Used::of(run, &rests);
     if sections.is_empty() {
-        return Err(match contradicted.is_empty() {
-            true => CalibrationError::NoSections {
+        return Err(if contradicted.is_empty() {
+            CalibrationError::NoSections {
                 labels: run.recording.labels(),
-            },
-            false => CalibrationError::LabelsContradicted { contradicted },
+            }
+        } else {
+            CalibrationError::LabelsContradicted { contradicted }
         });
     }
     let observed = labels::observed(run, &rests, &sections);

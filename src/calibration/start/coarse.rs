@@ -138,9 +138,10 @@ pub fn calibrated(problem: &Problem, dwells: &[Vec<AtRest>]) -> Result<Turned, C
     let mut at = Linearisation::new(triads, TermVector::zeros(), first);
     at.triads.gyro.bias = gyro_bias_at_rest(dwells);
     for round in 0..ROUNDS {
-        let sensors = match round < ROUNDS_OF_GYROS {
-            true => &[Sensor::Gyro][..],
-            false => &Sensor::ALL,
+        let sensors = if round < ROUNDS_OF_GYROS {
+            &[Sensor::Gyro][..]
+        } else {
+            &Sensor::ALL
         };
         let step = turned(problem, dwells, &mut at, sensors)?
             .equations

@@ -63,9 +63,10 @@ pub fn gyrocompass(
         let first = first(stretch);
         let (east, north) = (found[first], found[first + 1]);
         // Where nothing but rounding is found, as of a single dwell, the heading stays as it is.
-        let angle = match east.hypot(north) > ROUNDING * ROTATION_RATE {
-            true => north.atan2(east) - std::f64::consts::FRAC_PI_2,
-            false => 0.0,
+        let angle = if east.hypot(north) > ROUNDING * ROTATION_RATE {
+            north.atan2(east) - std::f64::consts::FRAC_PI_2
+        } else {
+            0.0
         };
         let level = covariance.fixed_view::<2, 2>(first, first).into_owned();
         let level = level.symmetric_eigenvalues().max().sqrt();

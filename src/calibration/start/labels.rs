@@ -291,9 +291,12 @@ fn directions(run: &Run, rests: &[Rest], sections: &[Section]) -> Vec<Direction>
     let middle = |of: &Section| of.samples.start.midpoint(of.samples.end);
     let direction = |section: &Section| {
         let rest = rest_at(rests, section.samples.start);
-        let found = standing.iter().find(|(other, _)| match section.stands() {
-            true => std::ptr::eq(*other, section),
-            false => rest.is_some() && rest_at(rests, middle(other)) == rest,
+        let found = standing.iter().find(|(other, _)| {
+            if section.stands() {
+                std::ptr::eq(*other, section)
+            } else {
+                rest.is_some() && rest_at(rests, middle(other)) == rest
+            }
         });
         found
             .map(|(_, direction)| *direction)

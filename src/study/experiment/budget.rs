@@ -1,7 +1,12 @@
 //! Contribution of each group of parameters to the position error.
 
-use super::{ByParameter, Calibrated};
+use nalgebra::SMatrix;
+
+use super::method::Calibrated;
 use crate::calibration::{Group, PARAMETERS, ParameterMatrix};
+
+/// Horizontal position error, east and north in nmile, by parameter errors.
+pub(super) type ByParameter = SMatrix<f64, 2, PARAMETERS>;
 
 /// Budget of the final position error from the stated covariance, averaged over all instruments.
 ///

@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{HOUR_PATH, POSITIONS};
 use crate::calibration::{
     Estimate, NoisePolicy, Options, ParameterMatrix, ParameterVector, Problem, UNWATCHED, estimate,
     in_general_form, six_position, to_vector,
@@ -12,6 +11,11 @@ use crate::models::ModelError;
 use crate::simulation::{Scenario, Simulated};
 use crate::study::StudyError;
 use crate::turntable::TableError;
+
+/// The static positions of the paper, used by the closed form.
+pub(super) const POSITIONS: &str = "six-position";
+/// A filter path with the table time of the closed form.
+const HOUR_PATH: &str = "three-axis-hour";
 
 /// An estimator with its path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

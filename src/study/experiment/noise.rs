@@ -6,11 +6,11 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
+use super::spread::Spread;
 use crate::earth::{ROTATION_RATE, normal_gravity};
 use crate::imu::{Noise, PerSensor};
 use crate::navigation::error_model::{ATTITUDE, INPUTS, InputMatrix, STATES};
 use crate::navigation::{ErrorMatrix, Instant, NavigationError, Solution};
-use crate::study::experiment::Spread;
 use crate::study::navigation::{INTERVAL, Mission, Motion, NavigationStudyError};
 
 /// Duration of self-alignment at rest, s.

@@ -44,7 +44,7 @@ fn exposure_against_navigation(cases: &[(InstallationForm, u32, f64)]) {
     // half a degree of attitude or a hundred miles are no longer small.
     for &(form, minutes, within) in cases {
         let study = study(minutes);
-        let scenario = study.scenario.clone().with_path(POSITIONS).unwrap();
+        let scenario = study.scenario.clone().with_path(method::POSITIONS).unwrap();
         let simulated = scenario.simulate(3, 0).unwrap();
         let estimate = six_position(&Problem::new(
             &simulated.run,

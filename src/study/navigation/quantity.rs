@@ -89,9 +89,10 @@ impl Quantity {
 
     /// The same for all errors or their σ, in the order of [`Outlook::sigma`].
     pub fn of(self, all: &ErrorVector) -> f64 {
-        let si = match self.is_component {
-            true => all[self.place],
-            false => all.fixed_rows::<2>(self.place).norm(),
+        let si = if self.is_component {
+            all[self.place]
+        } else {
+            all.fixed_rows::<2>(self.place).norm()
         };
         si / self.unit_value()
     }

@@ -90,11 +90,12 @@ pub fn show_found(path: &Path, found: &[Found]) {
 /// Path of a run.toml, for commands that do not accept a log.
 pub fn run_file(text: &str) -> Result<PathBuf, String> {
     let path = run_or_log(text)?;
-    match path.is_file() && path.extension().is_none_or(|end| end != "toml") {
-        true => Err(format!(
+    if path.is_file() && path.extension().is_none_or(|end| end != "toml") {
+        Err(format!(
             "found a log, expected the run.toml that describes it. Draft one with turncal init {text}"
-        )),
-        false => Ok(path),
+        ))
+    } else {
+        Ok(path)
     }
 }
 
@@ -102,8 +103,9 @@ pub fn run_file(text: &str) -> Result<PathBuf, String> {
 pub fn run_or_log(text: &str) -> Result<PathBuf, String> {
     let path = Path::new(text);
     let inside = path.join("run.toml");
-    match inside.is_file() {
-        true => Err(format!("this is a directory; give {}", inside.display())),
-        false => Ok(path.into()),
+    if inside.is_file() {
+        Err(format!("this is a directory; give {}", inside.display()))
+    } else {
+        Ok(path.into())
     }
 }

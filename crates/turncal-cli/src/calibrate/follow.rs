@@ -99,14 +99,15 @@ impl Follow<'_> {
             return Ok(());
         };
         let same = self.source.canonicalize().ok() == named.canonicalize().ok();
-        match same {
-            true => Ok(()),
-            false => bail!(
+        if same {
+            Ok(())
+        } else {
+            bail!(
                 "{}: [imu] names {}, but --follow {}. Follow the file named in run.toml",
                 run.display(),
                 named.display(),
                 self.source.display()
-            ),
+            )
         }
     }
 }
@@ -131,9 +132,12 @@ impl Followed<'_> {
         let Some((Opened { run, .. }, _)) = &self.opened else {
             return Ok(false);
         };
-        let status = self.evaluator.status(run, &|_| match is_ended() {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
+        let status = self.evaluator.status(run, &|_| {
+            if is_ended() {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
         });
         screen.show(run, &status, self.evaluator.specification())?;
         Ok(status.is_met())

@@ -173,9 +173,10 @@ fn read_in_background(source: PathBuf) -> anyhow::Result<Receiver<Option<Vec<u8>
     let read = move || {
         let mut buffer = [0; 4096];
         loop {
-            let opened: io::Result<Box<dyn Read>> = match is_stdin {
-                true => Ok(Box::new(io::stdin())),
-                false => File::open(&source).map(|file| Box::new(file) as Box<dyn Read>),
+            let opened: io::Result<Box<dyn Read>> = if is_stdin {
+                Ok(Box::new(io::stdin()))
+            } else {
+                File::open(&source).map(|file| Box::new(file) as Box<dyn Read>)
             };
             if let Ok(mut input) = opened {
                 while let Ok(count @ 1..) = input.read(&mut buffer) {

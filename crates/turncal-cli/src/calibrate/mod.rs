@@ -125,9 +125,10 @@ impl Calibrate {
         }
         match self.runs.as_slice() {
             [file] if self.specification.is_none() && self.shard.is_none() => {
-                match Campaign::is_at(file) {
-                    true => self.campaign(file),
-                    false => self.one(file),
+                if Campaign::is_at(file) {
+                    self.campaign(file)
+                } else {
+                    self.one(file)
                 }
             }
             _ if self.truth.is_some() => {
@@ -164,18 +165,17 @@ impl Calibrate {
         let activity = Activity::new(format!("reading {}", path.display()));
         let opened = self.of_log.open(path)?;
         let run = &opened.run;
-        let problem = match self.temperature {
-            true => {
-                let together = Together::default();
-                let problem = self.estimation.together(&[run], &together);
-                let problem = problem.inspect_err(|_| say(&run.recording))?;
-                // Without a turn, only the biases against temperature can be determined.
-                if let Some(at_rest) = problem.at_rest() {
-                    return self.at_rest(&at_rest, &problem, (&opened, path));
-                }
-                problem
+        let problem = if self.temperature {
+            let together = Together::default();
+            let problem = self.estimation.together(&[run], &together);
+            let problem = problem.inspect_err(|_| say(&run.recording))?;
+            // Without a turn, only the biases against temperature can be determined.
+            if let Some(at_rest) = problem.at_rest() {
+                return self.at_rest(&at_rest, &problem, (&opened, path));
             }
-            false => self.estimation.problem(run, path)?,
+            problem
+        } else {
+            self.estimation.problem(run, path)?
         };
         self.solved(
             &problem,
@@ -204,12 +204,13 @@ impl Calibrate {
             opened.write_run(&directory.path())?;
             directory.commit()?;
         }
-        match self.json {
-            true => print(&calibration_json(
+        if self.json {
+            print(&calibration_json(
                 &calibration,
                 Path::new("standard output"),
-            )?),
-            false => show(&document, false),
+            )?)
+        } else {
+            show(&document, false)
         }?;
         say(&run.recording);
         Ok(())

@@ -91,12 +91,11 @@ impl Screen {
     }
 
     fn tell(&self, line: &str) -> anyhow::Result<()> {
-        match self.silent {
-            true => {
-                tell!("{}", printable(line));
-                Ok(())
-            }
-            false => print(format!("{}\n", printable(line)).as_bytes()),
+        if self.silent {
+            tell!("{}", printable(line));
+            Ok(())
+        } else {
+            print(format!("{}\n", printable(line)).as_bytes())
         }
     }
 
@@ -106,9 +105,10 @@ impl Screen {
             return Ok(());
         }
         self.received = received;
-        match self.is_terminal && !self.silent {
-            true => self.redraw(),
-            false => Ok(()),
+        if self.is_terminal && !self.silent {
+            self.redraw()
+        } else {
+            Ok(())
         }
     }
 

@@ -8,9 +8,10 @@ use turncal_report::{Document, terminal};
 
 /// Prints a document as text in the width of the terminal, or as JSON.
 pub fn show(document: &Document, json: bool) -> anyhow::Result<()> {
-    let text = match json {
-        true => report::json(document),
-        false => terminal::text(document, columns().map(usize::from)),
+    let text = if json {
+        report::json(document)
+    } else {
+        terminal::text(document, columns().map(usize::from))
     };
     print(text.as_bytes())
 }

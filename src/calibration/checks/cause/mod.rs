@@ -238,9 +238,10 @@ impl FoundCause {
 
     /// A permanent cause (Earth rate) gets the chance level found while it is estimated; other causes are unchanged.
     pub fn beside_what_it_leaves(self, left: &Causes) -> Self {
-        match self.is_lasting() {
-            true => self.beside(left.chance, self.limit),
-            false => self,
+        if self.is_lasting() {
+            self.beside(left.chance, self.limit)
+        } else {
+            self
         }
     }
 

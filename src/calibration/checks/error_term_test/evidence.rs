@@ -49,9 +49,10 @@ impl Evidence {
 
     /// Limit that the gain exceeds by chance with this probability; infinite if the term is not observed.
     pub fn limit(&self, chance: f64) -> f64 {
-        match self.states > 0.0 {
-            true => self.share * chi_square_limit(self.states, chance),
-            false => f64::INFINITY,
+        if self.states > 0.0 {
+            self.share * chi_square_limit(self.states, chance)
+        } else {
+            f64::INFINITY
         }
     }
 }

@@ -188,9 +188,12 @@ struct Tested<'a> {
 impl<'a> Tested<'a> {
     fn new(problem: &'a Problem, outcome: &'a Outcome) -> Result<Self, CalibrationError> {
         let model = &problem.model;
-        let other = &problem.with(|other| match model.has(VARYING) {
-            true => other.switch_off(VARYING),
-            false => other.switch_on(VARYING),
+        let other = &problem.with(|other| {
+            if model.has(VARYING) {
+                other.switch_off(VARYING)
+            } else {
+                other.switch_on(VARYING)
+            }
         });
         // The longer of the two first: a thread that is done with something else can take the other.
         let (otherwise, terms): (Result<With, CalibrationError>, Result<_, CalibrationError>) =
@@ -235,10 +238,7 @@ impl<'a> Tested<'a> {
             (_, true) => &terms.without(term),
             (_, false) => &terms.with(&[term]),
         };
-        let (with, without) = match on {
-            true => (own, other),
-            false => (other, own),
-        };
+        let (with, without) = if on { (own, other) } else { (other, own) };
         let of_costs = ErrorTermTest::new(term, on, &with.posterior, &without.posterior);
         if term == VARYING {
             let gain = without.posterior.deviance - with.posterior.deviance;
@@ -390,16 +390,18 @@ mod tests {
             (ErrorTerm::TableAxes(AxisError::Wobble), false),
         ] {
             let mut model = problem.model.clone();
-            match on {
-                true => model.switch_off(term),
-                false => model.switch_on(term),
+            if on {
+                model.switch_off(term)
+            } else {
+                model.switch_on(term)
             }
             let other = last_pass(&problem.with_model(model), &outcome);
             let test = tests.iter().find(|e| e.term == term).unwrap();
             assert_eq!(test.on, on);
-            match on {
-                true => is_of_passes(test, &own, &other),
-                false => is_of_passes(test, &other, &own),
+            if on {
+                is_of_passes(test, &own, &other)
+            } else {
+                is_of_passes(test, &other, &own)
             }
         }
     }

@@ -84,9 +84,10 @@ pub fn triad_name(sensor: Sensor) -> &'static str {
 
 /// The widening of σ in words: in percent below a factor of two, else as a factor.
 pub fn widened_by(growth: f64) -> String {
-    match growth < 2.0 {
-        true => format!("by up to {:.0} %", 100.0 * (growth - 1.0)),
-        false => format!("up to {growth:.1} times"),
+    if growth < 2.0 {
+        format!("by up to {:.0} %", 100.0 * (growth - 1.0))
+    } else {
+        format!("up to {growth:.1} times")
     }
 }
 

@@ -50,9 +50,10 @@ impl Contradiction {
             // Without moves there is nothing to explain.
             let is_told = !motion.moves.is_empty() && motion.moves.len() >= measured.moves.len();
             let is_likely = || Weighed::of(&problem, &exchanged, &motion).explains(beyond_chance);
-            return Some(match is_told && is_likely() {
-                true => Self::Exchanged,
-                false => Self::Sensitivity(Sensitivity::of(run, Sensor::Accel, axes, vec![factor])),
+            return Some(if is_told && is_likely() {
+                Self::Exchanged
+            } else {
+                Self::Sensitivity(Sensitivity::of(run, Sensor::Accel, axes, vec![factor]))
             });
         }
         let mounting = Mounting::likeliest(problem, run, &measured);

@@ -1,0 +1,24 @@
+//! What the study simulates, and how the filter is set.
+
+use serde::{Deserialize, Serialize};
+
+use crate::calibration::{ErrorTerm, NoisePolicy};
+use crate::imu::InstallationForm;
+use crate::simulation::Scenario;
+
+/// Configuration of the study.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct AccuracyStudy {
+    /// The simulated scenario.
+    pub scenario: Scenario,
+    /// The filter's installation form; the truth has that of the scenario.
+    pub form: InstallationForm,
+    /// Error terms of the truth that the filter does not model.
+    pub unmodelled: Vec<ErrorTerm>,
+    /// Noise policy of the filter.
+    pub noise: NoisePolicy,
+    /// Number of runs.
+    pub runs: u64,
+    /// Seed; each run has its own random streams.
+    pub seed: u64,
+}
