@@ -23,11 +23,6 @@ pub fn factor(factor: f64) -> String {
     mean(factor, (0.99, 1.01))
 }
 
-/// A share in per cent.
-pub fn percent(share: f64) -> String {
-    value(100.0 * share, 1.0)
-}
-
 fn ratio_cells(of: Option<&Ratio>) -> [String; 2] {
     let cells = of.map(|of| with_interval(of.value, of.interval));
     cells.unwrap_or([NONE; 2].map(str::to_owned))
@@ -147,6 +142,7 @@ fn nis_row(name: &str, nis: &Nis) -> Vec<String> {
 
 /// Actual and expected fraction of errors in a region.
 pub fn held(of: &Containment) -> String {
+    let percent = |share: f64| value(100.0 * share, 1.0);
     let found = percent(of.within as f64 / of.runs as f64);
     let claimed = percent(of.region.probability());
     format!("{} {found} % (claimed {claimed} %)", region_name(of.region))

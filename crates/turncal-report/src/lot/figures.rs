@@ -8,7 +8,9 @@ use turncal::lot::{Lot, Quantity, Row, Sample};
 pub fn values(lot: &Lot) -> Plot {
     let panels = together(lot).into_iter().map(|of| panel(lot, &of));
     let what = match (&lot.specification, &lot.truth) {
-        (Some(_), _) => "Calibrations in the given order. Dashed: limits",
+        (Some(_), _) => {
+            "Calibrations in the given order. Dashed: limits, black if common to all axes"
+        }
         (None, Some(_)) => "Differences of the calibrations from the truth",
         (None, None) => "Differences of the calibrations from their mean",
     };
@@ -19,36 +21,37 @@ pub fn values(lot: &Lot) -> Plot {
 /// Series for each quantity: bars and marks, with crosses for outliers.
 fn panel(lot: &Lot, of: &Together) -> Panel {
     let count = of.quantities.len();
-    let points = |quantity: Quantity| -> Vec<(usize, f64, f64)> {
-        let all = lot.rows.iter().enumerate();
-        let point = |(place, row)| {
+    let points = |quantity: Quantity| {
+        let rows = lot.rows.iter().enumerate();
+        rows.filter_map(move |(place, row)| {
             let (value, sigma) = plotted(lot, row, quantity)?;
             Some((place, value, sigma))
-        };
-        all.filter_map(point).collect()
+        })
     };
     let series = of.quantities.iter().zip(&of.names).enumerate();
     let series = series.flat_map(|(n, (quantity, name))| {
         let shift = beside(n, count, 0.7);
         let outliers = lot.statistics_of(*quantity).map(|of| &of.outliers[..]);
         let outliers = outliers.unwrap_or_default();
-        let (crosses, dots): (Vec<_>, Vec<_>) = points(*quantity)
-            .into_iter()
-            .partition(|point| outliers.contains(&point.0));
+        let (crosses, dots): (Vec<_>, Vec<_>) =
+            points(*quantity).partition(|point| outliers.contains(&point.0));
         let place = |(place, value, sigma)| (place as f64 + shift, value, sigma);
         let dots = Series::measured(Mark::Dot, dots.into_iter().map(place)).key(name);
         let crosses = Series::measured(Mark::Cross, crosses.into_iter().map(place)).width(2.5);
         [dots, crosses].map(|marks| marks.nth(n))
     });
-    let limits = of.quantities.iter().enumerate().flat_map(|(n, &quantity)| {
-        let limits = limits(lot, quantity).into_iter();
-        limits.map(move |y| (y, Series::level(y).dashed().nth(n)))
+    let limits = of.quantities.iter().map(|&quantity| limits(lot, quantity));
+    let limits: Vec<Vec<f64>> = limits.collect();
+    let common = limits.windows(2).all(|pair| pair[0] == pair[1]);
+    let lines = limits.iter().enumerate().flat_map(|(n, limits)| {
+        let color = if common { Color::Ink } else { Color::Nth(n) };
+        let line = move |&y: &f64| Series::level(y).color(color).dashed();
+        limits.iter().map(line)
     });
-    let (limits, lines): (Vec<f64>, Vec<Series>) = limits.unzip();
     let units = Axis::places(lot.rows.iter().map(|row| row.unit.name.clone()));
     let zero = lot.specification.is_none().then_some(0.0);
     let y = Axis::linear("").room(0.05, 0.05);
-    let y = y.including(limits.into_iter().chain(zero));
+    let y = y.including(limits.iter().flatten().copied().chain(zero));
     Panel::new(&of.heading, units, y)
         .with_all(zero.map(|_| Series::zero()))
         .with_all(series)
