@@ -79,27 +79,23 @@ impl LotDirectory {
             check_same(target, &Part::read(target)?, part)?;
             check_units(&units, part)?;
             write_whole(&target.join(JOB_FILE), &part.to_json(), true)?;
-            return Ok(Self {
-                root: target.to_owned(),
-                _lock: lock,
-            });
+            return Ok(Self::locked(target, lock));
         }
         if begun {
             drop(lock(&units, waiting));
             clear_abandoned(&units);
         }
         let whole = WholeDirectory::create(target, force, inputs)?;
-        let refused = |error: std::io::Error| {
-            let advice = "Choose a directory that can be written.";
-            FileError::io(target, "write here", &error, advice)
-        };
+        let refused = |error: std::io::Error| FileError::unwritten(target, &error);
         fs::write(whole.path().join(JOB_FILE), part.to_json()).map_err(refused)?;
         fs::create_dir(whole.path().join(UNITS)).map_err(refused)?;
         whole.commit_growing(&[JOB_FILE, UNITS, &below_units()])?;
-        Ok(Self {
-            root: target.to_owned(),
-            _lock: lock(&units, waiting),
-        })
+        Ok(Self::locked(target, lock(&units, waiting)))
+    }
+
+    fn locked(target: &Path, lock: Option<File>) -> Self {
+        let root = target.to_owned();
+        Self { root, _lock: lock }
     }
 
     /// The previously calibrated unit, if its inputs are unchanged.
@@ -174,12 +170,9 @@ fn lock(units: &Path, waiting: &dyn Fn()) -> Option<File> {
 /// Refuses a directory started for a different job.
 fn check_same(target: &Path, found: &Part, expected: &Part) -> Result<(), FileError> {
     let difference = found.job.difference(&expected.job).or_else(|| {
-        let words = |part: &Part| {
-            let shard = part.shard;
-            shard.map_or_else(
-                || "the whole lot".to_owned(),
-                |shard| format!("part {shard}"),
-            )
+        let words = |part: &Part| match part.shard {
+            None => "the whole lot".to_owned(),
+            Some(shard) => format!("part {shard}"),
         };
         (found.shard != expected.shard).then(|| format!("{} and {}", words(found), words(expected)))
     });
@@ -195,19 +188,12 @@ fn check_same(target: &Path, found: &Part, expected: &Part) -> Result<(), FileEr
 
 /// Refuses a directory with units that are not in the lot.
 fn check_units(units: &Path, part: &Part) -> Result<(), FileError> {
-    let held: Vec<&str> = part
-        .held()
-        .into_iter()
-        .filter_map(|run| part.job.names.get(usize::try_from(run).ok()?))
-        .map(String::as_str)
-        .collect();
+    let name = |run: u64| part.job.names.get(usize::try_from(run).ok()?);
+    let held: Vec<&String> = part.held().into_iter().filter_map(name).collect();
     let entries = fs::read_dir(units).into_iter().flatten().flatten();
-    let mut others: Vec<String> = entries
-        .map(|entry| entry.file_name().to_string_lossy().into_owned())
-        .filter(|name| !name.starts_with('.') && !held.contains(&name.as_str()))
-        .collect();
-    others.sort();
-    others.first().map_or(Ok(()), |other| {
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let others = names.filter(|name| !name.starts_with('.') && !held.contains(&name));
+    others.min().map_or(Ok(()), |other| {
         Err(FileError::of(
             units,
             format_args!("unit `{other}`, which is not among the given runs"),
@@ -253,9 +239,8 @@ fn read_unit(directory: &Path, key: Option<&str>) -> Result<(Unit, String), File
 fn write_unit(unit: &Unit, key: &str, directory: &Path) -> Result<(), FileError> {
     let calibrated = unit.calibrated.as_ref().ok();
     let path = directory.join(CALIBRATION_FILE);
-    let json = calibrated
-        .map(|of| calibration_json(&of.calibration, &path))
-        .transpose()?;
+    let json = calibrated.map(|of| calibration_json(&of.calibration, &path));
+    let json = json.transpose()?;
     let record = UnitRecord {
         format: FORMAT.to_owned(),
         name: unit.name.clone(),

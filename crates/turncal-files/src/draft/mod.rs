@@ -7,13 +7,12 @@ mod found;
 mod motion;
 mod name;
 mod priors;
-mod raw_run;
 mod raw_samples;
-mod registers;
 mod stated;
 mod streams;
 mod text;
 mod time;
+mod turns;
 mod units;
 
 use std::path::Path;
@@ -21,13 +20,11 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use crate::Sheet;
-use crate::instrument::USUAL_PERIOD;
 pub use certainty::Certainty;
 use columns::Columns;
 pub use found::Found;
 use motion::{FOLLOWED, Motion};
 use raw_samples::RawSamples;
-use registers::Registers;
 pub use stated::{DataSheetError, KalibrImu, Stated, StatedColumns, StatedUnit};
 use streams::{FEWEST_ROWS, Streams};
 use time::Clock;
@@ -37,6 +34,8 @@ use turncal_input::FileError;
 use turncal_logs::DataFile;
 use units::Quantities;
 
+/// Assumed sample period of rows without a time, s.
+const USUAL_PERIOD: f64 = 0.01;
 /// Minimum number of samples at rest for a noise estimate.
 const FEWEST_AT_REST: usize = 64;
 
@@ -53,10 +52,8 @@ pub struct Draft {
     columns: Columns,
     clock: Clock,
     quantities: Quantities,
-    /// Nominal zero output of a register per row …
+    /// Nominal zero output of a register per row.
     offset: PerSensor<f64>,
-    /// … and its estimate from the recording, for counts.
-    registers: Option<Registers>,
     /// Reasons why the columns cannot be used unchanged.
     blocked: Vec<String>,
     /// White noise in the quantity of the file per second, per √Hz, if the log has dwells.
@@ -163,7 +160,6 @@ impl Draft {
             columns,
             clock,
             offset: PerSensor::default(),
-            registers: None,
             blocked: Vec::new(),
             random_walk: PerSensor::default(),
             motion: None,
@@ -172,7 +168,7 @@ impl Draft {
             stated: stated.clone(),
         };
         match rows {
-            Some(rows) => draft.take_rows(rows, &sheet),
+            Some(rows) => draft.take_rows(&rows, &sheet),
             None => draft.quantities.state(stated),
         }
         if let Some(streams) = &draft.streams {
@@ -186,42 +182,21 @@ impl Draft {
         draft
     }
 
-    /// Detects units, registers and noise.
-    fn take_rows(&mut self, mut rows: RawSamples, sheet: &Sheet) {
-        let mut motion = rows.motion();
+    /// Detects units and noise.
+    fn take_rows(&mut self, rows: &RawSamples, sheet: &Sheet) {
+        let motion = rows.motion();
         self.quantities = Quantities::find(sheet, &self.columns, &self.clock, rows.whole, &motion);
-        let is_open = motion.angle.is_none() && motion.is_turned;
-        if self.quantities.has_counts() || is_open {
-            motion = self.look_behind(&mut rows, &motion, sheet);
+        if self.quantities.has_counts() {
+            self.blocked = rows.unfit();
         }
         let period = self.clock.period.unwrap_or(f64::NAN);
         let of_units = || self.quantities.contradiction(&self.stated, &motion, period);
         self.contradiction = self.contradiction.take().or_else(of_units);
         self.quantities.state(&self.stated);
-        let random_walk = white_noise(&rows, &motion, &self.quantities, self.clock.period);
+        let random_walk = white_noise(rows, &motion, &self.quantities, self.clock.period);
         self.random_walk = random_walk.unwrap_or_default();
         self.offset = rows.offset;
         self.motion = Some(motion);
-    }
-
-    /// Detects the registers behind the rows, and returns the motion without their zero.
-    fn look_behind(&mut self, rows: &mut RawSamples, motion: &Motion, sheet: &Sheet) -> Motion {
-        let found = Registers::find(rows, motion);
-        let is_count = PerSensor::from_fn(|sensor| self.quantities.is_count(sensor));
-        found.apply(&mut rows.triads, &mut self.columns, &is_count);
-        let mut motion = rows.motion();
-        if let Some(turns) = &found.turns {
-            motion.cuts.clear();
-            motion.angle = motion.angle.or(turns.angle());
-        }
-        let (columns, clock) = (&self.columns, &self.clock);
-        self.quantities = Quantities::find(sheet, columns, clock, rows.whole, &motion);
-        self.quantities.of_registers(&found, clock.period);
-        if self.quantities.has_counts() {
-            self.blocked = rows.unfit();
-            self.registers = Some(found);
-        }
-        motion
     }
 
     /// Whether the log has this triad; both if none was identified.
@@ -230,15 +205,6 @@ impl Draft {
         let none = triads.gyro.is_none() && triads.accel.is_none();
         none || triads.get(sensor).is_some()
     }
-}
-
-/// Angle in rad per gyro unit in one row, from the rotation of gravity; negative if the triads have opposite signs.
-pub fn turned_angle(triads: PerSensor<Vec<Vector3<f64>>>, period: f64) -> Option<f64> {
-    let rows = RawSamples::new(triads, Vec::new(), period);
-    let motion = rows.motion();
-    motion
-        .angle
-        .or_else(|| Registers::find(&rows, &motion).turns?.angle())
 }
 
 /// Keeps the rows of one of several instruments, and returns the column and number.

@@ -10,7 +10,7 @@ use crate::schema::{
     BodyAxes, FORMAT, ImuColumns, ImuFile, InstanceFile, Names, PriorsFile, RunFile, SiteFile,
     TemperatureColumn, TimeColumn, TimeStamp, TimeUnitField,
 };
-use turncal::imu::{Noise, NoiseKeys, Output, Sensor};
+use turncal::imu::{Noise, NoiseKeys, Sensor};
 use turncal::number::rounded;
 use turncal_input::{Finite, Gravity, Height, Latitude, NonNegative, Positive};
 
@@ -82,10 +82,11 @@ impl Draft {
         let mut imu = ImuFile {
             file: file.to_owned(),
             output: found.output,
+            // A rate that is asked for first may tell the units.
+            sample_period_s: self.period(remarks),
             gyro_unit: self.unit(Sensor::Gyro, remarks),
             accel_unit: self.unit(Sensor::Accel, remarks),
             time_unit: (clock.unit != "s").then(|| TimeUnitField::of_text(&clock.unit)),
-            sample_period_s: self.period(remarks),
             time_stamp: TimeStamp::End,
             continuous: Some(self.cuts() == 0),
             body_axes: Some(self.body_axes(remarks)),
@@ -139,10 +140,8 @@ impl Draft {
     fn period(&self, remarks: &mut Remarks) -> Option<Positive> {
         let (path, clock) = ("imu.sample_period_s", &self.clock);
         let Some(period) = clock.period else {
-            if !self.rows_show_period() {
-                let why = "seconds between rows, which a counter does not give";
-                remarks.open(path, why);
-            }
+            let why = "seconds between rows, which a counter does not give";
+            remarks.open(path, why);
             return None;
         };
         let rate = rounded(period.recip(), 4);
@@ -174,14 +173,6 @@ impl Draft {
                 places(cuts)
             ),
         }
-    }
-
-    /// Whether rows without a time show how long they last: rates, whose sums are angles.
-    fn rows_show_period(&self) -> bool {
-        let gyro = &self.quantities.units.gyro;
-        self.columns.time.is_none()
-            && self.quantities.output == Output::Rate
-            && gyro.word.is_some_and(|word| word != "count")
     }
 
     fn body_axes(&self, remarks: &mut Remarks) -> BodyAxes {
@@ -219,8 +210,12 @@ impl Draft {
             }
             None => TimeColumn::One(self.name(time)),
         });
-        if time.is_none() {
-            self.without_time(remarks);
+        let why = &self.clock.why;
+        if time.is_none() && self.clock.is_stated {
+            remarks.before(path, format_args!("{why}; rows are taken as consecutive."));
+        } else if time.is_none() {
+            let words = format_args!("{why}; name a time column or set sample_period_s.");
+            remarks.open_before(path, words);
         }
         let known = columns.triads.gyro.or(columns.triads.accel);
         for sensor in Sensor::ALL {
@@ -238,7 +233,6 @@ impl Draft {
                 }
             }
         }
-        self.turned_axes(remarks);
         if !self.blocked.is_empty() {
             remarks.open(path, self.blocked.join("; "));
         }
@@ -277,20 +271,6 @@ impl Draft {
         }
     }
 
-    /// Substitute for a time column.
-    fn without_time(&self, remarks: &mut Remarks) {
-        let (path, why) = ("imu.columns", &self.clock.why);
-        let instead = if self.clock.is_stated {
-            "rows are taken as consecutive."
-        } else if self.rows_show_period() {
-            "the sample period is estimated from the turns unless sample_period_s is set."
-        } else {
-            let words = format_args!("{why}; name a time column or set sample_period_s.");
-            return remarks.open_before(path, words);
-        };
-        remarks.before(path, format_args!("{why}; {instead}"));
-    }
-
     /// Remark that an axis points down or that the accelerometers output gravity.
     pub fn down_words(&self, down: usize) -> String {
         format!(
@@ -298,27 +278,6 @@ impl Draft {
              as iOS does",
             self.columns.names[down]
         )
-    }
-
-    /// Remark on gyro columns that do not match the accelerometer axes.
-    fn turned_axes(&self, remarks: &mut Remarks) {
-        let registers = self.registers.as_ref();
-        let turns = registers.and_then(|found| found.turns.as_ref());
-        let turns = turns.filter(|of| !of.agree() && self.quantities.is_count(Sensor::Gyro));
-        let Some((turns, triad)) = turns.zip(self.columns.triads.gyro) else {
-            return;
-        };
-        let [x, y, z] = [0, 1, 2].map(|k| {
-            let sign = if turns.axes.scale[k] < 0.0 { "−" } else { "" };
-            format!("{sign}{}", self.columns.names[triad[k]])
-        });
-        remarks.before("imu.columns", format_args!(
-            "From the gravity directions in {} moves, the gyros about the accelerometer axes x, y and z are {x}, {y} \
-             and {z}.",
-            turns.moves
-        ));
-        let follows = "The gyro column order and scale signs follow from this.";
-        remarks.before("imu.columns", follows);
     }
 
     fn noise_fields(&self, remarks: &mut Remarks) -> NoiseFields {

@@ -5,12 +5,11 @@
 mod affine;
 mod autopilot;
 mod code;
-mod devices;
-mod gazebo;
 mod kalibr;
 mod kf_gins;
 mod mat;
 mod notation;
+mod realsense;
 mod remarks;
 mod ros;
 mod samples;
@@ -64,7 +63,7 @@ const IN_AUTOPILOTS: &str = "change of scale factors and misalignments with temp
 
 /// Every format.
 #[rustfmt::skip]
-pub static FORMATS: [Format; 17] = [
+pub static FORMATS: [Format; 14] = [
     row("kalibr", "yaml", "IMU intrinsics for Kalibr, model scale-misalignment", RightFrontUp, kalibr::kalibr),
     row("kf-gins", "yaml", "IMU section of a KF-GINS configuration", FrontRightDown, kf_gins::write),
     row("c", "h", "A C99 header with constants and a function", RightFrontUp, code::write).with_temperature(""),
@@ -75,16 +74,13 @@ pub static FORMATS: [Format; 17] = [
         autopilot::ardupilot).with_temperature(IN_AUTOPILOTS),
     row("open-vins-kalibr", "yaml", "IMU intrinsics for OpenVINS, model kalibr", Log, kalibr::open_vins_kalibr),
     row("open-vins-rpng", "yaml", "IMU intrinsics for OpenVINS, model rpng", Log, kalibr::open_vins_rpng),
-    row("ikalibr", "yaml", "IMU intrinsics for iKalibr", Log, kalibr::ikalibr),
     row("imu-calib", "yaml", "Accelerometer calibration for the ROS package imu_calib", Log, ros::imu_calib),
     row("ros-covariance", "yaml", "Covariances for ROS sensor_msgs/Imu, from the noise of a run", Log, ros::covariance),
-    row("gazebo", "sdf", "IMU noise for Gazebo", Log, gazebo::write),
     row("mat", "mat", "A MATLAB structure (MAT file)", RightFrontUp, mat::write),
     row("betaflight", "txt", "Accelerometer zeros for Betaflight", Log, autopilot::betaflight),
     row("inav", "txt", "Zeros and gains for INAV", Log, autopilot::inav),
     row("realsense", "bin", "IMU calibration table of a RealSense D400 camera, as written by rs-imu-calibration", Log,
-        devices::realsense),
-    row("slimevr", "h", "Calibration for a SlimeVR tracker", Log, devices::slimevr),
+        realsense::write),
 ];
 
 impl Format {

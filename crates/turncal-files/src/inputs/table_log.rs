@@ -43,9 +43,8 @@ impl AttitudeColumns<'_> {
         let values: Vec<f64> = values.collect::<Result<_, FileError>>()?;
         let (quaternion, angles) = values.split_at(values.len() - self.axes.len());
         let angles = self.axes.iter().zip(angles);
-        let angles: Vec<_> = angles
-            .map(|(axis, angle)| (*axis, angle * DEGREE))
-            .collect();
+        let angles = angles.map(|(axis, angle)| (*axis, angle * DEGREE));
+        let angles: Vec<_> = angles.collect();
         let &[w, x, y, z] = quaternion else {
             let turn = |of: Matrix3<f64>, (axis, angle): &(Vector3<f64>, f64)| {
                 of * attitude::exp(axis * *angle)
@@ -98,48 +97,33 @@ impl<'a> Fields<'a> {
             Some(axes) => ("turntable.axes", Some(axes)),
             None => ("turntable.columns.axes", columns.axes.as_ref()),
         };
-        let wrong = |path, expected: &str, advice| Err(self.document.wrong(path, expected, advice));
-        let missing = |path, meaning| Err(self.document.missing(path, meaning));
-        let angles = match (&columns.angles, axes) {
-            (Some(names), Some(letters)) if names.is_empty() || names.len() != letters.len() => {
-                let count = letters.len();
-                return wrong(
-                    "turntable.columns.angles",
-                    &format!("one angle column for each of the {count} axes, outermost first"),
-                    "Complete `angles` or `axes`.",
-                );
-            }
-            (Some(names), Some(letters)) => {
-                let pairs = names.iter().zip(letters).map(|(name, letter)| {
-                    let axis = LETTERS.iter().find(|(known, _)| known == letter);
-                    axis.map(|(_, axis)| (name.as_str(), *axis))
-                });
-                let Some(pairs) = pairs.collect() else {
-                    return wrong(
-                        path,
-                        "`x`, `y` or `z` for each axis",
-                        "Name the axis about which the table turns when all angles are zero.",
-                    );
-                };
-                pairs
-            }
-            (Some(_), None) => return missing("turntable.axes", "the axes of the angles"),
-            (None, Some(_)) => {
-                return wrong(
-                    path,
-                    "axes together with columns of `angles`",
-                    "Name the angle columns, or remove the axes.",
-                );
-            }
-            (None, None) if columns.quaternion.is_none() => {
-                let meaning = "columns of a quaternion or of `angles`";
-                return missing("turntable.columns.quaternion", meaning);
-            }
-            (None, None) => Vec::new(),
+        let names = columns.angles.as_deref().unwrap_or_default();
+        let letters = axes.map_or(&[][..], Vec::as_slice);
+        if names.len() != letters.len() {
+            let (names, letters) = (names.len(), letters.len());
+            return Err(FileError::of(
+                self.document.file,
+                format_args!("{names} columns of `angles` and {letters} `axes` in [turntable]"),
+                "one angle column for each axis, outermost first",
+                "Complete `angles` or `axes`.",
+            ));
+        }
+        if names.is_empty() && columns.quaternion.is_none() {
+            let meaning = "columns of a quaternion or of `angles`";
+            return Err(self
+                .document
+                .missing("turntable.columns.quaternion", meaning));
+        }
+        let axis = |letter: &String| LETTERS.iter().find(|(known, _)| known == letter);
+        let axes = letters.iter().map(|letter| Some(axis(letter)?.1));
+        let Some(axes) = axes.collect() else {
+            let advice = "Name the axis about which the table turns when all angles are zero.";
+            return Err(self
+                .document
+                .wrong(path, "`x`, `y` or `z` for each axis", advice));
         };
-        let (of_angles, axes): (Vec<&str>, _) = angles.into_iter().unzip();
         let quaternion = columns.quaternion.iter().flat_map(|names| &names.0);
-        let names = quaternion.map(String::as_str).chain(of_angles).collect();
+        let names = quaternion.chain(names).map(String::as_str).collect();
         Ok(AttitudeColumns { names, axes })
     }
 
@@ -197,18 +181,12 @@ impl TableLogFile<'_> {
         attitude.shrink_to_fit();
         axes.shrink_to_fit();
         let time: Vec<f64> = stamps.of_rows.iter().map(|&(time, _)| time).collect();
-        let (first, last) = match time.as_slice() {
-            [first, .., last] => (*first, *last),
-            _ => {
-                return Err(csv.error(
-                    "fewer than 2 readings",
-                    "at least 2",
-                    "Log the table during the whole run, or remove [turntable].",
-                ));
-            }
+        let [first, .., last] = time.as_slice() else {
+            let advice = "Log the table during the whole run, or remove [turntable].";
+            return Err(csv.error("fewer than 2 readings", "at least 2", advice));
         };
         let (start, end) = (imu.start(), imu.end());
-        if last < start || first > end {
+        if *last < start || *first > end {
             return Err(csv.error(
                 format_args!("readings from {first} s to {last} s"),
                 format_args!("times that overlap the IMU log ({start} s to {end} s)"),
