@@ -177,12 +177,10 @@ fn check_same(target: &Path, found: &Part, expected: &Part) -> Result<(), FileEr
         (found.shard != expected.shard).then(|| format!("{} and {}", words(found), words(expected)))
     });
     difference.map_or(Ok(()), |difference| {
-        Err(FileError::of(
-            target,
-            format_args!("a lot started with other options ({difference})"),
-            "the options of the job started here",
-            "Use the same options, choose another directory, or add --force to restart.",
-        ))
+        let found = format_args!("a lot started with other options ({difference})");
+        let expected = "the options of the job started here";
+        let advice = "Use the same options, choose another directory, or add --force to restart.";
+        Err(FileError::of(target, found, expected, advice))
     })
 }
 
@@ -194,11 +192,13 @@ fn check_units(units: &Path, part: &Part) -> Result<(), FileError> {
     let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
     let others = names.filter(|name| !name.starts_with('.') && !held.contains(&name));
     others.min().map_or(Ok(()), |other| {
+        let found = format_args!("unit `{other}`, which is not among the given runs");
+        let advice = "Also give its run.toml, choose another directory, or add --force to restart.";
         Err(FileError::of(
             units,
-            format_args!("unit `{other}`, which is not among the given runs"),
+            found,
             "only units of this lot",
-            "Also give its run.toml, choose another directory, or add --force to restart.",
+            advice,
         ))
     })
 }

@@ -74,12 +74,14 @@ impl Parts {
         for (directory, part) in &parts[1..] {
             if let Some(difference) = reference.job.any_difference(&part.job) {
                 let first = first.display();
+                let found = format!("a part of a different job than {first} ({difference})");
+                let advice = "Merge only parts made by the same version, with the same arguments, on processors of the \
+                              same type.";
                 return Err(FileError::of(
                     directory,
-                    format_args!("a part of a different job than {first} ({difference})"),
+                    found,
                     "parts of the same job",
-                    "Merge only parts made by the same version, with the same arguments, on processors of the same \
-                        type.",
+                    advice,
                 ));
             }
         }
@@ -116,10 +118,12 @@ impl Parts {
         let given = self.parts.iter().filter_map(|(_, part)| part.shard);
         let given: Vec<String> = given.map(|shard| shard.to_string()).collect();
         let given = list(given.iter().map(String::as_str));
+        let found = format_args!("no part that contains run {words}");
+        let expected = format!("all {} runs; the parts given are {given}", self.job.runs);
         Err(FileError::of(
             &first.0,
-            format_args!("no part that contains run {words}"),
-            format_args!("all {} runs; the parts given are {given}", self.job.runs),
+            found,
+            expected,
             "Add the missing parts.",
         ))
     }

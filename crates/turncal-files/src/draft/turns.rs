@@ -12,7 +12,9 @@ const MOST: f64 = 2.0 * TAU;
 const LONG: f64 = 4.0;
 /// Successive trials differ by this factor …
 const STEP: f64 = 1.03;
-/// … and those within this factor are equal.
+/// … of which this many parts are tried about the best.
+const FINER: i32 = 20;
+/// Trials within this factor of the best are no other.
 const SAME: f64 = 1.25;
 /// Square error relative to that without rotation …
 const GOOD: f64 = 0.1;
@@ -93,21 +95,13 @@ pub fn angle(intervals: &[Interval]) -> Option<f64> {
     let sizes = (0..=trials).map(|k| ENOUGH / least * STEP.powi(k));
     let tried = sizes.flat_map(|size| [size, -size]);
     let tried: Vec<(f64, f64)> = tried.map(|angle| (angle, error(angle))).collect();
-    let &(mut best, _) = tried.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let &(best, _) = tried.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
     let is_other = |angle: f64| !(SAME.recip()..SAME).contains(&(angle / best));
     let others = tried.iter().filter(|(angle, _)| is_other(*angle));
     let rival = others.map(|(_, error)| *error).fold(error(0.0), f64::min);
-    // The error is about a parabola near its least value.
-    let mut width = best * (STEP - 1.0);
-    for _ in 0..12 {
-        let [before, at, after] = [-width, 0.0, width].map(|off| error(best + off));
-        let curvature = before + after - 2.0 * at;
-        if curvature > 0.0 {
-            best += width * (0.5 * (before - after) / curvature).clamp(-1.0, 1.0);
-        }
-        width *= 0.5;
-    }
-    let found = error(best);
+    let finer = (-FINER..=FINER).map(|k| best * STEP.powf(f64::from(k) / f64::from(FINER)));
+    let finer = finer.map(|angle| (angle, error(angle)));
+    let (angle, found) = finer.min_by(|a, b| a.1.total_cmp(&b.1))?;
     let is_shown = found < GOOD * error(0.0) && TOLD_APART * found < rival;
-    is_shown.then_some(best)
+    is_shown.then_some(angle)
 }

@@ -117,11 +117,8 @@ impl<'a> Reading<'a> {
                 "If gyros and accelerometers are in separate rows, `turncal init` drafts a run.toml for that layout.",
             ),
         };
-        csv.error(
-            format_args!("{} samples{found}", self.held.len()),
-            format_args!("at least {FEWEST_SAMPLES}"),
-            advice,
-        )
+        let found = format_args!("{} samples{found}", self.held.len());
+        csv.error(found, format_args!("at least {FEWEST_SAMPLES}"), advice)
     }
 }
 

@@ -115,12 +115,10 @@ fn apart(file: &Path, gyro: &Track, accel: &Track) -> FileError {
         let (first, period) = (track.clock.first, track.clock.period);
         format!("{first} s to {} s", first + last * period)
     };
-    FileError::of(
-        file,
-        format_args!("an accelerometer stream from {}", of(accel)),
-        format_args!("times that overlap the gyro stream ({})", of(gyro)),
-        "Convert both streams to the same clock, or correct time_unit.",
-    )
+    let found = format!("an accelerometer stream from {}", of(accel));
+    let expected = format!("times that overlap the gyro stream ({})", of(gyro));
+    let advice = "Convert both streams to the same clock, or correct time_unit.";
+    FileError::of(file, found, expected, advice)
 }
 
 /// Remarks of both streams, each once, and a note about two streams.
@@ -182,11 +180,9 @@ impl Track {
             }
         }
         if stamps.of_rows.len() < 2 {
-            return Err(rows.error(
-                format_args!("{} samples", stamps.of_rows.len()),
-                "at least 2",
-                "Name another stream, or repeat the recording.",
-            ));
+            let found = format!("{} samples", stamps.of_rows.len());
+            let advice = "Name another stream, or repeat the recording.";
+            return Err(rows.error(found, "at least 2", advice));
         }
         let mut remarks = rows.remarks().to_vec();
         remarks.extend(rows.cut_off("turncal ignored it"));

@@ -55,11 +55,10 @@ impl AttitudeColumns<'_> {
         let quaternion = Quaternion::new(w, x, y, z);
         let norm = quaternion.norm();
         if (norm - 1.0).abs() > NORM_TOLERANCE {
-            return Err(csv.error_here(
-                format_args!("a quaternion with norm {norm:.6}"),
-                format_args!("norm 1 within {NORM_TOLERANCE}"),
-                "Correct the row or the column order in run.toml (w, x, y, z).",
-            ));
+            let found = format_args!("a quaternion with norm {norm:.6}");
+            let expected = format_args!("norm 1 within {NORM_TOLERANCE}");
+            let advice = "Correct the row or the column order in run.toml (w, x, y, z).";
+            return Err(csv.error_here(found, expected, advice));
         }
         let angles = Some(angles).filter(|angles| !angles.is_empty());
         let attitude = UnitQuaternion::from_quaternion(quaternion);
@@ -100,27 +99,30 @@ impl<'a> Fields<'a> {
         let names = columns.angles.as_deref().unwrap_or_default();
         let letters = axes.map_or(&[][..], Vec::as_slice);
         if names.len() != letters.len() {
-            let (names, letters) = (names.len(), letters.len());
+            let (names, letters, file) = (names.len(), letters.len(), self.document.file);
+            let found =
+                format_args!("{names} columns of `angles` and {letters} `axes` in [turntable]");
+            let expected = "one angle column for each axis, outermost first";
             return Err(FileError::of(
-                self.document.file,
-                format_args!("{names} columns of `angles` and {letters} `axes` in [turntable]"),
-                "one angle column for each axis, outermost first",
+                file,
+                found,
+                expected,
                 "Complete `angles` or `axes`.",
             ));
         }
         if names.is_empty() && columns.quaternion.is_none() {
-            let meaning = "columns of a quaternion or of `angles`";
-            return Err(self
-                .document
-                .missing("turntable.columns.quaternion", meaning));
+            let (path, meaning) = (
+                "turntable.columns.quaternion",
+                "columns of a quaternion or of `angles`",
+            );
+            return Err(self.document.missing(path, meaning));
         }
         let axis = |letter: &String| LETTERS.iter().find(|(known, _)| known == letter);
         let axes = letters.iter().map(|letter| Some(axis(letter)?.1));
         let Some(axes) = axes.collect() else {
+            let expected = "`x`, `y` or `z` for each axis";
             let advice = "Name the axis about which the table turns when all angles are zero.";
-            return Err(self
-                .document
-                .wrong(path, "`x`, `y` or `z` for each axis", advice));
+            return Err(self.document.wrong(path, expected, advice));
         };
         let quaternion = columns.quaternion.iter().flat_map(|names| &names.0);
         let names = quaternion.chain(names).map(String::as_str).collect();
@@ -133,11 +135,11 @@ impl<'a> Fields<'a> {
         let mut axes = TableGeometry::default().axes;
         for (kind, key, stated) in fields.axis_errors() {
             if stated.is_some() && angles == 0 {
-                return Err(self.document.wrong(
-                    &format!("turntable.{key}"),
-                    "`angles` in the table log, because a quaternion does not separate the axes",
-                    "Remove it, or add the angles of the table axes, with or without the quaternion.",
-                ));
+                let path = format!("turntable.{key}");
+                let expected =
+                    "`angles` in the table log, because a quaternion does not separate the axes";
+                let advice = "Remove it, or add the angles of the table axes, with or without the quaternion.";
+                return Err(self.document.wrong(&path, expected, advice));
             }
             axes += kind.of_table(angles, sigma(stated));
         }
@@ -187,11 +189,9 @@ impl TableLogFile<'_> {
         };
         let (start, end) = (imu.start(), imu.end());
         if *last < start || *first > end {
-            return Err(csv.error(
-                format_args!("readings from {first} s to {last} s"),
-                format_args!("times that overlap the IMU log ({start} s to {end} s)"),
-                "Convert both files to the same clock.",
-            ));
+            let found = format_args!("readings from {first} s to {last} s");
+            let expected = format_args!("times that overlap the IMU log ({start} s to {end} s)");
+            return Err(csv.error(found, expected, "Convert both files to the same clock."));
         }
         Ok(TableLog {
             time,

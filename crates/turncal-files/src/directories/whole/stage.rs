@@ -24,12 +24,9 @@ static ENDING: AtomicBool = AtomicBool::new(false);
 
 /// Error: an output must not replace what is at `target`.
 pub fn taken(target: &Path) -> FileError {
-    FileError::of(
-        target,
-        "an existing file or directory of this name",
-        "an unused name",
-        "Choose another name, or add --force to replace it.",
-    )
+    let found = "an existing file or directory of this name";
+    let advice = "Choose another name, or add --force to replace it.";
+    FileError::of(target, found, "an unused name", advice)
 }
 
 /// Error: the system does not allow writing at `target`.
@@ -107,12 +104,10 @@ pub struct Stage {
 impl Stage {
     pub fn new(target: &Path) -> Result<Self, FileError> {
         if target.file_name().is_none() {
-            return Err(FileError::of(
-                target,
-                "a path that does not end in a name",
-                "the name of a file or directory to write",
-                "Give a name that does not end in `..` or `/`.",
-            ));
+            let found = "a path that does not end in a name";
+            let expected = "the name of a file or directory to write";
+            let advice = "Give a name that does not end in `..` or `/`.";
+            return Err(FileError::of(target, found, expected, advice));
         }
         let parent = match target.parent() {
             Some(parent) if parent != Path::new("") => parent,
