@@ -1,8 +1,9 @@
 //! Both triads with the covariance of their parameters.
 
 use crate::calibration::budget::curvature::curvature;
-use crate::calibration::{PARAMETERS, ParameterMatrix, ParameterVector, to_vector};
-use crate::imu::{InstallationForm, PerSensor, Triad};
+use crate::calibration::{PARAMETERS, ParameterMatrix, ParameterVector, parameter, to_vector};
+use crate::imu::{InstallationForm, PerSensor, Sensor, Triad};
+use crate::run::Run;
 use nalgebra::{DMatrix, DMatrixView};
 
 /// Both triads with the covariance of their parameters.
@@ -59,6 +60,16 @@ impl Estimate {
     /// The installation form, one for both triads.
     pub fn form(&self) -> InstallationForm {
         self.triads.gyro.form
+    }
+
+    /// Addition to the covariance for an uncertain sample period: the same relative error of all gyro scale factors.
+    pub(in crate::calibration) fn by_period(&self, run: &Run) -> ParameterMatrix {
+        let scale = self.triads.gyro.scale * run.recording.imu.period_sigma;
+        let mut gained = ParameterMatrix::zeros();
+        let first = parameter(Sensor::Gyro, 0);
+        let mut of_scale = gained.fixed_view_mut::<3, 3>(first, first);
+        of_scale.copy_from(&(scale * scale.transpose()));
+        gained
     }
 
     /// Indices of the estimated parameters.

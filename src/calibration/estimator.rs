@@ -52,8 +52,11 @@ fn outcome(
 ) -> Result<Outcome, CalibrationError> {
     let (problem, findings) = (solved.problem.clone(), solved.findings.clone());
     let mut outcome = Outcome::by_noise(as_stated, solved, form_test)?;
-    let rounding = by_rounding(&problem, &outcome.estimate.triads);
-    outcome.set_part(BudgetSource::Rounding, rounding);
+    let (run, triads) = (problem.run(), outcome.estimate.triads);
+    outcome.set_part(BudgetSource::Rounding, by_rounding(&problem, &triads));
+    if run.recording.imu.period_sigma > 0.0 {
+        outcome.set_part(BudgetSource::Period, outcome.estimate.by_period(run));
+    }
     outcome.findings = checks::findings(as_stated, &outcome, findings);
     Ok(outcome)
 }

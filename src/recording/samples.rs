@@ -11,8 +11,10 @@ use crate::imu::{PerSensor, Sensor};
 /// The samples of both triads, at one period, in one stretch or several.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImuSamples {
-    /// Length of every sample, s.
+    /// Length of every sample, s …
     pub period: f64,
+    /// … and its relative 1σ; zero if a clock determines it.
+    pub period_sigma: f64,
     /// Stretches of consecutive samples, in order; at least one. Between two stretches at least one sample is
     /// lost.
     pub stretches: Vec<Stretch>,
@@ -126,6 +128,25 @@ impl ImuSamples {
         Ok(Self::made(start, period, gyro, accel))
     }
 
+    /// Samples of rates with another period, of this relative 1σ.
+    pub fn with_period(mut self, period: f64, sigma: f64) -> Self {
+        let longer = period / self.period;
+        for triad in [&mut self.gyro, &mut self.accel] {
+            triad
+                .to_mut()
+                .iter_mut()
+                .for_each(|sample| *sample *= longer);
+        }
+        for stretch in &mut self.stretches {
+            stretch.start *= longer;
+        }
+        Self {
+            period,
+            period_sigma: sigma,
+            ..self
+        }
+    }
+
     /// Simulated samples, which need no checks.
     pub fn made(
         start: f64,
@@ -136,6 +157,7 @@ impl ImuSamples {
         let (gyro, accel) = (gyro.into(), accel.into());
         Self {
             period,
+            period_sigma: 0.0,
             stretches: vec![Stretch {
                 samples: 0..gyro.len(),
                 start,

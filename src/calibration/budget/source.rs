@@ -57,6 +57,8 @@ pub enum BudgetSource {
     DwellScatter,
     /// Rounding of rates to steps wider than their noise.
     Rounding,
+    /// Sample period, if not determined by a clock.
+    Period,
     /// Error terms that the data show, but that are not estimated.
     ErrorTermsLeftOff,
     /// Possible bias variation that the estimated noise does not include.
@@ -101,6 +103,7 @@ impl BudgetSource {
             Self::Headings => "unknown heading",
             Self::DwellScatter => "scatter of dwells",
             Self::Rounding => "rounding of rates",
+            Self::Period => "sample period",
             Self::ErrorTermsLeftOff => "significant error terms not estimated",
             Self::UnseenVariation => "possible unseen bias variation",
         };

@@ -115,6 +115,7 @@ pub fn six_position_by(
     estimate.covariance += rounding;
     findings.extend(rounded(problem, &rounding, &estimate.covariance));
     share_gravity(estimate, &problem.run().site);
+    estimate.covariance += estimate.by_period(problem.run());
     Ok(closed_form)
 }
 

@@ -74,12 +74,13 @@ impl LotDirectory {
     ) -> Result<Self, FileError> {
         let units = target.join(UNITS);
         let begun = target.join(JOB_FILE).is_file();
+        let root = target.to_owned();
         if begun && !force {
-            let lock = lock(&units, waiting);
+            let _lock = lock(&units, waiting);
             check_same(target, &Part::read(target)?, part)?;
             check_units(&units, part)?;
             write_whole(&target.join(JOB_FILE), &part.to_json(), true)?;
-            return Ok(Self::locked(target, lock));
+            return Ok(Self { root, _lock });
         }
         if begun {
             drop(lock(&units, waiting));
@@ -90,12 +91,8 @@ impl LotDirectory {
         fs::write(whole.path().join(JOB_FILE), part.to_json()).map_err(refused)?;
         fs::create_dir(whole.path().join(UNITS)).map_err(refused)?;
         whole.commit_growing(&[JOB_FILE, UNITS, &below_units()])?;
-        Ok(Self::locked(target, lock(&units, waiting)))
-    }
-
-    fn locked(target: &Path, lock: Option<File>) -> Self {
-        let root = target.to_owned();
-        Self { root, _lock: lock }
+        let _lock = lock(&units, waiting);
+        Ok(Self { root, _lock })
     }
 
     /// The previously calibrated unit, if its inputs are unchanged.

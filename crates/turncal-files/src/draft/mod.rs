@@ -1,6 +1,5 @@
 //! A draft of `run.toml` for a log without one: detected fields with reasons, and open fields for the user.
 
-mod certainty;
 mod columns;
 mod convert;
 mod found;
@@ -20,13 +19,14 @@ use std::path::Path;
 use nalgebra::Vector3;
 
 use crate::Sheet;
-pub use certainty::Certainty;
+use crate::instrument::USUAL_PERIOD;
 use columns::Columns;
 pub use found::Found;
 use motion::{FOLLOWED, Motion};
 use raw_samples::RawSamples;
 pub use stated::{DataSheetError, KalibrImu, Stated, StatedColumns, StatedUnit};
 use streams::{FEWEST_ROWS, Streams};
+pub use time::Certainty;
 use time::Clock;
 use turncal::imu::{PerSensor, Sensor};
 use turncal::noise::{Clusters, TriadNoise};
@@ -34,8 +34,6 @@ use turncal_input::FileError;
 use turncal_logs::DataFile;
 use units::Quantities;
 
-/// Assumed sample period of rows without a time, s.
-const USUAL_PERIOD: f64 = 0.01;
 /// Minimum number of samples at rest for a noise estimate.
 const FEWEST_AT_REST: usize = 64;
 
@@ -193,10 +191,23 @@ impl Draft {
         let of_units = || self.quantities.contradiction(&self.stated, &motion, period);
         self.contradiction = self.contradiction.take().or_else(of_units);
         self.quantities.state(&self.stated);
-        let random_walk = white_noise(rows, &motion, &self.quantities, self.clock.period);
-        self.random_walk = random_walk.unwrap_or_default();
+        self.random_walk = self.noise_at_rest(rows, &motion).unwrap_or_default();
         self.offset = rows.offset;
         self.motion = Some(motion);
+    }
+
+    /// White noise of both triads in the longest dwell, as from `turncal allan`.
+    fn noise_at_rest(&self, rows: &RawSamples, motion: &Motion) -> Option<PerSensor<Option<f64>>> {
+        let (period, rest) = (self.clock.period?, motion.longest_rest.clone());
+        let clusters = Clusters::new(rest.len(), period);
+        let seconds = period * self.quantities.per_second(period);
+        let of = |sensor: Sensor| {
+            let rows = rows.triads.get(sensor)[rest.clone()].iter();
+            let increments: Vec<Vector3<f64>> = rows.map(|row| row * seconds).collect();
+            let figures = TriadNoise::new(&increments, period, &clusters).figures();
+            figures.map(|figures| figures.noise.random_walk)
+        };
+        (rest.len() >= FEWEST_AT_REST).then(|| PerSensor::from_fn(of))
     }
 
     /// Whether the log has this triad; both if none was identified.
@@ -205,6 +216,11 @@ impl Draft {
         let none = triads.gyro.is_none() && triads.accel.is_none();
         none || triads.get(sensor).is_some()
     }
+}
+
+/// Angle in rad per gyro unit in one row, from the rotation of gravity; negative if the triads have opposite signs.
+pub fn turned_angle(triads: PerSensor<Vec<Vector3<f64>>>, period: f64) -> Option<f64> {
+    RawSamples::new(triads, Vec::new(), period).motion().angle
 }
 
 /// Keeps the rows of one of several instruments, and returns the column and number.
@@ -229,25 +245,6 @@ fn retain_samples(sheet: &mut Sheet, columns: &Columns) {
         let is_new = |&k: &usize| of.columns[k][row] != of.columns[k][row - 1];
         row == 0 || of_samples.iter().any(is_new)
     });
-}
-
-/// White noise of both triads in the longest dwell, as from `turncal allan`.
-fn white_noise(
-    rows: &RawSamples,
-    motion: &Motion,
-    quantities: &Quantities,
-    period: Option<f64>,
-) -> Option<PerSensor<Option<f64>>> {
-    let (period, rest) = (period?, motion.longest_rest.clone());
-    let clusters = Clusters::new(rest.len(), period);
-    let seconds = period * quantities.per_second(period);
-    let of = |sensor: Sensor| {
-        let rows = rows.triads.get(sensor)[rest.clone()].iter();
-        let increments: Vec<Vector3<f64>> = rows.map(|row| row * seconds).collect();
-        let figures = TriadNoise::new(&increments, period, &clusters).figures();
-        figures.map(|figures| figures.noise.random_walk)
-    };
-    (rest.len() >= FEWEST_AT_REST).then(|| PerSensor::from_fn(of))
 }
 
 #[cfg(test)]

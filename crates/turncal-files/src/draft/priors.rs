@@ -119,7 +119,7 @@ impl Draft {
                 .and_then(|scale| one(rounded(scale.value, 7))),
             scale_sigma_ppm: one(scale_sigma),
             installation_sigma_arcsec: one(class.installation / ARCSEC),
-            bias: bias.map(|bias| seven_digits(&bias)),
+            bias: bias.map(|bias| bias.map(|value| rounded(value, 7)).into()),
             bias_sigma: bias_sigma.and_then(one),
         }
     }
@@ -164,8 +164,4 @@ fn open_scale(sensor: Sensor) -> &'static str {
         "counts per m/s² from the data sheet: counts per g divided by 9.80665; it could not be estimated from gravity at \
          rest",
     )
-}
-
-fn seven_digits(values: &Vector3<f64>) -> OneOrThree {
-    values.map(|value| rounded(value, 7)).into()
 }

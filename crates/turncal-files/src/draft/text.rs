@@ -10,7 +10,7 @@ use crate::schema::{
     BodyAxes, FORMAT, ImuColumns, ImuFile, InstanceFile, Names, PriorsFile, RunFile, SiteFile,
     TemperatureColumn, TimeColumn, TimeStamp, TimeUnitField,
 };
-use turncal::imu::{Noise, NoiseKeys, Sensor};
+use turncal::imu::{Noise, NoiseKeys, Output, Sensor};
 use turncal::number::rounded;
 use turncal_input::{Finite, Gravity, Height, Latitude, NonNegative, Positive};
 
@@ -140,8 +140,10 @@ impl Draft {
     fn period(&self, remarks: &mut Remarks) -> Option<Positive> {
         let (path, clock) = ("imu.sample_period_s", &self.clock);
         let Some(period) = clock.period else {
-            let why = "seconds between rows, which a counter does not give";
-            remarks.open(path, why);
+            if !self.rows_show_period() {
+                let why = "seconds between rows, which a counter does not give";
+                remarks.open(path, why);
+            }
             return None;
         };
         let rate = rounded(period.recip(), 4);
@@ -173,6 +175,14 @@ impl Draft {
                 places(cuts)
             ),
         }
+    }
+
+    /// Whether rows without a time show how long they last: rates, whose sums are angles.
+    fn rows_show_period(&self) -> bool {
+        let gyro = &self.quantities.units.gyro;
+        self.columns.time.is_none()
+            && self.quantities.output == Output::Rate
+            && gyro.word.is_some_and(|word| word != "count")
     }
 
     fn body_axes(&self, remarks: &mut Remarks) -> BodyAxes {
@@ -210,12 +220,8 @@ impl Draft {
             }
             None => TimeColumn::One(self.name(time)),
         });
-        let why = &self.clock.why;
-        if time.is_none() && self.clock.is_stated {
-            remarks.before(path, format_args!("{why}; rows are taken as consecutive."));
-        } else if time.is_none() {
-            let words = format_args!("{why}; name a time column or set sample_period_s.");
-            remarks.open_before(path, words);
+        if time.is_none() {
+            self.without_time(remarks);
         }
         let known = columns.triads.gyro.or(columns.triads.accel);
         for sensor in Sensor::ALL {
@@ -269,6 +275,20 @@ impl Draft {
             );
             remarks.before("imu.columns", remark);
         }
+    }
+
+    /// Substitute for a time column.
+    fn without_time(&self, remarks: &mut Remarks) {
+        let (path, why) = ("imu.columns", &self.clock.why);
+        let instead = if self.clock.is_stated {
+            "rows are taken as consecutive."
+        } else if self.rows_show_period() {
+            "the sample period is estimated from the turns unless sample_period_s is set."
+        } else {
+            let words = format_args!("{why}; name a time column or set sample_period_s.");
+            return remarks.open_before(path, words);
+        };
+        remarks.before(path, format_args!("{why}; {instead}"));
     }
 
     /// Remark that an axis points down or that the accelerometers output gravity.

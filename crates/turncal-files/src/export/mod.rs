@@ -79,11 +79,6 @@ pub static FORMATS: [Format; 14] = [
 ];
 
 impl Format {
-    /// Every format.
-    pub fn all() -> &'static [Self] {
-        &FORMATS
-    }
-
     /// The format with this name.
     pub fn named(name: &str) -> Option<&'static Self> {
         FORMATS.iter().find(|format| format.name == name)

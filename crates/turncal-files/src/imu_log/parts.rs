@@ -314,6 +314,7 @@ impl<'a> Parts<'a> {
         let ahead = ahead.map_or(0.0, |wander| place(wander, lag, 0).ceil());
         let begin = clock.first + (ahead - lag) * period;
         ImuSamples {
+            period_sigma: 0.0,
             stretches: stretches_between(gyro.len(), begin, period, &self.faults),
             period,
             continuous: log.continuous,

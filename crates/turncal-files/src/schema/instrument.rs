@@ -9,13 +9,14 @@ use crate::imu_log::ImuLog;
 use crate::inputs::temperature::TemperatureColumns;
 use crate::quantity::units;
 use turncal::imu::{
-    GaussMarkov, Instrument, MotionNoise, Noise, NoiseKeys, Nominal, PerSensor, Prior, Sensor,
+    GaussMarkov, Instrument, MotionNoise, Noise, NoiseKeys, Nominal, Output, PerSensor, Prior,
+    Sensor,
 };
 use turncal::models::term_sigma;
 use turncal::units::{ARCSEC, DEGREE, PPM};
 use turncal_input::{Document, FileError, OneOrThree, list, suggestion};
 use turncal_logs::DataFile;
-use turncal_logs::clock::Breaks;
+use turncal_logs::clock::{Breaks, Clock};
 
 /// Default 1σ of scale factors, misalignments and biases, typical of consumer MEMS.
 pub const USUAL_SCALE: f64 = 50_000.0 * PPM;
@@ -25,6 +26,8 @@ pub const USUAL_BIAS: PerSensor<f64> = PerSensor {
     gyro: 2.0 * DEGREE,
     accel: 1.0,
 };
+/// Assumed sample period until estimated from motion, s.
+pub const USUAL_PERIOD: f64 = 0.01;
 /// Maximum relative 1σ of a scale factor.
 const WIDEST_SCALE: f64 = 10.0;
 /// Maximum 1σ of a bias, beyond the range of any instrument, rad/s or m/s².
@@ -46,6 +49,8 @@ pub struct Fields<'a> {
 pub struct InstrumentFields<'a> {
     pub log: ImuLog<'a>,
     pub known: Instrument,
+    /// Whether the sample period is stated neither in run.toml nor by a time column.
+    pub without_period: bool,
 }
 
 impl<'a> Fields<'a> {
@@ -81,10 +86,7 @@ impl<'a> Fields<'a> {
         } else {
             Breaks::Settings
         };
-        if of_gyro.column.is_none() && of_gyro.period.is_none() {
-            let meaning = "a column name, or sample_period_s (--rate) for rows without a time";
-            return Err(self.document.missing("imu.columns.time", meaning));
-        }
+        let without_period = self.with_usual_period(&mut of_gyro)?;
         let names = |sensor| match imu.of(sensor).columns {
             Some(Names(names)) => names.each_ref().map(String::as_str),
             None => [""; 3],
@@ -106,7 +108,25 @@ impl<'a> Fields<'a> {
             nominal: known.nominal,
             full_scale: PerSensor::from_fn(|sensor| imu.of(sensor).full_scale),
         };
-        Ok(InstrumentFields { log, known })
+        Ok(InstrumentFields {
+            log,
+            known,
+            without_period,
+        })
+    }
+
+    /// The default period if none is stated; the period can only be estimated for rates without other logs.
+    fn with_usual_period(&self, clock: &mut Clock) -> Result<bool, FileError> {
+        if clock.column.is_some() || clock.period.is_some() {
+            return Ok(false);
+        }
+        if self.run.imu.output != Output::Rate || self.run.turntable.is_some() {
+            let meaning = "a column name (pulses, increments and runs with a [turntable] need either this or \
+                sample_period_s)";
+            return Err(self.document.missing("imu.columns.time", meaning));
+        }
+        clock.period = Some(USUAL_PERIOD);
+        Ok(true)
     }
 
     /// Units, nominal scales, priors, noise and error terms.

@@ -9,6 +9,7 @@ use toml::de::DeTable;
 
 use super::instrument::{Fields, InstrumentFields};
 use super::{FORMAT, META, RunFile, StandstillFile};
+use crate::draft::turned_angle;
 use crate::imu_log::ImuLog;
 use crate::inputs::segments;
 use turncal::earth::Site;
@@ -150,7 +151,10 @@ fn text_of(path: &Path) -> Result<String, FileError> {
 impl InstrumentFields<'_> {
     /// The samples of the log, checked against the statements.
     fn samples(&self, notes: &mut Vec<String>) -> Result<ImuSamples, FileError> {
-        let imu = self.log.read(notes)?;
+        let mut imu = self.log.read(notes)?;
+        if self.without_period {
+            imu = self.with_found_period(imu, notes)?;
+        }
         notes.extend(faults::notes(&imu));
         notes.extend(self.clock_note(&imu));
         Ok(imu)
@@ -176,6 +180,33 @@ impl InstrumentFields<'_> {
             ));
         }
         known
+    }
+
+    /// Rates without a known period, with the period for which their rotation matches that of gravity.
+    fn with_found_period(
+        &self,
+        imu: ImuSamples,
+        notes: &mut Vec<String>,
+    ) -> Result<ImuSamples, FileError> {
+        let rates = |sensor| imu.of(sensor).iter().map(|row| row / imu.period).collect();
+        let angle = turned_angle(PerSensor::from_fn(rates), imu.period);
+        let Some(period) = angle.filter(|&period| period > 0.0) else {
+            return Err(FileError::of(
+                &self.log.source.file,
+                "rows without time stamps, with turns too poor to estimate the sample period",
+                "a time column or sample_period_s in run.toml",
+                "Add sample_period_s to [imu].",
+            ));
+        };
+        // The scale factors of the gyros are taken to be right on average.
+        let sigma = self.known.prior.gyro.scale_sigma.norm() / 3.0;
+        let percent = 100.0 * sigma;
+        notes.push(format!(
+            "The log has no time column, and its rate is not stated. turncal estimated a sample period of {period:.4} s \
+             ± {percent:.1} % from the turns, which widens the σ of the gyro scale factors by the same amount. State \
+             sample_period_s (--rate)."
+        ));
+        Ok(imu.with_period(period, sigma))
     }
 
     /// Effect of using stamps instead of `sample_period_s`.
