@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::Vector3;
 use statrs::statistics::Statistics;
 
-use super::turns::{self, Interval};
+use super::turns::{self, ENOUGH, Interval};
 use turncal::imu::PerSensor;
 use turncal::statistics::{FALSE_ALARM, SIGMA_OF_MEDIAN, median, median_of_axes, student_limit};
 use turncal::units::DEGREE;
@@ -26,8 +26,6 @@ const STEADY: f64 = 5.0 * DEGREE;
 pub const FOLLOWED: f64 = 0.08;
 /// Specific force within this fraction of gravity gives its direction.
 const NEAR_GRAVITY: f64 = 0.1;
-/// Smaller changes of direction are not used, rad.
-pub const ENOUGH: f64 = 20.0 * DEGREE;
 /// Scale tolerance of data sheets.
 pub const TOLERANCE: f64 = 0.03;
 /// Number of samples summed to distinguish pulses, which carry fractions, from readings.

@@ -4,8 +4,10 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Rotation3, Vector3};
 
-use super::motion::ENOUGH;
+use turncal::units::DEGREE;
 
+/// Smaller changes of the gravity direction are not used, rad.
+pub const ENOUGH: f64 = 20.0 * DEGREE;
 /// The shortest move that changes the gravity direction is at most two turns.
 const MOST: f64 = 2.0 * TAU;
 /// Moves this many times as long are not used, because a small error of the unit is a large error of their angle.

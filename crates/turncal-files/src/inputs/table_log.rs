@@ -99,22 +99,15 @@ impl<'a> Fields<'a> {
         let names = columns.angles.as_deref().unwrap_or_default();
         let letters = axes.map_or(&[][..], Vec::as_slice);
         if names.len() != letters.len() {
-            let (names, letters, file) = (names.len(), letters.len(), self.document.file);
-            let found =
-                format_args!("{names} columns of `angles` and {letters} `axes` in [turntable]");
+            let of_angles = "turntable.columns.angles";
+            let path = if names.is_empty() { path } else { of_angles };
             let expected = "one angle column for each axis, outermost first";
-            return Err(FileError::of(
-                file,
-                found,
-                expected,
-                "Complete `angles` or `axes`.",
-            ));
+            let advice = "Complete `angles` or `axes`.";
+            return Err(self.document.wrong(path, expected, advice));
         }
         if names.is_empty() && columns.quaternion.is_none() {
-            let (path, meaning) = (
-                "turntable.columns.quaternion",
-                "columns of a quaternion or of `angles`",
-            );
+            let path = "turntable.columns.quaternion";
+            let meaning = "columns of a quaternion or of `angles`";
             return Err(self.document.missing(path, meaning));
         }
         let axis = |letter: &String| LETTERS.iter().find(|(known, _)| known == letter);
