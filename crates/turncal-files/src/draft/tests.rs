@@ -443,7 +443,7 @@ fn a_counter_that_other_packets_share_is_no_time_and_a_compass_no_gyro() {
     has(
         &text,
         &[
-            "# TODO: a counter shared with other packets is not a time; name a time column or set sample_period_s.",
+            "# a counter shared with other packets is not a time; the sample period is estimated from the turns",
             "columns = { gyro = [\"%float(RawGyroX)\", \"%float(RawGyroY)\", \"%float(RawGyroZ)\"], \
              accel = [\"%float(RawAccelX)\", ",
         ],
@@ -486,7 +486,7 @@ fn rows_that_a_tag_tells_apart_are_streams_and_constants_no_axes() {
         &text,
         &[
             "stream = \"Uni\"",
-            "accel_unit = \"m/s^2\"",
+            "gyro_unit = \"rad/s\"",
             "columns = { gyro = [\"2\", \"3\", \"4\"], accel = [\"5\", \"6\", \"7\"] }",
         ],
     );

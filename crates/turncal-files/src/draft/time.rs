@@ -11,7 +11,7 @@ use turncal::statistics::median;
 use turncal_logs::clock::Uniform;
 
 /// Plausible sample periods, s (5 kHz to 5 Hz): units that differ by 1000 cannot both be plausible.
-const PERIODS: std::ops::Range<f64> = 2e-4..0.2;
+pub const PERIODS: std::ops::Range<f64> = 2e-4..0.2;
 /// Steps within this factor match a stated rate.
 const STATED: f64 = 1.2;
 

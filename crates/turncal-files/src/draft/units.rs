@@ -10,7 +10,7 @@ use super::columns::Columns;
 use super::motion::Motion;
 use super::name::Name;
 use super::stated::{Stated, StatedUnit};
-use super::time::Clock;
+use super::time::{Clock, PERIODS};
 use crate::quantity::{Of, units};
 use crate::{Sheet, unit_scale};
 use turncal::imu::{Output, PerSensor, Sensor};
@@ -124,7 +124,7 @@ impl Quantities {
             _ => {
                 return match sensor {
                     Sensor::Accel => self.counts_of_accelerometers(rows),
-                    Sensor::Gyro => self.counts_of_gyros(rows, by_name),
+                    Sensor::Gyro => self.counts_of_gyros(rows, by_name, &all),
                 };
             }
         };
@@ -175,23 +175,38 @@ impl Quantities {
         }
     }
 
-    fn counts_of_gyros(&self, rows: &TriadRows, by_name: Option<&Hypothesis>) -> Unit {
+    fn counts_of_gyros(
+        &self,
+        rows: &TriadRows,
+        by_name: Option<&Hypothesis>,
+        all: &[Hypothesis],
+    ) -> Unit {
         let angle = rows.motion.angle.map(f64::abs);
         let row = self.row(rows.period);
-        if !rows.whole && rows.named.is_none() {
-            match angle {
-                Some(_) if !row.is_finite() => {
-                    return Unit::open("cannot be estimated from turns without the sample rate");
-                }
-                None if self.output != Output::Pulse => {
-                    return Unit::open(if rows.motion.is_turned {
-                        "too few usable turns of gravity to estimate it"
-                    } else {
-                        "gravity direction does not change, so it cannot be estimated"
-                    });
-                }
-                _ => {}
+        let is_bare = !rows.whole && rows.named.is_none();
+        match angle {
+            // Without a clock each unit needs a period of its own.
+            Some(angle) if !row.is_finite() && is_bare => {
+                let Some((word, period)) = usual_period(all, angle) else {
+                    return Unit::open("cannot be estimated from turns without time stamps");
+                };
+                let rate = rounded(period.recip(), 4);
+                let why = format!(
+                    "integrated gyro angles match the change of gravity direction at about {rate} Hz"
+                );
+                return Unit {
+                    word: Some(word),
+                    ..Unit::open(&why)
+                };
             }
+            None if is_bare && self.output != Output::Pulse => {
+                return Unit::open(if rows.motion.is_turned {
+                    "too few usable turns of gravity to estimate it"
+                } else {
+                    "gravity direction does not change, so it cannot be estimated"
+                });
+            }
+            _ => {}
         }
         let why = match by_name {
             Some(name) => {
@@ -317,4 +332,11 @@ fn why_count(rows: &TriadRows, unfit: &str) -> String {
         }
         None => unfit.to_owned(),
     }
+}
+
+/// The only unit that gives a usual period for rows with this rotation, and the period.
+fn usual_period(all: &[Hypothesis], angle: f64) -> Option<(&'static str, f64)> {
+    let periods = all.iter().map(|of| (of.word, of.per_si * angle));
+    let mut usual = periods.filter(|(_, period)| PERIODS.contains(period));
+    usual.next().filter(|_| usual.next().is_none())
 }

@@ -94,7 +94,7 @@ fn what_turned_where_rows_are_missing_is_no_cut_and_the_other_turns_tell_the_uni
 }
 
 #[test]
-fn without_a_time_the_rate_is_asked_for() {
+fn without_a_time_turns_tell_the_unit_that_has_a_usual_rate() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("log.csv");
     let rows = BY_HAND.rows();
@@ -103,16 +103,18 @@ fn without_a_time_the_rate_is_asked_for() {
         .map(|row| joined(&row[1..], ",") + "\n")
         .collect();
     fs::write(&path, "wx,wy,wz,fx,fy,fz\n".to_owned() + &rows).unwrap();
-    let draft = Draft::of_file(&path).unwrap();
+    let text = Draft::of_file(&path).unwrap().to_toml("log.csv");
+    let why = "gyro_unit = \"rad/s\"  # integrated gyro angles match the change of gravity direction at about ";
     has(
-        &draft.to_toml("log.csv"),
+        &text,
         &[
-            "# gyro_unit =  # TODO: cannot be estimated from turns without the sample rate",
-            "# TODO: no column increases like a time; name a time column or set sample_period_s.",
+            why,
+            "# no column increases like a time; the sample period is estimated from the turns",
         ],
     );
-    let error = draft.check(&path).unwrap_err().to_string();
-    assert!(error.contains("--rate"), "{error}");
+    let rate = text.split(why).nth(1).unwrap().split(' ').next().unwrap();
+    let rate: f64 = rate.parse().unwrap();
+    assert!((rate - 100.0).abs() < 5.0, "{rate} Hz");
 }
 
 #[test]

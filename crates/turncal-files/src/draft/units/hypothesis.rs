@@ -28,6 +28,7 @@ pub struct TriadRows<'a> {
 pub struct Hypothesis {
     pub word: &'static str,
     pub output: Output,
+    pub per_si: f64,
     /// Ratio of measured gravity, or of the measured turn, to its value in this unit; `None` if it is not observed.
     pub factor: Option<f64>,
     told_apart: f64,
@@ -51,6 +52,7 @@ impl Hypothesis {
         Self {
             word,
             output,
+            per_si,
             factor: factor.filter(|factor| sensor == Sensor::Accel || factor.is_finite()),
             told_apart: *TOLD_APART.get(sensor),
         }
