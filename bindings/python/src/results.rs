@@ -47,7 +47,7 @@ pub fn compare(
 
 #[pyfunction]
 pub fn export(calibration: &Calibration, format: &str, run: Option<&Run>) -> PyResult<Vec<u8>> {
-    let names = || formats::Format::all().iter().map(|format| format.name);
+    let names = || formats::FORMATS.iter().map(|format| format.name);
     let format = formats::Format::named(format).ok_or_else(|| {
         let known = names().collect::<Vec<_>>().join(", ");
         raised(format_args!(

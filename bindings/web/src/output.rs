@@ -85,9 +85,7 @@ pub fn all(
         let about = format.about.trim_end_matches("; needs --run");
         Some(Output::new(&name, about, exported.bytes))
     };
-    let formats = export::Format::all()
-        .iter()
-        .filter(|_| !calibration.is_failed());
+    let formats = export::FORMATS.iter().filter(|_| !calibration.is_failed());
     let own = page.chain([Output::new(&name, about, json)]);
     Ok(own.chain(formats.filter_map(exported)).collect())
 }

@@ -84,12 +84,8 @@ impl Opened {
             if stream.is_some() || *stated != Stated::default() {
                 let found = "statements about the log beside a run.toml (rate, units, site, sensor, stream)";
                 let advice = "Write them into run.toml, or omit them.";
-                return Err(FileError::of(
-                    file,
-                    found,
-                    "all statements in run.toml",
-                    advice,
-                ));
+                let expected = "all statements in run.toml";
+                return Err(FileError::of(file, found, expected, advice));
             }
             let run = match file.bytes().map(String::from_utf8_lossy) {
                 Some(text) => crate::run_of_text(file, &text, Some(file), in_memory)?,
@@ -103,15 +99,13 @@ impl Opened {
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let mut run = crate::run_of_text(file, &draft.to_toml(&name), None, in_memory)?;
         run.recording.doubts.extend(draft.doubts());
-        let log = Log {
-            path: file.to_path_buf(),
+        let path = file.to_path_buf();
+        let log = Some(Log {
+            path,
             draft,
             piped: None,
-        };
-        Ok(Self {
-            run,
-            log: Some(log),
-        })
+        });
+        Ok(Self { run, log })
     }
 
     /// Reads a log that has grown, with the fields found before.
@@ -163,14 +157,8 @@ fn piped(path: &Path) -> Result<TempDir, FileError> {
         io::copy(&mut io::stdin().lock(), &mut file)?;
         Ok(directory)
     };
-    spool().map_err(|error| {
-        FileError::io(
-            path,
-            "keep standard input",
-            &error,
-            "Give the log as a file.",
-        )
-    })
+    let advice = "Give the log as a file.";
+    spool().map_err(|error| FileError::io(path, "keep standard input", &error, advice))
 }
 
 #[cfg(test)]

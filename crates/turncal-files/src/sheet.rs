@@ -47,11 +47,8 @@ impl Sheet {
         }
         let rows = columns.first().map_or(0, Vec::len);
         if rows < fewest {
-            return Err(csv.error(
-                format_args!("only {rows} rows"),
-                format_args!("at least {fewest}"),
-                "Record a run with dwells and turns.",
-            ));
+            let (found, expected) = (format!("only {rows} rows"), format!("at least {fewest}"));
+            return Err(csv.error(found, expected, "Record a run with dwells and turns."));
         }
         Ok(Self {
             names,

@@ -243,7 +243,7 @@ fn each_wrong_value_in_run_toml_has_its_message() {
         (
             "quaternion = [\"qw\", \"qx\", \"qy\", \"qz\"]",
             "angles = [\"qw\"], axes = [\"x\", \"y\"]",
-            "each of the 2 axes",
+            "angles & for each axis",
         ),
         ("\"qz\"]", "\"qz\", \"qw\"]", "\"qw\"] & four columns"),
     ] {

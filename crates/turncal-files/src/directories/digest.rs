@@ -58,9 +58,8 @@ pub fn input_digests(run: &Path) -> Vec<(String, String)> {
     for recording in named {
         let folder = Path::new(recording).parent().unwrap_or(Path::new(""));
         let of_recording = digests_of_run(&directory.join(recording)).into_iter();
-        all.extend(
-            of_recording.map(|(name, digest)| (folder.join(name).display().to_string(), digest)),
-        );
+        let below = |name: String| folder.join(name).display().to_string();
+        all.extend(of_recording.map(|(name, digest)| (below(name), digest)));
     }
     all
 }

@@ -89,41 +89,38 @@ impl Job {
         digest_of(&(&self.version, &self.processor, self.job, &self.options))
     }
 
-    /// Difference between two jobs that affects results, in words; `None` if there is none.
+    /// First difference between two jobs that affects the result of a run, in words; `None` if there is none.
     pub fn difference(&self, other: &Self) -> Option<String> {
-        let words = |of: &Self| match of.job {
-            JobKind::Lot => "`calibrate` of a lot",
-            JobKind::StudyAccuracy => "`study accuracy`",
-            JobKind::StudyExperiment => "`study experiment`",
+        let decisive = |of: &Self| {
+            serde_json::json!({
+                "job": of.job,
+                "turncal": of.version,
+                "processor": of.processor,
+                "options": of.options,
+            })
         };
-        if self.job != other.job {
-            return Some(format!("jobs {} and {}", words(self), words(other)));
-        }
-        if self.version != other.version {
-            return Some(format!("turncal {} and {}", self.version, other.version));
-        }
-        if self.processor != other.processor {
-            let [a, b] = [self, other].map(|of| of.processor.join(" "));
-            return Some(format!("processors with the features {a} and {b}"));
-        }
-        (self.options != other.options).then(|| of_values("", &self.options, &other.options))
+        first_difference("", &decisive(self), &decisive(other))
+    }
+
+    /// First difference of any kind.
+    pub fn any_difference(&self, other: &Self) -> Option<String> {
+        let [one, other] = [self, other].map(|of| serde_json::to_value(of).unwrap_or_default());
+        first_difference("", &one, &other)
     }
 }
 
-/// The first value in which two differ.
-fn of_values(name: &str, a: &Value, b: &Value) -> String {
+/// The first value in which two differ, with its name.
+fn first_difference(name: &str, a: &Value, b: &Value) -> Option<String> {
+    if a == b {
+        return None;
+    }
     if let (Value::Object(a), Value::Object(b)) = (a, b) {
-        let names = a.keys().chain(b.keys().filter(|key| !a.contains_key(*key)));
-        for key in names {
+        let mut names = a.keys().chain(b.keys());
+        return names.find_map(|key| {
             let [one, other] = [a, b].map(|of| of.get(key).unwrap_or(&Value::Null));
-            if one != other {
-                let full = match name {
-                    "" => key.clone(),
-                    _ => format!("{name}.{key}"),
-                };
-                return of_values(&full, one, other);
-            }
-        }
+            let full = [name, key].into_iter().filter(|part| !part.is_empty());
+            first_difference(&full.collect::<Vec<_>>().join("."), one, other)
+        });
     }
     let short = |value: &Value| {
         let text = value.to_string();
@@ -132,7 +129,7 @@ fn of_values(name: &str, a: &Value, b: &Value) -> String {
             None => text,
         }
     };
-    format!("{name} = {} and {}", short(a), short(b))
+    Some(format!("{name} = {} and {}", short(a), short(b)))
 }
 
 impl Part {
@@ -169,12 +166,8 @@ impl Part {
         let is_lot = part.job.job == JobKind::Lot;
         if part.digest != digest_of(&part.job) || !is_whole || (is_lot && !named) {
             let found = "a job whose digest or run list does not match";
-            return Err(FileError::of(
-                &path,
-                found,
-                "the job as turncal wrote it",
-                advice,
-            ));
+            let expected = "the job as turncal wrote it";
+            return Err(FileError::of(&path, found, expected, advice));
         }
         Ok(part)
     }
@@ -188,12 +181,9 @@ impl Part {
 
 /// Architecture, system and the features that select numerical code at run time.
 fn processor() -> Vec<String> {
-    let mut all = vec![
-        std::env::consts::ARCH.to_owned(),
-        std::env::consts::OS.to_owned(),
-    ];
-    all.extend(features().into_iter().map(str::to_owned));
-    all
+    let system = [std::env::consts::ARCH, std::env::consts::OS];
+    let all = system.into_iter().chain(features());
+    all.map(str::to_owned).collect()
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -205,10 +195,8 @@ fn features() -> Vec<&'static str> {
         ("fma", std::is_x86_feature_detected!("fma")),
         ("avx512f", std::is_x86_feature_detected!("avx512f")),
     ];
-    all.into_iter()
-        .filter(|(_, has)| *has)
-        .map(|(name, _)| name)
-        .collect()
+    let has = all.into_iter().filter(|(_, has)| *has);
+    has.map(|(name, _)| name).collect()
 }
 
 #[cfg(not(target_arch = "x86_64"))]
@@ -234,10 +222,15 @@ mod tests {
         assert_eq!(one.difference(&one.clone()), None);
         let mut other = job(json!({"noise": "stated", "with": []}));
         let words = one.difference(&other).unwrap();
-        assert_eq!(words, "noise = \"auto\" and \"stated\"");
+        assert_eq!(words, "options.noise = \"auto\" and \"stated\"");
         assert!(one.key() != other.key());
         other.version = "0.0.0".to_owned();
-        assert!(one.difference(&other).unwrap().starts_with("turncal "));
+        other.options = one.options.clone();
+        assert!(one.difference(&other).unwrap().starts_with("turncal = "));
+        other = one.clone();
+        other.runs = 6;
+        assert_eq!(one.difference(&other), None);
+        assert_eq!(one.any_difference(&other).unwrap(), "runs = 5 and 6");
     }
 
     #[test]

@@ -74,32 +74,25 @@ impl LotDirectory {
     ) -> Result<Self, FileError> {
         let units = target.join(UNITS);
         let begun = target.join(JOB_FILE).is_file();
+        let root = target.to_owned();
         if begun && !force {
-            let lock = lock(&units, waiting);
+            let _lock = lock(&units, waiting);
             check_same(target, &Part::read(target)?, part)?;
             check_units(&units, part)?;
             write_whole(&target.join(JOB_FILE), &part.to_json(), true)?;
-            return Ok(Self {
-                root: target.to_owned(),
-                _lock: lock,
-            });
+            return Ok(Self { root, _lock });
         }
         if begun {
             drop(lock(&units, waiting));
             clear_abandoned(&units);
         }
         let whole = WholeDirectory::create(target, force, inputs)?;
-        let refused = |error: std::io::Error| {
-            let advice = "Choose a directory that can be written.";
-            FileError::io(target, "write here", &error, advice)
-        };
+        let refused = |error: std::io::Error| FileError::unwritten(target, &error);
         fs::write(whole.path().join(JOB_FILE), part.to_json()).map_err(refused)?;
         fs::create_dir(whole.path().join(UNITS)).map_err(refused)?;
         whole.commit_growing(&[JOB_FILE, UNITS, &below_units()])?;
-        Ok(Self {
-            root: target.to_owned(),
-            _lock: lock(&units, waiting),
-        })
+        let _lock = lock(&units, waiting);
+        Ok(Self { root, _lock })
     }
 
     /// The previously calibrated unit, if its inputs are unchanged.
@@ -174,45 +167,35 @@ fn lock(units: &Path, waiting: &dyn Fn()) -> Option<File> {
 /// Refuses a directory started for a different job.
 fn check_same(target: &Path, found: &Part, expected: &Part) -> Result<(), FileError> {
     let difference = found.job.difference(&expected.job).or_else(|| {
-        let words = |part: &Part| {
-            let shard = part.shard;
-            shard.map_or_else(
-                || "the whole lot".to_owned(),
-                |shard| format!("part {shard}"),
-            )
+        let words = |part: &Part| match part.shard {
+            None => "the whole lot".to_owned(),
+            Some(shard) => format!("part {shard}"),
         };
         (found.shard != expected.shard).then(|| format!("{} and {}", words(found), words(expected)))
     });
     difference.map_or(Ok(()), |difference| {
-        Err(FileError::of(
-            target,
-            format_args!("a lot started with other options ({difference})"),
-            "the options of the job started here",
-            "Use the same options, choose another directory, or add --force to restart.",
-        ))
+        let found = format_args!("a lot started with other options ({difference})");
+        let expected = "the options of the job started here";
+        let advice = "Use the same options, choose another directory, or add --force to restart.";
+        Err(FileError::of(target, found, expected, advice))
     })
 }
 
 /// Refuses a directory with units that are not in the lot.
 fn check_units(units: &Path, part: &Part) -> Result<(), FileError> {
-    let held: Vec<&str> = part
-        .held()
-        .into_iter()
-        .filter_map(|run| part.job.names.get(usize::try_from(run).ok()?))
-        .map(String::as_str)
-        .collect();
+    let name = |run: u64| part.job.names.get(usize::try_from(run).ok()?);
+    let held: Vec<&String> = part.held().into_iter().filter_map(name).collect();
     let entries = fs::read_dir(units).into_iter().flatten().flatten();
-    let mut others: Vec<String> = entries
-        .map(|entry| entry.file_name().to_string_lossy().into_owned())
-        .filter(|name| !name.starts_with('.') && !held.contains(&name.as_str()))
-        .collect();
-    others.sort();
-    others.first().map_or(Ok(()), |other| {
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let others = names.filter(|name| !name.starts_with('.') && !held.contains(&name));
+    others.min().map_or(Ok(()), |other| {
+        let found = format_args!("unit `{other}`, which is not among the given runs");
+        let advice = "Also give its run.toml, choose another directory, or add --force to restart.";
         Err(FileError::of(
             units,
-            format_args!("unit `{other}`, which is not among the given runs"),
+            found,
             "only units of this lot",
-            "Also give its run.toml, choose another directory, or add --force to restart.",
+            advice,
         ))
     })
 }
@@ -253,9 +236,8 @@ fn read_unit(directory: &Path, key: Option<&str>) -> Result<(Unit, String), File
 fn write_unit(unit: &Unit, key: &str, directory: &Path) -> Result<(), FileError> {
     let calibrated = unit.calibrated.as_ref().ok();
     let path = directory.join(CALIBRATION_FILE);
-    let json = calibrated
-        .map(|of| calibration_json(&of.calibration, &path))
-        .transpose()?;
+    let json = calibrated.map(|of| calibration_json(&of.calibration, &path));
+    let json = json.transpose()?;
     let record = UnitRecord {
         format: FORMAT.to_owned(),
         name: unit.name.clone(),

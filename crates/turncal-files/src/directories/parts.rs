@@ -36,10 +36,8 @@ pub fn write_part<T: Serialize>(directory: &Path, part: Part, runs: &[T]) -> Res
 
 /// Whether a directory contains this part of a study completely.
 pub fn part_is_there(directory: &Path, part: &Part) -> bool {
-    let Ok(found) = Part::read(directory) else {
-        return false;
-    };
-    let Ok(results) = fs::read(directory.join(RESULTS)) else {
+    let found = (Part::read(directory), fs::read(directory.join(RESULTS)));
+    let (Ok(found), Ok(results)) = found else {
         return false;
     };
     let whole = found.results.as_deref() == Some(digest_of_bytes(&results).as_str());
@@ -66,26 +64,24 @@ impl Parts {
     /// two of them.
     pub fn read(directories: &[PathBuf]) -> Result<Self, FileError> {
         let read = |directory: &PathBuf| Ok((directory.clone(), Part::read(directory)?));
-        let parts = directories
-            .iter()
-            .map(read)
-            .collect::<Result<Vec<_>, FileError>>()?;
+        let parts: Result<Vec<_>, FileError> = directories.iter().map(read).collect();
+        let parts = parts?;
         let Some((first, reference)) = parts.first() else {
             let (found, expected) = ("no part", "all parts of a job");
             let advice = "Give the directories that --shard wrote.";
             return Err(FileError::of(Path::new("."), found, expected, advice));
         };
         for (directory, part) in &parts[1..] {
-            if let Some(difference) = difference(&reference.job, &part.job) {
+            if let Some(difference) = reference.job.any_difference(&part.job) {
+                let first = first.display();
+                let found = format!("a part of a different job than {first} ({difference})");
+                let advice = "Merge only parts made by the same version, with the same arguments, on processors of the \
+                              same type.";
                 return Err(FileError::of(
                     directory,
-                    format_args!(
-                        "a part of a different job than {} ({difference})",
-                        first.display()
-                    ),
+                    found,
                     "parts of the same job",
-                    "Merge only parts made by the same version, with the same arguments, on processors of the same \
-                        type.",
+                    advice,
                 ));
             }
         }
@@ -103,16 +99,10 @@ impl Parts {
         held.sort();
         if let Some([(run, other), (_, directory)]) = held.array_windows().find(|[a, b]| a.0 == b.0)
         {
-            return Err(FileError::of(
-                directory,
-                format_args!(
-                    "run {}, which is also in {}",
-                    self.name(*run),
-                    other.display()
-                ),
-                "each run in one part only",
-                "Leave out one of the two.",
-            ));
+            let (run, other) = (self.name(*run), other.display());
+            let found = format_args!("run {run}, which is also in {other}");
+            let (expected, advice) = ("each run in one part only", "Leave out one of the two.");
+            return Err(FileError::of(directory, found, expected, advice));
         }
         let missing = self.job.runs.saturating_sub(held.len() as u64);
         let Some(first) = self.parts.first().filter(|_| missing > 0) else {
@@ -128,10 +118,12 @@ impl Parts {
         let given = self.parts.iter().filter_map(|(_, part)| part.shard);
         let given: Vec<String> = given.map(|shard| shard.to_string()).collect();
         let given = list(given.iter().map(String::as_str));
+        let found = format_args!("no part that contains run {words}");
+        let expected = format!("all {} runs; the parts given are {given}", self.job.runs);
         Err(FileError::of(
             &first.0,
-            format_args!("no part that contains run {words}"),
-            format_args!("all {} runs; the parts given are {given}", self.job.runs),
+            found,
+            expected,
             "Add the missing parts.",
         ))
     }
@@ -193,17 +185,4 @@ impl Parts {
         };
         all.into_iter().filter_map(unit).collect()
     }
-}
-
-/// Any difference between jobs.
-fn difference(a: &Job, b: &Job) -> Option<String> {
-    a.difference(b).or_else(|| {
-        if a.runs != b.runs {
-            return Some(format!("{} and {} runs", a.runs, b.runs));
-        }
-        if a.names != b.names {
-            return Some("different units or a different order".to_owned());
-        }
-        (a.specification != b.specification).then(|| "a different specification".to_owned())
-    })
 }

@@ -49,16 +49,14 @@ impl WholeDirectory {
             let here = Path::new(".");
             let mut needed = inputs.iter().copied().chain([here]);
             if let Some(held) = needed.find(inside) {
-                let name = match held == here {
-                    true => "the current directory".to_owned(),
-                    false => held.display().to_string(),
+                let found = if held == here {
+                    "the current directory in it".to_owned()
+                } else {
+                    format!("{} in it", held.display())
                 };
-                return Err(FileError::of(
-                    target,
-                    format_args!("{name} in it"),
-                    "a directory that can be replaced",
-                    "Choose another name; replacing this one would delete files that are still needed.",
-                ));
+                let expected = "a directory that can be replaced";
+                let advice = "Choose another name; replacing this one would delete files that are still needed.";
+                return Err(FileError::of(target, found, expected, advice));
             }
             only_output(target)?;
         }
@@ -122,16 +120,11 @@ fn only_output(directory: &Path) -> Result<(), FileError> {
     let foreign = manifest::foreign(directory)
         .map_err(|error| unwritable(directory, "list the directory", &error))?;
     foreign.map_or(Ok(()), |foreign| {
-        Err(FileError::of(
-            directory,
-            format_args!(
-                "`{}` in it, which turncal's list of its own files (`{}`) does not name",
-                foreign.display(),
-                manifest::FILE,
-            ),
-            "a directory with only files that turncal wrote",
-            "Move it elsewhere or choose another name, because replacing the directory would delete it.",
-        ))
+        let (name, list) = (foreign.display(), manifest::FILE);
+        let found = format!("`{name}` in it, which turncal's list of its own files (`{list}`) does not name");
+        let expected = "a directory with only files that turncal wrote";
+        let advice = "Move it elsewhere or choose another name, because replacing the directory would delete it.";
+        Err(FileError::of(directory, found, expected, advice))
     })
 }
 
@@ -149,12 +142,8 @@ pub fn write_whole_with(
     match fs::symlink_metadata(path) {
         Ok(_) if !force => return Err(taken(path)),
         Ok(existing) if existing.is_dir() => {
-            return Err(FileError::of(
-                path,
-                "a directory of this name",
-                "a file or an unused name",
-                "Choose another name.",
-            ));
+            let (found, expected) = ("a directory of this name", "a file or an unused name");
+            return Err(FileError::of(path, found, expected, "Choose another name."));
         }
         _ => {}
     }

@@ -153,9 +153,10 @@ impl Columns {
 /// The name of a column, or its number if the name is missing or not unique.
 fn distinct(names: &[String], column: usize) -> String {
     let like = names.iter().filter(|name| **name == names[column]);
-    match names[column].is_empty() || like.count() > 1 {
-        true => (column + 1).to_string(),
-        false => names[column].clone(),
+    if names[column].is_empty() || like.count() > 1 {
+        (column + 1).to_string()
+    } else {
+        names[column].clone()
     }
 }
 

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::certainty::Certainty;
 use super::motion::Motion;
+use super::time::Certainty;
 use super::{AXES_OF_PROGRAM, Draft, NO_COLUMNS};
 use turncal::imu::Sensor;
 use turncal::number::rounded;

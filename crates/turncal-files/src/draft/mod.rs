@@ -1,19 +1,17 @@
 //! A draft of `run.toml` for a log without one: detected fields with reasons, and open fields for the user.
 
-mod certainty;
 mod columns;
 mod convert;
 mod found;
 mod motion;
 mod name;
 mod priors;
-mod raw_run;
 mod raw_samples;
-mod registers;
 mod stated;
 mod streams;
 mod text;
 mod time;
+mod turns;
 mod units;
 
 use std::path::Path;
@@ -22,14 +20,13 @@ use nalgebra::Vector3;
 
 use crate::Sheet;
 use crate::instrument::USUAL_PERIOD;
-pub use certainty::Certainty;
 use columns::Columns;
 pub use found::Found;
 use motion::{FOLLOWED, Motion};
 use raw_samples::RawSamples;
-use registers::Registers;
 pub use stated::{DataSheetError, KalibrImu, Stated, StatedColumns, StatedUnit};
 use streams::{FEWEST_ROWS, Streams};
+pub use time::Certainty;
 use time::Clock;
 use turncal::imu::{PerSensor, Sensor};
 use turncal::noise::{Clusters, TriadNoise};
@@ -53,10 +50,8 @@ pub struct Draft {
     columns: Columns,
     clock: Clock,
     quantities: Quantities,
-    /// Nominal zero output of a register per row …
+    /// Nominal zero output of a register per row.
     offset: PerSensor<f64>,
-    /// … and its estimate from the recording, for counts.
-    registers: Option<Registers>,
     /// Reasons why the columns cannot be used unchanged.
     blocked: Vec<String>,
     /// White noise in the quantity of the file per second, per √Hz, if the log has dwells.
@@ -163,7 +158,6 @@ impl Draft {
             columns,
             clock,
             offset: PerSensor::default(),
-            registers: None,
             blocked: Vec::new(),
             random_walk: PerSensor::default(),
             motion: None,
@@ -172,7 +166,7 @@ impl Draft {
             stated: stated.clone(),
         };
         match rows {
-            Some(rows) => draft.take_rows(rows, &sheet),
+            Some(rows) => draft.take_rows(&rows, &sheet),
             None => draft.quantities.state(stated),
         }
         if let Some(streams) = &draft.streams {
@@ -186,42 +180,34 @@ impl Draft {
         draft
     }
 
-    /// Detects units, registers and noise.
-    fn take_rows(&mut self, mut rows: RawSamples, sheet: &Sheet) {
-        let mut motion = rows.motion();
+    /// Detects units and noise.
+    fn take_rows(&mut self, rows: &RawSamples, sheet: &Sheet) {
+        let motion = rows.motion();
         self.quantities = Quantities::find(sheet, &self.columns, &self.clock, rows.whole, &motion);
-        let is_open = motion.angle.is_none() && motion.is_turned;
-        if self.quantities.has_counts() || is_open {
-            motion = self.look_behind(&mut rows, &motion, sheet);
+        if self.quantities.has_counts() {
+            self.blocked = rows.unfit();
         }
         let period = self.clock.period.unwrap_or(f64::NAN);
         let of_units = || self.quantities.contradiction(&self.stated, &motion, period);
         self.contradiction = self.contradiction.take().or_else(of_units);
         self.quantities.state(&self.stated);
-        let random_walk = white_noise(&rows, &motion, &self.quantities, self.clock.period);
-        self.random_walk = random_walk.unwrap_or_default();
+        self.random_walk = self.noise_at_rest(rows, &motion).unwrap_or_default();
         self.offset = rows.offset;
         self.motion = Some(motion);
     }
 
-    /// Detects the registers behind the rows, and returns the motion without their zero.
-    fn look_behind(&mut self, rows: &mut RawSamples, motion: &Motion, sheet: &Sheet) -> Motion {
-        let found = Registers::find(rows, motion);
-        let is_count = PerSensor::from_fn(|sensor| self.quantities.is_count(sensor));
-        found.apply(&mut rows.triads, &mut self.columns, &is_count);
-        let mut motion = rows.motion();
-        if let Some(turns) = &found.turns {
-            motion.cuts.clear();
-            motion.angle = motion.angle.or(turns.angle());
-        }
-        let (columns, clock) = (&self.columns, &self.clock);
-        self.quantities = Quantities::find(sheet, columns, clock, rows.whole, &motion);
-        self.quantities.of_registers(&found, clock.period);
-        if self.quantities.has_counts() {
-            self.blocked = rows.unfit();
-            self.registers = Some(found);
-        }
-        motion
+    /// White noise of both triads in the longest dwell, as from `turncal allan`.
+    fn noise_at_rest(&self, rows: &RawSamples, motion: &Motion) -> Option<PerSensor<Option<f64>>> {
+        let (period, rest) = (self.clock.period?, motion.longest_rest.clone());
+        let clusters = Clusters::new(rest.len(), period);
+        let seconds = period * self.quantities.per_second(period);
+        let of = |sensor: Sensor| {
+            let rows = rows.triads.get(sensor)[rest.clone()].iter();
+            let increments: Vec<Vector3<f64>> = rows.map(|row| row * seconds).collect();
+            let figures = TriadNoise::new(&increments, period, &clusters).figures();
+            figures.map(|figures| figures.noise.random_walk)
+        };
+        (rest.len() >= FEWEST_AT_REST).then(|| PerSensor::from_fn(of))
     }
 
     /// Whether the log has this triad; both if none was identified.
@@ -234,11 +220,7 @@ impl Draft {
 
 /// Angle in rad per gyro unit in one row, from the rotation of gravity; negative if the triads have opposite signs.
 pub fn turned_angle(triads: PerSensor<Vec<Vector3<f64>>>, period: f64) -> Option<f64> {
-    let rows = RawSamples::new(triads, Vec::new(), period);
-    let motion = rows.motion();
-    motion
-        .angle
-        .or_else(|| Registers::find(&rows, &motion).turns?.angle())
+    RawSamples::new(triads, Vec::new(), period).motion().angle
 }
 
 /// Keeps the rows of one of several instruments, and returns the column and number.
@@ -263,25 +245,6 @@ fn retain_samples(sheet: &mut Sheet, columns: &Columns) {
         let is_new = |&k: &usize| of.columns[k][row] != of.columns[k][row - 1];
         row == 0 || of_samples.iter().any(is_new)
     });
-}
-
-/// White noise of both triads in the longest dwell, as from `turncal allan`.
-fn white_noise(
-    rows: &RawSamples,
-    motion: &Motion,
-    quantities: &Quantities,
-    period: Option<f64>,
-) -> Option<PerSensor<Option<f64>>> {
-    let (period, rest) = (period?, motion.longest_rest.clone());
-    let clusters = Clusters::new(rest.len(), period);
-    let seconds = period * quantities.per_second(period);
-    let of = |sensor: Sensor| {
-        let rows = rows.triads.get(sensor)[rest.clone()].iter();
-        let increments: Vec<Vector3<f64>> = rows.map(|row| row * seconds).collect();
-        let figures = TriadNoise::new(&increments, period, &clusters).figures();
-        figures.map(|figures| figures.noise.random_walk)
-    };
-    (rest.len() >= FEWEST_AT_REST).then(|| PerSensor::from_fn(of))
 }
 
 #[cfg(test)]

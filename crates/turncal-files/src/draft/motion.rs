@@ -5,6 +5,7 @@ use std::ops::Range;
 use nalgebra::Vector3;
 use statrs::statistics::Statistics;
 
+use super::turns::{self, ENOUGH, Interval};
 use turncal::imu::PerSensor;
 use turncal::statistics::{FALSE_ALARM, SIGMA_OF_MEDIAN, median, median_of_axes, student_limit};
 use turncal::units::DEGREE;
@@ -25,10 +26,6 @@ const STEADY: f64 = 5.0 * DEGREE;
 pub const FOLLOWED: f64 = 0.08;
 /// Specific force within this fraction of gravity gives its direction.
 const NEAR_GRAVITY: f64 = 0.1;
-/// Smaller changes of direction are not used, rad.
-const ENOUGH: f64 = 20.0 * DEGREE;
-/// Required agreement between gravity direction and gyros.
-const CORRELATION: f64 = 0.98;
 /// Scale tolerance of data sheets.
 pub const TOLERANCE: f64 = 0.03;
 /// Number of samples summed to distinguish pulses, which carry fractions, from readings.
@@ -47,8 +44,6 @@ pub struct Motion {
     pub is_turned: bool,
     /// Angle in rad per gyro unit in one row, if determined by turns; negative if the triads have opposite signs.
     pub angle: Option<f64>,
-    /// A first guess of its size.
-    pub size: f64,
     /// Samples before which the gravity direction jumps, as in concatenated sections.
     pub cuts: Vec<usize>,
     /// Variance of sums of samples at rest, relative to independent samples; smallest axis.
@@ -59,7 +54,7 @@ pub fn mean(samples: &[Vector3<f64>]) -> Vector3<f64> {
     samples.iter().sum::<Vector3<f64>>() / samples.len().max(1) as f64
 }
 
-pub fn means(samples: &[Vector3<f64>], length: usize) -> Vec<Vector3<f64>> {
+fn means(samples: &[Vector3<f64>], length: usize) -> Vec<Vector3<f64>> {
     samples.chunks_exact(length).map(mean).collect()
 }
 
@@ -101,14 +96,14 @@ impl Motion {
         let settled: Vec<Range<usize>> = settled.collect();
         let cuts = cuts(samples, breaks);
         let step = ((FOLLOWED / period).round() as usize).max(1);
-        let followed = Followed::new(samples, breaks, rest, usual, step);
+        let windows = (&at_rest[..], length);
+        let angle = turns::angle(&intervals(samples, breaks, (rest, usual), windows, step));
         Self {
             longest_rest: longest.start * length..longest.end * length,
             gravity: median(&mut sizes).unwrap_or(usual),
             rest,
             is_turned: is_turned(&accel, usual),
-            angle: followed.angle.filter(|_| cuts.is_empty()),
-            size: followed.size,
+            angle: angle.filter(|_| cuts.is_empty()),
             cuts,
             sum_variance: sum_variance(samples, &settled),
         }
@@ -131,45 +126,23 @@ pub fn is_whole(samples: &[Vector3<f64>]) -> bool {
     values.all(|value| value.fract() == 0.0)
 }
 
-/// Rotation per gyro unit in one row, rad, from the gravity direction step by step.
-struct Followed {
-    angle: Option<f64>,
-    size: f64,
-}
-
-impl Followed {
-    /// By least squares of `ḟ = f × ω`, wherever |f| equals gravity.
-    fn new(
-        samples: &PerSensor<Vec<Vector3<f64>>>,
-        breaks: &[usize],
-        zero: Vector3<f64>,
-        gravity: f64,
-        length: usize,
-    ) -> Self {
-        let gyro = means(&samples.gyro, length);
-        let accel = means(&samples.accel, length);
-        let (mut both, mut turned, mut seen, mut way) = (0.0, 0.0, 0.0, 0.0);
-        for (k, (rate, force)) in gyro.windows(3).zip(accel.windows(3)).enumerate() {
-            let at = k * length..(k + 3) * length;
-            if !force.iter().all(|f| is_near(f, gravity)) || is_broken(breaks, &at) {
-                continue;
-            }
-            let angle = (0.5 * (rate[0] + rate[2]) + rate[1] - 2.0 * zero) * length as f64;
-            let expected = force[1].normalize().cross(&angle);
-            let change = force[2].normalize() - force[0].normalize();
-            both += expected.dot(&change);
-            turned += expected.norm_squared();
-            seen += change.norm_squared();
-            way += angle.norm_squared();
-        }
-        let correlation: f64 = both / (turned * seen).sqrt();
-        let is_shown = correlation.abs() > CORRELATION && seen.sqrt() > 0.1 * ENOUGH;
-        Self {
-            angle: is_shown.then(|| both / turned),
-            // Of turns about any axis gravity's direction shows two thirds.
-            size: (1.5 * seen / way).sqrt(),
-        }
-    }
+/// Intervals of this number of samples, with dwells by windows of `window` samples.
+fn intervals(
+    samples: &PerSensor<Vec<Vector3<f64>>>,
+    breaks: &[usize],
+    (rest, gravity): (Vector3<f64>, f64),
+    (at_rest, window): (&[bool], usize),
+    length: usize,
+) -> Vec<Interval> {
+    let (gyro, accel) = (means(&samples.gyro, length), means(&samples.accel, length));
+    let both = gyro.iter().zip(&accel).enumerate();
+    let interval = |(k, (rate, force)): (usize, (&Vector3<f64>, &Vector3<f64>))| Interval {
+        rotation: (rate - rest) * length as f64,
+        up: is_near(force, gravity).then(|| force.normalize()),
+        is_at_rest: at_rest.get((k * length + length / 2) / window) == Some(&true),
+        is_broken: is_broken(breaks, &((k * length).saturating_sub(1)..(k + 1) * length)),
+    };
+    both.map(interval).collect()
 }
 
 /// Runs of windows at rest.

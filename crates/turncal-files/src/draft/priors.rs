@@ -106,38 +106,22 @@ impl Draft {
         if let Some(scale) = &unit.scale {
             remarks.reason(&path, &scale.why);
         } else if unit.word.is_none_or(|word| word == "count") {
-            remarks.open(&path, self.open_scale(sensor));
+            remarks.open(&path, open_scale(sensor));
         }
         let off = unit.scale.as_ref().map_or(0.0, |scale| 1e6 * scale.off);
         let scale_sigma = rounded(scale_sigma, 7).max(rounded(off, 4));
         let one = |value: f64| Some(OneOrThree::One(Finite(value)));
         let (bias, bias_sigma) = self.bias(sensor, bias_sigma, &table, remarks);
         PriorFile {
-            scale: unit.scale.as_ref().map(|scale| seven_digits(&scale.value)),
+            scale: unit
+                .scale
+                .as_ref()
+                .and_then(|scale| one(rounded(scale.value, 7))),
             scale_sigma_ppm: one(scale_sigma),
             installation_sigma_arcsec: one(class.installation / ARCSEC),
-            bias: bias.map(|bias| seven_digits(&bias)),
+            bias: bias.map(|bias| bias.map(|value| rounded(value, 7)).into()),
             bias_sigma: bias_sigma.and_then(one),
         }
-    }
-
-    fn open_scale(&self, sensor: Sensor) -> String {
-        let plain = sensor.pick(
-            "counts per rad/s from the data sheet: 57.29578 times the counts per deg/s, which are often 131, 65.5, \
-             32.8 or 16.4",
-            "counts per m/s² from the data sheet: counts per g divided by 9.80665",
-        );
-        let why = match &self.registers {
-            Some(found) if !found.has_rests => "; the log has no dwells to estimate it from",
-            Some(_) if sensor == Sensor::Accel => {
-                "; it could not be estimated from gravity in the dwells"
-            }
-            Some(_) => "; it could not be estimated from the change of gravity direction",
-            None => "",
-        };
-        let likely = self.quantities.units.get(sensor).likely.as_ref();
-        let likely = likely.map_or(String::new(), |likely| format!("; {likely}"));
-        format!("{plain}{why}{likely}")
     }
 
     /// Bias and its σ, in the quantity of the file per second.
@@ -148,63 +132,36 @@ impl Draft {
         table: &str,
         remarks: &mut Remarks,
     ) -> (Option<Vector3<f64>>, Option<f64>) {
-        let offset = *self.offset.get(sensor);
         let per_second = self.quantities.per_second(self.clock.period.unwrap_or(1.0));
-        let scale = self.quantities.scale(sensor);
-        let usual = scale.map(|scale| usual * scale.abs());
-        let path = format!("{table}.bias");
-        let own = self.own_zero(sensor, usual.map(|usual| usual / per_second));
-        let (bias, off) = match own {
-            Some((zero, off, why)) => {
-                remarks.reason(&path, why);
-                (Some(zero.add_scalar(offset)), off)
-            }
-            None => {
-                let rest = self.rest().filter(|_| sensor == Sensor::Gyro);
-                remarks.reason(&path, "output of an unsigned register at zero input");
-                let register = Some(Vector3::repeat(offset)).filter(|_| offset != 0.0);
-                (register, rest.map_or(0.0, |rest| rest.amax()))
-            }
+        let usual = self.quantities.scale(sensor).map(|scale| usual * scale);
+        let motion = self.motion.as_ref().filter(|_| sensor == Sensor::Gyro);
+        let rest = motion.map_or_else(Vector3::zeros, |motion| motion.rest * per_second);
+        let beyond = usual.map_or(f64::INFINITY, |usual| BEYOND * usual);
+        let is_own = self.quantities.is_count(sensor) && rest.amax() > beyond;
+        let (zero, off, why) = if is_own {
+            (rest, 0.0, "mean output at rest")
+        } else {
+            let why = "output of an unsigned register at zero input";
+            (Vector3::zeros(), rest.amax(), why)
         };
+        remarks.reason(&format!("{table}.bias"), why);
         let unit = match per_second {
             1.0 => "in the unit of the file",
             _ => "in the unit of the file, per second",
         };
         remarks.reason(&format!("{table}.bias_sigma"), unit);
-        let sigma = usual.map(|usual| rounded(usual.max(2.0 * off * per_second), 4));
-        (bias.map(|bias| bias * per_second), sigma)
-    }
-
-    /// Gyro output at rest, in the quantity of the file per row.
-    fn rest(&self) -> Option<Vector3<f64>> {
-        self.motion.as_ref().map(|motion| motion.rest)
-    }
-
-    /// Register zero estimated from the recording, with its σ, if it is not typical for the class; in the quantity of
-    /// the file per row.
-    fn own_zero(
-        &self,
-        sensor: Sensor,
-        usual: Option<f64>,
-    ) -> Option<(Vector3<f64>, f64, &'static str)> {
-        if !self.quantities.is_count(sensor) {
-            return None;
-        }
-        let registers = self.registers.as_ref()?;
-        match sensor {
-            Sensor::Accel => {
-                let gravity = registers.gravity.as_ref()?;
-                let why = "centre of the gravity vectors in the dwells";
-                Some((gravity.own_zero?, gravity.zero_sigma, why))
-            }
-            Sensor::Gyro => {
-                let rest = self.rest().filter(|_| registers.has_rests)?;
-                (rest.amax() > BEYOND * usual?).then_some((rest, 0.0, "mean output at rest"))
-            }
-        }
+        let bias = zero.add_scalar(per_second * self.offset.get(sensor));
+        let sigma = usual.map(|usual| rounded(usual.max(2.0 * off), 4));
+        (Some(bias).filter(|bias| *bias != Vector3::zeros()), sigma)
     }
 }
 
-fn seven_digits(values: &Vector3<f64>) -> OneOrThree {
-    values.map(|value| rounded(value, 7)).into()
+/// Meaning of a scale factor that the log does not show.
+fn open_scale(sensor: Sensor) -> &'static str {
+    sensor.pick(
+        "counts per rad/s from the data sheet: 57.29578 times the counts per deg/s, which are often 131, 65.5, 32.8 or \
+         16.4; it could not be estimated from the change of gravity direction",
+        "counts per m/s² from the data sheet: counts per g divided by 9.80665; it could not be estimated from gravity at \
+         rest",
+    )
 }

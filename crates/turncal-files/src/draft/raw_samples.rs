@@ -57,8 +57,7 @@ impl RawSamples {
 
     /// Reasons why count columns cannot be used unchanged.
     pub fn unfit(&self) -> Vec<String> {
-        let mut wrapped = Sensor::ALL.to_vec();
-        wrapped.retain(|&sensor| *self.wrapped.get(sensor));
+        let wrapped = Sensor::ALL.into_iter().filter(|&of| *self.wrapped.get(of));
         let why = |sensor: Sensor| {
             format!(
                 "the columns of {} contain signed 16-bit values written as unsigned: subtract 65536 from values of \
@@ -66,7 +65,7 @@ impl RawSamples {
                 sensor.name()
             )
         };
-        wrapped.into_iter().map(why).collect()
+        wrapped.map(why).collect()
     }
 }
 

@@ -7,7 +7,6 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::*;
 
-mod registers;
 mod turns;
 
 /// Three quarter turns about each axis in turn with rests between, at 100 Hz; `row` makes a line of time,
@@ -144,6 +143,39 @@ fn unsigned_registers_have_their_zero_in_the_middle_and_a_data_sheets_scale() {
     );
 }
 
+/// Whole signed counts at 65.5 per °/s and 8192 per g, with times; `change` is applied to them.
+fn counts(change: fn(f64) -> f64) -> String {
+    draft("t,gx,gy,gz,ax,ay,az\n", |k, v| {
+        let [gx, gy, gz, ax, ay, az] = v;
+        let gyro = [gx, gy, gz].map(|rate| rate.to_degrees() * 65.5);
+        let accel = [ax, ay, az].map(|force| force / 9.80665 * 8192.0);
+        let counts = [gyro, accel].concat();
+        let counts: Vec<f64> = counts.iter().map(|count| change(count.round())).collect();
+        format!("{:.2},{}", k as f64 * 0.01, joined(&counts, ","))
+    })
+}
+
+#[test]
+fn counts_get_the_data_sheets_scale_from_gravity_and_its_turns() {
+    has(
+        &counts(|count| count),
+        &[
+            "scale = 3752.874  # 65.5 counts per deg/s; measured 65.",
+            "scale = 835.3515  # 8192 counts per g; measured 81",
+        ],
+    );
+    // Of another sign than the accelerometers, and no data sheet's.
+    let text = counts(|count| (-1.1 * count).round());
+    has(&text, &["scale = 918.", "# Gravity rotates opposite"]);
+}
+
+#[test]
+fn signed_counts_that_were_written_as_unsigned_stay_open() {
+    let text = counts(|count| count.rem_euclid(65_536.0));
+    has(&text, &["# columns = { time = \"t\""]);
+    assert!(text.contains("written as unsigned:"), "{text}");
+}
+
 #[test]
 fn increments_and_pulses_are_known_by_the_period_and_by_their_sums() {
     let text = draft("t,gx,gy,gz,ax,ay,az\n", |k, v| {
@@ -176,7 +208,7 @@ fn increments_and_pulses_are_known_by_the_period_and_by_their_sums() {
             "output = \"pulse\"",
             "gyro_unit = \"count\"",
             "accel_unit = \"count\"",
-            "scale = 199",
+            "scale = 19",
         ],
     );
 }

@@ -82,10 +82,11 @@ impl Draft {
         let mut imu = ImuFile {
             file: file.to_owned(),
             output: found.output,
+            // A rate that is asked for first may tell the units.
+            sample_period_s: self.period(remarks),
             gyro_unit: self.unit(Sensor::Gyro, remarks),
             accel_unit: self.unit(Sensor::Accel, remarks),
             time_unit: (clock.unit != "s").then(|| TimeUnitField::of_text(&clock.unit)),
-            sample_period_s: self.period(remarks),
             time_stamp: TimeStamp::End,
             continuous: Some(self.cuts() == 0),
             body_axes: Some(self.body_axes(remarks)),
@@ -238,7 +239,6 @@ impl Draft {
                 }
             }
         }
-        self.turned_axes(remarks);
         if !self.blocked.is_empty() {
             remarks.open(path, self.blocked.join("; "));
         }
@@ -298,27 +298,6 @@ impl Draft {
              as iOS does",
             self.columns.names[down]
         )
-    }
-
-    /// Remark on gyro columns that do not match the accelerometer axes.
-    fn turned_axes(&self, remarks: &mut Remarks) {
-        let registers = self.registers.as_ref();
-        let turns = registers.and_then(|found| found.turns.as_ref());
-        let turns = turns.filter(|of| !of.agree() && self.quantities.is_count(Sensor::Gyro));
-        let Some((turns, triad)) = turns.zip(self.columns.triads.gyro) else {
-            return;
-        };
-        let [x, y, z] = [0, 1, 2].map(|k| {
-            let sign = if turns.axes.scale[k] < 0.0 { "−" } else { "" };
-            format!("{sign}{}", self.columns.names[triad[k]])
-        });
-        remarks.before("imu.columns", format_args!(
-            "From the gravity directions in {} moves, the gyros about the accelerometer axes x, y and z are {x}, {y} \
-             and {z}.",
-            turns.moves
-        ));
-        let follows = "The gyro column order and scale signs follow from this.";
-        remarks.before("imu.columns", follows);
     }
 
     fn noise_fields(&self, remarks: &mut Remarks) -> NoiseFields {

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use super::certainty::Certainty;
 use super::columns::Columns;
 use super::name::Name;
 use crate::Sheet;
@@ -15,6 +14,28 @@ use turncal_logs::clock::Uniform;
 pub const PERIODS: std::ops::Range<f64> = 2e-4..0.2;
 /// Steps within this factor match a stated rate.
 const STATED: f64 = 1.2;
+
+/// Certainty of a field.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Certainty {
+    /// Stated in the log and confirmed by motion, determined by motion alone, or stated by the user.
+    Certain,
+    /// Stated in the log or typical, but not confirmed by motion.
+    Guess,
+    /// Neither.
+    Unknown,
+}
+
+impl Certainty {
+    /// Its word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Certain => "certain",
+            Self::Guess => "guess",
+            Self::Unknown => "unknown",
+        }
+    }
+}
 
 /// Clock detected in the time column.
 #[derive(Debug, Clone, PartialEq)]

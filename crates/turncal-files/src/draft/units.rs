@@ -3,16 +3,12 @@
 mod data_sheet;
 mod hypothesis;
 
-use nalgebra::Vector3;
-
-use data_sheet::{Scale, likely_for_g};
+use data_sheet::Scale;
 use hypothesis::{Hypothesis, TriadRows};
 
 use super::columns::Columns;
-use super::motion::{Motion, TOLERANCE};
+use super::motion::Motion;
 use super::name::Name;
-use super::raw_run::Axes;
-use super::registers::Registers;
 use super::stated::{Stated, StatedUnit};
 use super::time::{Clock, PERIODS};
 use crate::quantity::{Of, units};
@@ -33,10 +29,8 @@ pub struct Unit {
     pub is_shown: bool,
     /// Whether rows that are not whole numbers fit no known unit.
     pub is_unfit: bool,
-    /// Scale of counts, if determined …
+    /// Scale of counts, if determined.
     pub scale: Option<Scale>,
-    /// … and typical values otherwise.
-    pub likely: Option<String>,
 }
 
 impl Unit {
@@ -176,7 +170,7 @@ impl Quantities {
             word: Some("count"),
             why: why_count(rows, &unfit),
             is_unfit: !rows.whole,
-            likely: per_g.is_finite().then(|| likely_for_g(per_g)),
+            scale: per_g.is_normal().then(|| Scale::of_gravity(per_g)),
             ..Unit::default()
         }
     }
@@ -228,15 +222,7 @@ impl Quantities {
             word: Some("count"),
             is_shown: measured.is_some() && rows.whole,
             is_unfit: measured.is_some() && !rows.whole,
-            scale: measured.map(|value| {
-                let (scale, sigma) = (Vector3::repeat(value), TOLERANCE);
-                let axes = Axes {
-                    scale,
-                    sigma,
-                    by_axis: false,
-                };
-                Scale::of_turns(&axes, None, 1.0, self.output)
-            }),
+            scale: measured.map(|per_rad| Scale::of_turns(per_rad, self.output)),
             ..Unit::open(&why)
         }
     }
@@ -301,32 +287,6 @@ impl Quantities {
         self.units.get(sensor).word == Some("count")
     }
 
-    /// Applies the registers detected behind the counts.
-    pub fn of_registers(&mut self, found: &Registers, period: Option<f64>) {
-        let period = period.unwrap_or(f64::NAN);
-        let (per_second, row) = (self.per_second(period), self.row(period));
-        let is_open = |unit: &Unit| unit.scale.as_ref().is_none_or(|of| !of.is_named);
-        let accel = &mut self.units.accel;
-        if accel.word == Some("count") && is_open(accel) {
-            let gravity = found.gravity.as_ref().filter(|_| per_second.is_finite());
-            accel.scale = gravity.map(|gravity| Scale::of_gravity(gravity, per_second));
-        }
-        let gyro = &mut self.units.gyro;
-        let Some(turns) = found.turns.as_ref().filter(|_| row.is_finite()) else {
-            return;
-        };
-        if gyro.word.is_none_or(|word| word == "count") && is_open(gyro) {
-            if gyro.word.is_none() {
-                gyro.word = Some("count");
-                gyro.is_unfit = true;
-                gyro.why = "no known unit fits the change of gravity direction".to_owned();
-            }
-            let moves = Some(turns.moves);
-            gyro.scale = Some(Scale::of_turns(&turns.axes, moves, row, self.output));
-            self.opposed = false;
-        }
-    }
-
     /// Rows to rates.
     pub fn per_second(&self, period: f64) -> f64 {
         match self.output {
@@ -343,7 +303,7 @@ impl Quantities {
     /// The file's quantity per second for one rad/s or m/s², if it is known.
     pub fn scale(&self, sensor: Sensor) -> Option<f64> {
         let unit = self.units.get(sensor);
-        let measured = unit.scale.as_ref().map(|scale| scale.value.abs().mean());
+        let measured = unit.scale.as_ref().map(|scale| scale.value);
         measured.or_else(|| unit_scale(sensor, unit.word?))
     }
 }
@@ -352,7 +312,7 @@ impl Quantities {
 fn scaled(sensor: Sensor, rows: &TriadRows) -> Option<Unit> {
     let unit = rows.named?;
     let scale = Scale::of_unit(sensor, unit)?;
-    let per_si = scale.value.x;
+    let per_si = scale.value;
     let of_it = Hypothesis::new(sensor, (unit.word, per_si), Output::Rate, rows);
     (!of_it.is_contradicted()).then(|| Unit {
         word: Some("count"),

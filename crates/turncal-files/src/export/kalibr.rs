@@ -1,16 +1,15 @@
-//! IMU intrinsics for Kalibr, model `scale-misalignment`, for OpenVINS and for iKalibr.
+//! IMU intrinsics for Kalibr, model `scale-misalignment`, and for OpenVINS.
 //!
 //! Source: Rehder et al., "Extending kalibr: calibrating the extrinsics of multiple IMUs and of individual axes", ICRA
-//! 2016; OpenVINS, `VioManagerOptions::print_and_load_state` and `Propagator::predict_and_compute`; iKalibr,
-//! `include/sensor/imu_intrinsic.hpp` and `config/imu-intri.yaml`.
+//! 2016; OpenVINS, `VioManagerOptions::print_and_load_state` and `Propagator::predict_and_compute`.
 
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
+use nalgebra::Matrix3;
 
 use super::notation::{list, number, rows};
 use super::remarks::{Exported, Remarks, SIGMA};
 use super::values::Values;
 use turncal::calibration::result::frame::accelerometer_frame;
-use turncal::imu::{AXES, PerSensor, Sensor, Term};
+use turncal::imu::{PerSensor, Sensor, Term};
 use turncal::units::ARCSEC;
 
 /// Quantities that Kalibr and OpenVINS estimate themselves.
@@ -145,61 +144,6 @@ fn open_vins(values: &Values, model: &str, split: fn(&Matrix3<f64>) -> Split) ->
         noise(values)
     );
     remarks.of_file(text.into_bytes())
-}
-
-/// From true to measured: `f_m = MAP_a f + BIAS_a`, `ω_m = MAP_g (SO3_AtoG ω) + BIAS_g`, both maps upper triangular
-/// with the coefficients (00, 11, 22, 01, 02, 12). The body frame is that of the accelerometer map.
-pub fn ikalibr(values: &Values) -> Exported {
-    let PerSensor { gyro, accel } = &values.triads;
-    let (accel_map, own) = upper(&accel.sensitivity);
-    let (gyro_map, of_gyro) = upper(&gyro.sensitivity);
-    let accel_to_gyro = Rotation3::from_matrix_unchecked(of_gyro * own.transpose());
-    let turn = turncal::attitude::log(&own).norm() / ARCSEC;
-    let frame = format!(
-        "the body frame: its frame differs from that of the calibration by {turn:.1} arcsec (the rotation below)"
-    );
-    let axis = |k: usize| {
-        let row = list(own.row(k).iter());
-        format!("its {} axis along the body axes: {row}", AXES[k])
-    };
-    let remarks = Remarks::new(values, "#", &[&frame, SIGMA])
-        .reads("iKalibr reads rad/s and m/s^2, here")
-        .defines([0, 1, 2].map(axis));
-    let column = |values: &[f64]| -> String {
-        let rows = values.iter().enumerate();
-        rows.map(|(k, &value)| format!("\n          r{k}c0: {}", number(value)))
-            .collect()
-    };
-    let coefficients = |map: &Matrix3<f64>| {
-        column(&[(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].map(|at| map[at]))
-    };
-    let q = UnitQuaternion::from_rotation_matrix(&accel_to_gyro);
-    let [x, y, z, w] = [q.i, q.j, q.k, q.w].map(number);
-    // The id is that of the pointer through which iKalibr reads them.
-    let text = format!(
-        "\
-Intrinsics:
-  ptr_wrapper:
-    id: 2147483649
-    data:
-      ACCE:
-        BIAS:{}
-        MAP_COEFF:{}
-      GYRO:
-        BIAS:{}
-        MAP_COEFF:{}
-      SO3_AtoG:
-        qx: {x}
-        qy: {y}
-        qz: {z}
-        qw: {w}
-",
-        column(accel.bias.as_slice()),
-        coefficients(&accel_map),
-        column(gyro.bias.as_slice()),
-        coefficients(&gyro_map),
-    );
-    remarks.above(&text)
 }
 
 #[cfg(test)]

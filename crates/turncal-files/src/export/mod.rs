@@ -5,12 +5,11 @@
 mod affine;
 mod autopilot;
 mod code;
-mod devices;
-mod gazebo;
 mod kalibr;
 mod kf_gins;
 mod mat;
 mod notation;
+mod realsense;
 mod remarks;
 mod ros;
 mod samples;
@@ -37,8 +36,8 @@ pub struct Format {
     pub about: &'static str,
     axes: Axes,
     write: fn(&Values) -> Exported,
-    /// Temperature dependence that the format omits; `None` for a calibration at one temperature.
-    of_temperature: Option<&'static str>,
+    /// Whether it holds the temperature dependence, and not a calibration at one temperature.
+    has_temperature: bool,
 }
 
 const fn row(
@@ -54,53 +53,40 @@ const fn row(
         about,
         axes,
         write,
-        of_temperature: None,
+        has_temperature: false,
     }
 }
 
-/// Temperature dependence that autopilots cannot represent.
-const IN_AUTOPILOTS: &str = "change of scale factors and misalignments with temperature, change of biases with \
-    temperature rate, and orders above three; biases refer to the temperature of the sensor";
-
 /// Every format.
 #[rustfmt::skip]
-pub static FORMATS: [Format; 17] = [
+pub static FORMATS: [Format; 14] = [
     row("kalibr", "yaml", "IMU intrinsics for Kalibr, model scale-misalignment", RightFrontUp, kalibr::kalibr),
     row("kf-gins", "yaml", "IMU section of a KF-GINS configuration", FrontRightDown, kf_gins::write),
-    row("c", "h", "A C99 header with constants and a function", RightFrontUp, code::write).with_temperature(""),
+    row("c", "h", "A C99 header with constants and a function", RightFrontUp, code::write).with_temperature(),
     row("text", "txt", "All values with name, σ and unit", RightFrontUp, text::write),
-    row("px4", "params", "PX4 parameters: CAL_GYRO0, CAL_ACC0", FrontRightDown, autopilot::px4)
-        .with_temperature(IN_AUTOPILOTS),
+    row("px4", "params", "PX4 parameters: CAL_GYRO0, CAL_ACC0", FrontRightDown, autopilot::px4),
     row("ardupilot", "param", "ArduPilot parameters: INS_GYROFFS, INS_ACCOFFS, INS_ACCSCAL", FrontRightDown,
-        autopilot::ardupilot).with_temperature(IN_AUTOPILOTS),
+        autopilot::ardupilot),
     row("open-vins-kalibr", "yaml", "IMU intrinsics for OpenVINS, model kalibr", Log, kalibr::open_vins_kalibr),
     row("open-vins-rpng", "yaml", "IMU intrinsics for OpenVINS, model rpng", Log, kalibr::open_vins_rpng),
-    row("ikalibr", "yaml", "IMU intrinsics for iKalibr", Log, kalibr::ikalibr),
     row("imu-calib", "yaml", "Accelerometer calibration for the ROS package imu_calib", Log, ros::imu_calib),
     row("ros-covariance", "yaml", "Covariances for ROS sensor_msgs/Imu, from the noise of a run", Log, ros::covariance),
-    row("gazebo", "sdf", "IMU noise for Gazebo", Log, gazebo::write),
     row("mat", "mat", "A MATLAB structure (MAT file)", RightFrontUp, mat::write),
     row("betaflight", "txt", "Accelerometer zeros for Betaflight", Log, autopilot::betaflight),
     row("inav", "txt", "Zeros and gains for INAV", Log, autopilot::inav),
     row("realsense", "bin", "IMU calibration table of a RealSense D400 camera, as written by rs-imu-calibration", Log,
-        devices::realsense),
-    row("slimevr", "h", "Calibration for a SlimeVR tracker", Log, devices::slimevr),
+        realsense::write),
 ];
 
 impl Format {
-    /// Every format.
-    pub fn all() -> &'static [Self] {
-        &FORMATS
-    }
-
     /// The format with this name.
     pub fn named(name: &str) -> Option<&'static Self> {
         FORMATS.iter().find(|format| format.name == name)
     }
 
-    const fn with_temperature(self, omitted: &'static str) -> Self {
+    const fn with_temperature(self) -> Self {
         Self {
-            of_temperature: Some(omitted),
+            has_temperature: true,
             ..self
         }
     }
@@ -117,17 +103,14 @@ pub fn write(
     run: Option<&Run>,
 ) -> Result<Exported, CorrectionError> {
     let mut exported = (format.write)(&Values::new(record, run, format.axes)?);
-    if let Some(thermal) = &record.temperature {
+    if let Some(thermal) = &record.temperature
+        && !format.has_temperature
+    {
         let reference = thermal.range.gyro.reference;
-        let omitted = match format.of_temperature {
-            Some(omitted) => omitted.to_owned(),
-            None => format!(
-                "change with temperature; this is the calibration at {reference} °C (use --temperature-degc for \
-                 another temperature)"
-            ),
-        };
-        let omitted = Some(omitted).filter(|note| !note.is_empty());
-        exported.notes.extend(omitted);
+        exported.notes.push(format!(
+            "change with temperature; this is the calibration at {reference} °C (use --temperature-degc for another \
+             temperature)"
+        ));
     }
     Ok(exported)
 }

@@ -52,25 +52,19 @@ fn triad(values: &Values, sensor: Sensor) -> Vec<String> {
     let (in_words, factor) = sensor.pick(("deg/h", DEG_PER_H), ("ug", MICRO_G));
     let in_input = Vector3::from(of.bias).component_div(&Vector3::from(of.scale)) / factor;
     let per_input = format!("{unit} per {}", Values::input(sensor));
-    let scale = (0..3).map(|k| {
-        let (name, sigma) = (
-            format!("{name}.scale.{}", AXES[k]),
-            sigma.map(|of| of.scale[k]),
-        );
-        row(&name, of.scale[k], sigma, &per_input)
-    });
+    let of_axis = |kind: &str, k: usize, values: [f64; 3], sigma: Option<[f64; 3]>, unit: &str| {
+        let name = format!("{name}.{kind}.{}", AXES[k]);
+        row(&name, values[k], sigma.map(|of| of[k]), unit)
+    };
+    let scale = (0..3).map(|k| of_axis("scale", k, of.scale, sigma.map(|of| of.scale), &per_input));
     let installation = places().map(|(i, j, place)| {
         let name = format!("{name}.installation.{place}");
         let sigma = sigma.filter(|_| i != j).map(|of| of.installation[i][j]);
         row(&name, of.installation[i][j], sigma, "1")
     });
     let bias = (0..3).map(|k| {
-        let (name, sigma) = (
-            format!("{name}.bias.{}", AXES[k]),
-            sigma.map(|of| of.bias[k]),
-        );
         let unit = format!("{unit}, {:.6} {in_words}", in_input[k]);
-        row(&name, of.bias[k], sigma, &unit)
+        of_axis("bias", k, of.bias, sigma.map(|of| of.bias), &unit)
     });
     scale.chain(installation).chain(bias).collect()
 }

@@ -70,8 +70,7 @@ impl<'a> Parts<'a> {
             series: PerSensor::from_fn(writer),
             even: wander.map(|wander| {
                 let even = |_| Even::new(&wander, log.stamp.lag(), log.output);
-                let even = PerSensor::from_fn(even);
-                (wander, even)
+                (wander.clone(), PerSensor::from_fn(even))
             }),
             log,
             layout,
@@ -126,9 +125,8 @@ impl<'a> Parts<'a> {
         let units = self.layout.units(self.log, self.clock.period());
         let names = &self.layout.names;
         let facts_of = |columns: &[Vec<f64>; 6], rows: Range<usize>| {
-            let of =
-                |k: usize| ColumnFacts::of(&names[k].name, &columns[k][rows.clone()], units[k]);
-            std::array::from_fn(of)
+            let values = |k: usize| &columns[k][rows.clone()];
+            std::array::from_fn(|k| ColumnFacts::of(&names[k].name, values(k), units[k]))
         };
         let facts = facts_of(&held.columns, 0..end);
         let of_rest = match self.taken {
@@ -216,8 +214,8 @@ impl<'a> Parts<'a> {
             self.keep_fault(fault, samples.start);
         }
         let begin_within = |bridge: &Bridge| samples.contains(&bridge.samples.start);
-        self.bridges
-            .extend(bridges.into_iter().filter(begin_within));
+        let begun = bridges.into_iter().filter(begin_within);
+        self.bridges.extend(begun);
         for sensor in Sensor::ALL {
             let of_axes = self.layout.columns(sensor).map(|column| &columns[column]);
             let series = self.series.get_mut(sensor);

@@ -64,17 +64,16 @@ impl<'a> Reading<'a> {
         }
         // Rows that another sensor wrote, or in which a sensor said nothing; a time tells that they are missing.
         let places = || self.places.iter().flatten();
-        match places().filter(|&&place| csv.is_blank(place)).count() {
-            0 => {}
-            _ if self.log.clock_of_rows().column.is_none() => {}
-            all if all == places().count() => {
-                self.blank += 1;
-                return Ok(());
-            }
-            _ => {
-                self.lacking += 1;
-                return Ok(());
-            }
+        let blank = places().filter(|&&place| csv.is_blank(place)).count();
+        if blank > 0 && self.log.clock_of_rows().column.is_some() {
+            let is_whole = blank == places().count();
+            let rows = if is_whole {
+                &mut self.blank
+            } else {
+                &mut self.lacking
+            };
+            *rows += 1;
+            return Ok(());
         }
         let mut row = [0.0; 6];
         for (value, &place) in row.iter_mut().zip(&self.places) {
@@ -103,19 +102,11 @@ impl<'a> Reading<'a> {
     /// Remarks on rows that are not samples, one sentence each.
     pub fn notes(&self) -> impl Iterator<Item = String> {
         let file = self.log.source.file.display();
-        let blank = (self.blank > 0).then(|| {
-            format!(
-                "{} row(s) of {file} are empty in the columns of both triads. turncal skipped them.",
-                self.blank
-            )
-        });
-        let lacking = (self.lacking > 0).then(|| {
-            format!(
-                "{} row(s) of {file} lack a gyro or accelerometer value and count as missing.",
-                self.lacking
-            )
-        });
-        [blank, lacking].into_iter().flatten()
+        let blank = "are empty in the columns of both triads. turncal skipped them.";
+        let lacking = "lack a gyro or accelerometer value and count as missing.";
+        let all = [(self.blank, blank), (self.lacking, lacking)].into_iter();
+        let found = all.filter(|(rows, _)| *rows > 0);
+        found.map(move |(rows, what)| format!("{rows} row(s) of {file} {what}"))
     }
 
     fn too_few(&self, csv: &LogRows) -> FileError {
@@ -126,11 +117,8 @@ impl<'a> Reading<'a> {
                 "If gyros and accelerometers are in separate rows, `turncal init` drafts a run.toml for that layout.",
             ),
         };
-        csv.error(
-            format_args!("{} samples{found}", self.held.len()),
-            format_args!("at least {FEWEST_SAMPLES}"),
-            advice,
-        )
+        let found = format_args!("{} samples{found}", self.held.len());
+        csv.error(found, format_args!("at least {FEWEST_SAMPLES}"), advice)
     }
 }
 
@@ -216,10 +204,8 @@ impl ImuLog<'_> {
     fn value(&self, csv: &LogRows, column: usize) -> Result<f64, FileError> {
         let value = csv.number(column)?;
         if self.output == Output::Pulse && value.fract() != 0.0 {
-            return Err(csv.not(
-                column,
-                "a whole number of pulses, or output = \"increment\" in run.toml",
-            ));
+            let expected = "a whole number of pulses, or output = \"increment\" in run.toml";
+            return Err(csv.not(column, expected));
         }
         Ok(value)
     }

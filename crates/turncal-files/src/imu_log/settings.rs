@@ -109,15 +109,13 @@ impl ImuLog<'_> {
         let Some((source, clock)) = &self.accel_from else {
             return self.source.open();
         };
+        let temperature = self.temperature.as_ref();
         let parts = PerSensor {
             gyro: Part {
                 source: &self.source,
                 clock: self.clock,
                 columns: self.triads.gyro,
-                further: self
-                    .temperature
-                    .as_ref()
-                    .map_or(&[], |columns| columns.names()),
+                further: temperature.map_or(&[], TemperatureColumns::names),
             },
             accel: Part {
                 source,

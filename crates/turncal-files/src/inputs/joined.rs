@@ -8,6 +8,7 @@ use std::path::Path;
 
 use super::course::{Course, Resampled};
 use turncal::imu::{Output, PerSensor};
+use turncal::number::rounded;
 use turncal_input::FileError;
 use turncal_logs::clock::{Breaks, Clock, Stamp, TimeUnit, Uniform};
 use turncal_logs::{Source, Table, TableRows};
@@ -88,10 +89,8 @@ fn columns_of_both(
         let time = gyro.clock.first + gyro.clock.time(number as f64);
         let begin = place(number as f64 - lag);
         let end = place(number as f64 + 1.0 - lag);
-        while courses
-            .get(course)
-            .is_some_and(|course| course.end() < begin)
-        {
+        let is_before = |course: &Course| course.end() < begin;
+        while courses.get(course).is_some_and(is_before) {
             course += 1;
         }
         let course = courses.get(course);
@@ -116,39 +115,27 @@ fn apart(file: &Path, gyro: &Track, accel: &Track) -> FileError {
         let (first, period) = (track.clock.first, track.clock.period);
         format!("{first} s to {} s", first + last * period)
     };
-    FileError::of(
-        file,
-        format_args!("an accelerometer stream from {}", of(accel)),
-        format_args!("times that overlap the gyro stream ({})", of(gyro)),
-        "Convert both streams to the same clock, or correct time_unit.",
-    )
+    let found = format!("an accelerometer stream from {}", of(accel));
+    let expected = format!("times that overlap the gyro stream ({})", of(gyro));
+    let advice = "Convert both streams to the same clock, or correct time_unit.";
+    FileError::of(file, found, expected, advice)
 }
 
 /// Remarks of both streams, each once, and a note about two streams.
 fn remarks_of_both(gyro: Track, accel: Track) -> Vec<String> {
-    let mut remarks = gyro.remarks;
-    remarks.extend(
-        accel
-            .remarks
-            .into_iter()
-            .filter(|remark| !remarks.contains(remark))
-            .collect::<Vec<_>>(),
-    );
+    let (mut remarks, mut others) = (gyro.remarks, accel.remarks);
+    others.retain(|remark| !remarks.contains(remark));
+    remarks.extend(others);
     let uneven = accel.clock.uneven();
     remarks.extend(uneven.map(|said| format!("Accelerometers: {said}")));
     remarks.push(format!(
         "Gyros (every {} s) and accelerometers (every {} s) are separate streams, so turncal integrated the \
          accelerometers over the gyro samples. If their clocks may differ, estimate the offset with --with \
          time-offset.",
-        rounded(gyro.clock.period),
-        rounded(accel.clock.period)
+        rounded(gyro.clock.period, 7),
+        rounded(accel.clock.period, 7)
     ));
     remarks
-}
-
-/// Seven digits.
-fn rounded(value: f64) -> f64 {
-    format!("{value:.6e}").parse().unwrap_or(value)
 }
 
 /// The samples of a stream on its own uniform clock.
@@ -193,11 +180,9 @@ impl Track {
             }
         }
         if stamps.of_rows.len() < 2 {
-            return Err(rows.error(
-                format_args!("{} samples", stamps.of_rows.len()),
-                "at least 2",
-                "Name another stream, or repeat the recording.",
-            ));
+            let found = format!("{} samples", stamps.of_rows.len());
+            let advice = "Name another stream, or repeat the recording.";
+            return Err(rows.error(found, "at least 2", advice));
         }
         let mut remarks = rows.remarks().to_vec();
         remarks.extend(rows.cut_off("turncal ignored it"));

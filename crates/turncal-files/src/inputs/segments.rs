@@ -43,10 +43,8 @@ pub fn read(
             return wrong("a segment", expected);
         }
         if row(start) == row(end) {
-            let expected = format!(
-                "a segment of several samples (sample period {} s)",
-                imu.period
-            );
+            let period = imu.period;
+            let expected = format!("a segment of several samples (sample period {period} s)");
             return wrong("no sample", expected);
         }
         let label = csv.text(label_column)?.into_owned();
@@ -59,9 +57,7 @@ pub fn read(
         });
     }
     // A label that lacks letters is none, which is said elsewhere.
-    notes.extend(
-        csv.cut_off("turncal used it")
-            .filter(|_| label_column + 1 != csv.header().len()),
-    );
+    let cut_off = csv.cut_off("turncal used it");
+    notes.extend(cut_off.filter(|_| label_column + 1 != csv.header().len()));
     Ok(segments)
 }

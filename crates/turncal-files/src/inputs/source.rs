@@ -35,11 +35,10 @@ impl<'a> Fields<'a> {
     ) -> Result<Clock<'a>, FileError> {
         let unknown = |name: &str| {
             let known = || TimeUnit::WORDS.iter().map(|(word, _)| *word);
-            self.document.wrong(
-                &format!("{table}.time_unit"),
-                format_args!("one of {}, or the duration of a tick in s", list(known())),
-                suggestion(name, known(), "Choose one of them."),
-            )
+            let path = format!("{table}.time_unit");
+            let expected = format!("one of {}, or the duration of a tick in s", list(known()));
+            let advice = suggestion(name, known(), "Choose one of them.");
+            self.document.wrong(&path, expected, advice)
         };
         let unit = unit.map(TimeUnitField::unit).transpose().map_err(unknown)?;
         if unit == Some(TimeUnit::Count) && period.is_none() {
@@ -91,12 +90,11 @@ impl<'a> Fields<'a> {
         if fields.time_unit.is_none() {
             clock.unit = of_gyro.unit;
         }
-        match clock.column {
-            Some(_) => Ok(Some((source, clock))),
-            None => Err(self.document.missing(
-                "imu.accel_from.time",
-                "the time column of the accelerometers, because separate streams both need one",
-            )),
+        if clock.column.is_none() {
+            let meaning =
+                "the time column of the accelerometers, because separate streams both need one";
+            return Err(self.document.missing("imu.accel_from.time", meaning));
         }
+        Ok(Some((source, clock)))
     }
 }

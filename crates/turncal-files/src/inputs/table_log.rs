@@ -43,9 +43,8 @@ impl AttitudeColumns<'_> {
         let values: Vec<f64> = values.collect::<Result<_, FileError>>()?;
         let (quaternion, angles) = values.split_at(values.len() - self.axes.len());
         let angles = self.axes.iter().zip(angles);
-        let angles: Vec<_> = angles
-            .map(|(axis, angle)| (*axis, angle * DEGREE))
-            .collect();
+        let angles = angles.map(|(axis, angle)| (*axis, angle * DEGREE));
+        let angles: Vec<_> = angles.collect();
         let &[w, x, y, z] = quaternion else {
             let turn = |of: Matrix3<f64>, (axis, angle): &(Vector3<f64>, f64)| {
                 of * attitude::exp(axis * *angle)
@@ -56,11 +55,10 @@ impl AttitudeColumns<'_> {
         let quaternion = Quaternion::new(w, x, y, z);
         let norm = quaternion.norm();
         if (norm - 1.0).abs() > NORM_TOLERANCE {
-            return Err(csv.error_here(
-                format_args!("a quaternion with norm {norm:.6}"),
-                format_args!("norm 1 within {NORM_TOLERANCE}"),
-                "Correct the row or the column order in run.toml (w, x, y, z).",
-            ));
+            let found = format_args!("a quaternion with norm {norm:.6}");
+            let expected = format_args!("norm 1 within {NORM_TOLERANCE}");
+            let advice = "Correct the row or the column order in run.toml (w, x, y, z).";
+            return Err(csv.error_here(found, expected, advice));
         }
         let angles = Some(angles).filter(|angles| !angles.is_empty());
         let attitude = UnitQuaternion::from_quaternion(quaternion);
@@ -98,48 +96,29 @@ impl<'a> Fields<'a> {
             Some(axes) => ("turntable.axes", Some(axes)),
             None => ("turntable.columns.axes", columns.axes.as_ref()),
         };
-        let wrong = |path, expected: &str, advice| Err(self.document.wrong(path, expected, advice));
-        let missing = |path, meaning| Err(self.document.missing(path, meaning));
-        let angles = match (&columns.angles, axes) {
-            (Some(names), Some(letters)) if names.is_empty() || names.len() != letters.len() => {
-                let count = letters.len();
-                return wrong(
-                    "turntable.columns.angles",
-                    &format!("one angle column for each of the {count} axes, outermost first"),
-                    "Complete `angles` or `axes`.",
-                );
-            }
-            (Some(names), Some(letters)) => {
-                let pairs = names.iter().zip(letters).map(|(name, letter)| {
-                    let axis = LETTERS.iter().find(|(known, _)| known == letter);
-                    axis.map(|(_, axis)| (name.as_str(), *axis))
-                });
-                let Some(pairs) = pairs.collect() else {
-                    return wrong(
-                        path,
-                        "`x`, `y` or `z` for each axis",
-                        "Name the axis about which the table turns when all angles are zero.",
-                    );
-                };
-                pairs
-            }
-            (Some(_), None) => return missing("turntable.axes", "the axes of the angles"),
-            (None, Some(_)) => {
-                return wrong(
-                    path,
-                    "axes together with columns of `angles`",
-                    "Name the angle columns, or remove the axes.",
-                );
-            }
-            (None, None) if columns.quaternion.is_none() => {
-                let meaning = "columns of a quaternion or of `angles`";
-                return missing("turntable.columns.quaternion", meaning);
-            }
-            (None, None) => Vec::new(),
+        let names = columns.angles.as_deref().unwrap_or_default();
+        let letters = axes.map_or(&[][..], Vec::as_slice);
+        if names.len() != letters.len() {
+            let of_angles = "turntable.columns.angles";
+            let path = if names.is_empty() { path } else { of_angles };
+            let expected = "one angle column for each axis, outermost first";
+            let advice = "Complete `angles` or `axes`.";
+            return Err(self.document.wrong(path, expected, advice));
+        }
+        if names.is_empty() && columns.quaternion.is_none() {
+            let path = "turntable.columns.quaternion";
+            let meaning = "columns of a quaternion or of `angles`";
+            return Err(self.document.missing(path, meaning));
+        }
+        let axis = |letter: &String| LETTERS.iter().find(|(known, _)| known == letter);
+        let axes = letters.iter().map(|letter| Some(axis(letter)?.1));
+        let Some(axes) = axes.collect() else {
+            let expected = "`x`, `y` or `z` for each axis";
+            let advice = "Name the axis about which the table turns when all angles are zero.";
+            return Err(self.document.wrong(path, expected, advice));
         };
-        let (of_angles, axes): (Vec<&str>, _) = angles.into_iter().unzip();
         let quaternion = columns.quaternion.iter().flat_map(|names| &names.0);
-        let names = quaternion.map(String::as_str).chain(of_angles).collect();
+        let names = quaternion.chain(names).map(String::as_str).collect();
         Ok(AttitudeColumns { names, axes })
     }
 
@@ -149,11 +128,11 @@ impl<'a> Fields<'a> {
         let mut axes = TableGeometry::default().axes;
         for (kind, key, stated) in fields.axis_errors() {
             if stated.is_some() && angles == 0 {
-                return Err(self.document.wrong(
-                    &format!("turntable.{key}"),
-                    "`angles` in the table log, because a quaternion does not separate the axes",
-                    "Remove it, or add the angles of the table axes, with or without the quaternion.",
-                ));
+                let path = format!("turntable.{key}");
+                let expected =
+                    "`angles` in the table log, because a quaternion does not separate the axes";
+                let advice = "Remove it, or add the angles of the table axes, with or without the quaternion.";
+                return Err(self.document.wrong(&path, expected, advice));
             }
             axes += kind.of_table(angles, sigma(stated));
         }
@@ -197,23 +176,15 @@ impl TableLogFile<'_> {
         attitude.shrink_to_fit();
         axes.shrink_to_fit();
         let time: Vec<f64> = stamps.of_rows.iter().map(|&(time, _)| time).collect();
-        let (first, last) = match time.as_slice() {
-            [first, .., last] => (*first, *last),
-            _ => {
-                return Err(csv.error(
-                    "fewer than 2 readings",
-                    "at least 2",
-                    "Log the table during the whole run, or remove [turntable].",
-                ));
-            }
+        let [first, .., last] = time.as_slice() else {
+            let advice = "Log the table during the whole run, or remove [turntable].";
+            return Err(csv.error("fewer than 2 readings", "at least 2", advice));
         };
         let (start, end) = (imu.start(), imu.end());
-        if last < start || first > end {
-            return Err(csv.error(
-                format_args!("readings from {first} s to {last} s"),
-                format_args!("times that overlap the IMU log ({start} s to {end} s)"),
-                "Convert both files to the same clock.",
-            ));
+        if *last < start || *first > end {
+            let found = format_args!("readings from {first} s to {last} s");
+            let expected = format_args!("times that overlap the IMU log ({start} s to {end} s)");
+            return Err(csv.error(found, expected, "Convert both files to the same clock."));
         }
         Ok(TableLog {
             time,

@@ -136,8 +136,9 @@ impl Temperatures {
         let usable = self.channels.iter().all(sound);
         let first = self.first.unwrap_or(0.0);
         let values = self.channels.into_iter().map(Channel::filled).collect();
+        let middle = first + 0.5 * TEMPERATURE_SPACING;
         let temperature = usable
-            .then(|| Temperature::new(first + 0.5 * TEMPERATURE_SPACING, values, self.of))
+            .then(|| Temperature::new(middle, values, self.of))
             .flatten();
         Read {
             temperature,
@@ -149,11 +150,8 @@ impl Temperatures {
 
 impl Channel {
     fn take(&mut self, csv: &LogRows, span: usize, unit: TemperatureUnit) {
-        let value = csv
-            .number(self.place)
-            .ok()
-            .filter(|value| value.is_finite());
-        let Some(value) = value else {
+        let value = csv.number(self.place).ok();
+        let Some(value) = value.filter(|value| value.is_finite()) else {
             if self.missing.0 == 0 {
                 self.missing.1 = csv.line();
             }
@@ -204,13 +202,9 @@ impl Channel {
 
     /// Means of the spans, with linear interpolation for spans without a value.
     fn filled(self) -> Vec<f64> {
-        let known: Vec<(usize, f64)> = self
-            .spans
-            .iter()
-            .enumerate()
-            .filter(|(_, (_, count))| *count > 0)
-            .map(|(k, (sum, count))| (k, sum / f64::from(*count)))
-            .collect();
+        let known = self.spans.iter().enumerate().filter(|(_, of)| of.1 > 0);
+        let mean = |(k, (sum, count)): (usize, &(f64, u32))| (k, sum / f64::from(*count));
+        let known: Vec<(usize, f64)> = known.map(mean).collect();
         let filled = |k: usize| {
             let behind = known.partition_point(|&(at, _)| at <= k);
             let [before, after] = [behind.wrapping_sub(1), behind].map(|of| known.get(of));

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::page::{self, Remarks};
 use crate::is_toml;
-use turncal::calibration::{DayToDay, Group, TemperatureOptions, Together};
-use turncal::imu::{HIGHEST_ORDER, InstallationForm, ParameterKind};
+use turncal::calibration::{DayToDay, TemperatureOptions, Together};
+use turncal::imu::HIGHEST_ORDER;
 use turncal::number::rounded;
 use turncal::recording::Temperature;
 use turncal::run::Run;
@@ -31,9 +31,6 @@ pub struct Campaign {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CampaignFile {
-    /// Parameter groups that are independent in each recording.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    own: Vec<String>,
     temperature: Option<TemperatureFile>,
     recording: Vec<RecordingFile>,
     /// 1σ from one recording to the next.
@@ -115,8 +112,7 @@ impl Campaign {
         let stated = &file.day_to_day;
         document.only("day_to_day", stated.keys(), &DayToDay::keys())?;
         let value = |key: &str| stated.get(key).map_or(0.0, |sigma| sigma.0);
-        let mut day_to_day = DayToDay::of_values(value);
-        own_parameters(document, &file.own, &runs, &mut day_to_day)?;
+        let day_to_day = DayToDay::of_values(value);
         let temperature = match temperature {
             Some(stated) => stated,
             None => {
@@ -144,7 +140,6 @@ pub fn campaign_text(paths: &[String], day_to_day: &DayToDay) -> String {
     let rounded_sigma = |(key, sigma)| (key, NonNegative(rounded(sigma, 3)));
     let differing = day_to_day.values().filter(|(_, sigma)| *sigma > 0.0);
     let file = CampaignFile {
-        own: Vec::new(),
         temperature: None,
         recording: paths.iter().map(recording).collect(),
         day_to_day: differing.map(rounded_sigma).collect(),
@@ -179,38 +174,4 @@ fn temperature(
         rate: rate.unwrap_or(usual.rate),
         reference: reference.map(|of| of.0).or(usual.reference),
     }))
-}
-
-/// The name of a group in `own`.
-fn own_name(group: Group) -> String {
-    let kind = match group.kind() {
-        ParameterKind::Scale => "scale",
-        ParameterKind::Installation => "installation",
-        ParameterKind::Bias => "bias",
-    };
-    format!("{}.{kind}", group.sensor().name())
-}
-
-/// Lets groups differ freely between recordings: by the 1σ by which instruments differ.
-fn own_parameters(
-    document: Document,
-    own: &[String],
-    runs: &[Run],
-    day_to_day: &mut DayToDay,
-) -> Result<(), FileError> {
-    let form = InstallationForm::General;
-    for name in own {
-        let Some(group) = Group::all().find(|&group| own_name(group) == *name) else {
-            let known: Vec<String> = Group::all().map(own_name).collect();
-            let expected = format_args!("names from the list {}", known.join(", "));
-            let advice = "Name parameter groups that differ freely between recordings.";
-            return Err(document.wrong("own", expected, advice));
-        };
-        for i in group.parameters(form) {
-            let (sensor, of_triad) = turncal::calibration::sensor_and_parameter(i);
-            let sigma = |run: &Run| run.instrument.prior.get(sensor).sigma(form)[of_triad];
-            day_to_day.parameters[i] = runs.first().map_or(0.0, sigma);
-        }
-    }
-    Ok(())
 }

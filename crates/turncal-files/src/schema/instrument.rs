@@ -79,10 +79,12 @@ impl<'a> Fields<'a> {
             );
             return Err(self.document.missing("imu.stream", &meaning));
         }
-        of_gyro.breaks = match self.run.turntable.is_some() || self.run.segments.is_some() {
-            _ if accel_from.is_some() => Breaks::None,
-            true => Breaks::Pauses,
-            false => Breaks::Settings,
+        of_gyro.breaks = if accel_from.is_some() {
+            Breaks::None
+        } else if self.run.turntable.is_some() || self.run.segments.is_some() {
+            Breaks::Pauses
+        } else {
+            Breaks::Settings
         };
         let without_period = self.with_usual_period(&mut of_gyro)?;
         let names = |sensor| match imu.of(sensor).columns {
@@ -218,11 +220,10 @@ impl<'a> Fields<'a> {
         let known = || units(sensor, imu.output);
         let names = || known().map(|(name, _)| name);
         let Some((_, of_unit)) = known().find(|(name, _)| *name == unit) else {
-            return Err(document.wrong(
-                &format!("imu.{}_unit", sensor.name()),
-                format_args!("one of {}", list(names())),
-                suggestion(unit, names(), "Choose one of them."),
-            ));
+            let path = format!("imu.{}_unit", sensor.name());
+            let expected = format!("one of {}", list(names()));
+            let advice = suggestion(unit, names(), "Choose one of them.");
+            return Err(document.wrong(&path, expected, advice));
         };
         let path = format!("imu.prior.{}.scale", sensor.name());
         let is_near = |scale: &Vector3<f64>, of_unit: f64| {

@@ -117,12 +117,10 @@ fn check_complete(
         count => format!("{count} required fields"),
     };
     let missing = list(missing.iter().map(String::as_str));
-    Err(FileError::of(
-        path,
-        format_args!("{fields} missing"),
-        format_args!("the fields required by ISO/IEC 17025, 7.8.2 and 7.8.4: {missing}"),
-        "Add them; `turncal certificate --draft` shows an example.",
-    ))
+    let found = format_args!("{fields} missing");
+    let expected = format_args!("the fields required by ISO/IEC 17025, 7.8.2 and 7.8.4: {missing}");
+    let advice = "Add them; `turncal certificate --draft` shows an example.";
+    Err(FileError::of(path, found, expected, advice))
 }
 
 /// Refuses empty texts and normalises white space for page and XML.

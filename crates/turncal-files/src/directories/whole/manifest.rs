@@ -69,9 +69,8 @@ pub fn foreign(directory: &Path) -> io::Result<Option<PathBuf>> {
             .entry(one.into())
             .or_insert_with(|| listed(&directory.join(grown).join(one)));
         let rest = name(parts.as_path());
-        !list
-            .as_ref()
-            .is_some_and(|list| rest.is_empty() || list.contains(&rest))
+        let names = |list: &BTreeSet<String>| rest.is_empty() || list.contains(&rest);
+        !list.as_ref().is_some_and(names)
     })
 }
 

@@ -1,6 +1,6 @@
 //! A temporary location next to an output.
 
-use std::fs::{self, File, OpenOptions, TryLockError};
+use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -12,8 +12,6 @@ use std::time::Duration;
 use turncal_input::FileError;
 
 const PREFIX: &str = ".turncal-";
-/// Locked during the lifetime of the process that created the stage.
-const LOCK: &str = "turncal.lock";
 const NEW: &str = "new";
 const OLD: &str = "old";
 /// New output that is being removed.
@@ -26,12 +24,9 @@ static ENDING: AtomicBool = AtomicBool::new(false);
 
 /// Error: an output must not replace what is at `target`.
 pub fn taken(target: &Path) -> FileError {
-    FileError::of(
-        target,
-        "an existing file or directory of this name",
-        "an unused name",
-        "Choose another name, or add --force to replace it.",
-    )
+    let found = "an existing file or directory of this name";
+    let advice = "Choose another name, or add --force to replace it.";
+    FileError::of(target, found, "an unused name", advice)
 }
 
 /// Error: the system does not allow writing at `target`.
@@ -101,7 +96,7 @@ impl Beside {
 pub struct Stage {
     /// Contains the new output and, during the exchange, the old one. Removed on drop.
     beside: Beside,
-    /// `None` if the file system has no locks.
+    /// The stage, locked during the lifetime of this process; `None` if the system has no locks of directories.
     lock: Option<File>,
     target: PathBuf,
 }
@@ -109,55 +104,38 @@ pub struct Stage {
 impl Stage {
     pub fn new(target: &Path) -> Result<Self, FileError> {
         if target.file_name().is_none() {
-            return Err(FileError::of(
-                target,
-                "a path that does not end in a name",
-                "the name of a file or directory to write",
-                "Give a name that does not end in `..` or `/`.",
-            ));
+            let found = "a path that does not end in a name";
+            let expected = "the name of a file or directory to write";
+            let advice = "Give a name that does not end in `..` or `/`.";
+            return Err(FileError::of(target, found, expected, advice));
         }
         let parent = match target.parent() {
             Some(parent) if parent != Path::new("") => parent,
             _ => Path::new("."),
         };
-        let missing: Vec<PathBuf> = parent
-            .ancestors()
-            .take_while(|ancestor| *ancestor != Path::new("") && !ancestor.exists())
-            .map(Path::to_owned)
-            .collect();
+        let is_missing = |of: &&Path| **of != *Path::new("") && !of.exists();
+        let missing = parent.ancestors().take_while(is_missing);
+        let missing: Vec<PathBuf> = missing.map(Path::to_owned).collect();
         let begun = fs::create_dir_all(parent).and_then(|()| {
             remove_abandoned(parent);
             begin(parent)
         });
-        match begun {
-            Ok((stage, lock)) => {
-                let beside = Beside {
-                    stage,
-                    parents: missing,
-                };
-                beside.announce();
-                Ok(Self {
-                    beside,
-                    lock,
-                    target: target.to_owned(),
-                })
-            }
-            Err(error) => {
-                let _ = missing.iter().try_for_each(fs::remove_dir);
-                let file = parent.ancestors().find(|ancestor| ancestor.is_file());
-                Err(file.map_or_else(
-                    || unwritable(target, "write here", &error),
-                    |file| {
-                        FileError::of(
-                            target,
-                            format_args!("the file {} in the path", file.display()),
-                            "directories",
-                            "Choose another name.",
-                        )
-                    },
-                ))
-            }
-        }
+        let (stage, lock) = begun.map_err(|error| {
+            let _ = missing.iter().try_for_each(fs::remove_dir);
+            let Some(file) = parent.ancestors().find(|ancestor| ancestor.is_file()) else {
+                return unwritable(target, "write here", &error);
+            };
+            let found = format_args!("the file {} in the path", file.display());
+            FileError::of(target, found, "directories", "Choose another name.")
+        })?;
+        let (target, parents) = (target.to_owned(), missing);
+        let beside = Beside { stage, parents };
+        beside.announce();
+        Ok(Self {
+            beside,
+            lock,
+            target,
+        })
     }
 
     pub fn new_path(&self) -> PathBuf {
@@ -187,16 +165,10 @@ impl Stage {
             return Ok(());
         };
         if exists && fs::rename(&old, &self.target).is_err() {
-            let doing = format!(
-                "put the output in place (the old output is in {})",
-                self.beside.stage.display()
-            );
-            return Err(FileError::io(
-                &self.target,
-                &doing,
-                &error,
-                "Move it back by hand.",
-            ));
+            let stage = self.beside.stage.display();
+            let doing = format!("put the output in place (the old output is in {stage})");
+            let advice = "Move it back by hand.";
+            return Err(FileError::io(&self.target, &doing, &error, advice));
         }
         Err(refused(error))
     }
@@ -212,63 +184,31 @@ impl Drop for Stage {
 
 /// Creates and locks a stage.
 fn begin(parent: &Path) -> io::Result<(PathBuf, Option<File>)> {
-    const ATTEMPTS: usize = 20;
-    for _ in 0..ATTEMPTS {
-        let beside = tempfile::Builder::new()
-            .prefix(PREFIX)
-            .tempdir_in(parent)?
-            .keep();
-        let lock = beside.join(LOCK);
-        let file = match File::create_new(&lock) {
-            Ok(file) => file,
-            // Taken for abandoned by another process before it could be locked.
-            Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
-            Err(error) => {
-                let _ = fs::remove_dir(&beside);
-                return Err(error);
-            }
-        };
-        match file.try_lock() {
-            Ok(()) if lock.exists() => return Ok((beside, Some(file))),
-            Ok(()) | Err(TryLockError::WouldBlock) => {}
-            Err(TryLockError::Error(_)) => return Ok((beside, None)),
-        }
-    }
-    Err(io::ErrorKind::ResourceBusy.into())
+    let stage = tempfile::Builder::new().prefix(PREFIX).tempdir_in(parent)?;
+    let stage = stage.keep();
+    let lock = File::open(&stage).ok();
+    let lock = lock.filter(|stage| stage.try_lock().is_ok());
+    Ok((stage, lock))
 }
 
-/// Removes stages of processes that no longer exist from a directory.
+/// Removes stages of processes that no longer exist from a directory, except empty ones, which may be about to be locked.
 pub fn remove_abandoned(parent: &Path) {
-    let Ok(entries) = fs::read_dir(parent) else {
-        return;
-    };
-    for entry in entries.flatten() {
-        let is_stage = entry
-            .file_name()
-            .as_encoded_bytes()
-            .starts_with(PREFIX.as_bytes())
-            && entry.file_type().is_ok_and(|kind| kind.is_dir());
-        if is_stage {
-            // What cannot be removed, another user's for one, does no harm.
-            let _ = remove_if_abandoned(&entry.path());
+    for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
+        let (stage, name) = (entry.path(), entry.file_name());
+        let is_begun = || {
+            [NEW, OLD, DEAD]
+                .iter()
+                .any(|name| stage.join(name).exists())
+        };
+        if name.as_encoded_bytes().starts_with(PREFIX.as_bytes())
+            && entry.file_type().is_ok_and(|kind| kind.is_dir())
+            && is_begun()
+            && File::open(&stage).is_ok_and(|lock| lock.try_lock().is_ok())
+        {
+            // Another user's stage cannot be removed, which does no harm.
+            let _ = remove(&stage);
         }
     }
-}
-
-fn remove_if_abandoned(stage: &Path) -> io::Result<()> {
-    let lock = stage.join(LOCK);
-    match fs::symlink_metadata(&lock) {
-        Ok(found) if found.is_file() => {}
-        Ok(_) => return Ok(()),
-        // Not locked yet, or never to be: one that is still empty is made again.
-        Err(_) => return fs::remove_dir(stage),
-    }
-    let file = OpenOptions::new().read(true).write(true).open(&lock)?;
-    if file.try_lock().is_err() {
-        return Ok(());
-    }
-    // Locked until it is gone: it may be about to be taken into use.
-    remove(stage)
 }
 
 /// Removes a stage, except one with the only copy of the output that was to be replaced.
@@ -286,7 +226,6 @@ fn remove(stage: &Path) -> io::Result<()> {
             Err(_) => {}
         }
     }
-    let _ = fs::remove_file(stage.join(LOCK));
     match fs::remove_dir(stage) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
         _ => Ok(()),

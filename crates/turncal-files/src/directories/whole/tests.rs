@@ -131,20 +131,22 @@ fn the_next_output_clears_what_a_killed_process_left_and_touches_no_living_one()
             fs::write(directory.join(file), "1").unwrap();
         }
     };
-    // Killed while it wrote, before it locked, and after it had put its output in place.
-    stage(".turncal-killed", &["turncal.lock", "new"]);
+    // Killed while it wrote, and after it had put its output in place.
+    stage(".turncal-killed", &["new"]);
+    stage(".turncal-late", &["old"]);
+    // Perhaps about to be locked.
     stage(".turncal-empty", &[]);
-    stage(".turncal-late", &["turncal.lock", "old"]);
     // The only copy of what was to be replaced, and what was never turncal's.
-    stage(".turncal-between", &["turncal.lock", "new", "old"]);
-    stage(".turncal-mine", &["new"]);
-    stage(".turncal-too", &["turncal.lock", "new", "notes.txt"]);
+    stage(".turncal-between", &["new", "old"]);
+    stage(".turncal-mine", &["notes.txt"]);
+    stage(".turncal-too", &["new", "notes.txt"]);
     write_whole(&root.path().join("file"), b"1", false).unwrap();
     living.commit().unwrap();
     assert_eq!(
         names(root.path()),
         [
             ".turncal-between",
+            ".turncal-empty",
             ".turncal-mine",
             ".turncal-too",
             "file",
@@ -152,10 +154,7 @@ fn the_next_output_clears_what_a_killed_process_left_and_touches_no_living_one()
         ]
     );
     assert!(root.path().join(".turncal-too/notes.txt").exists());
-    assert_eq!(
-        names(&root.path().join(".turncal-between")),
-        ["new", "old", "turncal.lock"]
-    );
+    assert_eq!(names(&root.path().join(".turncal-between")), ["new", "old"]);
 }
 
 #[test]

@@ -108,9 +108,8 @@ pub struct StatedColumns {
 impl StatedColumns {
     /// Refuses a column that the table does not have.
     pub fn check(&self, table: &Table) -> Result<(), FileError> {
-        let triads = Sensor::ALL
-            .into_iter()
-            .flat_map(|of| self.triads.get(of).iter().flatten());
+        let triad = |of: Sensor| self.triads.get(of).iter().flatten();
+        let triads = Sensor::ALL.into_iter().flat_map(triad);
         let mut all = triads.chain(&self.time).chain(&self.temperature);
         let Some(missing) = all.find(|name| !table.names().contains(name)) else {
             return Ok(());
@@ -118,12 +117,8 @@ impl StatedColumns {
         let names = || table.names().iter().map(String::as_str);
         let found = format_args!("the columns {}", choice(missing, names()));
         let advice = suggestion(missing, names(), "Correct the name.");
-        Err(FileError::of(
-            table.name(),
-            found,
-            format_args!("a column `{missing}`"),
-            advice,
-        ))
+        let expected = format_args!("a column `{missing}`");
+        Err(FileError::of(table.name(), found, expected, advice))
     }
 }
 
