@@ -112,6 +112,87 @@ run = \"mild/run.toml\"
     );
 }
 
+/// The bias that an autopilot takes off at a temperature by its own equation, along front, right and down, over that
+/// at the temperature of its calibration.
+fn px4(value: &dyn Fn(&str) -> f64, letter: char, place: usize, temperature: f64) -> f64 {
+    let of = |name: &str| value(&format!("TC_{letter}0_{name}"));
+    let d = temperature.clamp(of("TMIN"), of("TMAX")) - of("TREF");
+    let x = |k: usize| of(&format!("X{k}_{place}"));
+    x(0) + d * (x(1) + d * (x(2) + d * x(3)))
+}
+
+fn ardupilot(value: &dyn Fn(&str) -> f64, letter: char, place: usize, temperature: f64) -> f64 {
+    let kind = if letter == 'G' { "GYR" } else { "ACC" };
+    let within = |t: f64| t.clamp(value("INS_TCAL1_TMIN"), value("INS_TCAL1_TMAX"));
+    let at = |t: f64| {
+        let d = within(t) - 35.0;
+        let c = |k: usize| value(&format!("INS_TCAL1_{kind}{k}_{}", ["X", "Y", "Z"][place]));
+        d * (c(1) + d * (c(2) + d * c(3))) * 1e-6
+    };
+    at(temperature) - at(value(&format!("INS_{kind}1_CALTEMP")))
+}
+
+/// A parameter of an autopilot by its name, a letter for the triad, place of the axis and temperature.
+type Evaluated = fn(&dyn Fn(&str) -> f64, char, usize, f64) -> f64;
+
+#[test]
+fn autopilots_take_off_the_bias_at_a_temperature() {
+    let here = tempfile::tempdir().unwrap();
+    let here = here.path();
+    simulated(here);
+    calibrated(here, "simulated/campaign.toml", "all", "2");
+    let record = turncal_files::read_calibration(&here.join("all/calibration.json")).unwrap();
+    let run = turncal_files::read_run(&here.join("simulated/mild/run.toml")).unwrap();
+    let formats: [(&str, Evaluated); 2] = [("px4", px4), ("ardupilot", ardupilot)];
+    for (format, evaluate) in formats {
+        let arguments = [
+            "export",
+            "all/calibration.json",
+            "--format",
+            format,
+            "--run",
+            "simulated/mild/run.toml",
+        ];
+        let done = turncal(here, &arguments);
+        assert!(done.status.success(), "{}", words(&done));
+        let text = String::from_utf8(done.stdout).unwrap();
+        let value = |name: &str| -> f64 {
+            let line = text.lines().find(|line| {
+                let mut fields = line.split(['\t', ',']);
+                !line.starts_with('#') && fields.any(|field| field == name)
+            });
+            let mut fields = line.expect(name).split(['\t', ',']);
+            fields.find(|&field| field == name);
+            fields.next().unwrap().parse().unwrap()
+        };
+        let reference = record.temperature.as_ref().unwrap().range.gyro.reference;
+        let there = record.at_temperature(reference).unwrap();
+        for temperature in [2.0, 17.0, 38.0] {
+            let at = record.at_temperature(temperature).unwrap();
+            for sensor in Sensor::ALL {
+                let letter = match sensor {
+                    Sensor::Gyro => 'G',
+                    Sensor::Accel => 'A',
+                };
+                for (place, (axis, sign)) in [(1, 1.0), (0, 1.0), (2, -1.0)].into_iter().enumerate()
+                {
+                    let name = format!("{}.bias.{}", sensor.name(), ["x", "y", "z"][axis]);
+                    let nominal = run.instrument.nominal.get(sensor).0[axis];
+                    let expected = sign * (at[&name] - there[&name]) / nominal;
+                    let found = evaluate(&value, letter, place, temperature);
+                    // Numbers of 24 bits; what cancels between two temperatures is of the size of forty kelvin.
+                    let coefficient =
+                        (record.at_temperature(0.0).unwrap()[&name] - there[&name]) / nominal;
+                    assert!(
+                        (found - expected).abs() < 1e-5 * coefficient.abs().max(expected.abs()),
+                        "{format} {name} at {temperature}: {found} {expected}"
+                    );
+                }
+            }
+        }
+    }
+}
+
 /// A MEMS sensor that warms by 35 K in an hour, on a table.
 const WARMING: &str = "seed = 1
 [site]

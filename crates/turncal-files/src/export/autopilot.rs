@@ -3,8 +3,9 @@
 //! PX4 and ArduPilot compute `(n − offset) ⊙ scale` for accelerometers and `n − offset` for gyros, in sensor axes, and
 //! then rotate to body axes (`SENS_BOARD_ROT`, `AHRS_ORIENTATION`). INAV and Betaflight do the same in whole counts.
 //!
-//! Source: PX4-Autopilot, `src/lib/sensor_calibration`; ArduPilot, `AP_InertialSensor_Backend.cpp`,
-//! `_rotate_and_correct_accel`; Betaflight, `acceleration.c`, `applyAccelerationTrims`; INAV, `acceleration.c`, `applyAccelerationZero`, and
+//! Source: PX4-Autopilot, `src/lib/sensor_calibration` and `src/modules/temperature_compensation`; ArduPilot,
+//! `AP_InertialSensor_Backend.cpp`, `_rotate_and_correct_accel`, and `AP_InertialSensor_tempcal.cpp`, `correct_sensor`;
+//! Betaflight, `acceleration.c`, `applyAccelerationTrims`; INAV, `acceleration.c`, `applyAccelerationZero`, and
 //! `gyro.c`, `gyro_zero_x`.
 
 use nalgebra::Vector3;
@@ -12,11 +13,14 @@ use nalgebra::Vector3;
 use super::affine::Affine;
 use super::remarks::{Exported, Remarks};
 use super::values::Values;
-use turncal::imu::{AXES, PerSensor};
+use turncal::imu::{AXES, PerSensor, Sensor};
 use turncal::units::{DEGREE, STANDARD_GRAVITY};
 
 const UPPER: [&str; 3] = ["X", "Y", "Z"];
 const UNCORRECTED: &str = "gyro scale factors and all misalignments";
+/// Reference temperature of ArduPilot, °C, and the factor of its coefficients.
+const ARDUPILOT_REFERENCE: f64 = 35.0;
+const ARDUPILOT_FACTOR: f64 = 1e6;
 /// Counts per g of a 16-bit sensor with ±16 g, the setting of Betaflight and INAV …
 const COUNTS_PER_G: f64 = 2048.0;
 /// … and per rad/s with ±2000 °/s.
@@ -49,18 +53,44 @@ fn parameters(program: &PerSensor<Affine>, [gyro, offset, scale]: [&str; 3]) -> 
     gyros.chain(accel).collect()
 }
 
-/// Vehicle, component, name, value, and type: a number of 32 bits.
+/// Vehicle, component, name, value, type: 9 is a number of 32 bits, 6 a whole number.
+fn px4_lines(parameters: Parameters) -> String {
+    let line = |(name, value): (String, f64)| format!("1\t1\t{name}\t{:?}\t9\n", value as f32);
+    parameters.into_iter().map(line).collect()
+}
+
+/// PX4's temperature: `n − (X0 + X1 d + X2 d² + X3 d³)`, d = T − TREF, before `CAL_*` are applied.
 pub fn px4(values: &Values) -> Exported {
     let program = single(values);
     let id = "device identity: PX4 uses the parameters whose CAL_ACC0_ID and CAL_GYRO0_ID match the device; rename \
         them for an instrument other than number 0";
     let names = ["CAL_GYRO0_#OFF", "CAL_ACC0_#OFF", "CAL_ACC0_#SCALE"];
-    let line = |(name, value): (String, f64)| format!("1\t1\t{name}\t{:?}\t9\n", value as f32);
-    let text: String = parameters(&program, names).into_iter().map(line).collect();
+    let mut text = px4_lines(parameters(&program, names));
+    let thermal = values.record.temperature.iter();
+    for (thermal, sensor) in thermal.flat_map(|thermal| Sensor::ALL.map(|sensor| (thermal, sensor)))
+    {
+        let range = thermal.range.get(sensor);
+        let all = sensor.pick("TC_G", "TC_A");
+        let mut parameters = vec![
+            (format!("{all}0_TREF"), range.reference),
+            (format!("{all}0_TMIN"), range.lowest),
+            (format!("{all}0_TMAX"), range.highest),
+        ];
+        let powers = values.triads.get(sensor).bias_powers;
+        for (axis, [a, b, c]) in powers.into_iter().enumerate() {
+            // The constant part is in CAL_*.
+            let powers = [0.0, a, b, c].into_iter().enumerate();
+            parameters.extend(powers.map(|(k, power)| (format!("{all}0_X{k}_{axis}"), power)));
+        }
+        text += &px4_lines(parameters);
+        text += &format!("1\t1\t{all}_ENABLE\t1\t6\n");
+    }
     let reads = ("#", "PX4 reads rad/s and m/s^2");
     Remarks::of_program(values, reads, &program, &[UNCORRECTED, id]).above(&text)
 }
 
+/// ArduPilot's temperature: `n − p(T) + p(T_cal)` before the offsets are subtracted, with `p(T) = (c₁ d + c₂ d² + c₃
+/// d³) 10⁻⁶`, d = T − 35 °C.
 pub fn ardupilot(values: &Values) -> Exported {
     let program = single(values);
     let notes = [
@@ -68,9 +98,33 @@ pub fn ardupilot(values: &Values) -> Exported {
         "instance number: the second instance uses INS_ACC2OFFS_X and so on",
         "permanent gyro offsets: ArduPilot re-estimates them at every start unless INS_GYR_CAL is 0",
     ];
+    let lines = |parameters: Parameters| -> String {
+        let line = |(name, value): (String, f64)| format!("{name},{:?}\n", value as f32);
+        parameters.into_iter().map(line).collect()
+    };
     let names = ["INS_GYROFFS_#", "INS_ACCOFFS_#", "INS_ACCSCAL_#"];
-    let line = |(name, value): (String, f64)| format!("{name},{:?}\n", value as f32);
-    let text: String = parameters(&program, names).into_iter().map(line).collect();
+    let mut text = lines(parameters(&program, names));
+    if let Some(thermal) = &values.record.temperature {
+        let range = thermal.range.gyro;
+        let mut parameters = vec![
+            ("INS_TCAL1_TMIN".to_owned(), range.lowest),
+            ("INS_TCAL1_TMAX".to_owned(), range.highest),
+        ];
+        for (sensor, kind) in [(Sensor::Accel, "ACC"), (Sensor::Gyro, "GYR")] {
+            let reference = thermal.range.get(sensor).reference;
+            for (axis, [a, b, c]) in UPPER.iter().zip(values.triads.get(sensor).bias_powers) {
+                // Of a polynomial about the reference the same about 35 °C, except for a constant.
+                let s = ARDUPILOT_REFERENCE - reference;
+                let about = [a + 2.0 * b * s + 3.0 * c * s * s, b + 3.0 * c * s, c];
+                let name = |k: usize| format!("INS_TCAL1_{kind}{k}_{axis}");
+                let about = about.map(|power| power * ARDUPILOT_FACTOR);
+                parameters.extend((1..).map(name).zip(about));
+            }
+            parameters.push((format!("INS_{kind}1_CALTEMP"), reference));
+        }
+        text += "INS_TCAL1_ENABLE,1\n";
+        text += &lines(parameters);
+    }
     let reads = ("#", "ArduPilot reads rad/s and m/s^2");
     Remarks::of_program(values, reads, &program, &notes).above(&text)
 }

@@ -36,8 +36,8 @@ pub struct Format {
     pub about: &'static str,
     axes: Axes,
     write: fn(&Values) -> Exported,
-    /// Whether it holds the temperature dependence, and not a calibration at one temperature.
-    has_temperature: bool,
+    /// Temperature dependence that the format omits; `None` for a calibration at one temperature.
+    of_temperature: Option<&'static str>,
 }
 
 const fn row(
@@ -53,20 +53,25 @@ const fn row(
         about,
         axes,
         write,
-        has_temperature: false,
+        of_temperature: None,
     }
 }
+
+/// Temperature dependence that autopilots cannot represent.
+const IN_AUTOPILOTS: &str = "change of scale factors and misalignments with temperature, change of biases with \
+    temperature rate, and orders above three; biases refer to the temperature of the sensor";
 
 /// Every format.
 #[rustfmt::skip]
 pub static FORMATS: [Format; 14] = [
     row("kalibr", "yaml", "IMU intrinsics for Kalibr, model scale-misalignment", RightFrontUp, kalibr::kalibr),
     row("kf-gins", "yaml", "IMU section of a KF-GINS configuration", FrontRightDown, kf_gins::write),
-    row("c", "h", "A C99 header with constants and a function", RightFrontUp, code::write).with_temperature(),
+    row("c", "h", "A C99 header with constants and a function", RightFrontUp, code::write).with_temperature(""),
     row("text", "txt", "All values with name, σ and unit", RightFrontUp, text::write),
-    row("px4", "params", "PX4 parameters: CAL_GYRO0, CAL_ACC0", FrontRightDown, autopilot::px4),
+    row("px4", "params", "PX4 parameters: CAL_GYRO0, CAL_ACC0", FrontRightDown, autopilot::px4)
+        .with_temperature(IN_AUTOPILOTS),
     row("ardupilot", "param", "ArduPilot parameters: INS_GYROFFS, INS_ACCOFFS, INS_ACCSCAL", FrontRightDown,
-        autopilot::ardupilot),
+        autopilot::ardupilot).with_temperature(IN_AUTOPILOTS),
     row("open-vins-kalibr", "yaml", "IMU intrinsics for OpenVINS, model kalibr", Log, kalibr::open_vins_kalibr),
     row("open-vins-rpng", "yaml", "IMU intrinsics for OpenVINS, model rpng", Log, kalibr::open_vins_rpng),
     row("imu-calib", "yaml", "Accelerometer calibration for the ROS package imu_calib", Log, ros::imu_calib),
@@ -84,9 +89,9 @@ impl Format {
         FORMATS.iter().find(|format| format.name == name)
     }
 
-    const fn with_temperature(self) -> Self {
+    const fn with_temperature(self, omitted: &'static str) -> Self {
         Self {
-            has_temperature: true,
+            of_temperature: Some(omitted),
             ..self
         }
     }
@@ -103,14 +108,17 @@ pub fn write(
     run: Option<&Run>,
 ) -> Result<Exported, CorrectionError> {
     let mut exported = (format.write)(&Values::new(record, run, format.axes)?);
-    if let Some(thermal) = &record.temperature
-        && !format.has_temperature
-    {
+    if let Some(thermal) = &record.temperature {
         let reference = thermal.range.gyro.reference;
-        exported.notes.push(format!(
-            "change with temperature; this is the calibration at {reference} °C (use --temperature-degc for another \
-             temperature)"
-        ));
+        let omitted = match format.of_temperature {
+            Some(omitted) => omitted.to_owned(),
+            None => format!(
+                "change with temperature; this is the calibration at {reference} °C (use --temperature-degc for \
+                 another temperature)"
+            ),
+        };
+        let omitted = Some(omitted).filter(|note| !note.is_empty());
+        exported.notes.extend(omitted);
     }
     Ok(exported)
 }

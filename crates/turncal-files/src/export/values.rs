@@ -5,8 +5,11 @@ use nalgebra::{Matrix3, Vector3};
 use crate::unit_scale;
 use turncal::calibration::result::{Calibration, TriadRecord};
 use turncal::calibration::{Correction, CorrectionError};
-use turncal::imu::{AxisOrder, GaussMarkov, Noise, PerSensor, Sensor, Term};
+use turncal::imu::{AXES, AxisOrder, GaussMarkov, Noise, PerSensor, Sensor, Term};
 use turncal::run::Run;
+
+/// Polynomial orders in temperature supported by autopilots.
+pub const ORDERS: usize = 3;
 
 /// Axes of the values of a format.
 #[derive(Debug, Clone, Copy)]
@@ -43,6 +46,8 @@ pub struct Normalised {
     pub scale_sigma: Option<Vector3<f64>>,
     /// 1σ of the bias in n.
     pub bias_sigma: Option<Vector3<f64>>,
+    /// Coefficients of powers 1 to 3 of the bias about the reference temperature, axis by axis, in n per °C, °C², °C³.
+    pub bias_powers: [[f64; ORDERS]; 3],
     /// Stated noise of the run.
     pub noise: Option<Noise>,
 }
@@ -136,6 +141,13 @@ impl Normalised {
         let nominal = back.each(nominal);
         let sigma = record.sigma.as_ref().map(|sigma| sigma.get(sensor));
         let in_n = |sigma: [f64; 3]| back.each(sigma.into()).component_div(&nominal.abs());
+        let powers = record.temperature.as_ref().map(|thermal| &thermal.powers);
+        let bias_powers = std::array::from_fn(|axis| {
+            let name = format!("{}.bias.{}", sensor.name(), AXES[back.source[axis]]);
+            let of_axis = powers.and_then(|powers| powers.get(&name));
+            let power = |k| of_axis.and_then(|of| of.get(k)).copied().unwrap_or(0.0);
+            std::array::from_fn(|k| back.sign(axis) * power(k) / nominal[axis])
+        });
         Self {
             // An exportable calibration has an inverse.
             inverse: sensitivity.try_inverse().unwrap_or_else(Matrix3::identity),
@@ -144,6 +156,7 @@ impl Normalised {
             scale_sigma: sigma.map(|sigma| in_n(sigma.scale)),
             bias_sigma: sigma.map(|sigma| in_n(sigma.bias)),
             nominal,
+            bias_powers,
             noise: run.map(|run| *run.instrument.noise.get(sensor)),
         }
     }
