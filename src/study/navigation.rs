@@ -4,6 +4,7 @@
 mod methods;
 mod outlook;
 mod quantity;
+mod suited;
 
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use thiserror::Error;
