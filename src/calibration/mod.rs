@@ -3,6 +3,8 @@
 //! A [`Problem`] takes runs and [`Options`]; [`estimate`] and [`six_position`] solve it; [`bound`] gives the Cramér–Rao
 //! bound. This module does not print, read files or draw.
 
+#[cfg(test)]
+mod chain;
 mod checks;
 mod constants;
 mod filter;

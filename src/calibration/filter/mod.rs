@@ -8,7 +8,7 @@ mod gain_cache;
 mod gate;
 mod input_prior;
 mod propagation;
-mod rows;
+pub mod rows;
 mod update;
 
 pub use dwell::{DwellFilters, Taken, dwell_filters};

@@ -15,7 +15,7 @@ macro_rules! sources {
     ($($(#[$attribute:meta])* $variant:ident, $triad:ident, $name:literal in $unit:literal = $value:expr,
         $table:literal $line:expr, part of $part:ident $(($of:ident))?;)*) => {
         /// A source of noise with one σ.
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
         #[serde(rename_all = "kebab-case")]
         pub enum Source {
             $($(#[$attribute])* #[doc = $name] $variant,)*

@@ -18,9 +18,9 @@ const EPOCHS: f64 = 3600.0;
 /// Events at one linearisation point, independent of the noise.
 pub struct Script<'a> {
     pub at: &'a Linearisation,
-    priors: &'a [AttitudePrior],
+    pub priors: &'a [AttitudePrior],
     /// Events of each stretch.
-    events: Vec<Vec<Event>>,
+    pub events: Vec<Vec<Event>>,
 }
 
 /// Quantities that scale the noise in moves, over all moves.

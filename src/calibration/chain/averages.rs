@@ -1,0 +1,310 @@
+//! Average over effects that may be absent and whose size is not known: error terms, temperature orders.
+//!
+//! A group of constants is absent with probability one half, else of its usual size, which is known to a factor three.
+//! The posterior of all constants is the average over these cases. With many groups it is found by expectation
+//! propagation (Minka 2001, "Expectation propagation for approximate Bayesian inference", UAI 17): the prior of each
+//! group becomes the normal factor with which the average over its own cases has the right mean and covariance, given
+//! those of all others. For one group this is exact.
+
+use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
+
+/// Sizes over the usual one: every half power of three to the factor 3^(3/2), with weights of a triangle over their
+/// logarithms.
+const SIZES: [(f64, f64); 7] = [
+    (0.192_450_089_729_875_26, 1.0 / 16.0),
+    (0.333_333_333_333_333_3, 2.0 / 16.0),
+    (0.577_350_269_189_625_8, 3.0 / 16.0),
+    (1.0, 4.0 / 16.0),
+    (1.732_050_807_568_877_2, 3.0 / 16.0),
+    (3.0, 2.0 / 16.0),
+    (5.196_152_422_706_632, 1.0 / 16.0),
+];
+/// Prior probability that a group is absent.
+const ABSENT: f64 = 0.5;
+/// Most rounds over all groups.
+const ROUNDS: usize = 50;
+/// A change of the probability that any group is absent by less than this has settled.
+const SETTLED: f64 = 1e-6;
+
+/// Constants that share one size.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Group {
+    /// Their places among all constants.
+    pub places: Vec<usize>,
+    /// Usual 1σ of each, in its unit.
+    pub usual: Vec<f64>,
+}
+
+/// What data say of all constants: `½ xᵀ information x − xᵀ vector` is −ln L up to a constant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Information {
+    pub information: DMatrix<f64>,
+    pub vector: DVector<f64>,
+}
+
+/// The average over all cases.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Average {
+    pub mean: DVector<f64>,
+    pub covariance: DMatrix<f64>,
+    /// Probability that each group is absent.
+    pub absent: Vec<f64>,
+}
+
+/// The normal factor in place of the prior of a group.
+struct Site(Information);
+
+/// The average over all cases of groups that differ from zero; other constants have their prior in the information
+/// already. `None` if the information does not determine them.
+pub fn average(all: &Information, groups: &[Group]) -> Option<Average> {
+    let mut sites: Vec<Site> = groups.iter().map(Site::usual).collect();
+    let mut absent = vec![ABSENT; groups.len()];
+    let mut now = with_sites(all, groups, &sites)?;
+    for _ in 0..ROUNDS {
+        let mut most = 0.0f64;
+        for (k, group) in groups.iter().enumerate() {
+            let cavity = sites[k].cavity(group, &now)?;
+            let (moments, probability) = cases(&cavity, &group.usual)?;
+            most = most.max((probability - absent[k]).abs());
+            absent[k] = probability;
+            sites[k] = Site::between(&cavity, &moments)?;
+            now = with_sites(all, groups, &sites)?;
+        }
+        if most < SETTLED {
+            break;
+        }
+    }
+    let (mean, covariance) = now;
+    Some(Average {
+        mean,
+        covariance,
+        absent,
+    })
+}
+
+/// Mean and covariance of all constants.
+fn with_sites(
+    all: &Information,
+    groups: &[Group],
+    sites: &[Site],
+) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    let mut sum = all.clone();
+    for (group, Site(site)) in groups.iter().zip(sites) {
+        for (row, &i) in group.places.iter().enumerate() {
+            sum.vector[i] += site.vector[row];
+            for (column, &j) in group.places.iter().enumerate() {
+                sum.information[(i, j)] += site.information[(row, column)];
+            }
+        }
+    }
+    // With a diagonal of ones, whatever the units.
+    let scale = sum.information.diagonal().map(|value| value.sqrt().recip());
+    let scaled = DMatrix::from_fn(scale.len(), scale.len(), |i, j| {
+        sum.information[(i, j)] * scale[i] * scale[j]
+    });
+    let inverse = Cholesky::new(scaled)?.inverse();
+    let covariance = DMatrix::from_fn(scale.len(), scale.len(), |i, j| {
+        inverse[(i, j)] * scale[i] * scale[j]
+    });
+    Some((&covariance * &sum.vector, covariance))
+}
+
+impl Site {
+    fn usual(group: &Group) -> Self {
+        let information = group.usual.iter().map(|sigma| sigma.powi(-2));
+        let information = DVector::from_iterator(group.usual.len(), information);
+        Self(Information {
+            vector: DVector::zeros(information.len()),
+            information: DMatrix::from_diagonal(&information),
+        })
+    }
+
+    /// What all but this site say of a group.
+    fn cavity(
+        &self,
+        group: &Group,
+        (mean, covariance): &(DVector<f64>, DMatrix<f64>),
+    ) -> Option<Information> {
+        let places = &group.places;
+        let own = covariance.select_rows(places).select_columns(places);
+        let inverse = Cholesky::new(own)?.inverse();
+        Some(Information {
+            vector: &inverse * mean.select_rows(places) - &self.0.vector,
+            information: inverse - &self.0.information,
+        })
+    }
+
+    /// The factor between a cavity and the moments of the average over the cases.
+    fn between(
+        cavity: &Information,
+        (mean, covariance): &(DVector<f64>, DMatrix<f64>),
+    ) -> Option<Self> {
+        let inverse = Cholesky::new(covariance.clone())?.inverse();
+        Some(Self(Information {
+            vector: &inverse * mean - &cavity.vector,
+            information: inverse - &cavity.information,
+        }))
+    }
+}
+
+/// Mean and covariance of a group over its cases, given what all others say, and the probability that it is absent.
+fn cases(cavity: &Information, usual: &[f64]) -> Option<((DVector<f64>, DMatrix<f64>), f64)> {
+    let n = usual.len();
+    // In units of the usual sizes, along the directions that the others determine independently.
+    let scaled = DMatrix::from_fn(n, n, |i, j| {
+        cavity.information[(i, j)] * usual[i] * usual[j]
+    });
+    let turned = SymmetricEigen::try_new(scaled, f64::EPSILON, 0)?;
+    let scaled = DVector::from_fn(n, |i, _| cavity.vector[i] * usual[i]);
+    let told = turned.eigenvectors.tr_mul(&scaled);
+    let known = turned.eigenvalues.map(|value| value.max(0.0));
+    let mut weights = vec![ABSENT.ln()];
+    let mut means = vec![DVector::zeros(n)];
+    let mut variances = vec![DVector::zeros(n)];
+    for (size, weight) in SIZES {
+        let variance = known.map(|known| (known + size.powi(-2)).recip());
+        let mean = variance.component_mul(&told);
+        let likelihood = 0.5
+            * (0..n)
+                .map(|k| mean[k] * told[k] - (1.0 + size.powi(2) * known[k]).ln())
+                .sum::<f64>();
+        weights.push(((1.0 - ABSENT) * weight).ln() + likelihood);
+        means.push(mean);
+        variances.push(variance);
+    }
+    let largest = weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let weights: Vec<f64> = weights
+        .iter()
+        .map(|weight| (weight - largest).exp())
+        .collect();
+    let sum: f64 = weights.iter().sum();
+    let mut mean = DVector::zeros(n);
+    let mut squares = DMatrix::zeros(n, n);
+    for ((weight, of), variance) in weights.iter().zip(&means).zip(&variances) {
+        let weight = weight / sum;
+        mean.axpy(weight, of, 1.0);
+        squares += (of * of.transpose() + DMatrix::from_diagonal(variance)) * weight;
+    }
+    let covariance = squares - &mean * mean.transpose();
+    let back = DMatrix::from_fn(n, n, |i, j| usual[i] * turned.eigenvectors[(i, j)]);
+    let covariance = &back * covariance * back.transpose();
+    Some(((back * mean, covariance), weights[0] / sum))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two constants and two terms of one parameter each, seen in correlated rows.
+    fn seen(of_terms: [f64; 2]) -> Information {
+        let rows = DMatrix::from_row_slice(
+            6,
+            4,
+            &[
+                1.0, 0.0, 0.8, 0.0, 0.0, 1.0, 0.0, 0.6, 1.0, 1.0, 0.2, 0.1, 0.5, 0.0, -0.3, 0.4,
+                0.0, 0.7, 0.2, 0.9, 0.3, 0.3, 0.9, 0.5,
+            ],
+        ) * 3.0;
+        let truth = DVector::from_vec(vec![0.3, -0.2, of_terms[0], of_terms[1]]);
+        Information {
+            vector: rows.tr_mul(&(&rows * truth)),
+            information: rows.tr_mul(&rows),
+        }
+    }
+
+    /// The average over all cases of both groups, each case solved alone.
+    fn by_cases(all: &Information, groups: &[Group]) -> Average {
+        let cases: Vec<(f64, f64)> = std::iter::once((0.0, ABSENT))
+            .chain(SIZES.map(|(size, weight)| (size, (1.0 - ABSENT) * weight)))
+            .collect();
+        let count = cases.len().pow(groups.len() as u32);
+        let n = all.vector.len();
+        let (mut sum, mut mean) = (0.0, DVector::zeros(n));
+        let mut squares = DMatrix::zeros(n, n);
+        let mut absent = vec![0.0; groups.len()];
+        for number in 0..count {
+            let case = |k: usize| cases[number / cases.len().pow(k as u32) % cases.len()];
+            let mut with = all.clone();
+            let mut weight = 1.0;
+            for (k, group) in groups.iter().enumerate() {
+                let size = case(k).0.max(1e-7) * group.usual[0];
+                weight *= case(k).1 / size;
+                with.information[(group.places[0], group.places[0])] += size.powi(-2);
+            }
+            let covariance = with.information.clone().try_inverse().unwrap();
+            let of = &covariance * &with.vector;
+            weight *= covariance.determinant().sqrt() * (0.5 * of.dot(&with.vector)).exp();
+            sum += weight;
+            mean += &of * weight;
+            squares += (&covariance + &of * of.transpose()) * weight;
+            (0..groups.len())
+                .filter(|&k| case(k).0 == 0.0)
+                .for_each(|k| absent[k] += weight);
+        }
+        mean /= sum;
+        Average {
+            covariance: squares / sum - &mean * mean.transpose(),
+            absent: absent.iter().map(|of| of / sum).collect(),
+            mean,
+        }
+    }
+
+    fn group(place: usize) -> Group {
+        Group {
+            places: vec![place],
+            usual: vec![0.5],
+        }
+    }
+
+    #[test]
+    fn one_group_is_averaged_exactly() {
+        for size in [0.0, 0.1, 1.0, 3.0] {
+            let mut all = seen([size, 0.0]);
+            all.information[(3, 3)] += 1e6;
+            let groups = [group(2)];
+            let (found, expected) = (average(&all, &groups).unwrap(), by_cases(&all, &groups));
+            assert!((found.mean - expected.mean).amax() < 1e-6, "{size}");
+            assert!(
+                (found.covariance - expected.covariance).amax() < 1e-6,
+                "{size}"
+            );
+            assert!(
+                (found.absent[0] - expected.absent[0]).abs() < 1e-6,
+                "{size}"
+            );
+        }
+    }
+
+    #[test]
+    fn two_groups_that_are_seen_together_are_averaged_within_a_twentieth_of_sigma() {
+        for sizes in [[0.0, 0.0], [0.5, 0.0], [0.3, 0.3], [0.0, 2.0], [1.0, -1.0]] {
+            let all = seen(sizes);
+            let groups = [group(2), group(3)];
+            let (found, expected) = (average(&all, &groups).unwrap(), by_cases(&all, &groups));
+            for k in 0..4 {
+                let (one, other) = (found.covariance[(k, k)], expected.covariance[(k, k)]);
+                let sigma = other.sqrt();
+                let off = (found.mean[k] - expected.mean[k]).abs() / sigma;
+                assert!(off < 0.05, "{sizes:?} {k}: {off} σ");
+                let ratio = one.sqrt() / sigma;
+                assert!((ratio - 1.0).abs() < 0.05, "{sizes:?} {k}: σ × {ratio}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_not_seen_at_all_stays_at_its_prior() {
+        let all = Information {
+            information: DMatrix::from_diagonal(&DVector::from_vec(vec![4.0, 0.0])),
+            vector: DVector::from_vec(vec![2.0, 0.0]),
+        };
+        let found = average(&all, &[group(1)]).unwrap();
+        let mean_square: f64 = SIZES
+            .iter()
+            .map(|(size, weight)| weight * size.powi(2))
+            .sum();
+        let expected = (1.0 - ABSENT) * mean_square * 0.25;
+        assert!((found.covariance[(1, 1)] / expected - 1.0).abs() < 1e-9);
+        assert!((found.absent[0] - ABSENT).abs() < 1e-9);
+    }
+}

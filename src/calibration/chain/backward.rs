@@ -1,0 +1,129 @@
+//! The disturbance smoother through the chain: what all data say of every disturbance.
+//!
+//! Source: Koopman and Shephard 1992, "Exact score for time series models in state space form", Biometrika 79(4), for
+//! the score; de Jong 1991, "The diffuse Kalman filter", Annals of Statistics 19(2), for the columns of the constants.
+
+use std::collections::BTreeMap;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::effects::Effect;
+use super::forward::{Filtered, Passed};
+use super::links::Link;
+use crate::calibration::Posterior;
+
+/// Moments of the disturbances of one event, given all data.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Moments {
+    /// Derivative of −2 ln L with respect to the logarithm of the variance of this event alone.
+    pub slope: f64,
+    /// Expected curvature of −2 ln L with respect to the logarithm of its σ, from this event alone.
+    pub curvature: f64,
+    /// Sum of the squared means of the disturbances over their variance, …
+    pub squares: f64,
+    /// … that of their variances given all data, likewise, …
+    pub unknown: f64,
+    /// … and their number.
+    pub count: f64,
+}
+
+/// What all data say of the disturbances.
+pub struct Smoothed {
+    /// Of each event of each effect.
+    pub events: BTreeMap<(Effect, usize), Moments>,
+    /// Part of each effect in the covariance of the constants.
+    pub parts: BTreeMap<Effect, DMatrix<f64>>,
+}
+
+/// Smoothing cumulants: mean given zero constants, effect of the constants, and precision.
+pub struct Cumulants {
+    pub mean: DVector<f64>,
+    pub by_constants: DMatrix<f64>,
+    precision: DMatrix<f64>,
+}
+
+impl Cumulants {
+    /// Before the rows of a link.
+    fn observe(&mut self, passed: &Passed) {
+        let Passed { rows, across, .. } = passed;
+        // (I − K H)ᵀ r = r − Hᵀ L⁻ᵀ (L⁻¹ H P) r
+        let back = |r: &DMatrix<f64>| r - rows.tr_mul(&(across * r));
+        let seen = rows.tr_mul(&passed.innovations);
+        let told = across * &self.mean;
+        self.mean += seen - rows.tr_mul(&told);
+        self.by_constants = back(&self.by_constants) + rows.tr_mul(&passed.of_constants);
+        let half = back(&self.precision);
+        self.precision = back(&half.transpose()) + rows.tr_mul(rows);
+    }
+
+    /// Before a transition.
+    fn carry(&mut self, transition: &DMatrix<f64>) {
+        self.mean = transition.tr_mul(&self.mean);
+        self.by_constants = transition.tr_mul(&self.by_constants);
+        self.precision = transition.tr_mul(&self.precision) * transition;
+    }
+}
+
+impl Filtered<'_> {
+    /// Goes backward; `visit` sees each link with the cumulants of its rows and all later ones.
+    pub fn backward(&self, mut visit: impl FnMut(&Link, &Passed, &Cumulants)) {
+        let (n, c) = (self.chain.states.count, self.chain.constants.len());
+        let mut cumulants = Cumulants {
+            mean: DVector::zeros(n),
+            by_constants: DMatrix::zeros(n, c),
+            precision: DMatrix::zeros(n, n),
+        };
+        for (link, passed) in self.chain.links.iter().zip(&self.passed).rev() {
+            cumulants.observe(passed);
+            visit(link, passed, &cumulants);
+            cumulants.carry(&link.transition.states);
+        }
+    }
+
+    /// Smooths the disturbances with this posterior of the constants.
+    pub fn smoothed(&self, posterior: &Posterior) -> Smoothed {
+        let c = self.chain.constants.len();
+        let mut smoothed = Smoothed {
+            events: BTreeMap::new(),
+            parts: BTreeMap::new(),
+        };
+        self.backward(|link, _, cumulants| {
+            for drive in &link.transition.drives {
+                let variance = self.sizes.of(drive.effect, drive.event);
+                let mean = drive.by.tr_mul(&cumulants.mean);
+                let of_constants = drive.by.tr_mul(&cumulants.by_constants);
+                let mean = mean - &of_constants * &posterior.mean;
+                let across = &of_constants * &posterior.covariance;
+                let precision = drive.by.tr_mul(&cumulants.precision) * &drive.by
+                    - &across * of_constants.transpose();
+                let squares = variance * mean.norm_squared();
+                let known = variance * precision.trace();
+                let event = smoothed.events.entry((drive.effect, drive.event));
+                let event = event.or_default();
+                event.slope += known - squares;
+                event.curvature += 4.0 * variance.powi(2) * precision.norm_squared();
+                event.squares += squares;
+                event.unknown += drive.by.ncols() as f64 - known;
+                event.count += drive.by.ncols() as f64;
+                let part = smoothed.parts.entry(drive.effect);
+                let part = part.or_insert_with(|| DMatrix::zeros(c, c));
+                part.gemm(variance, &across.transpose(), &across, 1.0);
+            }
+        });
+        smoothed
+    }
+}
+
+impl Smoothed {
+    /// Moments of the disturbances of all events of an effect.
+    pub fn of(&self, effect: Effect) -> Moments {
+        let of_effect = self.events.iter().filter(|((of, _), _)| *of == effect);
+        of_effect.fold(Moments::default(), |sum, (_, of)| Moments {
+            slope: sum.slope + of.slope,
+            curvature: sum.curvature + of.curvature,
+            squares: sum.squares + of.squares,
+            unknown: sum.unknown + of.unknown,
+            count: sum.count + of.count,
+        })
+    }
+}

@@ -1,0 +1,137 @@
+//! The Kalman filter through the chain, with the constants as columns.
+
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+use super::effects::Sizes;
+use super::links::{Chain, Link};
+use crate::calibration::constants::triangle;
+use crate::calibration::{CalibrationError, Known, Posterior, Prior};
+
+/// A link after the filter has passed it.
+#[derive(Debug, Clone)]
+pub struct Passed {
+    /// States before the rows: mean given zero constants, effect of the constants, and covariance.
+    pub mean: DVector<f64>,
+    pub by_constants: DMatrix<f64>,
+    pub covariance: DMatrix<f64>,
+    /// `H P`, whitened.
+    pub across: DMatrix<f64>,
+    /// Rows of the states, whitened by the innovations' covariance …
+    pub rows: DMatrix<f64>,
+    /// … of the constants, …
+    pub of_constants: DMatrix<f64>,
+    /// … and what they say.
+    pub innovations: DVector<f64>,
+}
+
+/// A chain after the filter has passed it.
+pub struct Filtered<'a> {
+    pub chain: &'a Chain,
+    pub sizes: Sizes,
+    pub passed: Vec<Passed>,
+    log_determinant: f64,
+}
+
+impl Chain {
+    /// Runs the filter with these sizes.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    pub fn filter(&self, sizes: &Sizes) -> Result<Filtered<'_>, CalibrationError> {
+        let (n, c) = (self.states.count, self.constants.len());
+        let mut mean = DVector::zeros(n);
+        let mut by_constants = DMatrix::zeros(n, c);
+        let mut covariance = DMatrix::zeros(n, n);
+        let mut log_determinant = self.log_determinant;
+        let mut passed = Vec::with_capacity(self.links.len());
+        for link in &self.links {
+            let transition = &link.transition;
+            mean = &transition.states * mean + &transition.offset;
+            by_constants = &transition.states * by_constants + &transition.constants;
+            covariance = &transition.states * covariance * transition.states.transpose()
+                + &transition.covariance;
+            for drive in &transition.drives {
+                let factor = sizes.of(drive.effect, drive.event);
+                covariance.gemm(factor, &drive.by, &drive.by.transpose(), 1.0);
+            }
+            let seen = Passed::new(link, mean, by_constants, covariance)
+                .ok_or(CalibrationError::Diverged { time: link.time })?;
+            log_determinant += seen.1;
+            let seen = seen.0;
+            mean = &seen.mean + seen.across.tr_mul(&seen.innovations);
+            by_constants = &seen.by_constants - seen.across.tr_mul(&seen.of_constants);
+            covariance = &seen.covariance - seen.across.tr_mul(&seen.across);
+            passed.push(seen);
+        }
+        Ok(Filtered {
+            chain: self,
+            sizes: sizes.clone(),
+            passed,
+            log_determinant,
+        })
+    }
+}
+
+impl Passed {
+    /// Also the logarithm of the determinant of the innovations' covariance; `None` if that is not positive definite.
+    fn new(
+        link: &Link,
+        mean: DVector<f64>,
+        by_constants: DMatrix<f64>,
+        covariance: DMatrix<f64>,
+    ) -> Option<(Self, f64)> {
+        let rows = &link.rows;
+        let mut across = &rows.states * &covariance;
+        let mut of_innovations = &across * rows.states.transpose();
+        (0..rows.values.len()).for_each(|k| of_innovations[(k, k)] += 1.0);
+        let root = Cholesky::new(of_innovations)?.unpack();
+        let log_determinant = 2.0 * root.diagonal().map(f64::ln).sum();
+        let mut innovations = &rows.values - &rows.states * &mean;
+        let mut of_constants = &rows.states * &by_constants + &rows.constants;
+        let mut states = rows.states.clone();
+        let whitened = root.solve_lower_triangular_mut(&mut across)
+            && root.solve_lower_triangular_mut(&mut innovations)
+            && root.solve_lower_triangular_mut(&mut of_constants)
+            && root.solve_lower_triangular_mut(&mut states);
+        whitened.then_some((
+            Self {
+                mean,
+                by_constants,
+                covariance,
+                across,
+                rows: states,
+                of_constants,
+                innovations,
+            },
+            log_determinant,
+        ))
+    }
+}
+
+impl Filtered<'_> {
+    /// The posterior of the constants.
+    pub fn posterior(&self, prior: &Prior) -> Posterior {
+        let c = self.chain.constants.len();
+        let count = self.passed.iter().map(|of| of.innovations.len()).sum();
+        let mut rows = DMatrix::zeros(count, c + 1);
+        let mut first = 0;
+        for of in &self.passed {
+            let m = of.innovations.len();
+            rows.view_mut((first, 0), (m, c))
+                .copy_from(&of.of_constants);
+            rows.view_mut((first, c), (m, 1)).copy_from(&of.innovations);
+            first += m;
+        }
+        let mut known = Known::new(prior.clone());
+        if count > c {
+            rows = triangle(&rows);
+        }
+        known.learn(&rows);
+        let of_rows = known.posterior();
+        Posterior {
+            cost: of_rows.cost + self.chain.squares,
+            deviance: of_rows.deviance + self.chain.squares + self.log_determinant,
+            ..of_rows
+        }
+    }
+}

@@ -1,0 +1,361 @@
+//! Makes links from events.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::given::Given;
+use super::{Link, Rows, Transition};
+use crate::attitude::skew;
+use crate::calibration::budget::source::BudgetSource;
+use crate::calibration::chain::at_rest::Dispersion;
+use crate::calibration::chain::dynamics::Dynamics;
+use crate::calibration::chain::effects::{Effect, Slip};
+use crate::calibration::chain::part::{PartFilter, part_filter};
+use crate::calibration::chain::states::States;
+use crate::calibration::filter::rows::factor;
+use crate::calibration::record::{Event, Rest, between};
+use crate::calibration::{
+    ATTITUDE, CalibrationError, Constant, NAVIGATION, POSITION, Problem, Script, Source, Stretch,
+    VELOCITY,
+};
+use crate::imu::{GaussMarkov, MotionNoise, Noise, PerSensor, Sensor};
+use crate::navigation::{Block, ErrorMatrix, ProcessNoise};
+
+/// 1σ of a slip in a move over that of a position: slips of a hundred moves add up to as much.
+pub const SLIP: f64 = 0.1;
+
+/// Makes links one after the other.
+pub struct Maker<'a> {
+    problem: &'a Problem<'a>,
+    filter: Box<dyn PartFilter>,
+    dispersion: &'a Dispersion,
+    dynamics: Dynamics<'a>,
+    /// What happened since the last rows.
+    pending: Transition,
+    pub links: Vec<Link>,
+    pub squares: f64,
+    pub log_determinant: f64,
+    /// Number of dwells begun.
+    dwell: usize,
+}
+
+impl<'a> Maker<'a> {
+    /// Before the first stretch.
+    pub fn new(
+        (problem, dispersion): (&'a Problem<'a>, &'a Dispersion),
+        states: &'a States,
+        constants: &'a [Constant],
+    ) -> Self {
+        Self {
+            problem,
+            filter: part_filter(states.moving),
+            dispersion,
+            dynamics: Dynamics {
+                states,
+                constants,
+                turned: None,
+            },
+            pending: Transition::identity(states.count, constants.len()),
+            links: Vec::new(),
+            squares: 0.0,
+            log_determinant: 0.0,
+            dwell: 0,
+        }
+    }
+
+    /// The links of a stretch.
+    pub fn stretch(&mut self, script: &Script, number: usize) -> Result<(), CalibrationError> {
+        self.begin(script, number);
+        let stretch = &self.problem.stretches()[number];
+        let mut begins = true;
+        for event in &script.events[number] {
+            match event {
+                Event::Move(block) => self.advance(block),
+                Event::Rest(rest) => {
+                    self.stand(rest, stretch, begins)?;
+                    begins = false;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Begins a stretch: navigation errors, table position and Earth rate anew; in another recording also what lasts a
+    /// recording.
+    fn begin(&mut self, script: &Script, number: usize) {
+        let (problem, states) = (self.problem, self.dynamics.states);
+        let stretch = &problem.stretches()[number];
+        let (prior, at) = (&script.priors[number], &script.at.initial_attitudes[number]);
+        let start = stretch.start(prior, at);
+        let before = number.checked_sub(1).map(|k| &problem.stretches()[k]);
+        let same = before.filter(|before| before.recording == stretch.recording);
+        if let Some(before) = same {
+            self.vary(before.time_until(stretch));
+        }
+        let (stated, still) = (Effect::Stated, [0.0; 3]);
+        let level = (start.attitude.as_slice(), start.attitude_sigma.as_slice());
+        self.renew(ATTITUDE, level, stated(BudgetSource::InitialAttitude));
+        let place = stated(BudgetSource::Place);
+        self.renew(VELOCITY, (&still, &[start.velocity_sigma; 3]), place);
+        self.renew(POSITION, (&still, &[start.position_sigma; 3]), place);
+        if let Some(turn) = states.turn() {
+            self.renew(turn, (&still, &still), stated(BudgetSource::RotationAtRest));
+        }
+        if let Some(table) = states.table {
+            let sigma = [problem.model.position_sigma; 3];
+            let position = Effect::Noise(Source::TablePosition);
+            self.renew(table, (&still, &sigma), position);
+        }
+        if let Some(first) = states.earth_rate {
+            let sigma = start.earth_rate_sigma.as_slice();
+            let rate = (start.earth_rate.as_slice(), sigma);
+            self.renew(first, rate, stated(BudgetSource::Headings));
+        }
+        let moved = before.is_none_or(|before| before.run.site != stretch.run.site);
+        if let Some(state) = states.gravity.filter(|_| moved) {
+            let sigma = [stretch.run.site.gravity_sigma];
+            self.renew(state, (&[0.0], &sigma), stated(BudgetSource::Gravity));
+        }
+        if same.is_none() {
+            self.begin_recording(script, stretch.recording);
+        }
+    }
+
+    /// Begins a recording: slips of the table, deviations of the biases, and what differs between recordings, anew.
+    fn begin_recording(&mut self, script: &Script, recording: usize) {
+        let (model, states) = (&self.problem.model, self.dynamics.states);
+        let (stated, still) = (Effect::Stated, [0.0; 3]);
+        for first in states.slips.into_iter().flatten() {
+            self.renew(first, (&still, &still), stated(BudgetSource::TablePosition));
+        }
+        for sensor in Sensor::ALL {
+            let sigma = [variation(model.noise.get(sensor)).sigma; 3];
+            let first = *states.biases.get(sensor);
+            self.renew(first, (&still, &sigma), wander(sensor));
+        }
+        let own = script.at.own(recording);
+        for &(state, of) in &states.own {
+            let sigma = [model.day_to_day.of(of)];
+            self.renew(
+                state,
+                (&[-own.get(of)], &sigma),
+                stated(BudgetSource::Recording),
+            );
+        }
+        let mounted = model.day_to_day.mounting > 0.0;
+        self.dynamics.turned = mounted.then(|| own.response(&script.at.triads));
+    }
+
+    /// Lets some states begin anew, with these means and 1σ.
+    fn renew(&mut self, first: usize, (mean, sigma): (&[f64], &[f64]), effect: Effect) {
+        self.pending.reset(first..first + mean.len(), mean);
+        let root = DMatrix::from_diagonal(&DVector::from_column_slice(sigma));
+        self.pending.drive(effect, self.dwell, first, &root);
+    }
+
+    /// Through a move.
+    fn advance(&mut self, block: &Block) {
+        let n = self.dynamics.states.count;
+        let mut by = DMatrix::identity(n, n);
+        by.rows_mut(0, NAVIGATION)
+            .copy_from(&self.dynamics.by_states(block));
+        self.pending.then(&by);
+        let constants = self.dynamics.by_constants(block);
+        self.pending.add_constants(0, &constants);
+        let model = &self.problem.model;
+        for (effect, noise) in noises(model.noise, model.motion_noise) {
+            let covariance = block.noise.covariance(&noise);
+            self.pending
+                .drive(effect, self.dwell, 0, &root(&covariance));
+        }
+        if block.noise.parts.iter().any(|part| part.bridged.is_some()) {
+            let covariance = block.noise.covariance(&PerSensor::default());
+            let effect = Effect::Stated(BudgetSource::Interpolated);
+            self.pending
+                .drive(effect, self.dwell, 0, &root(&covariance));
+        }
+        self.vary(block.duration);
+    }
+
+    /// Lets the biases vary: first-order Gauss–Markov (Brown and Hwang, *Introduction to Random Signals*, 4th ed., §3.8).
+    fn vary(&mut self, duration: f64) {
+        let n = self.dynamics.states.count;
+        for sensor in Sensor::ALL {
+            let first = *self.dynamics.states.biases.get(sensor);
+            let variation = variation(self.problem.model.noise.get(sensor));
+            let keep = (-duration / variation.correlation_time).exp();
+            let mut by = DMatrix::identity(n, n);
+            (first..first + 3).for_each(|state| by[(state, state)] = keep);
+            self.pending.then(&by);
+            let sigma = variation.sigma * (1.0 - keep * keep).sqrt();
+            let root = DMatrix::from_diagonal_element(3, 3, sigma);
+            self.pending.drive(wander(sensor), self.dwell, first, &root);
+        }
+    }
+
+    /// Through a part of a dwell, which gives rows.
+    fn stand(
+        &mut self,
+        rest: &Rest,
+        stretch: &Stretch,
+        begins: bool,
+    ) -> Result<(), CalibrationError> {
+        let diverged = || CalibrationError::Diverged { time: rest.end() };
+        let Some(first) = rest.models.first() else {
+            return Ok(());
+        };
+        let place = self.begin_part(rest, stretch);
+        let model = &self.problem.model;
+        let part = self.filter.reduce((rest, stretch), model, &mut |_, _| {});
+        let factor = self.dispersion.of(self.dwell - 1);
+        let part = part.ok_or_else(diverged)?.dispersed(factor);
+        self.squares += part.squares;
+        self.log_determinant += part.log_determinant;
+        let given = Given::new(&self.dynamics, rest, first, self.filter.given());
+        let n = self.dynamics.states.count;
+        let pending = std::mem::replace(
+            &mut self.pending,
+            Transition::identity(n, self.dynamics.constants.len()),
+        );
+        let rows = given.rows(&part).and(place);
+        if !rows.values.iter().all(|value| value.is_finite()) {
+            return Err(diverged());
+        }
+        self.links.push(Link {
+            begins,
+            attitude: rest.first.then_some(rest.begin.attitude),
+            time: rest.end(),
+            transition: pending,
+            rows,
+        });
+        given.end(&part, self.dynamics.states.moving, &mut self.pending);
+        let duration = rest
+            .steps
+            .iter()
+            .map(|step| rest.models[step.model].duration);
+        self.vary(duration.sum());
+        Ok(())
+    }
+
+    /// Refers the states to where a part begins. Where the body came to rest at a new position, table and velocity are
+    /// anew, and the position is observed.
+    fn begin_part(&mut self, rest: &Rest, stretch: &Stretch) -> Rows {
+        let states = self.dynamics.states;
+        let (n, model) = (states.count, &self.problem.model);
+        if rest.first {
+            let mut by = DMatrix::identity(n, n);
+            for (first, computed) in [
+                (VELOCITY, rest.from.velocity),
+                (POSITION, rest.from.position),
+            ] {
+                by.fixed_view_mut::<3, 3>(first, ATTITUDE)
+                    .copy_from(&skew(-computed));
+            }
+            self.pending.then(&by);
+        }
+        let by = between(&rest.from, &rest.begin);
+        let errors = [ATTITUDE, VELOCITY, POSITION].into_iter().zip(by);
+        for (first, by) in errors.chain(states.turn().map(|turn| (turn, by[0]))) {
+            let mut offset = self.pending.offset.fixed_rows_mut::<3>(first);
+            offset += by;
+        }
+        let mut rows = Rows::none(n, self.dynamics.constants.len());
+        if !rest.first {
+            return rows;
+        }
+        self.dwell += 1;
+        let still = [0.0; 3];
+        if let Some(turn) = states.turn() {
+            self.pending.reset(turn..turn + 3, &still);
+        }
+        if rest.new_position {
+            if model.velocity_anew {
+                self.pending.reset(VELOCITY..VELOCITY + 3, &still);
+                let root = DMatrix::from_diagonal_element(3, 3, stretch.velocity_sigma());
+                let effect = Effect::Stated(BudgetSource::Place);
+                self.pending.drive(effect, self.dwell - 1, VELOCITY, &root);
+            }
+            if let Some(table) = states.table {
+                self.pending.reset(table..table + 3, &still);
+                let root = DMatrix::from_diagonal_element(3, 3, model.position_sigma);
+                let effect = Effect::Noise(Source::TablePosition);
+                self.pending.drive(effect, self.dwell - 1, table, &root);
+            }
+            let kinds = [Slip::Mount, Slip::Base].map(Effect::Slip);
+            for (slips, effect) in states.slips.into_iter().flatten().zip(kinds) {
+                let root = DMatrix::from_diagonal_element(3, 3, SLIP * model.position_sigma);
+                self.pending.drive(effect, self.dwell - 1, slips, &root);
+            }
+            let sigma = stretch.position_variance(model).sqrt();
+            rows = Rows::none(n, self.dynamics.constants.len()).of(3);
+            for axis in 0..3 {
+                rows.states[(axis, POSITION + axis)] = 1.0 / sigma;
+                rows.values[axis] = rest.begin.position[axis] / sigma;
+            }
+            self.log_determinant += 6.0 * sigma.ln();
+        }
+        rows
+    }
+}
+
+/// The sources of the noise of a move, with their densities.
+fn noises(
+    noise: PerSensor<Noise>,
+    motion: PerSensor<MotionNoise>,
+) -> [(Effect, PerSensor<ProcessNoise>); 6] {
+    let one = |sensor: Sensor, source: Source, of: ProcessNoise| {
+        let mut noise = PerSensor::default();
+        *noise.get_mut(sensor) = of;
+        (Effect::Noise(source), noise)
+    };
+    let none = ProcessNoise::default();
+    let white = |sensor: Sensor| ProcessNoise {
+        random_walk: noise.get(sensor).random_walk,
+        ..none
+    };
+    let by_motion = |sensor: Sensor| ProcessNoise {
+        by_motion: motion.get(sensor).by_motion,
+        ..none
+    };
+    let by_duration = |sensor: Sensor| ProcessNoise {
+        by_duration: motion.get(sensor).by_duration,
+        ..none
+    };
+    let (gyro, accel) = (Sensor::Gyro, Sensor::Accel);
+    [
+        one(gyro, Source::AngleRandomWalk, white(gyro)),
+        one(accel, Source::VelocityRandomWalk, white(accel)),
+        one(gyro, Source::GyroMotion, by_motion(gyro)),
+        one(accel, Source::AccelMotion, by_motion(accel)),
+        one(gyro, Source::GyroMoving, by_duration(gyro)),
+        one(accel, Source::AccelMoving, by_duration(accel)),
+    ]
+}
+
+/// The variation of biases; none is one of zero.
+fn variation(noise: &Noise) -> GaussMarkov {
+    noise.gauss_markov.unwrap_or(GaussMarkov {
+        sigma: 0.0,
+        correlation_time: f64::INFINITY,
+    })
+}
+
+fn wander(sensor: Sensor) -> Effect {
+    Effect::Noise(match sensor {
+        Sensor::Gyro => Source::GyroGaussMarkov,
+        Sensor::Accel => Source::AccelGaussMarkov,
+    })
+}
+
+/// A root of a covariance of the navigation errors, without columns that are only rounding.
+fn root(covariance: &ErrorMatrix) -> DMatrix<f64> {
+    let rows = covariance
+        .row_iter()
+        .map(|row| std::array::from_fn(|k| row[k]));
+    let mut matrix = [[0.0; NAVIGATION]; NAVIGATION];
+    for (row, to) in rows.zip(&mut matrix) {
+        *to = row;
+    }
+    let columns = factor(matrix, [0.0; NAVIGATION]);
+    let columns: Vec<[f64; NAVIGATION]> = columns.map(|(_, column, _)| column).collect();
+    DMatrix::from_fn(NAVIGATION, columns.len(), |row, k| columns[k][row])
+}

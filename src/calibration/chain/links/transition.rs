@@ -1,0 +1,81 @@
+//! A transition of the states, with what drives it.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::calibration::chain::effects::Effect;
+
+/// Independent disturbances of the states with σ 1 each, before the size of their effect.
+#[derive(Debug, Clone)]
+pub struct Drive {
+    pub effect: Effect,
+    /// Number of the event among those of the effect: the move, position or dwell before which it happens.
+    pub event: usize,
+    /// Change of the states per disturbance, one column each.
+    pub by: DMatrix<f64>,
+}
+
+/// `x ← transition x + constants c + offset + drives + noise`
+#[derive(Debug, Clone)]
+pub struct Transition {
+    pub states: DMatrix<f64>,
+    pub constants: DMatrix<f64>,
+    pub offset: DVector<f64>,
+    pub drives: Vec<Drive>,
+    /// Covariance of the noise at rest in the part before.
+    pub covariance: DMatrix<f64>,
+}
+
+impl Transition {
+    /// Keeps all states.
+    pub fn identity(states: usize, constants: usize) -> Self {
+        Self {
+            states: DMatrix::identity(states, states),
+            constants: DMatrix::zeros(states, constants),
+            offset: DVector::zeros(states),
+            drives: Vec::new(),
+            covariance: DMatrix::zeros(states, states),
+        }
+    }
+
+    /// Followed by a linear change of the states.
+    pub fn then(&mut self, states: &DMatrix<f64>) {
+        self.states = states * &self.states;
+        self.constants = states * &self.constants;
+        self.offset = states * &self.offset;
+        for drive in &mut self.drives {
+            drive.by = states * &drive.by;
+        }
+        self.covariance = states * &self.covariance * states.transpose();
+    }
+
+    /// Followed by an effect of constants on the states from a first one on.
+    pub fn add_constants(&mut self, first: usize, by: &DMatrix<f64>) {
+        let mut rows = self.constants.rows_mut(first, by.nrows());
+        rows += by;
+    }
+
+    /// Followed by a disturbance of the states from a first one on.
+    pub fn drive(&mut self, effect: Effect, event: usize, first: usize, root: &DMatrix<f64>) {
+        if root.amax() > 0.0 {
+            let mut by = DMatrix::zeros(self.offset.len(), root.ncols());
+            by.rows_mut(first, root.nrows()).copy_from(root);
+            self.drives.push(Drive { effect, event, by });
+        }
+    }
+
+    /// Followed by a new beginning of some states, independent of all before, at these values.
+    pub fn reset(&mut self, which: Range<usize>, mean: &[f64]) {
+        for (state, mean) in which.zip(mean) {
+            self.states.row_mut(state).fill(0.0);
+            self.constants.row_mut(state).fill(0.0);
+            self.offset[state] = *mean;
+            for drive in &mut self.drives {
+                drive.by.row_mut(state).fill(0.0);
+            }
+            self.covariance.row_mut(state).fill(0.0);
+            self.covariance.column_mut(state).fill(0.0);
+        }
+    }
+}

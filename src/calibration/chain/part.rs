@@ -1,0 +1,183 @@
+//! Reduction of a part of a dwell, by the noise at rest alone, to what it says of what it begins with.
+//!
+//! At rest the parameters act through three constant rates and three constant specific forces. Given these and the
+//! states at the begin (together `g`), only noise remains, which a filter of the moving states whitens in each
+//! observation. The whitened observations are linear in `g`, and so are the states at the end: together they are all
+//! that the part says (Friedland 1969, "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control 14(4)).
+
+mod course;
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::dynamics::{CONSTANTS, driven_at_rest};
+use crate::calibration::filter::rows::{add, factor};
+use crate::calibration::record::Rest;
+use crate::calibration::{ATTITUDE, Model, NAVIGATION, Observation, POSITION, Stretch, VELOCITY};
+use crate::navigation::Block;
+use course::{Course, StepModel};
+
+/// What a part of a dwell says.
+pub struct Part {
+    /// Rows of `g` …
+    pub measured: DMatrix<f64>,
+    /// … and their measured values, of σ 1.
+    pub values: DVector<f64>,
+    /// Sum of squares of the observations that is independent of `g` …
+    pub squares: f64,
+    /// … and logarithm of the determinant of their covariance.
+    pub log_determinant: f64,
+    /// Number of scalars that were observed.
+    pub count: usize,
+    /// Moving states at the end: rows of `g`, offset, covariance.
+    pub of_given: DMatrix<f64>,
+    pub offset: DVector<f64>,
+    pub covariance: DMatrix<f64>,
+}
+
+impl Part {
+    /// The same with the variances of all its noise multiplied by a factor.
+    pub fn dispersed(mut self, factor: f64) -> Self {
+        let root = factor.sqrt();
+        self.measured /= root;
+        self.values /= root;
+        self.squares /= factor;
+        self.log_determinant += self.count as f64 * factor.ln();
+        self.covariance *= factor;
+        self
+    }
+}
+
+/// Reduces parts of dwells of one kind.
+pub trait PartFilter {
+    /// Size of `g`.
+    fn given(&self) -> usize;
+
+    /// The reduction of a part; `None` if a covariance is not positive definite. `seen` gets each whitened observation
+    /// given `g = 0`, with the logarithm of its σ.
+    fn reduce(
+        &mut self,
+        part: (&Rest, &Stretch),
+        model: &Model,
+        seen: &mut dyn FnMut(f64, f64),
+    ) -> Option<Part>;
+}
+
+/// The filter for this number of moving states.
+pub fn part_filter(moving: usize) -> Box<dyn PartFilter> {
+    if moving == NAVIGATION {
+        Box::new(Course::<9, 12>::new(&begins(moving)))
+    } else {
+        Box::new(Course::<12, 15>::new(&begins(moving)))
+    }
+}
+
+/// The moving states in `g`: in a dwell, nothing depends on position.
+pub fn begins(moving: usize) -> Vec<usize> {
+    let is_position = |state: &usize| (POSITION..POSITION + 3).contains(state);
+    (0..moving).filter(|state| !is_position(state)).collect()
+}
+
+impl<const M: usize, const G: usize> PartFilter for Course<M, G> {
+    fn given(&self) -> usize {
+        G
+    }
+
+    fn reduce(
+        &mut self,
+        (rest, stretch): (&Rest, &Stretch),
+        model: &Model,
+        seen: &mut dyn FnMut(f64, f64),
+    ) -> Option<Part> {
+        let models = rest.models.iter().map(|block| step_model(block, model));
+        self.begin(models.collect());
+        let turn = (M > NAVIGATION).then_some(NAVIGATION);
+        let (mut at, mut mean, mut vector) = (Self::BEGIN, [0.0; M], [0.0; G]);
+        let (mut squares, mut log_determinant) = (0.0, 0.0);
+        for step in &rest.steps {
+            let errors = [ATTITUDE, VELOCITY, POSITION].into_iter();
+            let turned = turn.map(|turn| (turn, step.referred[0]));
+            for (first, by) in errors.zip(step.referred).chain(turned) {
+                (0..3).for_each(|axis| mean[first + axis] += by[axis]);
+            }
+            at = self.step(at, step.model);
+            mean = self.models[step.model].propagated(&mean);
+            for observed in &rest.seen[step.seen.clone()] {
+                let first = match observed.kind {
+                    Observation::Velocity => VELOCITY,
+                    Observation::Table => ATTITUDE,
+                    Observation::Attitude => turn.unwrap_or(ATTITUDE),
+                };
+                let variance =
+                    stretch.observation_variance(model, observed.kind, observed.readings);
+                at = self.observe(at, first, variance)?;
+                let gain = self.points[at].gain.as_ref()?;
+                let expected = Vector3::new(mean[first], mean[first + 1], mean[first + 2]);
+                let whitened = gain
+                    .root
+                    .solve_lower_triangular(&(observed.residual - expected))?;
+                squares += whitened.norm_squared();
+                log_determinant += gain.log_determinant;
+                for axis in 0..3 {
+                    seen(whitened[axis], gain.root[(axis, axis)].ln());
+                    add(&mut mean, whitened[axis], &gain.of_errors[axis]);
+                    add(&mut vector, whitened[axis], &gain.rows[axis]);
+                }
+            }
+        }
+        let known = &self.points[at].known;
+        let rows = factor(known.information, vector);
+        let (rows, values): (Vec<_>, Vec<_>) = rows.map(|(_, row, value)| (row, value)).unzip();
+        let values = DVector::from_vec(values);
+        Some(Part {
+            measured: matrix(&rows),
+            squares: squares - values.norm_squared(),
+            log_determinant,
+            values,
+            count: 3 * rest.seen.len(),
+            of_given: matrix(&known.of_given),
+            offset: DVector::from_column_slice(&mean),
+            covariance: matrix(&known.covariance),
+        })
+    }
+}
+
+fn matrix<const N: usize>(rows: &[[f64; N]]) -> DMatrix<f64> {
+    DMatrix::from_row_slice(rows.len(), N, rows.as_flattened())
+}
+
+/// Propagation of the moving states in a step.
+fn step_model<const M: usize>(block: &Block, model: &Model) -> StepModel<M> {
+    let driven_by = driven_at_rest(block);
+    let own = |row: usize| {
+        row.checked_sub(NAVIGATION)
+            .map_or(row, |axis| ATTITUDE + axis)
+    };
+    let of_navigation = block.noise.covariance(&model.process_noise());
+    let turning = model.turning_at_rest.powi(2) * block.duration;
+    let (mut transition, mut driven) = (Vec::new(), Vec::new());
+    let mut noise = [[0.0; M]; M];
+    for row in 0..M {
+        for k in 0..M {
+            // The rotation at rest follows the change of the attitude.
+            let phi = if k >= NAVIGATION {
+                f64::from(k == row)
+            } else {
+                let itself = f64::from(row >= NAVIGATION && own(row) == k);
+                block.navigation[(own(row), k)] - itself
+            };
+            transition.push((row, k, phi));
+            let alone = f64::from(row == k && row >= NAVIGATION);
+            noise[row][k] = of_navigation[(own(row), own(k))] + alone * turning;
+        }
+        for k in 0..CONSTANTS {
+            driven.push((row, M - 3 + k, driven_by[(own(row), k)]));
+        }
+    }
+    transition.retain(|&(.., phi)| phi != 0.0);
+    driven.retain(|&(.., by)| by != 0.0);
+    StepModel {
+        noise,
+        transition,
+        driven,
+    }
+}

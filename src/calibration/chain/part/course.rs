@@ -1,0 +1,197 @@
+//! Covariances and gains along the steps and observations of a part.
+//!
+//! They depend on the sequence of steps and observations, not on what was observed (Gelb, *Applied Optimal Estimation*,
+//! §4.2), and at rest not on the attitude either, because gravity and Earth rate are constant in East-North-Up. So most
+//! parts repeat the sequence of the one before.
+
+use nalgebra::Matrix3;
+
+use crate::calibration::filter::rows::{add, whiten};
+
+/// Propagation of the moving states in one step, with the effect of `g` and noise.
+#[derive(PartialEq)]
+pub struct StepModel<const M: usize> {
+    /// Covariance of the noise.
+    pub noise: [[f64; M]; M],
+    /// Nonzero elements of Φ: row, column, value.
+    pub transition: Vec<(usize, usize, f64)>,
+    /// Effect of the constants of `g`: row, place in `g`, value.
+    pub driven: Vec<(usize, usize, f64)>,
+}
+
+/// The sequence of a part, kept as far as the next one repeats it.
+pub struct Course<const M: usize, const G: usize> {
+    pub models: Vec<StepModel<M>>,
+    pub points: Vec<Point<M, G>>,
+}
+
+/// What is known after an event.
+pub struct Point<const M: usize, const G: usize> {
+    event: Event,
+    pub known: Known<M, G>,
+    /// Gain, if the event was an observation.
+    pub gain: Option<Gain<M, G>>,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Event {
+    Begin,
+    /// A step of this model.
+    Step(usize),
+    /// Three states from a first one on are observed, each with this variance.
+    Observed(usize, f64),
+}
+
+/// Gain of an observation for given `g`.
+pub struct Gain<const M: usize, const G: usize> {
+    /// Lower triangular root of its covariance.
+    pub root: Matrix3<f64>,
+    /// Rows of `g`, whitened by it.
+    pub rows: [[f64; G]; 3],
+    /// Gain of the moving states from the whitened observation.
+    pub of_errors: [[f64; M]; 3],
+    pub log_determinant: f64,
+}
+
+/// Moving states `U g + m` for given `g`, and information on `g`.
+#[derive(Clone)]
+pub struct Known<const M: usize, const G: usize> {
+    /// U
+    pub of_given: [[f64; G]; M],
+    /// Covariance of m.
+    pub covariance: [[f64; M]; M],
+    pub information: [[f64; G]; G],
+}
+
+impl<const M: usize> StepModel<M> {
+    /// The mean after the step.
+    pub fn propagated(&self, before: &[f64; M]) -> [f64; M] {
+        let mut mean = [0.0; M];
+        for &(row, column, phi) in &self.transition {
+            mean[row] += phi * before[column];
+        }
+        mean
+    }
+}
+
+impl<const M: usize, const G: usize> Course<M, G> {
+    /// Index of the common start.
+    pub const BEGIN: usize = 0;
+
+    /// Component `k` of `g` is the moving state `begins[k]` at the begin of a part.
+    pub fn new(begins: &[usize]) -> Self {
+        let mut known = Known {
+            of_given: [[0.0; G]; M],
+            covariance: [[0.0; M]; M],
+            information: [[0.0; G]; G],
+        };
+        for (component, &state) in begins.iter().enumerate() {
+            known.of_given[state][component] = 1.0;
+        }
+        let begin = Point {
+            event: Event::Begin,
+            known,
+            gain: None,
+        };
+        Self {
+            models: Vec::new(),
+            points: vec![begin],
+        }
+    }
+
+    /// Starts a part with these models; what is known for other models is dropped.
+    pub fn begin(&mut self, models: Vec<StepModel<M>>) {
+        let pairs = self.models.iter().zip(&models);
+        let alike = pairs.take_while(|(one, other)| one == other).count();
+        let other = |of: &Point<M, G>| matches!(of.event, Event::Step(model) if model >= alike);
+        let first = self.points.iter().position(other);
+        self.points.truncate(first.unwrap_or(self.points.len()));
+        self.models = models;
+    }
+
+    /// The point after a step.
+    pub fn step(&mut self, from: usize, model: usize) -> usize {
+        let event = Event::Step(model);
+        if !self.is_next(from, event) {
+            let known = self.points[from].known.propagated(&self.models[model]);
+            self.lead(from, event, known, None);
+        }
+        from + 1
+    }
+
+    /// The point after an observation of three states; `None` if their covariance is not positive definite.
+    pub fn observe(&mut self, from: usize, first: usize, variance: f64) -> Option<usize> {
+        let event = Event::Observed(first, variance);
+        if !self.is_next(from, event) {
+            let mut known = self.points[from].known.clone();
+            let gain = known.gain(first, variance)?;
+            known.update(&gain);
+            self.lead(from, event, known, Some(gain));
+        }
+        Some(from + 1)
+    }
+
+    fn is_next(&self, from: usize, event: Event) -> bool {
+        let next = self.points.get(from + 1);
+        next.is_some_and(|point| point.event == event)
+    }
+
+    fn lead(&mut self, from: usize, event: Event, known: Known<M, G>, gain: Option<Gain<M, G>>) {
+        self.points.truncate(from + 1);
+        self.points.push(Point { event, known, gain });
+    }
+}
+
+impl<const M: usize, const G: usize> Known<M, G> {
+    fn propagated(&self, model: &StepModel<M>) -> Self {
+        let mut of_given = [[0.0; G]; M];
+        let mut half = [[0.0; M]; M];
+        for &(row, column, phi) in &model.transition {
+            add(&mut of_given[row], phi, &self.of_given[column]);
+            add(&mut half[row], phi, &self.covariance[column]);
+        }
+        for &(row, component, by) in &model.driven {
+            of_given[row][component] += by;
+        }
+        let mut covariance = model.noise;
+        for (row, sum) in covariance.iter_mut().enumerate() {
+            for &(at, column, phi) in &model.transition {
+                sum[at] += phi * half[row][column];
+            }
+        }
+        Self {
+            of_given,
+            covariance,
+            information: self.information,
+        }
+    }
+
+    fn gain(&self, first: usize, variance: f64) -> Option<Gain<M, G>> {
+        let states = [0, 1, 2].map(|axis| first + axis);
+        let mut rows = states.map(|state| self.of_given[state]);
+        let mut of_errors = states.map(|state| self.covariance[state]);
+        let own = Matrix3::from_fn(|row, column| of_errors[row][states[column]])
+            + Matrix3::from_diagonal_element(variance);
+        let root = own.cholesky()?.l();
+        whiten(&root, &mut rows);
+        whiten(&root, &mut of_errors);
+        Some(Gain {
+            log_determinant: 2.0 * root.diagonal().map(f64::ln).sum(),
+            root,
+            rows,
+            of_errors,
+        })
+    }
+
+    fn update(&mut self, gain: &Gain<M, G>) {
+        for (row, of_errors) in gain.rows.iter().zip(&gain.of_errors) {
+            for (state, gain) in of_errors.iter().enumerate() {
+                add(&mut self.of_given[state], -gain, row);
+                add(&mut self.covariance[state], -gain, of_errors);
+            }
+            for (of_component, weight) in self.information.iter_mut().zip(row) {
+                add(of_component, *weight, row);
+            }
+        }
+    }
+}
