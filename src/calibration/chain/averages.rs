@@ -54,6 +54,12 @@ pub struct Average {
 /// The normal factor in place of the prior of a group.
 struct Site(Information);
 
+/// A mean with its covariance.
+struct Moments {
+    mean: DVector<f64>,
+    covariance: DMatrix<f64>,
+}
+
 /// The average over all cases of groups that differ from zero; other constants have their prior in the information
 /// already. `None` if the information does not determine them.
 pub fn average(all: &Information, groups: &[Group]) -> Option<Average> {
@@ -74,7 +80,7 @@ pub fn average(all: &Information, groups: &[Group]) -> Option<Average> {
             break;
         }
     }
-    let (mean, covariance) = now;
+    let Moments { mean, covariance } = now;
     Some(Average {
         mean,
         covariance,
@@ -83,11 +89,7 @@ pub fn average(all: &Information, groups: &[Group]) -> Option<Average> {
 }
 
 /// Mean and covariance of all constants.
-fn with_sites(
-    all: &Information,
-    groups: &[Group],
-    sites: &[Site],
-) -> Option<(DVector<f64>, DMatrix<f64>)> {
+fn with_sites(all: &Information, groups: &[Group], sites: &[Site]) -> Option<Moments> {
     let mut sum = all.clone();
     for (group, Site(site)) in groups.iter().zip(sites) {
         for (row, &i) in group.places.iter().enumerate() {
@@ -106,7 +108,8 @@ fn with_sites(
     let covariance = DMatrix::from_fn(scale.len(), scale.len(), |i, j| {
         inverse[(i, j)] * scale[i] * scale[j]
     });
-    Some((&covariance * &sum.vector, covariance))
+    let mean = &covariance * &sum.vector;
+    Some(Moments { mean, covariance })
 }
 
 impl Site {
@@ -120,11 +123,7 @@ impl Site {
     }
 
     /// What all but this site say of a group.
-    fn cavity(
-        &self,
-        group: &Group,
-        (mean, covariance): &(DVector<f64>, DMatrix<f64>),
-    ) -> Option<Information> {
+    fn cavity(&self, group: &Group, Moments { mean, covariance }: &Moments) -> Option<Information> {
         let places = &group.places;
         let own = covariance.select_rows(places).select_columns(places);
         let inverse = Cholesky::new(own)?.inverse();
@@ -135,10 +134,7 @@ impl Site {
     }
 
     /// The factor between a cavity and the moments of the average over the cases.
-    fn between(
-        cavity: &Information,
-        (mean, covariance): &(DVector<f64>, DMatrix<f64>),
-    ) -> Option<Self> {
+    fn between(cavity: &Information, Moments { mean, covariance }: &Moments) -> Option<Self> {
         let inverse = Cholesky::new(covariance.clone())?.inverse();
         Some(Self(Information {
             vector: &inverse * mean - &cavity.vector,
@@ -148,7 +144,7 @@ impl Site {
 }
 
 /// Mean and covariance of a group over its cases, given what all others say, and the probability that it is absent.
-fn cases(cavity: &Information, usual: &[f64]) -> Option<((DVector<f64>, DMatrix<f64>), f64)> {
+fn cases(cavity: &Information, usual: &[f64]) -> Option<(Moments, f64)> {
     let n = usual.len();
     // In units of the usual sizes, along the directions that the others determine independently.
     let scaled = DMatrix::from_fn(n, n, |i, j| {
@@ -188,7 +184,8 @@ fn cases(cavity: &Information, usual: &[f64]) -> Option<((DVector<f64>, DMatrix<
     let covariance = squares - &mean * mean.transpose();
     let back = DMatrix::from_fn(n, n, |i, j| usual[i] * turned.eigenvectors[(i, j)]);
     let covariance = &back * covariance * back.transpose();
-    Some(((back * mean, covariance), weights[0] / sum))
+    let mean = back * mean;
+    Some((Moments { mean, covariance }, weights[0] / sum))
 }
 
 #[cfg(test)]

@@ -53,12 +53,13 @@ pub fn descend<E>(
         step *= (LONGEST / step.amax()).min(1.0);
         let mut there = slope_at(&(&at + &step))?;
         let mut fraction = 1.0;
-        while !(there.cost < here.cost) && fraction > SHORTEST {
+        let falls = |there: &Slope| there.cost < here.cost;
+        while !falls(&there) && fraction > SHORTEST {
             fraction *= 0.5;
             step *= 0.5;
             there = slope_at(&(&at + &step))?;
         }
-        if !(there.cost < here.cost) {
+        if !falls(&there) {
             if is_fresh {
                 break;
             }
