@@ -1,6 +1,6 @@
 //! The noise at rest, from the dwells alone.
 //!
-//! What a part of a dwell begins with, and the constant rates and forces in it, are its own and free; what is left of it
+//! What a part of a dwell begins with, and the constant rates and forces in it, are its own and free; the remainder
 //! shows white noise, sway and turning by hand, whatever the parameters are.
 
 use std::convert::Infallible;

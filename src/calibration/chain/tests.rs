@@ -161,7 +161,7 @@ fn errors(of: &Estimated, truth: &PerSensor<Triad>) -> Vec<f64> {
 
 /// Estimates a run of the demo whose table readings in these dwells, or from the first of them on, are changed, and holds
 /// it against the truth: `named` alone stands out, no parameter is off by more than 4 σ, and no σ is over these times
-/// that of the sound run.
+/// that of the run without the change.
 fn stands_out(
     (named, dwell): (Effect, usize),
     stays: bool,

@@ -145,7 +145,7 @@ impl<'a> Maker<'a> {
         self.dynamics.turned = mounted.then(|| own.response(&script.at.triads));
     }
 
-    /// Lets some states begin anew, with these means and 1σ.
+    /// Resets some states, with these means and 1σ.
     fn renew(&mut self, first: usize, (mean, sigma): (&[f64], &[f64]), effect: Effect) {
         self.pending.reset(first..first + mean.len(), mean);
         let root = DMatrix::from_diagonal(&DVector::from_column_slice(sigma));
