@@ -21,7 +21,7 @@ pub use catalogue::Embedded;
 pub use instrument::{InstallationModel, Instrument, Spread, Tolerances, Variation};
 pub use machine::{path, turntable};
 pub use source::{ModelError, Place, Room, Text, inconsistent, names, text};
-pub use terms::{TermFile, term_sigma};
+pub use terms::{TermFile, stated_terms};
 pub use thermal::ThermalVariation;
 pub use trajectory::trajectory;
 

@@ -12,9 +12,7 @@ use std::sync::OnceLock;
 use dense_filter::DenseFilter;
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use turncal::calibration::{
-    Method, NoisePolicy, Options, Outcome, Problem, UNWATCHED, bound, estimate, test_error_terms,
-};
+use turncal::calibration::{Method, NoisePolicy, Options, Problem, UNWATCHED, bound, estimate};
 use turncal::imu::{InstallationForm, PerSensor, Triad};
 use turncal::navigation::{Navigator, ProcessNoise, State};
 use turncal::run::Run;
@@ -120,19 +118,6 @@ fn estimator(bencher: Bencher, noise: NoisePolicy) {
     bencher
         .counter(samples())
         .bench(|| estimate(&problem, UNWATCHED));
-}
-
-#[divan::bench]
-fn error_terms(bencher: Bencher) {
-    static SOLVED: OnceLock<(Problem, Outcome)> = OnceLock::new();
-    let (problem, outcome) = SOLVED.get_or_init(|| {
-        let problem = Problem::new(run(), &Options::default());
-        let outcome = estimate(&problem, UNWATCHED).expect("a sound run");
-        (problem, outcome)
-    });
-    bencher
-        .counter(samples())
-        .bench(|| test_error_terms(problem, outcome));
 }
 
 /// All that `calibrate` works out of a recorded run, if it is there.

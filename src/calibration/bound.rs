@@ -1,10 +1,11 @@
 //! The Bayesian Cramér–Rao bound of a run.
 
-use crate::calibration::checks::error_term_test::{TermsOn, with_everything};
+use crate::calibration::outcome::{auxiliary_of, last_attitude};
+use crate::calibration::sizes::Effects;
 use crate::calibration::start::coarse::initial_attitudes;
 use crate::calibration::{
-    Auxiliary, CalibrationError, Epoch, ErrorTerm, Estimate, Gate, Linearisation, Observability,
-    ParameterVector, PassResult, Prior, Problem, Script, pass,
+    Auxiliary, CalibrationError, Epoch, ErrorTerm, Estimate, Linearisation, Observability,
+    ParameterVector, Problem, Script,
 };
 use crate::imu::{PerSensor, TermVector, Triad};
 
@@ -35,10 +36,10 @@ pub struct TermLeftOff {
     pub change: ParameterVector,
 }
 
-/// The covariance of a pass linearised at the truth, with `terms` the true error terms, in the installation
-/// form of the truth: the inverse of the Bayesian information matrix for Gaussian noise (Van Trees, *Detection,
-/// Estimation, and Modulation Theory*, part I, §2.4.3). The initial attitude is that of the first
-/// reading or the coarse start: arc seconds of tilt and arc minutes of heading have no effect on the
+/// The covariance of a chain linearised at the truth, with the noise and the error terms of the problem as stated and with
+/// `terms` the true ones, in the installation form of the truth: the inverse of the Bayesian information matrix for
+/// Gaussian noise (Van Trees, *Detection, Estimation, and Modulation Theory*, part I, §2.4.3). The initial attitude is
+/// that of the first reading or the coarse start: arc seconds of tilt and arc minutes of heading have no effect on the
 /// covariance.
 ///
 /// # Errors
@@ -48,39 +49,42 @@ pub fn bound(
     truth: &PerSensor<Triad>,
     terms: &TermVector,
 ) -> Result<Bound, CalibrationError> {
-    let (bound, _) = bound_with_parts(problem, truth, terms, &[])?;
+    let (bound, _) = bound_without_moves(problem, truth, terms)?;
     Ok(bound)
 }
 
-/// The same, with the 1σ of the parameters without the rows between each of these increasing times in s and the next.
+/// The same, with the 1σ of the parameters without each move in turn.
 ///
 /// # Errors
 /// [`CalibrationError`] as for [`super::estimate`].
-pub fn bound_with_parts(
+pub fn bound_without_moves(
     problem: &Problem,
     truth: &PerSensor<Triad>,
     terms: &TermVector,
-    times: &[f64],
 ) -> Result<(Bound, Vec<ParameterVector>), CalibrationError> {
-    let problem = problem.with(|model| *model = model.in_form(problem.run(), truth.gyro.form));
-    let at = Linearisation::new(*truth, *terms, Vec::new());
-    let at_truth = pass_at(&problem, at)?;
-    let prior = Prior::new(&at_truth.reduction.constants, &problem.model, &at_truth.at);
+    let problem = at_truth(problem, truth).with(|model| model.may_have.clear());
+    let script = script(&problem, Linearisation::new(*truth, *terms, Vec::new()))?;
+    let effects = Effects::new(&problem);
+    let chain = effects.chain(&problem, &script)?;
+    let weighed = effects.weighed(&chain, &problem, &script)?;
+    let (filtered, posterior) = (&weighed.filtered, &weighed.posterior);
     let prior_sigma = problem.model.prior_sigma;
     let estimate = Estimate {
         triads: *truth,
-        covariance: at_truth.posterior.parameter_covariance,
+        covariance: posterior.parameter_covariance,
     };
-    let (_, across) = at_truth.last_attitude();
-    let without = at_truth.reduction.sigma_without(&prior, times);
+    let (_, across) = last_attitude(&weighed, &script.priors);
+    let sites = effects.candidates.sites(&weighed.prior);
+    let beside = (&weighed.prior, &sites);
+    let (_, history) = filtered.innovations((&problem, &script), beside, &effects.dispersion)?;
     let bound = Bound {
         observability: Observability::new(&estimate, &prior_sigma, &across),
+        auxiliary: auxiliary_of(posterior, &script.at, &problem.model, |_| true),
         prior_sigma,
         estimate,
-        auxiliary: at_truth.auxiliary(&problem.model),
-        history: at_truth.reduction.history(&prior, &at_truth.at),
+        history,
     };
-    Ok((bound, without))
+    Ok((bound, filtered.without_moves(posterior)))
 }
 
 /// The constant error terms that a problem does not estimate, at a truth as for [`bound`].
@@ -92,27 +96,41 @@ pub fn terms_left_off(
     truth: &PerSensor<Triad>,
     terms: &TermVector,
 ) -> Result<Vec<TermLeftOff>, CalibrationError> {
-    let problem = problem.with(|model| *model = model.in_form(problem.run(), truth.gyro.form));
-    let at = Linearisation::new(*truth, *terms, Vec::new());
-    let PassResult { at, reduction, .. } = pass_at(&with_everything(&problem), at)?;
-    let terms_on = TermsOn::new(&problem, &at, reduction.folded());
-    let off = ErrorTerm::constant().filter(|&term| !problem.model.has(term));
-    let left_off = off.filter_map(|term| {
+    let problem = at_truth(problem, truth).with(|model| {
+        let off = ErrorTerm::constant().filter(|&term| !model.has(term) && model.can_have(term));
+        model.may_have = off.collect();
+    });
+    let script = script(&problem, Linearisation::new(*truth, *terms, Vec::new()))?;
+    let effects = Effects::new(&problem);
+    let chain = effects.chain(&problem, &script)?;
+    let weighed = effects.weighed(&chain, &problem, &script)?;
+    let first = weighed.prior.constants.len() - weighed.prior.candidates;
+    let candidates = &weighed.prior.constants[first..];
+    let left_off = problem.model.may_have.iter().filter_map(|&term| {
+        let places = candidates.iter().enumerate();
+        let places = places.filter(|(_, of)| of.error_term() == Some(term));
+        let places: Vec<usize> = places.map(|(place, _)| place).collect();
+        let (change, remaining) = weighed.known.effect_of(&places)?;
         Some(TermLeftOff {
             term,
-            remaining: terms_on.remaining(term)?,
-            change: terms_on.left_off(term)?.usual,
+            remaining,
+            change,
         })
     });
     Ok(left_off.collect())
 }
 
-/// A pass at the truth.
-fn pass_at(problem: &Problem, truth: Linearisation) -> Result<PassResult, CalibrationError> {
+/// The problem in the installation form of a truth, with stated noise.
+fn at_truth<'a>(problem: &Problem<'a>, truth: &PerSensor<Triad>) -> Problem<'a> {
+    problem.with(|model| *model = model.in_form(problem.run(), truth.gyro.form))
+}
+
+/// Events at a truth.
+fn script(problem: &Problem, truth: Linearisation) -> Result<Script, CalibrationError> {
     let attitudes = initial_attitudes(problem)?;
     let at = Linearisation {
         initial_attitudes: attitudes.iter().map(|attitude| attitude.mean).collect(),
         ..truth
     };
-    pass(problem, &Script::new(problem, &attitudes, &at)?, Gate::Open)
+    Script::new(problem, &attitudes, &at)
 }

@@ -6,6 +6,17 @@ use crate::imu::{InstallationForm, PerSensor, Sensor, Triad};
 use crate::run::Run;
 use nalgebra::{DMatrix, DMatrixView};
 
+/// Estimate of the parameters of both triads at one time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Epoch {
+    /// Time, s.
+    pub time: f64,
+    /// Parameters of both triads.
+    pub estimate: ParameterVector,
+    /// 1σ of each.
+    pub sigma: ParameterVector,
+}
+
 /// Both triads with the covariance of their parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {

@@ -30,6 +30,8 @@ pub struct Linearisation {
     pub own: Vec<Difference>,
     /// `C_b_n` at the first sample of each stretch.
     pub initial_attitudes: Vec<Matrix3<f64>>,
+    /// `C_b_n` where each dwell begins, whatever the table reads; empty at the start.
+    pub dwells: Vec<Matrix3<f64>>,
 }
 
 impl Linearisation {
@@ -45,6 +47,7 @@ impl Linearisation {
             thermal: PerSensor::default(),
             own: Vec::new(),
             initial_attitudes,
+            dwells: Vec::new(),
         }
     }
 
@@ -85,7 +88,11 @@ impl Linearisation {
     /// The point a fraction of the way to another.
     pub(in crate::calibration) fn towards(&self, other: &Self, fraction: f64) -> Self {
         let from = to_vector(&self.triads);
-        let attitudes = self.initial_attitudes.iter().zip(&other.initial_attitudes);
+        let turned = |from: &[Matrix3<f64>], to: &[Matrix3<f64>]| {
+            let pairs = from.iter().zip(to);
+            let turned = pairs.map(|(from, to)| exp(log(&(to * from.transpose())) * fraction) * from);
+            turned.collect()
+        };
         Self {
             triads: from_vector(
                 self.triads.gyro.form,
@@ -99,9 +106,12 @@ impl Linearisation {
             own: (0..self.own.len().max(other.own.len()))
                 .map(|k| self.own(k).towards(&other.own(k), fraction))
                 .collect(),
-            initial_attitudes: attitudes
-                .map(|(from, to)| exp(log(&(to * from.transpose())) * fraction) * from)
-                .collect(),
+            initial_attitudes: turned(&self.initial_attitudes, &other.initial_attitudes),
+            dwells: if self.dwells.is_empty() {
+                other.dwells.clone()
+            } else {
+                turned(&self.dwells, &other.dwells)
+            },
         }
     }
 }

@@ -1,16 +1,14 @@
-//! Calibration: closed form, coarse start, filter and Gauss–Newton iterations, and the checks of a result.
+//! Calibration: closed form, coarse start, chain of dwells with the sizes of all effects, and the checks of a result.
 //!
 //! A [`Problem`] takes runs and [`Options`]; [`estimate`] and [`six_position`] solve it; [`bound`] gives the Cramér–Rao
 //! bound. This module does not print, read files or draw.
 
-#[cfg(test)]
 mod chain;
 mod checks;
 mod constants;
-mod filter;
 mod record;
-mod reduction;
 mod several;
+mod sizes;
 mod start;
 
 mod bound;
@@ -18,26 +16,23 @@ mod budget;
 mod error;
 mod estimate;
 mod estimator;
-mod gauss_newton;
-mod layout;
+mod iterations;
 mod linearisation;
 pub mod model;
 mod noise;
 mod options;
 mod outcome;
 mod parameters;
-mod pass;
+mod passes;
 mod problem;
 pub mod result;
 mod solution;
-mod solved;
 
 // Most files of this module import their common types from here.
-pub use bound::{Bound, TermLeftOff, bound, bound_with_parts, terms_left_off};
-pub use budget::{Budget, BudgetPart, BudgetPartRecord, BudgetRecord, BudgetSource, LeftOffRecord};
-pub use checks::cause::{Cause, FoundCause};
-pub use checks::dwell_scatter::DwellScatter;
-pub use checks::error_term_test::{ErrorTermTest, Role, UnmodelledEffect, test_error_terms};
+pub use bound::{Bound, TermLeftOff, bound, bound_without_moves, terms_left_off};
+pub use budget::{Budget, BudgetPart, BudgetPartRecord, BudgetRecord, BudgetSource};
+pub use chain::Slip;
+pub use checks::event::{Event, EventKind};
 pub use checks::finding::Finding;
 pub use checks::finding::kind::{Kind as FindingKind, Level};
 pub use checks::finding::verdict::{Verdict, Word};
@@ -46,20 +41,16 @@ pub use checks::innovation::{Consistency, Innovation, Nis, Observation, mean_squ
 pub use checks::observability::{Direction, Observability};
 pub use checks::quality::{DwellResidual, Measures, Quality, Spread};
 pub use checks::recordings::RecordingDifference;
-use constants::{Constant, Known, Posterior, Prior};
-pub use constants::{Disturbance, DisturbanceKind};
+pub use checks::term::TermEvidence;
+use constants::{Candidate, Constant, Known, Posterior, Prior, of_parameters};
 pub use error::{CalibrationError, ComparisonError};
-pub use estimate::Estimate;
+pub use estimate::{Epoch, Estimate};
 pub use estimator::estimate;
-pub use gauss_newton::Pass;
-use gauss_newton::{Iterated, iterate};
-pub use gauss_newton::{Progress, UNWATCHED};
-use layout::{ATTITUDE, Layout, NAVIGATION, POSITION, VELOCITY};
 pub use linearisation::{AttitudePrior, Linearisation};
 pub use model::Model;
 pub use noise::{NoisePolicy, NoiseReport, NoiseTest, Source, SourceFigures};
 pub use options::Options;
-pub use outcome::Outcome;
+pub use outcome::{Outcome, Own};
 pub use parameters::auxiliary::{
     AUXILIARY, Auxiliary, AuxiliaryKind, AuxiliaryVector, auxiliary_name, auxiliary_vector,
 };
@@ -69,11 +60,10 @@ pub use parameters::{
     OBSERVED_BELOW, PARAMETERS, ParameterMatrix, ParameterVector, from_vector, in_general_form,
     parameter, parameter_index, parameter_name, sensor_and_parameter, stacked, to_vector,
 };
-use pass::{Gate, PassResult, pass};
+pub use passes::{Pass, Progress, UNWATCHED};
 pub use problem::Problem;
 use problem::Stretch;
-pub use reduction::{Epoch, Own};
-use reduction::{Reduction, Script};
+use record::Script;
 pub use result::at_temperature::TemperatureError;
 pub use result::correction::{Calibrated, Correction, CorrectionError};
 pub use result::frame::{Canonical, Named, in_body_frame};
@@ -87,10 +77,8 @@ pub use result::{Calibration, Method, triads_of};
 pub use several::at_rest::{AtRest, MeanAtRest};
 pub use several::day_to_day::{DayToDay, Difference};
 pub use several::thermal::{Coefficient, Thermal};
-pub use several::{Repeatability, TemperatureOptions, Together};
+pub use several::{Repeatability, SeparateEstimate, TemperatureOptions, Together};
 pub use solution::{Assessment, Solution};
-pub use solved::SeparateEstimate;
-use solved::Solved;
 pub use start::closed_form::{ClosedForm, Reference, six_position, six_position_of};
 pub use start::coarse::{CoarseStart, coarse_start};
 pub use start::mounting::orders_of_gyros;

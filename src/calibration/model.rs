@@ -7,15 +7,17 @@ use nalgebra::Vector3;
 use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::parameters::stacked;
 use crate::calibration::record::standstill::FLOOR;
-use crate::calibration::{DayToDay, Disturbance, ErrorTerm, Options, ParameterVector, to_vector};
+use crate::calibration::{
+    Constant, DayToDay, ErrorTerm, Options, ParameterVector, to_vector,
+};
+use crate::earth::ROTATION_RATE;
 use crate::imu::{
-    GaussMarkov, InstallationForm, MotionNoise, Noise, PerSensor, Sensor, Term, TermVector,
-    ThermalModel,
+    GaussMarkov, InstallationForm, MotionNoise, Noise, PerSensor, Sensor, TermVector, ThermalModel,
 };
 use crate::navigation::ProcessNoise;
 use crate::run::{Aiding, Run};
 use crate::turntable::{AxisError, TableGeometry};
-use crate::units::ARCSEC;
+use crate::units::{ARCSEC, DEGREE};
 
 /// Default 1σ of the level of a table, rad.
 pub const USUAL_LEVEL: f64 = 10.0 * ARCSEC;
@@ -23,6 +25,8 @@ pub const USUAL_LEVEL: f64 = 10.0 * ARCSEC;
 pub const USUAL_NORTH: f64 = 60.0 * ARCSEC;
 /// Default 1σ of each tilt of its axes, rad.
 const USUAL_TILT: f64 = 10.0 * ARCSEC;
+/// Time in which a table settles after a stop, s.
+pub const SETTLING_TIME: f64 = 1.0;
 /// Default correlation time of a varying bias, s.
 const USUAL_CORRELATION: f64 = 100.0;
 /// Default 1σ of a varying bias, in multiples of the white noise averaged over a correlation time.
@@ -49,11 +53,10 @@ pub struct Model {
     /// Unwanted rotation of the body in dwells without a table: 1σ density of a random walk,
     /// rad/√s. Gyros sense it, so it is not part of their noise.
     pub turning_at_rest: f64,
-    /// Whether velocity is reset after each move: without a table log, a move adds more noise than information to
-    /// velocity, except about terms visible in no other observation.
-    pub velocity_anew: bool,
     /// 1σ of each parameter of the instrument's error terms, around zero; zero if a term is off.
     pub term_sigma: TermVector,
+    /// Error terms that may be absent: the average over their sizes is estimated.
+    pub may_have: Vec<ErrorTerm>,
     /// Temperature dependence of the instrument, if any.
     pub thermal: Option<Arc<ThermalModel>>,
     /// σ of the differences between recordings.
@@ -64,10 +67,10 @@ pub struct Model {
     pub position_sigma: f64,
     /// 1σ per axis of a reading of the table, rad; zero without a table.
     pub reading_sigma: f64,
+    /// The same of a reading just after a stop in addition, which fades with [`SETTLING_TIME`].
+    pub settling_sigma: f64,
     /// 1σ of table errors not included in its readings; zero if off.
     pub geometry: TableGeometry,
-    /// Single events that are estimated.
-    pub(in crate::calibration) disturbances: Vec<Disturbance>,
     /// Number of table axes with angle readings; zero if there are none.
     table_axes: usize,
     /// The source with scaled variance, and the factor; used to compute its share of the budget.
@@ -90,15 +93,15 @@ impl Model {
             motion_noise: run.instrument.motion_noise,
             standstill_sigma: PerSensor::default(),
             turning_at_rest: run.standstill.turning,
-            velocity_anew: false,
             term_sigma: run.instrument.term_sigma,
+            may_have: Vec::new(),
             thermal: None,
             day_to_day: DayToDay::default(),
             gravity_sigma: run.site.gravity_sigma,
             position_sigma: accuracy.position_sigma,
             reading_sigma: accuracy.reading_sigma,
+            settling_sigma: accuracy.settling_sigma,
             geometry: accuracy.geometry,
-            disturbances: Vec::new(),
             table_axes: axes.map_or(0, |axes| axes.iter().flatten().count()),
             varied: None,
         };
@@ -106,10 +109,59 @@ impl Model {
         for &term in &options.terms {
             model.switch_on(term);
         }
-        let shows_in_velocity = [Term::SizeEffect, Term::TimeOffset].map(ErrorTerm::Instrument);
-        let needed = shows_in_velocity.into_iter().any(|term| model.has(term));
-        model.velocity_anew = aiding == Aiding::Velocity && !needed;
+        if options.auto_terms {
+            let absent = &run.instrument.absent_terms;
+            let is_absent = |term| matches!(term, ErrorTerm::Instrument(of) if absent.contains(&of));
+            let may_have = ErrorTerm::constant().filter(|&term| !is_absent(term));
+            model.may_have = may_have
+                .filter(|&term| !model.has(term) && model.can_have(term))
+                .collect();
+        }
         model
+    }
+
+    /// Prior 1σ of a constant or, if it may be absent, its usual size; zero if it is off.
+    pub(in crate::calibration) fn sigma(&self, constant: Constant) -> f64 {
+        let stated = match constant {
+            Constant::Parameter(index) => self.prior_sigma[index],
+            Constant::Term(index) => self.term_sigma[index],
+            Constant::Thermal(of) => {
+                let thermal = self.thermal.as_deref();
+                thermal.map_or(0.0, |thermal| of.of(&thermal.sigma))
+            }
+            Constant::Gravity => self.gravity_sigma,
+            Constant::Base(axis) => self.geometry.base[axis],
+            Constant::Axis(index) => self.geometry.axes[index],
+            Constant::EarthRate(_) => 0.0,
+        };
+        if stated > 0.0 {
+            return stated;
+        }
+        match constant {
+            // A latitude is easily stated wrong by a degree; on a table only, because a hand tells no heading.
+            Constant::EarthRate(_) if self.aiding == Aiding::Table && !self.may_have.is_empty() => {
+                ROTATION_RATE * DEGREE
+            }
+            _ => {
+                let term = constant.error_term();
+                let term = term.filter(|term| self.may_have.contains(term));
+                term.map_or(0.0, |term| self.usual_size(term, constant))
+            }
+        }
+    }
+
+    /// Usual size of a constant of an error term.
+    fn usual_size(&self, term: ErrorTerm, constant: Constant) -> f64 {
+        match (term, constant) {
+            (ErrorTerm::Instrument(of), _) => of.usual_size(&self.noise),
+            (_, Constant::Base(2)) => USUAL_NORTH,
+            (_, Constant::Base(_)) => USUAL_LEVEL,
+            (ErrorTerm::TableAxes(kind), Constant::Axis(index)) => {
+                let usual = usual_axis_error(kind, self.position_sigma);
+                kind.of_table(self.table_axes, usual)[index]
+            }
+            _ => 0.0,
+        }
     }
 
     /// Process noise of the navigation errors.
@@ -129,6 +181,12 @@ impl Model {
         })
     }
 
+    /// Variance of a table's reading per axis by settling, this time after a stop, rad².
+    pub(in crate::calibration) fn settling(&self, since_stop: f64) -> f64 {
+        let fading = (-2.0 * since_stop / SETTLING_TIME).exp();
+        self.settling_sigma.powi(2) * fading * self.weight(BudgetSource::Settling)
+    }
+
     /// Factor of the variance of a source.
     pub(in crate::calibration) fn weight(&self, source: BudgetSource) -> f64 {
         let varied = self.varied.filter(|&(varied, _)| varied == source);
@@ -143,19 +201,6 @@ impl Model {
     ) {
         let sigma = (variance + FLOOR.get(sensor).powi(2)).sqrt();
         *self.standstill_sigma.get_mut(sensor) = Some(sigma);
-    }
-
-    /// The same model with the noise of another.
-    pub(in crate::calibration) fn with_noise_of(&self, other: &Self) -> Self {
-        Self {
-            noise: other.noise,
-            motion_noise: other.motion_noise,
-            standstill_sigma: other.standstill_sigma,
-            turning_at_rest: other.turning_at_rest,
-            position_sigma: other.position_sigma,
-            reading_sigma: other.reading_sigma,
-            ..self.clone()
-        }
     }
 
     /// The model with its parameters in another form.
@@ -197,6 +242,7 @@ impl Model {
     /// Switches an error term on, with its usual σ unless the run states one. No effect if the
     /// run does not support it.
     pub fn switch_on(&mut self, term: ErrorTerm) {
+        self.may_have.retain(|&of| of != term);
         if !self.has(term) && self.can_have(term) {
             self.set(term, true);
         }
@@ -204,6 +250,7 @@ impl Model {
 
     /// Switches an error term off.
     pub fn switch_off(&mut self, term: ErrorTerm) {
+        self.may_have.retain(|&of| of != term);
         self.set(term, false);
     }
 

@@ -3,7 +3,6 @@
 use crate::calibration::{ErrorTerm, NoisePolicy};
 use crate::imu::InstallationForm;
 use crate::run::Aiding;
-use crate::statistics::FALSE_ALARM;
 
 /// Options of the estimation; the default suits most runs.
 ///
@@ -25,12 +24,10 @@ pub struct Options {
     pub aiding: Option<Aiding>,
     /// Error terms to estimate in addition to those with a σ stated for instrument or table.
     pub terms: Vec<ErrorTerm>,
-    /// Whether error terms supported by the data are also estimated.
+    /// Whether all other error terms are averaged over being absent and their usual sizes.
     pub auto_terms: bool,
     /// Noise policy.
     pub noise: NoisePolicy,
-    /// Probability that the gate rejects any observation of a recording without outliers.
-    pub false_rejection: f64,
     /// Convergence limit: largest step of any parameter, in σ.
     pub converged_sigma: f64,
     /// Maximum number of passes over the recording.
@@ -45,7 +42,6 @@ impl Default for Options {
             terms: Vec::new(),
             auto_terms: true,
             noise: NoisePolicy::default(),
-            false_rejection: FALSE_ALARM,
             converged_sigma: 0.02,
             passes: 20,
         }
@@ -79,7 +75,7 @@ impl Options {
         }
     }
 
-    /// Adds this error term, with its usual σ unless instrument or table state another.
+    /// Adds this error term, whatever the data say of it, with a wide σ unless instrument or table state another.
     pub fn with(mut self, term: ErrorTerm) -> Self {
         self.terms.push(term);
         self

@@ -1,18 +1,28 @@
-//! Outcome of the filter for a run: an estimate with its covariance, and the diagnostics of the filter.
+//! Outcome of the estimator: an estimate with its covariance, and the diagnostics of the filter.
 
-use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use crate::calibration::checks::dwell_scatter::DwellScores;
+use crate::calibration::chain::Filtered;
+use crate::calibration::chain::states::ATTITUDE;
+use crate::calibration::checks::event::Event;
+use crate::calibration::checks::form::form_test;
 use crate::calibration::checks::innovation::consistency;
-use crate::calibration::estimate::largest_growth;
+use crate::calibration::checks::observability::AttitudeCovariance;
+use crate::calibration::checks::recordings::RecordingDifference;
+use crate::calibration::checks::rounding::by_rounding;
+use crate::calibration::checks::term::{TermEvidence, is_shown};
+use crate::calibration::constants::parameters;
+use crate::calibration::iterations::Solved;
 use crate::calibration::linearisation::{UNKNOWN_HEADING, not_invertible};
+use crate::calibration::several::SeparateEstimate;
+use crate::calibration::sizes::Weighed;
 use crate::calibration::{
-    AttitudePrior, Auxiliary, BudgetSource, CalibrationError, Consistency, DwellScatter, Epoch,
-    Estimate, Finding, FormTest, FoundCause, Innovation, Linearisation, Model, NoiseReport,
-    OBSERVED_BELOW, Observability, Own, ParameterMatrix, ParameterVector, Pass, Posterior, Prior,
-    Problem, Reduction, Script, SeparateEstimate, Solved, Thermal, Verdict, Word,
+    AttitudePrior, Auxiliary, CalibrationError, Candidate, Consistency, Constant, Difference,
+    Epoch, Estimate, Finding, FormTest, Innovation, Linearisation, Model, NoiseReport,
+    OBSERVED_BELOW, Observability, ParameterMatrix, ParameterVector, Pass, Posterior, Problem,
+    Thermal, Verdict, Word,
 };
 use crate::imu::Sensor;
 
@@ -24,11 +34,6 @@ const HEADING_SEEN: f64 = 6.0;
 pub struct Outcome {
     /// The estimate after the last pass.
     pub estimate: Estimate,
-    /// Covariance of the parameters due to noise and prior alone, from the last pass.
-    pub covariance_by_noise: ParameterMatrix,
-    /// The other parts of the covariance of the estimate, by their source;
-    /// [`crate::calibration::Solution::assess`] adds more.
-    pub covariance_parts: BTreeMap<BudgetSource, ParameterMatrix>,
     /// Prior 1σ of every parameter.
     pub prior_sigma: ParameterVector,
     /// Prior of the initial attitude of each stretch.
@@ -36,7 +41,8 @@ pub struct Outcome {
     /// Posterior 1σ of the initial attitude of the last stretch about East, North and Up, rad; the last is that of the
     /// heading.
     pub attitude_sigma: Vector3<f64>,
-    /// Errors of the table's geometry and parameters of the instrument's error terms.
+    /// Errors of the table's geometry and parameters of the instrument's error terms, of those that are certain or asked
+    /// for.
     pub auxiliary: Auxiliary,
     /// Temperature dependence of the parameters, if any.
     pub thermal: Option<Thermal>,
@@ -62,81 +68,91 @@ pub struct Outcome {
     pub innovations: Vec<Innovation>,
     /// Consistency of the innovations with their covariance in the last pass.
     pub consistency: Consistency,
-    /// Scatter of the dwells relative to the covariance; `None` if there are too few dwells.
-    pub dwell_scatter: Option<DwellScatter>,
     /// Whether the data reject the installation form; `None` if they cannot test it.
     pub form_test: Option<FormTest>,
     /// The estimated model, with the noise that was used.
     pub model: Model,
     /// Origin of that noise.
     pub noise: NoiseReport,
-    /// Steps of each dwell after a stop that are skipped.
-    pub settling: usize,
-    /// Causes found in the recording that were not part of the problem.
-    pub causes: Vec<FoundCause>,
+    /// Single events that stand out.
+    pub events: Vec<Event>,
+    /// Evidence for every error term that may be there.
+    pub terms: Vec<TermEvidence>,
+    /// Differences between recordings that the data show beyond the stated ones.
+    pub differences: Vec<RecordingDifference>,
     /// Findings that a calibration engineer must know before using the figures.
     pub findings: Vec<Finding>,
+    /// The iterations from which all this follows.
+    pub(in crate::calibration) solved: Arc<Solved>,
+}
+
+/// Deviation of one recording from the common parameters.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Own {
+    /// The estimate.
+    pub values: Difference,
+    /// 1σ; zero for parameters common to all.
+    pub sigma: Difference,
 }
 
 impl Outcome {
-    /// The estimate, with the effects of noise and dwell scatter.
-    pub(in crate::calibration) fn by_noise(
-        as_stated: &Problem,
+    /// The outcome of a problem as stated, solved with a prior that it does not contradict.
+    pub(in crate::calibration) fn new(
+        (as_stated, problem): (&Problem, &Problem),
+        alone: Vec<SeparateEstimate>,
         solved: Solved,
-        form_test: Option<FormTest>,
     ) -> Result<Self, CalibrationError> {
-        let (problem, priors) = (solved.problem, solved.priors);
-        let (model, prior_sigma) = (&problem.model, as_stated.model.prior_sigma);
-        let estimate = solved.iterated.both_triads();
-        if let Some(sensor) = not_invertible(&estimate.triads) {
+        if let Some(sensor) = not_invertible(&solved.estimate.triads) {
             return Err(CalibrationError::Singular { sensor });
         }
-        let (mut held, converged) = (solved.iterated.held, solved.iterated.converged);
-        let prior = Prior::new(&held.reduction.constants, model, &held.at);
-        let scores = DwellScores::new(&held.reduction, &prior, &held.posterior);
-        let widened = scores.as_ref().and_then(DwellScores::widened);
-        let scattered = widened.map(|widened| {
-            held.posterior = held.posterior.clone().with_covariance(widened);
-            let widened = &held.posterior.parameter_covariance;
-            Estimate::with_curvature(estimate.triads, widened).covariance - estimate.covariance
-        });
-        let (mut attitude_sigma, attitude_covariance) = held.last_attitude();
-        if priors.last().is_some_and(AttitudePrior::heading_is_unknown) {
-            attitude_sigma.z = UNKNOWN_HEADING;
+        let (script, effects) = (solved.script.clone(), &solved.effects);
+        let chain = solved.chain.clone();
+        let weighed = effects.weighed(&chain, problem, &script)?;
+        let Weighed {
+            filtered,
+            prior,
+            posterior,
+            ..
+        } = &weighed;
+        let model = effects.model(&problem.model);
+        let made = problem.with_model(model.clone());
+        let sites = effects.candidates.sites(prior);
+        let (innovations, mut history) =
+            filtered.innovations((&made, &script), (prior, &sites), &effects.dispersion)?;
+        let estimate = with_all_parts(problem, &solved);
+        if let Some(last) = history.last_mut() {
+            (last.estimate, last.sigma) = (estimate.vector(), estimate.sigma());
         }
-        let gravity = held.gravity();
-        let mut outcome = Self {
-            form_test,
-            dwell_scatter: scores.map(|scores| scores.scatter),
+        let (attitude_sigma, attitude_covariance) = last_attitude(&weighed, &script.priors);
+        let prior_sigma = as_stated.model.prior_sigma;
+        let (off, gravity_sigma) = gravity(filtered, posterior);
+        Ok(Self {
             observability: Observability::new(&estimate, &prior_sigma, &attitude_covariance),
-            covariance_by_noise: estimate.covariance,
+            form_test: form_test(problem, &solved)?,
+            auxiliary: auxiliary(&weighed, &solved, &problem.model),
+            thermal: posterior.thermal(&script.at, &problem.model),
+            own: own(filtered, posterior, &script.at),
+            gravity: (problem.run().site.gravity + off, gravity_sigma),
+            terms: TermEvidence::all(&weighed, &effects.candidates, &problem.model),
+            events: Event::all(problem, &weighed),
+            differences: effects.differences(&weighed, problem)?,
+            velocity_sigma: made.standstill_sigma(Sensor::Accel),
+            noise: effects.report(problem),
+            consistency: consistency(&innovations),
+            prior_attitudes: script.priors.clone(),
+            linearised_at: script.at.clone(),
+            passes: solved.passes.clone(),
+            converged: solved.converged,
+            findings: Vec::new(),
             estimate,
-            covariance_parts: BTreeMap::new(),
             prior_sigma,
             attitude_sigma,
-            prior_attitudes: priors,
-            auxiliary: held.auxiliary(model),
-            thermal: held.posterior.thermal(&held.at, model),
-            own: held.reduction.own(&held.at, &held.posterior),
-            alone: solved.alone,
-            gravity: (problem.run().site.gravity + gravity.0, gravity.1),
-            converged,
-            consistency: consistency(&held.innovations),
-            history: held.reduction.history(&prior, &held.at),
-            linearised_at: held.at,
-            innovations: held.innovations,
-            velocity_sigma: problem.standstill_sigma(Sensor::Accel),
-            model: model.clone(),
-            settling: solved.settling,
-            causes: solved.causes,
-            noise: solved.noise,
-            passes: solved.passes,
-            findings: Vec::new(),
-        };
-        if let Some(scattered) = scattered {
-            outcome.set_part(BudgetSource::DwellScatter, scattered);
-        }
-        Ok(outcome)
+            alone,
+            history,
+            innovations,
+            model,
+            solved: Arc::new(solved),
+        })
     }
 
     /// Whether it may be used.
@@ -159,83 +175,125 @@ impl Outcome {
         4.0 * of_run > HEADING_SEEN
     }
 
-    /// The problem as calibrated: with the estimated noise, and a prior that the data do not contradict.
-    pub(in crate::calibration) fn as_calibrated<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
-        let problem = self.with_prior(problem);
-        if self.noise.learnt {
-            problem.with_model(problem.model.with_noise_of(&self.model))
-        } else {
-            problem
-        }
-    }
-
-    /// The problem with that prior and all causes found, but with the stated noise.
-    pub(in crate::calibration) fn with_prior<'a>(&self, problem: &Problem<'a>) -> Problem<'a> {
-        let causes = self.causes.iter();
-        let problem = causes.fold(problem.settled(self.settling), |problem, of| {
-            of.taken_into(&problem)
-        });
-        problem.with(|model| model.prior_sigma = self.model.prior_sigma)
-    }
-
-    /// Accepted observations.
-    pub(in crate::calibration) fn accepted(&self) -> Vec<bool> {
-        let each = self.innovations.iter();
-        each.map(|innovation| innovation.accepted).collect()
-    }
-
-    /// Events of a problem at the linearisation point.
-    pub(in crate::calibration) fn script<'a>(
-        &'a self,
-        problem: &'a Problem,
-    ) -> Result<Script<'a>, CalibrationError> {
-        Script::new(problem, &self.prior_attitudes, &self.linearised_at)
-    }
-
-    /// Information of the recording about the constants there.
-    pub(in crate::calibration) fn reduction(
-        &self,
-        problem: &Problem,
-    ) -> Result<Reduction, CalibrationError> {
-        self.script(problem)?.reduce(problem, &self.accepted())
-    }
-
-    /// The same with the prior of those constants.
-    pub(in crate::calibration) fn posterior(
-        &self,
-        problem: &Problem,
-        reduction: &Reduction,
-    ) -> Posterior {
-        let constants = &reduction.constants;
-        reduction.posterior(&Prior::new(constants, &problem.model, &self.linearised_at))
-    }
-
-    /// A part of the covariance of the estimate that no pass includes; zero if absent.
-    pub fn part(&self, source: BudgetSource) -> ParameterMatrix {
-        self.covariance_parts
-            .get(&source)
-            .copied()
-            .unwrap_or_default()
-    }
-
-    /// Replaces such a part of the covariance of the estimate.
-    pub(in crate::calibration) fn set_part(&mut self, source: BudgetSource, part: ParameterMatrix) {
-        self.estimate.covariance += part - self.part(source);
-        self.covariance_parts.insert(source, part);
-    }
-
-    /// Largest growth factor of σ due to such a part.
-    pub(in crate::calibration) fn growth_by(&self, source: BudgetSource) -> f64 {
-        let with = self.estimate.covariance;
-        let without = with - self.part(source);
-        let variances = [without, with].map(|covariance| covariance.diagonal());
-        largest_growth(variances[0].as_slice(), variances[1].as_slice())
-    }
-
     /// Indices of the parameters that the run did not observe.
     pub fn unobserved(&self) -> Vec<usize> {
         let sigma = self.estimate.sigma();
         let hidden = |&i: &usize| sigma[i] > OBSERVED_BELOW * self.prior_sigma[i];
         self.estimate.estimated().filter(hidden).collect()
     }
+}
+
+/// The estimate with its covariance: that of the chain, the second order of unknown angles, rounding, and the clock.
+fn with_all_parts(problem: &Problem, solved: &Solved) -> Estimate {
+    let mut estimate = solved.both_triads();
+    let beside: ParameterMatrix = beside(problem, &estimate).into_iter().sum();
+    estimate.covariance += beside;
+    estimate
+}
+
+/// Parts of the covariance of an estimate that no chain has: of rounding and of the sample period.
+pub fn beside(problem: &Problem, estimate: &Estimate) -> [ParameterMatrix; 2] {
+    [
+        by_rounding(problem, &estimate.triads),
+        estimate.by_period(problem.run()),
+    ]
+}
+
+/// Mean and 1σ of the error of gravity at the last site, true − stated, m/s²; zero if it is not estimated.
+fn gravity(filtered: &Filtered, posterior: &Posterior) -> (f64, f64) {
+    let (mean, covariance) = (&posterior.mean, &posterior.covariance);
+    let mut constants = posterior.constants.iter();
+    let place = constants.position(|&constant| constant == Constant::Gravity);
+    let found = place.map(|k| (mean[k], covariance[(k, k)]));
+    let found = found.or_else(|| {
+        let state = filtered.layout().gravity?;
+        let (_, last) = filtered.states(posterior, |link| link.begins).pop()?;
+        Some((last.mean[state], last.covariance[(state, state)]))
+    });
+    found.map_or((0.0, 0.0), |(mean, variance)| (mean, variance.max(0.0).sqrt()))
+}
+
+/// Initial attitude of the last stretch: 1σ about East, North and Up, rad, and its covariance with each parameter
+/// divided by this 1σ.
+pub fn last_attitude(of: &Weighed, priors: &[AttitudePrior]) -> (Vector3<f64>, AttitudeCovariance) {
+    let mut across = AttitudeCovariance::zeros();
+    let begins = of.filtered.states(&of.posterior, |link| link.begins);
+    let Some((_, last)) = begins.last() else {
+        return (Vector3::zeros(), across);
+    };
+    let variance = |axis: usize| last.covariance[(ATTITUDE + axis, ATTITUDE + axis)];
+    let mut sigma = Vector3::from_fn(|axis, _| variance(axis).max(0.0).sqrt());
+    for (k, index) in parameters(&of.posterior.constants) {
+        for axis in 0..3 {
+            across[(index, axis)] = last.with_constants[(k, ATTITUDE + axis)] / sigma[axis];
+        }
+    }
+    if priors.last().is_some_and(AttitudePrior::heading_is_unknown) {
+        sigma.z = UNKNOWN_HEADING;
+    }
+    (sigma, across)
+}
+
+/// Deviation of each recording, linearised `at` a point.
+fn own(filtered: &Filtered, posterior: &Posterior, at: &Linearisation) -> Vec<Own> {
+    let layout = filtered.layout();
+    let mut all = Vec::new();
+    if layout.own.is_empty() {
+        return all;
+    }
+    for (link, states) in filtered.states(posterior, |link| link.begins) {
+        if link.recording < all.len() {
+            continue;
+        }
+        let mut own = Own {
+            values: at.own(link.recording),
+            sigma: Difference::default(),
+        };
+        for &(state, of) in &layout.own {
+            *own.values.get_mut(of) += states.mean[state];
+            *own.sigma.get_mut(of) = states.covariance[(state, state)].max(0.0).sqrt();
+        }
+        all.push(own);
+    }
+    all
+}
+
+/// Estimates of error terms and table, of those that were asked for or are certain to be there.
+pub fn auxiliary(of: &Weighed, solved: &Solved, model: &Model) -> Auxiliary {
+    let shown = |constant: Constant| {
+        Candidate::of(constant, model).is_none_or(|candidate| {
+            let mut absent = solved.effects.candidates.absent();
+            absent.any(|(other, absent)| other == candidate && is_shown(absent))
+        })
+    };
+    auxiliary_of(&of.posterior, &solved.script.at, model, shown)
+}
+
+/// The same of the constants that are selected.
+pub fn auxiliary_of(
+    posterior: &Posterior,
+    at: &Linearisation,
+    model: &Model,
+    selected: impl Fn(Constant) -> bool,
+) -> Auxiliary {
+    let mut auxiliary = Auxiliary::default();
+    let (mean, covariance) = (&posterior.mean, &posterior.covariance);
+    let all = posterior.constants.iter().enumerate();
+    let all = all.filter_map(|(k, &constant)| {
+        let index = constant.auxiliary().filter(|_| selected(constant))?;
+        Some((k, index))
+    });
+    let all: Vec<(usize, usize)> = all.collect();
+    for &(k, index) in &all {
+        let at = Auxiliary::of_terms(index).map_or(0.0, |term| at.terms[term]);
+        auxiliary.values[index] = mean[k] + at;
+        auxiliary.prior_sigma[index] = model.sigma(posterior.constants[k]);
+        for &(j, other) in &all {
+            auxiliary.covariance[(index, other)] = covariance[(k, j)];
+        }
+        for (j, parameter) in parameters(&posterior.constants) {
+            auxiliary.cross[(parameter, index)] = covariance[(j, k)];
+        }
+    }
+    auxiliary
 }

@@ -4,17 +4,16 @@ use std::sync::Arc;
 
 use nalgebra::Matrix3;
 
-use crate::attitude::{self, to_tilt_and_heading};
+use crate::attitude::to_tilt_and_heading;
 use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::checks::finding::Finding;
 use crate::calibration::linearisation::Start;
-use crate::calibration::record::schedule::{Step, first_reading, step_length, steps};
+use crate::calibration::record::schedule::{Step, first_reading, steps};
 use crate::calibration::record::standstill::{FLOOR, standstill_sigma};
 use crate::calibration::{AttitudePrior, Model, Observation, Options};
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::{Recording, TableLog};
-use crate::run::{Aiding, Dwell, LONG_ENOUGH, Position, Run};
-use crate::statistics::chi_square_limit;
+use crate::run::{Aiding, Dwell, LONG_ENOUGH, Run};
 
 /// 1σ of the initial velocity of a body at rest, m/s, in addition to its sway.
 const INITIAL_VELOCITY: f64 = 1e-3;
@@ -141,49 +140,16 @@ impl<'a> Problem<'a> {
         &self,
         become_of: impl Fn(usize, &Stretch, &Dwell) -> Option<Dwell>,
     ) -> Self {
-        let mut stays = Vec::new();
+        let mut number = 0;
         let stretches = self.stretches.iter().map(|stretch| {
             let dwells = stretch.dwells.iter().filter_map(|dwell| {
-                let becomes = become_of(stays.len(), stretch, dwell);
-                stays.push(becomes.is_some());
-                becomes
+                number += 1;
+                become_of(number - 1, stretch, dwell)
             });
             let (dwells, sigma) = (dwells.collect(), stretch.standstill_sigma);
             Stretch::new(stretch.run, stretch.table, stretch.recording, dwells, sigma)
         });
-        let stretches = stretches.collect();
-        self.with(|model| {
-            for disturbance in &mut model.disturbances {
-                let before = stays.iter().take(disturbance.dwell);
-                disturbance.dwell = before.filter(|stays| **stays).count();
-            }
-        })
-        .with_stretches(stretches)
-    }
-
-    /// The same without the first steps of each dwell after a move; at least half of each dwell is kept.
-    pub(in crate::calibration) fn settled(&self, steps: usize) -> Self {
-        if steps == 0 {
-            return self.clone();
-        }
-        self.with_dwells(|_, stretch, dwell| {
-            let first = stretch.dwells.first().map(|first| &first.samples);
-            if first == Some(&dwell.samples) {
-                return Some(dwell.clone());
-            }
-            let imu = &stretch.run.recording.imu;
-            let skipped = (steps * step_length(imu.period)).min(dwell.samples.len() / 2);
-            let samples = dwell.samples.start + skipped..dwell.samples.end;
-            let begin = imu.time(samples.start);
-            let position = dwell.position.as_ref().and_then(|position| {
-                let (table, readings) = (stretch.table?, position.readings.clone());
-                let early = table.time[readings.clone()].partition_point(|&time| time < begin);
-                let readings = readings.start + early..readings.end;
-                let attitude = attitude::mean(&table.attitude[readings.clone()])?;
-                Some(Position { readings, attitude })
-            });
-            Some(Dwell { samples, position })
-        })
+        self.with_stretches(stretches.collect())
     }
 
     /// The same problem, its run at rest throughout.
@@ -195,22 +161,6 @@ impl<'a> Problem<'a> {
         };
         let stretch = Stretch::new(self.run, None, 0, vec![dwell], PerSensor::default());
         self.with_stretches([stretch].into())
-    }
-
-    /// Duration of this number of steps of a dwell, s.
-    pub(in crate::calibration) fn duration_of_steps(&self, steps: usize) -> f64 {
-        let period = self.run.recording.imu.period;
-        (steps * step_length(period)) as f64 * period
-    }
-
-    /// The same problem, observed once per this number of steps of a dwell, with the mean of the table's readings over
-    /// them.
-    pub(in crate::calibration) fn observed_every(&self, steps_of_dwell: usize) -> Self {
-        let stretches = self.stretches.iter().map(|stretch| Stretch {
-            steps: steps(stretch.run, stretch.table, &stretch.dwells, steps_of_dwell),
-            ..stretch.clone()
-        });
-        self.with_stretches(stretches.collect())
     }
 
     pub(in crate::calibration) fn stretches(&self) -> &[Stretch<'a>] {
@@ -308,14 +258,6 @@ impl<'a> Problem<'a> {
     pub fn dwells(&self) -> impl Iterator<Item = &Dwell> {
         self.stretches.iter().flat_map(|stretch| &stretch.dwells)
     }
-
-    /// Squared whitened innovation of three components beyond which an observation is an outlier.
-    pub(in crate::calibration) fn gate_limit(&self) -> f64 {
-        let steps = self.stretches.iter().flat_map(|stretch| &stretch.steps);
-        let observations: usize = steps.map(|step| self.observed(step).count()).sum();
-        let of_each = self.options.false_rejection / observations.max(1) as f64;
-        chi_square_limit(3.0, of_each)
-    }
 }
 
 impl<'a> Stretch<'a> {
@@ -327,7 +269,7 @@ impl<'a> Stretch<'a> {
         standstill_sigma: PerSensor<f64>,
     ) -> Self {
         Self {
-            steps: steps(run, table, &dwells, 1),
+            steps: steps(run, table, &dwells),
             run,
             table,
             recording,
@@ -420,25 +362,4 @@ fn stretches<'a>(run: &'a Run, recording: usize, model: &Model) -> Vec<Stretch<'
     parts
         .map(|dwells| Stretch::new(run, table, recording, dwells.to_vec(), standstill_sigma))
         .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use crate::calibration::UNWATCHED;
-    use approx::assert_relative_eq;
-    use statrs::distribution::{ChiSquared, ContinuousCDF};
-
-    use super::*;
-    use crate::calibration::Method;
-    use crate::simulation::Scenario;
-
-    #[test]
-    fn one_sound_record_in_a_thousand_loses_an_observation() {
-        let simulated = Scenario::load("demo").unwrap().simulate(1, 0).unwrap();
-        let problem = Problem::new(&simulated.run, &Options::default());
-        let solution = problem.solve(Method::Ekf, UNWATCHED).unwrap();
-        let observations = solution.outcome().unwrap().innovations.len();
-        let of_each = ChiSquared::new(3.0).unwrap().sf(problem.gate_limit());
-        assert_relative_eq!(observations as f64 * of_each, 1e-3, max_relative = 1e-6);
-    }
 }

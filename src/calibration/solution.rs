@@ -1,11 +1,9 @@
 //! Solution of a problem by either method, with its assessment.
 
-use crate::calibration::checks::error_term_test::bias_variation;
 use crate::calibration::result::Provenance;
 use crate::calibration::{
-    Budget, BudgetSource, Calibration, CalibrationError, ClosedForm, Contradiction, ErrorTermTest,
-    Estimate, Finding, Method, Outcome, Problem, Progress, Quality, estimate, six_position,
-    test_error_terms,
+    Budget, Calibration, CalibrationError, ClosedForm, Contradiction, Estimate, Finding, Method,
+    Outcome, Problem, Progress, Quality, estimate, six_position,
 };
 use crate::imu::{PerSensor, Sensor};
 use crate::units::DEGREE;
@@ -22,8 +20,6 @@ pub enum Solution {
 /// Assessment of a solution and of its model by the data.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assessment {
-    /// Tests of all error terms; empty for the closed form.
-    pub error_terms: Vec<ErrorTermTest>,
     /// Residuals of gravity and turns.
     pub quality: Quality,
     /// Uncertainty budget; `None` for the closed form.
@@ -107,55 +103,35 @@ impl Solution {
         }
     }
 
-    /// Tests error terms and evaluates the residuals of gravity and turns. The effect of significant error terms that
-    /// are not estimated is added to the covariance of the estimate; if the noise was estimated, so is the effect of
-    /// undetectable bias variations.
+    /// Evaluates the residuals of gravity and turns, and the uncertainty budget.
     ///
     /// # Errors
     /// [`CalibrationError`] if the problem is not the one of the solution.
-    pub fn assess(&mut self, problem: &Problem) -> Result<Assessment, CalibrationError> {
-        let outcome = match self {
-            Self::Filter(outcome) => outcome,
-            Self::ClosedForm(closed_form) => {
-                return Ok(Assessment {
-                    error_terms: Vec::new(),
-                    quality: closed_form.quality(problem)?,
-                    budget: None,
-                });
+    pub fn assess(&self, problem: &Problem) -> Result<Assessment, CalibrationError> {
+        match self {
+            Self::Filter(outcome) => {
+                let (quality, budget) = rayon::join(
+                    || outcome.quality(problem),
+                    || Budget::new(problem, outcome),
+                );
+                Ok(Assessment {
+                    quality: quality?,
+                    // A calibration is one without its budget, too.
+                    budget: budget.ok(),
+                })
             }
-        };
-        let (error_terms, (quality, budget)) = rayon::join(
-            || test_error_terms(problem, outcome),
-            || (outcome.quality(problem), Budget::new(problem, outcome)),
-        );
-        let (error_terms, left_off) = match error_terms {
-            // Where the iterations ended without convergence there may be nothing to test.
-            Err(_) if !outcome.converged => (Vec::new(), None),
-            tests => tests?,
-        };
-        // A calibration is one without its budget, too.
-        let mut budget = budget.ok();
-        let variation = bias_variation(problem, outcome, &error_terms)?;
-        for (source, part) in [
-            (BudgetSource::ErrorTermsLeftOff, left_off),
-            (BudgetSource::UnseenVariation, variation),
-        ] {
-            let Some(part) = part else { continue };
-            outcome.set_part(source, part);
-            budget = budget.map(|budget| budget.and(source, part));
+            Self::ClosedForm(closed_form) => Ok(Assessment {
+                quality: closed_form.quality(problem)?,
+                budget: None,
+            }),
         }
-        Ok(Assessment {
-            error_terms,
-            quality: quality?,
-            budget,
-        })
     }
 
     /// Findings to read before using the results.
-    pub fn findings(&self, assessment: &Assessment) -> Vec<Finding> {
+    pub fn findings(&self) -> &[Finding] {
         match self {
-            Self::Filter(outcome) => outcome.findings_with(&assessment.error_terms),
-            Self::ClosedForm(closed_form) => closed_form.findings.clone(),
+            Self::Filter(outcome) => &outcome.findings,
+            Self::ClosedForm(closed_form) => &closed_form.findings,
         }
     }
 
@@ -163,10 +139,9 @@ impl Solution {
     pub fn calibration(&self, problem: &Problem, assessment: &Assessment) -> Calibration {
         match self {
             Self::Filter(outcome) => {
-                let tests = &assessment.error_terms;
-                let mut record = outcome.record(problem, tests, &assessment.quality);
+                let mut record = outcome.record(problem, &assessment.quality);
                 if let Some(budget) = &assessment.budget {
-                    record.take_budget(problem.run(), outcome, budget, tests);
+                    record.take_budget(problem.run(), outcome, budget);
                 }
                 record
             }

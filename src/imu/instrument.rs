@@ -2,8 +2,8 @@
 
 use super::triad::INSTALLATION;
 use super::{
-    BodyFrame, InstallationForm, MotionNoise, Noise, Nominal, PerSensor, Prior, TermVector, Triad,
-    TriadVector,
+    BodyFrame, InstallationForm, MotionNoise, Noise, Nominal, PerSensor, Prior, Term, TermVector,
+    Triad, TriadVector,
 };
 
 /// An instrument as described by data sheet and experience.
@@ -23,6 +23,8 @@ pub struct Instrument {
     pub motion_noise: PerSensor<MotionNoise>,
     /// Prior 1σ of each error-term parameter, around zero; zero if a term is off.
     pub term_sigma: TermVector,
+    /// Error terms that are stated to be absent.
+    pub absent_terms: Vec<Term>,
 }
 
 impl Instrument {
@@ -39,6 +41,7 @@ impl Instrument {
             noise_is_stated: PerSensor::from_fn(|_| true),
             motion_noise: PerSensor::default(),
             term_sigma: TermVector::zeros(),
+            absent_terms: Vec::new(),
         }
     }
 

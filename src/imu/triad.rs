@@ -171,7 +171,7 @@ impl Triad {
 }
 
 /// The three kinds of parameter, each with its own unit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ParameterKind {
     /// Scale factor, relative.
     Scale,

@@ -6,11 +6,11 @@ use rand_distr::{Distribution, StandardNormal, StandardUniform};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-use super::terms::{TermFile, term_sigma};
+use super::terms::{TermFile, stated_terms};
 use super::thermal::{ThermalFile, ThermalVariation, thermal_variation};
 use super::{ModelError, Place, Room, text};
 use crate::imu::{
-    ANGLES, GaussMarkov, InstallationForm, Noise, PerSensor, Prior, Sensor, TermVector,
+    ANGLES, GaussMarkov, InstallationForm, Noise, PerSensor, Prior, Sensor, Term, TermVector,
 };
 use crate::units::{ARCSEC, DEG_PER_H, DEG_PER_SQRT_H, DEGREE, MICRO_G, MICRO_G_PER_SQRT_HZ, PPM};
 use turncal_input::{Finite, NonNegative, Positive};
@@ -28,6 +28,9 @@ pub struct Instrument {
     pub variation: PerSensor<Variation>,
     /// 1σ of the parameters of its error terms, around zero; zero if it has none.
     pub term_sigma: TermVector,
+    /// Error terms that are stated to be absent.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub absent_terms: Vec<Term>,
     /// Temperature dependence of the grade; `None` if there is none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub thermal: Option<PerSensor<ThermalVariation>>,
@@ -153,6 +156,7 @@ impl Instrument {
             let stated = stated.as_ref().unwrap_or(const { &ThermalFile::new() });
             thermal_variation(text.document(), sensor, stated)
         })?;
+        let (term_sigma, absent_terms) = stated_terms(text.document(), "terms", &terms)?;
         Ok(Self {
             name: text.name(),
             pulse: PerSensor {
@@ -185,7 +189,8 @@ impl Instrument {
                     bias: accel.bias_ug.times(MICRO_G),
                 },
             },
-            term_sigma: term_sigma(text.document(), "terms", &terms)?,
+            term_sigma,
+            absent_terms,
             thermal: warms.then_some(thermal),
         })
     }

@@ -288,6 +288,7 @@ impl Scenario {
             noise_is_stated: PerSensor::from_fn(|_| true),
             motion_noise: PerSensor::default(),
             term_sigma: self.instrument.term_sigma,
+            absent_terms: self.instrument.absent_terms.clone(),
         }
     }
 
@@ -379,6 +380,7 @@ impl Scenario {
         TableAccuracy {
             position_sigma: errors.position,
             reading_sigma: errors.reading,
+            settling_sigma: 0.0,
             geometry: TableGeometry {
                 base: Vector3::new(errors.level, errors.level, errors.north),
                 axes: match self.path.moves {

@@ -164,6 +164,7 @@ impl Scenario {
                 }
             }
             ErrorTerm::Instrument(term) => {
+                self.instrument.absent_terms.retain(|&of| of != term);
                 for parameter in term.parameters() {
                     let sigma = &mut self.instrument.term_sigma[parameter];
                     if *sigma == 0.0 {

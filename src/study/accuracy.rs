@@ -11,7 +11,7 @@ mod trial;
 
 use super::navigation::NavigationStudyError;
 use super::{Study, StudyError};
-use crate::calibration::{ErrorTerm, ErrorTermTest, Group, Nis, mean_square_interval};
+use crate::calibration::{ErrorTerm, Group, Nis, TermEvidence, mean_square_interval};
 use crate::imu::InstallationForm;
 use crate::simulation::Runs;
 
@@ -44,8 +44,8 @@ pub struct Accuracy {
     pub anees: Option<Anees>,
     /// Figures of each error term that was estimated, RMS over its parameters, in rad or SI.
     pub error_terms: Vec<(ErrorTerm, Figures)>,
-    /// Effect of each error term on the filter in the first run: see [`crate::calibration::test_error_terms`].
-    pub effects: Vec<ErrorTermTest>,
+    /// Evidence for each error term in the first run.
+    pub effects: Vec<TermEvidence>,
     /// NIS of zero velocity over all runs.
     pub velocity: Nis,
     /// NIS of table attitude over all runs.

@@ -31,7 +31,7 @@ impl CheckedCalibration {
     ///
     /// # Errors
     /// [`CalibrationError`] if the problem is not the one of the solution.
-    pub fn new(problem: &Problem, mut solution: Solution) -> Result<Self, CalibrationError> {
+    pub fn new(problem: &Problem, solution: Solution) -> Result<Self, CalibrationError> {
         let assessment = solution.assess(problem)?;
         let calibration = solution.calibration(problem, &assessment);
         Ok(Self {

@@ -3,7 +3,7 @@
 use super::navigation::{Mission, NavigationStudyError, Outlook};
 use crate::calibration::{
     Bound, CalibrationError, ErrorTerm, Options, ParameterVector, Problem, TermLeftOff,
-    bound_with_parts, coarse_start, terms_left_off,
+    bound_without_moves, coarse_start, terms_left_off,
 };
 use crate::imu::{PerSensor, TermVector, Triad};
 use crate::lot::{Check, Specification};
@@ -149,12 +149,9 @@ impl PathStudy {
     pub fn evaluate(&self) -> Result<Evaluation, PathError> {
         let motion = self.scenario.motion()?;
         let moves = motion.moves();
-        // From the middle of one move to that of the next, there is one dwell.
-        let middles = moves.iter().map(|(start, end)| 0.5 * (start + end));
-        let middles: Vec<f64> = middles.chain([f64::INFINITY]).collect();
         let (run, truth, terms) = self.record()?;
         let problem = Problem::new(&run, &self.options);
-        let (mut evaluation, sigma) = Evaluation::new(&problem, (&truth, &terms), &middles)?;
+        let (mut evaluation, sigma) = Evaluation::new(&problem, (&truth, &terms))?;
         evaluation.standing = motion.dwells().map(|(start, end)| end - start).sum();
         let starts = moves.iter().map(|(start, _)| *start);
         let next = starts.clone().skip(1).chain([motion.duration()]);
@@ -174,7 +171,7 @@ impl PathStudy {
         let mut run = simulated.run;
         if self.by_hand {
             run.recording.table = None;
-            run.instrument.motion_noise.gyro = TURNED_BY_HAND;
+            run.instrument.motion_noise = PerSensor::from_fn(|_| TURNED_BY_HAND);
         }
         Ok((run, simulated.truth, simulated.terms))
     }
@@ -189,7 +186,7 @@ impl Evaluation {
         let problem = Problem::new(run, options);
         let start = coarse_start(&problem)?;
         let problem = start.by_hand(&problem).unwrap_or(problem);
-        let (evaluation, _) = Self::new(&problem, (&start.at.triads, &TermVector::zeros()), &[])?;
+        let (evaluation, _) = Self::new(&problem, (&start.at.triads, &TermVector::zeros()))?;
         Ok(evaluation)
     }
 
@@ -198,16 +195,15 @@ impl Evaluation {
         decided(specification, &self.bound.estimate)
     }
 
-    /// Expected results, without those of moves, and σ without the observations between each two of these times, s.
+    /// Expected results, without those of moves, and σ without each move.
     fn new(
         problem: &Problem,
         (truth, terms): (&PerSensor<Triad>, &TermVector),
-        times: &[f64],
     ) -> Result<(Self, Vec<ParameterVector>), PathError> {
         let run = problem.run();
         let imu = &run.recording.imu;
         let (bound, left_off) = rayon::join(
-            || bound_with_parts(problem, truth, terms, times),
+            || bound_without_moves(problem, truth, terms),
             || terms_left_off(problem, truth, terms),
         );
         let (bound, without) = bound?;

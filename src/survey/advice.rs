@@ -13,7 +13,7 @@ use super::Survey;
 use super::attained::Attained;
 use crate::attitude::level;
 use crate::calibration::{Bound, Options, Problem, bound};
-use crate::imu::{InstallationForm, MotionNoise, NoiseSource, Sensor, TermVector};
+use crate::imu::{InstallationForm, MotionNoise, NoiseSource, PerSensor, Sensor, TermVector};
 use crate::lot::{Check, Specification, Verdict};
 use crate::recording::Recording;
 use crate::run::{Aiding, Run};
@@ -23,7 +23,7 @@ use crate::turntable::{
 };
 use crate::units::DEGREE;
 
-/// Noise that turning by hand adds to the gyros' angle, √s: 0.05° (1σ) in a quarter turn of 1.5 s, the size that
+/// Noise that turning by hand adds to the integrals of both triads, √s: 0.05° (1σ) in a quarter turn of 1.5 s, the size that
 /// records of MEMS sensors turned by hand show (bandwidth, timing and second-order effects of the sensor).
 pub const TURNED_BY_HAND: MotionNoise = MotionNoise {
     by_motion: 7e-4,
@@ -215,7 +215,7 @@ fn alone(run: &Run, from: &Vector3<f64>, of: Move) -> Option<Bound> {
     };
     let options = Options::default().aiding(Aiding::Velocity);
     let mut problem = Problem::new(&record, &options);
-    problem.model.motion_noise.gyro = TURNED_BY_HAND;
+    problem.model.motion_noise = PerSensor::from_fn(|_| TURNED_BY_HAND);
     let truth = run.instrument.prior_mean(InstallationForm::General);
     bound(&problem, &truth, &TermVector::zeros()).ok()
 }

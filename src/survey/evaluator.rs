@@ -163,9 +163,8 @@ impl InterimCalibration {
     /// `None` if the rows cannot be calibrated, or progress is stopped.
     fn of(run: &Run, options: &Options, bound: &Bound, progress: Progress) -> Option<Self> {
         let problem = Problem::new(run, options);
-        let mut solution = problem.solve(Method::Ekf, progress).ok()?;
-        let assessment = solution.assess(&problem).ok()?;
-        let findings = solution.findings(&assessment);
+        let solution = problem.solve(Method::Ekf, progress).ok()?;
+        let findings = solution.findings().to_vec();
         let [found, expected] = [solution.estimate(), &bound.estimate].map(Estimate::sigma);
         Some(Self {
             duration: run.recording.imu.duration(),

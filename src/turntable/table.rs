@@ -39,6 +39,8 @@ pub struct TableAccuracy {
     pub position_sigma: f64,
     /// 1σ per axis of the white error of each reading, rad.
     pub reading_sigma: f64,
+    /// 1σ per axis of a reading just after a stop in addition, rad; it fades within a second.
+    pub settling_sigma: f64,
     /// 1σ of errors that the reading does not include.
     pub geometry: TableGeometry,
 }

@@ -152,8 +152,26 @@ fn wrong_usage_is_status_two_and_says_what_to_do() {
         "--with",
         "table-axes",
     ];
+    let none = [
+        "calibrate",
+        "run.toml",
+        "--with",
+        "none",
+        "--with",
+        "time-offset",
+    ];
+    let auto = ["path", "evaluate", "three-axis", "--with", "auto,none"];
     for (arguments, says) in [
         (&six[..], "omit --with, or use --method ekf"),
+        (
+            &none,
+            "--with none and --with time-offset exclude each other; write --with none alone",
+        ),
+        (&auto, "--with auto and --with none exclude each other"),
+        (
+            &["study", "accuracy", "--with", "none"],
+            "omit --with, or name terms",
+        ),
         (&velocity, "--aiding velocity does not use the table"),
         (&study, "omit one of them"),
         (&["calibrate", here], "this is a directory; give"),

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix};
 use rayon::prelude::*;
-use turncal::calibration::result::{EQUATION, EQUATION_WITH_TERMS};
+use turncal::calibration::result::{Calibration, EQUATION, EQUATION_WITH_TERMS};
 use turncal::calibration::{
     ErrorTerm, NoisePolicy, Options, Outcome, Problem, UNWATCHED, estimate, mean_square_interval,
     to_vector,
@@ -127,6 +127,21 @@ fn a_written_run_keeps_its_terms_and_its_truth_has_them() {
     let offset = made.terms[Term::TimeOffset.parameters().start];
     assert_eq!(truth.terms["accel.time_offset"].value, offset);
     assert_eq!(truth.terms.len(), 1);
+}
+
+#[test]
+fn with_none_no_error_term_of_the_instrument_is_estimated() {
+    let directory = tempfile::tempdir().unwrap();
+    let turncal = |arguments: &[&str]| {
+        let mut command = assert_cmd::Command::new(env!("CARGO_BIN_EXE_turncal"));
+        command.current_dir(&directory).args(arguments);
+        command.assert().success()
+    };
+    turncal(&["simulate", "demo", "-o", "run"]);
+    let calibrate = ["calibrate", "run/run.toml", "--json", "--with", "none"];
+    let calibrated = turncal(&calibrate);
+    let record: Calibration = serde_json::from_slice(&calibrated.get_output().stdout).unwrap();
+    assert!(record.terms.is_empty(), "{:?}", record.terms);
 }
 
 #[test]

@@ -51,11 +51,13 @@ fn value_first(text: &str) -> String {
     };
     let terms = ErrorTerm::ALL.map(ErrorTerm::name);
     let policies = NoisePolicy::ALL.map(NoisePolicy::name);
-    let known =
-        terms
-            .into_iter()
-            .chain(policies)
-            .chain(["ekf", "six-position", "table", "velocity"]);
+    let known = terms.into_iter().chain(policies).chain([
+        "ekf",
+        "six-position",
+        "table",
+        "velocity",
+        "none",
+    ]);
     let end = of.find(|letter: char| !letter.is_ascii_alphanumeric() && letter != '-');
     let (word, rest) = of.split_at(end.unwrap_or(of.len()));
     match known.into_iter().any(|known| known == word) {

@@ -229,7 +229,8 @@ impl Run {
     /// method : {"ekf", "six-position"}
     ///     The filter over the whole run, or the closed form from dwells.
     /// with_ : str or sequence of str, optional
-    ///     Error terms to estimate, such as "accel-second-order". Default: those that the data support.
+    ///     "auto" (default): every error term is averaged over being absent and its usual sizes; "none": K, E, D alone;
+    ///     or terms to estimate whatever the data say, such as "accel-second-order".
     /// noise : {"auto", "stated", "learnt"}
     ///     Stated noise unless the data contradict it, stated noise, or noise estimated from the run.
     /// temperature : bool
@@ -268,11 +269,12 @@ impl Run {
             noise,
             &NoisePolicy::ALL.map(|policy| (policy.name(), policy)),
         )?);
-        options.auto_terms = with_.is_none();
+        let (auto_terms, terms) = asked_terms(with_)?;
+        options.auto_terms = auto_terms;
         let request = Request {
             method: named("method", method, &methods)?,
             temperature,
-            terms: error_terms("with_", with_)?,
+            terms,
             options,
             specification: specification.as_deref().map(limits).transpose()?,
         };
@@ -318,6 +320,21 @@ pub fn error_terms(argument: &str, of: Given) -> PyResult<Vec<ErrorTerm>> {
     let all = ErrorTerm::ALL.map(|term| (term.name(), term));
     let of = names(argument, of)?;
     of.iter().map(|name| named(argument, name, &all)).collect()
+}
+
+/// Whether every error term is averaged over, and the terms that `with_` names. An empty sequence is none.
+pub fn asked_terms(with_: Given) -> PyResult<(bool, Vec<ErrorTerm>)> {
+    let asked = names("with_", with_)?;
+    let is_word = |name: &&String| ["auto", "none"].contains(&name.as_str());
+    let Some(alone) = asked.iter().find(is_word) else {
+        return Ok((with_.is_none(), error_terms("with_", with_)?));
+    };
+    if let Some(other) = asked.iter().find(|name| *name != alone) {
+        return Err(raised(format_args!(
+            "with_: found {alone:?} beside {other:?}, expected {alone:?} alone. Use with_={alone:?}, or omit {alone:?}."
+        )));
+    }
+    Ok((alone == "auto", Vec::new()))
 }
 
 /// A specification by name or path.

@@ -23,9 +23,9 @@ use turncal_report::path::{Report as OfPath, in_words, moves_in_words};
 use turncal_report::{Document, accuracy, experiment};
 
 use crate::calibration::Calibration;
-use crate::errors::{Given, named, raise, raised, wrong};
+use crate::errors::{Given, named, names, raise, raised, wrong};
 use crate::report::Report;
-use crate::run::{Recorded, Run, error_terms, limits};
+use crate::run::{Recorded, Run, asked_terms, error_terms, limits};
 use crate::wait::{Progress, Watch, finish, wait};
 
 /// Fewest and most runs of a study.
@@ -161,7 +161,11 @@ pub fn study_options(
         return Err(wrong("runs", runs, &expected));
     }
     let of = named("name", name, &[("accuracy", true), ("experiment", false)])?;
-    let modelled = error_terms("with_", with_)?;
+    if names("with_", with_)?.iter().any(|name| name == "none") {
+        let expected = "names of terms. Omit it: a study estimates the terms that it simulates.";
+        return Err(wrong("with_", "\"none\"", expected));
+    }
+    let (_, modelled) = asked_terms(with_)?;
     let unmodelled = error_terms("unmodelled", unmodelled)?;
     if !of && (scenario.is_some() || !modelled.is_empty() || !unmodelled.is_empty()) {
         return Err(raised(
@@ -275,10 +279,10 @@ pub fn evaluate(
 ) -> PyResult<Report> {
     let all = [("table", Aiding::Table), ("velocity", Aiding::Velocity)];
     let aiding = aiding.map(|name| named("aiding", name, &all)).transpose()?;
-    let terms = error_terms("with_", with_)?;
+    let (auto_terms, terms) = asked_terms(with_)?;
     let limits = specification.as_deref().map(limits).transpose()?;
     let report = finish(py, move || {
-        let study = PathStudy::load(&Named {
+        let mut study = PathStudy::load(&Named {
             path: &path,
             scenario: scenario.as_deref(),
             imu: imu.as_deref(),
@@ -286,6 +290,7 @@ pub fn evaluate(
             aiding,
             terms,
         })?;
+        study.options.auto_terms = auto_terms;
         let evaluation = study.evaluate()?;
         let checks = limits.map(|limits| evaluation.decided(&limits));
         let report = OfPath {

@@ -108,6 +108,15 @@ def test_a_line_counts_what_is_determined_as_the_report_does():
     assert line.startswith("9 of 24 parameters determined") and line in calibration._repr_html_()
 
 
+def test_none_and_auto_are_words_of_with_that_stand_alone(run):
+    calibration = run.calibrate(noise="stated", with_="none")
+    assert calibration.parameters.equals(run.calibrate(noise="stated", with_=()).parameters)
+    with pytest.raises(turncal.Error, match='"none" beside "time-offset"'):
+        run.calibrate(with_=["time-offset", "none"])
+    with pytest.raises(turncal.Error, match='"auto" beside "none"'):
+        turncal.path.evaluate("three-axis", with_=["auto", "none"])
+
+
 def test_a_specification_is_decided(run):
     report = run.calibrate(specification="mems-by-hand").conformity
     assert len(report.data["units"]) == 1 and "Limits" in str(report)

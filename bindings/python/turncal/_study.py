@@ -37,7 +37,7 @@ def study(
     seed : int, optional
         Seed of all random numbers. Default: that of the scenario.
     with_, unmodelled : str or sequence of str
-        Error terms to simulate and to estimate; to simulate only.
+        Error terms to simulate and to estimate ("auto": no further ones); to simulate only.
     client : dask.distributed.Client, optional
         Cluster that makes the runs; a worker that is lost is replaced. The result is the same to the bit on processors
         of one type.

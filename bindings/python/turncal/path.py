@@ -17,7 +17,7 @@ def evaluate(
     imu: str | None = None,
     table: str | None = None,
     aiding: str | None = None,
-    with_: Union[str, Sequence[str]] = (),
+    with_: Union[str, Sequence[str], None] = None,
     specification: Union[str, "os.PathLike[str]", None] = None,
 ) -> Report:
     """Predict the accuracy of a calibration: σ, the value of each move, and errors that the path cannot reveal.
@@ -33,8 +33,9 @@ def evaluate(
         Instrument and table in place of the scenario's: an embedded name or a TOML file.
     aiding : {"table", "velocity"}, optional
         Observations of the filter. Default: table; by hand velocity.
-    with_ : str or sequence of str
-        Error terms to estimate.
+    with_ : str or sequence of str, optional
+        "auto" (default): every error term is averaged over being absent and its usual sizes; "none": K, E, D alone; or
+        terms to estimate whatever the data say.
     specification : path-like, optional
         Limits that the calibration must decide.
 

@@ -57,7 +57,7 @@ impl Demo {
         let still = Problem::new(&standing.run, &Options::default());
         let whole = calibration::six_position(&still)?;
         let problem = Problem::new(&turning.run, &Options::default());
-        let mut solution = solve(&problem, Method::Ekf, &activity)?;
+        let solution = solve(&problem, Method::Ekf, &activity)?;
         if !solution.converged() {
             bail!("the demonstration did not converge; take another --seed");
         }
@@ -125,8 +125,7 @@ fn document(
         aiding: problem.model.aiding,
         body_frame: problem.model.aiding.body_frame(),
         outcome: solution.outcome(),
-        findings: &solution.findings(assessment),
-        effects: &assessment.error_terms,
+        findings: &solution.findings(),
         budget: assessment.budget.as_ref(),
         predicted: None,
         quality: Some(&assessment.quality),

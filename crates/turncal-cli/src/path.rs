@@ -7,9 +7,9 @@ use anyhow::Context;
 use clap::Subcommand;
 
 use crate::NotMet;
-use crate::arguments::{Delivery, OfLog, error_term, needs_table};
+use crate::arguments::{Delivery, OfLog, With, needs_table, with_value};
 use crate::terminal::Activity;
-use turncal::calibration::{ErrorTerm, Word};
+use turncal::calibration::Word;
 use turncal::models::specification;
 use turncal::run::Aiding;
 use turncal::study::path::{Evaluation, Named, PathStudy};
@@ -65,9 +65,10 @@ pub struct Evaluate {
     /// Observations of the filter [default: table; by hand: velocity]
     #[arg(long, value_parser = one_of(&AIDINGS))]
     aiding: Option<Aiding>,
-    /// Error terms to estimate
-    #[arg(long, value_name = "TERM", value_parser = error_term(), value_delimiter = ',')]
-    with: Vec<ErrorTerm>,
+    /// Error terms of the calibration. auto: every error term is averaged over being absent and its usual sizes; none:
+    /// K, E, D alone; or terms to estimate whatever the data say [default: auto]
+    #[arg(long, value_name = "TERM", value_parser = with_value(), value_delimiter = ',')]
+    with: Vec<With>,
     /// Limits that the calibration must decide (a specification.toml)
     #[arg(long, value_name = "FILE")]
     specification: Option<PathBuf>,
@@ -77,6 +78,7 @@ pub struct Evaluate {
 
 impl Evaluate {
     fn run(&self) -> anyhow::Result<()> {
+        With::check(&self.with);
         let specification = self.specification.as_deref().map(specification);
         let specification = specification.transpose()?;
         let file = Path::new(&self.path);
@@ -114,26 +116,26 @@ impl Evaluate {
             imu: self.imu.as_deref(),
             table: self.table.as_deref(),
             aiding: self.aiding,
-            terms: self.with.clone(),
+            terms: With::terms(&self.with).collect(),
         }
     }
 
     fn of_run(&self, file: &Path) -> anyhow::Result<(String, String, Vec<String>, Evaluation)> {
         let Opened { run, .. } = OfLog::default().open(file)?;
         let aiding = self.aiding.unwrap_or_else(|| run.aiding());
-        self.with
-            .iter()
-            .for_each(|&term| needs_table(term, Some(aiding)));
-        let options = self.named().options(aiding);
+        With::terms(&self.with).for_each(|term| needs_table(term, Some(aiding)));
+        let mut options = self.named().options(aiding);
+        options.auto_terms = With::is_auto(&self.with);
         let evaluation = Evaluation::of_run(&run, &options).with_context(|| self.path.clone())?;
         let with = format!("Recording of {}, with the noise stated there", self.path);
         Ok((run.recording.name.clone(), with, Vec::new(), evaluation))
     }
 
     fn of_path(&self) -> anyhow::Result<(String, String, Vec<String>, Evaluation)> {
-        let study = PathStudy::load(&self.named())?;
+        let mut study = PathStudy::load(&self.named())?;
+        study.options.auto_terms = With::is_auto(&self.with);
         let aiding = study.options.aiding;
-        self.with.iter().for_each(|&term| needs_table(term, aiding));
+        With::terms(&self.with).for_each(|term| needs_table(term, aiding));
         let name = study.scenario.path_name.clone();
         let moves = moves_in_words(&study.scenario);
         let evaluation = study.evaluate().with_context(|| format!("path {name}"))?;

@@ -1,11 +1,11 @@
-//! Names of auxiliary parameters, in addition to those of the triads.
+//! Auxiliary parameters, in addition to those of the triads, and the evidence for each error term.
 
 use std::collections::BTreeMap;
 
 use crate::prelude::*;
 use turncal::calibration::result::TermRecord;
 use turncal::calibration::{
-    Auxiliary, AuxiliaryKind, ErrorTerm, ErrorTermTest, OBSERVED_BELOW, auxiliary_name,
+    Auxiliary, AuxiliaryKind, ErrorTerm, OBSERVED_BELOW, TermEvidence, auxiliary_name,
 };
 use turncal::turntable::AxisError;
 
@@ -99,53 +99,75 @@ pub fn improvement(prior: f64, posterior: f64) -> String {
     }
 }
 
-/// Effect of the terms that were on or are significant.
-pub fn explained(effects: &[ErrorTermTest]) -> Table {
-    let row = |effect: &ErrorTermTest| {
+/// Above this probability, a term counts as present.
+pub const CERTAIN: f64 = 0.999;
+/// Smallest growth of σ that three digits show.
+const GROWN: f64 = 1.005;
+
+/// Every error term that was estimated or may be present.
+pub fn explained(all: &[TermEvidence]) -> Table {
+    let row = |of: &TermEvidence| {
         cells![
-            title(effect.term),
-            if effect.on { "on" } else { "off" },
-            nis(effect),
-            three_digits(effect.gain),
-            format!("< {}", three_digits(effect.limit)),
-            if effect.significant() { "yes" } else { "no" },
-            growth(effect),
+            title(of.term),
+            presence(of.present),
+            growth(of),
+            visibility(of)
         ]
     };
-    let shown = |on| {
-        effects
-            .iter()
-            .filter(move |e| e.on == on && (e.on || e.significant()))
-    };
-    Table::new("Effect of each error term", columns("term | | NIS | cost falls by | by chance | significant | σ grows"))
-        .sections([shown(true).map(row), shown(false).map(row)])
-        .note(
-            "NIS of all observations without → with the term. Cost: −2 ln of likelihood and prior. By chance: limit \
-             of the fall by chance, at a total false-alarm rate of 1 in 1000 runs.",
-        )
-        .note(
-            "σ grows: σ with the term divided by σ without it, RMS over the parameters of the group where it is largest.",
-        )
-        .note("Terms that are off are tested with their usual σ and shown if significant.")
+    let is_estimated = |of: &&TermEvidence| of.present == 1.0;
+    let (estimated, others): (Vec<_>, Vec<_>) = all.iter().partition(is_estimated);
+    let rows = [estimated, others].map(|terms| terms.into_iter().map(row));
+    Table::new(
+        "Evidence for each error term",
+        columns("term | present | σ grows | shown by this path"),
+    )
+    .sections(rows)
+    .note(
+        "Present: probability that the instrument or the table has this error; “estimated” if the term was requested \
+         or stated. Values and σ are averaged over the models with and without each term, weighted by these \
+         probabilities.",
+    )
+    .note(
+        "σ grows: σ with the term divided by σ without it, RMS over the parameters of the group where it is largest.",
+    )
+    .note(
+        "Shown by this path: whether the recording reduces the σ of every parameter of the term to less than half; if \
+         not, the moves or dwells to add.",
+    )
 }
 
-/// The group whose σ grows most.
-fn growth(effect: &ErrorTermTest) -> String {
-    let groups = Group::all().zip(effect.sigma_factors);
-    let known = groups.filter_map(|(group, factor)| Some((group, factor?)));
-    let largest = known.max_by(|a, b| a.1.total_cmp(&b.1));
+/// The probability that a term is present.
+fn presence(present: f64) -> String {
+    if present == 1.0 {
+        "estimated".to_owned()
+    } else if present > CERTAIN {
+        "> 99.9 %".to_owned()
+    } else if present < 1.0 - CERTAIN {
+        "< 0.1 %".to_owned()
+    } else {
+        // Two digits, and one decimal near 100 %.
+        let percent = 100.0 * present;
+        let shown = value(percent, percent.min(10.0 * (100.0 - percent)));
+        format!("{shown} %")
+    }
+}
+
+/// The group whose σ grows most; a dash if none grows visibly.
+fn growth(of: &TermEvidence) -> String {
+    let groups = Group::all().zip(of.sigma_factors);
+    let grown = groups.filter_map(|(group, factor)| Some((group, factor?)));
+    let grown = grown.filter(|(_, factor)| *factor >= GROWN);
+    let largest = grown.max_by(|a, b| a.1.total_cmp(&b.1));
     largest.map_or(NONE.to_owned(), |(group, factor)| {
-        format!("{}: {}", group.short(), value(factor, 0.1))
+        format!("{} × {}", group.short(), three_digits(factor))
     })
 }
 
-fn nis(effect: &ErrorTermTest) -> String {
-    let digits = |nis: f64| {
-        if nis < 10.0 {
-            value(nis, 0.01)
-        } else {
-            three_digits(nis)
-        }
-    };
-    format!("{} → {}", digits(effect.without), digits(effect.with))
+/// Whether the path shows a term; if not, the moves or dwells that do.
+fn visibility(of: &TermEvidence) -> String {
+    if of.remaining > OBSERVED_BELOW {
+        format!("no: {}", of.term.shown_by())
+    } else {
+        "yes".to_owned()
+    }
 }

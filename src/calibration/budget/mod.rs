@@ -2,27 +2,28 @@
 //!
 //! The covariance of a filter is homogeneous of degree one in the variances of all sources together: priors, noise of
 //! the instrument, errors of the table, noise of each observation. So the part of a source is its variance times the
-//! derivative with respect to it, and the parts add up to the covariance (Euler). The part of the prior of the
-//! constants is exact; the derivative with respect to a noise is computed from the information of two reductions.
+//! derivative with respect to it, and the parts add up to the covariance (Euler). The parts of effects between dwells
+//! come from one backward pass (Koopman and Shephard 1992), that of the prior is exact, and those of sources at rest are
+//! differences of the chain.
 
 pub mod curvature;
 
 mod record;
 pub mod source;
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
-use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::calibration::budget::curvature::curvature;
 use crate::calibration::constants::of_parameters;
-use crate::calibration::{
-    CalibrationError, Layout, Outcome, PARAMETERS, ParameterMatrix, Prior, Problem, Source,
-};
-use crate::run::Run;
+use crate::calibration::iterations::Solved;
+use crate::calibration::outcome::beside;
+use crate::calibration::sizes::{Candidates, Weighed};
+use crate::calibration::{CalibrationError, Outcome, PARAMETERS, ParameterMatrix, Problem};
+use crate::imu::Sensor;
 use crate::statistics::student_limit;
-pub use record::{BudgetPartRecord, BudgetRecord, LeftOffRecord};
+pub use record::{BudgetPartRecord, BudgetRecord};
 pub use source::BudgetSource;
 
 /// Two-sided coverage probability: k = 2 with a normal distribution.
@@ -50,9 +51,22 @@ pub struct BudgetPart {
     pub degrees_of_freedom: f64,
 }
 
-/// Relative change of a source's variance for central differences: they are accurate to its square, and the rounding of
+/// Relative change of the variance of a source at rest, for a difference: it is accurate to this, and the rounding of
 /// covariances that fall by ten orders of magnitude stays below that.
-const STEP: f64 = 0.01;
+const STEP: f64 = 1e-3;
+
+/// Sources that act within dwells, whose parts are differences of the chain made again.
+const AT_REST: [BudgetSource; 9] = [
+    BudgetSource::White(Sensor::Gyro),
+    BudgetSource::White(Sensor::Accel),
+    BudgetSource::Pulses,
+    BudgetSource::VelocityAtRest,
+    BudgetSource::AttitudeAtRest,
+    BudgetSource::RotationAtRest,
+    BudgetSource::TableReading,
+    BudgetSource::Settling,
+    BudgetSource::Place,
+];
 
 impl Budget {
     /// The budget of the estimate of an outcome.
@@ -60,33 +74,49 @@ impl Budget {
     /// # Errors
     /// [`CalibrationError`] if the problem is not the one of the outcome.
     pub fn new(problem: &Problem, outcome: &Outcome) -> Result<Self, CalibrationError> {
-        let problem = &outcome.as_calibrated(problem);
-        let (script, accepted) = (outcome.script(problem)?, outcome.accepted());
-        let reduction = |varied| {
-            let problem = problem.with(|model| model.varied = varied);
-            script.reduce(&problem, &accepted)
+        let problem = &problem.with(|model| model.prior_sigma = outcome.model.prior_sigma);
+        let solved = &outcome.solved;
+        let (chain, effects) = (&solved.chain, &solved.effects);
+        let weighed = effects.weighed(chain, problem, &solved.script)?;
+        let mut by_source = BTreeMap::<BudgetSource, ParameterMatrix>::new();
+        let mut add = |source: BudgetSource, part: ParameterMatrix| {
+            *by_source.entry(source).or_default() += part;
         };
-        let own = reduction(None)?;
-        let prior = Prior::new(&own.constants, &problem.model, &outcome.linearised_at);
-        let posterior = own.posterior(&prior);
-        let of_constants = |part: &DMatrix<f64>| of_parameters(&own.constants, part);
-        let of_noise = |source: BudgetSource| {
-            let information = |factor| Ok(reduction(Some((source, factor)))?.information());
-            let fall = information(1.0 - STEP)? - information(1.0 + STEP)?;
-            let part = &posterior.covariance * (fall / (2.0 * STEP)) * &posterior.covariance;
-            Ok::<_, CalibrationError>((source, of_constants(&part)))
-        };
-        let sources = problem.sources().into_par_iter();
-        let mut by_source = sources.map(of_noise).collect::<Result<Vec<_>, _>>()?;
-        let of_prior = prior.parts(&posterior).into_iter();
-        by_source.extend(of_prior.map(|(source, part)| (source, of_constants(&part))));
-        let filter: ParameterMatrix = by_source.iter().map(|(_, part)| part).sum();
-        let bent = curvature(&outcome.estimate.triads, &filter);
-        let beside = outcome.covariance_parts.iter();
-        let parts = by_source
-            .into_iter()
-            .chain([(BudgetSource::Curvature, bent)])
-            .chain(beside.map(|(&source, &part)| (source, part)));
+        for (source, part) in at_rest(problem, outcome, &weighed)? {
+            add(source, part);
+        }
+        let Weighed {
+            filtered,
+            prior,
+            posterior,
+            ..
+        } = &weighed;
+        let constants = &posterior.constants;
+        for (effect, part) in filtered.smoothed(posterior).parts {
+            add(effect.in_budget(), of_parameters(constants, &part));
+        }
+        for (source, part) in prior.parts(posterior) {
+            add(source, of_parameters(constants, &part));
+        }
+        for (source, part) in of_candidates(&weighed, &effects.candidates) {
+            add(source, part);
+        }
+        let sum: ParameterMatrix = by_source.values().sum();
+        let rest = posterior.parameter_covariance - sum;
+        // What differences leave over belongs to the largest.
+        let trace = |part: &ParameterMatrix| relative(part, &posterior.parameter_covariance);
+        let largest = by_source.iter_mut();
+        let largest = largest.max_by(|a, b| trace(a.1).total_cmp(&trace(b.1)));
+        if let Some((_, part)) = largest {
+            *part += rest;
+        }
+        let bent = curvature(&outcome.estimate.triads, &posterior.parameter_covariance);
+        let [rounding, period] = beside(problem, &outcome.estimate);
+        let parts = by_source.into_iter().chain([
+            (BudgetSource::Curvature, bent),
+            (BudgetSource::Rounding, rounding),
+            (BudgetSource::Period, period),
+        ]);
         let variance = outcome.estimate.covariance.diagonal();
         let counts = |part: &ParameterMatrix| {
             let own = part.diagonal();
@@ -102,20 +132,6 @@ impl Budget {
                 })
                 .collect(),
         })
-    }
-
-    /// Adds a part whose variance is known exactly.
-    pub(in crate::calibration) fn and(
-        mut self,
-        source: BudgetSource,
-        covariance: ParameterMatrix,
-    ) -> Self {
-        self.parts.push(BudgetPart {
-            source,
-            covariance,
-            degrees_of_freedom: f64::INFINITY,
-        });
-        self
     }
 
     /// The sum of all parts.
@@ -142,29 +158,53 @@ impl Budget {
     }
 }
 
-impl Problem<'_> {
-    /// The noise sources of its reduction: stated sources and those with a nonzero floor.
-    fn sources(&self) -> BTreeSet<BudgetSource> {
-        let layout = Layout::new(&self.model, self.one_gravity());
-        let noise = Source::ALL.into_iter();
-        let noise = noise.filter(|source| source.sigma(self) > 0.0);
-        let bridged = |run: &Run| {
-            let imu = &run.recording.imu;
-            imu.bridged(&(0..imu.len())).next().is_some()
-        };
-        let interpolated = self.runs().any(bridged);
-        let always = [
-            BudgetSource::Pulses,
-            BudgetSource::VelocityAtRest,
-            BudgetSource::AttitudeAtRest,
-        ];
-        let states = layout.sources.into_iter();
-        states
-            .chain(noise.map(Source::in_budget))
-            .chain(always)
-            .chain(interpolated.then_some(BudgetSource::Interpolated))
-            .collect()
-    }
+/// Parts of the sources at rest: their variance times the derivative of the covariance, `−C Λ′ C` with Λ′ that of the
+/// information of the rows.
+fn at_rest(
+    problem: &Problem,
+    outcome: &Outcome,
+    weighed: &Weighed,
+) -> Result<Vec<(BudgetSource, ParameterMatrix)>, CalibrationError> {
+    let Solved {
+        script, effects, ..
+    } = &*outcome.solved;
+    let here = weighed.filtered.information();
+    let covariance = &weighed.posterior.covariance;
+    let part = |&source: &BudgetSource| {
+        let varied = problem.with(|model| model.varied = Some((source, 1.0 + STEP)));
+        let chain = effects.chain(&varied, script)?;
+        let there = chain.filter(&weighed.filtered.sizes)?.information();
+        let part = covariance * ((&here - there) / STEP) * covariance;
+        Ok((source, of_parameters(&weighed.posterior.constants, &part)))
+    };
+    AT_REST.par_iter().map(part).collect()
+}
+
+/// Parts of the constants that may be absent: of their normal factors, as of a prior.
+fn of_candidates(
+    weighed: &Weighed,
+    candidates: &Candidates,
+) -> Vec<(BudgetSource, ParameterMatrix)> {
+    let posterior = &weighed.posterior;
+    let first = weighed.prior.constants.len() - weighed.prior.candidates;
+    let sites = candidates.sites(&weighed.prior);
+    let part = |places: &[usize]| {
+        let all: Vec<usize> = places.iter().map(|place| first + place).collect();
+        let across = posterior.covariance.select_columns(&all);
+        let information = sites.information.select_rows(places).select_columns(places);
+        let part = &across * information * across.transpose();
+        let source = posterior.constants[all[0]].source();
+        (source, of_parameters(&posterior.constants, &part))
+    };
+    candidates.places().map(|(_, places)| part(places)).collect()
+}
+
+/// Sum of the variances over those of a whole.
+fn relative(part: &ParameterMatrix, whole: &ParameterMatrix) -> f64 {
+    let pairs = part.diagonal().zip_map(&whole.diagonal(), |part, whole| {
+        if whole > 0.0 { part / whole } else { 0.0 }
+    });
+    pairs.sum()
 }
 
 impl BudgetSource {
@@ -172,11 +212,6 @@ impl BudgetSource {
     /// of the interval of the estimated noise, because the lower end may be zero; the smallest of several figures is
     /// used, but at least one.
     fn degrees_of_freedom(self, outcome: &Outcome) -> f64 {
-        if self == Self::DwellScatter {
-            let parameters = outcome.estimate.estimated().count().max(1);
-            let scores = outcome.dwell_scatter.map_or(0, |scatter| scatter.count);
-            return (scores as f64 / parameters as f64).max(1.0);
-        }
         let learnt = outcome.noise.sources.iter();
         let of_own = learnt.filter(|figures| figures.source.in_budget() == self);
         let freedoms = of_own.filter_map(|figures| {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::calibration::{Budget, ErrorTermTest, ParameterVector};
+use crate::calibration::Budget;
 
 /// Standard uncertainties of the estimated parameters by source, in their order and units.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -13,9 +13,6 @@ pub struct BudgetRecord {
     pub degrees_of_freedom: Vec<Option<f64>>,
     /// Coverage factor for 95.45 %.
     pub coverage_factor: Vec<f64>,
-    /// Error terms that are not estimated; not included in any sum.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub left_off: Vec<LeftOffRecord>,
 }
 
 /// Contribution of one source.
@@ -30,29 +27,13 @@ pub struct BudgetPartRecord {
     pub degrees_of_freedom: Option<f64>,
 }
 
-/// Possible effect of an error term that is not estimated.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct LeftOffRecord {
-    /// Its name, such as `size-effect`.
-    pub term: String,
-    /// 1σ of the change of each parameter if the term has its usual size; three digits.
-    pub usual: Vec<f64>,
-    /// RMS of the change if the evidence in the recording is also used; three digits.
-    pub shown: Vec<f64>,
-}
-
 impl Budget {
     /// Converts to a record of these parameters, each with its factor to the unit of the file.
     pub(in crate::calibration) fn record(
         &self,
         estimated: &[usize],
         factor: impl Fn(usize) -> f64,
-        tests: &[ErrorTermTest],
     ) -> BudgetRecord {
-        let of = |all: &ParameterVector| -> Vec<f64> {
-            let in_unit = |&i: &usize| three_digits((all[i] * factor(i)).abs());
-            estimated.iter().map(in_unit).collect()
-        };
         let finite = |freedom: f64| Some(freedom).filter(|freedom| freedom.is_finite());
         BudgetRecord {
             sources: self
@@ -72,21 +53,6 @@ impl Budget {
                 .map(|&i| finite(self.degrees_of_freedom(i)))
                 .collect(),
             coverage_factor: estimated.iter().map(|&i| self.coverage_factor(i)).collect(),
-            left_off: tests
-                .iter()
-                .filter_map(|test| {
-                    let left_off = test.left_off?;
-                    Some(LeftOffRecord {
-                        term: test.term.name().to_owned(),
-                        usual: of(&left_off.usual),
-                        shown: of(&left_off.shown),
-                    })
-                })
-                .collect(),
         }
     }
-}
-
-fn three_digits(value: f64) -> f64 {
-    format!("{value:.2e}").parse().unwrap_or(value)
 }

@@ -27,6 +27,10 @@ pub enum BudgetSource {
     TablePosition,
     /// Readings of the table.
     TableReading,
+    /// Settling of the table after stops.
+    Settling,
+    /// Slips of the instrument on the table and of the table on the ground.
+    Slips,
     /// Level of the table's base.
     TableLevel,
     /// North of the table's base.
@@ -47,22 +51,18 @@ pub enum BudgetSource {
     Temperature,
     /// Differences of the instrument between recordings.
     Recording,
-    /// Prior of the parameters of an estimated error term.
+    /// Parameters of an error term.
     Term(Term),
     /// Second-order effects of the installation form in poorly known angles.
     Curvature,
     /// Headings not determined by Earth rate.
     Headings,
-    /// Scatter of the dwells beyond all noise.
-    DwellScatter,
     /// Rounding of rates to steps wider than their noise.
     Rounding,
     /// Sample period, if not determined by a clock.
     Period,
-    /// Error terms that the data show, but that are not estimated.
-    ErrorTermsLeftOff,
-    /// Possible bias variation that the estimated noise does not include.
-    UnseenVariation,
+    /// Earth rate, if it may differ from that at the stated latitude.
+    EarthRate,
 }
 
 impl BudgetSource {
@@ -88,6 +88,8 @@ impl BudgetSource {
             Self::Place => "position of the IMU",
             Self::TablePosition => "table position",
             Self::TableReading => "table reading",
+            Self::Settling => "settling of the table",
+            Self::Slips => "slips in moves",
             Self::TableLevel => "table level",
             Self::TableNorth => "table north",
             Self::TableSquareness => "non-orthogonality of the table axes",
@@ -96,16 +98,14 @@ impl BudgetSource {
             Self::Gravity => "gravity",
             Self::InitialAttitude => "initial attitude",
             Self::Prior => "prior",
-            Self::Temperature => "prior of temperature coefficients",
+            Self::Temperature => "temperature coefficients",
             Self::Recording => "differences between recordings",
-            Self::Term(term) => return format!("prior of {}", term.name()),
+            Self::Term(term) => return term.name().to_owned(),
             Self::Curvature => "second-order effect of unknown angles",
             Self::Headings => "unknown heading",
-            Self::DwellScatter => "scatter of dwells",
             Self::Rounding => "rounding of rates",
             Self::Period => "sample period",
-            Self::ErrorTermsLeftOff => "significant error terms not estimated",
-            Self::UnseenVariation => "possible unseen bias variation",
+            Self::EarthRate => "Earth rate at an uncertain latitude",
         };
         name.to_owned()
     }

@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use super::effects::Effect;
 use super::forward::{Filtered, Passed};
 use super::links::Link;
+use super::states::States;
 use crate::calibration::Posterior;
 
 /// Moments of the disturbances of one event, given all data.
@@ -39,7 +40,7 @@ pub struct Smoothed {
 pub struct Cumulants {
     pub mean: DVector<f64>,
     pub by_constants: DMatrix<f64>,
-    precision: DMatrix<f64>,
+    pub precision: DMatrix<f64>,
 }
 
 impl Cumulants {
@@ -65,17 +66,17 @@ impl Cumulants {
 }
 
 impl Filtered<'_> {
-    /// Goes backward; `visit` sees each link with the cumulants of its rows and all later ones.
-    pub fn backward(&self, mut visit: impl FnMut(&Link, &Passed, &Cumulants)) {
+    /// Goes backward; `visit` sees the number of each link with the cumulants of its rows and all later ones.
+    pub fn backward(&self, mut visit: impl FnMut(usize, &Cumulants)) {
         let (n, c) = (self.chain.states.count, self.chain.constants.len());
         let mut cumulants = Cumulants {
             mean: DVector::zeros(n),
             by_constants: DMatrix::zeros(n, c),
             precision: DMatrix::zeros(n, n),
         };
-        for (link, passed) in self.chain.links.iter().zip(&self.passed).rev() {
-            cumulants.observe(passed);
-            visit(link, passed, &cumulants);
+        for (number, link) in self.chain.links.iter().enumerate().rev() {
+            cumulants.observe(&self.passed[number]);
+            visit(number, &cumulants);
             cumulants.carry(&link.transition.states);
         }
     }
@@ -87,8 +88,8 @@ impl Filtered<'_> {
             events: BTreeMap::new(),
             parts: BTreeMap::new(),
         };
-        self.backward(|link, _, cumulants| {
-            for drive in &link.transition.drives {
+        self.backward(|number, cumulants| {
+            for drive in &self.chain.links[number].transition.drives {
                 let variance = self.sizes.of(drive.effect, drive.event);
                 let mean = drive.by.tr_mul(&cumulants.mean);
                 let of_constants = drive.by.tr_mul(&cumulants.by_constants);
@@ -114,16 +115,63 @@ impl Filtered<'_> {
     }
 }
 
+/// States at one time, given all data.
+pub struct SmoothedStates {
+    pub mean: DVector<f64>,
+    pub covariance: DMatrix<f64>,
+    /// Covariance of the constants (rows) with them.
+    pub with_constants: DMatrix<f64>,
+}
+
+impl SmoothedStates {
+    fn new(passed: &Passed, cumulants: &Cumulants, posterior: &Posterior) -> Self {
+        let p = &passed.covariance;
+        let by = &passed.by_constants - p * &cumulants.by_constants;
+        let with_constants = &posterior.covariance * by.transpose();
+        Self {
+            mean: &passed.mean + p * &cumulants.mean + &by * &posterior.mean,
+            covariance: p - p * &cumulants.precision * p + by * &with_constants,
+            with_constants,
+        }
+    }
+}
+
+impl Filtered<'_> {
+    /// The states where parts begin, given all data, of those links that are wanted, in order.
+    pub fn states<'a>(
+        &'a self,
+        posterior: &Posterior,
+        wanted: impl Fn(&Link) -> bool,
+    ) -> Vec<(&'a Link, SmoothedStates)> {
+        let mut all = Vec::new();
+        self.backward(|number, cumulants| {
+            let (link, passed) = (&self.chain.links[number], &self.passed[number]);
+            if wanted(link) {
+                all.push((link, SmoothedStates::new(passed, cumulants, posterior)));
+            }
+        });
+        all.reverse();
+        all
+    }
+
+    /// The layout of the states.
+    pub fn layout(&self) -> &States {
+        &self.chain.states
+    }
+}
+
 impl Smoothed {
-    /// Moments of the disturbances of all events of an effect.
-    pub fn of(&self, effect: Effect) -> Moments {
-        let of_effect = self.events.iter().filter(|((of, _), _)| *of == effect);
-        of_effect.fold(Moments::default(), |sum, (_, of)| Moments {
-            slope: sum.slope + of.slope,
-            curvature: sum.curvature + of.curvature,
-            squares: sum.squares + of.squares,
-            unknown: sum.unknown + of.unknown,
-            count: sum.count + of.count,
-        })
+    /// Moments of the disturbances of all events of each effect.
+    pub fn by_effect(&self) -> BTreeMap<Effect, Moments> {
+        let mut sums = BTreeMap::<Effect, Moments>::new();
+        for ((effect, _), of) in &self.events {
+            let sum = sums.entry(*effect).or_default();
+            sum.slope += of.slope;
+            sum.curvature += of.curvature;
+            sum.squares += of.squares;
+            sum.unknown += of.unknown;
+            sum.count += of.count;
+        }
+        sums
     }
 }

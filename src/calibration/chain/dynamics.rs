@@ -2,10 +2,10 @@
 
 use nalgebra::{DMatrix, SMatrix};
 
-use super::states::States;
+use super::states::{ATTITUDE, NAVIGATION, States, VELOCITY};
 use crate::calibration::several::day_to_day::{OwnState, Turned};
 use crate::calibration::{
-    ATTITUDE, Constant, NAVIGATION, ParameterVector, VELOCITY, parameter, sensor_and_parameter,
+    Constant, ParameterVector, parameter, sensor_and_parameter,
 };
 use crate::imu::{PARAMETERS as PER_TRIAD, Sensor};
 use crate::navigation::{Block, ErrorVector};
@@ -87,9 +87,8 @@ impl Dynamics<'_> {
                 columns.column(coefficient.parameter) * weight
             }
             Constant::Gravity => block.gravity,
-            Constant::Base(_) | Constant::Axis(_) | Constant::Disturbance(..) => {
-                ErrorVector::zeros()
-            }
+            Constant::EarthRate(axis) => of_earth_rate(block, axis),
+            Constant::Base(_) | Constant::Axis(_) => ErrorVector::zeros(),
         }
     }
 }

@@ -2,14 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use crate::calibration::Source;
 use crate::calibration::budget::source::BudgetSource;
+use crate::calibration::{Group, Problem, Source};
 
 /// What drives the states of the chain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Effect {
     /// Noise whose size is estimated.
     Noise(Source),
+    /// Differences between recordings, of a size that is estimated.
+    Difference(Group),
     /// A turn in a move that stays from then on.
     Slip(Slip),
     /// Something of a stated size.
@@ -26,21 +28,32 @@ pub enum Slip {
 }
 
 impl Effect {
-    /// Whether single events may be far larger than the others: moves, positions, slips.
+    /// Whether single events may be far larger than the others: moves, positions, steps of biases, slips.
     pub fn has_heavy_tails(self) -> bool {
         match self {
             Self::Slip(_) => true,
             Self::Noise(source) => matches!(
                 source,
-                Source::GyroMotion | Source::AccelMotion | Source::TablePosition
+                Source::GyroMotion
+                    | Source::AccelMotion
+                    | Source::TablePosition
+                    | Source::GyroGaussMarkov
+                    | Source::AccelGaussMarkov
             ),
-            Self::Stated(_) => false,
+            Self::Difference(_) | Self::Stated(_) => false,
+        }
+    }
+
+    /// Its source in the uncertainty budget.
+    pub fn in_budget(self) -> BudgetSource {
+        match self {
+            Self::Noise(source) => source.in_budget(),
+            Self::Difference(_) => BudgetSource::Recording,
+            Self::Slip(_) => BudgetSource::Slips,
+            Self::Stated(source) => source,
         }
     }
 }
-
-/// A change of ln of the variance of a single event by less than this has settled.
-const SETTLED: f64 = 0.05;
 
 /// Variance of each effect over that with which the links were made, and of single events over that of their effect.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -64,12 +77,8 @@ impl Sizes {
 
     /// The factor of an event.
     pub fn of(&self, effect: Effect, event: usize) -> f64 {
-        self.of_effect(effect) * self.of_event(effect, event)
-    }
-
-    /// The factor of an effect.
-    pub fn of_effect(&self, effect: Effect) -> f64 {
-        self.effects.get(&effect).copied().unwrap_or(1.0)
+        let of_effect = self.effects.get(&effect).copied().unwrap_or(1.0);
+        of_effect * self.of_event(effect, event)
     }
 
     /// The factor of an event over that of its effect.
@@ -77,16 +86,44 @@ impl Sizes {
         self.events.get(&(effect, event)).copied().unwrap_or(1.0)
     }
 
-    /// Whether the events are as large as those of others.
-    pub fn is_like(&self, other: &Self) -> bool {
-        let changed = |(&(effect, event), factor): (&(Effect, usize), &f64)| {
-            (factor / other.of_event(effect, event)).ln().abs() > SETTLED
-        };
-        !self.events.iter().any(changed)
-    }
-
     /// The events.
     pub fn events(&self) -> impl Iterator<Item = ((Effect, usize), f64)> + '_ {
         self.events.iter().map(|(&event, &factor)| (event, factor))
+    }
+
+    /// The same with every effect as the links were made.
+    pub fn of_events_alone(&self) -> Self {
+        Self {
+            effects: BTreeMap::new(),
+            events: self.events.clone(),
+        }
+    }
+}
+
+/// Variance of the noise at rest in each dwell over that of all.
+///
+/// A dwell that is less still than the others then makes no noise of them: with an inverse-gamma prior of its variance
+/// its noise is a draw from Student's t (Lange, Little, Taylor 1989, J. Am. Stat. Assoc. 84(408)).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dispersion(Vec<f64>);
+
+impl Dispersion {
+    /// All dwells alike.
+    pub fn alike(problem: &Problem) -> Self {
+        Self(vec![1.0; problem.dwells().count()])
+    }
+
+    /// With these factors, over that of the middle dwell.
+    pub fn of_dwells(mut factors: Vec<f64>) -> Self {
+        let mut sorted = factors.clone();
+        if let Some(middle) = crate::statistics::median(&mut sorted) {
+            factors.iter_mut().for_each(|factor| *factor /= middle);
+        }
+        Self(factors)
+    }
+
+    /// The factor of a dwell.
+    pub fn of(&self, dwell: usize) -> f64 {
+        self.0.get(dwell).copied().unwrap_or(1.0)
     }
 }

@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::effects::Sizes;
 use super::links::{Chain, Link};
-use crate::calibration::constants::triangle;
+use crate::calibration::constants::Sites;
 use crate::calibration::{CalibrationError, Known, Posterior, Prior};
 
 /// A link after the filter has passed it.
@@ -109,8 +109,8 @@ impl Passed {
 }
 
 impl Filtered<'_> {
-    /// The posterior of the constants.
-    pub fn posterior(&self, prior: &Prior) -> Posterior {
+    /// What all rows say of the constants, with their prior.
+    pub fn known(&self, prior: &Prior) -> Known {
         let c = self.chain.constants.len();
         let count = self.passed.iter().map(|of| of.innovations.len()).sum();
         let mut rows = DMatrix::zeros(count, c + 1);
@@ -123,15 +123,27 @@ impl Filtered<'_> {
             first += m;
         }
         let mut known = Known::new(prior.clone());
-        if count > c {
-            rows = triangle(&rows);
-        }
         known.learn(&rows);
-        let of_rows = known.posterior();
-        Posterior {
+        known
+    }
+
+    /// The posterior of the constants, from what is known of them; `None` if something is undetermined.
+    pub fn posterior_with(&self, known: &Known, sites: &Sites) -> Option<Posterior> {
+        let of_rows = known.with(sites)?;
+        Some(Posterior {
             cost: of_rows.cost + self.chain.squares,
             deviance: of_rows.deviance + self.chain.squares + self.log_determinant,
             ..of_rows
+        })
+    }
+
+    /// Information of all rows on the constants.
+    pub fn information(&self) -> DMatrix<f64> {
+        let c = self.chain.constants.len();
+        let mut information = DMatrix::zeros(c, c);
+        for of in &self.passed {
+            information.gemm_tr(1.0, &of.of_constants, &of.of_constants, 1.0);
         }
+        information
     }
 }

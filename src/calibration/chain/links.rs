@@ -6,9 +6,10 @@ mod transition;
 
 use nalgebra::{DMatrix, DVector, Matrix3};
 
-use super::at_rest::Dispersion;
+use super::effects::Dispersion;
 use super::states::States;
-use crate::calibration::{CalibrationError, Constant, Layout, Problem, Script};
+use crate::calibration::{CalibrationError, Constant, Problem, Script};
+pub use given::Given;
 use maker::Maker;
 pub use maker::SLIP;
 pub use transition::Transition;
@@ -29,12 +30,18 @@ pub struct Rows {
 pub struct Link {
     /// Whether a stretch begins here.
     pub begins: bool,
+    /// Number of the recording.
+    pub recording: usize,
+    /// Number of the dwell.
+    pub dwell: usize,
     /// Computed attitude, if a dwell begins here.
     pub attitude: Option<Matrix3<f64>>,
     /// End of the part, s.
     pub time: f64,
     pub transition: Transition,
     pub rows: Rows,
+    /// What the part is given.
+    pub given: Given,
 }
 
 /// The links of all stretches.
@@ -43,6 +50,8 @@ pub struct Chain {
     pub states: States,
     pub constants: Vec<Constant>,
     pub links: Vec<Link>,
+    /// Number of scalars that were observed.
+    pub observations: usize,
     /// Sum of squares of the observations within parts that depends on nothing else …
     pub squares: f64,
     /// … and logarithm of the determinant of their covariance.
@@ -88,6 +97,16 @@ impl Rows {
 }
 
 impl Chain {
+    /// The same without the rows of some dwells, given by number.
+    pub fn observed_in(&self, used: impl Fn(usize) -> bool) -> Self {
+        let mut part = self.clone();
+        let (n, c) = (self.states.count, self.constants.len());
+        for link in part.links.iter_mut().filter(|link| !used(link.dwell)) {
+            link.rows = Rows::none(n, c);
+        }
+        part
+    }
+
     /// The links of a problem, from its events at one linearisation point, with this dispersion of the dwells.
     ///
     /// # Errors
@@ -99,7 +118,7 @@ impl Chain {
     ) -> Result<Self, CalibrationError> {
         let one_gravity = problem.one_gravity();
         let states = States::new(&problem.model, one_gravity);
-        let constants = Layout::new(&problem.model, one_gravity).constants;
+        let constants = Constant::all(&problem.model, one_gravity);
         let mut maker = Maker::new((problem, dispersion), &states, &constants);
         for number in 0..problem.stretches().len() {
             maker.stretch(script, number)?;
@@ -108,10 +127,12 @@ impl Chain {
             links,
             squares,
             log_determinant,
+            observations,
             ..
         } = maker;
         Ok(Self {
             links,
+            observations,
             squares,
             log_determinant,
             states,

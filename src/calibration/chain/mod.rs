@@ -1,27 +1,26 @@
-//! The chain of dwells: what the parts of dwells say, what moves do between them, and the sizes of all effects.
+//! The chain of dwells: what the parts of dwells say, and what moves do between them.
 //!
 //! Within a part of a dwell the noise at rest alone acts; [`links`] reduces each part once to rows of what it begins
 //! with and of the constants. Between parts the states go on through moves, table positions, and biases that vary: a
 //! chain of links, which [`forward`] filters with the constants as columns (Friedland 1969, "Treatment of bias in
-//! recursive filtering", IEEE Trans. Automatic Control 14(4)) and [`backward`] smooths. A trial of the sizes of effects
+//! recursive filtering", IEEE Trans. Automatic Control 14(4)) and [`backward`] smooths. Another size of an effect
 //! touches no sample.
 
-mod at_rest;
-mod averages;
 mod backward;
-mod descent;
 mod dynamics;
-mod effects;
-mod estimate;
+pub mod effects;
 mod forward;
+mod innovations;
 mod links;
-mod part;
-mod sizes;
-mod states;
-mod usual;
+pub mod part;
+mod short_rows;
+pub mod states;
+mod without;
 
-use effects::{Effect, Sizes, Slip};
-use links::Chain;
+pub use backward::{Moments, Smoothed};
+pub use effects::{Dispersion, Effect, Sizes, Slip};
+pub use forward::Filtered;
+pub use links::{Chain, SLIP};
 
 #[cfg(test)]
 mod tests;

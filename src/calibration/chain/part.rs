@@ -7,12 +7,13 @@
 
 mod course;
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use super::dynamics::{CONSTANTS, driven_at_rest};
-use crate::calibration::filter::rows::{add, factor};
+use super::short_rows::{add, factor};
+use super::states::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::record::Rest;
-use crate::calibration::{ATTITUDE, Model, NAVIGATION, Observation, POSITION, Stretch, VELOCITY};
+use crate::calibration::{BudgetSource, Model, Observation, Stretch};
 use crate::navigation::Block;
 use course::{Course, StepModel};
 
@@ -47,28 +48,46 @@ impl Part {
     }
 }
 
+/// An observation, whitened by its covariance given `g`.
+pub struct Whitened<'a> {
+    /// Its number among those of the part.
+    pub number: usize,
+    /// Three scalars of σ 1, given `g = 0` …
+    pub scalars: Vector3<f64>,
+    /// … the lower triangular root of the covariance of the three components …
+    pub root: &'a Matrix3<f64>,
+    /// … and their rows of `g`, one after the other.
+    pub rows: &'a [f64],
+}
+
 /// Reduces parts of dwells of one kind.
 pub trait PartFilter {
     /// Size of `g`.
     fn given(&self) -> usize;
 
-    /// The reduction of a part; `None` if a covariance is not positive definite. `seen` gets each whitened observation
-    /// given `g = 0`, with the logarithm of its σ.
+    /// The reduction of a part; `None` if a covariance is not positive definite. `seen` gets each observation.
     fn reduce(
         &mut self,
         part: (&Rest, &Stretch),
         model: &Model,
-        seen: &mut dyn FnMut(f64, f64),
+        seen: &mut dyn FnMut(Whitened),
     ) -> Option<Part>;
 }
 
-/// The filter for this number of moving states.
-pub fn part_filter(moving: usize) -> Box<dyn PartFilter> {
-    if moving == NAVIGATION {
-        Box::new(Course::<9, 12>::new(&begins(moving)))
-    } else {
-        Box::new(Course::<12, 15>::new(&begins(moving)))
-    }
+/// The filters for this number of moving states: for parts that follow a move, and for others, which have other noise.
+pub fn part_filters(moving: usize) -> [Box<dyn PartFilter>; 2] {
+    [(); 2].map(|()| -> Box<dyn PartFilter> {
+        if moving == NAVIGATION {
+            Box::new(Course::<9, 12>::new(&begins(moving)))
+        } else {
+            Box::new(Course::<12, 15>::new(&begins(moving)))
+        }
+    })
+}
+
+/// Which of the two filters a part has.
+pub fn filter_of(rest: &Rest) -> usize {
+    usize::from(!(rest.first && rest.new_position))
 }
 
 /// The moving states in `g`: in a dwell, nothing depends on position.
@@ -86,13 +105,14 @@ impl<const M: usize, const G: usize> PartFilter for Course<M, G> {
         &mut self,
         (rest, stretch): (&Rest, &Stretch),
         model: &Model,
-        seen: &mut dyn FnMut(f64, f64),
+        seen: &mut dyn FnMut(Whitened),
     ) -> Option<Part> {
         let models = rest.models.iter().map(|block| step_model(block, model));
         self.begin(models.collect());
         let turn = (M > NAVIGATION).then_some(NAVIGATION);
         let (mut at, mut mean, mut vector) = (Self::BEGIN, [0.0; M], [0.0; G]);
         let (mut squares, mut log_determinant) = (0.0, 0.0);
+        let mut since_stop = 0.0;
         for step in &rest.steps {
             let errors = [ATTITUDE, VELOCITY, POSITION].into_iter();
             let turned = turn.map(|turn| (turn, step.referred[0]));
@@ -101,7 +121,9 @@ impl<const M: usize, const G: usize> PartFilter for Course<M, G> {
             }
             at = self.step(at, step.model);
             mean = self.models[step.model].propagated(&mean);
-            for observed in &rest.seen[step.seen.clone()] {
+            since_stop += rest.models[step.model].duration;
+            for number in step.seen.clone() {
+                let observed = &rest.seen[number];
                 let first = match observed.kind {
                     Observation::Velocity => VELOCITY,
                     Observation::Table => ATTITUDE,
@@ -109,19 +131,26 @@ impl<const M: usize, const G: usize> PartFilter for Course<M, G> {
                 };
                 let variance =
                     stretch.observation_variance(model, observed.kind, observed.readings);
-                at = self.observe(at, first, variance)?;
+                let settles = filter_of(rest) == 0 && observed.kind == Observation::Table;
+                let settling = if settles { model.settling(since_stop) } else { 0.0 };
+                at = self.observe(at, first, variance + settling)?;
                 let gain = self.points[at].gain.as_ref()?;
                 let expected = Vector3::new(mean[first], mean[first + 1], mean[first + 2]);
-                let whitened = gain
+                let scalars = gain
                     .root
                     .solve_lower_triangular(&(observed.residual - expected))?;
-                squares += whitened.norm_squared();
+                squares += scalars.norm_squared();
                 log_determinant += gain.log_determinant;
                 for axis in 0..3 {
-                    seen(whitened[axis], gain.root[(axis, axis)].ln());
-                    add(&mut mean, whitened[axis], &gain.of_errors[axis]);
-                    add(&mut vector, whitened[axis], &gain.rows[axis]);
+                    add(&mut mean, scalars[axis], &gain.of_errors[axis]);
+                    add(&mut vector, scalars[axis], &gain.rows[axis]);
                 }
+                seen(Whitened {
+                    number,
+                    scalars,
+                    root: &gain.root,
+                    rows: gain.rows.as_flattened(),
+                });
             }
         }
         let known = &self.points[at].known;
@@ -153,7 +182,9 @@ fn step_model<const M: usize>(block: &Block, model: &Model) -> StepModel<M> {
             .map_or(row, |axis| ATTITUDE + axis)
     };
     let of_navigation = block.noise.covariance(&model.process_noise());
-    let turning = model.turning_at_rest.powi(2) * block.duration;
+    let turning = model.turning_at_rest.powi(2)
+        * model.weight(BudgetSource::RotationAtRest)
+        * block.duration;
     let (mut transition, mut driven) = (Vec::new(), Vec::new());
     let mut noise = [[0.0; M]; M];
     for row in 0..M {

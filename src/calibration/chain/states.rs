@@ -1,9 +1,18 @@
 //! The states of the chain.
 
 use crate::calibration::several::day_to_day::OwnState;
-use crate::calibration::{Model, NAVIGATION, PARAMETERS};
+use crate::calibration::{Model, PARAMETERS};
 use crate::imu::{PerSensor, Sensor};
 use crate::run::Aiding;
+
+/// Attitude error φ, `C_computed = (I − [φ×]) C_true`, East-North-Up, rad.
+pub const ATTITUDE: usize = 0;
+/// Velocity error δV = computed − true, East-North-Up, m/s.
+pub const VELOCITY: usize = 3;
+/// Position error δp = computed − true, East-North-Up, m.
+pub const POSITION: usize = 6;
+/// Number of navigation states.
+pub const NAVIGATION: usize = 9;
 
 /// Index of each group of states. Those that move within a dwell come first: navigation errors, then the rotation at
 /// rest.

@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
+use crate::calibration::iterations::Solved;
 use crate::calibration::{
-    CalibrationError, Finding, FindingKind as Kind, Linearisation, Prior, Script, Solved,
-    in_general_form,
+    CalibrationError, Finding, FindingKind as Kind, Linearisation, Problem, Script, in_general_form,
 };
 use crate::imu::InstallationForm;
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
@@ -45,34 +45,29 @@ impl FormTest {
     }
 }
 
-/// Tests the form of a converged pass against the general form, linearised at the same estimate (Van Trees,
-/// *Detection, Estimation, and Modulation Theory*, part I, §2.5). `None` for a form with as many angles as the
-/// general one, which no data can reject.
-pub fn form_test(
-    Solved {
-        problem: restricted,
-        priors,
-        iterated,
-        ..
-    }: &Solved,
-) -> Result<Option<FormTest>, CalibrationError> {
+/// Tests the form of an estimate against the general form, linearised there (Van Trees, *Detection, Estimation, and
+/// Modulation Theory*, part I, §2.5). `None` for a form with as many angles as the general one, which no data can
+/// reject.
+///
+/// # Errors
+/// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+pub fn form_test(problem: &Problem, solved: &Solved) -> Result<Option<FormTest>, CalibrationError> {
     let general = InstallationForm::General;
     let angles = |form: InstallationForm| 2 * form.angle_names().len();
-    let more = angles(general) - angles(restricted.model.form);
+    let more = angles(general) - angles(problem.model.form);
     if more == 0 {
         return Ok(None);
     }
-    let model = restricted.model.in_form(restricted.run(), general);
+    let free = problem.with(|model| *model = model.in_form(problem.run(), general));
     let at = Linearisation {
-        triads: in_general_form(&iterated.estimate.triads),
-        ..iterated.estimate.clone()
+        triads: in_general_form(&solved.estimate.triads),
+        ..solved.estimate.clone()
     };
-    let general = restricted.with_model(model);
-    let script = Script::new(&general, priors, &at)?;
-    let free = script.reduce(&general, &iterated.held.accepted())?;
-    let free = free.posterior(&Prior::new(&free.constants, &general.model, &at));
+    let script = Script::new(&free, &solved.script.priors, &at)?;
+    let chain = solved.effects.chain(&free, &script)?;
+    let of_general = solved.effects.weighed(&chain, &free, &script)?;
     Ok(Some(FormTest {
-        gain: iterated.held.posterior.cost - free.cost,
+        gain: solved.posterior.cost - of_general.posterior.cost,
         angles: more,
         limit: chi_square_limit(more as f64, FALSE_ALARM),
     }))

@@ -44,8 +44,6 @@ pub struct Innovation {
     pub whitened: [f64; 3],
     /// These σ, rad or m/s.
     pub sigma: [f64; 3],
-    /// Whether the gate accepted it.
-    pub accepted: bool,
     /// Number of its dwell.
     pub dwell: usize,
     /// Whether it shows the errors of the move before its dwell; false if rows are missing in between.
@@ -56,11 +54,6 @@ impl Innovation {
     /// Squared Mahalanobis distance, χ² with three degrees of freedom.
     pub fn distance(&self) -> f64 {
         self.whitened.iter().map(|w| w * w).sum()
-    }
-
-    /// −2 ln of its likelihood, up to a constant.
-    pub fn deviance(&self) -> f64 {
-        self.distance() + 2.0 * self.sigma.map(f64::ln).iter().sum::<f64>()
     }
 }
 
@@ -110,49 +103,28 @@ const LOOKS: [(&str, &str, Squares); 3] = [
 ];
 const AFTER_MOVES: &str = "after-moves";
 
-/// All accepted innovations.
 fn of_all(innovations: &[&Innovation]) -> Vec<f64> {
-    let accepted = innovations.iter().filter(|i| i.accepted);
-    accepted.flat_map(|i| i.whitened.map(|w| w * w)).collect()
+    let each = innovations.iter();
+    each.flat_map(|i| i.whitened.map(|w| w * w)).collect()
 }
 
-/// The first innovation of each dwell after a move, accepted or not: it shows the errors of the move.
+/// The first innovation of each dwell after a move: it shows the errors of the move.
 fn after_moves(innovations: &[&Innovation]) -> Vec<f64> {
     let dwells = innovations.chunk_by(|a, b| a.dwell == b.dwell);
     let first = dwells.filter_map(|dwell| dwell.first().filter(|i| i.after_move));
     first.flat_map(|i| i.whitened.map(|w| w * w)).collect()
 }
 
-/// Normalised sums of the accepted innovations over each dwell: they show lasting errors.
+/// Normalised sums of the innovations over each dwell: they show lasting errors.
 fn over_dwells(innovations: &[&Innovation]) -> Vec<f64> {
     let dwells = innovations.chunk_by(|a, b| a.dwell == b.dwell);
     let summed = dwells.flat_map(|dwell| {
-        let accepted: Vec<_> = dwell.iter().filter(|i| i.accepted).collect();
-        let axes = 0..if accepted.is_empty() { 0 } else { 3 };
-        axes.map(move |axis| {
-            let sum: f64 = accepted.iter().map(|i| i.whitened[axis]).sum();
-            sum.powi(2) / accepted.len() as f64
+        (0..3).map(move |axis| {
+            let sum: f64 = dwell.iter().map(|i| i.whitened[axis]).sum();
+            sum.powi(2) / dwell.len() as f64
         })
     });
     summed.collect()
-}
-
-/// The finding on observations that the gate rejected, if any, with the place of most of them.
-pub fn outliers(innovations: &[Innovation]) -> Option<Finding> {
-    let observations = innovations.len();
-    let rejected: Vec<&Innovation> = innovations.iter().filter(|i| !i.accepted).collect();
-    let dwells = rejected.chunk_by(|one, other| one.dwell == other.dwell);
-    let most = dwells.rev().max_by_key(|of_dwell| of_dwell.len())?;
-    let (rejected, dwell, time) = (rejected.len(), most[0].dwell + 1, most[0].time);
-    let text = format!(
-        "{rejected} of {observations} observations were rejected as outliers, {} of them in dwell {dwell}, which \
-         starts at {time:.1} s. Check that dwell for a bump.",
-        most.len()
-    );
-    let figures = json!({
-        "rejected": rejected, "observations": observations, "dwell": dwell, "time_s": time
-    });
-    Some(Finding::new(Kind::Outliers, text, figures))
 }
 
 /// The finding on innovations that do not agree with their covariance, if any.
@@ -198,10 +170,9 @@ const OUTSIDE: f64 = 0.05;
 
 /// Consistency of a pass, separately for each kind of observation.
 pub fn consistency(innovations: &[Innovation]) -> Consistency {
-    let accepted = innovations.iter().filter(|i| i.accepted);
-    let of = |kind| nis(accepted.clone().filter(move |i| i.observation == kind));
+    let of = |kind| nis(innovations.iter().filter(move |i| i.observation == kind));
     Consistency {
-        all: nis(accepted.clone()),
+        all: nis(innovations.iter()),
         velocity: of(Observation::Velocity),
         table: of(Observation::Table),
         attitude: of(Observation::Attitude),
@@ -263,7 +234,6 @@ mod tests {
                 observation,
                 whitened: [whitened; 3],
                 sigma: [1.0; 3],
-                accepted: true,
                 dwell,
                 after_move: dwell > 0,
             };

@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 use crate::attitude::{exp, level, log, tilt};
 use crate::calibration::linearisation::singular;
 use crate::calibration::start::closed_form::six_position_by;
+use crate::calibration::iterations::Solved;
 use crate::calibration::{
-    CalibrationError, ClosedForm, Gate, Linearisation, Outcome, Problem, Reference, Script,
-    Stretch, pass,
+    CalibrationError, ClosedForm, Linearisation, Outcome, Problem, Reference, Stretch,
 };
 use crate::imu::{PerSensor, Sensed, Sensor, TermVector, Triad};
 use crate::navigation::{Navigator, State};
@@ -120,25 +120,28 @@ impl FromIterator<f64> for Spread {
 impl Outcome {
     /// The quality of this calibration of a problem.
     ///
-    /// Cross-validation uses one additional pass, without the observations of every other dwell. It has the
-    /// linearisation point of the last pass, and no other information from it.
+    /// Cross-validation solves the chain without the rows of every other dwell, at the linearisation point of the last pass.
     ///
     /// # Errors
     /// [`CalibrationError`] if the problem is not the one of the outcome.
     pub fn quality(&self, problem: &Problem) -> Result<Quality, CalibrationError> {
-        let problem = &self.as_calibrated(problem);
-        let estimate = Linearisation {
-            triads: self.estimate.triads,
-            terms: self.auxiliary.terms(),
-            ..self.linearised_at.clone()
-        };
-        let half = every_other(problem).and_then(|half| {
-            let script = Script::new(&half, &self.prior_attitudes, &self.linearised_at);
-            // Half the dwells may be too few.
-            pass(&half, &script.ok()?, Gate::Innovations).ok()
+        let Solved {
+            script,
+            chain,
+            effects,
+            estimate,
+            ..
+        } = &*self.solved;
+        let enough = every_other(problem).is_some();
+        let half = enough.then(|| chain.observed_in(|dwell| dwell % 2 == 0));
+        // Half the dwells may be too few.
+        let half = half.and_then(|half| {
+            let of_half = effects.weighed(&half, problem, script).ok()?;
+            let moved = of_half.filtered.moved(&script.at, &of_half.posterior);
+            Some(moved)
         });
-        let held_out = half.map(|half| residuals(problem, &half.estimate(), |k| k % 2 == 1));
-        let all = residuals(problem, &estimate, |_| true)?;
+        let held_out = half.map(|half| residuals(problem, &half, |k| k % 2 == 1));
+        let all = residuals(problem, estimate, |_| true)?;
         Ok(Quality::new(all, held_out.transpose()?))
     }
 }

@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 
-use crate::calibration::{Finding, FindingKind as Kind};
+use crate::calibration::sizes::Usual;
+use crate::calibration::{DayToDay, Finding, FindingKind as Kind, Group, Model};
 
 /// Differences between recordings in a group of parameters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -20,8 +21,25 @@ pub struct RecordingDifference {
     pub limit: f64,
 }
 
-/// The finding on differences that were estimated and are used.
-pub fn recordings_differ(differences: &[RecordingDifference]) -> Finding {
+impl RecordingDifference {
+    /// The difference of a group, found at a logarithm over the usual size; without its test.
+    pub(in crate::calibration) fn new(group: Group, model: &Model, usual: &Usual, log: f64) -> Self {
+        let (key, unit) = DayToDay::key(group);
+        let first = group.parameters(model.form).into_iter();
+        let prior = first.map(|index| model.prior_sigma[index]).fold(0.0, f64::max);
+        let stated = if usual.stated { usual.sigma } else { 0.0 };
+        Self {
+            key,
+            stated: stated * prior / unit,
+            found: usual.sigma * log.exp() * prior / unit,
+            ratio: 0.0,
+            limit: 0.0,
+        }
+    }
+}
+
+/// The finding on differences that were estimated and are used, if there are any.
+pub fn recordings_differ(differences: &[RecordingDifference]) -> Option<Finding> {
     let one =
         |of: &RecordingDifference| format!("{} = {:.2e} (stated {})", of.key, of.found, of.stated);
     let each: Vec<String> = differences.iter().map(one).collect();
@@ -31,9 +49,6 @@ pub fn recordings_differ(differences: &[RecordingDifference]) -> Finding {
          temperature sensor away from the inertial sensors.",
         each.join(", ")
     );
-    Finding::new(
-        Kind::RecordingsDiffer,
-        text,
-        json!({ "differences": differences }),
-    )
+    let figures = json!({ "differences": differences });
+    (!differences.is_empty()).then(|| Finding::new(Kind::RecordingsDiffer, text, figures))
 }

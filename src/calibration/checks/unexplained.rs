@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use crate::calibration::noise::LOG_SIGMA;
+use crate::calibration::sizes::LOG_SIGMA;
 use crate::calibration::{Finding, FindingKind as Kind, Innovation, Nis, Outcome};
 use crate::statistics::chi_square_limit;
 
@@ -75,7 +75,6 @@ mod tests {
                 observation: Observation::Velocity,
                 whitened: [factor; 3],
                 sigma: [1.0; 3],
-                accepted: true,
                 dwell: 0,
                 after_move: false,
             })

@@ -1,9 +1,9 @@
 //! Current information on constants: the prior and whitened rows `[G ν]` as one triangle.
 
 use faer::MatRef;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
-use crate::calibration::{Posterior, Prior};
+use crate::calibration::{Constant, ParameterVector, Posterior, Prior};
 
 /// Current information on constants.
 #[derive(Debug, Clone)]
@@ -16,14 +16,22 @@ pub struct Known {
     root: DMatrix<f64>,
 }
 
+/// Normal factors in place of the prior of the constants that may be absent: `−½ xᵀ information x + xᵀ vector` is their
+/// logarithm up to a constant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sites {
+    pub information: DMatrix<f64>,
+    pub vector: DVector<f64>,
+}
+
 impl Known {
-    /// The prior, before any data.
+    /// The prior, before any data; constants that may be absent have none yet.
     pub fn new(prior: Prior) -> Self {
         let all = 0..prior.sigma.len();
         let (open, fixed): (Vec<usize>, Vec<usize>) = all.partition(|&k| prior.sigma[k] > 0.0);
         let n = open.len();
         let mut root = DMatrix::zeros(n + 1, n + 1);
-        for (row, &k) in open.iter().enumerate() {
+        for (row, &k) in open.iter().take(n - prior.candidates).enumerate() {
             root[(row, row)] = prior.sigma[k].recip();
             root[(row, n)] = prior.mean[k] / prior.sigma[k];
         }
@@ -52,7 +60,104 @@ impl Known {
         self.root = triangle(&with);
     }
 
-    /// Mean and root of the covariance of combinations of the constants, each given by a row of weights.
+    /// What the rows say of the constants that may be absent, whatever all others are.
+    pub fn of_candidates(&self) -> Sites {
+        let (n, m) = (self.open.len(), self.prior.candidates);
+        let root = self.root.view((n - m, n - m), (m, m));
+        Sites {
+            information: root.tr_mul(&root),
+            vector: root.tr_mul(&self.root.view((n - m, n), (m, 1)).column(0)),
+        }
+    }
+
+    /// Change of all other free constants per candidate, one column each.
+    fn by_candidates(&self) -> Option<DMatrix<f64>> {
+        let (n, m) = (self.open.len(), self.prior.candidates);
+        let mut by = -self.root.view((0, n - m), (n - m, m)).into_owned();
+        let root = self.root.view((0, 0), (n - m, n - m));
+        root.solve_upper_triangular_mut(&mut by).then_some(by)
+    }
+
+    /// Root mean square change of the parameters of both triads by the candidates at these places, each of its usual size;
+    /// and the largest remaining part of that size, if nothing else that may be absent is there.
+    pub fn effect_of(&self, places: &[usize]) -> Option<(ParameterVector, f64)> {
+        let (n, m) = (self.open.len(), self.prior.candidates);
+        let all = self.prior.sigma.len();
+        let usual = |place: usize| self.prior.sigma[all - m + place];
+        let by = self.by_candidates()?;
+        let mut squares = ParameterVector::zeros();
+        for &place in places {
+            for row in 0..n - m {
+                if let Constant::Parameter(index) = self.prior.constants[self.open[row]] {
+                    squares[index] += (by[(row, place)] * usual(place)).powi(2);
+                }
+            }
+        }
+        let information = self.of_candidates().information;
+        let scaled = DMatrix::from_fn(places.len(), places.len(), |i, j| {
+            let own = information[(places[i], places[j])] * usual(places[i]) * usual(places[j]);
+            own + f64::from(u8::from(i == j))
+        });
+        let least = scaled.symmetric_eigenvalues().min().max(1.0);
+        Some((squares.map(f64::sqrt), least.sqrt().recip()))
+    }
+
+    /// Estimate and covariance with these factors for the constants that may be absent; `None` if something is still
+    /// undetermined.
+    pub fn with(&self, sites: &Sites) -> Option<Posterior> {
+        let (n, m) = (self.open.len(), self.prior.candidates);
+        let k = n - m;
+        let own = self.of_candidates();
+        let (information, vector) = (own.information + &sites.information, own.vector + &sites.vector);
+        // With a diagonal of ones, whatever the units.
+        let scale = information.diagonal().map(|value| value.sqrt().recip());
+        let scaled = DMatrix::from_fn(m, m, |i, j| information[(i, j)] * scale[i] * scale[j]);
+        let factor = Cholesky::new(scaled)?;
+        let logarithms = factor.l_dirty().diagonal().map(f64::ln).sum() - scale.map(f64::ln).sum();
+        let inverse = factor.inverse();
+        let of_candidates = DMatrix::from_fn(m, m, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
+        let candidates = &of_candidates * &vector;
+        let root = self.root.view((0, 0), (k, k)).into_owned();
+        let mut of_known = DMatrix::identity(k, k);
+        let mut by_candidates = -self.root.view((0, k), (k, m)).into_owned();
+        let mut known = self.root.view((0, n), (k, 1)).into_owned();
+        let solved = root.solve_upper_triangular_mut(&mut of_known)
+            && root.solve_upper_triangular_mut(&mut by_candidates)
+            && root.solve_upper_triangular_mut(&mut known);
+        if !solved {
+            return None;
+        }
+        let across = &by_candidates * &of_candidates;
+        let covariance = &of_known * of_known.transpose() + &across * by_candidates.transpose();
+        let known = known.column(0) + &by_candidates * &candidates;
+        let all = self.prior.sigma.len();
+        let mut mean = self.prior.mean.clone();
+        let mut full = DMatrix::zeros(all, all);
+        for (row, &i) in self.open.iter().enumerate() {
+            mean[i] = if row < k { known[row] } else { candidates[row - k] };
+            for (column, &j) in self.open.iter().enumerate() {
+                full[(i, j)] = match (row < k, column < k) {
+                    (true, true) => covariance[(row, column)],
+                    (true, false) => across[(row, column - k)],
+                    (false, true) => across[(column, row - k)],
+                    (false, false) => of_candidates[(row - k, column - k)],
+                };
+            }
+        }
+        let squares = self.root.view((k, n), (m + 1, 1)).norm_squared();
+        let of_root: f64 = (0..k).map(|row| self.root[(row, row)].abs().ln()).sum();
+        let of_prior: f64 = self.open.iter().take(k).map(|&i| self.prior.sigma[i].ln()).sum();
+        Some(Posterior::new(
+            &self.prior.constants,
+            mean,
+            full,
+            squares - vector.dot(&candidates),
+            2.0 * (of_root + logarithms + of_prior),
+        ))
+    }
+
+    /// Mean and root of the covariance of combinations of the constants, each given by a row of weights; those that may
+    /// be absent must have rows of their own.
     pub fn through(&self, weights: &DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
         let n = self.open.len();
         let mut across = weights.select_columns(&self.open).transpose();
@@ -67,21 +172,16 @@ impl Known {
             root,
         )
     }
+}
 
-    /// Estimate and covariance; NaN if a constant is still undetermined.
-    pub fn posterior(&self) -> Posterior {
-        let (n, all) = (self.open.len(), self.prior.sigma.len());
-        let (mean, root) = self.through(&DMatrix::identity(all, all));
-        let last = self.root[(n, n)];
-        let logarithms: f64 = (0..n).map(|k| self.root[(k, k)].abs().ln()).sum();
-        let of_prior: f64 = self.open.iter().map(|&k| self.prior.sigma[k].ln()).sum();
-        Posterior::new(
-            &self.prior.constants,
-            mean,
-            &root * root.transpose(),
-            last.powi(2),
-            2.0 * (logarithms + of_prior),
-        )
+impl Sites {
+    /// Nothing in addition to the rows.
+    pub fn none(prior: &Prior) -> Self {
+        let m = prior.candidates;
+        Self {
+            information: DMatrix::zeros(m, m),
+            vector: DVector::zeros(m),
+        }
     }
 }
 

@@ -1,17 +1,17 @@
 //! The constants of a recording, with their prior and posterior.
 
-mod disturbance;
+mod candidate;
 mod known;
 mod posterior;
 mod prior;
 
 use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::parameters::auxiliary::OF_AXES;
-use crate::calibration::{Coefficient, ErrorTerm};
-use crate::imu::Term;
-use crate::turntable::{AxisError, TABLE_GEOMETRY};
-pub use disturbance::{Disturbance, DisturbanceKind};
-pub use known::{Known, triangle};
+use crate::calibration::{Coefficient, ErrorTerm, Model, PARAMETERS};
+use crate::imu::{TERM_PARAMETERS, Term};
+use crate::turntable::{AXIS_ERRORS, AxisError, TABLE_GEOMETRY};
+pub use candidate::Candidate;
+pub use known::{Known, Sites, triangle};
 pub use posterior::{Posterior, of_parameters};
 pub use prior::Prior;
 
@@ -28,15 +28,35 @@ pub enum Constant {
     Base(usize),
     /// An error of the table's axes, by its index.
     Axis(usize),
-    /// A component of a single event.
-    Disturbance(Disturbance, usize),
+    /// Deviation of Earth rate from that at the stated latitude, by its axis: East, North, Up.
+    EarthRate(usize),
 }
 
 impl Constant {
+    /// The constants of a model, those that may be absent last; `gravity`: whether gravity is a constant.
+    pub fn all(model: &Model, gravity: bool) -> Vec<Self> {
+        let parameters = (0..PARAMETERS).filter(|&i| model.prior_sigma[i] > 0.0);
+        let parameters = parameters.map(Self::Parameter);
+        let terms = (0..TERM_PARAMETERS).map(Self::Term);
+        let table = (0..3).map(Self::Base);
+        let table = table.chain((0..AXIS_ERRORS).map(Self::Axis));
+        let rate = (0..3).map(Self::EarthRate);
+        let thermal = Coefficient::all(model.form, model.thermal.as_deref()).into_iter();
+        let beside = terms.chain(table).chain(rate);
+        let beside = beside.chain(thermal.map(Self::Thermal));
+        let beside = beside.filter(|constant| model.sigma(*constant) > 0.0);
+        let (known, candidates): (Vec<Self>, Vec<Self>) =
+            beside.partition(|&constant| Candidate::of(constant, model).is_none());
+        let gravity = (gravity && model.gravity_sigma > 0.0).then_some(Self::Gravity);
+        let known = parameters.chain(gravity).chain(known);
+        known.chain(candidates).collect()
+    }
+
     /// The budget source of its prior.
     pub fn source(self) -> BudgetSource {
         match self {
-            Self::Parameter(_) | Self::Disturbance(..) => BudgetSource::Prior,
+            Self::Parameter(_) => BudgetSource::Prior,
+            Self::EarthRate(_) => BudgetSource::EarthRate,
             Self::Term(index) => Term::of(index).map_or(BudgetSource::Prior, BudgetSource::Term),
             Self::Thermal(_) => BudgetSource::Temperature,
             Self::Gravity => BudgetSource::Gravity,

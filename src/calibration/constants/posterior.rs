@@ -50,15 +50,6 @@ impl Posterior {
         }
     }
 
-    /// The same with another covariance.
-    pub fn with_covariance(self, covariance: DMatrix<f64>) -> Self {
-        Self {
-            parameter_covariance: of_parameters(&self.constants, &covariance),
-            covariance,
-            ..self
-        }
-    }
-
     /// Estimates of the temperature coefficients, linearised `at` a point; `None` if nothing depends on temperature.
     pub fn thermal(&self, at: &Linearisation, model: &Model) -> Option<Thermal> {
         let of_model = model.thermal.as_deref()?;
@@ -81,12 +72,6 @@ impl Posterior {
         })
     }
 
-    /// Addition to the covariance of another posterior if the prior of this one is correct: the mean square error of
-    /// the other estimate is this covariance plus the squared difference of the estimates.
-    pub fn added_to(&self, other: &Self) -> ParameterMatrix {
-        let change = self.parameters - other.parameters;
-        self.parameter_covariance - other.parameter_covariance + change * change.transpose()
-    }
 }
 
 /// Extracts the parameters of both triads from a matrix of constants.

@@ -5,52 +5,48 @@ use std::collections::BTreeMap;
 use nalgebra::{DMatrix, DVector};
 
 use crate::calibration::budget::source::BudgetSource;
-use crate::calibration::{Constant, Linearisation, Model, Posterior, parameter, to_vector};
-use crate::imu::PARAMETERS as PER_TRIAD;
+use crate::calibration::{Candidate, Constant, Linearisation, Model, Posterior, to_vector};
 
 /// The prior of constants, as errors of the linearisation point.
 #[derive(Debug, Clone)]
 pub struct Prior {
-    /// The constants.
+    /// The constants, those that may be absent last.
     pub constants: Vec<Constant>,
     pub mean: DVector<f64>,
-    /// 1σ of each; zero for constants fixed at their mean.
+    /// 1σ of each; zero for constants fixed at their mean. For those that may be absent, their usual size.
     pub sigma: DVector<f64>,
+    /// Number of constants that may be absent.
+    pub candidates: usize,
 }
 
 impl Prior {
     /// The prior of these constants in a model, as errors of this point.
     pub fn new(constants: &[Constant], model: &Model, at: &Linearisation) -> Self {
         let parameters = model.prior_mean - to_vector(&at.triads);
-        let of = |constant: &Constant| match *constant {
-            Constant::Parameter(index) => (parameters[index], model.prior_sigma[index]),
-            Constant::Term(index) => (-at.terms[index], model.term_sigma[index]),
-            Constant::Thermal(of) => {
-                let sigma = model.thermal.as_deref();
-                let sigma = sigma.map_or(0.0, |thermal| of.of(&thermal.sigma));
-                (-of.of(&at.thermal), sigma)
-            }
-            Constant::Gravity => (0.0, model.gravity_sigma),
-            Constant::Base(axis) => (0.0, model.geometry.base[axis]),
-            Constant::Axis(index) => (0.0, model.geometry.axes[index]),
-            Constant::Disturbance(of, component) => {
-                let bias = |sensor| model.prior_sigma[parameter(sensor, PER_TRIAD - 3 + component)];
-                (0.0, of.sigma(bias))
-            }
+        let mean = |constant: &Constant| match *constant {
+            Constant::Parameter(index) => parameters[index],
+            Constant::Term(index) => -at.terms[index],
+            Constant::Thermal(of) => -of.of(&at.thermal),
+            _ => 0.0,
         };
-        let (mean, sigma): (Vec<f64>, Vec<f64>) = constants.iter().map(of).unzip();
+        let may_be_absent = |of: &&Constant| Candidate::of(**of, model).is_some();
         Self {
             constants: constants.to_vec(),
-            mean: mean.into(),
-            sigma: sigma.into(),
+            mean: DVector::from_iterator(constants.len(), constants.iter().map(mean)),
+            sigma: DVector::from_iterator(
+                constants.len(),
+                constants.iter().map(|&constant| model.sigma(constant)),
+            ),
+            candidates: constants.iter().filter(may_be_absent).count(),
         }
     }
 
-    /// Its exact contribution to a covariance, by source: `P P₀⁻¹ P`.
+    /// Its exact contribution to a covariance, by source: `P P₀⁻¹ P`; without those that may be absent.
     pub fn parts(&self, of: &Posterior) -> BTreeMap<BudgetSource, DMatrix<f64>> {
         let n = self.constants.len();
         let mut parts = BTreeMap::new();
-        for (k, constant) in self.constants.iter().enumerate() {
+        let known = self.constants.iter().take(n - self.candidates);
+        for (k, constant) in known.enumerate() {
             if self.sigma[k] > 0.0 {
                 let column = of.covariance.column(k) / self.sigma[k];
                 let part = parts.entry(constant.source());

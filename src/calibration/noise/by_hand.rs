@@ -2,8 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::likelihood_ratio::{INTERVAL, limit};
-use super::report::{NoiseReport, SourceFigures};
+use super::likelihood_ratio::limit;
 use super::source::Source;
 use super::variances::{Component, Slope, likeliest};
 use crate::calibration::{Model, Problem};
@@ -82,24 +81,6 @@ impl ByHand {
         model
     }
 
-    /// The noise report of a problem with this noise.
-    pub fn report(&self, problem: &Problem) -> NoiseReport {
-        let figures = |one: &Component| {
-            let stated = BY_HAND[one.place].sigma(problem);
-            let used = stated.hypot(one.variance.sqrt());
-            // Of σ, half as wide as of its square.
-            let off = 0.5 * INTERVAL * one.spread;
-            let interval = [-off, off].map(|off| used * off.exp());
-            let stated = (stated > 0.0).then_some(stated);
-            SourceFigures::new(BY_HAND[one.place], stated, used, Some(interval))
-        };
-        NoiseReport {
-            policy: problem.options.noise,
-            learnt: true,
-            test: None,
-            sources: self.found.iter().map(figures).collect(),
-        }
-    }
 }
 
 fn add(covariance: &mut DMatrix<f64>, parts: &DVector<f64>, variance: f64) {

@@ -78,6 +78,8 @@ sources! {
         "turntable" ("position_sigma_arcsec", ARCSEC), part of TablePosition;
     TableReading, Gyro, "table reading" in "arcsec" = ARCSEC,
         "turntable" ("reading_sigma_arcsec", ARCSEC), part of TableReading;
+    Settling, Gyro, "settling of the table" in "arcsec" = ARCSEC,
+        "turntable" ("settling_sigma_arcsec", ARCSEC), part of Settling;
     GyroGaussMarkov, Gyro, "Gauss-Markov bias of the gyros" in "deg/h" = DEG_PER_H,
         "imu.noise" GYRO.gauss_markov, part of Wander(Gyro);
     AccelGaussMarkov, Accel, "Gauss-Markov bias of the accelerometers" in "ug" = MICRO_G,
@@ -116,6 +118,7 @@ impl Source {
             Self::RotationAtRest => model.turning_at_rest,
             Self::TablePosition => model.position_sigma,
             Self::TableReading => model.reading_sigma,
+            Self::Settling => model.settling_sigma,
             Self::GyroGaussMarkov | Self::AccelGaussMarkov => {
                 noise.gauss_markov.map_or(0.0, |bias| bias.sigma)
             }
@@ -137,6 +140,7 @@ impl Source {
             Self::RotationAtRest => model.turning_at_rest = sigma,
             Self::TablePosition => model.position_sigma = sigma,
             Self::TableReading => model.reading_sigma = sigma,
+            Self::Settling => model.settling_sigma = sigma,
             Self::GyroGaussMarkov | Self::AccelGaussMarkov => {
                 let stated = noise.gauss_markov;
                 let correlation_time = stated.map_or(correlation_time, |g| g.correlation_time);

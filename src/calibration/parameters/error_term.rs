@@ -51,6 +51,16 @@ impl ErrorTerm {
         }
     }
 
+    /// The term with whose effect its own is one where an axis is only up and down or turns at one rate: what is even in
+    /// force or rate. Apart, neither is absent or present.
+    pub(in crate::calibration) fn alike(self) -> Self {
+        Self::Instrument(match self {
+            Self::Instrument(Term::AccelAsymmetry) => Term::AccelSecondOrder,
+            Self::Instrument(Term::GyroSecondOrder) => Term::GyroAsymmetry,
+            _ => return self,
+        })
+    }
+
     /// Moves or dwells that show it, where a path does not.
     pub fn shown_by(self) -> &'static str {
         match self {

@@ -6,7 +6,7 @@ use crate::imu::{InstallationForm, ParameterKind, Sensor, Triad};
 use crate::units::{ARCSEC, DEG_PER_H, MICRO_G, PPM};
 
 /// Parameters of one triad and kind.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Group {
     sensor: Sensor,
     kind: ParameterKind,

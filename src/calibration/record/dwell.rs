@@ -18,9 +18,8 @@ const STEPS: usize = 100;
 /// A part of a dwell, modelled with one constant attitude.
 #[derive(Debug, Clone)]
 pub struct Rest {
-    /// Whether it is the first and the last part of the dwell.
+    /// Whether it is the first part of the dwell.
     pub first: bool,
-    pub last: bool,
     /// Whether the body moved before it.
     pub new_position: bool,
     /// Computed state before its start …
@@ -128,7 +127,6 @@ impl Rest {
         seen.shrink_to_fit();
         Self {
             first: false,
-            last: false,
             new_position: false,
             from: begin,
             begin,

@@ -1,68 +1,61 @@
-//! Events of a pass: navigation, which does not depend on noise.
+//! Events of a recording: navigation, which does not depend on noise.
 
 pub mod dwell;
 pub mod schedule;
+pub mod script;
 pub mod standstill;
 
 use nalgebra::Matrix3;
 
 use crate::calibration::linearisation::singular;
-use crate::calibration::{CalibrationError, Layout, Linearisation, Model, Problem, Stretch};
+use crate::calibration::{CalibrationError, Constant, Linearisation, Model, Problem, Stretch};
 use crate::navigation::{Block, Navigator, State};
 pub use dwell::{Rest, between, part_of};
 use dwell::{longest, samples_of};
-use schedule::{cut, step_length};
+pub use script::Script;
 
-/// A move or a piece of one, or a part of a dwell.
+/// A move, or a part of a dwell.
+#[derive(Debug)]
 pub enum Event {
     Move(Box<Block>),
     Rest(Box<Rest>),
 }
 
-/// Events in a stretch of a problem, for a filter of this layout, linearised at this point; `initial` is the attitude
-/// at the first sample.
+/// Events in a stretch of a problem, linearised at this point; with the attitude at the first sample, and the number of the
+/// stretch's first dwell.
 pub fn events(
     of: (&Problem, &Stretch),
-    layout: &Layout,
-    at: (&Linearisation, &Matrix3<f64>),
+    (at, initial, first_dwell): (&Linearisation, &Matrix3<f64>, usize),
 ) -> Result<Vec<Event>, CalibrationError> {
     let (problem, stretch) = of;
-    let imu = &stretch.run.recording.imu;
-    // Where biases vary a move is cut as dwells are.
-    let varies = !layout.varying_biases.is_empty();
-    let piece = varies.then(|| step_length(imu.period));
-    let mut navigator = navigator(stretch, at, (&problem.model, layout))?;
+    let mut navigator = navigator(stretch, (at, initial), &problem.model)?;
     let mut events = Vec::new();
     let (mut next, mut most, mut new_position) = (0, 0, false);
-    let mut held = *at.1;
+    let (mut held, mut dwells) = (*initial, first_dwell);
     while let Some(step) = stretch.steps.get(next) {
         let Some(at_rest) = &step.at_rest else {
-            let length = piece.unwrap_or(step.samples.len());
-            let pieces = cut(step.samples.clone(), length);
-            events.extend(pieces.map(|of| Event::Move(Box::new(navigator.advance(of)))));
+            let block = navigator.advance(step.samples.clone());
+            events.push(Event::Move(Box::new(block)));
             next += 1;
             continue;
         };
         if at_rest.first {
             // The start holds what the first dwell says of table and position.
             (most, new_position) = (longest(step), next > 0);
+            dwells += 1;
         }
         let count = part_of(&stretch.steps[next..], most);
         let part = &stretch.steps[next..next + count];
         next += count;
         let from = navigator.state;
         navigator.warm(&samples_of(part));
-        navigator.state = at_rest.tied(&from, &navigator.triads().accel);
+        let known = at.dwells.get(dwells - 1);
+        navigator.state = at_rest.tied(&from, &navigator.triads().accel, known);
         if at_rest.first {
             held = navigator.state.attitude;
         }
-        let following = stretch
-            .steps
-            .get(next)
-            .and_then(|step| step.at_rest.as_ref());
         events.push(Event::Rest(Box::new(Rest {
             first: at_rest.first,
-            last: following.is_none_or(|following| following.first),
             new_position,
             from,
             ..Rest::navigate(&mut navigator, of, part, &held)
@@ -75,10 +68,14 @@ pub fn events(
 fn navigator<'a>(
     stretch: &Stretch<'a>,
     (at, initial): (&Linearisation, &Matrix3<f64>),
-    (model, layout): (&Model, &Layout),
+    model: &Model,
 ) -> Result<Navigator<'a>, CalibrationError> {
     let run = stretch.run;
-    let on = layout.terms();
+    let constants = Constant::all(model, false).into_iter();
+    let on = constants.filter_map(|constant| match constant {
+        Constant::Term(index) => Some(index),
+        _ => None,
+    });
     let start = State::at_rest(*initial);
     let triads = at.in_recording(stretch.recording);
     let navigator = Navigator::new(&run.recording.imu, &run.site, &triads, start);

@@ -50,9 +50,8 @@ const STEP: f64 = 0.1;
 /// by random walk, not by their own noise.
 const STEPS_OF_PACKED: usize = 10;
 
-/// The steps from the start of the first dwell to the end of the last, without a gap; in dwells, `together`
-/// steps are combined into one.
-pub fn steps(run: &Run, table: Option<&TableLog>, dwells: &[Dwell], together: usize) -> Vec<Step> {
+/// The steps from the start of the first dwell to the end of the last, without a gap.
+pub fn steps(run: &Run, table: Option<&TableLog>, dwells: &[Dwell]) -> Vec<Step> {
     let imu = &run.recording.imu;
     let length = step_length(imu.period);
     let longest = if imu.is_packed() {
@@ -60,7 +59,7 @@ pub fn steps(run: &Run, table: Option<&TableLog>, dwells: &[Dwell], together: us
     } else {
         length
     };
-    let of_dwell = |dwell: &Dwell| growing(dwell.samples.clone(), (length, longest), together);
+    let of_dwell = |dwell: &Dwell| growing(dwell.samples.clone(), (length, longest));
     // Exact capacity: there may be too many steps for a vector that doubles.
     let count = dwells.iter().map(|dwell| 1 + of_dwell(dwell).count());
     let mut steps = Vec::with_capacity(count.sum());
@@ -113,13 +112,20 @@ pub fn steps(run: &Run, table: Option<&TableLog>, dwells: &[Dwell], together: us
 }
 
 impl AtRest {
-    /// Linearisation point while the table is at rest: its mean attitude, otherwise the computed attitude, levelled.
+    /// Linearisation point while the table is at rest: the attitude known from the pass before or else its mean reading;
+    /// without a table the computed attitude, levelled.
     ///
     /// Both are within arc seconds of the truth in every pass, so the noise accumulated over a long
     /// record never leaves the linear range, and a tilt due to noise does not change the effect of a wrong
     /// heading.
-    pub fn tied(&self, computed: &State, accel: &Triad) -> State {
-        State::at_rest(self.dwell.attitude.unwrap_or_else(|| {
+    pub fn tied(
+        &self,
+        computed: &State,
+        accel: &Triad,
+        known: Option<&Matrix3<f64>>,
+    ) -> State {
+        let of_table = self.dwell.attitude.map(|read| known.copied().unwrap_or(read));
+        State::at_rest(of_table.unwrap_or_else(|| {
             let up = accel.correction().unwrap_or_default() * (self.dwell.accel - accel.bias);
             exp(tilt(&(computed.attitude * up))) * computed.attitude
         }))
@@ -140,28 +146,18 @@ pub fn step_length(period: f64) -> usize {
     samples_of(STEP, period)
 }
 
-/// Cuts a range into parts of this length; the last may be shorter.
-pub fn cut(range: Range<usize>, length: usize) -> impl Iterator<Item = Range<usize>> {
-    let end = range.end;
-    let begins = range.step_by(length.max(1));
-    begins.map(move |begin| begin..(begin + length).min(end))
-}
-
 /// Cuts a range into parts of the first length, then into increasing ones, each as long as all previous parts together,
-/// up to the second length; `together` parts are combined into one.
+/// up to the second length.
 fn growing(
     range: Range<usize>,
     (length, longest): (usize, usize),
-    together: usize,
 ) -> impl Iterator<Item = Range<usize>> {
     let begin = range.start;
     let mut at = begin;
     std::iter::from_fn(move || {
         let from = at;
-        for _ in 0..together.max(1) {
-            let length = (at - begin).clamp(length.max(1), longest.max(1));
-            at = (at + length).min(range.end);
-        }
+        let length = (at - begin).clamp(length.max(1), longest.max(1));
+        at = (at + length).min(range.end);
         (at > from).then_some(from..at)
     })
 }

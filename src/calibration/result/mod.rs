@@ -20,7 +20,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 use super::budget::BudgetRecord;
 use super::noise::NoiseReport;
 use crate::calibration::result::thermal_record::{RecordingRecord, ThermalRecord};
-use crate::calibration::{Direction, DwellScatter, Finding, Quality, Verdict, Word};
+use crate::calibration::{Direction, Finding, Quality, Verdict, Word};
 use crate::imu::{AXES, BodyFrame, InstallationForm, Nominal, Output, PerSensor, Sensor, Triad};
 use crate::run::Aiding;
 
@@ -250,9 +250,6 @@ pub struct ConsistencyRecord {
     /// NIS of the table's attitude.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub table: Option<NisRecord>,
-    /// Scatter of the dwells' scores relative to their σ; `None` if there are too few dwells.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub dwells: Option<DwellScatter>,
     /// NIS of the constant attitude at standstill, without a table.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub attitude: Option<NisRecord>,
@@ -267,25 +264,19 @@ pub struct NisRecord {
     pub nis_interval: [f64; 2],
 }
 
-/// Comparison of a run with and without an error term.
+/// Evidence for an error term.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BlockRecord {
     /// Its name, such as `accel-second-order`.
     pub block: String,
-    /// Whether it was on; if not, it was tested with its usual σ.
+    /// Whether it was stated or asked for.
     pub on: bool,
-    /// σ with the term divided by σ without it, of gyro K, E, D and accel K, E, D; `None` if there is no σ.
+    /// Probability that it is there.
+    pub present: f64,
+    /// Largest remaining part of its usual size: from 0 (known) to 1 (not shown).
+    pub remaining: f64,
+    /// σ with the term divided by σ if it were absent, of gyro K, E, D and accel K, E, D; `None` if there is no σ.
     pub sigma_factors: [Option<f64>; 6],
-    /// Decrease of the cost, −2 ln of likelihood and prior, with it.
-    pub merit_gain: f64,
-    /// Its limit at this term's share of the false-alarm rate.
-    pub merit_gain_limit: f64,
-    /// Whether the gain exceeds its limit, so that the data support the term.
-    pub asked_for: bool,
-    /// NIS of all observations without it …
-    pub nis_without: f64,
-    /// … and with it.
-    pub nis_with: f64,
 }
 
 /// A raw output of both triads with its calibrated value, gyro first.

@@ -12,8 +12,8 @@ use super::{
 };
 use crate::calibration::parameters::factor;
 use crate::calibration::{
-    AtRest, Auxiliary, Budget, ClosedForm, ErrorTermTest, Estimate, Finding, Nis, Outcome,
-    PARAMETERS, ParameterVector, Problem, Quality, Verdict, auxiliary_name, from_vector,
+    AtRest, Auxiliary, Budget, ClosedForm, Estimate, Finding, Nis, Outcome, PARAMETERS,
+    ParameterVector, Problem, Quality, TermEvidence, Verdict, auxiliary_name, from_vector,
     parameter_name,
 };
 use crate::imu::{BodyFrame, InstallationForm, Nominal, Output, PerSensor, Sensor, Triad};
@@ -27,14 +27,8 @@ const TEST_INPUTS: [[f64; 6]; 3] = [
 ];
 
 impl Outcome {
-    /// The record of this calibration of a problem, with the effects of error terms and the residuals of gravity and
-    /// turns.
-    pub fn record(
-        &self,
-        problem: &Problem,
-        tests: &[ErrorTermTest],
-        quality: &Quality,
-    ) -> Calibration {
+    /// The record of this calibration of a problem, with the residuals of gravity and turns.
+    pub fn record(&self, problem: &Problem, quality: &Quality) -> Calibration {
         let (run, estimate) = (problem.run(), &self.estimate);
         let equation = if self.auxiliary.has_terms() {
             EQUATION_WITH_TERMS
@@ -58,14 +52,14 @@ impl Outcome {
             converged: Some(self.converged),
             consistency: Some(self.consistency_record()),
             quality: Some(quality.clone()),
-            blocks: tests.iter().map(BlockRecord::from).collect(),
+            blocks: self.terms.iter().map(BlockRecord::from).collect(),
             observability: self.observability.directions.clone(),
             noise: Some(self.noise_record()),
             equation: Some(equation.to_owned()),
             provenance: Some(problem.provenance()),
             ..estimate.record(run, problem.model.aiding.body_frame())
         };
-        record.with_findings(self.findings_with(tests))
+        record.with_findings(self.findings.clone())
     }
 
     fn consistency_record(&self) -> ConsistencyRecord {
@@ -80,7 +74,6 @@ impl Outcome {
             velocity: some(consistency.velocity),
             table: some(consistency.table),
             attitude: some(consistency.attitude),
-            dwells: self.dwell_scatter,
         }
     }
 
@@ -100,11 +93,10 @@ impl Calibration {
         run: &Run,
         outcome: &Outcome,
         budget: &Budget,
-        tests: &[ErrorTermTest],
     ) {
         let estimated: Vec<usize> = outcome.estimate.estimated().collect();
         let factor = |index| factor(&run.instrument.nominal, index);
-        self.budget = Some(budget.record(&estimated, factor, tests));
+        self.budget = Some(budget.record(&estimated, factor));
     }
 
     fn with_findings(self, findings: Vec<Finding>) -> Self {
@@ -269,17 +261,14 @@ impl TriadRecord {
     }
 }
 
-impl From<&ErrorTermTest> for BlockRecord {
-    fn from(test: &ErrorTermTest) -> Self {
+impl From<&TermEvidence> for BlockRecord {
+    fn from(of: &TermEvidence) -> Self {
         Self {
-            block: test.term.name().to_owned(),
-            on: test.on,
-            sigma_factors: test.sigma_factors,
-            merit_gain: test.gain,
-            merit_gain_limit: test.limit,
-            asked_for: test.significant(),
-            nis_without: test.without,
-            nis_with: test.with,
+            block: of.term.name().to_owned(),
+            on: of.present == 1.0,
+            present: of.present,
+            remaining: of.remaining,
+            sigma_factors: of.sigma_factors,
         }
     }
 }

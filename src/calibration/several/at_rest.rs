@@ -10,14 +10,13 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, SVector};
 
-use super::{TemperatureOptions, order, temperatures};
+use super::{TemperatureOptions, temperatures};
 use crate::calibration::checks::observability::{not_observed, temperature_not_seen};
 use crate::calibration::constants::triangle;
-use crate::calibration::layout::constants;
-use crate::calibration::reduction::Part;
+use crate::calibration::sizes::Candidates;
 use crate::calibration::{
-    Constant, Estimate, Finding, Linearisation, Model, PARAMETERS, ParameterMatrix, Prior, Problem,
-    Reduction, Thermal, from_vector, parameter, parameter_name, sensor_and_parameter,
+    Constant, Estimate, Finding, Known, Linearisation, Model, PARAMETERS, ParameterMatrix, Prior,
+    Problem, Thermal, from_vector, parameter, parameter_name, sensor_and_parameter,
 };
 use crate::earth::ROTATION_RATE;
 use crate::imu::{
@@ -68,8 +67,6 @@ struct Block {
     output: PerSensor<[f64; 3]>,
     /// Functions of temperature.
     state: ThermalState,
-    /// Time of its end, s.
-    end: f64,
 }
 
 impl Problem<'_> {
@@ -89,27 +86,27 @@ impl Problem<'_> {
         let blocks = Block::all(run, &thermal.range);
         let model = &mut problem.model;
         model.thermal = Some(Arc::new(thermal));
-        let sigma = noise(&reduction(&blocks, model, [1.0; 6]))?;
+        model.may_have.clear();
+        let constants = Constant::all(model, false);
+        let sigma = noise(&rows(&blocks, &constants, model, [1.0; 6]))?;
         let triads = from_vector(model.form, &model.prior_mean);
         let at = Linearisation::new(triads, SVector::zeros(), Vec::new());
-        let posterior = |reduction: &Reduction, model: &Model| {
-            reduction.posterior(&Prior::new(&reduction.constants, model, &at))
-        };
-        let whole = reduction(&blocks, model, sigma);
-        let highest = posterior(&whole, model).thermal(&at, model)?;
-        let selected = order::select(&whole, (&at, model), &highest);
-        model.thermal = Some(Arc::new(selected.model));
-        let posterior = posterior(&reduction(&blocks, model, sigma), model);
+        let prior = Prior::new(&constants, model, &at);
+        let mut known = Known::new(prior.clone());
+        known.learn(&rows(&blocks, &constants, model, sigma));
+        let mut orders = Candidates::new(&constants, model);
+        orders.weigh(&known, &prior);
+        let posterior = known.with(&orders.sites(&prior))?;
         let thermal = posterior.thermal(&at, model)?;
         let outputs = Estimate {
-            triads: selected.at.triads,
+            triads: from_vector(model.form, &(model.prior_mean + posterior.parameters)),
             covariance: posterior.parameter_covariance,
         };
         Some(AtRest {
             means: means(&blocks, &outputs, &thermal),
             outputs,
             thermal,
-            findings: not_turned(&self.model).chain(selected.finding).collect(),
+            findings: not_turned(&self.model).collect(),
         })
     }
 }
@@ -177,19 +174,17 @@ impl Block {
                 (sum / (end - begin)).into()
             }),
             state: PerSensor::from_fn(|sensor| [0, 1, 2].map(|axis| mean(sensor, axis))),
-            end,
         })
     }
 }
 
-/// The rows of each block: one for each axis, with noise of this σ.
-fn reduction(blocks: &[Block], model: &Model, sigma: [f64; 6]) -> Reduction {
-    let constants = constants(model, false);
+/// The rows of all blocks: one for each axis, with noise of this σ; the last column is what was observed.
+fn rows(blocks: &[Block], constants: &[Constant], model: &Model, sigma: [f64; 6]) -> DMatrix<f64> {
     let n = constants.len();
-    let parts = blocks.iter().enumerate().map(|(number, block)| {
-        let mut rows = DMatrix::zeros(6, n + 1);
-        for (row, (sensor, axis)) in axes().enumerate() {
-            let bias = bias(sensor, axis);
+    let mut rows = DMatrix::zeros(6 * blocks.len(), n + 1);
+    for (number, block) in blocks.iter().enumerate() {
+        for (k, (sensor, axis)) in axes().enumerate() {
+            let (row, bias) = (6 * number + k, bias(sensor, axis));
             for (column, constant) in constants.iter().enumerate() {
                 rows[(row, column)] = match constant {
                     Constant::Parameter(index) if *index == bias => 1.0,
@@ -198,32 +193,19 @@ fn reduction(blocks: &[Block], model: &Model, sigma: [f64; 6]) -> Reduction {
                 };
             }
             rows[(row, n)] = block.output.get(sensor)[axis] - model.prior_mean[bias];
-            rows.row_mut(row).unscale_mut(sigma[row]);
+            rows.row_mut(row).unscale_mut(sigma[k]);
         }
-        Part {
-            dwell: number,
-            time: block.end,
-            rows,
-        }
-    });
-    Reduction {
-        parts: parts.collect(),
-        constants,
-        squares: 0.0,
-        log_determinant: 0.0,
-        attitudes: Vec::new(),
-        own: Vec::new(),
-        gravity: None,
     }
+    rows
 }
 
 /// 1σ of the blocks of each axis about its curve of the highest order, from rows with a σ of one; `None` if the blocks
 /// are too few, or the outputs of an axis constant.
-fn noise(rows: &Reduction) -> Option<[f64; 6]> {
-    let (count, observed) = (rows.parts.len(), rows.constants.len());
+fn noise(rows: &DMatrix<f64>) -> Option<[f64; 6]> {
+    let (count, observed) = (rows.nrows() / 6, rows.ncols() - 1);
     let mut sigma = [0.0; 6];
-    for (row, sigma) in sigma.iter_mut().enumerate() {
-        let entry = |block: usize, column: usize| rows.parts[block].rows[(row, column)];
+    for (axis, sigma) in sigma.iter_mut().enumerate() {
+        let entry = |block: usize, column: usize| rows[(6 * block + axis, column)];
         let is_on = |&column: &usize| (0..count).any(|block| entry(block, column) != 0.0);
         let mut on: Vec<usize> = (0..observed).filter(is_on).collect();
         let freedom = count.checked_sub(on.len()).filter(|&freedom| freedom > 0)?;

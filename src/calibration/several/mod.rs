@@ -2,29 +2,26 @@
 //! recordings have a stated σ, and parameters may depend on temperature.
 //!
 //! Each recording is first calibrated alone, on its own thread. Polynomials through these estimates are the start of
-//! the Gauss–Newton iterations on all data: first with all orders that the temperatures support, then with those
-//! that a likelihood-ratio test selects.
+//! the iterations on all data, with all orders that the temperatures support; each is averaged over being absent.
 
 pub mod at_rest;
 pub mod day_to_day;
 pub mod separate;
 pub mod thermal;
 
-mod between_recordings;
-mod order;
 mod repeat;
 mod temperatures;
 
 use std::sync::Arc;
 
 use crate::calibration::{
-    AttitudePrior, CalibrationError, DayToDay, Difference, Gate, Linearisation, NoisePolicy,
-    Options, PARAMETERS, Problem, Progress, SeparateEstimate, Solved, from_vector,
-    sensor_and_parameter, to_vector,
+    AttitudePrior, CalibrationError, CoarseStart, DayToDay, Difference, Linearisation, Options,
+    PARAMETERS, Problem, coarse_start, from_vector, sensor_and_parameter, to_vector,
 };
 use crate::imu::{PerSensor, ThermalCoefficients, Triad};
 use crate::run::{Aiding, Run};
 pub use repeat::Repeatability;
+pub use separate::SeparateEstimate;
 pub use temperatures::TemperatureOptions;
 
 /// Common and individual properties of recordings of one instrument.
@@ -79,44 +76,38 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// Solves a problem of several recordings, or one with temperature dependence, with the stated noise. Differences
-/// between recordings are as stated or, if noise may be estimated, as estimated.
-pub fn solve<'a>(
-    problem: &Problem<'a>,
-    progress: Progress,
-) -> Result<Solved<'a>, CalibrationError> {
+/// Where the iterations of a problem begin.
+pub struct Start {
+    pub at: Linearisation,
+    /// Prior of the initial attitude of each stretch.
+    pub priors: Vec<AttitudePrior>,
+    /// Each recording calibrated alone, if there are several or their temperatures differ.
+    pub alone: Vec<SeparateEstimate>,
+}
+
+/// The start of a problem: the coarse start of a single recording, or what several say alone.
+///
+/// # Errors
+/// [`CalibrationError`] if a recording has no start.
+pub fn start(problem: &Problem) -> Result<Start, CalibrationError> {
+    if !problem.varies() && problem.runs().nth(1).is_none() {
+        let CoarseStart { at, attitudes, .. } = coarse_start(problem)?;
+        return Ok(Start {
+            at,
+            priors: attitudes,
+            alone: Vec::new(),
+        });
+    }
     let alone = separate::each(problem)?;
-    let mut findings = Vec::new();
-    let mut problem = problem.clone();
-    if problem.options.noise != NoisePolicy::Stated
-        && let Some((day_to_day, finding)) = between_recordings::learnt(&problem.model, &alone)
-    {
-        problem = problem.with(|model| model.day_to_day = day_to_day);
-        findings.push(finding);
-    }
-    let priors: Vec<AttitudePrior> = alone.iter().flat_map(|a| a.priors.clone()).collect();
-    let at = start(&problem, &alone);
-    let mut solved = Solved::of(&problem, priors, at, Gate::Innovations, progress)?;
-    let held = &solved.iterated.held;
-    if let Some(thermal) = held.posterior.thermal(&held.at, &problem.model) {
-        let reduction = held.reduction.clone().folded();
-        let selected = order::select(&reduction, (&held.at, &problem.model), &thermal);
-        findings.extend(selected.finding);
-        if selected.model != thermal.model {
-            let problem = problem.with(|model| model.thermal = Some(Arc::new(selected.model)));
-            solved.iterated.estimate = selected.at;
-            solved = solved.again(problem, progress)?;
-        }
-    }
-    Ok(Solved {
+    Ok(Start {
+        at: through(problem, &alone),
+        priors: alone.iter().flat_map(|a| a.priors.clone()).collect(),
         alone,
-        findings,
-        ..solved
     })
 }
 
-/// Start of the iterations: for each parameter, the polynomial through the recordings calibrated alone.
-fn start(problem: &Problem, alone: &[SeparateEstimate]) -> Linearisation {
+/// For each parameter, the polynomial through the recordings calibrated alone.
+fn through(problem: &Problem, alone: &[SeparateEstimate]) -> Linearisation {
     let model = &problem.model;
     let initial = alone.iter().flat_map(|a| a.at.initial_attitudes.clone());
     let mut common = model.prior_mean;

@@ -2,17 +2,18 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector, SVector};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::day_to_day::{DayToDay, Difference};
-use crate::calibration::noise::learn;
-use crate::calibration::start::attempt::from_coarse_start;
+use super::day_to_day::DayToDay;
+use crate::calibration::iterations::{Solved, solve};
 use crate::calibration::{
-    AttitudePrior, CalibrationError, Estimate, Gate, Iterated, Linearisation, Model, Problem,
-    SeparateEstimate, Solved, UNWATCHED, coarse_start, from_vector, parameter, to_vector,
+    AttitudePrior, CalibrationError, Estimate, Linearisation, Model, Problem, UNWATCHED,
+    coarse_start, from_vector, parameter, to_vector,
 };
-use crate::imu::{PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalModel, ThermalRange, thermal_state};
+use crate::imu::{
+    PerSensor, Sensor, THERMAL_FUNCTIONS, ThermalModel, ThermalRange, ThermalState, thermal_state,
+};
 use crate::run::Dwell;
 
 /// Factor by which σ of a recording calibrated alone may exceed that of its noise: neglected effects may be
@@ -22,72 +23,50 @@ const BEYOND_NOISE: f64 = 10.0;
 /// A recording that spans less than this part of the range counts as one temperature.
 const PART_OF_RANGE: f64 = 0.1;
 
-/// Calibrates each recording alone, in parallel, with the stated noise or, if the policy allows and the data demand it,
-/// with the noise estimated from it.
-pub fn each(problem: &Problem) -> Result<Vec<SeparateEstimate>, CalibrationError> {
-    let runs = problem.runs().count();
-    let plain = |number: usize| plain(&problem.recordings(|of| of == number), &problem.model);
-    let all = (0..runs).into_par_iter();
-    let all = all.map(|number| of(&plain(number), problem.model.thermal.as_ref()));
-    let (mut all, contradicted): (Vec<SeparateEstimate>, Vec<bool>) =
-        all.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
-    if contradicted.contains(&true)
-        && let Some(model) = noise_of_all(problem, &all)
-    {
-        all.par_iter_mut().enumerate().for_each(|(number, alone)| {
-            if let Some(estimate) = with_noise(alone, &plain(number).with_model(model.clone())) {
-                alone.estimate = Some(estimate);
-            }
-        });
+/// A recording calibrated alone.
+#[derive(Debug, Clone)]
+pub struct SeparateEstimate {
+    /// Its name.
+    pub name: String,
+    /// Mean temperature of each axis, °C, and its rate, K/s, over its dwells; `None` if unknown.
+    pub temperature: Option<PerSensor<[f64; 3]>>,
+    /// The span of its temperatures, K.
+    pub span: f64,
+    /// Calibration at that temperature; `None` if it failed.
+    pub estimate: Option<Estimate>,
+    /// Functions of temperature, if its temperature is constant.
+    pub(in crate::calibration) state: Option<ThermalState>,
+    /// The estimate with the initial attitudes, or the coarse start.
+    pub(in crate::calibration) at: Linearisation,
+    pub(in crate::calibration) priors: Vec<AttitudePrior>,
+}
+
+impl SeparateEstimate {
+    /// Mean temperature of all axes over its dwells, °C.
+    pub fn mean_temperature(&self) -> Option<f64> {
+        let PerSensor { gyro, accel } = self.temperature?;
+        Some(gyro.iter().chain(&accel).sum::<f64>() / 6.0)
     }
-    Ok(all)
 }
 
-/// The problem of a recording without differences between recordings and without temperature dependence.
-fn plain<'a>(recording: &Problem<'a>, model: &Model) -> Problem<'a> {
-    recording.with_model(model.clone()).with(|model| {
-        model.thermal = None;
-        model.day_to_day = DayToDay::default();
-    })
-}
-
-/// Noise model estimated jointly from recordings that share no parameters. A short recording cannot show its own noise,
-/// and differences between recordings must not be taken for noise.
-fn noise_of_all(problem: &Problem, alone: &[SeparateEstimate]) -> Option<Model> {
-    let known = |number: usize| alone[number].estimate.is_some();
-    let problem = problem.recordings(known);
-    let mut model = plain(&problem, &problem.model).model;
-    model.day_to_day.parameters = model.prior_sigma;
-    let problem = problem.with_model(model);
-    let known: Vec<&SeparateEstimate> = alone
-        .iter()
-        .filter(|alone| alone.estimate.is_some())
-        .collect();
-    let priors: Vec<AttitudePrior> = known.iter().flat_map(|a| a.priors.clone()).collect();
-    let attitudes = known.iter().flat_map(|a| a.at.initial_attitudes.clone());
-    let mean = problem.model.prior_mean;
-    let mut at = Linearisation::new(
-        from_vector(problem.model.form, &mean),
-        SVector::zeros(),
-        attitudes.collect(),
-    );
-    let differences = known.iter().map(|alone| Difference {
-        parameters: to_vector(&alone.at.triads) - mean,
-        ..Difference::default()
+/// Calibrates each recording alone, in parallel.
+pub fn each(problem: &Problem) -> Result<Vec<SeparateEstimate>, CalibrationError> {
+    let all = (0..problem.runs().count()).into_par_iter();
+    let all = all.map(|number| {
+        let plain = problem.recordings(|of| of == number).with(|model| {
+            model.thermal = None;
+            model.day_to_day = DayToDay::default();
+        });
+        alone(&plain, problem.model.thermal.as_ref())
     });
-    at.own = differences.collect();
-    let stated = Solved::of(&problem, priors, at, Gate::Innovations, UNWATCHED).ok()?;
-    let learnt = learn(&problem, stated, UNWATCHED).ok()?;
-    let of_all = || plain(&problem, &learnt.problem.model).model;
-    learnt.noise.learnt.then(of_all)
+    all.collect()
 }
 
-/// Calibrates a recording alone with the stated or the estimated noise; also returns whether it contradicts the stated
-/// noise.
-fn of(
+/// Calibrates a recording alone.
+fn alone(
     plain: &Problem,
     thermal: Option<&Arc<ThermalModel>>,
-) -> Result<(SeparateEstimate, bool), CalibrationError> {
+) -> Result<SeparateEstimate, CalibrationError> {
     let run = plain.run();
     let temperature = run.recording.imu.temperature.as_ref();
     let span = temperature.map_or(0.0, |temperature| {
@@ -104,23 +83,22 @@ fn of(
         let span = |range: &ThermalRange| range.highest - range.lowest;
         span(&thermal.range.gyro).max(span(&thermal.range.accel))
     });
-    let stands = span < PART_OF_RANGE * whole;
-    let solved = stands
-        .then(|| from_coarse_start(plain, UNWATCHED).ok())
-        .flatten();
-    let solved = solved.map(|solved| learn(plain, solved.clone(), UNWATCHED).unwrap_or(solved));
-    let contradicted = solved.as_ref().is_some_and(|solved| solved.noise.learnt);
-    let estimate = solved
-        .as_ref()
-        .and_then(|solved| estimate(&solved.iterated));
+    let solved = if span < PART_OF_RANGE * whole {
+        let start = coarse_start(plain).ok();
+        start.and_then(|start| solve(plain, (&start.at, &start.attitudes), UNWATCHED).ok())
+    } else {
+        None
+    };
+    let estimate = solved.as_ref().filter(|solved| solved.converged);
+    let estimate = estimate.map(Solved::both_triads);
     let (at, priors) = match solved {
-        Some(solved) => (solved.iterated.estimate, solved.priors),
+        Some(solved) => (solved.estimate, solved.script.priors.clone()),
         None => {
             let start = coarse_start(&plain.with(|model| model.thermal = thermal.cloned()))?;
             (start.at, start.attitudes)
         }
     };
-    let alone = SeparateEstimate {
+    Ok(SeparateEstimate {
         name: run.recording.name.clone(),
         temperature: middle,
         span,
@@ -128,8 +106,7 @@ fn of(
         state,
         at,
         priors,
-    };
-    Ok((alone, contradicted))
+    })
 }
 
 /// Mean temperature of each axis in the middles of a recording's dwells, °C; `None` if unknown.
@@ -145,18 +122,6 @@ fn middle_temperature(recording: &Problem) -> Option<PerSensor<[f64; 3]>> {
             values.sum::<f64>() / times.len().max(1) as f64
         })
     }))
-}
-
-/// The estimate of a recording alone with other noise.
-fn with_noise(alone: &SeparateEstimate, recording: &Problem) -> Option<Estimate> {
-    alone.estimate.as_ref()?;
-    let (priors, at) = (alone.priors.clone(), alone.at.clone());
-    let solved = Solved::of(recording, priors, at, Gate::Innovations, UNWATCHED).ok()?;
-    estimate(&solved.iterated)
-}
-
-fn estimate(iterated: &Iterated) -> Option<Estimate> {
-    iterated.converged.then(|| iterated.both_triads())
 }
 
 /// For a parameter: the common deviation from its prior mean, and the coefficient of each function of temperature, by

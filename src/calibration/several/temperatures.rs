@@ -11,9 +11,10 @@ use crate::units::MINUTE;
 /// Recordings within this many kelvin count as one temperature, because of the self-heating of a soaked instrument.
 const ONE_TEMPERATURE: f64 = 1.0;
 
-/// Prior 1σ of the change of a parameter over the range, in its prior σ: more than for an instrument of its
-/// grade, so that the data decide.
-const CHANGE: f64 = 3.0;
+/// Usual change of a parameter over the range, in its prior σ: as much as an instrument of its grade differs from another …
+const CHANGE: f64 = 1.0;
+/// … and of each further order, over that of the one before.
+const HIGHER: f64 = 1.0 / 3.0;
 
 /// Options for the temperature dependence of parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,7 +67,12 @@ pub fn model(
                 _ => function < *order.get(sensor),
             };
             let sigma = problem.model.prior_sigma[parameter(sensor, of_triad)];
-            if on { CHANGE * sigma } else { 0.0 }
+            let order = if function == RATE { 0 } else { function };
+            if on {
+                CHANGE * HIGHER.powi(order as i32) * sigma
+            } else {
+                0.0
+            }
         })
     });
     let any = order.gyro + order.accel > 0;

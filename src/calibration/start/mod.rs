@@ -2,7 +2,6 @@
 //!
 //! One set of equations ([`equations`]) with four kinds of rows: from a table, labels, gravity and Earth rate.
 
-pub mod attempt;
 mod both_triads;
 pub mod closed_form;
 pub mod coarse;

@@ -11,7 +11,8 @@
 use nalgebra::{SMatrix, SVector, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::Sensor;
+use super::{Noise, PerSensor, Sensor};
+use crate::units::{DEG_PER_SQRT_H, MICRO_G_PER_SQRT_HZ};
 
 mod entry;
 
@@ -80,6 +81,12 @@ registry! {
     G2Sensitivity: g2_sensitivity::ENTRY,
 }
 
+/// White noise of precise instruments (ring laser, quartz pendulum): rad/√s and (m/s)/√s.
+const PRECISE: PerSensor<f64> = PerSensor {
+    gyro: 0.003 * DEG_PER_SQRT_H,
+    accel: 10.0 * MICRO_G_PER_SQRT_HZ,
+};
+
 /// Index of the first parameter of each term, and the number of all.
 const FIRST: [usize; Term::ALL.len() + 1] = {
     let mut first = [0; Term::ALL.len() + 1];
@@ -115,6 +122,17 @@ impl Term {
     pub fn usual_sigma(self) -> f64 {
         let entry = self.entry();
         entry.usual_sigma * entry.unit.1
+    }
+
+    /// Usual size of each of its parameters in an instrument with this noise, in SI: that of precise instruments, and as
+    /// much more as the white noise of its triad is; lever arms and delays do not depend on the class.
+    pub fn usual_size(self, noise: &PerSensor<Noise>) -> f64 {
+        let precise = 0.1 * self.usual_sigma();
+        if matches!(self, Self::SizeEffect | Self::TimeOffset) {
+            return precise;
+        }
+        let sensor = self.entry().sensor;
+        precise * (noise.get(sensor).random_walk / PRECISE.get(sensor)).max(1.0)
     }
 
     /// Indices of its parameters.

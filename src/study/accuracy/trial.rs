@@ -5,9 +5,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{AccuracyStudy, Baseline};
 use crate::calibration::{
-    AUXILIARY, AuxiliaryVector, ErrorTermTest, Estimate, FormTest, Nees, Nis, Options, Outcome,
-    PARAMETERS, ParameterMatrix, ParameterVector, Problem, UNWATCHED, auxiliary_vector, bound,
-    estimate, in_general_form, nees, test_error_terms, to_vector,
+    AUXILIARY, AuxiliaryVector, Estimate, FormTest, Nees, Nis, Options, Outcome, PARAMETERS,
+    ParameterMatrix, ParameterVector, Problem, TermEvidence, UNWATCHED, auxiliary_vector, bound,
+    estimate, in_general_form, nees, to_vector,
 };
 use crate::imu::{BodyFrame, InstallationForm, PerSensor, Triad};
 use crate::run::Aiding;
@@ -29,8 +29,8 @@ pub struct Trial {
     pub(super) bound_covariance: ParameterMatrix,
     /// σ of the bound of the auxiliary constants; zero for constants without a bound.
     pub auxiliary_bound: AuxiliaryVector,
-    /// Effect of the error terms on the filter; for the first run only.
-    pub effects: Vec<ErrorTermTest>,
+    /// Evidence for each error term; for the first run only.
+    pub effects: Vec<TermEvidence>,
     /// Error of the closed form in its own time and in the filter's; `None` if it failed.
     pub(super) closed_form: [Option<ParameterVector>; 2],
 }
@@ -56,8 +56,6 @@ pub struct Filtered {
     pub velocity: Nis,
     /// NIS of table attitude.
     pub table: Nis,
-    /// Number of observations rejected by the gate.
-    pub rejected: usize,
     /// Test of the installation form.
     pub form_test: Option<FormTest>,
 }
@@ -92,10 +90,7 @@ impl AccuracyStudy {
         }
         let outcome = estimate(&problem, UNWATCHED);
         let effects = match &outcome {
-            Ok(outcome) if run == 0 => {
-                let (tests, _) = test_error_terms(&problem, outcome).unwrap_or_default();
-                tests
-            }
+            Ok(outcome) if run == 0 => outcome.terms.clone(),
             _ => Vec::new(),
         };
         let auxiliary = auxiliary_vector(&simulated.geometry, &simulated.terms);
@@ -147,7 +142,6 @@ impl Filtered {
             passes: outcome.passes.len(),
             velocity: outcome.consistency.velocity,
             table: outcome.consistency.table,
-            rejected: outcome.innovations.iter().filter(|i| !i.accepted).count(),
             form_test: outcome.form_test,
         }
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 use turncal::earth::Site;
-use turncal::imu::{GaussMarkov, Instrument, MotionNoise, Noise, PerSensor, Prior, Sensor};
+use turncal::imu::{GaussMarkov, Instrument, MotionNoise, Noise, PerSensor, Prior, Sensor, Term};
 use turncal::recording::{LabelledMotion, Recording, Segment, TableLog};
 use turncal::run::{Run, Standstill};
 use turncal::turntable::TableAccuracy;
@@ -72,6 +72,7 @@ pub fn made_run(name: &str) -> Run {
             gyro: "rad".to_owned(),
             accel: "m/s".to_owned(),
         },
+        absent_terms: vec![Term::SizeEffect, Term::GSensitivity],
         ..Instrument::new(
             PerSensor {
                 gyro: prior,
@@ -84,6 +85,7 @@ pub fn made_run(name: &str) -> Run {
         table: TableAccuracy {
             position_sigma: 5e-6,
             reading_sigma: 2e-6,
+            settling_sigma: 3e-6,
             geometry: Default::default(),
         },
         standstill: Standstill {
@@ -114,6 +116,7 @@ pub fn assert_same(a: &Run, b: &Run) {
             &a.instrument.unit,
             &a.instrument.nominal,
             &a.instrument.motion_noise,
+            &a.instrument.absent_terms,
             &a.recording.segments,
             &a.standstill
         ),
@@ -123,6 +126,7 @@ pub fn assert_same(a: &Run, b: &Run) {
             &b.instrument.unit,
             &b.instrument.nominal,
             &b.instrument.motion_noise,
+            &b.instrument.absent_terms,
             &b.recording.segments,
             &b.standstill
         )
@@ -188,6 +192,7 @@ pub fn assert_same(a: &Run, b: &Run) {
     if let (Some(log_a), Some(log_b)) = (&a.recording.table, &b.recording.table) {
         near(a.table.position_sigma, b.table.position_sigma);
         near(a.table.reading_sigma, b.table.reading_sigma);
+        near(a.table.settling_sigma, b.table.settling_sigma);
         assert_eq!(log_a.time, log_b.time);
         for (a, b) in log_a.attitude.iter().zip(&log_b.attitude) {
             assert!(a.angle_to(b) < 1e-14);

@@ -54,6 +54,21 @@ fn increments_and_rates_come_back_as_they_went() {
 }
 
 #[test]
+fn a_term_that_a_run_states_to_be_absent_is_written_with_a_sigma_of_zero() {
+    let directory = tempfile::tempdir().unwrap();
+    let run = made_run("x");
+    write_run(directory.path(), &run, Output::Increment, None).unwrap();
+    let text = fs::read_to_string(directory.path().join("run.toml")).unwrap();
+    assert!(
+        text.contains("[imu.terms.g-sensitivity]\nsigma = 0.0\n"),
+        "{text}"
+    );
+    let back = read(directory.path());
+    assert_eq!(back.instrument.absent_terms, run.instrument.absent_terms);
+    assert_eq!(back.instrument.term_sigma, run.instrument.term_sigma);
+}
+
+#[test]
 fn the_same_run_gives_the_same_bytes() {
     let bytes = || {
         let directory = tempfile::tempdir().unwrap();

@@ -147,6 +147,16 @@ fn each_wrong_value_in_run_toml_has_its_message() {
             "imu.terms.time-offset.sigma = 1e12 & at most 573",
         ),
         (
+            "[imu.noise]",
+            "[imu.terms]\ntime-offset = { sigma = -1.0 }\n[imu.noise]",
+            "imu.terms.time-offset.sigma = -1.0 & at least zero",
+        ),
+        (
+            "reading_sigma_arcsec = 0.5",
+            "reading_sigma_arcsec = 0.5\nsettling_sigma_arcsec = 0",
+            "turntable.settling_sigma_arcsec = 0 & above zero",
+        ),
+        (
             "gravity_m_s2 = 9.797",
             "gravity_m_s2 = 9.797\ngravity_sigma_mgal = 1e6",
             "site.gravity_sigma_mgal = 1e6 & from 0 to 100000",

@@ -10,18 +10,23 @@ use turncal::turntable::AxisError;
 
 /// Parses the name of an error term.
 pub fn error_term() -> impl TypedValueParser<Value = ErrorTerm> {
-    let value = |term: ErrorTerm| {
-        let value = PossibleValue::new(term.name()).help(help(term));
-        match term {
-            ErrorTerm::GaussMarkovBias => value.alias("wandering-bias"),
-            _ => value,
-        }
-    };
-    PossibleValuesParser::new(ErrorTerm::ALL.map(value)).map(|name| {
-        let mut all = ErrorTerm::ALL.into_iter();
-        all.find(|term| term.name() == name)
-            .unwrap_or(ErrorTerm::GaussMarkovBias)
-    })
+    PossibleValuesParser::new(ErrorTerm::ALL.map(listed)).map(|name| named(&name))
+}
+
+/// An error term in a list of possible values.
+pub fn listed(term: ErrorTerm) -> PossibleValue {
+    let value = PossibleValue::new(term.name()).help(help(term));
+    match term {
+        ErrorTerm::GaussMarkovBias => value.alias("wandering-bias"),
+        _ => value,
+    }
+}
+
+/// The error term of a listed name; the only alias is that of Gauss–Markov biases.
+pub fn named(name: &str) -> ErrorTerm {
+    let mut all = ErrorTerm::ALL.into_iter();
+    all.find(|term| term.name() == name)
+        .unwrap_or(ErrorTerm::GaussMarkovBias)
 }
 
 fn help(term: ErrorTerm) -> &'static str {

@@ -3,12 +3,11 @@
 use super::choice::{AIDINGS, FORMS, METHODS, NOISE, one_of};
 use anyhow::Context;
 use clap::error::ErrorKind;
-use serde::{Serialize, Serializer};
+use serde::Serialize;
 
-use super::error_term::{error_term, needs_table, supported};
-use turncal::calibration::{
-    CalibrationError, ErrorTerm, Method, NoisePolicy, Options, Problem, Together,
-};
+use super::error_term::{needs_table, supported};
+use super::with::{With, with_value};
+use turncal::calibration::{CalibrationError, Method, NoisePolicy, Options, Problem, Together};
 use turncal::imu::InstallationForm;
 use turncal::run::{Aiding, Run};
 
@@ -24,10 +23,11 @@ pub struct Estimation {
     /// Observations used by the filter [default: table if the run has a table log, otherwise velocity]
     #[arg(long, value_parser = one_of(&AIDINGS))]
     aiding: Option<Aiding>,
-    /// Error terms to estimate, in addition to those switched on in run.toml [default: those supported by the data]
-    #[arg(long, value_name = "TERM", value_parser = error_term(), value_delimiter = ',')]
-    #[serde(serialize_with = "names")]
-    with: Vec<ErrorTerm>,
+    /// Error terms in addition to those switched on in run.toml. auto: every error term is averaged over being absent
+    /// and its usual sizes; none: K, E, D alone; or terms to estimate whatever the data say [default: auto]
+    #[arg(long, value_name = "TERM", value_parser = with_value(), value_delimiter = ',')]
+    #[serde(serialize_with = "With::names")]
+    with: Vec<With>,
     /// Noise used by the filter
     #[arg(long, value_parser = one_of(&NOISE), default_value = "auto")]
     noise: NoisePolicy,
@@ -36,7 +36,9 @@ pub struct Estimation {
 impl Estimation {
     /// Exits if arguments exclude each other.
     pub fn check(&self) {
-        if let (Method::SixPosition, Some(term)) = (self.method, self.with.first()) {
+        With::check(&self.with);
+        let first = With::terms(&self.with).next();
+        if let (Method::SixPosition, Some(term)) = (self.method, first) {
             let message = format!(
                 "--with {}: --method six-position estimates only scale factors, misalignments and biases; omit \
                  --with, or use --method ekf\n",
@@ -44,7 +46,7 @@ impl Estimation {
             );
             clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
         }
-        for &term in &self.with {
+        for term in With::terms(&self.with) {
             needs_table(term, self.aiding);
         }
     }
@@ -55,7 +57,7 @@ impl Estimation {
             return Err(CalibrationError::NoTable).with_context(|| path.display().to_string());
         }
         let problem = Problem::new(run, &self.options());
-        for &term in &self.with {
+        for term in With::terms(&self.with) {
             supported(term, &problem)?;
         }
         Ok(problem)
@@ -74,7 +76,7 @@ impl Estimation {
             );
         }
         let problem = Problem::together(runs, &self.options(), together)?;
-        for &term in &self.with {
+        for term in With::terms(&self.with) {
             supported(term, &problem)?;
         }
         Ok(problem)
@@ -85,15 +87,10 @@ impl Estimation {
         Options {
             form: self.installation,
             aiding: self.aiding,
-            terms: self.with.clone(),
-            auto_terms: self.with.is_empty(),
+            terms: With::terms(&self.with).collect(),
+            auto_terms: With::is_auto(&self.with),
             noise: self.noise,
             ..Options::default()
         }
     }
-}
-
-/// Error terms by their command-line names.
-fn names<S: Serializer>(terms: &[ErrorTerm], serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_seq(terms.iter().map(|term| term.name()))
 }

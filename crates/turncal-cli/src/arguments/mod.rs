@@ -7,6 +7,7 @@ mod estimation;
 mod log;
 mod sharding;
 mod values;
+mod with;
 
 pub use choice::{AIDINGS, FORMS, NOISE, export_format, one_of};
 pub use delivery::{Delivery, Overwrite, keep};
@@ -18,3 +19,4 @@ pub use values::{
     at_least_two, at_temperature, gravity, height, hours, latitude, number, positive, seconds,
     seed, shard,
 };
+pub use with::{With, with_value};

@@ -3,8 +3,12 @@
 use crate::arguments::{AIDINGS, FORMS, NOISE, one_of};
 use std::path::Path;
 
+use clap::error::ErrorKind;
+
 use super::carry_out::carry_out;
-use crate::arguments::{Delivery, Sharding, at_least_two, error_term, needs_table, seed};
+use crate::arguments::{
+    Delivery, Sharding, With, at_least_two, error_term, needs_table, seed, with_value,
+};
 use turncal::calibration::{ErrorTerm, NoisePolicy};
 use turncal::imu::InstallationForm;
 use turncal::models::{InstallationModel, Place};
@@ -45,9 +49,10 @@ pub struct Accuracy {
     /// Installation of the simulated instruments: a TOML file or an embedded name [default: from the scenario]
     #[arg(long, value_name = "MODEL")]
     truth_installation: Option<String>,
-    /// Error terms to simulate and to estimate, in addition to those of the scenario
-    #[arg(long, value_name = "TERM", value_parser = error_term(), value_delimiter = ',')]
-    with: Vec<ErrorTerm>,
+    /// Error terms to simulate and to estimate, in addition to those of the scenario; auto: no further terms
+    /// [default: auto]
+    #[arg(long, value_name = "TERM", value_parser = with_value(), value_delimiter = ',')]
+    with: Vec<With>,
     /// Error terms to simulate but not to estimate
     #[arg(long, value_name = "TERM", value_parser = error_term(), value_delimiter = ',')]
     unmodelled: Vec<ErrorTerm>,
@@ -68,6 +73,12 @@ pub struct Accuracy {
 
 impl Accuracy {
     pub fn run(&self) -> anyhow::Result<()> {
+        With::check(&self.with);
+        if self.with.contains(&With::None) {
+            let message = "--with none does not apply to a study, which estimates the terms that it simulates; omit \
+                --with, or name terms with --with\n";
+            clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
+        }
         let mut scenario = Scenario::load(&self.scenario)?;
         scenario.body_frame = self.aiding.body_frame();
         if let Some(path) = &self.path {
@@ -76,7 +87,7 @@ impl Accuracy {
         if let Some(model) = &self.truth_installation {
             scenario.installation = InstallationModel::load(model, &Place::CommandLine)?;
         }
-        for &term in self.with.iter().chain(&self.unmodelled) {
+        for term in With::terms(&self.with).chain(self.unmodelled.iter().copied()) {
             needs_table(term, Some(self.aiding));
             scenario = scenario.with_error_term(term);
         }

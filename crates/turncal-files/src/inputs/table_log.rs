@@ -74,6 +74,7 @@ impl<'a> Fields<'a> {
         };
         let stated = (fields.time_unit.as_ref(), fields.sample_period_s);
         let attitude = self.attitude(fields)?;
+        let settling = fields.settling_sigma_arcsec;
         if fields.time_sigma_ms.is_some() {
             let note = "turntable.time_sigma_ms currently has no effect.";
             self.notes.push(note.to_owned());
@@ -84,6 +85,7 @@ impl<'a> Fields<'a> {
             accuracy: TableAccuracy {
                 position_sigma: fields.position_sigma_arcsec.0 * ARCSEC,
                 reading_sigma: fields.reading_sigma_arcsec.0 * ARCSEC,
+                settling_sigma: settling.map_or(0.0, |sigma| sigma.0 * ARCSEC),
                 geometry: self.geometry(fields, attitude.axes.len())?,
             },
             attitude,

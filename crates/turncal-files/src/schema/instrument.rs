@@ -12,7 +12,7 @@ use turncal::imu::{
     GaussMarkov, Instrument, MotionNoise, Noise, NoiseKeys, Nominal, Output, PerSensor, Prior,
     Sensor,
 };
-use turncal::models::term_sigma;
+use turncal::models::stated_terms;
 use turncal::units::{ARCSEC, DEGREE, PPM};
 use turncal_input::{Document, FileError, OneOrThree, list, suggestion};
 use turncal_logs::DataFile;
@@ -140,6 +140,7 @@ impl<'a> Fields<'a> {
         (self.document).only("imu.noise", imu.noise.keys(), names)?;
         let noise = PerSensor::try_from_fn(|sensor| self.noise(sensor))?;
         let prior = PerSensor::try_from_fn(|sensor| self.prior(sensor, *nominal.get(sensor)))?;
+        let (term_sigma, absent_terms) = stated_terms(self.document, "imu.terms", &imu.terms)?;
         let walk = |sensor| NoiseKeys::of(sensor).random_walk.0;
         Ok(Instrument {
             prior,
@@ -148,7 +149,8 @@ impl<'a> Fields<'a> {
             noise: PerSensor::from_fn(|sensor| noise.get(sensor).0),
             noise_is_stated: PerSensor::from_fn(|sensor| imu.noise.contains_key(walk(sensor))),
             motion_noise: PerSensor::from_fn(|sensor| noise.get(sensor).1),
-            term_sigma: term_sigma(self.document, "imu.terms", &imu.terms)?,
+            term_sigma,
+            absent_terms,
         })
     }
 

@@ -110,7 +110,7 @@ pub struct ImuFile {
     /// Knowledge of the triads before the calibration
     #[serde(default)]
     pub prior: PriorsFile,
-    /// Error terms to estimate, by name, such as time-offset
+    /// Error terms to estimate, by name, such as time-offset; sigma = 0: known to be absent
     #[serde(default)]
     pub terms: BTreeMap<String, TermFile>,
 }
@@ -277,6 +277,8 @@ pub struct TurntableFile {
     pub position_sigma_arcsec: Angle,
     /// 1σ per axis of the white error of each reading, ″
     pub reading_sigma_arcsec: Angle,
+    /// 1σ per axis by which a reading just after a stop is off, fading within a second, ″
+    pub settling_sigma_arcsec: Option<Angle>,
     /// 1σ of the base's tilt, ″; switches its estimation on
     pub level_sigma_arcsec: Option<Angle>,
     /// 1σ of the base's azimuth, ″; switches its estimation on

@@ -204,7 +204,9 @@ fn imu_file(run: &Run, output: Output) -> ImuFile {
     let temperature = || TemperatureColumn::One("temperature".to_owned());
     let terms = Term::ALL.into_iter().filter_map(|term| {
         let sigma = instrument.term_sigma[term.parameters().start];
-        let sigma = Positive(above_zero(sigma, term.entry().unit.1)?);
+        let is_absent = instrument.absent_terms.contains(&term);
+        let sigma = above_zero(sigma, term.entry().unit.1).or(is_absent.then_some(0.0))?;
+        let sigma = NonNegative(sigma);
         Some((term.name().to_owned(), TermFile { sigma }))
     });
     ImuFile {
@@ -290,6 +292,7 @@ fn turntable_file(run: &Run) -> TurntableFile {
         axes: None,
         position_sigma_arcsec: Angle(in_unit(table.position_sigma, ARCSEC)),
         reading_sigma_arcsec: Angle(in_unit(table.reading_sigma, ARCSEC)),
+        settling_sigma_arcsec: angle(table.settling_sigma),
         level_sigma_arcsec: angle(geometry.base.x),
         north_sigma_arcsec: angle(geometry.base.z),
         nonorthogonality_sigma_arcsec: of_axes(AxisError::Tilt),

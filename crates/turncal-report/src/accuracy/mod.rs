@@ -6,10 +6,9 @@ mod tables;
 mod tests;
 mod verdict;
 
-use super::terms;
 use crate::accuracy::tables::white_within;
 use crate::prelude::*;
-use crate::terms::title;
+use crate::terms::{explained, title};
 use turncal::calibration::result::BlockRecord;
 use turncal::calibration::{ErrorTerm, Nis};
 use turncal::study::accuracy::{Containment, Journey, Region};
@@ -29,7 +28,7 @@ pub fn document(accuracy: &Accuracy) -> Document {
     document.both(tables::gain(accuracy));
     document.both(tables::consistency(accuracy));
     document.both(tables::auxiliary(accuracy));
-    document.both(terms::explained(&accuracy.effects));
+    document.both(explained(&accuracy.effects).note("This evidence is from the first run."));
     document.pages(figures::figures(accuracy));
     document.data = data(accuracy);
     document
@@ -139,7 +138,6 @@ pub fn data(accuracy: &Accuracy) -> Value {
         "anees_directions": accuracy.anees.map(|anees| anees.directions),
         "nis": { "velocity": nis(&accuracy.velocity), "table": nis(&accuracy.table) },
         "passes": passes(accuracy).map(|(median, most)| json!({ "median": median, "largest": most })),
-        "rejected_observations": accuracy.filtered().map(|filtered| filtered.rejected).sum::<usize>(),
         "form_rejections":
             (tested > 0).then(|| json!({ "rejected": rejections, "tested": tested })),
     });

@@ -6,8 +6,8 @@ use serde_json::Value;
 
 use super::super::{svg, terminal};
 use super::*;
-use turncal::calibration::Group;
-use turncal::imu::InstallationForm;
+use turncal::calibration::{Group, TermEvidence};
+use turncal::imu::{InstallationForm, Term};
 use turncal::navigation::NearPole;
 use turncal::simulation::Scenario;
 use turncal::study::{AccuracyStudy, Study, UNWATCHED};
@@ -159,6 +159,22 @@ fn a_form_that_cannot_hold_the_truth_is_charged_with_what_it_costs() {
     assert_eq!(json(&accuracy)["form_holds_truth"], false);
     accuracy.study.scenario.installation.form = InstallationForm::ThreeAngle;
     assert!(!doubts(&accuracy).contains("cannot represent"));
+}
+
+#[test]
+fn an_error_term_that_is_present_although_not_requested_is_named() {
+    let mut accuracy = small();
+    for (present, is_named) in [(0.5, false), (0.9995, true)] {
+        accuracy.effects = vec![TermEvidence {
+            term: ErrorTerm::Instrument(Term::SizeEffect),
+            present,
+            remaining: 0.1,
+            sigma_factors: [None; 6],
+        }];
+        let doubts = doubts(&accuracy);
+        assert_eq!(doubts.contains("accel lever arm"), is_named, "{doubts}");
+        assert_eq!(json(&accuracy)["block_effects"][0]["present"], present);
+    }
 }
 
 #[test]

@@ -5,7 +5,8 @@ use std::cmp::Ordering;
 use super::tables;
 use super::tables::{compared, journey_name, white_within};
 use crate::prelude::*;
-use turncal::calibration::{ErrorTermTest, Nis};
+use crate::terms::{CERTAIN, title};
+use turncal::calibration::{ErrorTerm, Nis};
 use turncal::imu::Output;
 use turncal::study::{Accuracy, Figures, Ratio};
 
@@ -44,8 +45,7 @@ pub fn say(document: &mut Document, accuracy: &Accuracy) {
         ))
     }));
     sentences.extend(form(accuracy));
-    let advice = ErrorTermTest::most_significant(&accuracy.effects, None);
-    sentences.extend(advice.map(|advice| warn(format!("In the first run: {advice}"))));
+    sentences.extend(not_requested(accuracy).map(warn));
     sentences.extend(gain(accuracy));
     let runs = accuracy.trials.len();
     sentences.extend((runs < FEW).then(|| {
@@ -197,6 +197,22 @@ fn form(accuracy: &Accuracy) -> Option<(bool, String)> {
     let by_chance = 1e-3 * tested as f64;
     let few = rejections as f64 <= by_chance + 3.0 * by_chance.sqrt();
     Some((form.holds(truth) && few, text))
+}
+
+/// Error terms that the first run shows although they were not requested.
+fn not_requested(accuracy: &Accuracy) -> Option<String> {
+    let study = &accuracy.study;
+    let is_requested =
+        |term: ErrorTerm| study.scenario.has(term) && !study.unmodelled.contains(&term);
+    let shown = accuracy.effects.iter();
+    let shown = shown.filter(|of| of.present > CERTAIN && !is_requested(of.term));
+    let names: Vec<&str> = shown.map(|of| title(of.term)).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "The first run shows error terms that were not requested (probability above 99.9 %): {}.",
+            names.join(", ")
+        )
+    })
 }
 
 fn gain(accuracy: &Accuracy) -> Vec<(bool, String)> {

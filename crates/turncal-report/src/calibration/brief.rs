@@ -18,7 +18,6 @@ pub fn add(document: &mut Document, report: &Report) {
         ("weakest", weakest(report)),
         ("excluded from fit", tables::cross_validation(report)),
         ("navigation", navigated.map(navigation::line)),
-        ("not covered", budget::unseen(report, estimate)),
     ] {
         if let Some(value) = value {
             facts.push(name, value);

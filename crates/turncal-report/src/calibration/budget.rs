@@ -1,9 +1,7 @@
 //! Sources of the uncertainty: tables and stacked bars.
 
-use super::super::terms::title;
-use super::report::Report;
 use crate::prelude::*;
-use turncal::calibration::{Budget, BudgetPart, ErrorTermTest, Estimate, ParameterVector};
+use turncal::calibration::{Budget, BudgetPart, BudgetSource, Estimate, ParameterVector};
 use turncal::earth::ROTATION_RATE;
 use turncal::imu::Sensor;
 
@@ -11,8 +9,6 @@ use turncal::imu::Sensor;
 const SHOWN: usize = 5;
 /// Usual resolution of a stated latitude, rad.
 const LATITUDE: f64 = 1e-3 * DEGREE;
-/// Maximum number of unobservable error terms that are named.
-const NAMED_TERMS: usize = 3;
 /// A source is named if it contributes at least this fraction of a variance.
 const NAMED: f64 = 1e-3;
 
@@ -42,7 +38,7 @@ pub fn table(budget: &Budget, estimate: &Estimate) -> Table {
     coverage.extend(factors.map(|k| or_dash(k, |k| value(k, 0.1))));
     coverage.push(String::new());
     let columns = [group_columns("source"), vec!["ν".to_owned()]].concat();
-    Table::new("Uncertainty budget", columns)
+    let mut table = Table::new("Uncertainty budget", columns)
         .section(rows)
         .section([
             row("combined standard uncertainty", combined, ""),
@@ -56,7 +52,26 @@ pub fn table(budget: &Budget, estimate: &Estimate) -> Table {
         .note(
             "ν: degrees of freedom of each source, infinite if stated. k: from Student's t with the effective \
              degrees of freedom, largest of the group.",
-        )
+        );
+    table.notes.extend(taken_as_exact(budget));
+    table
+}
+
+/// Inputs that are no source of the budget, with their effect on the parameters.
+fn taken_as_exact(budget: &Budget) -> Option<String> {
+    let latitude = format!(
+        "the latitude of the site (0.001° changes gyro biases by up to {} °/h)",
+        three_digits(ROTATION_RATE * LATITUDE / DEG_PER_H)
+    );
+    let gravity = "gravity (1 mGal changes every accelerometer scale factor by 1.02 ppm)";
+    let inputs = [
+        (BudgetSource::EarthRate, latitude),
+        (BudgetSource::Gravity, gravity.to_owned()),
+    ];
+    let is_source = |source: BudgetSource| budget.parts.iter().any(|part| part.source == source);
+    let exact = inputs.into_iter().filter(|(source, _)| !is_source(*source));
+    let exact: Vec<String> = exact.map(|(_, input)| input).collect();
+    (!exact.is_empty()).then(|| format!("Taken as exact: {}.", exact.join(" and ")))
 }
 
 /// The relevant sources, the largest first.
@@ -136,63 +151,5 @@ pub fn figure(budget: &Budget, estimate: &Estimate) -> Plot {
     .caption(
         "Share of each source in the variance of every parameter. Improve the largest source first: noise with more \
          time at rest, table position with more positions, the prior with a path that excites the parameter.",
-    )
-}
-
-/// Effects not included in σ: undetectable error terms that change a group by more than its σ.
-pub fn unseen(report: &Report, estimate: &Estimate) -> Option<String> {
-    let claimed = estimate.sigma();
-    let worst = |test: &ErrorTermTest| {
-        let left_off = test.left_off.filter(|_| !test.significant())?;
-        let of_group = |group: Group| {
-            let [may, sigma] = [&left_off.shown, &claimed].map(|v| group.rms(v, estimate));
-            Some((group, may? / sigma?))
-        };
-        let groups = Group::all().filter_map(of_group);
-        groups
-            .filter(|&(_, times)| times > 1.0)
-            .max_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(group, times)| (test.term, group, times))
-    };
-    let mut unseen: Vec<_> = report.effects.iter().filter_map(worst).collect();
-    unseen.sort_by(|a, b| b.2.total_cmp(&a.2));
-    let named = unseen.iter().take(NAMED_TERMS).map(|(term, group, times)| {
-        let (name, group, times) = (term.name(), group.short(), three_digits(*times));
-        format!("{name} (may change {group} by {times} σ)")
-    });
-    let mut named: Vec<String> = named.collect();
-    let more = unseen.len() - named.len();
-    named.extend((more > 0).then(|| format!("{more} more")));
-    let named = named.join(", ");
-    (!named.is_empty())
-        .then(|| format!("{named}: not visible in this recording, so not included in σ"))
-}
-
-/// Effects not included in any sum: error terms that are not estimated.
-pub fn left_off(report: &Report, estimate: &Estimate) -> Table {
-    let row = |test: &ErrorTermTest| {
-        let left_off = test.left_off?;
-        let mut row = cells![title(test.term)];
-        let changes = Group::all().map(|group| group.rms(&left_off.shown, estimate));
-        row.extend(changes.map(|change| or_dash(change, sigma)));
-        Some(row)
-    };
-    let gravity = if report.run.site.gravity_sigma > 0.0 {
-        ""
-    } else {
-        " and gravity (1 mGal changes every accelerometer scale factor by 1.02 ppm)"
-    };
-    Table::new(
-        "Possible effect of error terms that are not estimated",
-        group_columns("term"),
-    )
-    .section(report.effects.iter().filter_map(row))
-    .note(format!(
-        "Taken as exact: the latitude of the site (0.001° changes gyro biases by up to {} °/h){gravity}.",
-        three_digits(ROTATION_RATE * LATITUDE / DEG_PER_H),
-    ))
-    .note(
-        "Not included in the sums above. RMS change of the parameters of a group if the term is as large as the data \
-         allow. If it matters, estimate the term with --with.",
     )
 }

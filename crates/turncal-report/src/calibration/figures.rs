@@ -91,15 +91,11 @@ impl Report<'_> {
             .filter(|kind| of_kind(*kind).next().is_some());
         let panel = |kind: Observation, direction: usize| {
             let point = |i: &Innovation| (i.time, i.whitened[direction].clamp(-EDGE, EDGE));
-            let of = |accepted| {
-                let those = of_kind(kind).filter(move |i| i.accepted == accepted);
-                those.map(point)
-            };
-            let accepted: Vec<_> = of(true).collect();
-            let shown = if accepted.len() <= DOTS {
-                Series::marks(Mark::Dot, accepted)
+            let points: Vec<Point> = of_kind(kind).map(point).collect();
+            let shown = if points.len() <= DOTS {
+                Series::marks(Mark::Dot, points)
             } else {
-                Series::line(self.interrupted_by_turns(&accepted))
+                Series::line(self.interrupted_by_turns(&points))
             };
             let title = format!("{}, {}, σ", kind.name(), ["east", "north", "up"][direction]);
             let y = Axis::linear("").between(-EDGE, EDGE);
@@ -107,14 +103,13 @@ impl Report<'_> {
                 .shaded(self.dwells)
                 .with(shown.width(1.0))
                 .with_all([-3.0, -1.0, 1.0, 3.0].map(bound))
-                .with(Series::marks(Mark::Cross, of(false)).nth(1))
         };
         let panels = kinds.flat_map(|kind| [0, 1, 2].map(|direction| panel(kind, direction)));
         let panels: Vec<Panel> = panels.collect();
         let caption = format!(
             "Innovations of the last pass divided by their σ; they should look like white noise of unit variance. \
              Solid lines: ±1σ; dashed: ±3σ. Dense data are drawn as the extremes of each interval. \
-             Crosses: rejected by the gate; at the edge: ±{EDGE}σ or more."
+             Points at the edge: ±{EDGE}σ or more."
         );
         let drawn = !panels.is_empty();
         let plot = Plot::new("innovations.svg", "Innovations", (3, 270), panels);

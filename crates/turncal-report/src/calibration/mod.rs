@@ -57,13 +57,12 @@ impl Report<'_> {
         if let Some(outcome) = self.outcome {
             temperature::add(&mut document, outcome);
             document.page(tables::consistency(outcome));
-            document.both(terms::explained(self.effects));
+            document.both(terms::explained(&outcome.terms));
         }
         if let (Some(of), Some(estimate)) = (self.budget, self.estimate()) {
             document.fold("Uncertainty budget");
             document.page(budget::table(of, estimate));
             document.page(budget::figure(of, estimate));
-            document.page(budget::left_off(self, estimate));
         }
         document.fold("Navigation");
         navigation::add(&mut document, self.navigation);

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use turncal::calibration::result::TermRecord;
 use turncal::calibration::{
-    Budget, ErrorTermTest, Estimate, Finding, Outcome, ParameterVector, Quality, to_vector,
+    Budget, Estimate, Finding, Outcome, ParameterVector, Quality, to_vector,
 };
 use turncal::imu::{BodyFrame, PerSensor, Triad};
 use turncal::recording::TableLog;
@@ -28,8 +28,6 @@ pub struct Report<'a> {
     pub outcome: Option<&'a Outcome>,
     /// Findings to read before using the results.
     pub findings: &'a [Finding],
-    /// Actual or possible effect of error terms.
-    pub effects: &'a [ErrorTermTest],
     /// Uncertainty budget of the filter result.
     pub budget: Option<&'a Budget>,
     /// The closed-form result, if any.

@@ -8,10 +8,10 @@ use super::super::tests::synthetic;
 use super::super::{html, svg, terminal, write};
 use super::*;
 use turncal::calibration::{
-    ErrorTerm, ErrorTermTest, Nis, Observation, PARAMETERS, ParameterMatrix, ParameterVector, Role,
-    UnmodelledEffect, from_vector, parameter, parameter_name, to_vector,
+    Budget, BudgetPart, BudgetSource, ErrorTerm, Nis, Observation, PARAMETERS, ParameterMatrix,
+    TermEvidence, from_vector, parameter_name, to_vector,
 };
-use turncal::imu::{GaussMarkov, InstallationForm, Sensor, Term};
+use turncal::imu::{GaussMarkov, InstallationForm, Term};
 use turncal::navigation::NearPole;
 use turncal::study::navigation::NavigationStudyError;
 use turncal::units::{DEG_PER_H, PPM};
@@ -328,72 +328,96 @@ fn the_position_error_at_the_end_stands_in_the_summary() {
     assert!(summary.contains("EKF 5.00 nmile (σ 1.41)"), "{summary}");
 }
 
-#[test]
-fn what_a_record_would_not_show_is_said_where_it_is_more_than_sigma() {
-    let made_up = synthetic(InstallationForm::General);
-    let scale = parameter(Sensor::Gyro, 0);
-    let off = |times: f64| {
-        let sigma = made_up.outcome.estimate.sigma();
-        let group = Group::of(scale);
-        // The same for all three axes, so that the group has it, too.
-        ParameterVector::from_fn(|i, _| {
-            if Group::of(i) == group {
-                times * sigma[i]
-            } else {
-                0.0
-            }
-        })
-    };
-    let effect = |term: Term, times: f64, gain: f64| ErrorTermTest {
-        left_off: Some(UnmodelledEffect {
-            usual: off(times),
-            shown: off(times),
-        }),
-        ..tested(term, gain)
-    };
-    let effects = [
-        effect(Term::GyroSecondOrder, 0.9, 1.0),
-        effect(Term::GyroNonlinearity, 20.0, 1.0),
-        // This one is seen, and is a finding.
-        effect(Term::GyroAsymmetry, 50.0, 100.0),
-    ];
-    let report = Report {
-        effects: &effects,
-        ..made_up.report()
-    };
-    let said = summary(&report);
-    assert!(
-        said.contains("gyro-nonlinearity (may change gyro K by 20.0 σ): not visible"),
-        "{said}"
-    );
-    assert!(!summary(&made_up.report()).contains("not visible"));
+/// Evidence for a term that the path shows, with this probability that it is present.
+fn evidence(present: f64) -> TermEvidence {
+    TermEvidence {
+        term: ErrorTerm::Instrument(Term::GyroAsymmetry),
+        present,
+        remaining: 0.1,
+        sigma_factors: [None; 6],
+    }
 }
 
-/// A test of a term that is off.
-fn tested(term: Term, gain: f64) -> ErrorTermTest {
-    ErrorTermTest {
-        term: ErrorTerm::Instrument(term),
-        on: false,
-        sigma_factors: [None; 6],
-        gain,
-        limit: 10.0,
-        significance: gain,
-        role: Role::None,
-        without: 1.0,
-        with: 1.0,
-        left_off: None,
+/// The row that the table of error terms has for this evidence.
+fn explained(evidence: TermEvidence) -> Vec<String> {
+    let table = terms::explained(&[evidence]);
+    let row = table.sections[0][0].clone();
+    assert_eq!(row.len(), table.columns.len());
+    row
+}
+
+#[test]
+fn a_term_is_estimated_if_requested_and_otherwise_present_with_a_probability() {
+    for (present, said) in [
+        (1.0, "estimated"),
+        (0.9995, "> 99.9 %"),
+        (0.998, "99.8 %"),
+        (0.95, "95 %"),
+        (0.0321, "3.2 %"),
+        (1e-9, "< 0.1 %"),
+    ] {
+        assert_eq!(explained(evidence(present))[1], said);
     }
 }
 
 #[test]
-fn the_group_whose_sigma_grows_most_with_a_term_is_named() {
-    let test = ErrorTermTest {
-        on: true,
-        sigma_factors: [Some(1.1), None, Some(1.7), None, Some(1.2), None],
-        ..tested(Term::GyroAsymmetry, 20.0)
+fn terms_that_were_requested_stand_before_those_that_may_be_present() {
+    let table = terms::explained(&[evidence(0.2), evidence(1.0), evidence(0.3)]);
+    let present = |section: &Vec<Vec<String>>| -> Vec<String> {
+        section.iter().map(|row| row[1].clone()).collect()
     };
-    let table = terms::explained(&[test]);
-    let cells = &table.sections[0][0];
-    assert_eq!(cells.last().map(String::as_str), Some("gyro D: 1.70"));
-    assert_eq!(cells.len(), table.columns.len());
+    let present: Vec<_> = table.sections.iter().map(present).collect();
+    assert_eq!(present, [vec!["estimated"], vec!["20 %", "30 %"]]);
+}
+
+#[test]
+fn the_group_whose_sigma_grows_most_with_a_term_is_named() {
+    let grows = |sigma_factors| {
+        let evidence = TermEvidence {
+            sigma_factors,
+            ..evidence(0.5)
+        };
+        explained(evidence)[2].clone()
+    };
+    let factors = [Some(1.1), None, Some(1.704), None, Some(1.2), None];
+    assert_eq!(grows(factors), "gyro D × 1.70");
+    assert_eq!(grows([Some(1.004); 6]), NONE);
+}
+
+#[test]
+fn a_term_that_the_path_does_not_show_has_the_moves_that_do() {
+    assert_eq!(explained(evidence(0.5))[3], "yes");
+    let hidden = TermEvidence {
+        remaining: 0.9,
+        ..evidence(0.5)
+    };
+    assert_eq!(explained(hidden)[3], "no: turns both ways about each axis");
+}
+
+#[test]
+fn the_evidence_for_every_error_term_stands_in_the_report() {
+    let mut made_up = synthetic(InstallationForm::General);
+    assert!(!page(&made_up.report()).contains("gyro asymmetry"));
+    made_up.outcome.terms = vec![evidence(0.25)];
+    let page = page(&made_up.report());
+    assert!(page.contains("gyro asymmetry") && page.contains("25 %"));
+}
+
+#[test]
+fn a_budget_names_the_inputs_that_it_takes_as_exact() {
+    let estimate = synthetic(InstallationForm::General).outcome.estimate;
+    let exact = |sources: &[BudgetSource]| {
+        let part = |&source: &BudgetSource| BudgetPart {
+            source,
+            covariance: estimate.covariance,
+            degrees_of_freedom: f64::INFINITY,
+        };
+        let parts = sources.iter().map(part).collect();
+        let notes = budget::table(&Budget { parts }, &estimate).notes.concat();
+        ["Taken as exact", "latitude", "gravity ("].map(|words| notes.contains(words))
+    };
+    assert_eq!(exact(&[BudgetSource::Prior]), [true; 3]);
+    assert_eq!(exact(&[BudgetSource::EarthRate]), [true, false, true]);
+    let both = [BudgetSource::EarthRate, BudgetSource::Gravity];
+    assert_eq!(exact(&both), [false; 3]);
 }

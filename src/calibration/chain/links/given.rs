@@ -5,14 +5,16 @@ use nalgebra::DMatrix;
 use super::{Rows, Transition};
 use crate::calibration::chain::dynamics::{Dynamics, rates};
 use crate::calibration::chain::part::{Part, begins};
+use crate::calibration::Constant;
+use crate::calibration::chain::states::{ATTITUDE, POSITION};
 use crate::calibration::record::Rest;
-use crate::calibration::{ATTITUDE, Constant, POSITION};
 use crate::navigation::Block;
 
 /// What a part is given, per state and constant: the moving states at its begin except position, then rates and forces.
+#[derive(Debug, Clone)]
 pub struct Given {
-    states: DMatrix<f64>,
-    constants: DMatrix<f64>,
+    pub states: DMatrix<f64>,
+    pub constants: DMatrix<f64>,
     /// Attitude error of the table.
     table_states: DMatrix<f64>,
     table_constants: DMatrix<f64>,

@@ -6,17 +6,14 @@ use super::given::Given;
 use super::{Link, Rows, Transition};
 use crate::attitude::skew;
 use crate::calibration::budget::source::BudgetSource;
-use crate::calibration::chain::at_rest::Dispersion;
 use crate::calibration::chain::dynamics::Dynamics;
-use crate::calibration::chain::effects::{Effect, Slip};
-use crate::calibration::chain::part::{PartFilter, part_filter};
-use crate::calibration::chain::states::States;
-use crate::calibration::filter::rows::factor;
+use crate::calibration::chain::effects::{Dispersion, Effect, Slip};
+use crate::calibration::chain::part::{PartFilter, filter_of, part_filters};
+use crate::calibration::chain::states::{ATTITUDE, NAVIGATION, POSITION, States, VELOCITY};
+use crate::calibration::chain::short_rows::factor;
 use crate::calibration::record::{Event, Rest, between};
-use crate::calibration::{
-    ATTITUDE, CalibrationError, Constant, NAVIGATION, POSITION, Problem, Script, Source, Stretch,
-    VELOCITY,
-};
+use crate::calibration::several::day_to_day::OwnState;
+use crate::calibration::{CalibrationError, Constant, Group, Problem, Script, Source, Stretch};
 use crate::imu::{GaussMarkov, MotionNoise, Noise, PerSensor, Sensor};
 use crate::navigation::{Block, ErrorMatrix, ProcessNoise};
 
@@ -26,7 +23,7 @@ pub const SLIP: f64 = 0.1;
 /// Makes links one after the other.
 pub struct Maker<'a> {
     problem: &'a Problem<'a>,
-    filter: Box<dyn PartFilter>,
+    filters: [Box<dyn PartFilter>; 2],
     dispersion: &'a Dispersion,
     dynamics: Dynamics<'a>,
     /// What happened since the last rows.
@@ -34,6 +31,7 @@ pub struct Maker<'a> {
     pub links: Vec<Link>,
     pub squares: f64,
     pub log_determinant: f64,
+    pub observations: usize,
     /// Number of dwells begun.
     dwell: usize,
 }
@@ -47,7 +45,7 @@ impl<'a> Maker<'a> {
     ) -> Self {
         Self {
             problem,
-            filter: part_filter(states.moving),
+            filters: part_filters(states.moving),
             dispersion,
             dynamics: Dynamics {
                 states,
@@ -58,6 +56,7 @@ impl<'a> Maker<'a> {
             links: Vec::new(),
             squares: 0.0,
             log_determinant: 0.0,
+            observations: 0,
             dwell: 0,
         }
     }
@@ -125,7 +124,7 @@ impl<'a> Maker<'a> {
         let (model, states) = (&self.problem.model, self.dynamics.states);
         let (stated, still) = (Effect::Stated, [0.0; 3]);
         for first in states.slips.into_iter().flatten() {
-            self.renew(first, (&still, &still), stated(BudgetSource::TablePosition));
+            self.renew(first, (&still, &still), stated(BudgetSource::Slips));
         }
         for sensor in Sensor::ALL {
             let sigma = [variation(model.noise.get(sensor)).sigma; 3];
@@ -135,11 +134,11 @@ impl<'a> Maker<'a> {
         let own = script.at.own(recording);
         for &(state, of) in &states.own {
             let sigma = [model.day_to_day.of(of)];
-            self.renew(
-                state,
-                (&[-own.get(of)], &sigma),
-                stated(BudgetSource::Recording),
-            );
+            let effect = match of {
+                OwnState::Parameter(index) => Effect::Difference(Group::of(index)),
+                OwnState::Mounting(_) => stated(BudgetSource::Recording),
+            };
+            self.renew(state, (&[-own.get(of)], &sigma), effect);
         }
         let mounted = model.day_to_day.mounting > 0.0;
         self.dynamics.turned = mounted.then(|| own.response(&script.at.triads));
@@ -205,12 +204,15 @@ impl<'a> Maker<'a> {
         };
         let place = self.begin_part(rest, stretch);
         let model = &self.problem.model;
-        let part = self.filter.reduce((rest, stretch), model, &mut |_, _| {});
+        let filter = &mut self.filters[filter_of(rest)];
+        let part = filter.reduce((rest, stretch), model, &mut |_| {});
+        let size = filter.given();
         let factor = self.dispersion.of(self.dwell - 1);
         let part = part.ok_or_else(diverged)?.dispersed(factor);
+        self.observations += part.count;
         self.squares += part.squares;
         self.log_determinant += part.log_determinant;
-        let given = Given::new(&self.dynamics, rest, first, self.filter.given());
+        let given = Given::new(&self.dynamics, rest, first, size);
         let n = self.dynamics.states.count;
         let pending = std::mem::replace(
             &mut self.pending,
@@ -220,14 +222,17 @@ impl<'a> Maker<'a> {
         if !rows.values.iter().all(|value| value.is_finite()) {
             return Err(diverged());
         }
+        given.end(&part, self.dynamics.states.moving, &mut self.pending);
         self.links.push(Link {
             begins,
+            recording: stretch.recording,
+            dwell: self.dwell - 1,
             attitude: rest.first.then_some(rest.begin.attitude),
             time: rest.end(),
             transition: pending,
             rows,
+            given,
         });
-        given.end(&part, self.dynamics.states.moving, &mut self.pending);
         let duration = rest
             .steps
             .iter()
@@ -236,8 +241,8 @@ impl<'a> Maker<'a> {
         Ok(())
     }
 
-    /// Refers the states to where a part begins. Where the body came to rest at a new position, table and velocity are
-    /// anew, and the position is observed.
+    /// Refers the states to where a part begins. Where the body came to rest at a new position, that of the table is anew,
+    /// and the position is observed.
     fn begin_part(&mut self, rest: &Rest, stretch: &Stretch) -> Rows {
         let states = self.dynamics.states;
         let (n, model) = (states.count, &self.problem.model);
@@ -268,12 +273,6 @@ impl<'a> Maker<'a> {
             self.pending.reset(turn..turn + 3, &still);
         }
         if rest.new_position {
-            if model.velocity_anew {
-                self.pending.reset(VELOCITY..VELOCITY + 3, &still);
-                let root = DMatrix::from_diagonal_element(3, 3, stretch.velocity_sigma());
-                let effect = Effect::Stated(BudgetSource::Place);
-                self.pending.drive(effect, self.dwell - 1, VELOCITY, &root);
-            }
             if let Some(table) = states.table {
                 self.pending.reset(table..table + 3, &still);
                 let root = DMatrix::from_diagonal_element(3, 3, model.position_sigma);

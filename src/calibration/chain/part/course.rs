@@ -6,7 +6,7 @@
 
 use nalgebra::Matrix3;
 
-use crate::calibration::filter::rows::{add, whiten};
+use crate::calibration::chain::short_rows::{add, whiten};
 
 /// Propagation of the moving states in one step, with the effect of `g` and noise.
 #[derive(PartialEq)]

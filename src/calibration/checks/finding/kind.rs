@@ -79,35 +79,18 @@ kinds! {
         "In dwells, the samples scatter more or less than the stated white noise implies. The estimate uses 0.1 s \
          averages, so mount vibration adds to it. Record an hour at rest, run `turncal allan` to separate noise from \
          vibration, and state the result in [imu.noise]."
-    BiasesMayVary = "W09" "biases-may-vary" Note:
-        "A short recording cannot show bias drift. turncal assumed the drift that is typical for this class of \
-         sensor and widened σ to include it. Record several hours at rest, run `turncal allan`, and state the bias instability \
-         and its correlation time in [imu.noise]."
     Inconsistent = "W10" "inconsistent" Care:
         "The normalised innovation squared (NIS) is outside its 99.9 % interval: the residuals are larger or smaller \
          than predicted. If they are larger only after moves, suspect the table position, a scale factor or a time \
          offset; if in dwells, bias drift, often due to temperature (--temperature); if everywhere, the white noise \
          in [imu.noise]."
-    ErrorTermSignificant = "W11" "error-term-significant" Care:
-        "The data show an error that K, E and D cannot describe, and the named error term explains it best. Until \
-         you estimate that term, σ include its possible effect on the parameters. Rerun with --with and the term."
     ErrorTermEstimated = "W12" "error-term-estimated" Care:
         "The recording shows a significant error term, so turncal estimated it together with K, E and D. The values \
          are valid only together with this term: `turncal apply` removes it, while export formats without error \
          terms leave it in and report this. To switch it off, list the terms that you want with --with."
-    DwellsScatter = "W13" "dwells-scatter" Care:
-        "The dwells disagree by more than their σ allow, and neither the estimated noise nor the estimated terms \
-         explain it. turncal widened σ by the observed scatter. Check the error terms in the report; one of them may \
-         explain it."
-    Outliers = "W14" "outliers" Note:
-        "Some observations were outside their gate and were rejected. A few in ten thousand occur by chance; several \
-         in one dwell indicate a bump or motion. Look at the residuals of that dwell in the report."
-    Settling = "W15" "settling" Note:
-        "After each stop the attitude or the sensors take some time to settle. turncal excludes that time from every \
-         dwell. If dwells become too short, wait longer after each stop or stiffen the mount."
     PositionWrong = "W16" "position-wrong" Care:
-        "The table attitude in one dwell contradicts the gyros and accelerometers. turncal excluded the table \
-         readings of that dwell and used the rest. Check the table log for a missed step, a wrong label or a bump at \
+        "The table attitude in one dwell contradicts the gyros and accelerometers. Its readings have next to no weight; \
+         the rest is used. Check the table log for a missed step, a wrong label or a bump at \
          that time."
     MoveWrong = "W17" "move-wrong" Care:
         "In one move the integrated gyro angle differs from the change of attitude. turncal estimated the \
@@ -158,6 +141,17 @@ kinds! {
         "A scale factor differs from the stated one by more than 10 prior σ and more than 10 %, or by more than 41 \
          %. The estimate may result from a wrong turn angle or unit. Correct scale, unit or sample_period_s in \
          [imu], or widen scale_sigma_ppm if the sensor really differs that much."
+    VelocityWrong = "W32" "velocity-wrong" Care:
+        "In one move the accelerometers missed a velocity that is far larger than in other moves. turncal estimated it. \
+         Check that move for lost samples, a force beyond the range, or a bump."
+    Slipped = "W33" "slipped" Care:
+        "From one dwell on, all attitudes are turned by one angle: the instrument slipped on the table, or the table on the \
+         ground. turncal estimated the angle, so that scale factors and biases are hardly less accurate; the \
+         misalignments hold for the mounting before the slip. Fasten the mount and repeat the recording."
+    TermNotShown = "W34" "term-not-shown" Note:
+        "An error term that instruments of this class may have cannot be seen in this recording, and K, E or D depend on \
+         it. σ include its usual size. Add the moves that the finding names, or state that the instrument does not have it: \
+         sigma = 0 in [imu.terms]. `--with none` leaves out all terms."
 }
 
 impl Kind {
@@ -176,7 +170,7 @@ mod tests {
 
     #[test]
     fn codes_rise_without_those_that_are_no_longer_given_and_names_are_distinct() {
-        const RETIRED: [usize; 1] = [23];
+        const RETIRED: [usize; 6] = [9, 11, 13, 14, 15, 23];
         let numbers = (1..).filter(|number| !RETIRED.contains(number));
         for (number, kind) in numbers.zip(Kind::ALL) {
             assert_eq!(kind.code(), format!("W{number:02}"));

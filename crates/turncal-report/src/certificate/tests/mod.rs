@@ -194,7 +194,6 @@ fn a_budget_is_spoken_of_only_where_there_is_one() {
         sources: Vec::new(),
         degrees_of_freedom: vec![None; size],
         coverage_factor: vec![2.0; size],
-        left_off: Vec::new(),
     });
     for (calibration, has) in [(without, false), (with, true)] {
         assert_eq!(said(calibration).0.contains("uncertainty budget"), has);

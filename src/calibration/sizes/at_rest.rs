@@ -7,10 +7,11 @@ use std::convert::Infallible;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::descent::{Slope, descend};
-use super::part::{Part, part_filter};
-use super::states::States;
+use super::descent::{Lowest, Slope, descend};
 use super::usual::Usual;
+use crate::calibration::chain::Dispersion;
+use crate::calibration::chain::part::{Part, Whitened, filter_of, part_filters};
+use crate::calibration::chain::states::States;
 use crate::calibration::{Model, Problem, Script};
 
 /// Step of a logarithm for differences.
@@ -25,29 +26,12 @@ const BEFOREHAND: f64 = 6.0;
 /// Rounds of common sizes and dispersions of dwells.
 const ROUNDS: usize = 3;
 
-/// Variance of the noise in each dwell over that of all.
-///
-/// A dwell that is less still than the others then makes no noise of them: with an inverse-gamma prior of its variance
-/// its noise is a draw from Student's t (Lange, Little, Taylor 1989, J. Am. Stat. Assoc. 84(408)).
-#[derive(Debug, Clone, PartialEq)]
-pub struct Dispersion(Vec<f64>);
-
-impl Dispersion {
-    /// All dwells alike.
-    pub fn alike(problem: &Problem) -> Self {
-        Self(vec![1.0; problem.dwells().count()])
-    }
-
-    /// The factor of a dwell.
-    pub fn of(&self, dwell: usize) -> f64 {
-        self.0.get(dwell).copied().unwrap_or(1.0)
-    }
-}
-
 /// The noise at rest.
 pub struct NoiseAtRest {
     /// Logarithms of the common sizes over the usual ones.
     pub logs: DVector<f64>,
+    /// 1σ of each.
+    pub sigma: DVector<f64>,
     pub dispersion: Dispersion,
 }
 
@@ -79,7 +63,7 @@ impl AllLeft {
         model: &Model,
     ) -> Option<Self> {
         let states = States::new(model, problem.one_gravity());
-        let mut filter = part_filter(states.moving);
+        let mut filters = part_filters(states.moving);
         let mut all = Self::default();
         for (number, stretch) in problem.stretches().iter().enumerate() {
             for rest in script.parts(number) {
@@ -89,8 +73,10 @@ impl AllLeft {
                 let factor = dispersion.of(all.dwells.len() - 1);
                 let root = factor.sqrt();
                 let seen = &mut all.seen;
-                let part = filter.reduce((rest, stretch), model, &mut |whitened, log| {
-                    seen.push((whitened / root, log));
+                let filter = &mut filters[filter_of(rest)];
+                let part = filter.reduce((rest, stretch), model, &mut |of: Whitened| {
+                    let each = (0..3).map(|k| (of.scalars[k] / root, of.root[(k, k)].ln()));
+                    seen.extend(each);
                 })?;
                 all.dwells
                     .last_mut()?
@@ -151,15 +137,22 @@ pub fn likeliest(
     let rounds = if before.is_some() { 1 } else { ROUNDS };
     let (mut dispersion, mut logs) =
         before.unwrap_or_else(|| (Dispersion::alike(problem), DVector::zeros(usual.len())));
+    let mut sigma = DVector::zeros(usual.len());
     for _ in 0..rounds {
-        logs = common(problem, script, usual, &dispersion, logs);
+        let lowest = common(problem, script, usual, &dispersion, logs);
+        sigma = lowest.sigma();
+        logs = lowest.at;
         let model = model_at(problem, usual, &logs);
         if let Some(left) = AllLeft::new(problem, script, &dispersion, &model) {
             let factor = |of: &Left| (BEFOREHAND + of.squares) / (BEFOREHAND + of.freedom);
-            dispersion = Dispersion(left.dwells.iter().map(factor).collect());
+            dispersion = Dispersion::of_dwells(left.dwells.iter().map(factor).collect());
         }
     }
-    NoiseAtRest { logs, dispersion }
+    NoiseAtRest {
+        logs,
+        sigma,
+        dispersion,
+    }
 }
 
 fn model_at(problem: &Problem, usual: &[Usual], at: &DVector<f64>) -> Model {
@@ -179,7 +172,7 @@ fn common(
     usual: &[Usual],
     dispersion: &Dispersion,
     start: DVector<f64>,
-) -> DVector<f64> {
+) -> Lowest {
     let left_at = |at: &DVector<f64>| {
         let model = model_at(problem, usual, at);
         AllLeft::new(problem, script, dispersion, &model)

@@ -8,6 +8,8 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
+use crate::calibration::constants::Sites;
+
 /// Sizes over the usual one: every half power of three to the factor 3^(3/2), with weights of a triangle over their
 /// logarithms.
 const SIZES: [(f64, f64); 7] = [
@@ -21,38 +23,24 @@ const SIZES: [(f64, f64); 7] = [
 ];
 /// Prior probability that a group is absent.
 const ABSENT: f64 = 0.5;
-/// Most rounds over all groups.
-const ROUNDS: usize = 50;
+/// Most rounds over all groups …
+const ROUNDS: usize = 100;
+/// … of which this many go to where each group leads, later ones half the way.
+const WHOLE: usize = 20;
 /// A change of the probability that any group is absent by less than this has settled.
-const SETTLED: f64 = 1e-6;
+const SETTLED: f64 = 1e-8;
 
-/// Constants that share one size.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Group {
-    /// Their places among all constants.
-    pub places: Vec<usize>,
-    /// Usual 1σ of each, in its unit.
-    pub usual: Vec<f64>,
-}
+/// Information below this part of the largest is rounding.
+const ROUNDING: f64 = 1e-9;
 
-/// What data say of all constants: `½ xᵀ information x − xᵀ vector` is −ln L up to a constant.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Information {
-    pub information: DMatrix<f64>,
-    pub vector: DVector<f64>,
-}
-
-/// The average over all cases.
+/// The average over all cases of groups of constants, in units of their usual sizes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Average {
-    pub mean: DVector<f64>,
-    pub covariance: DMatrix<f64>,
+    /// The normal factor in place of the prior of each group, block by block.
+    pub sites: Sites,
     /// Probability that each group is absent.
     pub absent: Vec<f64>,
 }
-
-/// The normal factor in place of the prior of a group.
-struct Site(Information);
 
 /// A mean with its covariance.
 struct Moments {
@@ -60,99 +48,127 @@ struct Moments {
     covariance: DMatrix<f64>,
 }
 
-/// The average over all cases of groups that differ from zero; other constants have their prior in the information
-/// already. `None` if the information does not determine them.
-pub fn average(all: &Information, groups: &[Group]) -> Option<Average> {
-    let mut sites: Vec<Site> = groups.iter().map(Site::usual).collect();
-    let mut absent = vec![ABSENT; groups.len()];
-    let mut now = with_sites(all, groups, &sites)?;
-    for _ in 0..ROUNDS {
-        let mut most = 0.0f64;
-        for (k, group) in groups.iter().enumerate() {
-            let cavity = sites[k].cavity(group, &now)?;
-            let (moments, probability) = cases(&cavity, &group.usual)?;
-            most = most.max((probability - absent[k]).abs());
-            absent[k] = probability;
-            sites[k] = Site::between(&cavity, &moments)?;
-            now = with_sites(all, groups, &sites)?;
-        }
-        if most < SETTLED {
-            break;
+impl Average {
+    /// Every group present with its usual size.
+    pub fn usual(groups: &[Vec<usize>]) -> Self {
+        let n = groups.iter().map(Vec::len).sum();
+        Self {
+            sites: Sites {
+                information: DMatrix::identity(n, n),
+                vector: DVector::zeros(n),
+            },
+            absent: vec![ABSENT; groups.len()],
         }
     }
-    let Moments { mean, covariance } = now;
-    Some(Average {
-        mean,
-        covariance,
-        absent,
-    })
-}
 
-/// Mean and covariance of all constants.
-fn with_sites(all: &Information, groups: &[Group], sites: &[Site]) -> Option<Moments> {
-    let mut sum = all.clone();
-    for (group, Site(site)) in groups.iter().zip(sites) {
-        for (row, &i) in group.places.iter().enumerate() {
-            sum.vector[i] += site.vector[row];
-            for (column, &j) in group.places.iter().enumerate() {
-                sum.information[(i, j)] += site.information[(row, column)];
+    /// The average given what data say of all groups, each with its places among the constants, begun at this one; `None` if
+    /// the two contradict each other beyond rounding.
+    pub fn given(mut self, data: &Sites, groups: &[Vec<usize>]) -> Option<Self> {
+        for round in 0..ROUNDS {
+            let mut now = self.moments(data)?;
+            let mut most = 0.0f64;
+            for (k, places) in groups.iter().enumerate() {
+                let Some((site, absent)) = self.of_group(places, &now) else {
+                    continue;
+                };
+                let fraction = if round < WHOLE { 1.0 } else { 0.5 };
+                most = most.max((absent - self.absent[k]).abs());
+                self.absent[k] = absent;
+                let change = self.replace(places, &site, fraction);
+                now.update(places, &change)?;
+            }
+            if most < SETTLED {
+                break;
             }
         }
+        self.moments(data).map(|_| self)
     }
-    // With a diagonal of ones, whatever the units.
-    let scale = sum.information.diagonal().map(|value| value.sqrt().recip());
-    let scaled = DMatrix::from_fn(scale.len(), scale.len(), |i, j| {
-        sum.information[(i, j)] * scale[i] * scale[j]
-    });
-    let inverse = Cholesky::new(scaled)?.inverse();
-    let covariance = DMatrix::from_fn(scale.len(), scale.len(), |i, j| {
-        inverse[(i, j)] * scale[i] * scale[j]
-    });
-    let mean = &covariance * &sum.vector;
-    Some(Moments { mean, covariance })
+
+    /// Mean and covariance of all.
+    fn moments(&self, data: &Sites) -> Option<Moments> {
+        let information = &data.information + &self.sites.information;
+        let scale = information.diagonal().map(|value| value.sqrt().recip());
+        let n = scale.len();
+        let scaled = DMatrix::from_fn(n, n, |i, j| information[(i, j)] * scale[i] * scale[j]);
+        let inverse = Cholesky::new(scaled)?.inverse();
+        let covariance = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
+        Some(Moments {
+            mean: &covariance * (&data.vector + &self.sites.vector),
+            covariance,
+        })
+    }
+
+    /// The factor of a group that gives its average over all cases, given all others, and the probability that it is
+    /// absent; `None` if the others do not allow one yet.
+    fn of_group(&self, places: &[usize], now: &Moments) -> Option<(Sites, f64)> {
+        let own = now.covariance.select_rows(places).select_columns(places);
+        let inverse = Cholesky::new(own)?.inverse();
+        let (information, vector) = self.site(places);
+        let cavity = Sites {
+            vector: &inverse * now.mean.select_rows(places) - vector,
+            information: inverse - information,
+        };
+        let (average, absent) = cases(&cavity)?;
+        let inverse = Cholesky::new(average.covariance)?.inverse();
+        let site = Sites {
+            vector: &inverse * average.mean - cavity.vector,
+            information: inverse - cavity.information,
+        };
+        Some((site, absent))
+    }
+
+    fn site(&self, places: &[usize]) -> (DMatrix<f64>, DVector<f64>) {
+        let Sites {
+            information,
+            vector,
+        } = &self.sites;
+        let information = information.select_rows(places).select_columns(places);
+        (information, vector.select_rows(places))
+    }
+
+    /// Moves the factor of a group a fraction of the way to another; returns the change.
+    fn replace(&mut self, places: &[usize], site: &Sites, fraction: f64) -> Sites {
+        let (information, vector) = self.site(places);
+        let change = Sites {
+            information: (&site.information - information) * fraction,
+            vector: (&site.vector - vector) * fraction,
+        };
+        for (row, &i) in places.iter().enumerate() {
+            self.sites.vector[i] += change.vector[row];
+            for (column, &j) in places.iter().enumerate() {
+                self.sites.information[(i, j)] += change.information[(row, column)];
+            }
+        }
+        change
+    }
 }
 
-impl Site {
-    fn usual(group: &Group) -> Self {
-        let information = group.usual.iter().map(|sigma| sigma.powi(-2));
-        let information = DVector::from_iterator(group.usual.len(), information);
-        Self(Information {
-            vector: DVector::zeros(information.len()),
-            information: DMatrix::from_diagonal(&information),
-        })
-    }
-
-    /// What all but this site say of a group.
-    fn cavity(&self, group: &Group, Moments { mean, covariance }: &Moments) -> Option<Information> {
-        let places = &group.places;
-        let own = covariance.select_rows(places).select_columns(places);
-        let inverse = Cholesky::new(own)?.inverse();
-        Some(Information {
-            vector: &inverse * mean.select_rows(places) - &self.0.vector,
-            information: inverse - &self.0.information,
-        })
-    }
-
-    /// The factor between a cavity and the moments of the average over the cases.
-    fn between(cavity: &Information, Moments { mean, covariance }: &Moments) -> Option<Self> {
-        let inverse = Cholesky::new(covariance.clone())?.inverse();
-        Some(Self(Information {
-            vector: &inverse * mean - &cavity.vector,
-            information: inverse - &cavity.information,
-        }))
+impl Moments {
+    /// With the factor of a group changed (Woodbury's identity).
+    fn update(&mut self, places: &[usize], change: &Sites) -> Option<()> {
+        let across = self.covariance.select_columns(places);
+        let own = across.select_rows(places);
+        let n = places.len();
+        let inverse = (DMatrix::identity(n, n) + &change.information * own).try_inverse()?;
+        let gain = &across * &inverse;
+        // (P⁻¹ + ΔS)⁻¹ (P⁻¹ m + Δη) = m + P_g (I + ΔS P_gg)⁻¹ (Δη − ΔS m_g)
+        let mean = self.mean.select_rows(places);
+        self.mean += &gain * (&change.vector - &change.information * mean);
+        self.covariance -= gain * &change.information * across.transpose();
+        Some(())
     }
 }
 
 /// Mean and covariance of a group over its cases, given what all others say, and the probability that it is absent.
-fn cases(cavity: &Information, usual: &[f64]) -> Option<(Moments, f64)> {
-    let n = usual.len();
-    // In units of the usual sizes, along the directions that the others determine independently.
-    let scaled = DMatrix::from_fn(n, n, |i, j| {
-        cavity.information[(i, j)] * usual[i] * usual[j]
-    });
-    let turned = SymmetricEigen::try_new(scaled, f64::EPSILON, 0)?;
-    let scaled = DVector::from_fn(n, |i, _| cavity.vector[i] * usual[i]);
-    let told = turned.eigenvectors.tr_mul(&scaled);
+fn cases(cavity: &Sites) -> Option<(Moments, f64)> {
+    let n = cavity.vector.len();
+    // Along the directions that the others determine independently.
+    let turned = SymmetricEigen::try_new(cavity.information.clone(), f64::EPSILON, 0)?;
+    let largest = turned.eigenvalues.amax();
+    if turned.eigenvalues.min() < -ROUNDING * largest {
+        return None;
+    }
+    let told = turned.eigenvectors.tr_mul(&cavity.vector);
     let known = turned.eigenvalues.map(|value| value.max(0.0));
     let mut weights = vec![ABSENT.ln()];
     let mut means = vec![DVector::zeros(n)];
@@ -182,7 +198,7 @@ fn cases(cavity: &Information, usual: &[f64]) -> Option<(Moments, f64)> {
         squares += (of * of.transpose() + DMatrix::from_diagonal(variance)) * weight;
     }
     let covariance = squares - &mean * mean.transpose();
-    let back = DMatrix::from_fn(n, n, |i, j| usual[i] * turned.eigenvectors[(i, j)]);
+    let back = turned.eigenvectors;
     let covariance = &back * covariance * back.transpose();
     let mean = back * mean;
     Some((Moments { mean, covariance }, weights[0] / sum))
@@ -193,7 +209,7 @@ mod tests {
     use super::*;
 
     /// Two constants and two terms of one parameter each, seen in correlated rows.
-    fn seen(of_terms: [f64; 2]) -> Information {
+    fn seen(of_terms: [f64; 2]) -> Sites {
         let rows = DMatrix::from_row_slice(
             6,
             4,
@@ -203,7 +219,7 @@ mod tests {
             ],
         ) * 3.0;
         let truth = DVector::from_vec(vec![0.3, -0.2, of_terms[0], of_terms[1]]);
-        Information {
+        Sites {
             vector: rows.tr_mul(&(&rows * truth)),
             information: rows.tr_mul(&rows),
         }
@@ -291,7 +307,7 @@ mod tests {
 
     #[test]
     fn what_is_not_seen_at_all_stays_at_its_prior() {
-        let all = Information {
+        let all = Sites {
             information: DMatrix::from_diagonal(&DVector::from_vec(vec![4.0, 0.0])),
             vector: DVector::from_vec(vec![2.0, 0.0]),
         };

@@ -31,11 +31,25 @@ impl Slope {
     }
 }
 
+/// The lowest point found.
+pub struct Lowest {
+    pub at: DVector<f64>,
+    /// Inverse of the second derivatives there.
+    inverse: DMatrix<f64>,
+}
+
+impl Lowest {
+    /// 1σ of each logarithm, the cost being −2 ln of a density.
+    pub fn sigma(&self) -> DVector<f64> {
+        self.inverse.diagonal().map(|of| (2.0 * of.max(0.0)).sqrt())
+    }
+}
+
 /// The lowest point found from a start. The gradients improve the curvature (Broyden, Fletcher, Goldfarb, Shanno: Nocedal and Wright, *Numerical Optimization*, 2nd ed., §6.1).
 pub fn descend<E>(
     start: DVector<f64>,
     mut slope_at: impl FnMut(&DVector<f64>) -> Result<Slope, E>,
-) -> Result<DVector<f64>, E> {
+) -> Result<Lowest, E> {
     let n = start.len();
     let mut at = start;
     let mut here = slope_at(&at)?;
@@ -76,5 +90,8 @@ pub fn descend<E>(
         at += step;
         here = there;
     }
-    Ok(at)
+    Ok(Lowest {
+        at,
+        inverse: inverse_of(&here),
+    })
 }

@@ -2,30 +2,12 @@
 
 use nalgebra::Matrix3;
 
-/// Number of products summed in parallel.
-const LANES: usize = 4;
-
 /// `sum += weight row`
 #[inline]
 pub fn add<const N: usize>(sum: &mut [f64; N], weight: f64, row: &[f64; N]) {
     for k in 0..N {
         sum[k] += weight * row[k];
     }
-}
-
-#[inline]
-pub fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
-    // Several sums at once: a sum whose order is fixed waits for each of its terms.
-    let (of_a, rest_of_a) = a.as_chunks::<LANES>();
-    let (of_b, rest_of_b) = b.as_chunks::<LANES>();
-    let mut sums = [0.0; LANES];
-    for (a, b) in of_a.iter().zip(of_b) {
-        for k in 0..LANES {
-            sums[k] += a[k] * b[k];
-        }
-    }
-    let rest = rest_of_a.iter().zip(rest_of_b).map(|(a, b)| a * b);
-    sums.iter().sum::<f64>() + rest.sum::<f64>()
 }
 
 /// `L⁻¹` times rows.

@@ -1,0 +1,241 @@
+//! Single events that stand out: a wrong position, a move, a velocity, a step of a bias, a slip.
+
+use std::collections::BTreeMap;
+
+use nalgebra::DVector;
+use serde_json::json;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use crate::calibration::chain::states::{ATTITUDE, VELOCITY};
+use crate::calibration::chain::{Effect, Slip};
+use crate::calibration::sizes::{FREEDOM, Weighed};
+use crate::calibration::{Finding, FindingKind as Kind, Problem, Source};
+use crate::imu::Sensor;
+use crate::statistics::FALSE_ALARM;
+use crate::units::{ARCSEC, DEG_PER_H, MICRO_G};
+
+/// What stands out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EventKind {
+    /// The table's readings in one dwell.
+    Position,
+    /// A turn that the gyros did not sense.
+    Move,
+    /// A change of velocity that the accelerometers did not sense.
+    Velocity,
+    /// A change of the biases of a triad.
+    BiasStep(Sensor),
+    /// A turn that stays from then on: of the instrument on the table, or of the table on the ground.
+    Slip(Slip),
+}
+
+/// An event beyond what its effect, with its heavy tails, makes by chance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Event {
+    /// Its kind.
+    pub kind: EventKind,
+    /// Number of the dwell that it concerns or precedes, from zero.
+    pub dwell: usize,
+    /// End of the first part of that dwell, s.
+    pub time: f64,
+    /// Its size, in rad, m/s, rad/s or m/s².
+    pub size: f64,
+    /// −2 ln of the p-value, and its limit.
+    pub significance: f64,
+    /// The limit of the significance at a false-alarm rate of 0.1 % over all events.
+    pub limit: f64,
+}
+
+/// What all data say of an event.
+struct Told {
+    time: f64,
+    /// Squared means of its disturbances, and their expectation with its variance.
+    squares: f64,
+    known: f64,
+    /// Squared eigenvalues of that expectation, summed.
+    spread: f64,
+    count: f64,
+    /// Change of the states.
+    change: DVector<f64>,
+}
+
+impl Event {
+    /// The events of a problem that stand out. With its weight κ, the squares of an event's disturbances are `s` where `p`
+    /// is expected (of one, what the data tell of it); with the common variance they would be `s / p / (1 − p + p / κ)`
+    /// times what is expected. Student's tails make them a draw from Fisher's F.
+    pub(in crate::calibration) fn all(problem: &Problem, of: &Weighed) -> Vec<Self> {
+        let told = told(of);
+        let limit = -2.0 * (FALSE_ALARM / told.len().max(1) as f64).ln();
+        let events = told.iter().filter_map(|(&(effect, dwell), told)| {
+            let kind = EventKind::of(effect)?;
+            let freedom = told.known.powi(2) / told.spread;
+            let p = (told.known / told.count).clamp(0.0, 1.0);
+            let factor = of.filtered.sizes.of_event(effect, dwell);
+            let ratio = told.squares / told.known / (1.0 - p + p / factor);
+            let law = FisherSnedecor::new(freedom, FREEDOM).ok()?;
+            let chance = law.sf(ratio).max(f64::MIN_POSITIVE);
+            Some(Self {
+                kind,
+                dwell,
+                time: told.time,
+                size: kind.size(of, &told.change),
+                significance: -2.0 * chance.ln(),
+                limit,
+            })
+        });
+        let mut events: Vec<Self> = events.filter(|of| of.significance > of.limit).collect();
+        // By hand every move is another.
+        let table = problem.model.aiding == crate::run::Aiding::Table;
+        events.retain(|of| table || !matches!(of.kind, EventKind::Velocity));
+        events.sort_by_key(|event| event.dwell);
+        events
+    }
+
+    /// The finding on it: kind, time and treatment.
+    pub fn finding(&self) -> Finding {
+        let Self {
+            time,
+            dwell,
+            significance,
+            limit,
+            ..
+        } = self;
+        let number = dwell + 1;
+        let (kind, text) = self.kind.words(number, *time, self.size);
+        let text = format!("{text} (significance {significance:.0}; limit {limit:.0}).");
+        let figures = json!({
+            "dwell": number, "time_s": time, "size": self.size,
+            "significance": significance, "limit": limit
+        });
+        Finding::new(kind, text, figures)
+    }
+}
+
+/// What all data say of the events of effects with heavy tails.
+fn told(of: &Weighed) -> BTreeMap<(Effect, usize), Told> {
+    let (filtered, posterior) = (&of.filtered, &of.posterior);
+    let mut all = BTreeMap::<(Effect, usize), Told>::new();
+    filtered.backward(|number, cumulants| {
+        let link = &filtered.chain.links[number];
+        for drive in &link.transition.drives {
+            let variance = filtered.sizes.of(drive.effect, drive.event);
+            if !drive.effect.has_heavy_tails() || variance == 0.0 {
+                continue;
+            }
+            let of_constants = drive.by.tr_mul(&cumulants.by_constants);
+            let mean = drive.by.tr_mul(&cumulants.mean) - &of_constants * &posterior.mean;
+            let precision = drive.by.tr_mul(&cumulants.precision) * &drive.by
+                - &of_constants * &posterior.covariance * of_constants.transpose();
+            let change = &drive.by * &mean * variance;
+            let told = all.entry((drive.effect, drive.event)).or_insert(Told {
+                time: link.time,
+                squares: 0.0,
+                known: 0.0,
+                spread: 0.0,
+                count: 0.0,
+                change: DVector::zeros(change.len()),
+            });
+            told.time = link.time;
+            told.squares += variance * mean.norm_squared();
+            told.known += variance * precision.trace();
+            told.spread += variance.powi(2) * precision.norm_squared();
+            told.count += drive.by.ncols() as f64;
+            told.change += change;
+        }
+    });
+    all.retain(|_, told| told.known > 0.0 && told.spread > 0.0);
+    all
+}
+
+impl EventKind {
+    fn of(effect: Effect) -> Option<Self> {
+        Some(match effect {
+            Effect::Noise(Source::TablePosition) => Self::Position,
+            Effect::Noise(Source::GyroMotion) => Self::Move,
+            Effect::Noise(Source::AccelMotion) => Self::Velocity,
+            Effect::Noise(Source::GyroGaussMarkov) => Self::BiasStep(Sensor::Gyro),
+            Effect::Noise(Source::AccelGaussMarkov) => Self::BiasStep(Sensor::Accel),
+            Effect::Slip(slip) => Self::Slip(slip),
+            _ => return None,
+        })
+    }
+
+    /// Size of a change of the states.
+    fn size(self, of: &Weighed, change: &DVector<f64>) -> f64 {
+        let layout = of.filtered.layout();
+        let first = match self {
+            Self::Position => layout.table,
+            Self::Move => Some(ATTITUDE),
+            Self::Velocity => Some(VELOCITY),
+            Self::BiasStep(sensor) => Some(*layout.biases.get(sensor)),
+            Self::Slip(Slip::Mount) => layout.slips.map(|[mount, _]| mount),
+            Self::Slip(Slip::Base) => layout.slips.map(|[_, base]| base),
+        };
+        first.map_or(0.0, |first| change.rows(first, 3).norm())
+    }
+
+    /// Kind and words of the finding.
+    fn words(self, number: usize, time: f64, size: f64) -> (Kind, String) {
+        let angle = angle(size);
+        match self {
+            Self::Position => (
+                Kind::PositionWrong,
+                format!(
+                    "The table readings in dwell {number} are wrong by {angle} (at {time:.1} s). They have next to no \
+                     weight. Check the log there for a bump or a wrong reading"
+                ),
+            ),
+            Self::Move => (
+                Kind::MoveWrong,
+                format!(
+                    "In the move before dwell {number} (at {time:.1} s) the gyros missed a turn of {angle}. turncal \
+                     estimated this angle. Check the log there for lost samples, an exceeded range or a loose mount"
+                ),
+            ),
+            Self::Velocity => (
+                Kind::VelocityWrong,
+                format!(
+                    "In the move before dwell {number} (at {time:.1} s) the accelerometers missed a velocity of \
+                     {size:.2e} m/s. turncal estimated it. Check the log there for lost samples, an exceeded range or a \
+                     bump"
+                ),
+            ),
+            Self::BiasStep(sensor) => {
+                let (unit, name) = match sensor {
+                    Sensor::Gyro => (DEG_PER_H, "°/h"),
+                    Sensor::Accel => (MICRO_G, "µg"),
+                };
+                let (sensor, size) = (sensor.name(), size / unit);
+                (
+                    Kind::BiasStep,
+                    format!(
+                        "Before dwell {number} (at {time:.1} s) the {sensor} biases changed by about {size:.2} {name}. \
+                         The biases are the mean over the recording. Check the log there for a shock or a jump of \
+                         temperature or supply"
+                    ),
+                )
+            }
+            Self::Slip(slip) => {
+                let what = match slip {
+                    Slip::Mount => "the instrument slipped on the table",
+                    Slip::Base => "the table turned on the ground",
+                };
+                (
+                    Kind::Slipped,
+                    format!(
+                        "Before dwell {number} (at {time:.1} s) {what} by {angle}. turncal estimated this angle; \
+                         misalignments are those to the table as it stood before. Fasten it, and repeat the recording"
+                    ),
+                )
+            }
+        }
+    }
+}
+
+fn angle(size: f64) -> String {
+    let seconds = size / ARCSEC;
+    match seconds {
+        ..1000.0 => format!("{seconds:.0}″"),
+        _ => format!("{:.3}°", seconds / 3600.0),
+    }
+}

@@ -1,0 +1,146 @@
+//! Evidence for error terms, and the findings on those that are there and those that a path does not show.
+
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use crate::calibration::sizes::{Candidates, Weighed};
+use crate::calibration::{
+    Candidate, ErrorTerm, Finding, FindingKind as Kind, Group, Model, OBSERVED_BELOW, PARAMETERS,
+    Posterior,
+};
+use crate::statistics::FALSE_ALARM;
+
+/// A term that a path does not show is named if it widens the σ of a group by more than this.
+const NAMED: f64 = 1.25;
+
+/// Whether a candidate that is absent with this probability is named as there.
+pub fn is_shown(absent: f64) -> bool {
+    absent < FALSE_ALARM
+}
+
+/// Evidence for an error term.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TermEvidence {
+    /// The error term.
+    pub term: ErrorTerm,
+    /// Probability that it is there; one if it is stated or asked for.
+    pub present: f64,
+    /// Largest remaining part of its usual size: from 0 (known) to 1 (not shown by the recording).
+    pub remaining: f64,
+    /// RMS σ of each of [`Group::all`] with it, divided by that if it were known to be absent; `None` if the group has no σ.
+    pub sigma_factors: [Option<f64>; 6],
+}
+
+impl TermEvidence {
+    /// Of every term that may be there.
+    pub(in crate::calibration) fn all(
+        of: &Weighed,
+        candidates: &Candidates,
+        model: &Model,
+    ) -> Vec<Self> {
+        let absent = |term: ErrorTerm| {
+            let candidate = Candidate::Term(term.alike());
+            let mut absent = candidates.absent();
+            absent.find(|(other, _)| *other == candidate).map(|found| found.1)
+        };
+        let terms = ErrorTerm::constant().filter_map(|term| {
+            let asked = model.has(term);
+            let absent = absent(term).filter(|_| !asked && model.may_have.contains(&term));
+            if !asked && absent.is_none() {
+                return None;
+            }
+            let (n, m) = (of.prior.constants.len(), of.prior.candidates);
+            let constants = of.prior.constants.iter().enumerate();
+            let own = constants.filter(|(_, of)| of.error_term() == Some(term));
+            let own: Vec<usize> = own.map(|(k, _)| k).collect();
+            let candidates: Vec<usize> = own.iter().filter_map(|k| k.checked_sub(n - m)).collect();
+            let remaining = if asked {
+                let sigma = own.iter().map(|&k| {
+                    of.posterior.covariance[(k, k)].max(0.0).sqrt() / of.prior.sigma[k]
+                });
+                sigma.fold(0.0, f64::max)
+            } else {
+                of.known.effect_of(&candidates)?.1
+            };
+            // Next to certain is not certain.
+            let most = 1.0 - f64::EPSILON;
+            Some(Self {
+                term,
+                present: absent.map_or(1.0, |absent| (1.0 - absent).min(most)),
+                remaining,
+                sigma_factors: factors(&of.posterior, &own),
+            })
+        });
+        terms.collect()
+    }
+
+    /// The findings on terms that were not asked for.
+    pub(in crate::calibration) fn findings(all: &[Self]) -> Vec<Finding> {
+        all.iter().filter_map(Self::finding).collect()
+    }
+
+    fn finding(&self) -> Option<Finding> {
+        let Self {
+            term,
+            present,
+            remaining,
+            ..
+        } = self;
+        let name = term.name();
+        let figures = json!({ "term": name, "present": present, "remaining": remaining });
+        if *present == 1.0 {
+            return None;
+        }
+        if is_shown(1.0 - present) {
+            let text = format!(
+                "The data show an error that scale factors, misalignments and biases cannot explain: {name} (probability \
+                 above 99.9 %). turncal estimated it with them, as --with {name} does. Use the values only together \
+                 with this term."
+            );
+            return Some(Finding::new(Kind::ErrorTermEstimated, text, figures));
+        }
+        let (group, factor) = self.widest()?;
+        if *remaining < OBSERVED_BELOW || factor < NAMED {
+            return None;
+        }
+        let (shown_by, group) = (term.shown_by(), group.title());
+        let text = format!(
+            "This recording does not show {name}, which may be there: σ of {group} are {factor:.2} times what they \
+             would be without it. To show it, add {shown_by}; if the instrument does not have it, state [imu.terms] \
+             {name} = {{ sigma = 0 }}."
+        );
+        Some(Finding::new(Kind::TermNotShown, text, figures))
+    }
+
+    /// The group whose σ it widens most.
+    pub fn widest(&self) -> Option<(Group, f64)> {
+        let groups = Group::all().zip(self.sigma_factors);
+        let groups = groups.filter_map(|(group, factor)| Some((group, factor?)));
+        groups.max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+}
+
+/// σ of each group over that if the constants at these places were known.
+fn factors(posterior: &Posterior, places: &[usize]) -> [Option<f64>; 6] {
+    let covariance = &posterior.covariance;
+    let across = covariance.select_columns(places);
+    let own = across.select_rows(places);
+    let scale = own.diagonal().map(|variance| variance.sqrt().recip());
+    let scaled = nalgebra::DMatrix::from_fn(places.len(), places.len(), |i, j| {
+        own[(i, j)] * scale[i] * scale[j]
+    });
+    let across = across * nalgebra::DMatrix::from_diagonal(&scale);
+    let Some(factor) = scaled.cholesky() else {
+        return [None; 6];
+    };
+    let known = covariance - &across * factor.solve(&across.transpose());
+    let [with, without] = [covariance, &known]
+        .map(|of| crate::calibration::of_parameters(&posterior.constants, of).diagonal());
+    let mut each = Group::all().map(|group| {
+        let of_group = (0..PARAMETERS).filter(|&i| Group::of(i) == group);
+        let sums = of_group.map(|i| [with[i], without[i].max(0.0)]);
+        let [with, without] = sums.fold([0.0; 2], |[a, b], [c, d]| [a + c, b + d]);
+        Some((with / without).sqrt()).filter(|ratio: &f64| ratio.is_finite())
+    });
+    std::array::from_fn(|_| each.next().flatten())
+}

@@ -1,0 +1,178 @@
+//! The iterations: navigation, sizes of all effects and the chain in turn, until the parameters have settled.
+
+use std::sync::Arc;
+
+use crate::attitude::from_tilt_and_heading;
+use crate::calibration::chain::states::ATTITUDE;
+use crate::calibration::chain::{Chain, Filtered};
+use crate::calibration::linearisation::not_invertible;
+use crate::calibration::passes::tell;
+use crate::calibration::sizes::{Effects, Weighed};
+use crate::calibration::{
+    AttitudePrior, CalibrationError, Constant, Estimate, Linearisation, Pass, Posterior, Problem,
+    Progress, Script, from_vector, to_vector,
+};
+
+/// The sizes are estimated in earnest once no parameter moves by more than this, in σ: before, the misfit is that of the
+/// linearisation.
+const NEAR: f64 = 2.0;
+/// After a step longer than this fraction of the one before, all further steps are halved.
+const SHRINKS: f64 = 0.8;
+/// Most halvings of a step that leads nowhere: to a thousandth.
+const MOST_SHORTENED: usize = 10;
+
+/// A problem whose iterations have ended.
+#[derive(Debug, Clone)]
+pub struct Solved {
+    /// Events at the last linearisation point, and the chain made of them.
+    pub script: Arc<Script>,
+    pub chain: Arc<Chain>,
+    pub effects: Effects,
+    pub posterior: Posterior,
+    /// Parameters and attitudes after the last pass.
+    pub estimate: Linearisation,
+    pub passes: Vec<Pass>,
+    pub converged: bool,
+}
+
+/// Iterates from a starting point with these priors of the initial attitudes.
+///
+/// # Errors
+/// [`CalibrationError`] if no pass is possible at the start. Without convergence, the result says so.
+pub fn solve(
+    problem: &Problem,
+    (start, priors): (&Linearisation, &[AttitudePrior]),
+    progress: Progress,
+) -> Result<Solved, CalibrationError> {
+    let mut at = start.clone();
+    let mut effects = Effects::new(problem);
+    let mut passes = Vec::new();
+    let mut before: Option<Solved> = None;
+    let (mut fraction, mut shortened) = (1.0, 0);
+    let (mut step, mut was_near) = (f64::INFINITY, false);
+    loop {
+        let is_near = step < NEAR;
+        let first_near = is_near && !was_near;
+        was_near |= is_near;
+        let solved = one_pass(problem, (&at, priors), &mut effects, first_near);
+        let mut solved = match (solved, before) {
+            (Ok(solved), _) => solved,
+            (Err(error), None) => return Err(error),
+            // Where a step leads nowhere, a shorter one is made.
+            (Err(_), Some(last)) if shortened < MOST_SHORTENED => {
+                shortened += 1;
+                at = last.script.at.towards(&at, 0.5);
+                effects = last.effects.clone();
+                before = Some(last);
+                continue;
+            }
+            (Err(_), Some(last)) => return Ok(Solved { passes, ..last }),
+        };
+        let pass = Pass {
+            largest_step: largest(&solved.posterior),
+            cost: solved.posterior.cost,
+            observations: solved.chain.observations,
+        };
+        tell(progress, &pass)?;
+        passes.push(pass);
+        if was_near && effects.are_settled && pass.largest_step > SHRINKS * step {
+            fraction *= 0.5;
+        }
+        step = pass.largest_step;
+        solved.converged = was_near && effects.are_settled && step <= problem.options.converged_sigma;
+        if solved.converged || passes.len() >= problem.options.passes {
+            return Ok(Solved { passes, ..solved });
+        }
+        at = at.towards(&solved.estimate, fraction);
+        before = Some(solved);
+    }
+}
+
+/// One pass: navigates, makes the sizes likelier, and solves the chain.
+fn one_pass(
+    problem: &Problem,
+    (at, priors): (&Linearisation, &[AttitudePrior]),
+    effects: &mut Effects,
+    first_near: bool,
+) -> Result<Solved, CalibrationError> {
+    let script = Script::new(problem, priors, at)?;
+    effects.improve(problem, &script, first_near)?;
+    let chain = effects.chain(problem, &script)?;
+    let Weighed {
+        filtered,
+        posterior,
+        ..
+    } = effects.weighed(&chain, problem, &script)?;
+    let mut estimate = filtered.moved(at, &posterior);
+    if not_invertible(&estimate.triads).is_some() {
+        estimate = at.clone();
+    }
+    Ok(Solved {
+        effects: effects.clone(),
+        posterior,
+        estimate,
+        passes: Vec::new(),
+        converged: false,
+        script: Arc::new(script),
+        chain: Arc::new(chain),
+    })
+}
+
+/// Largest step of any parameter, in σ; a step that is no number is no step to end with.
+fn largest(posterior: &Posterior) -> f64 {
+    let variance = posterior.parameter_covariance.diagonal();
+    let steps = posterior.parameters.iter().zip(&variance);
+    let steps = steps.filter(|(_, variance)| **variance != 0.0);
+    steps
+        .map(|(step, variance)| (step / variance.sqrt()).abs())
+        .max_by(f64::total_cmp)
+        .unwrap_or(0.0)
+}
+
+impl Filtered<'_> {
+    /// The linearisation point of the next pass.
+    pub fn moved(&self, at: &Linearisation, posterior: &Posterior) -> Linearisation {
+        let values = to_vector(&at.triads) + posterior.parameters;
+        let mut moved = Linearisation {
+            triads: from_vector(at.triads.gyro.form, &values),
+            initial_attitudes: Vec::new(),
+            dwells: Vec::new(),
+            own: Vec::new(),
+            ..at.clone()
+        };
+        for (constant, error) in posterior.constants.iter().zip(&posterior.mean) {
+            match constant {
+                Constant::Term(index) => moved.terms[*index] += error,
+                Constant::Thermal(of) => *of.of_mut(&mut moved.thermal) += error,
+                _ => {}
+            }
+        }
+        for (link, states) in self.states(posterior, |link| link.attitude.is_some()) {
+            let Some(computed) = link.attitude else {
+                continue;
+            };
+            let error = states.mean.fixed_rows::<3>(ATTITUDE).into_owned();
+            let attitude = from_tilt_and_heading(&error) * computed;
+            if link.begins {
+                moved.initial_attitudes.push(attitude);
+            }
+            moved.dwells.push(attitude);
+            while moved.own.len() <= link.recording && !self.layout().own.is_empty() {
+                moved.own.push(at.own(moved.own.len()));
+                let recording = moved.own.len() - 1;
+                for &(state, of) in &self.layout().own {
+                    *moved.own[recording].get_mut(of) += states.mean[state];
+                }
+            }
+        }
+        moved
+    }
+}
+
+impl Solved {
+    /// The estimate of both triads; its covariance has no part beside that of the chain.
+    pub fn both_triads(&self) -> Estimate {
+        let linear = &self.posterior.parameter_covariance;
+        Estimate::with_curvature(self.estimate.triads, linear)
+    }
+}

@@ -1,0 +1,33 @@
+//! Passes over a recording, and who watches them.
+
+use std::ops::ControlFlow;
+
+use crate::calibration::CalibrationError;
+
+/// One pass over the recording.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pass {
+    /// The largest step of any parameter from the linearisation point, in σ.
+    pub largest_step: f64,
+    /// Whitened innovations squared plus prior, summed.
+    pub cost: f64,
+    /// Number of scalar observations that entered the cost.
+    pub observations: usize,
+}
+
+/// Callback after each pass, which may stop the work; the command line displays the progress.
+pub type Progress<'a> = &'a (dyn Fn(&Pass) -> ControlFlow<()> + Sync);
+
+/// A callback that does nothing.
+pub const UNWATCHED: Progress<'static> = &|_| ControlFlow::Continue(());
+
+/// Reports a pass.
+///
+/// # Errors
+/// [`CalibrationError::Stopped`] if the callback stops the work.
+pub fn tell(progress: Progress, pass: &Pass) -> Result<(), CalibrationError> {
+    match progress(pass) {
+        ControlFlow::Continue(()) => Ok(()),
+        ControlFlow::Break(()) => Err(CalibrationError::Stopped),
+    }
+}

@@ -1,0 +1,98 @@
+//! Constants that may be absent, averaged over that and their sizes.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::averages::Average;
+use crate::calibration::constants::Sites;
+use crate::calibration::{Candidate, Constant, Known, Model, Prior};
+
+/// Constants that may be absent, in groups, with the average over their cases.
+#[derive(Debug, Clone)]
+pub struct Candidates {
+    all: Vec<Candidate>,
+    /// Places of the constants of each among those that may be absent.
+    places: Vec<Vec<usize>>,
+    average: Average,
+}
+
+impl Candidates {
+    /// Those among constants, each present with its usual size.
+    pub fn new(constants: &[Constant], model: &Model) -> Self {
+        let mut all = Vec::new();
+        let mut places = Vec::<Vec<usize>>::new();
+        let candidates = constants.iter().filter_map(|&of| Candidate::of(of, model));
+        for (place, candidate) in candidates.enumerate() {
+            match all.iter().position(|&of| of == candidate) {
+                Some(k) => places[k].push(place),
+                None => {
+                    all.push(candidate);
+                    places.push(vec![place]);
+                }
+            }
+        }
+        Self {
+            average: Average::usual(&places),
+            all,
+            places,
+        }
+    }
+
+    /// The candidates with the probability that each is absent.
+    pub fn absent(&self) -> impl Iterator<Item = (Candidate, f64)> + '_ {
+        let absent = self.average.absent.iter().copied();
+        self.all.iter().copied().zip(absent)
+    }
+
+    /// The candidates with the places of their constants among those that may be absent.
+    pub fn places(&self) -> impl Iterator<Item = (Candidate, &[usize])> {
+        self.all.iter().copied().zip(self.places.iter().map(Vec::as_slice))
+    }
+
+    /// Normal factors in place of their prior, as errors of the linearisation point of this one.
+    pub fn sites(&self, prior: &Prior) -> Sites {
+        let (usual, at) = usual_and_values(prior);
+        let Sites {
+            information,
+            vector,
+        } = &self.average.sites;
+        let inverse = DMatrix::from_diagonal(&usual.map(f64::recip));
+        let information = &inverse * information * &inverse;
+        Sites {
+            vector: inverse * vector - &information * at,
+            information,
+        }
+    }
+
+    /// Averages over all cases, given what is known of the constants; returns the largest change of a probability.
+    pub fn weigh(&mut self, known: &Known, prior: &Prior) -> f64 {
+        if self.all.is_empty() {
+            return 0.0;
+        }
+        let (usual, at) = usual_and_values(prior);
+        let of_data = known.of_candidates();
+        let scale = DMatrix::from_diagonal(&usual);
+        let data = Sites {
+            vector: &scale * (of_data.vector + &of_data.information * at),
+            information: &scale * of_data.information * &scale,
+        };
+        let begun = [self.average.clone(), Average::usual(&self.places)];
+        let found = begun.into_iter().find_map(|of| of.given(&data, &self.places));
+        let Some(found) = found else {
+            return 0.0;
+        };
+        let pairs = found.absent.iter().zip(&self.average.absent);
+        let change = pairs.map(|(now, before)| (now - before).abs());
+        let change = change.fold(0.0, f64::max);
+        self.average = found;
+        change
+    }
+}
+
+/// Usual size of each constant that may be absent, and its value at the linearisation point.
+fn usual_and_values(prior: &Prior) -> (DVector<f64>, DVector<f64>) {
+    let (n, m) = (prior.sigma.len(), prior.candidates);
+    (
+        prior.sigma.rows(n - m, m).into_owned(),
+        -prior.mean.rows(n - m, m),
+    )
+}

@@ -1,0 +1,302 @@
+//! How large all effects are: noise at rest from the dwells alone, all others from the chain, and what may be absent.
+
+mod at_rest;
+mod averages;
+mod candidates;
+mod descent;
+mod likeliest;
+mod usual;
+
+use nalgebra::DVector;
+
+use crate::calibration::chain::{Chain, Dispersion, Effect, Filtered, Sizes, Slip};
+use crate::calibration::checks::recordings::RecordingDifference;
+use crate::calibration::noise::INTERVAL;
+use crate::calibration::{
+    CalibrationError, Constant, Known, Model, NoisePolicy, NoiseReport, NoiseTest, Posterior,
+    Prior, Problem, Script, SourceFigures,
+};
+use crate::statistics::{FALSE_ALARM, chi_square_limit};
+pub use candidates::Candidates;
+pub use likeliest::FREEDOM;
+use likeliest::{At, Search};
+pub use usual::LOG_SIGMA;
+pub use usual::Usual;
+use usual::What;
+
+/// Most rounds of sizes and averages at one linearisation point, when the first is near.
+const ROUNDS: usize = 4;
+/// A change of the logarithm of every size, or of the probability that something is absent, by less than this has
+/// settled.
+const SETTLED: f64 = 0.1;
+/// A stated figure is named as wrong if it is more than this times too small: σ that grow by half are no longer those
+/// that were expected.
+const NAMED: f64 = 1.5;
+
+/// A size as estimated.
+#[derive(Debug, Clone, Copy)]
+struct Size {
+    usual: Usual,
+    /// Logarithm over the usual size, and its 1σ.
+    log: f64,
+    sigma: f64,
+}
+
+/// Sizes of all effects.
+#[derive(Debug, Clone)]
+pub struct Effects {
+    at_rest: Vec<Size>,
+    between: Vec<Size>,
+    pub dispersion: Dispersion,
+    /// Variances of single events over those of their effects.
+    events: Sizes,
+    pub candidates: Candidates,
+    pub are_settled: bool,
+}
+
+/// The chain with its sizes, and what it says of the constants.
+pub struct Weighed<'a> {
+    pub filtered: Filtered<'a>,
+    pub prior: Prior,
+    pub known: Known,
+    pub posterior: Posterior,
+}
+
+impl Effects {
+    /// As stated.
+    pub fn new(problem: &Problem) -> Self {
+        let constants = Constant::all(&problem.model, problem.one_gravity());
+        Self {
+            at_rest: Vec::new(),
+            between: Vec::new(),
+            dispersion: Dispersion::alike(problem),
+            events: Sizes::default(),
+            candidates: Candidates::new(&constants, &problem.model),
+            are_settled: false,
+        }
+    }
+
+    /// Makes the sizes likelier at a linearisation point, in several rounds if they are not yet near.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    pub fn improve(
+        &mut self,
+        problem: &Problem,
+        script: &Script,
+        is_near: bool,
+    ) -> Result<(), CalibrationError> {
+        let is_stated = problem.options.noise == NoisePolicy::Stated;
+        if !is_stated {
+            self.improve_at_rest(problem, script);
+        }
+        let rounds = if is_near { ROUNDS } else { 1 };
+        let chain = self.chain(problem, script)?;
+        let prior = Prior::new(&chain.constants, &problem.model, &script.at);
+        for round in 0..rounds {
+            let change = if is_stated {
+                let filtered = chain.filter(&self.sizes(&chain))?;
+                self.candidates.weigh(&filtered.known(&prior), &prior)
+            } else {
+                self.improve_between(&chain, &prior)?
+            };
+            if round == 0 {
+                self.are_settled = change < SETTLED;
+            }
+            if change < SETTLED {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// The noise at rest, from the dwells alone.
+    fn improve_at_rest(&mut self, problem: &Problem, script: &Script) {
+        let usual = Usual::all(problem, &script.moves());
+        let (between, at_rest): (Vec<Usual>, Vec<Usual>) =
+            usual.into_iter().partition(|of| of.effect().is_some());
+        let before = (!self.at_rest.is_empty()).then(|| {
+            let logs = self.at_rest.iter().map(|size| size.log);
+            let logs = DVector::from_iterator(self.at_rest.len(), logs);
+            (self.dispersion.clone(), logs)
+        });
+        let still = at_rest::likeliest(problem, script, &at_rest, before);
+        self.dispersion = still.dispersion;
+        let sizes = at_rest.into_iter().zip(&still.logs).zip(&still.sigma);
+        self.at_rest = sizes
+            .map(|((usual, &log), &sigma)| Size { usual, log, sigma })
+            .collect();
+        let log = |k: usize| self.between.get(k).map_or(0.0, |size: &Size| size.log);
+        let sizes = between.into_iter().enumerate();
+        self.between = sizes
+            .map(|(k, usual)| Size {
+                usual,
+                log: log(k),
+                sigma: usual.spread,
+            })
+            .collect();
+    }
+
+    /// The sizes between dwells and the averages over what may be absent; returns the largest change.
+    fn improve_between(&mut self, chain: &Chain, prior: &Prior) -> Result<f64, CalibrationError> {
+        let usual: Vec<Usual> = self.between.iter().map(|size| size.usual).collect();
+        let search = Search {
+            chain,
+            prior,
+            usual: &usual,
+        };
+        let mut start = At::usual(&usual, chain);
+        let before = DVector::from_iterator(usual.len(), self.between.iter().map(|of| of.log));
+        start.logs.copy_from(&before);
+        if self.events != Sizes::default() {
+            start.events = self.events.clone();
+        }
+        let here = search.likeliest(start, &self.candidates.sites(prior))?;
+        let change = self.candidates.weigh(&here.known, prior);
+        let sigma = here.sigma(&usual);
+        for (k, size) in self.between.iter_mut().enumerate() {
+            (size.log, size.sigma) = (here.at.logs[k], sigma[k]);
+        }
+        let of_sizes = if usual.is_empty() { 0.0 } else { (&here.at.logs - before).amax() };
+        self.events = here.at.events;
+        Ok(change.max(of_sizes))
+    }
+
+    /// The chain at a linearisation point.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Diverged`] if a part of a dwell cannot be reduced.
+    pub fn chain(&self, problem: &Problem, script: &Script) -> Result<Chain, CalibrationError> {
+        let made = problem.with(|model| self.set(model, |_| 0.0));
+        Chain::new(&made, script, &self.dispersion)
+    }
+
+    /// What a chain says of the constants.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    pub fn weighed<'a>(
+        &self,
+        chain: &'a Chain,
+        problem: &Problem,
+        script: &Script,
+    ) -> Result<Weighed<'a>, CalibrationError> {
+        let filtered = chain.filter(&self.sizes(chain))?;
+        let prior = Prior::new(&chain.constants, &problem.model, &script.at);
+        let known = filtered.known(&prior);
+        let time = chain.links.last().map_or(0.0, |link| link.time);
+        let posterior = filtered
+            .posterior_with(&known, &self.candidates.sites(&prior))
+            .ok_or(CalibrationError::Diverged { time })?;
+        Ok(Weighed {
+            filtered,
+            prior,
+            known,
+            posterior,
+        })
+    }
+
+    /// Variances over those with which the links of a chain are made; as stated, nothing slips.
+    pub fn sizes(&self, chain: &Chain) -> Sizes {
+        if self.at_rest.is_empty() && self.between.is_empty() {
+            let slips = chain.states.slips.is_some();
+            let slips = [Slip::Mount, Slip::Base].into_iter().filter(|_| slips);
+            return slips.fold(Sizes::default(), |sizes, slip| {
+                sizes.with(Effect::Slip(slip), 0.0)
+            });
+        }
+        let each = self.between.iter();
+        each.fold(self.events.clone(), |sizes, size| match size.usual.effect() {
+            Some(effect) => sizes.with(effect, (2.0 * size.log).exp()),
+            None => sizes,
+        })
+    }
+
+    /// Sets the noise at rest in a model, and all other effects at a logarithm over their usual sizes.
+    fn set(&self, model: &mut Model, log: impl Fn(&Size) -> f64) {
+        self.at_rest
+            .iter()
+            .for_each(|size| size.usual.set(model, size.log));
+        self.between
+            .iter()
+            .for_each(|size| size.usual.set(model, log(size)));
+    }
+
+    /// A model with all sizes.
+    pub fn model(&self, stated: &Model) -> Model {
+        let mut model = stated.clone();
+        self.set(&mut model, |size| size.log);
+        model
+    }
+
+    /// The noise that was used, and whether the data contradict what is stated.
+    pub fn report(&self, problem: &Problem) -> NoiseReport {
+        let policy = problem.options.noise;
+        if policy == NoisePolicy::Stated {
+            return NoiseReport::stated(policy, None);
+        }
+        let sizes = self.at_rest.iter().chain(&self.between);
+        let figures = sizes.clone().filter_map(|size| {
+            let What::Noise(source) = size.usual.what else {
+                return None;
+            };
+            let used = size.usual.sigma * size.log.exp();
+            let off = INTERVAL * size.sigma;
+            let interval = [-off, off].map(|off| used * off.exp());
+            let stated = size.usual.stated.then_some(size.usual.sigma);
+            Some(SourceFigures::new(source, stated, used, Some(interval)))
+        });
+        let stated = sizes.filter(|size| size.usual.stated);
+        let distances = stated.map(|size| (size.log, (size.log / size.sigma).powi(2)));
+        let distances: Vec<(f64, f64)> = distances.collect();
+        let limit = chi_square_limit(1.0, FALSE_ALARM / distances.len().max(1) as f64);
+        NoiseReport {
+            policy,
+            learnt: true,
+            test: Some(NoiseTest {
+                ratio: distances.iter().map(|of| of.1).fold(0.0, f64::max),
+                limit,
+                rejected: distances
+                    .iter()
+                    .any(|&(log, distance)| distance > limit && log > NAMED.ln()),
+            }),
+            sources: figures.collect(),
+        }
+    }
+
+    /// Differences between recordings beyond the stated ones, from a chain with these sizes.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    pub fn differences(
+        &self,
+        of: &Weighed,
+        problem: &Problem,
+    ) -> Result<Vec<RecordingDifference>, CalibrationError> {
+        let each = self.between.iter().filter_map(|size| match size.usual.what {
+            What::Difference(group) => Some((size, group)),
+            What::Noise(_) => None,
+        });
+        let each: Vec<_> = each.collect();
+        let limit = chi_square_limit(1.0, FALSE_ALARM / each.len().max(1) as f64);
+        let sites = self.candidates.sites(&of.prior);
+        let mut found = Vec::new();
+        for (size, group) in each {
+            let without = if size.usual.stated { 1.0 } else { 0.0 };
+            let sizes = self.sizes(of.filtered.chain);
+            let sizes = sizes.with(Effect::Difference(group), without);
+            let filtered = of.filtered.chain.filter(&sizes)?;
+            let posterior = filtered.posterior_with(&filtered.known(&of.prior), &sites);
+            let ratio = posterior.map_or(0.0, |other| other.deviance - of.posterior.deviance);
+            if ratio > limit && size.log > 0.0 || ratio > limit && !size.usual.stated {
+                let difference = RecordingDifference::new(group, &problem.model, &size.usual, size.log);
+                found.push(RecordingDifference {
+                    ratio,
+                    limit,
+                    ..difference
+                });
+            }
+        }
+        Ok(found)
+    }
+}
