@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let sigma = calibration.sigma_of(name).copied().unwrap_or(f64::NAN);
         println!("{name} = {:.6} ± {sigma:.6}", calibration[name]);
     }
-    for finding in solution.findings(&assessment) {
+    for finding in solution.findings() {
         println!("{finding}");
     }
     Ok(())

@@ -134,7 +134,7 @@ fn calibrate(bencher: Bencher, name: &str) {
     bencher
         .counter(ItemsCount::new(run.recording.imu.len()))
         .bench(|| {
-            let mut solution = problem.solve(Method::Ekf, UNWATCHED)?;
+            let solution = problem.solve(Method::Ekf, UNWATCHED)?;
             solution.assess(&problem)
         });
 }

@@ -303,7 +303,7 @@ mod by_hand {
         let (_, shown) = status.expected.unwrap().history.pop().unwrap();
 
         let problem = Problem::new(&run, &Options::default());
-        let mut solution = problem.solve(Method::Ekf, UNWATCHED).unwrap();
+        let solution = problem.solve(Method::Ekf, UNWATCHED).unwrap();
         solution.assess(&problem).unwrap();
         let found = by_group(&solution.estimate().sigma(), solution.estimate());
         for ((group, shown), (_, found)) in shown.into_iter().zip(found) {

@@ -363,7 +363,7 @@ fn spoilt_calibrations() {
     let read = turncal_files::read_run(&run.path().join("run.toml")).unwrap();
     let problem = Problem::new(&read, &Options::default());
     let outcome = estimate(&problem, UNWATCHED).unwrap();
-    let record = outcome.record(&problem, &[], &outcome.quality(&problem).unwrap());
+    let record = outcome.record(&problem, &outcome.quality(&problem).unwrap());
     let path = run.path().join("calibration.json");
     turncal_files::write_calibration(&record, &path, false).unwrap();
     let kept = fuzz(&run, "calibration.json", |directory| {

@@ -29,7 +29,6 @@ mod init;
 mod interrupted;
 mod labels;
 mod learnt_noise;
-mod lock;
 mod logs;
 mod lot;
 mod lot_slow;

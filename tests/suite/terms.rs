@@ -155,7 +155,7 @@ fn a_record_with_terms_says_that_the_correction_is_not_all() {
         let problem = Problem::new(&run, options);
         let outcome = estimate(&problem, UNWATCHED).unwrap();
         let quality = outcome.quality(&problem).unwrap();
-        outcome.record(&problem, &[], &quality).equation.unwrap()
+        outcome.record(&problem, &quality).equation.unwrap()
     };
     // Errors of the table are none of the instrument.
     assert_eq!(equation(&stated()), EQUATION);
@@ -168,8 +168,7 @@ fn without_terms(term: Term) -> (Outcome, SMatrix<f64, 24, 1>) {
     run.instrument.term_sigma = TermVector::zeros();
     let outcome = estimate(&Problem::new(&run, &stated().no_auto_terms()), UNWATCHED).unwrap();
     let error = outcome.estimate.vector() - to_vector(&truth);
-    let sigma = outcome.covariance_by_noise.diagonal().map(f64::sqrt);
-    let normalised = error.component_div(&sigma);
+    let normalised = error.component_div(&outcome.estimate.sigma());
     (outcome, normalised)
 }
 

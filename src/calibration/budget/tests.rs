@@ -1,9 +1,6 @@
 use super::*;
-use crate::calibration::gauss_newton::UNWATCHED;
 use crate::calibration::model::Model;
-use crate::calibration::pass::{Gate, PassResult, pass};
-use crate::calibration::reduction::Script;
-use crate::calibration::{ErrorTerm, NoisePolicy, Options, estimate};
+use crate::calibration::{ErrorTerm, NoisePolicy, Options, UNWATCHED, estimate};
 use crate::imu::{Sensor, Term};
 use crate::run::{Aiding, Run};
 use crate::simulation::Scenario;
@@ -25,10 +22,14 @@ fn difference(a: &ParameterMatrix, b: &ParameterMatrix) -> f64 {
         .fold(0.0, f64::max)
 }
 
-fn once_more(problem: &Problem, outcome: &Outcome) -> PassResult {
-    let (priors, at) = (&outcome.prior_attitudes, &outcome.linearised_at);
-    let script = Script::new(problem, priors, at).unwrap();
-    pass(problem, &script, Gate::As(&outcome.accepted())).unwrap()
+/// Covariance of the parameters with another model at the same point.
+fn once_more(problem: &Problem, outcome: &Outcome) -> ParameterMatrix {
+    let Solved {
+        script, effects, ..
+    } = &*outcome.solved;
+    let chain = effects.chain(problem, script).unwrap();
+    let weighed = effects.weighed(&chain, problem, script).unwrap();
+    weighed.posterior.parameter_covariance
 }
 
 #[test]
@@ -103,8 +104,7 @@ fn held_against_passes(run: &Run, options: &Options) -> usize {
         let covariance = |factor: f64| {
             let mut model = model.clone();
             change(&mut model, factor.sqrt());
-            let again = once_more(&problem.with_model(model), &outcome);
-            again.posterior.parameter_covariance
+            once_more(&problem.with_model(model), &outcome)
         };
         let lost = (covariance(1.0 + STEP) - covariance(1.0 - STEP)) / (2.0 * STEP);
         let apart = lost - part.covariance;

@@ -63,6 +63,11 @@ impl Candidates {
         }
     }
 
+    /// Begins the average anew, each candidate present with its usual size.
+    pub fn begin(&mut self) {
+        self.average = Average::usual(&self.places);
+    }
+
     /// Averages over all cases, given what is known of the constants; returns the largest change of a probability.
     pub fn weigh(&mut self, known: &Known, prior: &Prior) -> f64 {
         if self.all.is_empty() {

@@ -96,16 +96,17 @@ impl<'a> Search<'a> {
         let mut here = self.here(start, sites)?;
         for _ in 0..STEPS {
             let next = self.next(&here);
-            let mut fraction = 1.0;
-            let mut there = self.here(next.clone(), sites)?;
-            while there.cost > here.cost && fraction > SHORTEST {
-                fraction *= 0.5;
-                there = self.here(here.at.towards(&next, fraction), sites)?;
-            }
+            let fractions = std::iter::successors(Some(1.0), |of| Some(0.5 * of));
+            let mut shorter = fractions.take_while(|&of| of > SHORTEST);
+            let lower = shorter.find_map(|fraction| {
+                let there = self.here(here.at.towards(&next, fraction), sites).ok()?;
+                (there.cost < here.cost).then_some(there)
+            });
+            let Some(there) = lower else {
+                break;
+            };
             let fall = here.cost - there.cost;
-            if fall > 0.0 {
-                here = there;
-            }
+            here = there;
             if fall < SETTLED {
                 break;
             }

@@ -151,7 +151,13 @@ impl Effects {
         if self.events != Sizes::default() {
             start.events = self.events.clone();
         }
-        let here = search.likeliest(start, &self.candidates.sites(prior))?;
+        let mut here = search.likeliest(start.clone(), &self.candidates.sites(prior));
+        if here.is_err() {
+            // What averages said elsewhere may contradict the rows here.
+            self.candidates.begin();
+            here = search.likeliest(start, &self.candidates.sites(prior));
+        }
+        let here = here?;
         let change = self.candidates.weigh(&here.known, prior);
         let sigma = here.sigma(&usual);
         for (k, size) in self.between.iter_mut().enumerate() {

@@ -147,7 +147,6 @@ fn a_calibration_comes_back_as_it_went() {
         velocity: Some(nis),
         table: None,
         attitude: None,
-        dwells: None,
     });
     record.warnings = vec!["heading is not observed".to_owned()];
     record.fixed = vec!["accel.installation.xy".to_owned()];

@@ -96,7 +96,7 @@ mod tests {
             Verdict::of(&kinds.iter().map(finding).collect::<Vec<_>>())
         };
         assert_eq!(of(&[]).word, Word::Good);
-        assert_eq!(of(&[Kind::Recording, Kind::Outliers]), of(&[]));
+        assert_eq!(of(&[Kind::Recording, Kind::TermNotShown]), of(&[]));
         let care = of(&[
             Kind::Recording,
             Kind::NoiseLearnt,

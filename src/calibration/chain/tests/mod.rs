@@ -1,15 +1,18 @@
+mod batch;
+
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
-use super::at_rest::Dispersion;
-use super::estimate::{Estimated, estimate};
-use super::{Chain, Effect, Sizes, Slip};
+use super::{Chain, Dispersion, Effect, Sizes, Slip};
 use crate::attitude::{exp, matrix, quaternion};
 use crate::calibration::start::coarse::coarse_start;
+use crate::calibration::constants::Sites;
+use crate::calibration::iterations::{Solved, solve};
 use crate::calibration::{
-    AttitudePrior, ErrorTerm, Linearisation, NoisePolicy, Options, PARAMETERS, ParameterVector,
-    Posterior, Prior, Problem, Script, Source, nees, to_vector,
+    AttitudePrior, ErrorTerm, Estimate, Linearisation, NoisePolicy, Options, PARAMETERS,
+    ParameterVector, Posterior, Prior, Problem, Script, Source, UNWATCHED, nees, to_vector,
 };
+use batch::batch_estimate;
 use crate::imu::{PerSensor, Triad};
 use crate::run::{Aiding, Run};
 use crate::simulation::Scenario;
@@ -33,18 +36,6 @@ fn prior(problem: &Problem, chain: &Chain, at: &Linearisation) -> Prior {
     Prior::new(&chain.constants, &problem.model, at)
 }
 
-/// Largest difference of two covariances, over their σ.
-fn apart(one: &DMatrix<f64>, other: &DMatrix<f64>) -> f64 {
-    let mut most = 0.0f64;
-    for i in 0..one.nrows() {
-        for j in 0..one.nrows() {
-            let scale = (one[(i, i)] * one[(j, j)]).sqrt();
-            most = most.max((one[(i, j)] - other[(i, j)]).abs() / scale);
-        }
-    }
-    most
-}
-
 /// With constant biases.
 fn constant(mut run: Run) -> Run {
     run.instrument.noise.gyro.gauss_markov = None;
@@ -53,7 +44,7 @@ fn constant(mut run: Run) -> Run {
 }
 
 fn kinds() -> Vec<(Run, Options)> {
-    let options = Options::default().noise(NoisePolicy::Stated);
+    let options = plain();
     let by_hand = options.clone().aiding(Aiding::Velocity);
     vec![
         (run("demo"), options.clone()),
@@ -63,43 +54,78 @@ fn kinds() -> Vec<(Run, Options)> {
     ]
 }
 
-#[test]
-fn a_chain_with_constant_biases_says_what_the_filter_says() {
-    for (run, options) in kinds() {
-        let (problem, priors, at) = started(&run, &options);
-        let script = Script::new(&problem, &priors, &at).unwrap();
-        let reduction = script.reduce(&problem, &[]).unwrap();
-        let filter = reduction.posterior(&Prior::new(&reduction.constants, &problem.model, &at));
-        let chain = Chain::new(&problem, &script, &Dispersion::alike(&problem)).unwrap();
-        let slips = [Slip::Mount, Slip::Base].map(Effect::Slip);
-        let none = slips
-            .into_iter()
-            .fold(Sizes::default(), |sizes, slip| sizes.with(slip, 0.0));
-        let filtered = chain.filter(&none).unwrap();
-        let posterior = filtered.posterior(&prior(&problem, &chain, &at));
-        let name = &run.recording.name;
-        let sigma = filter.covariance.diagonal().map(f64::sqrt);
-        let off = (&posterior.mean - &filter.mean)
-            .component_div(&sigma)
-            .amax();
-        assert!(off < 1e-6, "{name}: {off}");
-        let off = apart(&filter.covariance, &posterior.covariance);
-        assert!(off < 1e-6, "{name}: {off}");
-        let off = posterior.deviance - filter.deviance;
-        assert!(off.abs() < 1e-4, "{name}: {off} of {}", filter.deviance);
+/// Largest difference of estimate and of covariance between an estimate and batch least squares, in σ and its products.
+fn from_batch(problem: &Problem) -> f64 {
+    let outcome = crate::calibration::estimate(problem, UNWATCHED).unwrap();
+    assert!(outcome.converged);
+    let batch = batch_estimate(problem, &outcome).unwrap();
+    let sigma = batch.sigma();
+    let linear = &outcome.solved.posterior.parameter_covariance;
+    let chain = Estimate::with_curvature(outcome.estimate.triads, linear);
+    let apart = chain.vector() - batch.vector();
+    let mut most = 0f64;
+    for i in (0..PARAMETERS).filter(|&i| sigma[i] > 0.0) {
+        most = most.max((apart[i] / sigma[i]).abs());
+        for j in (0..PARAMETERS).filter(|&j| sigma[j] > 0.0) {
+            let apart = chain.covariance[(i, j)] - batch.covariance[(i, j)];
+            most = most.max((apart / (sigma[i] * sigma[j])).abs());
+        }
     }
+    println!("{}: {most:.1e}", problem.run().recording.name);
+    most
+}
+
+/// Noise as stated, and no term that may be absent.
+fn plain() -> Options {
+    Options::default().noise(NoisePolicy::Stated).no_auto_terms()
+}
+
+/// The first 200 s of a run.
+fn shortened(mut run: Run) -> Run {
+    run.recording.imu.gyro.to_mut().truncate(20_000);
+    run.recording.imu.accel.to_mut().truncate(20_000);
+    run.recording.imu.stretches[0].samples.end = 20_000;
+    if let Some(table) = &mut run.recording.table {
+        let readings = table.time.partition_point(|&t| t <= 200.0);
+        table.time.truncate(readings);
+        table.attitude.truncate(readings);
+    }
+    run
+}
+
+#[test]
+fn batch_least_squares_gives_the_estimate_and_covariance_of_the_chain() {
+    let whole = run("demo");
+    let mut quiet = shortened(whole.clone());
+    quiet.instrument.noise.gyro.random_walk = 0.0;
+    let mut exact = shortened(whole.clone());
+    exact.table.position_sigma = 0.0;
+    for run in [whole, quiet, exact] {
+        assert!(from_batch(&Problem::new(&run, &plain())) < 1e-6);
+    }
+}
+
+#[test]
+fn two_recordings_together_are_both_stacked() {
+    let scenario = Scenario::load("demo").unwrap();
+    let one = shortened(run("demo"));
+    let other = scenario.simulate_recording(1, 0, 1, &Default::default());
+    let other = shortened(other.unwrap().run);
+    assert!(from_batch(&Problem::new(&one, &plain()).and(&other)) < 1e-6);
 }
 
 /// The posterior with a size.
 fn posterior(problem: &Problem, chain: &Chain, at: &Linearisation, sizes: &Sizes) -> Posterior {
+    let prior = prior(problem, chain, at);
     let filtered = chain.filter(sizes).unwrap();
-    filtered.posterior(&prior(problem, chain, at))
+    let known = filtered.known(&prior);
+    filtered.posterior_with(&known, &Sites::none(&prior)).unwrap()
 }
 
 #[test]
 fn slopes_and_parts_are_those_of_differences() {
     for (run, options) in kinds() {
-        let options = options.with(ErrorTerm::GaussMarkovBias);
+        let options = options.with(ErrorTerm::GaussMarkovBias).no_auto_terms();
         let (mut problem, priors, at) = started(&run, &options);
         for motion in [
             &mut problem.model.motion_noise.gyro,
@@ -110,7 +136,7 @@ fn slopes_and_parts_are_those_of_differences() {
         let script = Script::new(&problem, &priors, &at).unwrap();
         let chain = Chain::new(&problem, &script, &Dispersion::alike(&problem)).unwrap();
         let filtered = chain.filter(&Sizes::default()).unwrap();
-        let here = filtered.posterior(&prior(&problem, &chain, &at));
+        let here = posterior(&problem, &chain, &at, &Sizes::default());
         let smoothed = filtered.smoothed(&here);
         for source in Source::ALL {
             let effect = Effect::Noise(source);
@@ -124,7 +150,7 @@ fn slopes_and_parts_are_those_of_differences() {
             };
             let (more, less) = (of(step.exp()), of((-step).exp()));
             let expected = (more.deviance - less.deviance) / (2.0 * step);
-            let slope = smoothed.of(effect).slope;
+            let slope = smoothed.by_effect()[&effect].slope;
             assert!(
                 (slope - expected).abs() < 1e-4 * (expected.abs() + 1.0),
                 "{} {source:?}: {slope} instead of {expected}",
@@ -141,19 +167,19 @@ fn slopes_and_parts_are_those_of_differences() {
 }
 
 /// Estimates from the coarse start.
-fn estimated(problem: &Problem) -> Estimated {
+fn estimated(problem: &Problem) -> Solved {
     let start = coarse_start(problem).unwrap();
-    let estimated = estimate(problem, &start.attitudes, start.at).unwrap();
-    assert!(estimated.converged, "{} passes", estimated.passes);
-    estimated
+    let solved = solve(problem, (&start.at, &start.attitudes), UNWATCHED).unwrap();
+    assert!(solved.converged, "{} passes", solved.passes.len());
+    solved
 }
 
-fn sigma(of: &Estimated) -> ParameterVector {
+fn sigma(of: &Solved) -> ParameterVector {
     of.posterior.parameter_covariance.diagonal().map(f64::sqrt)
 }
 
 /// Errors over their σ.
-fn errors(of: &Estimated, truth: &PerSensor<Triad>) -> Vec<f64> {
+fn errors(of: &Solved, truth: &PerSensor<Triad>) -> Vec<f64> {
     let error = to_vector(&of.estimate.triads) - to_vector(truth);
     let over = error.component_div(&sigma(of));
     over.iter().copied().filter(|e| e.is_finite()).collect()
@@ -183,7 +209,8 @@ fn stands_out(
         *attitude = quaternion(&change(&matrix(attitude)));
     }
     let found = estimated(&Problem::new(&run, &options));
-    let standing_out = found.sizes.events().filter(|&(_, factor)| factor > 30.0);
+    let sizes = found.effects.sizes(&found.chain);
+    let standing_out = sizes.events().filter(|&(_, factor)| factor > 30.0);
     let standing_out: Vec<_> = standing_out.collect();
     let is_it = |of: &((Effect, usize), f64)| of.0 == (named, dwell);
     assert!(
