@@ -15,12 +15,12 @@
 //! // A simulated run; `turncal_files::read_run("run.toml".as_ref())` reads a recorded one.
 //! let run = Scenario::load("single-axis")?.simulate(1, 0)?.run;
 //! let problem = Problem::new(&run, &Options::default());
-//! let mut solution = problem.solve(Method::Ekf, UNWATCHED)?;
+//! let solution = problem.solve(Method::Ekf, UNWATCHED)?;
 //! let assessment = solution.assess(&problem)?;
 //! let calibration = solution.calibration(&problem, &assessment);
 //! assert!(solution.converged());
 //! println!("{} ± {:?}", calibration["gyro.bias.x"], calibration.sigma_of("gyro.bias.x"));
-//! for finding in solution.findings(&assessment) {
+//! for finding in solution.findings() {
 //!     println!("{finding}");
 //! }
 //! # Ok(())

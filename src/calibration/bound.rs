@@ -62,7 +62,10 @@ pub fn bound_without_moves(
     truth: &PerSensor<Triad>,
     terms: &TermVector,
 ) -> Result<(Bound, Vec<ParameterVector>), CalibrationError> {
-    let problem = at_truth(problem, truth).with(|model| model.may_have.clear());
+    let problem = at_truth(problem, truth).with(|model| {
+        model.may_have.clear();
+        model.may_be_elsewhere = false;
+    });
     let script = script(&problem, Linearisation::new(*truth, *terms, Vec::new()))?;
     let effects = Effects::new(&problem);
     let chain = effects.chain(&problem, &script)?;
@@ -99,6 +102,7 @@ pub fn terms_left_off(
     let problem = at_truth(problem, truth).with(|model| {
         let off = ErrorTerm::constant().filter(|&term| !model.has(term) && model.can_have(term));
         model.may_have = off.collect();
+        model.may_be_elsewhere = false;
     });
     let script = script(&problem, Linearisation::new(*truth, *terms, Vec::new()))?;
     let effects = Effects::new(&problem);

@@ -7,7 +7,7 @@ use crate::calibration::chain::states::ATTITUDE;
 use crate::calibration::chain::{Chain, Filtered};
 use crate::calibration::linearisation::not_invertible;
 use crate::calibration::passes::tell;
-use crate::calibration::sizes::{Effects, Weighed};
+use crate::calibration::sizes::{Effects, Stage, Weighed};
 use crate::calibration::{
     AttitudePrior, CalibrationError, Constant, Estimate, Linearisation, Pass, Posterior, Problem,
     Progress, Script, from_vector, to_vector,
@@ -51,10 +51,13 @@ pub fn solve(
     let (mut fraction, mut shortened) = (1.0, 0);
     let (mut step, mut was_near) = (f64::INFINITY, false);
     loop {
-        let is_near = step < NEAR;
-        let first_near = is_near && !was_near;
-        was_near |= is_near;
-        let solved = one_pass(problem, (&at, priors), &mut effects, first_near);
+        let stage = match (step < NEAR, was_near) {
+            (true, false) => Stage::FirstNear,
+            (_, true) => Stage::Near,
+            (false, false) => Stage::Far,
+        };
+        was_near |= stage == Stage::FirstNear;
+        let solved = one_pass(problem, (&at, priors), &mut effects, stage);
         let mut solved = match (solved, before) {
             (Ok(solved), _) => solved,
             (Err(error), None) => return Err(error),
@@ -93,10 +96,10 @@ fn one_pass(
     problem: &Problem,
     (at, priors): (&Linearisation, &[AttitudePrior]),
     effects: &mut Effects,
-    first_near: bool,
+    stage: Stage,
 ) -> Result<Solved, CalibrationError> {
     let script = Script::new(problem, priors, at)?;
-    effects.improve(problem, &script, first_near)?;
+    effects.improve(problem, &script, stage)?;
     let chain = effects.chain(problem, &script)?;
     let Weighed {
         filtered,

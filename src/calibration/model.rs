@@ -7,17 +7,14 @@ use nalgebra::Vector3;
 use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::parameters::stacked;
 use crate::calibration::record::standstill::FLOOR;
-use crate::calibration::{
-    Constant, DayToDay, ErrorTerm, Options, ParameterVector, to_vector,
-};
-use crate::earth::ROTATION_RATE;
+use crate::calibration::{DayToDay, ErrorTerm, Options, ParameterVector, to_vector};
 use crate::imu::{
     GaussMarkov, InstallationForm, MotionNoise, Noise, PerSensor, Sensor, TermVector, ThermalModel,
 };
 use crate::navigation::ProcessNoise;
 use crate::run::{Aiding, Run};
 use crate::turntable::{AxisError, TableGeometry};
-use crate::units::{ARCSEC, DEGREE};
+use crate::units::ARCSEC;
 
 /// Default 1σ of the level of a table, rad.
 pub const USUAL_LEVEL: f64 = 10.0 * ARCSEC;
@@ -25,7 +22,7 @@ pub const USUAL_LEVEL: f64 = 10.0 * ARCSEC;
 pub const USUAL_NORTH: f64 = 60.0 * ARCSEC;
 /// Default 1σ of each tilt of its axes, rad.
 const USUAL_TILT: f64 = 10.0 * ARCSEC;
-/// Time in which a table settles after a stop, s.
+/// Usual time in which a table settles after a stop, s.
 pub const SETTLING_TIME: f64 = 1.0;
 /// Default correlation time of a varying bias, s.
 const USUAL_CORRELATION: f64 = 100.0;
@@ -57,6 +54,8 @@ pub struct Model {
     pub term_sigma: TermVector,
     /// Error terms that may be absent: the average over their sizes is estimated.
     pub may_have: Vec<ErrorTerm>,
+    /// Whether the latitude may be another than the stated one, which only a table shows.
+    pub may_be_elsewhere: bool,
     /// Temperature dependence of the instrument, if any.
     pub thermal: Option<Arc<ThermalModel>>,
     /// σ of the differences between recordings.
@@ -67,12 +66,14 @@ pub struct Model {
     pub position_sigma: f64,
     /// 1σ per axis of a reading of the table, rad; zero without a table.
     pub reading_sigma: f64,
-    /// The same of a reading just after a stop in addition, which fades with [`SETTLING_TIME`].
+    /// The same of a reading just after a stop in addition, …
     pub settling_sigma: f64,
+    /// … and the time in which it fades, s.
+    pub settling_time: f64,
     /// 1σ of table errors not included in its readings; zero if off.
     pub geometry: TableGeometry,
     /// Number of table axes with angle readings; zero if there are none.
-    table_axes: usize,
+    pub(in crate::calibration) table_axes: usize,
     /// The source with scaled variance, and the factor; used to compute its share of the budget.
     pub(in crate::calibration) varied: Option<(BudgetSource, f64)>,
 }
@@ -95,12 +96,15 @@ impl Model {
             turning_at_rest: run.standstill.turning,
             term_sigma: run.instrument.term_sigma,
             may_have: Vec::new(),
+            may_be_elsewhere: aiding == Aiding::Table
+                && (options.auto_terms || !options.terms.is_empty()),
             thermal: None,
             day_to_day: DayToDay::default(),
             gravity_sigma: run.site.gravity_sigma,
             position_sigma: accuracy.position_sigma,
             reading_sigma: accuracy.reading_sigma,
             settling_sigma: accuracy.settling_sigma,
+            settling_time: SETTLING_TIME,
             geometry: accuracy.geometry,
             table_axes: axes.map_or(0, |axes| axes.iter().flatten().count()),
             varied: None,
@@ -118,50 +122,6 @@ impl Model {
                 .collect();
         }
         model
-    }
-
-    /// Prior 1σ of a constant or, if it may be absent, its usual size; zero if it is off.
-    pub(in crate::calibration) fn sigma(&self, constant: Constant) -> f64 {
-        let stated = match constant {
-            Constant::Parameter(index) => self.prior_sigma[index],
-            Constant::Term(index) => self.term_sigma[index],
-            Constant::Thermal(of) => {
-                let thermal = self.thermal.as_deref();
-                thermal.map_or(0.0, |thermal| of.of(&thermal.sigma))
-            }
-            Constant::Gravity => self.gravity_sigma,
-            Constant::Base(axis) => self.geometry.base[axis],
-            Constant::Axis(index) => self.geometry.axes[index],
-            Constant::EarthRate(_) => 0.0,
-        };
-        if stated > 0.0 {
-            return stated;
-        }
-        match constant {
-            // A latitude is easily stated wrong by a degree; on a table only, because a hand tells no heading.
-            Constant::EarthRate(_) if self.aiding == Aiding::Table && !self.may_have.is_empty() => {
-                ROTATION_RATE * DEGREE
-            }
-            _ => {
-                let term = constant.error_term();
-                let term = term.filter(|term| self.may_have.contains(term));
-                term.map_or(0.0, |term| self.usual_size(term, constant))
-            }
-        }
-    }
-
-    /// Usual size of a constant of an error term.
-    fn usual_size(&self, term: ErrorTerm, constant: Constant) -> f64 {
-        match (term, constant) {
-            (ErrorTerm::Instrument(of), _) => of.usual_size(&self.noise),
-            (_, Constant::Base(2)) => USUAL_NORTH,
-            (_, Constant::Base(_)) => USUAL_LEVEL,
-            (ErrorTerm::TableAxes(kind), Constant::Axis(index)) => {
-                let usual = usual_axis_error(kind, self.position_sigma);
-                kind.of_table(self.table_axes, usual)[index]
-            }
-            _ => 0.0,
-        }
     }
 
     /// Process noise of the navigation errors.
@@ -183,7 +143,7 @@ impl Model {
 
     /// Variance of a table's reading per axis by settling, this time after a stop, rad².
     pub(in crate::calibration) fn settling(&self, since_stop: f64) -> f64 {
-        let fading = (-2.0 * since_stop / SETTLING_TIME).exp();
+        let fading = (-2.0 * since_stop / self.settling_time).exp();
         self.settling_sigma.powi(2) * fading * self.weight(BudgetSource::Settling)
     }
 

@@ -17,7 +17,7 @@ use crate::calibration::constants::parameters;
 use crate::calibration::iterations::Solved;
 use crate::calibration::linearisation::{UNKNOWN_HEADING, not_invertible};
 use crate::calibration::several::SeparateEstimate;
-use crate::calibration::sizes::Weighed;
+use crate::calibration::sizes::{LARGEST, Weighed};
 use crate::calibration::{
     AttitudePrior, Auxiliary, CalibrationError, Candidate, Consistency, Constant, Difference,
     Epoch, Estimate, Finding, FormTest, Innovation, Linearisation, Model, NoiseReport,
@@ -260,10 +260,12 @@ fn own(filtered: &Filtered, posterior: &Posterior, at: &Linearisation) -> Vec<Ow
 
 /// Estimates of error terms and table, of those that were asked for or are certain to be there.
 pub fn auxiliary(of: &Weighed, solved: &Solved, model: &Model) -> Auxiliary {
+    let count = solved.effects.candidates.absent().count();
     let shown = |constant: Constant| {
         Candidate::of(constant, model).is_none_or(|candidate| {
             let mut absent = solved.effects.candidates.absent();
-            absent.any(|(other, absent)| other == candidate && is_shown(absent))
+            let is_it = |(other, absent)| other == candidate && is_shown(absent, count);
+            solved.converged && absent.any(is_it)
         })
     };
     auxiliary_of(&of.posterior, &solved.script.at, model, shown)
@@ -287,7 +289,9 @@ pub fn auxiliary_of(
     for &(k, index) in &all {
         let at = Auxiliary::of_terms(index).map_or(0.0, |term| at.terms[term]);
         auxiliary.values[index] = mean[k] + at;
-        auxiliary.prior_sigma[index] = model.sigma(posterior.constants[k]);
+        let constant = posterior.constants[k];
+        let widest = Candidate::of(constant, model).map_or(1.0, |_| LARGEST);
+        auxiliary.prior_sigma[index] = widest * constant.sigma(model);
         for &(j, other) in &all {
             auxiliary.covariance[(index, other)] = covariance[(k, j)];
         }

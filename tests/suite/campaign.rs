@@ -335,8 +335,8 @@ fn recordings_that_differ_by_more_than_is_stated_are_found_to() {
     // Three axes on four days, less their means: nine degrees of freedom.
     let known = 0.2 / 18.0f64.sqrt();
     assert!((found[0].found - 0.2).abs() < 3.0 * known, "{found:?}");
-    let ratio = of_silent / of_stated * 0.2 / found[0].found;
-    assert!((ratio - 1.0).abs() < 0.02, "{of_silent} {of_stated} °/h");
+    // Both estimate the difference, from about it and from the usual one.
+    assert!((of_silent / of_stated - 1.0).abs() < 0.1, "{of_silent} {of_stated} °/h");
 }
 
 #[test]
@@ -485,11 +485,20 @@ fn biases_of_a_real_instrument_at_rest_follow_its_temperature_better_than_by_a_c
         let ratio = (squares / imu.len() as f64).sqrt() / cubic.as_f64().unwrap();
         println!("{name}: {} functions, {ratio:.3} of a cubic", on.len());
         assert!(ratio < 1.0, "{name}: {ratio}");
-        for (&(k, c), expected) in on.iter().zip(fit(&|_| true).iter().skip(1)) {
-            let sigma = thermal.covariance[(k, k)].sqrt();
-            let off = (thermal.values[k] - expected) / sigma;
-            assert!(off.abs() < 0.5, "{name} {}: {off} σ", c.function);
-        }
+        // What is drawn towards zero costs little of what the data show.
+        let whole = fit(&|_| true);
+        let mut averaged = whole.clone();
+        averaged[0] = at_rest.outputs.vector()[*bias];
+        on.iter()
+            .enumerate()
+            .for_each(|(place, (k, _))| averaged[1 + place] = thermal.values[*k]);
+        let rms = |of: &DVector<f64>| {
+            let off = |second: usize| output(second) - row(second).dot(of);
+            let squares = (0..imu.len()).map(|second| off(second).powi(2));
+            (squares.sum::<f64>() / imu.len() as f64).sqrt()
+        };
+        let ratio = rms(&averaged) / rms(&whole);
+        assert!(ratio < 1.02, "{name}: {ratio}");
     }
     let record = at_rest.record(&problem);
     let unseen = record.findings.iter().any(|finding| {

@@ -28,7 +28,7 @@ fn simulated(unmodelled: Option<ErrorTerm>) -> Run {
 
 /// The terms that are named as there.
 fn shown(outcome: &Outcome) -> Vec<ErrorTerm> {
-    let terms = outcome.terms.iter().filter(|of| of.present > 0.999);
+    let terms = outcome.terms.iter().filter(|of| of.shown);
     terms.map(|of| of.term).collect()
 }
 

@@ -57,7 +57,7 @@ fn a_move_that_alone_shows_a_parameter_is_worth_most() {
 fn a_path_with_the_moves_that_show_a_term_shows_it() {
     let level = "z_up, x_up, x_down, y_up, y_down, z_down";
     let not_shown = |words: &str| -> Vec<String> {
-        let expected = json(&[words, "--imu", "navigation-fog"]);
+        let expected = json(&[words, "--imu", "bmi088"]);
         let all = expected["not_shown"].as_array().unwrap();
         let name = |of: &Value| of["what"].as_str().unwrap().to_owned();
         all.iter().map(name).collect()

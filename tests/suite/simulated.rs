@@ -11,9 +11,9 @@ use turncal::models::{InstallationModel, Place};
 use turncal::simulation::{Scenario, Simulated};
 use turncal::units::ARCSEC;
 
-/// With the noise that the run states, which is that of its data.
+/// With the noise that the run states, which is that of its data, and without terms that it does not state.
 fn stated() -> Options {
-    Options::default().noise(NoisePolicy::Stated)
+    Options::default().noise(NoisePolicy::Stated).no_auto_terms()
 }
 
 /// Fixed before the first run was made.

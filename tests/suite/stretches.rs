@@ -5,7 +5,7 @@ use std::ops::Range;
 use approx::assert_relative_eq;
 use nalgebra::{DMatrix, Vector3};
 use turncal::calibration::{
-    Estimate, Finding, Options, Outcome, PARAMETERS, ParameterVector, Problem, Together, UNWATCHED,
+    Estimate, Finding, NoisePolicy, Options, Outcome, PARAMETERS, ParameterVector, Problem, Together, UNWATCHED,
     bound, estimate, mean_square_interval, nees, to_vector,
 };
 use turncal::imu::{PARAMETERS as PER_TRIAD, ParameterKind, Sensor, Triad};
@@ -24,11 +24,16 @@ fn solved(problem: &Problem) -> Outcome {
     outcome
 }
 
+/// With the noise that the run states, and without terms that it does not state.
+fn plain() -> Options {
+    Options::default().noise(NoisePolicy::Stated).no_auto_terms()
+}
+
 /// Converged until rounding, so that two ways to one result may be compared.
 fn exactly() -> Options {
     Options {
         converged_sigma: 2e-7,
-        ..Options::default()
+        ..plain()
     }
 }
 
@@ -115,7 +120,7 @@ fn one_dwell_shows_the_bias_of_the_gyro_about_the_vertical_and_no_scale() {
     let duration = first.len() as f64 * run.recording.imu.period;
     let mut dwell = part(&run, first);
     dwell.recording.table = None;
-    let problem = Problem::new(&dwell, &Options::default().aiding(Aiding::Velocity));
+    let problem = Problem::new(&dwell, &plain().aiding(Aiding::Velocity));
     let outcome = solved(&problem);
     let (sigma, prior) = (outcome.estimate.sigma(), outcome.prior_sigma);
     let error = outcome.estimate.vector() - to_vector(&truth);
@@ -146,7 +151,7 @@ fn one_dwell_does_not_show_the_level_biases_of_accelerometers() {
         .unwrap()
         .run;
     let dwell = part(&run, run.dwells(run.aiding())[0].samples.clone());
-    let problem = Problem::new(&dwell, &Options::default().aiding(Aiding::Velocity));
+    let problem = Problem::new(&dwell, &plain().aiding(Aiding::Velocity));
     let outcome = solved(&problem);
     let (sigma, prior) = (outcome.estimate.sigma(), outcome.prior_sigma);
     // A tilt makes up for any of them; the one along the plumb line is seen to what the scale factor leaves.
@@ -171,7 +176,7 @@ fn one_dwell_leaves_the_bias_of_a_gyro_to_where_north_is() {
     let level = run.site.earth_rate_n().y;
     // Earth rate is within what the bias may be, so it tells no heading.
     dwell.instrument.prior.gyro.bias_sigma.fill(100.0 * level);
-    let problem = Problem::new(&dwell, &Options::default().aiding(Aiding::Velocity));
+    let problem = Problem::new(&dwell, &plain().aiding(Aiding::Velocity));
     let outcome = solved(&problem);
     let sigma = outcome.estimate.sigma();
     let [_, _, _, _, _, _, _, _, _, bias_x, bias_y, _] =
@@ -193,7 +198,7 @@ fn a_break_of_ten_seconds_in_a_move_costs_no_more_than_what_is_lost() {
         run.dwells(run.aiding()),
         "what stands is as it was"
     );
-    let problem = Problem::new(&cut, &Options::default());
+    let problem = Problem::new(&cut, &plain());
     let outcome = solved(&problem);
     assert_eq!(outcome.prior_attitudes.len(), 2);
     assert_as_accurate_as_claimed(&outcome, &to_vector(&truth));
@@ -213,12 +218,12 @@ fn a_break_of_ten_seconds_in_a_move_costs_no_more_than_what_is_lost() {
         bridge.with(sensor, axis, [1.0, 1e4][sensor as usize])
     });
     bridged.recording.imu.bridges = vec![bridge];
-    let bridged = Problem::new(&bridged, &Options::default());
+    let bridged = Problem::new(&bridged, &plain());
     let without = bound(&bridged, &truth, &terms).unwrap().estimate;
     let (_, change) = apart(&without, &least);
     assert!(change < 0.002, "{change}");
 
-    let whole = Problem::new(&run, &Options::default());
+    let whole = Problem::new(&run, &plain());
     let whole = bound(&whole, &truth, &terms).unwrap().estimate;
     let more = least.sigma().component_div(&whole.sigma());
     println!("σ against all data: {:.4} to {:.4}", more.min(), more.max());
@@ -354,7 +359,7 @@ fn a_break_where_a_table_is_crooked_leaves_the_claimed_accuracy_true() {
     assert!(run.table.geometry.base.amin() > 0.0);
     let lost = in_the_longest_move(&run);
     let cut = broken(&run, &lost);
-    let problem = Problem::new(&cut, &Options::default());
+    let problem = Problem::new(&cut, &plain());
     let outcome = solved(&problem);
     assert_as_accurate_as_claimed(&outcome, &to_vector(&truth));
 }
@@ -366,10 +371,10 @@ fn a_run_whose_table_is_not_observed_is_a_run_without_a_table() {
         .simulate(SEED, 0)
         .unwrap()
         .run;
-    let unobserved = Problem::new(&run, &Options::default().aiding(Aiding::Velocity));
+    let unobserved = Problem::new(&run, &plain().aiding(Aiding::Velocity));
     let mut without = run.clone();
     without.recording.table = None;
-    let without = Problem::new(&without, &Options::default());
+    let without = Problem::new(&without, &plain());
     assert_eq!(
         solved(&unobserved).estimate,
         solved(&without).estimate,
@@ -385,7 +390,7 @@ fn sections_without_an_order_hide_what_moves_would_have_shown() {
         .unwrap()
         .run;
     run.recording.imu.continuous = false;
-    let problem = Problem::new(&run, &Options::default());
+    let problem = Problem::new(&run, &plain());
     let outcome = solved(&problem);
     let dwells = problem.dwells().count();
     assert_eq!(outcome.prior_attitudes.len(), dwells);
@@ -397,7 +402,7 @@ fn sections_without_an_order_hide_what_moves_would_have_shown() {
     // Earth rate alone is too little for scale factors and installation of gyros, and accelerometers
     // need no order.
     run.recording.imu.continuous = true;
-    let ordered = solved(&Problem::new(&run, &Options::default()));
+    let ordered = solved(&Problem::new(&run, &plain()));
     let sigma = outcome.estimate.sigma();
     let more = sigma.component_div(&ordered.estimate.sigma());
     for (index, more) in more.iter().enumerate() {

@@ -14,9 +14,9 @@ use turncal::turntable::TABLE_GEOMETRY;
 use crate::shared::{read, shared};
 use crate::simulated::says;
 
-/// With the noise that the run states, which is that of its data.
+/// With the noise that the run states, which is that of its data, and without terms that it does not state.
 fn stated() -> Options {
-    Options::default().noise(NoisePolicy::Stated)
+    Options::default().noise(NoisePolicy::Stated).no_auto_terms()
 }
 
 const FORM: InstallationForm = InstallationForm::General;
@@ -166,7 +166,7 @@ fn a_record_with_terms_says_that_the_correction_is_not_all() {
 fn without_terms(term: Term) -> (Outcome, SMatrix<f64, 24, 1>) {
     let Simulated { mut run, truth, .. } = scenario(term).simulate(SEED, 0).unwrap();
     run.instrument.term_sigma = TermVector::zeros();
-    let outcome = estimate(&Problem::new(&run, &stated().no_auto_terms()), UNWATCHED).unwrap();
+    let outcome = estimate(&Problem::new(&run, &stated()), UNWATCHED).unwrap();
     let error = outcome.estimate.vector() - to_vector(&truth);
     let normalised = error.component_div(&outcome.estimate.sigma());
     (outcome, normalised)

@@ -1,7 +1,7 @@
 //! Velocity aiding: no table, standstill alone.
 
 use nalgebra::{SVector, Vector3};
-use turncal::calibration::{Options, Outcome, Problem, UNWATCHED, estimate};
+use turncal::calibration::{NoisePolicy, Options, Outcome, Problem, UNWATCHED, estimate};
 use turncal::earth::Site;
 use turncal::imu::{BodyFrame, Output, PARAMETERS as PER_TRIAD, ParameterKind, PerSensor, Triad};
 use turncal::models::{InstallationModel, Instrument, Place};
@@ -111,7 +111,8 @@ fn from_body_axes_along_east_north_and_up_the_nineteen_positions_hardly_see_gyro
             prior.scale_sigma = Vector3::repeat(200.0 * PPM);
             prior.installation_sigma = Vector3::repeat(200.0 * ARCSEC);
         }
-        estimate(&Problem::new(&run, &Options::default()), UNWATCHED).unwrap()
+        let stated = Options::default().noise(NoisePolicy::Stated).no_auto_terms();
+        estimate(&Problem::new(&run, &stated), UNWATCHED).unwrap()
     };
     let [published, level] = [published, level].map(calibrated);
     let scale = largest_gyro_sigma(&published, ParameterKind::Scale) / PPM;

@@ -100,7 +100,7 @@ pub fn improvement(prior: f64, posterior: f64) -> String {
 }
 
 /// Above this probability, a term counts as present.
-pub const CERTAIN: f64 = 0.999;
+const CERTAIN: f64 = 0.999;
 /// Smallest growth of σ that three digits show.
 const GROWN: f64 = 1.005;
 

@@ -53,7 +53,7 @@ pub struct BudgetPart {
 
 /// Relative change of the variance of a source at rest, for a difference: it is accurate to this, and the rounding of
 /// covariances that fall by ten orders of magnitude stays below that.
-const STEP: f64 = 1e-3;
+const STEP: f64 = 3e-4;
 
 /// Sources that act within dwells, whose parts are differences of the chain made again.
 const AT_REST: [BudgetSource; 9] = [

@@ -9,9 +9,11 @@ use crate::units::DEG_PER_H;
 
 /// The finding, if Earth rate is not that of the stated latitude.
 pub fn earth_rate(outcome: &Outcome) -> Option<Finding> {
-    let mut absent = outcome.solved.effects.candidates.absent();
+    let candidates = &outcome.solved.effects.candidates;
+    let count = candidates.absent().count();
+    let mut absent = candidates.absent();
     let (_, absent) = absent.find(|(candidate, _)| *candidate == Candidate::EarthRate)?;
-    if !is_shown(absent) {
+    if !is_shown(absent, count) {
         return None;
     }
     let posterior = &outcome.solved.posterior;

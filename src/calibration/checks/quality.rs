@@ -141,7 +141,11 @@ impl Outcome {
             Some(moved)
         });
         let held_out = half.map(|half| residuals(problem, &half, |k| k % 2 == 1));
-        let all = residuals(problem, estimate, |_| true)?;
+        let estimate = Linearisation {
+            triads: self.estimate.triads,
+            ..estimate.clone()
+        };
+        let all = residuals(problem, &estimate, |_| true)?;
         Ok(Quality::new(all, held_out.transpose()?))
     }
 }

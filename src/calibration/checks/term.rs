@@ -13,9 +13,9 @@ use crate::statistics::FALSE_ALARM;
 /// A term that a path does not show is named if it widens the σ of a group by more than this.
 const NAMED: f64 = 1.25;
 
-/// Whether a candidate that is absent with this probability is named as there.
-pub fn is_shown(absent: f64) -> bool {
-    absent < FALSE_ALARM
+/// Whether one of this many candidates, absent with this probability, is named as there.
+pub fn is_shown(absent: f64, candidates: usize) -> bool {
+    absent < FALSE_ALARM / candidates.max(1) as f64
 }
 
 /// Evidence for an error term.
@@ -25,6 +25,8 @@ pub struct TermEvidence {
     pub term: ErrorTerm,
     /// Probability that it is there; one if it is stated or asked for.
     pub present: f64,
+    /// Whether it is there beyond doubt although nobody asked for it: one false alarm in a thousand recordings.
+    pub shown: bool,
     /// Largest remaining part of its usual size: from 0 (known) to 1 (not shown by the recording).
     pub remaining: f64,
     /// RMS σ of each of [`Group::all`] with it, divided by that if it were known to be absent; `None` if the group has no σ.
@@ -38,6 +40,7 @@ impl TermEvidence {
         candidates: &Candidates,
         model: &Model,
     ) -> Vec<Self> {
+        let count = candidates.absent().count();
         let absent = |term: ErrorTerm| {
             let candidate = Candidate::Term(term.alike());
             let mut absent = candidates.absent();
@@ -65,6 +68,7 @@ impl TermEvidence {
             // Next to certain is not certain.
             let most = 1.0 - f64::EPSILON;
             Some(Self {
+                shown: absent.is_some_and(|absent| is_shown(absent, count)),
                 term,
                 present: absent.map_or(1.0, |absent| (1.0 - absent).min(most)),
                 remaining,
@@ -91,7 +95,7 @@ impl TermEvidence {
         if *present == 1.0 {
             return None;
         }
-        if is_shown(1.0 - present) {
+        if self.shown {
             let text = format!(
                 "The data show an error that scale factors, misalignments and biases cannot explain: {name} (probability \
                  above 99.9 %). turncal estimated it with them, as --with {name} does. Use the values only together \

@@ -1,7 +1,9 @@
 //! Constants that may be absent.
 
-use crate::calibration::{Constant, ErrorTerm, Model};
-use crate::imu::{ParameterKind, Sensor, Triad};
+use super::constant::Constant;
+use crate::calibration::{Coefficient, ErrorTerm, Model, PARAMETERS};
+use crate::imu::{ParameterKind, Sensor, TERM_PARAMETERS, Triad};
+use crate::turntable::AXIS_ERRORS;
 
 /// Constants that are absent or present together, with one size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,5 +32,26 @@ impl Candidate {
                 may_be_absent.then(|| Self::Term(term.alike()))
             }
         }
+    }
+}
+
+impl Constant {
+    /// The constants of a model, those that may be absent last; `gravity`: whether gravity is a constant.
+    pub fn all(model: &Model, gravity: bool) -> Vec<Self> {
+        let parameters = (0..PARAMETERS).filter(|&i| model.prior_sigma[i] > 0.0);
+        let parameters = parameters.map(Self::Parameter);
+        let terms = (0..TERM_PARAMETERS).map(Self::Term);
+        let table = (0..3).map(Self::Base);
+        let table = table.chain((0..AXIS_ERRORS).map(Self::Axis));
+        let rate = (0..3).map(Self::EarthRate);
+        let thermal = Coefficient::all(model.form, model.thermal.as_deref()).into_iter();
+        let beside = terms.chain(table).chain(rate);
+        let beside = beside.chain(thermal.map(Self::Thermal));
+        let beside = beside.filter(|constant| constant.sigma(model) > 0.0);
+        let (known, candidates): (Vec<Self>, Vec<Self>) =
+            beside.partition(|&constant| Candidate::of(constant, model).is_none());
+        let gravity = (gravity && model.gravity_sigma > 0.0).then_some(Self::Gravity);
+        let known = parameters.chain(gravity).chain(known);
+        known.chain(candidates).collect()
     }
 }

@@ -35,7 +35,7 @@ impl Prior {
             mean: DVector::from_iterator(constants.len(), constants.iter().map(mean)),
             sigma: DVector::from_iterator(
                 constants.len(),
-                constants.iter().map(|&constant| model.sigma(constant)),
+                constants.iter().map(|&constant| constant.sigma(model)),
             ),
             candidates: constants.iter().filter(may_be_absent).count(),
         }

@@ -272,8 +272,10 @@ pub struct BlockRecord {
     /// Whether it was stated or asked for.
     pub on: bool,
     /// Probability that it is there.
+    #[serde(default)]
     pub present: f64,
     /// Largest remaining part of its usual size: from 0 (known) to 1 (not shown).
+    #[serde(default)]
     pub remaining: f64,
     /// σ with the term divided by σ if it were absent, of gyro K, E, D and accel K, E, D; `None` if there is no σ.
     pub sigma_factors: [Option<f64>; 6],

@@ -87,6 +87,7 @@ impl Problem<'_> {
         let model = &mut problem.model;
         model.thermal = Some(Arc::new(thermal));
         model.may_have.clear();
+        model.may_be_elsewhere = false;
         let constants = Constant::all(model, false);
         let sigma = noise(&rows(&blocks, &constants, model, [1.0; 6]))?;
         let triads = from_vector(model.form, &model.prior_mean);

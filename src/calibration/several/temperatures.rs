@@ -11,10 +11,13 @@ use crate::units::MINUTE;
 /// Recordings within this many kelvin count as one temperature, because of the self-heating of a soaked instrument.
 const ONE_TEMPERATURE: f64 = 1.0;
 
-/// Usual change of a parameter over the range, in its prior σ: as much as an instrument of its grade differs from another …
-const CHANGE: f64 = 1.0;
-/// … and of each further order, over that of the one before.
+/// Span over which a parameter usually changes by as much as an instrument of its grade differs from another: the
+/// −40 to 85 °C of data sheets, K.
+const SPECIFIED: f64 = 125.0;
+/// Usual change by each further order, over that of the one before.
 const HIGHER: f64 = 1.0 / 3.0;
+/// Usual time by which the temperature of the sensing element lags, s.
+const LAG: f64 = 60.0;
 
 /// Options for the temperature dependence of parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,12 +70,12 @@ pub fn model(
                 _ => function < *order.get(sensor),
             };
             let sigma = problem.model.prior_sigma[parameter(sensor, of_triad)];
-            let order = if function == RATE { 0 } else { function };
-            if on {
-                CHANGE * HIGHER.powi(order as i32) * sigma
-            } else {
-                0.0
-            }
+            let range = range.get(sensor);
+            let span = match function {
+                RATE => LAG * range.largest_rate,
+                _ => HIGHER.powi(function as i32) * (range.highest - range.lowest),
+            };
+            if on { sigma * span / SPECIFIED } else { 0.0 }
         })
     });
     let any = order.gyro + order.accel > 0;

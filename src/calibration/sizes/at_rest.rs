@@ -38,75 +38,164 @@ pub struct NoiseAtRest {
 /// What the parts of a dwell leave when all that they are given is free.
 #[derive(Debug, Clone, Copy, Default)]
 struct Left {
-    /// −2 ln L.
-    deviance: f64,
+    /// Logarithm of the determinant of the covariance.
+    log_determinant: f64,
     /// Sum of squares over the variances common to all dwells …
     squares: f64,
     /// … and its degrees of freedom.
     freedom: f64,
 }
 
-/// What all dwells leave with some noise at rest.
-#[derive(Default)]
+/// What all dwells leave with some models.
 struct AllLeft {
-    dwells: Vec<Left>,
-    /// Each whitened observation, and the logarithm of its σ.
-    seen: Vec<(f64, f64)>,
+    /// Per model and dwell.
+    dwells: Vec<Vec<Left>>,
+    /// Products of the changes of the observations' distribution from the first model to two others, for Fisher's
+    /// information on what changes.
+    products: DMatrix<f64>,
 }
 
-impl AllLeft {
-    /// With the noise at rest of a model; `None` if a covariance is not positive definite.
-    fn new(
-        problem: &Problem,
-        script: &Script,
-        dispersion: &Dispersion,
-        model: &Model,
-    ) -> Option<Self> {
-        let states = States::new(model, problem.one_gravity());
-        let mut filters = part_filters(states.moving);
-        let mut all = Self::default();
-        for (number, stretch) in problem.stretches().iter().enumerate() {
-            for rest in script.parts(number) {
-                if rest.first {
-                    all.dwells.push(Left::default());
+/// The scalars of a part.
+#[derive(Default, Clone)]
+struct Seen {
+    /// Each whitened, less what the part is given as all of them say; with the logarithm of its σ.
+    scalars: Vec<(f64, f64)>,
+    /// Their rows of what the part is given, one after the other.
+    rows: Vec<f64>,
+}
+
+/// Dwells whose noise is sought.
+struct Dwells<'a> {
+    problem: &'a Problem<'a>,
+    script: &'a Script,
+    usual: &'a [Usual],
+}
+
+impl Dwells<'_> {
+    /// What dwells leave with the noise at rest of these models; `None` if a covariance is not positive definite.
+    fn left(&self, dispersion: &Dispersion, models: &[Model]) -> Option<AllLeft> {
+        let states = States::new(models.first()?, self.problem.one_gravity());
+        let mut filters: Vec<_> = models.iter().map(|_| part_filters(states.moving)).collect();
+        let mut all = AllLeft {
+            dwells: vec![Vec::new(); models.len()],
+            products: DMatrix::zeros(models.len() - 1, models.len() - 1),
+        };
+        let mut seen = vec![Seen::default(); models.len()];
+        for (number, stretch) in self.problem.stretches().iter().enumerate() {
+            for rest in self.script.parts(number) {
+                let each = filters.iter_mut().zip(models).enumerate();
+                for (k, (filters, model)) in each {
+                    if rest.first {
+                        all.dwells[k].push(Left::default());
+                    }
+                    let factor = dispersion.of(all.dwells[k].len() - 1);
+                    let (root, seen) = (factor.sqrt(), &mut seen[k]);
+                    (seen.scalars.clear(), seen.rows.clear());
+                    let filter = &mut filters[filter_of(rest)];
+                    let part = filter.reduce((rest, stretch), model, &mut |of: Whitened| {
+                        let scalar = |k: usize| (of.scalars[k] / root, of.root[(k, k)].ln());
+                        seen.scalars.extend((0..3).map(scalar));
+                        seen.rows.extend(of.rows.iter().map(|weight| weight / root));
+                    })?;
+                    let given = all.dwells[k].last_mut()?.add(&part.dispersed(factor), factor)?;
+                    seen.take_off(&given);
                 }
-                let factor = dispersion.of(all.dwells.len() - 1);
-                let root = factor.sqrt();
-                let seen = &mut all.seen;
-                let filter = &mut filters[filter_of(rest)];
-                let part = filter.reduce((rest, stretch), model, &mut |of: Whitened| {
-                    let each = (0..3).map(|k| (of.scalars[k] / root, of.root[(k, k)].ln()));
-                    seen.extend(each);
-                })?;
-                all.dwells
-                    .last_mut()?
-                    .add(&part.dispersed(factor), factor)?;
+                all.compare(&seen);
             }
         }
         Some(all)
     }
 
-    fn deviance(&self) -> f64 {
-        self.dwells.iter().map(|of| of.deviance).sum()
+    fn model_at(&self, at: &DVector<f64>) -> Model {
+        let mut model = self.problem.model.clone();
+        let sizes = self.usual.iter().zip(at);
+        sizes.for_each(|(usual, by)| usual.set(&mut model, *by));
+        model
     }
 
-    /// Product of the changes of the observations' distribution from here to two other places, for Fisher's
-    /// information on what was changed.
-    fn product(&self, one: &Self, other: &Self) -> f64 {
-        let pairs = one.seen.iter().zip(&other.seen).zip(&self.seen);
-        pairs
-            .map(|((one, other), here)| {
-                let (a, b) = (one.1 - here.1, other.1 - here.1);
-                let (u, v) = (one.0 - here.0, other.0 - here.0);
-                // The whitened observation changes by its σ too.
-                2.0 * a * b + (u + a * here.0) * (v + b * here.0)
+    /// The likeliest sizes common to all dwells, by Fisher's scoring with differences (Gupta and Mehra 1974, IEEE Trans.
+    /// Automatic Control 19(6)); with these dispersions, or whatever they are.
+    fn common(&self, dispersion: Option<&Dispersion>, start: DVector<f64>) -> Lowest {
+        let n = self.usual.len();
+        let alike = Dispersion::alike(self.problem);
+        let of_prior = |k: usize| self.usual[k].spread.powi(-2);
+        let slope_at = |at: &DVector<f64>| {
+            let penalty: f64 = (0..n).map(|k| at[k].powi(2) * of_prior(k)).sum();
+            let mut models = vec![self.model_at(at)];
+            models.extend((0..n).map(|k| {
+                let mut there = at.clone();
+                there[k] += DIFFERENCE;
+                self.model_at(&there)
+            }));
+            let Some(all) = self.left(dispersion.unwrap_or(&alike), &models) else {
+                return Ok::<_, Infallible>(Slope::nowhere(n));
+            };
+            let deviance = |k: usize| -> f64 {
+                let dwells = all.dwells[k].iter().enumerate();
+                let each = dwells.map(|(dwell, left)| match dispersion {
+                    Some(dispersion) => left.deviance(dispersion.of(dwell)),
+                    None => left.deviance_of_any(),
+                });
+                each.sum()
+            };
+            let here = deviance(0);
+            Ok(Slope {
+                cost: here + penalty,
+                gradient: DVector::from_fn(n, |k, _| {
+                    (deviance(k + 1) - here) / DIFFERENCE + 2.0 * at[k] * of_prior(k)
+                }),
+                curvature: DMatrix::from_fn(n, n, |i, j| {
+                    let own = if i == j { 2.0 * of_prior(i) } else { 0.0 };
+                    2.0 * all.products[(i, j)] / DIFFERENCE.powi(2) + own
+                }),
             })
-            .sum()
+        };
+        let Ok(lowest) = descend(start, slope_at);
+        lowest
+    }
+}
+
+impl Seen {
+    fn take_off(&mut self, given: &DVector<f64>) {
+        let rows = self.rows.chunks_exact(given.len());
+        for (scalar, row) in self.scalars.iter_mut().zip(rows) {
+            let known = row.iter().zip(given.iter());
+            scalar.0 -= known.map(|(weight, given)| weight * given).sum::<f64>();
+        }
+    }
+}
+
+impl AllLeft {
+    /// Adds the products of a part.
+    fn compare(&mut self, seen: &[Seen]) {
+        let Some((here, others)) = seen.split_first() else {
+            return;
+        };
+        let change = |of: &Seen, k: usize| {
+            let (of, here) = (of.scalars[k], here.scalars[k]);
+            let log = of.1 - here.1;
+            // The whitened observation changes by its σ too.
+            (log, of.0 - here.0 + log * here.0)
+        };
+        for (i, one) in others.iter().enumerate() {
+            for (j, other) in others.iter().enumerate().take(i + 1) {
+                let each = (0..here.scalars.len()).map(|k| {
+                    let ((a, u), (b, v)) = (change(one, k), change(other, k));
+                    2.0 * a * b + u * v
+                });
+                let sum: f64 = each.sum();
+                self.products[(i, j)] += sum;
+                if i != j {
+                    self.products[(j, i)] += sum;
+                }
+            }
+        }
     }
 }
 
 impl Left {
-    fn add(&mut self, part: &Part, factor: f64) -> Option<()> {
+    /// Adds a part; returns what it is given, as its rows say.
+    fn add(&mut self, part: &Part, factor: f64) -> Option<DVector<f64>> {
         let given = part.measured.ncols();
         let wide = |k: usize| match given - k {
             1..=3 => FORCE,
@@ -116,92 +205,66 @@ impl Left {
         let mut information = part.measured.tr_mul(&part.measured);
         (0..given).for_each(|k| information[(k, k)] += wide(k).powi(-2));
         let root = information.cholesky()?;
-        let mut told = part.measured.tr_mul(&part.values);
+        let said = part.measured.tr_mul(&part.values);
+        let mut told = said.clone();
         root.l_dirty().solve_lower_triangular_mut(&mut told);
         let determinant = 2.0 * root.l_dirty().diagonal().map(f64::ln).sum();
         let squares = part.squares + part.values.norm_squared() - told.norm_squared();
         self.squares += factor * squares;
         self.freedom += (part.count - part.values.len()) as f64;
-        self.deviance += squares + part.log_determinant + determinant;
-        Some(())
+        self.log_determinant += part.log_determinant + determinant;
+        Some(root.solve(&said))
+    }
+
+    /// −2 ln of the likelihood with this factor of the variance.
+    fn deviance(&self, factor: f64) -> f64 {
+        self.squares / factor + self.log_determinant
+    }
+
+    /// The same, averaged over all factors: Student's t.
+    fn deviance_of_any(&self) -> f64 {
+        (BEFOREHAND + self.freedom) * (self.squares / BEFOREHAND).ln_1p() + self.log_determinant
     }
 }
 
 /// The likeliest noise at rest, each size with its prior; from that at a linearisation point before, if any.
+///
+/// The first sizes are sought whatever the dispersions are, so that a dwell which is less still than others does not
+/// begin as noise of all.
 pub fn likeliest(
     problem: &Problem,
     script: &Script,
     usual: &[Usual],
     before: Option<(Dispersion, DVector<f64>)>,
 ) -> NoiseAtRest {
+    let dwells = Dwells {
+        problem,
+        script,
+        usual,
+    };
     let rounds = if before.is_some() { 1 } else { ROUNDS };
-    let (mut dispersion, mut logs) =
-        before.unwrap_or_else(|| (Dispersion::alike(problem), DVector::zeros(usual.len())));
+    let dispersed = |before: &Dispersion, logs: &DVector<f64>| {
+        let left = dwells.left(before, &[dwells.model_at(logs)])?;
+        let factor = |of: &Left| (BEFOREHAND + of.squares) / (BEFOREHAND + of.freedom);
+        Some(Dispersion::of_dwells(
+            left.dwells[0].iter().map(factor).collect(),
+        ))
+    };
+    let (mut dispersion, mut logs) = before.unwrap_or_else(|| {
+        let alike = Dispersion::alike(problem);
+        let logs = dwells.common(None, DVector::zeros(usual.len())).at;
+        (dispersed(&alike, &logs).unwrap_or(alike), logs)
+    });
     let mut sigma = DVector::zeros(usual.len());
     for _ in 0..rounds {
-        let lowest = common(problem, script, usual, &dispersion, logs);
+        let lowest = dwells.common(Some(&dispersion), logs);
         sigma = lowest.sigma();
         logs = lowest.at;
-        let model = model_at(problem, usual, &logs);
-        if let Some(left) = AllLeft::new(problem, script, &dispersion, &model) {
-            let factor = |of: &Left| (BEFOREHAND + of.squares) / (BEFOREHAND + of.freedom);
-            dispersion = Dispersion::of_dwells(left.dwells.iter().map(factor).collect());
-        }
+        dispersion = dispersed(&dispersion, &logs).unwrap_or(dispersion);
     }
     NoiseAtRest {
         logs,
         sigma,
         dispersion,
     }
-}
-
-fn model_at(problem: &Problem, usual: &[Usual], at: &DVector<f64>) -> Model {
-    let mut model = problem.model.clone();
-    usual
-        .iter()
-        .zip(at)
-        .for_each(|(usual, by)| usual.set(&mut model, *by));
-    model
-}
-
-/// The likeliest sizes common to all dwells, by Fisher's scoring with differences (Gupta and Mehra 1974, IEEE Trans.
-/// Automatic Control 19(6)).
-fn common(
-    problem: &Problem,
-    script: &Script,
-    usual: &[Usual],
-    dispersion: &Dispersion,
-    start: DVector<f64>,
-) -> Lowest {
-    let left_at = |at: &DVector<f64>| {
-        let model = model_at(problem, usual, at);
-        AllLeft::new(problem, script, dispersion, &model)
-    };
-    let n = usual.len();
-    let of_prior = |k: usize| usual[k].spread.powi(-2);
-    let slope_at = |at: &DVector<f64>| {
-        let penalty: f64 = (0..n).map(|k| at[k].powi(2) * of_prior(k)).sum();
-        let beside = |k: usize| {
-            let mut there = at.clone();
-            there[k] += DIFFERENCE;
-            left_at(&there)
-        };
-        let all: Option<Vec<AllLeft>> = (0..n).map(beside).collect();
-        let Some((here, beside)) = left_at(at).zip(all) else {
-            return Ok::<_, Infallible>(Slope::nowhere(n));
-        };
-        let deviance = here.deviance();
-        Ok(Slope {
-            cost: deviance + penalty,
-            gradient: DVector::from_fn(n, |k, _| {
-                (beside[k].deviance() - deviance) / DIFFERENCE + 2.0 * at[k] * of_prior(k)
-            }),
-            curvature: DMatrix::from_fn(n, n, |i, j| {
-                let own = if i == j { 2.0 * of_prior(i) } else { 0.0 };
-                2.0 * here.product(&beside[i], &beside[j]) / DIFFERENCE.powi(2) + own
-            }),
-        })
-    };
-    let Ok(lowest) = descend(start, slope_at);
-    lowest
 }

@@ -21,6 +21,8 @@ const SIZES: [(f64, f64); 7] = [
     (3.0, 2.0 / 16.0),
     (5.196_152_422_706_632, 1.0 / 16.0),
 ];
+/// The largest size over the usual one.
+pub const LARGEST: f64 = SIZES[6].0;
 /// Prior probability that a group is absent.
 const ABSENT: f64 = 0.5;
 /// Most rounds over all groups …

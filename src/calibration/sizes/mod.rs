@@ -17,6 +17,7 @@ use crate::calibration::{
     Prior, Problem, Script, SourceFigures,
 };
 use crate::statistics::{FALSE_ALARM, chi_square_limit};
+pub use averages::LARGEST;
 pub use candidates::Candidates;
 pub use likeliest::FREEDOM;
 use likeliest::{At, Search};
@@ -40,6 +41,17 @@ struct Size {
     /// Logarithm over the usual size, and its 1σ.
     log: f64,
     sigma: f64,
+}
+
+/// How far a linearisation point is from the estimate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// The misfit is that of the linearisation.
+    Far,
+    /// Near for the first time.
+    FirstNear,
+    /// Near as before.
+    Near,
 }
 
 /// Sizes of all effects.
@@ -76,7 +88,7 @@ impl Effects {
         }
     }
 
-    /// Makes the sizes likelier at a linearisation point, in several rounds if they are not yet near.
+    /// Makes the sizes likelier at a linearisation point, in several rounds once it is near.
     ///
     /// # Errors
     /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
@@ -84,13 +96,14 @@ impl Effects {
         &mut self,
         problem: &Problem,
         script: &Script,
-        is_near: bool,
+        stage: Stage,
     ) -> Result<(), CalibrationError> {
         let is_stated = problem.options.noise == NoisePolicy::Stated;
-        if !is_stated {
+        // What dwells alone say hardly depends on the linearisation.
+        if !is_stated && (self.at_rest.is_empty() || stage == Stage::FirstNear) {
             self.improve_at_rest(problem, script);
         }
-        let rounds = if is_near { ROUNDS } else { 1 };
+        let rounds = if stage == Stage::Far { 1 } else { ROUNDS };
         let chain = self.chain(problem, script)?;
         let prior = Prior::new(&chain.constants, &problem.model, &script.at);
         for round in 0..rounds {
@@ -281,7 +294,7 @@ impl Effects {
     ) -> Result<Vec<RecordingDifference>, CalibrationError> {
         let each = self.between.iter().filter_map(|size| match size.usual.what {
             What::Difference(group) => Some((size, group)),
-            What::Noise(_) => None,
+            What::Noise(_) | What::SettlingTime => None,
         });
         let each: Vec<_> = each.collect();
         let limit = chi_square_limit(1.0, FALSE_ALARM / each.len().max(1) as f64);

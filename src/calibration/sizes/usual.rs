@@ -3,6 +3,7 @@
 use crate::calibration::chain::Effect;
 use crate::calibration::record::schedule::step_length;
 use crate::calibration::record::script::Moves;
+use crate::calibration::model::SETTLING_TIME;
 use crate::calibration::{Group, Model, Problem, Source};
 use crate::run::Aiding;
 
@@ -20,6 +21,8 @@ const DIFFERENCE: f64 = 0.1;
 pub enum What {
     /// A source of noise.
     Noise(Source),
+    /// The time in which a table settles.
+    SettlingTime,
     /// The difference between recordings of a group of parameters.
     Difference(Group),
 }
@@ -42,10 +45,17 @@ impl Usual {
     pub fn all(problem: &Problem, moves: &Moves) -> Vec<Self> {
         let sources = Source::ALL.into_iter();
         let sources = sources.filter_map(|source| Self::of(source, problem, moves));
+        let settles = problem.model.aiding == Aiding::Table;
+        let settling = settles.then_some(Self {
+            what: What::SettlingTime,
+            sigma: SETTLING_TIME,
+            spread: LOG_SIGMA,
+            stated: false,
+        });
         let several = problem.runs().nth(1).is_some();
         let groups = Group::all().filter(|_| several);
         let differences = groups.filter_map(|group| Self::difference(group, &problem.model));
-        sources.chain(differences).collect()
+        sources.chain(settling).chain(differences).collect()
     }
 
     fn of(source: Source, problem: &Problem, moves: &Moves) -> Option<Self> {
@@ -84,6 +94,7 @@ impl Usual {
     /// The effect of the chain that it scales; `None` if it acts within dwells alone.
     pub fn effect(&self) -> Option<Effect> {
         match self.what {
+            What::SettlingTime => None,
             What::Difference(group) => Some(Effect::Difference(group)),
             What::Noise(source) => {
                 let at_rest = matches!(
@@ -105,10 +116,16 @@ impl Usual {
     pub fn set(&self, model: &mut Model, by: f64) {
         let sigma = self.sigma * by.exp();
         match self.what {
+            What::SettlingTime => model.settling_time = sigma,
             What::Noise(source) => source.set(model, sigma, CORRELATION_TIME),
             What::Difference(group) => {
                 for index in group.parameters(model.form) {
-                    model.day_to_day.parameters[index] = sigma * model.prior_sigma[index];
+                    let own = &mut model.day_to_day.parameters[index];
+                    *own = if self.stated {
+                        *own * by.exp()
+                    } else {
+                        sigma * model.prior_sigma[index]
+                    };
                 }
             }
         }

@@ -168,6 +168,7 @@ fn an_error_term_that_is_present_although_not_requested_is_named() {
         accuracy.effects = vec![TermEvidence {
             term: ErrorTerm::Instrument(Term::SizeEffect),
             present,
+            shown: is_named,
             remaining: 0.1,
             sigma_factors: [None; 6],
         }];

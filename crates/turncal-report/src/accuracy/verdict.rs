@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use super::tables;
 use super::tables::{compared, journey_name, white_within};
 use crate::prelude::*;
-use crate::terms::{CERTAIN, title};
+use crate::terms::title;
 use turncal::calibration::{ErrorTerm, Nis};
 use turncal::imu::Output;
 use turncal::study::{Accuracy, Figures, Ratio};
@@ -205,7 +205,7 @@ fn not_requested(accuracy: &Accuracy) -> Option<String> {
     let is_requested =
         |term: ErrorTerm| study.scenario.has(term) && !study.unmodelled.contains(&term);
     let shown = accuracy.effects.iter();
-    let shown = shown.filter(|of| of.present > CERTAIN && !is_requested(of.term));
+    let shown = shown.filter(|of| of.shown && !is_requested(of.term));
     let names: Vec<&str> = shown.map(|of| title(of.term)).collect();
     (!names.is_empty()).then(|| {
         format!(

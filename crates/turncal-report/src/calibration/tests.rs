@@ -332,6 +332,7 @@ fn the_position_error_at_the_end_stands_in_the_summary() {
 fn evidence(present: f64) -> TermEvidence {
     TermEvidence {
         term: ErrorTerm::Instrument(Term::GyroAsymmetry),
+        shown: false,
         present,
         remaining: 0.1,
         sigma_factors: [None; 6],

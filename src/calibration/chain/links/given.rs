@@ -2,7 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use super::{Rows, Transition};
+use super::rows::Rows;
+use super::transition::Transition;
 use crate::calibration::chain::dynamics::{Dynamics, rates};
 use crate::calibration::chain::part::{Part, begins};
 use crate::calibration::Constant;

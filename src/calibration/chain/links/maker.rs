@@ -3,7 +3,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::given::Given;
-use super::{Link, Rows, Transition};
+use super::link::Link;
+use super::rows::Rows;
+use super::transition::Transition;
 use crate::attitude::skew;
 use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::chain::dynamics::Dynamics;
@@ -88,7 +90,7 @@ impl<'a> Maker<'a> {
         let before = number.checked_sub(1).map(|k| &problem.stretches()[k]);
         let same = before.filter(|before| before.recording == stretch.recording);
         if let Some(before) = same {
-            self.vary(before.time_until(stretch));
+            self.vary(before.time_until(stretch), self.dwell);
         }
         let (stated, still) = (Effect::Stated, [0.0; 3]);
         let level = (start.attitude.as_slice(), start.attitude_sigma.as_slice());
@@ -172,11 +174,12 @@ impl<'a> Maker<'a> {
             self.pending
                 .drive(effect, self.dwell, 0, &root(&covariance));
         }
-        self.vary(block.duration);
+        self.vary(block.duration, self.dwell);
     }
 
     /// Lets the biases vary: first-order Gauss–Markov (Brown and Hwang, *Introduction to Random Signals*, 4th ed., §3.8).
-    fn vary(&mut self, duration: f64) {
+    /// `event`: the number of the dwell that it concerns or precedes.
+    fn vary(&mut self, duration: f64, event: usize) {
         let n = self.dynamics.states.count;
         for sensor in Sensor::ALL {
             let first = *self.dynamics.states.biases.get(sensor);
@@ -187,7 +190,7 @@ impl<'a> Maker<'a> {
             self.pending.then(&by);
             let sigma = variation.sigma * (1.0 - keep * keep).sqrt();
             let root = DMatrix::from_diagonal_element(3, 3, sigma);
-            self.pending.drive(wander(sensor), self.dwell, first, &root);
+            self.pending.drive(wander(sensor), event, first, &root);
         }
     }
 
@@ -237,7 +240,7 @@ impl<'a> Maker<'a> {
             .steps
             .iter()
             .map(|step| rest.models[step.model].duration);
-        self.vary(duration.sum());
+        self.vary(duration.sum(), self.dwell - 1);
         Ok(())
     }
 

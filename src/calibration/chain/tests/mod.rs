@@ -100,8 +100,8 @@ fn batch_least_squares_gives_the_estimate_and_covariance_of_the_chain() {
     quiet.instrument.noise.gyro.random_walk = 0.0;
     let mut exact = shortened(whole.clone());
     exact.table.position_sigma = 0.0;
-    for run in [whole, quiet, exact] {
-        assert!(from_batch(&Problem::new(&run, &plain())) < 1e-6);
+    for (run, most) in [(whole, 1e-6), (exact, 1e-6), (quiet, 1e-5)] {
+        assert!(from_batch(&Problem::new(&run, &plain())) < most);
     }
 }
 
@@ -195,7 +195,7 @@ fn stands_out(
     most: f64,
 ) {
     let simulated = Scenario::load("demo").unwrap().simulate(1, 0).unwrap();
-    let options = Options::default();
+    let options = Options::default().no_auto_terms();
     let problem = Problem::new(&simulated.run, &options);
     let of_sound = estimated(&problem);
     let mut run = simulated.run.clone();

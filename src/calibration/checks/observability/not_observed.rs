@@ -3,7 +3,9 @@
 
 use serde_json::json;
 
-use crate::calibration::{Finding, FindingKind as Kind, Outcome, auxiliary_name, parameter_name};
+use crate::calibration::{
+    Finding, FindingKind as Kind, OBSERVED_BELOW, Outcome, auxiliary_name, parameter_name,
+};
 use crate::units::DEGREE;
 
 /// All findings on quantities that the path of a filter's run does not determine.
@@ -19,8 +21,24 @@ pub fn not_observed_by_path(outcome: &Outcome) -> Vec<Finding> {
         (!outcome.heading_observed()).then(|| heading(outcome.attitude_sigma.z)),
         not_observed(path, constants.collect()),
         outcome.auxiliary.even_terms_inseparable().then(even_terms),
+        temperature_not_seen(unseen_temperature(outcome)),
     ];
     findings.into_iter().flatten().collect()
+}
+
+/// Parameters whose linear change with temperature is hardly known beyond its usual size.
+fn unseen_temperature(outcome: &Outcome) -> Vec<String> {
+    let Some(thermal) = &outcome.thermal else {
+        return Vec::new();
+    };
+    let linear = thermal.coefficients.iter().enumerate();
+    let unseen = linear.filter(|(k, of)| {
+        let usual = of.of(&thermal.model.sigma);
+        of.function == 0 && thermal.covariance[(*k, *k)].sqrt() > OBSERVED_BELOW * usual
+    });
+    let form = outcome.estimate.form();
+    let names = unseen.filter_map(|(_, of)| parameter_name(form, of.index()));
+    names.collect()
 }
 
 /// The finding on parameters that kept more than half of their prior σ, if any.

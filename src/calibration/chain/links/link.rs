@@ -1,0 +1,26 @@
+//! A transition, and what is observed after it.
+
+use nalgebra::Matrix3;
+
+use super::given::Given;
+use super::rows::Rows;
+use super::transition::Transition;
+
+/// A transition, and what is observed after it.
+#[derive(Debug, Clone)]
+pub struct Link {
+    /// Whether a stretch begins here.
+    pub begins: bool,
+    /// Number of the recording.
+    pub recording: usize,
+    /// Number of the dwell.
+    pub dwell: usize,
+    /// Computed attitude, if a dwell begins here.
+    pub attitude: Option<Matrix3<f64>>,
+    /// End of the part, s.
+    pub time: f64,
+    pub transition: Transition,
+    pub rows: Rows,
+    /// What the part is given.
+    pub given: Given,
+}

@@ -1,0 +1,52 @@
+//! Observations of states and constants.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Observations linear in states and constants, each with noise of σ 1.
+#[derive(Debug, Clone)]
+pub struct Rows {
+    /// Per state.
+    pub states: DMatrix<f64>,
+    /// Per constant.
+    pub constants: DMatrix<f64>,
+    /// What was observed.
+    pub values: DVector<f64>,
+}
+
+impl Rows {
+    pub fn none(states: usize, constants: usize) -> Self {
+        Self {
+            states: DMatrix::zeros(0, states),
+            constants: DMatrix::zeros(0, constants),
+            values: DVector::zeros(0),
+        }
+    }
+
+    /// This number of rows, all zero.
+    pub fn of(self, count: usize) -> Self {
+        Self {
+            states: DMatrix::zeros(count, self.states.ncols()),
+            constants: DMatrix::zeros(count, self.constants.ncols()),
+            values: DVector::zeros(count),
+        }
+    }
+
+    /// With others above them.
+    pub fn and(self, above: Self) -> Self {
+        let (m, k) = (above.values.len(), self.values.len());
+        let mut all = above.of_more(k);
+        all.states.rows_mut(m, k).copy_from(&self.states);
+        all.constants.rows_mut(m, k).copy_from(&self.constants);
+        all.values.rows_mut(m, k).copy_from(&self.values);
+        all
+    }
+
+    fn of_more(self, more: usize) -> Self {
+        let m = self.values.len();
+        Self {
+            states: self.states.insert_rows(m, more, 0.0),
+            constants: self.constants.insert_rows(m, more, 0.0),
+            values: self.values.insert_rows(m, more, 0.0),
+        }
+    }
+}
