@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let run = Run::new(recording, instrument, site);
 
     let problem = Problem::new(&run, &Options::default().aiding(Aiding::Velocity));
-    let mut solution = problem.solve(Method::Ekf, UNWATCHED)?;
+    let solution = problem.solve(Method::Ekf, UNWATCHED)?;
     let assessment = solution.assess(&problem)?;
     let calibration = solution.calibration(&problem, &assessment);
     for name in ["gyro.bias.x", "accel.scale.z"] {

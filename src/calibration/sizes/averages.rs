@@ -25,6 +25,8 @@ const SIZES: [(f64, f64); 7] = [
 pub const LARGEST: f64 = SIZES[6].0;
 /// Prior probability that a group is absent.
 const ABSENT: f64 = 0.5;
+/// Size over the usual one with which a group begins.
+const BEGUN: f64 = 0.01;
 /// Most rounds over all groups …
 const ROUNDS: usize = 100;
 /// … of which this many go to where each group leads, later ones half the way.
@@ -51,12 +53,12 @@ struct Moments {
 }
 
 impl Average {
-    /// Every group present with its usual size.
-    pub fn usual(groups: &[Vec<usize>]) -> Self {
+    /// Every group next to absent: were all present at first, everything else could be explained by them together.
+    pub fn begun(groups: &[Vec<usize>]) -> Self {
         let n = groups.iter().map(Vec::len).sum();
         Self {
             sites: Sites {
-                information: DMatrix::identity(n, n),
+                information: DMatrix::from_diagonal_element(n, n, BEGUN.powi(-2)),
                 vector: DVector::zeros(n),
             },
             absent: vec![ABSENT; groups.len()],
@@ -240,7 +242,7 @@ mod tests {
     }
 
     fn by_propagation(data: &Sites, groups: &[Vec<usize>]) -> Whole {
-        let found = Average::usual(groups).given(data, groups).unwrap();
+        let found = Average::begun(groups).given(data, groups).unwrap();
         let Moments { mean, covariance } = found.moments(data).unwrap();
         Whole {
             mean,

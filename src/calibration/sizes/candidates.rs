@@ -16,7 +16,7 @@ pub struct Candidates {
 }
 
 impl Candidates {
-    /// Those among constants, each present with its usual size.
+    /// Those among constants, not yet weighed.
     pub fn new(constants: &[Constant], model: &Model) -> Self {
         let mut all = Vec::new();
         let mut places = Vec::<Vec<usize>>::new();
@@ -31,7 +31,7 @@ impl Candidates {
             }
         }
         Self {
-            average: Average::usual(&places),
+            average: Average::begun(&places),
             all,
             places,
         }
@@ -63,9 +63,9 @@ impl Candidates {
         }
     }
 
-    /// Begins the average anew, each candidate present with its usual size.
+    /// Begins the average anew.
     pub fn begin(&mut self) {
-        self.average = Average::usual(&self.places);
+        self.average = Average::begun(&self.places);
     }
 
     /// Averages over all cases, given what is known of the constants; returns the largest change of a probability.
@@ -80,7 +80,7 @@ impl Candidates {
             vector: &scale * (of_data.vector + &of_data.information * at),
             information: &scale * of_data.information * &scale,
         };
-        let begun = [self.average.clone(), Average::usual(&self.places)];
+        let begun = [self.average.clone(), Average::begun(&self.places)];
         let found = begun.into_iter().find_map(|of| of.given(&data, &self.places));
         let Some(found) = found else {
             return 0.0;
