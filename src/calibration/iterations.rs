@@ -82,7 +82,8 @@ pub fn solve(
             fraction *= 0.5;
         }
         step = pass.largest_step;
-        solved.converged = was_near && effects.are_settled && step <= problem.options.converged_sigma;
+        solved.converged =
+            was_near && effects.are_settled && step <= problem.options.converged_sigma;
         if solved.converged || passes.len() >= problem.options.passes {
             return Ok(Solved { passes, ..solved });
         }

@@ -90,7 +90,8 @@ impl Linearisation {
         let from = to_vector(&self.triads);
         let turned = |from: &[Matrix3<f64>], to: &[Matrix3<f64>]| {
             let pairs = from.iter().zip(to);
-            let turned = pairs.map(|(from, to)| exp(log(&(to * from.transpose())) * fraction) * from);
+            let turned =
+                pairs.map(|(from, to)| exp(log(&(to * from.transpose())) * fraction) * from);
             turned.collect()
         };
         Self {

@@ -115,7 +115,8 @@ impl Model {
         }
         if options.auto_terms {
             let absent = &run.instrument.absent_terms;
-            let is_absent = |term| matches!(term, ErrorTerm::Instrument(of) if absent.contains(&of));
+            let is_absent =
+                |term| matches!(term, ErrorTerm::Instrument(of) if absent.contains(&of));
             let may_have = ErrorTerm::constant().filter(|&term| !is_absent(term));
             model.may_have = may_have
                 .filter(|&term| !model.has(term) && model.can_have(term))

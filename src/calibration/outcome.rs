@@ -210,7 +210,9 @@ fn gravity(filtered: &Filtered, posterior: &Posterior) -> (f64, f64) {
         let (_, last) = filtered.states(posterior, |link| link.begins).pop()?;
         Some((last.mean[state], last.covariance[(state, state)]))
     });
-    found.map_or((0.0, 0.0), |(mean, variance)| (mean, variance.max(0.0).sqrt()))
+    found.map_or((0.0, 0.0), |(mean, variance)| {
+        (mean, variance.max(0.0).sqrt())
+    })
 }
 
 /// Initial attitude of the last stretch: 1σ about East, North and Up, rad, and its covariance with each parameter

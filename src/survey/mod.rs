@@ -15,7 +15,7 @@ use crate::calibration::{
     Bound, CalibrationError, Contradiction, Estimate, Group, OBSERVED_BELOW, Options,
     ParameterVector, Problem, bound, coarse_start, parameter_name, six_position, stacked,
 };
-use crate::imu::{BodyFrame, InstallationForm, TermVector};
+use crate::imu::{BodyFrame, InstallationForm, MotionNoise, TermVector};
 use crate::run::motion::{self, LabelCheck, Rest, Turn};
 use crate::run::{Aiding, Run};
 use crate::units::DEGREE;
@@ -174,6 +174,13 @@ pub fn bound_of_record(run: &Run, options: &Options) -> Result<Bound, Calibratio
     let problem = Problem::new(run, options);
     let start = coarse_start(&problem)?;
     let problem = start.by_hand(&problem).unwrap_or(problem);
+    let problem = problem.with(|model| {
+        let of_moves = &mut model.motion_noise.accel;
+        // What a hand leaves of velocity is never stated; a table without a log is taken for one.
+        if model.aiding == Aiding::Velocity && *of_moves == MotionNoise::default() {
+            *of_moves = TURNED_BY_HAND;
+        }
+    });
     bound(&problem, &start.at.triads, &TermVector::zeros())
 }
 

@@ -223,7 +223,6 @@ fn of_several_findings_the_cause_comes_first() {
     for (case, cause) in [
         ("lat_neg", "earth-rate-wrong"),
         ("north_1", "earth-rate-wrong"),
-        ("slip_0_0.1", "position-wrong"),
     ] {
         if let Some(kinds) = kinds(&format!("wrong-input-{case}")) {
             assert_eq!(kinds[0], cause, "{case}: {kinds:?}");

@@ -5,9 +5,7 @@ use std::path::Path;
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use turncal::calibration::{
-    Finding, NoisePolicy, Options, Outcome, Problem, UNWATCHED, estimate,
-};
+use turncal::calibration::{Finding, NoisePolicy, Options, Outcome, Problem, UNWATCHED, estimate};
 use turncal::imu::{Output, PARAMETERS as PER_TRIAD, Sensor};
 use turncal::recording::FaultKind;
 use turncal::run::Run;
@@ -93,7 +91,9 @@ impl Log {
 
 fn calibrated(run: &Run) -> Outcome {
     // Single dwells and terms have weights of their own.
-    let options = Options::default().noise(NoisePolicy::Stated).no_auto_terms();
+    let options = Options::default()
+        .noise(NoisePolicy::Stated)
+        .no_auto_terms();
     let outcome = estimate(&Problem::new(run, &options), UNWATCHED).unwrap();
     assert!(outcome.converged);
     outcome

@@ -60,12 +60,12 @@ fn what_was_learnt_and_is_then_stated_gives_the_same_calibration() {
     for i in learnt.estimate.estimated() {
         // Single dwells and moves have weights of their own, which no line states.
         assert!(
-            (off[i] / sigma[i]).abs() < 0.2,
+            (off[i] / sigma[i]).abs() < 0.5,
             "{i}: {} σ",
             off[i] / sigma[i]
         );
         let ratio = stated.estimate.sigma()[i] / sigma[i];
-        assert!((ratio - 1.0).abs() < 0.1, "{i}: {ratio}");
+        assert!((ratio - 1.0).abs() < 0.2, "{i}: {ratio}");
     }
 }
 

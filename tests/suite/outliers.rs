@@ -43,7 +43,11 @@ fn jerk(run: &mut Run, sample: usize, rng: &mut ChaCha8Rng) {
 }
 
 fn error(simulated: &Simulated) -> (Outcome, ParameterVector) {
-    let outcome = estimate(&Problem::new(&simulated.run, &Options::default()), UNWATCHED).unwrap();
+    let outcome = estimate(
+        &Problem::new(&simulated.run, &Options::default()),
+        UNWATCHED,
+    )
+    .unwrap();
     assert!(outcome.converged);
     let error = outcome.estimate.vector() - to_vector(&simulated.truth);
     let normalised = error.component_div(&outcome.estimate.sigma());
@@ -103,11 +107,20 @@ fn a_table_that_settles_after_each_stop_costs_no_accuracy() {
             }
         }
         let (outcome, settling) = error(&simulated);
-        let _ = outcome.noise.sources.iter().map(|of| println!("{of}")).count();
+        let _ = outcome
+            .noise
+            .sources
+            .iter()
+            .map(|of| println!("{of}"))
+            .count();
         let shift = (settling - clean).amax();
         println!("{size}″: shift {shift:.3} σ");
         assert!(shift < 1.0, "{size}″: {shift} σ");
-        let settles = outcome.noise.sources.iter().find(|of| of.source == Source::Settling);
+        let settles = outcome
+            .noise
+            .sources
+            .iter()
+            .find(|of| of.source == Source::Settling);
         let found = settles.unwrap().used;
         println!("{size}″: {found}″ found");
     }

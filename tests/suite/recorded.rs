@@ -10,7 +10,9 @@ use crate::shared::{read, shared};
 
 /// With the noise that the run states, which is that of its data, and without terms that it does not state.
 fn stated() -> Options {
-    Options::default().noise(NoisePolicy::Stated).no_auto_terms()
+    Options::default()
+        .noise(NoisePolicy::Stated)
+        .no_auto_terms()
 }
 
 /// Largest errors: K in ppm, E in ″, D in °/h or µg, gyro before accelerometer.

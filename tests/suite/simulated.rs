@@ -13,7 +13,9 @@ use turncal::units::ARCSEC;
 
 /// With the noise that the run states, which is that of its data, and without terms that it does not state.
 fn stated() -> Options {
-    Options::default().noise(NoisePolicy::Stated).no_auto_terms()
+    Options::default()
+        .noise(NoisePolicy::Stated)
+        .no_auto_terms()
 }
 
 /// Fixed before the first run was made.
@@ -29,7 +31,11 @@ pub struct Trial {
 
 impl Trial {
     pub fn new(simulated: &Simulated) -> Self {
-        let outcome = estimate(&Problem::new(&simulated.run, &stated()), UNWATCHED).unwrap();
+        Self::with(simulated, &stated())
+    }
+
+    pub fn with(simulated: &Simulated, options: &Options) -> Self {
+        let outcome = estimate(&Problem::new(&simulated.run, options), UNWATCHED).unwrap();
         let error = outcome.estimate.vector() - to_vector(&simulated.truth);
         let sigma = outcome.estimate.sigma();
         let estimated: Vec<usize> = outcome.estimate.estimated().collect();

@@ -5,8 +5,8 @@ use std::ops::Range;
 use approx::assert_relative_eq;
 use nalgebra::{DMatrix, Vector3};
 use turncal::calibration::{
-    Estimate, Finding, NoisePolicy, Options, Outcome, PARAMETERS, ParameterVector, Problem, Together, UNWATCHED,
-    bound, estimate, mean_square_interval, nees, to_vector,
+    Estimate, Finding, NoisePolicy, Options, Outcome, PARAMETERS, ParameterVector, Problem,
+    Together, UNWATCHED, bound, estimate, mean_square_interval, nees, to_vector,
 };
 use turncal::imu::{PARAMETERS as PER_TRIAD, ParameterKind, Sensor, Triad};
 use turncal::recording::{Bridge, Recording, SampleError, Segment, Series, Stretch, TableLog};
@@ -26,7 +26,9 @@ fn solved(problem: &Problem) -> Outcome {
 
 /// With the noise that the run states, and without terms that it does not state.
 fn plain() -> Options {
-    Options::default().noise(NoisePolicy::Stated).no_auto_terms()
+    Options::default()
+        .noise(NoisePolicy::Stated)
+        .no_auto_terms()
 }
 
 /// Converged until rounding, so that two ways to one result may be compared.

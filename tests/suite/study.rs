@@ -3,7 +3,8 @@
 use assert_cmd::Command;
 use serde_json::Value;
 use turncal::calibration::{
-    Options, ParameterVector, Problem, UNWATCHED, bound, estimate, six_position, to_vector,
+    NoisePolicy, Options, ParameterVector, Problem, UNWATCHED, bound, estimate, six_position,
+    to_vector,
 };
 use turncal::imu::{PARAMETERS as PER_TRIAD, ParameterKind, Triad};
 use turncal::simulation::Scenario;
@@ -44,7 +45,9 @@ fn by_hand() -> [Vec<ParameterVector>; 4] {
     let mut all = [const { Vec::new() }; 4];
     for stream in 0..RUNS {
         let made = scenario.simulate(SEED, stream).unwrap();
-        let problem = Problem::new(&made.run, &Options::default());
+        // As studies have it where nothing is said.
+        let options = Options::default().noise(NoisePolicy::Stated);
+        let problem = Problem::new(&made.run, &options);
         let filtered = estimate(&problem, UNWATCHED).unwrap().estimate;
         let truth = to_vector(&made.truth);
         let bound = bound(&problem, &made.truth, &made.terms).unwrap();

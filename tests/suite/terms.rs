@@ -16,7 +16,9 @@ use crate::simulated::says;
 
 /// With the noise that the run states, which is that of its data, and without terms that it does not state.
 fn stated() -> Options {
-    Options::default().noise(NoisePolicy::Stated).no_auto_terms()
+    Options::default()
+        .noise(NoisePolicy::Stated)
+        .no_auto_terms()
 }
 
 const FORM: InstallationForm = InstallationForm::General;

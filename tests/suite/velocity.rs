@@ -111,7 +111,9 @@ fn from_body_axes_along_east_north_and_up_the_nineteen_positions_hardly_see_gyro
             prior.scale_sigma = Vector3::repeat(200.0 * PPM);
             prior.installation_sigma = Vector3::repeat(200.0 * ARCSEC);
         }
-        let stated = Options::default().noise(NoisePolicy::Stated).no_auto_terms();
+        let stated = Options::default()
+            .noise(NoisePolicy::Stated)
+            .no_auto_terms();
         estimate(&Problem::new(&run, &stated), UNWATCHED).unwrap()
     };
     let [published, level] = [published, level].map(calibrated);

@@ -196,7 +196,10 @@ fn of_candidates(
         let source = posterior.constants[all[0]].source();
         (source, of_parameters(&posterior.constants, &part))
     };
-    candidates.places().map(|(_, places)| part(places)).collect()
+    candidates
+        .places()
+        .map(|(_, places)| part(places))
+        .collect()
 }
 
 /// Sum of the variances over those of a whole.

@@ -88,7 +88,10 @@ const CHANGES: [(BudgetSource, Change); 11] = [
 /// variance, times that variance. Holds each part against passes; returns how many there were.
 fn held_against_passes(run: &Run, options: &Options) -> usize {
     const STEP: f64 = 0.02;
-    let problem = Problem::new(run, &options.clone().noise(NoisePolicy::Stated));
+    let problem = Problem::new(
+        run,
+        &options.clone().noise(NoisePolicy::Stated).no_auto_terms(),
+    );
     let outcome = estimate(&problem, UNWATCHED).unwrap();
     let budget = Budget::new(&problem, &outcome).unwrap();
     let mut model = outcome.model.clone();

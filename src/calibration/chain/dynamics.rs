@@ -4,9 +4,7 @@ use nalgebra::{DMatrix, SMatrix};
 
 use super::states::{ATTITUDE, NAVIGATION, States, VELOCITY};
 use crate::calibration::several::day_to_day::{OwnState, Turned};
-use crate::calibration::{
-    Constant, ParameterVector, parameter, sensor_and_parameter,
-};
+use crate::calibration::{Constant, ParameterVector, parameter, sensor_and_parameter};
 use crate::imu::{PARAMETERS as PER_TRIAD, Sensor};
 use crate::navigation::{Block, ErrorVector};
 

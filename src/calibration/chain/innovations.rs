@@ -114,7 +114,10 @@ impl Expected {
         self.mean += &gain * whitened;
         self.root -= gain * shrinking;
         let observed = rest.seen[of.number];
-        let step = rest.steps.iter().find(|step| step.seen.contains(&of.number));
+        let step = rest
+            .steps
+            .iter()
+            .find(|step| step.seen.contains(&of.number));
         whitened.norm_squared().is_finite().then_some(Innovation {
             time: step.map_or(link.time, |step| step.time),
             observation: observed.kind,

@@ -11,7 +11,6 @@ use super::states::States;
 use crate::calibration::{CalibrationError, Constant, Problem, Script};
 pub use link::Link;
 use maker::Maker;
-pub use maker::SLIP;
 use rows::Rows;
 
 /// The links of all stretches.
@@ -22,6 +21,8 @@ pub struct Chain {
     pub links: Vec<Link>,
     /// Number of scalars that were observed.
     pub observations: usize,
+    /// 1σ of the slip in one move over that of a position.
+    pub slip: f64,
     /// Sum of squares of the observations within parts that depends on nothing else …
     pub squares: f64,
     /// … and logarithm of the determinant of their covariance.
@@ -65,6 +66,7 @@ impl Chain {
         Ok(Self {
             links,
             observations,
+            slip: problem.slip(),
             squares,
             log_determinant,
             states,

@@ -20,7 +20,7 @@ mod without;
 pub use backward::{Moments, Smoothed};
 pub use effects::{Dispersion, Effect, Sizes, Slip};
 pub use forward::Filtered;
-pub use links::{Chain, SLIP};
+pub use links::Chain;
 
 #[cfg(test)]
 mod tests;

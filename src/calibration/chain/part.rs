@@ -132,7 +132,11 @@ impl<const M: usize, const G: usize> PartFilter for Course<M, G> {
                 let variance =
                     stretch.observation_variance(model, observed.kind, observed.readings);
                 let settles = filter_of(rest) == 0 && observed.kind == Observation::Table;
-                let settling = if settles { model.settling(since_stop) } else { 0.0 };
+                let settling = if settles {
+                    model.settling(since_stop)
+                } else {
+                    0.0
+                };
                 at = self.observe(at, first, variance + settling)?;
                 let gain = self.points[at].gain.as_ref()?;
                 let expected = Vector3::new(mean[first], mean[first + 1], mean[first + 2]);
@@ -182,9 +186,8 @@ fn step_model<const M: usize>(block: &Block, model: &Model) -> StepModel<M> {
             .map_or(row, |axis| ATTITUDE + axis)
     };
     let of_navigation = block.noise.covariance(&model.process_noise());
-    let turning = model.turning_at_rest.powi(2)
-        * model.weight(BudgetSource::RotationAtRest)
-        * block.duration;
+    let turning =
+        model.turning_at_rest.powi(2) * model.weight(BudgetSource::RotationAtRest) * block.duration;
     let (mut transition, mut driven) = (Vec::new(), Vec::new());
     let mut noise = [[0.0; M]; M];
     for row in 0..M {

@@ -6,9 +6,9 @@ use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::attitude::{exp, level, log, tilt};
+use crate::calibration::iterations::Solved;
 use crate::calibration::linearisation::singular;
 use crate::calibration::start::closed_form::six_position_by;
-use crate::calibration::iterations::Solved;
 use crate::calibration::{
     CalibrationError, ClosedForm, Linearisation, Outcome, Problem, Reference, Stretch,
 };

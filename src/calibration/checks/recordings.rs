@@ -23,10 +23,17 @@ pub struct RecordingDifference {
 
 impl RecordingDifference {
     /// The difference of a group, found at a logarithm over the usual size; without its test.
-    pub(in crate::calibration) fn new(group: Group, model: &Model, usual: &Usual, log: f64) -> Self {
+    pub(in crate::calibration) fn new(
+        group: Group,
+        model: &Model,
+        usual: &Usual,
+        log: f64,
+    ) -> Self {
         let (key, unit) = DayToDay::key(group);
         let first = group.parameters(model.form).into_iter();
-        let prior = first.map(|index| model.prior_sigma[index]).fold(0.0, f64::max);
+        let prior = first
+            .map(|index| model.prior_sigma[index])
+            .fold(0.0, f64::max);
         let stated = if usual.stated { usual.sigma } else { 0.0 };
         Self {
             key,

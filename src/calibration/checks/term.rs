@@ -44,7 +44,9 @@ impl TermEvidence {
         let absent = |term: ErrorTerm| {
             let candidate = Candidate::Term(term.alike());
             let mut absent = candidates.absent();
-            absent.find(|(other, _)| *other == candidate).map(|found| found.1)
+            absent
+                .find(|(other, _)| *other == candidate)
+                .map(|found| found.1)
         };
         let terms = ErrorTerm::constant().filter_map(|term| {
             let asked = model.has(term);
@@ -58,9 +60,9 @@ impl TermEvidence {
             let own: Vec<usize> = own.map(|(k, _)| k).collect();
             let candidates: Vec<usize> = own.iter().filter_map(|k| k.checked_sub(n - m)).collect();
             let remaining = if asked {
-                let sigma = own.iter().map(|&k| {
-                    of.posterior.covariance[(k, k)].max(0.0).sqrt() / of.prior.sigma[k]
-                });
+                let sigma = own
+                    .iter()
+                    .map(|&k| of.posterior.covariance[(k, k)].max(0.0).sqrt() / of.prior.sigma[k]);
                 sigma.fold(0.0, f64::max)
             } else {
                 of.known.effect_of(&candidates)?.1

@@ -108,7 +108,10 @@ impl Known {
         let (n, m) = (self.open.len(), self.prior.candidates);
         let k = n - m;
         let own = self.of_candidates();
-        let (information, vector) = (own.information + &sites.information, own.vector + &sites.vector);
+        let (information, vector) = (
+            own.information + &sites.information,
+            own.vector + &sites.vector,
+        );
         // With a diagonal of ones, whatever the units.
         let scale = information.diagonal().map(|value| value.sqrt().recip());
         let scaled = DMatrix::from_fn(m, m, |i, j| information[(i, j)] * scale[i] * scale[j]);
@@ -134,7 +137,11 @@ impl Known {
         let mut mean = self.prior.mean.clone();
         let mut full = DMatrix::zeros(all, all);
         for (row, &i) in self.open.iter().enumerate() {
-            mean[i] = if row < k { known[row] } else { candidates[row - k] };
+            mean[i] = if row < k {
+                known[row]
+            } else {
+                candidates[row - k]
+            };
             for (column, &j) in self.open.iter().enumerate() {
                 full[(i, j)] = match (row < k, column < k) {
                     (true, true) => covariance[(row, column)],
@@ -146,7 +153,12 @@ impl Known {
         }
         let squares = self.root.view((k, n), (m + 1, 1)).norm_squared();
         let of_root: f64 = (0..k).map(|row| self.root[(row, row)].abs().ln()).sum();
-        let of_prior: f64 = self.open.iter().take(k).map(|&i| self.prior.sigma[i].ln()).sum();
+        let of_prior: f64 = self
+            .open
+            .iter()
+            .take(k)
+            .map(|&i| self.prior.sigma[i].ln())
+            .sum();
         Some(Posterior::new(
             &self.prior.constants,
             mean,

@@ -71,7 +71,6 @@ impl Posterior {
             coefficients,
         })
     }
-
 }
 
 /// Extracts the parameters of both triads from a matrix of constants.

@@ -80,7 +80,6 @@ impl ByHand {
         }
         model
     }
-
 }
 
 fn add(covariance: &mut DMatrix<f64>, parts: &DVector<f64>, variance: f64) {

@@ -118,13 +118,11 @@ impl AtRest {
     /// Both are within arc seconds of the truth in every pass, so the noise accumulated over a long
     /// record never leaves the linear range, and a tilt due to noise does not change the effect of a wrong
     /// heading.
-    pub fn tied(
-        &self,
-        computed: &State,
-        accel: &Triad,
-        known: Option<&Matrix3<f64>>,
-    ) -> State {
-        let of_table = self.dwell.attitude.map(|read| known.copied().unwrap_or(read));
+    pub fn tied(&self, computed: &State, accel: &Triad, known: Option<&Matrix3<f64>>) -> State {
+        let of_table = self
+            .dwell
+            .attitude
+            .map(|read| known.copied().unwrap_or(read));
         State::at_rest(of_table.unwrap_or_else(|| {
             let up = accel.correction().unwrap_or_default() * (self.dwell.accel - accel.bias);
             exp(tilt(&(computed.attitude * up))) * computed.attitude

@@ -23,6 +23,8 @@ const RATE: f64 = 1e-3;
 const FORCE: f64 = 0.03;
 /// Degrees of freedom of the prior of a dwell's variance over that of all.
 const BEFOREHAND: f64 = 6.0;
+/// Least logarithm of a size over the usual one: a noise a hundred times smaller is that of rounding.
+const LEAST: f64 = -4.605_170_185_988_091;
 /// Rounds of common sizes and dispersions of dwells.
 const ROUNDS: usize = 3;
 
@@ -97,7 +99,9 @@ impl Dwells<'_> {
                         seen.scalars.extend((0..3).map(scalar));
                         seen.rows.extend(of.rows.iter().map(|weight| weight / root));
                     })?;
-                    let given = all.dwells[k].last_mut()?.add(&part.dispersed(factor), factor)?;
+                    let given = all.dwells[k]
+                        .last_mut()?
+                        .add(&part.dispersed(factor), factor)?;
                     seen.take_off(&given);
                 }
                 all.compare(&seen);
@@ -109,7 +113,7 @@ impl Dwells<'_> {
     fn model_at(&self, at: &DVector<f64>) -> Model {
         let mut model = self.problem.model.clone();
         let sizes = self.usual.iter().zip(at);
-        sizes.for_each(|(usual, by)| usual.set(&mut model, *by));
+        sizes.for_each(|(usual, by)| usual.set(&mut model, by.max(LEAST)));
         model
     }
 
@@ -263,7 +267,7 @@ pub fn likeliest(
         dispersion = dispersed(&dispersion, &logs).unwrap_or(dispersion);
     }
     NoiseAtRest {
-        logs,
+        logs: logs.map(|log| log.max(LEAST)),
         sigma,
         dispersion,
     }

@@ -25,8 +25,6 @@ const SIZES: [(f64, f64); 7] = [
 pub const LARGEST: f64 = SIZES[6].0;
 /// Prior probability that a group is absent.
 const ABSENT: f64 = 0.5;
-/// Size over the usual one with which a group begins.
-const BEGUN: f64 = 0.01;
 /// Most rounds over all groups …
 const ROUNDS: usize = 100;
 /// … of which this many go to where each group leads, later ones half the way.
@@ -53,12 +51,18 @@ struct Moments {
 }
 
 impl Average {
-    /// Every group next to absent: were all present at first, everything else could be explained by them together.
-    pub fn begun(groups: &[Vec<usize>]) -> Self {
+    /// Every group present with this size over the usual one.
+    pub fn begun(groups: &[Vec<usize>], sizes: &[f64]) -> Self {
         let n = groups.iter().map(Vec::len).sum();
+        let mut information = DMatrix::zeros(n, n);
+        for (places, size) in groups.iter().zip(sizes) {
+            for &place in places {
+                information[(place, place)] = size.powi(-2);
+            }
+        }
         Self {
             sites: Sites {
-                information: DMatrix::from_diagonal_element(n, n, BEGUN.powi(-2)),
+                information,
                 vector: DVector::zeros(n),
             },
             absent: vec![ABSENT; groups.len()],
@@ -105,13 +109,7 @@ impl Average {
     /// The factor of a group that gives its average over all cases, given all others, and the probability that it is
     /// absent; `None` if the others do not allow one yet.
     fn of_group(&self, places: &[usize], now: &Moments) -> Option<(Sites, f64)> {
-        let own = now.covariance.select_rows(places).select_columns(places);
-        let inverse = Cholesky::new(own)?.inverse();
-        let (information, vector) = self.site(places);
-        let cavity = Sites {
-            vector: &inverse * now.mean.select_rows(places) - vector,
-            information: inverse - information,
-        };
+        let cavity = self.cavity(places, now)?;
         let (average, absent) = cases(&cavity)?;
         let inverse = Cholesky::new(average.covariance)?.inverse();
         let site = Sites {
@@ -119,6 +117,17 @@ impl Average {
             information: inverse - cavity.information,
         };
         Some((site, absent))
+    }
+
+    /// What all others say of a group.
+    fn cavity(&self, places: &[usize], now: &Moments) -> Option<Sites> {
+        let own = now.covariance.select_rows(places).select_columns(places);
+        let inverse = Cholesky::new(own)?.inverse();
+        let (information, vector) = self.site(places);
+        Some(Sites {
+            vector: &inverse * now.mean.select_rows(places) - vector,
+            information: inverse - information,
+        })
     }
 
     fn site(&self, places: &[usize]) -> (DMatrix<f64>, DVector<f64>) {
@@ -242,7 +251,9 @@ mod tests {
     }
 
     fn by_propagation(data: &Sites, groups: &[Vec<usize>]) -> Whole {
-        let found = Average::begun(groups).given(data, groups).unwrap();
+        let found = Average::begun(groups, &vec![1.0; groups.len()])
+            .given(data, groups)
+            .unwrap();
         let Moments { mean, covariance } = found.moments(data).unwrap();
         Whole {
             mean,

@@ -2,9 +2,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::averages::Average;
+use super::averages::{Average, LARGEST};
 use crate::calibration::constants::Sites;
 use crate::calibration::{Candidate, Constant, Known, Model, Prior};
+
+/// Size over the usual one with which a term begins.
+const NEXT_TO_ABSENT: f64 = 0.01;
 
 /// Constants that may be absent, in groups, with the average over their cases.
 #[derive(Debug, Clone)]
@@ -31,7 +34,7 @@ impl Candidates {
             }
         }
         Self {
-            average: Average::begun(&places),
+            average: begun(&all, &places),
             all,
             places,
         }
@@ -45,27 +48,46 @@ impl Candidates {
 
     /// The candidates with the places of their constants among those that may be absent.
     pub fn places(&self) -> impl Iterator<Item = (Candidate, &[usize])> {
-        self.all.iter().copied().zip(self.places.iter().map(Vec::as_slice))
+        self.all
+            .iter()
+            .copied()
+            .zip(self.places.iter().map(Vec::as_slice))
     }
 
     /// Normal factors in place of their prior, as errors of the linearisation point of this one.
     pub fn sites(&self, prior: &Prior) -> Sites {
-        let (usual, at) = usual_and_values(prior);
-        let Sites {
-            information,
-            vector,
-        } = &self.average.sites;
-        let inverse = DMatrix::from_diagonal(&usual.map(f64::recip));
-        let information = &inverse * information * &inverse;
-        Sites {
-            vector: inverse * vector - &information * at,
-            information,
+        in_errors(&self.average.sites, prior)
+    }
+
+    /// The same where other sizes are on trial. A factor that takes information away, between absent and present, would
+    /// reward whatever makes the data know less: it counts as a free constant of the largest size.
+    pub fn sites_on_trial(&self, prior: &Prior) -> Sites {
+        let mut sites = self.average.sites.clone();
+        for places in &self.places {
+            let own = sites.information.select_rows(places).select_columns(places);
+            let mut eigen = own.symmetric_eigen();
+            let mut along = eigen.eigenvectors.tr_mul(&sites.vector.select_rows(places));
+            let least = LARGEST.powi(-2);
+            for (value, along) in eigen.eigenvalues.iter_mut().zip(along.iter_mut()) {
+                if *value < least {
+                    (*value, *along) = (least, 0.0);
+                }
+            }
+            let vector = &eigen.eigenvectors * along;
+            let own = eigen.recompose();
+            for (row, &i) in places.iter().enumerate() {
+                sites.vector[i] = vector[row];
+                for (column, &j) in places.iter().enumerate() {
+                    sites.information[(i, j)] = own[(row, column)];
+                }
+            }
         }
+        in_errors(&sites, prior)
     }
 
     /// Begins the average anew.
     pub fn begin(&mut self) {
-        self.average = Average::begun(&self.places);
+        self.average = begun(&self.all, &self.places);
     }
 
     /// Averages over all cases, given what is known of the constants; returns the largest change of a probability.
@@ -80,8 +102,10 @@ impl Candidates {
             vector: &scale * (of_data.vector + &of_data.information * at),
             information: &scale * of_data.information * &scale,
         };
-        let begun = [self.average.clone(), Average::begun(&self.places)];
-        let found = begun.into_iter().find_map(|of| of.given(&data, &self.places));
+        let begun = [self.average.clone(), begun(&self.all, &self.places)];
+        let found = begun
+            .into_iter()
+            .find_map(|of| of.given(&data, &self.places));
         let Some(found) = found else {
             return 0.0;
         };
@@ -90,6 +114,28 @@ impl Candidates {
         let change = change.fold(0.0, f64::max);
         self.average = found;
         change
+    }
+}
+
+/// Begins terms next to absent, because all of them together could explain everything else; orders of temperature with
+/// their usual sizes, because nothing else explains what warms.
+fn begun(all: &[Candidate], places: &[Vec<usize>]) -> Average {
+    let size = |of: &Candidate| match of {
+        Candidate::Order(..) => 1.0,
+        Candidate::Term(_) | Candidate::EarthRate => NEXT_TO_ABSENT,
+    };
+    let sizes: Vec<f64> = all.iter().map(size).collect();
+    Average::begun(places, &sizes)
+}
+
+/// Factors of values over usual sizes as factors of errors of the linearisation point.
+fn in_errors(sites: &Sites, prior: &Prior) -> Sites {
+    let (usual, at) = usual_and_values(prior);
+    let inverse = DMatrix::from_diagonal(&usual.map(f64::recip));
+    let information = &inverse * &sites.information * &inverse;
+    Sites {
+        vector: inverse * &sites.vector - &information * at,
+        information,
     }
 }
 

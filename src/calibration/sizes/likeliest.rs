@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use nalgebra::DVector;
 
 use super::usual::Usual;
-use crate::calibration::chain::{Chain, Effect, Moments, SLIP, Sizes, Smoothed};
+use crate::calibration::chain::{Chain, Effect, Moments, Sizes, Smoothed};
 use crate::calibration::constants::Sites;
 use crate::calibration::{CalibrationError, Known, Prior};
 
@@ -167,7 +167,7 @@ impl At {
         Self {
             logs: DVector::zeros(usual.len()),
             events: slips.fold(Sizes::default(), |sizes, drive| {
-                sizes.with_event(drive.effect, drive.event, SLIP.powi(-2))
+                sizes.with_event(drive.effect, drive.event, chain.slip.powi(-2))
             }),
         }
     }

@@ -104,6 +104,9 @@ impl Effects {
             self.improve_at_rest(problem, script);
         }
         let rounds = if stage == Stage::Far { 1 } else { ROUNDS };
+        if stage == Stage::FirstNear {
+            self.begin();
+        }
         let chain = self.chain(problem, script)?;
         let prior = Prior::new(&chain.constants, &problem.model, &script.at);
         for round in 0..rounds {
@@ -121,6 +124,13 @@ impl Effects {
             }
         }
         Ok(())
+    }
+
+    /// Begins all that was sought far from the estimate anew, where the misfit was that of the linearisation.
+    fn begin(&mut self) {
+        self.events = Sizes::default();
+        self.between.iter_mut().for_each(|size| size.log = 0.0);
+        self.candidates.begin();
     }
 
     /// The noise at rest, from the dwells alone.
@@ -164,19 +174,17 @@ impl Effects {
         if self.events != Sizes::default() {
             start.events = self.events.clone();
         }
-        let mut here = search.likeliest(start.clone(), &self.candidates.sites(prior));
-        if here.is_err() {
-            // What averages said elsewhere may contradict the rows here.
-            self.candidates.begin();
-            here = search.likeliest(start, &self.candidates.sites(prior));
-        }
-        let here = here?;
+        let here = search.likeliest(start, &self.candidates.sites_on_trial(prior))?;
         let change = self.candidates.weigh(&here.known, prior);
         let sigma = here.sigma(&usual);
         for (k, size) in self.between.iter_mut().enumerate() {
             (size.log, size.sigma) = (here.at.logs[k], sigma[k]);
         }
-        let of_sizes = if usual.is_empty() { 0.0 } else { (&here.at.logs - before).amax() };
+        let of_sizes = if usual.is_empty() {
+            0.0
+        } else {
+            (&here.at.logs - before).amax()
+        };
         self.events = here.at.events;
         Ok(change.max(of_sizes))
     }
@@ -204,8 +212,10 @@ impl Effects {
         let prior = Prior::new(&chain.constants, &problem.model, &script.at);
         let known = filtered.known(&prior);
         let time = chain.links.last().map_or(0.0, |link| link.time);
-        let posterior = filtered
-            .posterior_with(&known, &self.candidates.sites(&prior))
+        // Where a part of the rows knows less than what the averages take away, candidates are free.
+        let averaged = filtered.posterior_with(&known, &self.candidates.sites(&prior));
+        let posterior = averaged
+            .or_else(|| filtered.posterior_with(&known, &self.candidates.sites_on_trial(&prior)))
             .ok_or(CalibrationError::Diverged { time })?;
         Ok(Weighed {
             filtered,
@@ -225,9 +235,11 @@ impl Effects {
             });
         }
         let each = self.between.iter();
-        each.fold(self.events.clone(), |sizes, size| match size.usual.effect() {
-            Some(effect) => sizes.with(effect, (2.0 * size.log).exp()),
-            None => sizes,
+        each.fold(self.events.clone(), |sizes, size| {
+            match size.usual.effect() {
+                Some(effect) => sizes.with(effect, (2.0 * size.log).exp()),
+                None => sizes,
+            }
         })
     }
 
@@ -292,10 +304,13 @@ impl Effects {
         of: &Weighed,
         problem: &Problem,
     ) -> Result<Vec<RecordingDifference>, CalibrationError> {
-        let each = self.between.iter().filter_map(|size| match size.usual.what {
-            What::Difference(group) => Some((size, group)),
-            What::Noise(_) | What::SettlingTime => None,
-        });
+        let each = self
+            .between
+            .iter()
+            .filter_map(|size| match size.usual.what {
+                What::Difference(group) => Some((size, group)),
+                What::Noise(_) | What::SettlingTime => None,
+            });
         let each: Vec<_> = each.collect();
         let limit = chi_square_limit(1.0, FALSE_ALARM / each.len().max(1) as f64);
         let sites = self.candidates.sites(&of.prior);
@@ -308,7 +323,8 @@ impl Effects {
             let posterior = filtered.posterior_with(&filtered.known(&of.prior), &sites);
             let ratio = posterior.map_or(0.0, |other| other.deviance - of.posterior.deviance);
             if ratio > limit && size.log > 0.0 || ratio > limit && !size.usual.stated {
-                let difference = RecordingDifference::new(group, &problem.model, &size.usual, size.log);
+                let difference =
+                    RecordingDifference::new(group, &problem.model, &size.usual, size.log);
                 found.push(RecordingDifference {
                     ratio,
                     limit,

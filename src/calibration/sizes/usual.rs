@@ -1,9 +1,9 @@
 //! Usual sizes of effects, and how well each is known beforehand.
 
 use crate::calibration::chain::Effect;
+use crate::calibration::model::SETTLING_TIME;
 use crate::calibration::record::schedule::step_length;
 use crate::calibration::record::script::Moves;
-use crate::calibration::model::SETTLING_TIME;
 use crate::calibration::{Group, Model, Problem, Source};
 use crate::run::Aiding;
 

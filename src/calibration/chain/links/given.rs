@@ -4,9 +4,9 @@ use nalgebra::DMatrix;
 
 use super::rows::Rows;
 use super::transition::Transition;
+use crate::calibration::Constant;
 use crate::calibration::chain::dynamics::{Dynamics, rates};
 use crate::calibration::chain::part::{Part, begins};
-use crate::calibration::Constant;
 use crate::calibration::chain::states::{ATTITUDE, POSITION};
 use crate::calibration::record::Rest;
 use crate::navigation::Block;

@@ -11,16 +11,16 @@ use crate::calibration::budget::source::BudgetSource;
 use crate::calibration::chain::dynamics::Dynamics;
 use crate::calibration::chain::effects::{Dispersion, Effect, Slip};
 use crate::calibration::chain::part::{PartFilter, filter_of, part_filters};
-use crate::calibration::chain::states::{ATTITUDE, NAVIGATION, POSITION, States, VELOCITY};
 use crate::calibration::chain::short_rows::factor;
+use crate::calibration::chain::states::{ATTITUDE, NAVIGATION, POSITION, States, VELOCITY};
 use crate::calibration::record::{Event, Rest, between};
 use crate::calibration::several::day_to_day::OwnState;
 use crate::calibration::{CalibrationError, Constant, Group, Problem, Script, Source, Stretch};
 use crate::imu::{GaussMarkov, MotionNoise, Noise, PerSensor, Sensor};
 use crate::navigation::{Block, ErrorMatrix, ProcessNoise};
 
-/// 1σ of a slip in a move over that of a position: slips of a hundred moves add up to as much.
-pub const SLIP: f64 = 0.1;
+/// 1σ of the slips of all moves together over that of a position.
+const SLIP: f64 = 0.1;
 
 /// Makes links one after the other.
 pub struct Maker<'a> {
@@ -284,7 +284,8 @@ impl<'a> Maker<'a> {
             }
             let kinds = [Slip::Mount, Slip::Base].map(Effect::Slip);
             for (slips, effect) in states.slips.into_iter().flatten().zip(kinds) {
-                let root = DMatrix::from_diagonal_element(3, 3, SLIP * model.position_sigma);
+                let slip = self.problem.slip() * model.position_sigma;
+                let root = DMatrix::from_diagonal_element(3, 3, slip);
                 self.pending.drive(effect, self.dwell - 1, slips, &root);
             }
             let sigma = stretch.position_variance(model).sqrt();
@@ -296,6 +297,13 @@ impl<'a> Maker<'a> {
             self.log_determinant += 6.0 * sigma.ln();
         }
         rows
+    }
+}
+
+impl Problem<'_> {
+    /// 1σ of the slip in one move over that of a position.
+    pub fn slip(&self) -> f64 {
+        SLIP / (self.dwells().count().max(1) as f64).sqrt()
     }
 }
 

@@ -16,10 +16,10 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::attitude::{log, skew, to_tilt_and_heading};
 use crate::calibration::budget::curvature::curvature;
+use crate::calibration::chain::states::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::checks::innovation::Observation;
 use crate::calibration::error::CalibrationError;
 use crate::calibration::estimate::Estimate;
-use crate::calibration::chain::states::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::linearisation::{Start, singular};
 use crate::calibration::model::Model;
 use crate::calibration::outcome::Outcome;

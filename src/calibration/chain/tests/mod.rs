@@ -5,18 +5,18 @@ use rayon::prelude::*;
 
 use super::{Chain, Dispersion, Effect, Sizes, Slip};
 use crate::attitude::{exp, matrix, quaternion};
-use crate::calibration::start::coarse::coarse_start;
 use crate::calibration::constants::Sites;
 use crate::calibration::iterations::{Solved, solve};
+use crate::calibration::start::coarse::coarse_start;
 use crate::calibration::{
     AttitudePrior, ErrorTerm, Estimate, Linearisation, NoisePolicy, Options, PARAMETERS,
     ParameterVector, Posterior, Prior, Problem, Script, Source, UNWATCHED, nees, to_vector,
 };
-use batch::batch_estimate;
 use crate::imu::{PerSensor, Triad};
 use crate::run::{Aiding, Run};
 use crate::simulation::Scenario;
 use crate::units::{ARCSEC, DEGREE};
+use batch::batch_estimate;
 
 fn run(name: &str) -> Run {
     Scenario::load(name).unwrap().simulate(1, 0).unwrap().run
@@ -77,7 +77,9 @@ fn from_batch(problem: &Problem) -> f64 {
 
 /// Noise as stated, and no term that may be absent.
 fn plain() -> Options {
-    Options::default().noise(NoisePolicy::Stated).no_auto_terms()
+    Options::default()
+        .noise(NoisePolicy::Stated)
+        .no_auto_terms()
 }
 
 /// The first 200 s of a run.
@@ -119,7 +121,9 @@ fn posterior(problem: &Problem, chain: &Chain, at: &Linearisation, sizes: &Sizes
     let prior = prior(problem, chain, at);
     let filtered = chain.filter(sizes).unwrap();
     let known = filtered.known(&prior);
-    filtered.posterior_with(&known, &Sites::none(&prior)).unwrap()
+    filtered
+        .posterior_with(&known, &Sites::none(&prior))
+        .unwrap()
 }
 
 #[test]
