@@ -18,6 +18,8 @@ use crate::calibration::{
 const NEAR: f64 = 2.0;
 /// After a step longer than this fraction of the one before, all further steps are halved.
 const SHRINKS: f64 = 0.8;
+/// Steps below this, in σ, are those of the sizes.
+const SMALL: f64 = 0.2;
 /// Most halvings of a step that leads nowhere: to a thousandth.
 const MOST_SHORTENED: usize = 10;
 
@@ -78,7 +80,7 @@ pub fn solve(
         };
         tell(progress, &pass)?;
         passes.push(pass);
-        if was_near && effects.are_settled && pass.largest_step > SHRINKS * step {
+        if effects.are_settled && pass.largest_step > (SHRINKS * step).max(SMALL) {
             fraction *= 0.5;
         }
         step = pass.largest_step;

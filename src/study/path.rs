@@ -60,11 +60,7 @@ pub struct Evaluation {
     pub navigation: Vec<Outlook>,
 }
 
-/// What a calibration would know without the rows of the dwell after a move.
-///
-/// With the likelihood as a product of factors, each dwell given those before it, this factor is left out (partial
-/// likelihood: Cox 1975, Biometrika 62(2)). The next dwell still shows a part of the move, so σ is a lower limit of that
-/// of a path without the move.
+/// What a calibration would know without a move: attitude, velocity and position may have become anything in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Without {
     /// Time of the move and the dwell after it, s.

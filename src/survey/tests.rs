@@ -151,7 +151,7 @@ mod by_hand {
 
     use super::*;
     use crate::attitude::exp;
-    use crate::calibration::{Method, UNWATCHED, parameter};
+    use crate::calibration::{Method, NoisePolicy, UNWATCHED, parameter};
     use crate::imu::Sensor;
     use crate::models;
     use crate::turntable::{BodyStep, Moves, Path, Rotation};
@@ -356,7 +356,12 @@ mod by_hand {
     fn who_does_what_is_said_needs_hardly_more_dwells_than_the_best_of_fifty_orders() {
         let mut ratios = Vec::new();
         for seed in 0..4 {
-            let (mut person, mut evaluator) = (Person::new(seed), evaluator());
+            // As orders are judged: by what motion and stated noise tell.
+            let options = Options::default()
+                .noise(NoisePolicy::Stated)
+                .no_auto_terms();
+            let mut evaluator = Evaluator::new(options, Some(specification()));
+            let mut person = Person::new(seed);
             let mut dwells = 1;
             loop {
                 let status = evaluator.status(&person.run(), UNWATCHED);

@@ -139,7 +139,7 @@ impl Report<'_> {
         facts
     }
 
-    /// σ of each group without what the dwell after each move says, divided by σ with all dwells.
+    /// σ of each group without what each move says, divided by σ with all moves.
     fn moves(&self) -> Table {
         let (estimate, all) = (
             &self.evaluation.bound.estimate,
@@ -157,12 +157,9 @@ impl Report<'_> {
         };
         let columns = cells!["", "move", "s"].into_iter();
         let columns = columns.chain(Group::all().map(Group::short));
-        let mut table = Table::new("σ without the dwell after each move, divided by σ with all dwells", columns)
+        let mut table = Table::new("σ without each move, divided by σ with all moves", columns)
             .section(self.evaluation.without.iter().enumerate().map(row))
-            .note(
-                "The next dwell still shows a part of the move, so a path without the move can lose more. Evaluate that \
-                 path before you use it.",
-            );
+            .note("A path without the move also lacks the dwell after it. Evaluate that path before you use it.");
         table.optional = vec![2];
         table
     }

@@ -57,7 +57,7 @@ fn rejected(name: &str, nis: f64, worst: f64) -> Option<Finding> {
     let text = format!(
         "Calibration rejected: {name} is {nis:.0}, far above anything a wrong noise figure could cause (limit \
          {limit:.0}). The largest residual is at {worst:.1} s: look there for lost, repeated or wrapped rows, a bump \
-         or a wrong table position. If it really is noise, rerun with --noise auto."
+         or a wrong table position."
     );
     let figures = json!({ "nis": nis, "limit": limit, "worst": worst });
     (nis > limit).then(|| Finding::new(Kind::Unexplained, text, figures))

@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 pub enum NoisePolicy {
     /// Use the noise that run.toml and models state
     Stated,
-    /// Use the stated noise; estimate it from the recording if the two disagree (p < 0.001)
+    /// Estimate the noise from the recording, with the stated noise as prior
     #[default]
     Auto,
-    /// Estimate the noise from the recording, with the stated noise as prior
+    /// The same as auto
     Learnt,
 }
 

@@ -26,16 +26,16 @@ pub struct NoiseReport {
     pub sources: Vec<SourceFigures>,
 }
 
-/// The test of the stated noise against the estimated noise: −2 ln of the likelihood ratio.
+/// The test of the stated noise against the estimated noise.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct NoiseTest {
-    /// −2 ln of the likelihood ratio of the stated to the estimated noise …
+    /// The largest squared distance of a stated figure from the estimate, in logarithms and their σ …
     #[serde(default)]
     pub ratio: f64,
-    /// … and its limit for correct stated noise (p < 0.001).
+    /// … and its limit for correct stated noise (χ², p < 0.001 over all figures).
     #[serde(rename = "ratio_limit")]
     pub limit: f64,
-    /// Whether the data contradict the stated noise.
+    /// Whether a stated figure is too small by more than half beyond this limit.
     pub rejected: bool,
 }
 
@@ -66,11 +66,11 @@ impl NoiseReport {
     }
 
     /// Noise as stated, not tested.
-    pub(in crate::calibration) fn stated(policy: NoisePolicy, test: Option<NoiseTest>) -> Self {
+    pub(in crate::calibration) fn stated(policy: NoisePolicy) -> Self {
         Self {
             policy,
             learnt: false,
-            test,
+            test: None,
             sources: Vec::new(),
         }
     }
@@ -79,10 +79,7 @@ impl NoiseReport {
 impl fmt::Display for NoiseReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if !self.learnt {
-            return match &self.test {
-                Some(_) => f.write_str("Stated noise was used; the data agree with it."),
-                None => f.write_str("Stated noise was used."),
-            };
+            return f.write_str("Stated noise was used.");
         }
         f.write_str("Noise estimated from the recording:")?;
         for (number, figures) in self.sources.iter().filter(|s| s.counts()).enumerate() {
@@ -150,8 +147,7 @@ fn symbol(unit: &str) -> String {
     })
 }
 
-/// The finding on estimated noise: −2 ln of the likelihood ratio of stated to estimated noise, its limit, and the
-/// sources. `None` if no noise was stated.
+/// The finding on estimated noise: the distance of the worst stated figure, its limit, and the sources. `None` if no noise was stated.
 fn noise_learnt(
     problem: &Problem,
     (ratio, limit): (f64, f64),
@@ -164,8 +160,8 @@ fn noise_learnt(
     let used = sources.iter().filter(|figures| figures.counts());
     let used: Vec<String> = used.map(SourceFigures::to_string).collect();
     let text = format!(
-        "The stated noise does not fit this record (likelihood-ratio statistic {ratio:.0}; expected below \
-         {limit:.0}). turncal used the noise it estimated from the record \
+        "The stated noise does not fit this record (squared distance of the worst figure {ratio:.0}; expected \
+         below {limit:.0}). turncal used the noise it estimated from the record \
          instead; all σ include it: {}. To keep it, paste noise.run_toml of calibration.json into [imu.noise].",
         used.join("; ")
     );

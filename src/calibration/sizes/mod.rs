@@ -27,8 +27,8 @@ use usual::What;
 
 /// Most rounds of sizes and averages at one linearisation point, when the first is near.
 const ROUNDS: usize = 4;
-/// A change of the logarithm of every size, or of the probability that something is absent, by less than this has
-/// settled.
+/// A change of the logarithm of every size, in its σ, or of the probability that something is absent, by less than this
+/// has settled.
 const SETTLED: f64 = 0.1;
 /// A stated figure is named as wrong if it is more than this times too small: σ that grow by half are no longer those
 /// that were expected.
@@ -180,11 +180,9 @@ impl Effects {
         for (k, size) in self.between.iter_mut().enumerate() {
             (size.log, size.sigma) = (here.at.logs[k], sigma[k]);
         }
-        let of_sizes = if usual.is_empty() {
-            0.0
-        } else {
-            (&here.at.logs - before).amax()
-        };
+        // What the data hardly tell may wander.
+        let moved = (&here.at.logs - before).component_div(&sigma);
+        let of_sizes = moved.iter().map(|by| by.abs()).fold(0.0, f64::max);
         self.events = here.at.events;
         Ok(change.max(of_sizes))
     }
@@ -264,7 +262,7 @@ impl Effects {
     pub fn report(&self, problem: &Problem) -> NoiseReport {
         let policy = problem.options.noise;
         if policy == NoisePolicy::Stated {
-            return NoiseReport::stated(policy, None);
+            return NoiseReport::stated(policy);
         }
         let sizes = self.at_rest.iter().chain(&self.between);
         let figures = sizes.clone().filter_map(|size| {

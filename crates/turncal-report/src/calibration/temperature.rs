@@ -22,7 +22,7 @@ pub fn figure(outcome: &Outcome) -> Option<Plot> {
         };
         outcome.alone.iter().filter_map(change).collect()
     };
-    let marks = "each recording alone, with stated noise";
+    let marks = "each recording alone";
     Some(curves(&outcome.estimate, thermal, marks, alone))
 }
 
@@ -76,8 +76,8 @@ pub fn orders(form: InstallationForm, thermal: &Thermal) -> Table {
             rows.filter_map(|i| row(group, i)).collect::<Vec<_>>()
         }))
         .note(format!(
-            "Legendre coefficients ± 1σ over {ranges}: change of the parameter over half the range. The order of \
-             each kind is the highest with a significant likelihood ratio (p < 0.001)."
+            "Legendre coefficients ± 1σ over {ranges}: change of the parameter over half the range. Each \
+             order is averaged over being absent and its usual sizes."
         ))
 }
 

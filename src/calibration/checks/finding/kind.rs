@@ -72,8 +72,8 @@ kinds! {
          gyro biases are less accurate because Earth rate is less certain. If you need the heading, use a table, or \
          gyros with noise below 0.1 °/√h and dwells of one minute."
     NoiseLearnt = "W07" "noise-learnt" Care:
-        "The residuals contradict the noise in [imu.noise] by a likelihood-ratio test with a false-alarm rate of 1 in \
-         1000. turncal estimated the noise from the record and used it for weights and σ. This is normal for a sensor turned by hand, because motion adds noise that a data sheet does not state. To keep the estimate, paste noise.run_toml of \
+        "A noise figure in [imu.noise] is more than 1.5 times too small for this recording (false-alarm rate 1 in 1000). \
+         turncal estimated the noise from the record and used it for weights and σ. This is normal for a sensor turned by hand, because motion adds noise that a data sheet does not state. To keep the estimate, paste noise.run_toml of \
          calibration.json into [imu.noise]; to use the stated noise anyway, add --noise stated."
     ScatterAtRest = "W08" "scatter-at-rest" Care:
         "In dwells, the samples scatter more or less than the stated white noise implies. The estimate uses 0.1 s \
