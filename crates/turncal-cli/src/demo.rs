@@ -125,7 +125,7 @@ fn document(
         aiding: problem.model.aiding,
         body_frame: problem.model.aiding.body_frame(),
         outcome: solution.outcome(),
-        findings: &solution.findings(),
+        findings: solution.findings(),
         budget: assessment.budget.as_ref(),
         predicted: None,
         quality: Some(&assessment.quality),

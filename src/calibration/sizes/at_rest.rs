@@ -92,7 +92,8 @@ impl Dwells<'_> {
                     }
                     let factor = dispersion.of(all.dwells[k].len() - 1);
                     let (root, seen) = (factor.sqrt(), &mut seen[k]);
-                    (seen.scalars.clear(), seen.rows.clear());
+                    seen.scalars.clear();
+                    seen.rows.clear();
                     let filter = &mut filters[filter_of(rest)];
                     let part = filter.reduce((rest, stretch), model, &mut |of: Whitened| {
                         let scalar = |k: usize| (of.scalars[k] / root, of.root[(k, k)].ln());

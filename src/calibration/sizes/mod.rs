@@ -320,7 +320,7 @@ impl Effects {
             let filtered = of.filtered.chain.filter(&sizes)?;
             let posterior = filtered.posterior_with(&filtered.known(&of.prior), &sites);
             let ratio = posterior.map_or(0.0, |other| other.deviance - of.posterior.deviance);
-            if ratio > limit && size.log > 0.0 || ratio > limit && !size.usual.stated {
+            if ratio > limit && (size.log > 0.0 || !size.usual.stated) {
                 let difference =
                     RecordingDifference::new(group, &problem.model, &size.usual, size.log);
                 found.push(RecordingDifference {

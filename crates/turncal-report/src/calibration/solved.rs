@@ -40,7 +40,7 @@ pub fn document(
         aiding: problem.model.aiding,
         body_frame: calibration.body_frame,
         outcome: solution.outcome(),
-        findings: &solution.findings(),
+        findings: solution.findings(),
         budget: assessment.budget.as_ref(),
         predicted: consequences.predicted.as_ref(),
         quality: Some(&assessment.quality),
