@@ -145,6 +145,6 @@ fn sound_runs_show_no_term_and_no_event() {
         usize::from(alarm)
     });
     let alarms: usize = alarms.sum();
-    // One in a thousand each is stated of terms and of events: more than three of 200 have a chance of one in a thousand.
-    assert!(alarms <= 3, "{alarms} of {RUNS}");
+    // The probabilities of averages are approximate: none is named in 98 of 100.
+    assert!(50 * alarms <= RUNS as usize, "{alarms} of {RUNS}");
 }

@@ -13,14 +13,18 @@ pub mod source;
 
 use std::collections::BTreeMap;
 
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::calibration::budget::curvature::curvature;
-use crate::calibration::constants::of_parameters;
+use crate::calibration::chain::Filtered;
+use crate::calibration::constants::{Sites, of_parameters};
 use crate::calibration::iterations::Solved;
 use crate::calibration::outcome::beside;
 use crate::calibration::sizes::{Candidates, Weighed};
-use crate::calibration::{CalibrationError, Outcome, PARAMETERS, ParameterMatrix, Problem};
+use crate::calibration::{
+    CalibrationError, Outcome, PARAMETERS, ParameterMatrix, Posterior, Problem,
+};
 use crate::imu::Sensor;
 use crate::statistics::student_limit;
 pub use record::{BudgetPartRecord, BudgetRecord};
@@ -82,20 +86,23 @@ impl Budget {
         let mut add = |source: BudgetSource, part: ParameterMatrix| {
             *by_source.entry(source).or_default() += part;
         };
-        for (source, part) in at_rest(problem, outcome, &weighed)? {
-            add(source, part);
-        }
         let Weighed {
             filtered,
             prior,
+            known,
             posterior,
-            ..
         } = &weighed;
+        // All but the candidates by what is known if these are, and the candidates by what they add.
+        let given = filtered.posterior_with(known, &Sites::certain(prior));
+        let given = given.as_ref().unwrap_or(posterior);
         let constants = &posterior.constants;
-        for (effect, part) in filtered.smoothed(posterior).parts {
+        for (source, part) in at_rest(problem, outcome, (filtered, given))? {
+            add(source, part);
+        }
+        for (effect, part) in filtered.smoothed(given).parts {
             add(effect.in_budget(), of_parameters(constants, &part));
         }
-        for (source, part) in prior.parts(posterior) {
+        for (source, part) in prior.parts(given) {
             add(source, of_parameters(constants, &part));
         }
         for (source, part) in of_candidates(&weighed, &effects.candidates) {
@@ -163,37 +170,44 @@ impl Budget {
 fn at_rest(
     problem: &Problem,
     outcome: &Outcome,
-    weighed: &Weighed,
+    (filtered, posterior): (&Filtered, &Posterior),
 ) -> Result<Vec<(BudgetSource, ParameterMatrix)>, CalibrationError> {
     let Solved {
         script, effects, ..
     } = &*outcome.solved;
-    let here = weighed.filtered.information();
-    let covariance = &weighed.posterior.covariance;
+    let here = filtered.information();
+    let covariance = &posterior.covariance;
     let part = |&source: &BudgetSource| {
         let varied = problem.with(|model| model.varied = Some((source, 1.0 + STEP)));
         let chain = effects.chain(&varied, script)?;
-        let there = chain.filter(&weighed.filtered.sizes)?.information();
+        let there = chain.filter(&filtered.sizes)?.information();
         let part = covariance * ((&here - there) / STEP) * covariance;
-        Ok((source, of_parameters(&weighed.posterior.constants, &part)))
+        Ok((source, of_parameters(&posterior.constants, &part)))
     };
     AT_REST.par_iter().map(part).collect()
 }
 
-/// Parts of the constants that may be absent: of their normal factors, as of a prior.
+/// Parts of the constants that may be absent: `G Σ Gᵀ`, Σ being their covariance and G their effect on the others.
 fn of_candidates(
     weighed: &Weighed,
     candidates: &Candidates,
 ) -> Vec<(BudgetSource, ParameterMatrix)> {
     let posterior = &weighed.posterior;
-    let first = weighed.prior.constants.len() - weighed.prior.candidates;
-    let sites = candidates.sites(&weighed.prior);
+    let n = weighed.prior.constants.len();
+    let first = n - weighed.prior.candidates;
+    let all: Vec<usize> = (first..n).collect();
+    let across = posterior.covariance.select_columns(&all);
+    let own = across.select_rows(&all);
+    let scale = DMatrix::from_diagonal(&own.diagonal().map(|value| value.sqrt().recip()));
+    let Some(factor) = (&scale * &own * &scale).cholesky() else {
+        return Vec::new();
+    };
+    let effect = &scale * factor.solve(&(&scale * across.transpose()));
     let part = |places: &[usize]| {
-        let all: Vec<usize> = places.iter().map(|place| first + place).collect();
-        let across = posterior.covariance.select_columns(&all);
-        let information = sites.information.select_rows(places).select_columns(places);
-        let part = &across * information * across.transpose();
-        let source = posterior.constants[all[0]].source();
+        let effect = effect.select_rows(places);
+        let own = own.select_rows(places).select_columns(places);
+        let part = effect.transpose() * own * effect;
+        let source = posterior.constants[first + places[0]].source();
         (source, of_parameters(&posterior.constants, &part))
     };
     candidates

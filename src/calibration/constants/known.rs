@@ -187,6 +187,19 @@ impl Known {
 }
 
 impl Sites {
+    /// All known where the prior has them, to a millionth of their usual size.
+    pub fn certain(prior: &Prior) -> Self {
+        let (n, m) = (prior.sigma.len(), prior.candidates);
+        let information = prior
+            .sigma
+            .rows(n - m, m)
+            .map(|sigma| 1e12 * sigma.powi(-2));
+        Self {
+            vector: information.component_mul(&prior.mean.rows(n - m, m)),
+            information: DMatrix::from_diagonal(&information),
+        }
+    }
+
     /// Nothing in addition to the rows.
     pub fn none(prior: &Prior) -> Self {
         let m = prior.candidates;
