@@ -113,13 +113,11 @@ impl Dispersion {
         Self(vec![1.0; problem.dwells().count()])
     }
 
-    /// With these factors, over that of the middle dwell.
-    pub fn of_dwells(mut factors: Vec<f64>) -> Self {
-        let mut sorted = factors.clone();
-        if let Some(middle) = crate::statistics::median(&mut sorted) {
-            factors.iter_mut().for_each(|factor| *factor /= middle);
-        }
-        Self(factors)
+    /// With these factors, over that of the middle dwell, which is returned too.
+    pub fn of_dwells(mut factors: Vec<f64>) -> (Self, f64) {
+        let middle = crate::statistics::median(&mut factors.clone()).unwrap_or(1.0);
+        factors.iter_mut().for_each(|factor| *factor /= middle);
+        (Self(factors), middle)
     }
 
     /// The factor of a dwell.

@@ -110,7 +110,7 @@ impl<const M: usize, const G: usize> PartFilter for Course<M, G> {
         let models = rest.models.iter().map(|block| step_model(block, model));
         self.begin(models.collect());
         let turn = (M > NAVIGATION).then_some(NAVIGATION);
-        let (mut at, mut mean, mut vector) = (Self::BEGIN, [0.0; M], [0.0; G]);
+        let (mut events, mut mean, mut vector) = (0, [0.0; M], [0.0; G]);
         let (mut squares, mut log_determinant) = (0.0, 0.0);
         let mut since_stop = 0.0;
         for step in &rest.steps {
@@ -119,7 +119,8 @@ impl<const M: usize, const G: usize> PartFilter for Course<M, G> {
             for (first, by) in errors.zip(step.referred).chain(turned) {
                 (0..3).for_each(|axis| mean[first + axis] += by[axis]);
             }
-            at = self.step(at, step.model);
+            self.step(events, step.model);
+            events += 1;
             mean = self.models[step.model].propagated(&mean);
             since_stop += rest.models[step.model].duration;
             for number in step.seen.clone() {
@@ -137,8 +138,8 @@ impl<const M: usize, const G: usize> PartFilter for Course<M, G> {
                 } else {
                     0.0
                 };
-                at = self.observe(at, first, variance + settling)?;
-                let gain = self.points[at].gain.as_ref()?;
+                let gain = self.observe(events, first, variance + settling)?;
+                events += 1;
                 let expected = Vector3::new(mean[first], mean[first + 1], mean[first + 2]);
                 let scalars = gain
                     .root
@@ -157,7 +158,7 @@ impl<const M: usize, const G: usize> PartFilter for Course<M, G> {
                 });
             }
         }
-        let known = &self.points[at].known;
+        let known = self.known(events);
         let rows = factor(known.information, vector);
         let (rows, values): (Vec<_>, Vec<_>) = rows.map(|(_, row, value)| (row, value)).unzip();
         let values = DVector::from_vec(values);

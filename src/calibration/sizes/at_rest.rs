@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 use super::descent::{Lowest, Slope, descend};
 use super::usual::Usual;
 use crate::calibration::chain::Dispersion;
-use crate::calibration::chain::part::{Part, Whitened, filter_of, part_filters};
+use crate::calibration::chain::part::{Part, PartFilter, Whitened, filter_of, part_filters};
 use crate::calibration::chain::states::States;
 use crate::calibration::{Model, Problem, Script};
 
@@ -25,8 +25,6 @@ const FORCE: f64 = 0.03;
 const BEFOREHAND: f64 = 6.0;
 /// Least logarithm of a size over the usual one: a noise a hundred times smaller is that of rounding.
 const LEAST: f64 = -4.605_170_185_988_091;
-/// Rounds of common sizes and dispersions of dwells.
-const ROUNDS: usize = 3;
 
 /// The noise at rest.
 pub struct NoiseAtRest {
@@ -71,13 +69,13 @@ struct Dwells<'a> {
     problem: &'a Problem<'a>,
     script: &'a Script,
     usual: &'a [Usual],
+    /// One pair a model.
+    filters: Vec<[Box<dyn PartFilter>; 2]>,
 }
 
 impl Dwells<'_> {
     /// What dwells leave with the noise at rest of these models; `None` if a covariance is not positive definite.
-    fn left(&self, dispersion: &Dispersion, models: &[Model]) -> Option<AllLeft> {
-        let states = States::new(models.first()?, self.problem.one_gravity());
-        let mut filters: Vec<_> = models.iter().map(|_| part_filters(states.moving)).collect();
+    fn left(&mut self, dispersion: &Dispersion, models: &[Model]) -> Option<AllLeft> {
         let mut all = AllLeft {
             dwells: vec![Vec::new(); models.len()],
             products: DMatrix::zeros(models.len() - 1, models.len() - 1),
@@ -85,7 +83,7 @@ impl Dwells<'_> {
         let mut seen = vec![Seen::default(); models.len()];
         for (number, stretch) in self.problem.stretches().iter().enumerate() {
             for rest in self.script.parts(number) {
-                let each = filters.iter_mut().zip(models).enumerate();
+                let each = self.filters.iter_mut().zip(models).enumerate();
                 for (k, (filters, model)) in each {
                     if rest.first {
                         all.dwells[k].push(Left::default());
@@ -118,11 +116,10 @@ impl Dwells<'_> {
         model
     }
 
-    /// The likeliest sizes common to all dwells, by Fisher's scoring with differences (Gupta and Mehra 1974, IEEE Trans.
-    /// Automatic Control 19(6)); with these dispersions, or whatever they are.
-    fn common(&self, dispersion: Option<&Dispersion>, start: DVector<f64>) -> Lowest {
+    /// The likeliest sizes common to all dwells, whatever the factor of each is, by Fisher's scoring with differences
+    /// (Gupta and Mehra 1974, IEEE Trans. Automatic Control 19(6)).
+    fn common(&mut self, dispersion: &Dispersion, start: DVector<f64>) -> Lowest {
         let n = self.usual.len();
-        let alike = Dispersion::alike(self.problem);
         let of_prior = |k: usize| self.usual[k].spread.powi(-2);
         let slope_at = |at: &DVector<f64>| {
             let penalty: f64 = (0..n).map(|k| at[k].powi(2) * of_prior(k)).sum();
@@ -132,17 +129,10 @@ impl Dwells<'_> {
                 there[k] += DIFFERENCE;
                 self.model_at(&there)
             }));
-            let Some(all) = self.left(dispersion.unwrap_or(&alike), &models) else {
+            let Some(all) = self.left(dispersion, &models) else {
                 return Ok::<_, Infallible>(Slope::nowhere(n));
             };
-            let deviance = |k: usize| -> f64 {
-                let dwells = all.dwells[k].iter().enumerate();
-                let each = dwells.map(|(dwell, left)| match dispersion {
-                    Some(dispersion) => left.deviance(dispersion.of(dwell)),
-                    None => left.deviance_of_any(),
-                });
-                each.sum()
-            };
+            let deviance = |k: usize| all.dwells[k].iter().map(Left::deviance).sum::<f64>();
             let here = deviance(0);
             Ok(Slope {
                 cost: here + penalty,
@@ -221,55 +211,43 @@ impl Left {
         Some(root.solve(&said))
     }
 
-    /// −2 ln of the likelihood with this factor of the variance.
-    fn deviance(&self, factor: f64) -> f64 {
-        self.squares / factor + self.log_determinant
+    /// −2 ln of the likelihood, averaged over all factors of the variance: Student's t.
+    fn deviance(&self) -> f64 {
+        (BEFOREHAND + self.freedom) * (self.squares / BEFOREHAND).ln_1p() + self.log_determinant
     }
 
-    /// The same, averaged over all factors: Student's t.
-    fn deviance_of_any(&self) -> f64 {
-        (BEFOREHAND + self.freedom) * (self.squares / BEFOREHAND).ln_1p() + self.log_determinant
+    /// The factor of the variance that the dwell shows.
+    fn factor(&self) -> f64 {
+        (BEFOREHAND + self.squares) / (BEFOREHAND + self.freedom)
     }
 }
 
-/// The likeliest noise at rest, each size with its prior; from that at a linearisation point before, if any.
-///
-/// The first sizes are sought whatever the dispersions are, so that a dwell which is less still than others does not
-/// begin as noise of all.
+/// The likeliest noise at rest, each size with its prior, as seen in the middle dwell; from that at a linearisation point
+/// before, if any.
 pub fn likeliest(
     problem: &Problem,
     script: &Script,
     usual: &[Usual],
     before: Option<(Dispersion, DVector<f64>)>,
 ) -> NoiseAtRest {
-    let dwells = Dwells {
+    let states = States::new(&problem.model, problem.one_gravity());
+    let filters = (0..=usual.len()).map(|_| part_filters(states.moving));
+    let mut dwells = Dwells {
         problem,
         script,
         usual,
+        filters: filters.collect(),
     };
-    let rounds = if before.is_some() { 1 } else { ROUNDS };
-    let dispersed = |before: &Dispersion, logs: &DVector<f64>| {
-        let left = dwells.left(before, &[dwells.model_at(logs)])?;
-        let factor = |of: &Left| (BEFOREHAND + of.squares) / (BEFOREHAND + of.freedom);
-        Some(Dispersion::of_dwells(
-            left.dwells[0].iter().map(factor).collect(),
-        ))
-    };
-    let (mut dispersion, mut logs) = before.unwrap_or_else(|| {
-        let alike = Dispersion::alike(problem);
-        let logs = dwells.common(None, DVector::zeros(usual.len())).at;
-        (dispersed(&alike, &logs).unwrap_or(alike), logs)
-    });
-    let mut sigma = DVector::zeros(usual.len());
-    for _ in 0..rounds {
-        let lowest = dwells.common(Some(&dispersion), logs);
-        sigma = lowest.sigma();
-        logs = lowest.at;
-        dispersion = dispersed(&dispersion, &logs).unwrap_or(dispersion);
-    }
+    let (before, start) =
+        before.unwrap_or_else(|| (Dispersion::alike(problem), DVector::zeros(usual.len())));
+    let lowest = dwells.common(&before, start);
+    let model = dwells.model_at(&lowest.at);
+    let left = dwells.left(&before, &[model]);
+    let factors = left.map(|left| left.dwells[0].iter().map(Left::factor).collect());
+    let (dispersion, middle) = factors.map_or((before, 1.0), Dispersion::of_dwells);
     NoiseAtRest {
-        logs: logs.map(|log| log.max(LEAST)),
-        sigma,
+        logs: lowest.at.map(|log| (log + 0.5 * middle.ln()).max(LEAST)),
+        sigma: lowest.sigma(),
         dispersion,
     }
 }

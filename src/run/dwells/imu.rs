@@ -1,5 +1,6 @@
 //! Standstills in the output of the instrument.
 
+use std::collections::VecDeque;
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, SQRT_2};
 use std::ops::Range;
 
@@ -8,6 +9,7 @@ use nalgebra::Vector3;
 use crate::earth::ROTATION_RATE;
 use crate::imu::Sensor;
 use crate::navigation::samples_of;
+use crate::recording::ImuSamples;
 use crate::recording::faults::ranges;
 use crate::run::Run;
 use crate::statistics::{SIGMA_OF_MEDIAN, chi_square_limit, median, median_of_axes};
@@ -15,7 +17,7 @@ use crate::units::DEG_PER_H;
 
 /// Length of the windows whose means are compared, s.
 const WINDOW: f64 = 0.25;
-/// Minimum number of consecutive windows of a standstill, because a released sensor still swings.
+/// Minimum length of a standstill in windows, because a released sensor still swings.
 const FEWEST: usize = 4;
 /// A standstill of this many seconds between two moves is always found. Its ends cut up to one window in all; at each
 /// end, the next window differs from its neighbour, and the one after is dropped because it may be a gentle move.
@@ -29,41 +31,80 @@ const STILL_FORCE: f64 = 3e-3;
 /// False-alarm rate of the test that ends a standstill at a window that differs from its neighbours: an axis
 /// has started to turn, or still settles. A false alarm costs a window.
 const SETTLED: f64 = 0.01;
-/// Number of neighbouring windows it is compared with.
+/// Number of windows one after the other that it is compared with.
 const BESIDE: usize = 2 * FEWEST;
 /// During warm-up, a bias changes by less than [`STILL_RATE`] in this time, s.
 const WARMING: f64 = 20.0;
 /// A bias is within this many σ of its prior.
 const BIAS_SIGMAS: f64 = 6.0;
 
+/// Windows that slide over a recording by single samples, so that standstills do not depend on where it begins.
+#[derive(Clone, Copy)]
+struct Slide {
+    /// Samples per window.
+    length: usize,
+    /// Samples from one to the next.
+    step: usize,
+}
+
 /// Mean output of a triad over each window.
 struct Windows {
+    slide: Slide,
     /// NaN if samples are missing, so that the window does not count as at rest or steady.
     means: Vec<Vector3<f64>>,
     /// 1σ per axis of their noise.
     sigma: f64,
 }
 
+impl Slide {
+    fn of(imu: &ImuSamples) -> Self {
+        let length = samples_of(WINDOW, imu.period);
+        // The means of a packed recording would take the memory that packing saves.
+        let step = if imu.is_packed() { length } else { 1 };
+        Self { length, step }
+    }
+
+    /// Windows from one to the next that has no samples in common with it.
+    fn apart(self) -> usize {
+        self.length / self.step
+    }
+
+    /// The windows with some of these samples.
+    fn with(self, samples: &Range<usize>, count: usize) -> Range<usize> {
+        let first = (samples.start + 1).saturating_sub(self.length);
+        first.div_ceil(self.step).min(count)..samples.end.div_ceil(self.step).min(count)
+    }
+}
+
 impl Windows {
-    /// Number of samples per window.
-    fn of(run: &Run, sensor: Sensor, length: usize) -> Self {
+    fn of(run: &Run, sensor: Sensor, slide: Slide) -> Self {
         let imu = &run.recording.imu;
-        let duration = length as f64 * imu.period;
-        let sums = imu.of(sensor).sums(0..imu.len(), length);
-        let mut means: Vec<_> = sums.map(|sum| sum / duration).collect();
+        let duration = slide.length as f64 * imu.period;
+        let sums = imu.of(sensor).sums(0..imu.len(), slide.step);
+        let mut within = VecDeque::from([Vector3::zeros()]);
+        let mut sum = Vector3::zeros();
+        let means = sums.filter_map(|of_step| {
+            sum += of_step;
+            within.push_back(sum);
+            let before = (within.len() > slide.apart()).then(|| within.pop_front())?;
+            Some((sum - before?) / duration)
+        });
+        let mut means: Vec<_> = means.collect();
         for missing in imu.missing() {
-            let windows = missing.start / length..missing.end.div_ceil(length).min(means.len());
+            let windows = slide.with(&missing, means.len());
             means[windows].fill(Vector3::repeat(f64::NAN));
         }
         // Most windows are at rest or turn evenly, so the median sees noise alone; noise figures may
         // know nothing of a laboratory's shaking.
-        let changes = means.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+        let pairs = means.iter().zip(means.iter().skip(slide.apart()));
+        let changes = pairs.map(|(one, next)| (next - one).abs());
         let known = changes.filter(|change| !change.x.is_nan());
         let mut known: Vec<f64> = known.flat_map(<[f64; 3]>::from).collect();
         let found = SIGMA_OF_MEDIAN * FRAC_1_SQRT_2 * median(&mut known).unwrap_or(0.0);
         let stated = run.instrument.noise.get(sensor).random_walk / duration.sqrt();
         let pulse = imu.pulse.get(sensor) / duration;
         Self {
+            slide,
             means,
             sigma: found.max(stated).max(pulse),
         }
@@ -85,13 +126,14 @@ impl Windows {
         let Some(begin) = may_begin.min_by(|&a, &b| off(a).total_cmp(&off(b))) else {
             return still;
         };
+        let drift = WINDOW / WARMING / self.slide.apart() as f64;
         let mut follow = |windows: &mut dyn Iterator<Item = usize>| {
             let mut rest = most;
             for k in windows.filter(|&k| may_be(k)) {
                 let off = self.means[k] - rest;
                 still[k] = off.norm() < rate;
                 if still[k] {
-                    rest += off * (WINDOW / WARMING);
+                    rest += off * drift;
                 }
             }
         };
@@ -100,53 +142,60 @@ impl Windows {
         still
     }
 
-    /// The part of a standstill at whose ends the output agrees with its neighbouring windows.
-    fn settled(&self, standstill: Range<usize>) -> Range<usize> {
-        let Range { mut start, mut end } = standstill;
+    /// The samples of a standstill, which consists of these windows, without those at its ends that differ from their
+    /// neighbours.
+    fn settled(&self, windows: Range<usize>) -> Range<usize> {
+        let Slide { length, step } = self.slide;
+        let (mut first, mut last) = (windows.start, windows.end - 1);
         let limit = chi_square_limit(3.0, SETTLED);
         // A median of n normal numbers has a variance of π/2n.
         let variance = self.sigma.powi(2) * (1.0 + FRAC_PI_2 / BESIDE as f64);
+        let apart = self.slide.apart();
         let moves = |window: usize, beside: Range<usize>| {
-            let rest = median_of_axes(&self.means[beside]);
+            let beside: Vec<_> = beside.step_by(apart).map(|k| self.means[k]).collect();
+            let rest = median_of_axes(&beside);
             rest.is_some_and(|rest| (self.means[window] - rest).norm_squared() > limit * variance)
         };
-        while end.saturating_sub(start) > BESIDE && moves(start, start + 1..start + 1 + BESIDE) {
-            start += 1;
+        let reach = BESIDE * apart;
+        while last - first >= reach && moves(first, first + apart..first + reach + 1) {
+            first += 1;
         }
-        while end.saturating_sub(start) > BESIDE && moves(end - 1, end - 1 - BESIDE..end - 1) {
-            end -= 1;
+        while last - first >= reach && moves(last, last - reach..last) {
+            last -= 1;
         }
-        start..end
+        first * step..last * step + length
     }
 }
 
 /// Samples during which the gyros give their output at rest and the accelerometers do not change.
 pub fn standstills(run: &Run) -> Vec<Range<usize>> {
     let imu = &run.recording.imu;
-    let length = samples_of(WINDOW, imu.period);
-    let [gyro, accel] = Sensor::ALL.map(|sensor| Windows::of(run, sensor, length));
+    let slide = Slide::of(imu);
+    let [gyro, accel] = Sensor::ALL.map(|sensor| Windows::of(run, sensor, slide));
     let rate = STILL_SIGMAS * gyro.sigma + STILL_RATE;
     let force = STILL_SIGMAS * SQRT_2 * accel.sigma + STILL_FORCE;
-    // Beyond the recording, or what is known of it.
-    let unknown = |k: usize| accel.means.get(k).is_none_or(|mean| mean.x.is_nan());
+    // A window beyond the recording, or what is known of it, does not tell.
     let steady = |k: usize, beside: usize| {
-        unknown(beside) || (accel.means[k] - accel.means[beside]).norm() < force
+        let beside = accel.means.get(beside);
+        beside.is_none_or(|beside| beside.x.is_nan() || (accel.means[k] - beside).norm() < force)
     };
-    let is_steady = |k: usize| steady(k, k.wrapping_sub(1)) && steady(k, k + 1);
+    let apart = slide.apart();
+    let is_steady = |k: usize| steady(k, k.wrapping_sub(apart)) && steady(k, k + apart);
     let still = gyro.at_rest(run, rate, is_steady);
-    let count = gyro.means.len();
-    let still = ranges(count, |k| still[k]).into_iter();
+    let still = ranges(gyro.means.len(), |k| still[k]).into_iter();
     let standstills = still.filter_map(|still| {
+        let Range { mut start, mut end } = gyro.settled(still);
         // A move begins and ends too gently for the windows at its ends to show it.
-        let Range { start, end } = gyro.settled(still);
-        let begin = start + usize::from(!unknown(start.wrapping_sub(1)));
-        let end = end - usize::from(!unknown(end));
-        let samples = if end == count {
-            begin * length..imu.len()
-        } else {
-            begin * length..end * length
-        };
-        (end >= begin + FEWEST).then_some(samples)
+        let is_known = |sample: usize| !imu.is_lost(&(sample..sample + 1));
+        if start.checked_sub(1).is_some_and(is_known) {
+            start += slide.length;
+        }
+        if end + slide.step > imu.len() {
+            end = imu.len();
+        } else if is_known(end) {
+            end -= slide.length;
+        }
+        (end >= start + FEWEST * slide.length).then_some(start..end)
     });
     standstills.collect()
 }

@@ -19,23 +19,22 @@ pub struct StepModel<const M: usize> {
     pub driven: Vec<(usize, usize, f64)>,
 }
 
+/// What is known is kept after this many events, and found again from there: a gain is a sixth of it.
+const KEPT: usize = 32;
+
 /// The sequence of a part, kept as far as the next one repeats it.
 pub struct Course<const M: usize, const G: usize> {
     pub models: Vec<StepModel<M>>,
-    pub points: Vec<Point<M, G>>,
-}
-
-/// What is known after an event.
-pub struct Point<const M: usize, const G: usize> {
-    event: Event,
-    pub known: Known<M, G>,
-    /// Gain, if the event was an observation.
-    pub gain: Option<Gain<M, G>>,
+    /// Each event, with its gain if it was an observation.
+    events: Vec<(Event, Option<Gain<M, G>>)>,
+    /// What is known before the first event and after every `KEPT` others …
+    kept: Vec<Known<M, G>>,
+    /// … and after the last event.
+    last: Known<M, G>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
 enum Event {
-    Begin,
     /// A step of this model.
     Step(usize),
     /// Three states from a first one on are observed, each with this variance.
@@ -75,9 +74,6 @@ impl<const M: usize> StepModel<M> {
 }
 
 impl<const M: usize, const G: usize> Course<M, G> {
-    /// Index of the common start.
-    pub const BEGIN: usize = 0;
-
     /// Component `k` of `g` is the moving state `begins[k]` at the begin of a part.
     pub fn new(begins: &[usize]) -> Self {
         let mut known = Known {
@@ -88,62 +84,87 @@ impl<const M: usize, const G: usize> Course<M, G> {
         for (component, &state) in begins.iter().enumerate() {
             known.of_given[state][component] = 1.0;
         }
-        let begin = Point {
-            event: Event::Begin,
-            known,
-            gain: None,
-        };
         Self {
             models: Vec::new(),
-            points: vec![begin],
+            events: Vec::new(),
+            kept: vec![known.clone()],
+            last: known,
         }
     }
 
-    /// Starts a part with these models; what is known for other models is dropped.
+    /// Starts a part with these models; events of other models are dropped.
     pub fn begin(&mut self, models: Vec<StepModel<M>>) {
         let pairs = self.models.iter().zip(&models);
         let alike = pairs.take_while(|(one, other)| one == other).count();
-        let other = |of: &Point<M, G>| matches!(of.event, Event::Step(model) if model >= alike);
-        let first = self.points.iter().position(other);
-        self.points.truncate(first.unwrap_or(self.points.len()));
+        let other = |of: &Event| matches!(of, Event::Step(model) if *model >= alike);
+        if let Some(first) = self.events.iter().position(|(event, _)| other(event)) {
+            self.back_to(first);
+        }
         self.models = models;
     }
 
-    /// The point after a step.
-    pub fn step(&mut self, from: usize, model: usize) -> usize {
+    /// Makes a step after this number of events.
+    pub fn step(&mut self, from: usize, model: usize) {
         let event = Event::Step(model);
         if !self.is_next(from, event) {
-            let known = self.points[from].known.propagated(&self.models[model]);
-            self.lead(from, event, known, None);
+            self.back_to(from);
+            self.last.propagate(&self.models[model]);
+            self.add(event, None);
         }
-        from + 1
     }
 
-    /// The point after an observation of three states; `None` if their covariance is not positive definite.
-    pub fn observe(&mut self, from: usize, first: usize, variance: f64) -> Option<usize> {
+    /// The gain of an observation of three states after this number of events; `None` if their covariance is not
+    /// positive definite.
+    pub fn observe(&mut self, from: usize, first: usize, variance: f64) -> Option<&Gain<M, G>> {
         let event = Event::Observed(first, variance);
         if !self.is_next(from, event) {
-            let mut known = self.points[from].known.clone();
-            let gain = known.gain(first, variance)?;
-            known.update(&gain);
-            self.lead(from, event, known, Some(gain));
+            self.back_to(from);
+            let gain = self.last.gain(first, variance)?;
+            self.last.update(&gain);
+            self.add(event, Some(gain));
         }
-        Some(from + 1)
+        self.events[from].1.as_ref()
+    }
+
+    /// What is known after this number of events.
+    pub fn known(&self, at: usize) -> Known<M, G> {
+        if at == self.events.len() {
+            return self.last.clone();
+        }
+        let mut known = self.kept[at / KEPT].clone();
+        for event in &self.events[at / KEPT * KEPT..at] {
+            match event {
+                (Event::Step(model), _) => known.propagate(&self.models[*model]),
+                (Event::Observed(..), gain) => {
+                    gain.iter().for_each(|gain| known.update(gain));
+                }
+            }
+        }
+        known
     }
 
     fn is_next(&self, from: usize, event: Event) -> bool {
-        let next = self.points.get(from + 1);
-        next.is_some_and(|point| point.event == event)
+        self.events.get(from).is_some_and(|next| next.0 == event)
     }
 
-    fn lead(&mut self, from: usize, event: Event, known: Known<M, G>, gain: Option<Gain<M, G>>) {
-        self.points.truncate(from + 1);
-        self.points.push(Point { event, known, gain });
+    fn back_to(&mut self, at: usize) {
+        if at < self.events.len() {
+            self.last = self.known(at);
+            self.events.truncate(at);
+            self.kept.truncate(at / KEPT + 1);
+        }
+    }
+
+    fn add(&mut self, event: Event, gain: Option<Gain<M, G>>) {
+        self.events.push((event, gain));
+        if self.events.len().is_multiple_of(KEPT) {
+            self.kept.push(self.last.clone());
+        }
     }
 }
 
 impl<const M: usize, const G: usize> Known<M, G> {
-    fn propagated(&self, model: &StepModel<M>) -> Self {
+    fn propagate(&mut self, model: &StepModel<M>) {
         let mut of_given = [[0.0; G]; M];
         let mut half = [[0.0; M]; M];
         for &(row, column, phi) in &model.transition {
@@ -159,11 +180,7 @@ impl<const M: usize, const G: usize> Known<M, G> {
                 sum[at] += phi * half[row][column];
             }
         }
-        Self {
-            of_given,
-            covariance,
-            information: self.information,
-        }
+        (self.of_given, self.covariance) = (of_given, covariance);
     }
 
     fn gain(&self, first: usize, variance: f64) -> Option<Gain<M, G>> {
