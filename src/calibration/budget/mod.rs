@@ -99,7 +99,7 @@ impl Budget {
         for (source, part) in at_rest(problem, outcome, (filtered, given))? {
             add(source, part);
         }
-        for (effect, part) in filtered.smoothed(given).parts {
+        for (effect, part) in filtered.parts(given) {
             add(effect.in_budget(), of_parameters(constants, &part));
         }
         for (source, part) in prior.parts(given) {

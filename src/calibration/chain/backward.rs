@@ -28,13 +28,8 @@ pub struct Moments {
     pub count: f64,
 }
 
-/// What all data say of the disturbances.
-pub struct Smoothed {
-    /// Of each event of each effect.
-    pub events: BTreeMap<(Effect, usize), Moments>,
-    /// Part of each effect in the covariance of the constants.
-    pub parts: BTreeMap<Effect, DMatrix<f64>>,
-}
+/// What all data say of the disturbances of each event of each effect.
+pub struct Smoothed(pub BTreeMap<(Effect, usize), Moments>);
 
 /// Smoothing cumulants: mean given zero constants, effect of the constants, and precision.
 pub struct Cumulants {
@@ -83,35 +78,43 @@ impl Filtered<'_> {
 
     /// Smooths the disturbances with this posterior of the constants.
     pub fn smoothed(&self, posterior: &Posterior) -> Smoothed {
-        let c = self.chain.constants.len();
-        let mut smoothed = Smoothed {
-            events: BTreeMap::new(),
-            parts: BTreeMap::new(),
-        };
+        let mut events = BTreeMap::<_, Moments>::new();
         self.backward(|number, cumulants| {
+            let by_constants = &cumulants.by_constants;
+            let mean = &cumulants.mean - by_constants * &posterior.mean;
+            let of_constants = by_constants * &posterior.covariance * by_constants.transpose();
+            let precision = &cumulants.precision - of_constants;
             for drive in &self.chain.links[number].transition.drives {
                 let variance = self.sizes.of(drive.effect, drive.event);
-                let mean = drive.by.tr_mul(&cumulants.mean);
-                let of_constants = drive.by.tr_mul(&cumulants.by_constants);
-                let mean = mean - &of_constants * &posterior.mean;
-                let across = &of_constants * &posterior.covariance;
-                let precision = drive.by.tr_mul(&cumulants.precision) * &drive.by
-                    - &across * of_constants.transpose();
-                let squares = variance * mean.norm_squared();
+                let precision = drive.by.tr_mul(&(&precision * &drive.by));
+                let squares = variance * drive.by.tr_mul(&mean).norm_squared();
                 let known = variance * precision.trace();
-                let event = smoothed.events.entry((drive.effect, drive.event));
-                let event = event.or_default();
+                let event = events.entry((drive.effect, drive.event)).or_default();
                 event.slope += known - squares;
                 event.curvature += 4.0 * variance.powi(2) * precision.norm_squared();
                 event.squares += squares;
                 event.unknown += drive.by.ncols() as f64 - known;
                 event.count += drive.by.ncols() as f64;
-                let part = smoothed.parts.entry(drive.effect);
-                let part = part.or_insert_with(|| DMatrix::zeros(c, c));
-                part.gemm(variance, &across.transpose(), &across, 1.0);
             }
         });
-        smoothed
+        Smoothed(events)
+    }
+
+    /// Part of each effect in the covariance of the constants.
+    pub fn parts(&self, posterior: &Posterior) -> BTreeMap<Effect, DMatrix<f64>> {
+        let c = self.chain.constants.len();
+        let mut parts = BTreeMap::new();
+        self.backward(|number, cumulants| {
+            let across = &cumulants.by_constants * &posterior.covariance;
+            for drive in &self.chain.links[number].transition.drives {
+                let variance = self.sizes.of(drive.effect, drive.event);
+                let part = parts.entry(drive.effect);
+                let part = part.or_insert_with(|| DMatrix::zeros(c, c));
+                let across = drive.by.tr_mul(&across);
+                part.gemm_tr(variance, &across, &across, 1.0);
+            }
+        });
+        parts
     }
 }
 
@@ -164,7 +167,7 @@ impl Smoothed {
     /// Moments of the disturbances of all events of each effect.
     pub fn by_effect(&self) -> BTreeMap<Effect, Moments> {
         let mut sums = BTreeMap::<Effect, Moments>::new();
-        for ((effect, _), of) in &self.events {
+        for ((effect, _), of) in &self.0 {
             let sum = sums.entry(*effect).or_default();
             sum.slope += of.slope;
             sum.curvature += of.curvature;

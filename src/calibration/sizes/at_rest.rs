@@ -50,9 +50,20 @@ struct Left {
 struct AllLeft {
     /// Per model and dwell.
     dwells: Vec<Vec<Left>>,
-    /// Products of the changes of the observations' distribution from the first model to two others, for Fisher's
-    /// information on what changes.
-    products: DMatrix<f64>,
+    /// Per dwell.
+    changes: Vec<Changes>,
+}
+
+/// Changes of the distribution of a dwell's observations from the first model to others, for Fisher's information.
+struct Changes {
+    /// Number of scalars.
+    count: f64,
+    /// Sum of the changes of the logarithms of their σ, per model, …
+    logs: DVector<f64>,
+    /// … sums of products of two, …
+    of_logs: DMatrix<f64>,
+    /// … and the same of the changes of the whitened scalars.
+    of_scalars: DMatrix<f64>,
 }
 
 /// The scalars of a part.
@@ -78,11 +89,14 @@ impl Dwells<'_> {
     fn left(&mut self, dispersion: &Dispersion, models: &[Model]) -> Option<AllLeft> {
         let mut all = AllLeft {
             dwells: vec![Vec::new(); models.len()],
-            products: DMatrix::zeros(models.len() - 1, models.len() - 1),
+            changes: Vec::new(),
         };
         let mut seen = vec![Seen::default(); models.len()];
         for (number, stretch) in self.problem.stretches().iter().enumerate() {
             for rest in self.script.parts(number) {
+                if rest.first {
+                    all.changes.push(Changes::none(models.len() - 1));
+                }
                 let each = self.filters.iter_mut().zip(models).enumerate();
                 for (k, (filters, model)) in each {
                     if rest.first {
@@ -103,7 +117,7 @@ impl Dwells<'_> {
                         .add(&part.dispersed(factor), factor)?;
                     seen.take_off(&given);
                 }
-                all.compare(&seen);
+                all.changes.last_mut()?.add(&seen);
             }
         }
         Some(all)
@@ -139,10 +153,8 @@ impl Dwells<'_> {
                 gradient: DVector::from_fn(n, |k, _| {
                     (deviance(k + 1) - here) / DIFFERENCE + 2.0 * at[k] * of_prior(k)
                 }),
-                curvature: DMatrix::from_fn(n, n, |i, j| {
-                    let own = if i == j { 2.0 * of_prior(i) } else { 0.0 };
-                    2.0 * all.products[(i, j)] / DIFFERENCE.powi(2) + own
-                }),
+                curvature: all.information() * (2.0 / DIFFERENCE.powi(2))
+                    + DMatrix::from_fn(n, n, |i, j| if i == j { 2.0 * of_prior(i) } else { 0.0 }),
             })
         };
         let Ok(lowest) = descend(start, slope_at);
@@ -161,29 +173,44 @@ impl Seen {
 }
 
 impl AllLeft {
-    /// Adds the products of a part.
-    fn compare(&mut self, seen: &[Seen]) {
+    /// Fisher's information on the changes, whatever the factor of each dwell's variance is.
+    fn information(&self) -> DMatrix<f64> {
+        let n = self.dwells.len() - 1;
+        let each = self.changes.iter().zip(&self.dwells[0]);
+        each.fold(DMatrix::zeros(n, n), |sum, (of, left)| {
+            let free = &of.logs * of.logs.transpose() / (0.5 * (of.count + BEFOREHAND));
+            sum + &of.of_logs * 2.0 + &of.of_scalars / left.factor() - free
+        })
+    }
+}
+
+impl Changes {
+    fn none(models: usize) -> Self {
+        Self {
+            count: 0.0,
+            logs: DVector::zeros(models),
+            of_logs: DMatrix::zeros(models, models),
+            of_scalars: DMatrix::zeros(models, models),
+        }
+    }
+
+    /// Adds a part, as seen with all models.
+    fn add(&mut self, seen: &[Seen]) {
         let Some((here, others)) = seen.split_first() else {
             return;
         };
-        let change = |of: &Seen, k: usize| {
-            let (of, here) = (of.scalars[k], here.scalars[k]);
-            let log = of.1 - here.1;
-            // The whitened observation changes by its σ too.
-            (log, of.0 - here.0 + log * here.0)
-        };
-        for (i, one) in others.iter().enumerate() {
-            for (j, other) in others.iter().enumerate().take(i + 1) {
-                let each = (0..here.scalars.len()).map(|k| {
-                    let ((a, u), (b, v)) = (change(one, k), change(other, k));
-                    2.0 * a * b + u * v
-                });
-                let sum: f64 = each.sum();
-                self.products[(i, j)] += sum;
-                if i != j {
-                    self.products[(j, i)] += sum;
-                }
-            }
+        self.count += here.scalars.len() as f64;
+        for (k, here) in here.scalars.iter().enumerate() {
+            let changes = others.iter().map(|of| {
+                let log = of.scalars[k].1 - here.1;
+                // The whitened observation changes by its σ too.
+                (log, of.scalars[k].0 - here.0 + log * here.0)
+            });
+            let (logs, scalars): (Vec<_>, Vec<_>) = changes.unzip();
+            let (logs, scalars) = (DVector::from_vec(logs), DVector::from_vec(scalars));
+            self.of_logs.ger(1.0, &logs, &logs, 1.0);
+            self.of_scalars.ger(1.0, &scalars, &scalars, 1.0);
+            self.logs += logs;
         }
     }
 }
@@ -206,9 +233,12 @@ impl Left {
         let determinant = 2.0 * root.l_dirty().diagonal().map(f64::ln).sum();
         let squares = part.squares + part.values.norm_squared() - told.norm_squared();
         self.squares += factor * squares;
-        self.freedom += (part.count - part.values.len()) as f64;
         self.log_determinant += part.log_determinant + determinant;
-        Some(root.solve(&said))
+        // What the part tells of what it is given.
+        let inverse = root.inverse();
+        let told = (0..given).map(|k| 1.0 - wide(k).powi(-2) * inverse[(k, k)]);
+        self.freedom += part.count as f64 - told.sum::<f64>();
+        Some(inverse * said)
     }
 
     /// −2 ln of the likelihood, averaged over all factors of the variance: Student's t.

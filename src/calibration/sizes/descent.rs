@@ -29,6 +29,14 @@ impl Slope {
             curvature: DMatrix::identity(size, size),
         }
     }
+
+    fn inverse(&self) -> DMatrix<f64> {
+        let root = self.curvature.clone().cholesky();
+        root.map_or_else(
+            || DMatrix::identity(self.gradient.len(), self.gradient.len()),
+            |root| root.inverse(),
+        )
+    }
 }
 
 /// The lowest point found.
@@ -45,53 +53,38 @@ impl Lowest {
     }
 }
 
-/// The lowest point found from a start. The gradients improve the curvature (Broyden, Fletcher, Goldfarb, Shanno: Nocedal and Wright, *Numerical Optimization*, 2nd ed., §6.1).
+/// The lowest point found from a start, by Newton's steps with the expected curvature (Fisher's scoring).
 pub fn descend<E>(
     start: DVector<f64>,
     mut slope_at: impl FnMut(&DVector<f64>) -> Result<Slope, E>,
 ) -> Result<Lowest, E> {
-    let n = start.len();
     let mut at = start;
     let mut here = slope_at(&at)?;
-    let inverse_of = |slope: &Slope| {
-        let root = slope.curvature.clone().cholesky();
-        root.map_or_else(|| DMatrix::identity(n, n), |root| root.inverse())
-    };
-    let mut inverse = inverse_of(&here);
-    let mut is_fresh = true;
+    // What is met may bend more than is expected: then a whole step goes too far, to and fro.
+    let mut bend = 1.0f64;
     for _ in 0..STEPS {
-        let mut step = -(&inverse * &here.gradient);
+        let mut step = here.inverse() * &here.gradient / -bend;
         if -0.5 * step.dot(&here.gradient) < SETTLED {
             break;
         }
         step *= (LONGEST / step.amax()).min(1.0);
         let mut there = slope_at(&(&at + &step))?;
         let mut fraction = 1.0;
-        let falls = |there: &Slope| there.cost < here.cost;
-        while !falls(&there) && fraction > SHORTEST {
+        while there.cost >= here.cost && fraction > SHORTEST {
             fraction *= 0.5;
             step *= 0.5;
             there = slope_at(&(&at + &step))?;
         }
-        if !falls(&there) {
-            if is_fresh {
-                break;
-            }
-            (inverse, is_fresh) = (inverse_of(&here), true);
-            continue;
+        if there.cost >= here.cost {
+            break;
         }
-        is_fresh = false;
-        let change = &there.gradient - &here.gradient;
-        let bent = change.dot(&step);
-        if bent > 0.0 {
-            let back = DMatrix::identity(n, n) - &step * change.transpose() / bent;
-            inverse = &back * inverse * back.transpose() + &step * step.transpose() / bent;
-        }
+        let met = step.dot(&(&there.gradient - &here.gradient));
+        bend = (met / step.dot(&(&here.curvature * &step))).max(1.0);
         at += step;
         here = there;
     }
     Ok(Lowest {
         at,
-        inverse: inverse_of(&here),
+        inverse: here.inverse(),
     })
 }

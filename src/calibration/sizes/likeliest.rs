@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use nalgebra::DVector;
 
 use super::usual::Usual;
-use crate::calibration::chain::{Chain, Effect, Moments, Sizes, Smoothed};
+use crate::calibration::chain::{Chain, Effect, Filtered, Moments, Sizes, Smoothed};
 use crate::calibration::constants::Sites;
-use crate::calibration::{CalibrationError, Known, Prior};
+use crate::calibration::{CalibrationError, Known, Posterior, Prior};
 
 /// Degrees of freedom of the distribution of single events (Student's t).
 pub const FREEDOM: f64 = 6.0;
@@ -29,11 +29,12 @@ pub struct At {
     pub events: Sizes,
 }
 
-/// A point with its cost, and what the backward pass says there.
-pub struct Here {
+/// A point with its cost.
+pub struct Here<'a> {
     pub at: At,
     pub known: Known,
-    smoothed: Smoothed,
+    filtered: Filtered<'a>,
+    posterior: Posterior,
     /// −2 ln of the restricted likelihood and of the priors of the sizes.
     cost: f64,
 }
@@ -56,7 +57,7 @@ impl<'a> Search<'a> {
         })
     }
 
-    fn here(&self, at: At, sites: &Sites) -> Result<Here, CalibrationError> {
+    fn here(&self, at: At, sites: &Sites) -> Result<Here<'a>, CalibrationError> {
         let filtered = self.chain.filter(&self.sizes(&at))?;
         let known = filtered.known(self.prior);
         let undetermined = CalibrationError::Diverged {
@@ -66,7 +67,6 @@ impl<'a> Search<'a> {
             .posterior_with(&known, sites)
             .filter(|posterior| posterior.deviance.is_finite())
             .ok_or(undetermined)?;
-        let smoothed = filtered.smoothed(&posterior);
         let of_logs = self.usual.iter().zip(&at.logs);
         let of_logs: f64 = of_logs.map(|(of, by)| (by / of.spread).powi(2)).sum();
         // That of an inverse gamma distribution of the variance, whose normal draws are Student's.
@@ -79,7 +79,8 @@ impl<'a> Search<'a> {
             cost: posterior.deviance + of_logs + of_events,
             at,
             known,
-            smoothed,
+            filtered,
+            posterior,
         })
     }
 
@@ -92,7 +93,7 @@ impl<'a> Search<'a> {
     ///
     /// # Errors
     /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
-    pub fn likeliest(&self, start: At, sites: &Sites) -> Result<Here, CalibrationError> {
+    pub fn likeliest(&self, start: At, sites: &Sites) -> Result<Here<'a>, CalibrationError> {
         let mut here = self.here(start, sites)?;
         for _ in 0..STEPS {
             let next = self.next(&here);
@@ -116,7 +117,8 @@ impl<'a> Search<'a> {
 
     /// A step of Fisher's scoring for the sizes of effects, and what each event says of its own.
     fn next(&self, here: &Here) -> At {
-        let by_effect = here.smoothed.by_effect();
+        let smoothed = here.smoothed();
+        let by_effect = smoothed.by_effect();
         let mut at = here.at.clone();
         for (k, of) in self.usual.iter().enumerate() {
             let moments = of.effect().and_then(|effect| by_effect.get(&effect));
@@ -128,7 +130,7 @@ impl<'a> Search<'a> {
             at.logs[k] += step.clamp(-LONGEST, LONGEST);
         }
         let mut events = at.events.of_events_alone();
-        for (&(effect, event), moments) in &here.smoothed.events {
+        for (&(effect, event), moments) in &smoothed.0 {
             if effect.has_heavy_tails() {
                 // What the data do not tell of an event says nothing of its size.
                 let squares = moments.squares * at.events.of_event(effect, event);
@@ -142,10 +144,14 @@ impl<'a> Search<'a> {
     }
 }
 
-impl Here {
+impl Here<'_> {
+    fn smoothed(&self) -> Smoothed {
+        self.filtered.smoothed(&self.posterior)
+    }
+
     /// 1σ of the logarithm of the size of each effect.
     pub fn sigma(&self, usual: &[Usual]) -> DVector<f64> {
-        let by_effect = self.smoothed.by_effect();
+        let by_effect = self.smoothed().by_effect();
         DVector::from_iterator(
             usual.len(),
             usual.iter().map(|of| {

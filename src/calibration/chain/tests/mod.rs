@@ -141,10 +141,10 @@ fn slopes_and_parts_are_those_of_differences() {
         let chain = Chain::new(&problem, &script, &Dispersion::alike(&problem)).unwrap();
         let filtered = chain.filter(&Sizes::default()).unwrap();
         let here = posterior(&problem, &chain, &at, &Sizes::default());
-        let smoothed = filtered.smoothed(&here);
+        let (smoothed, parts) = (filtered.smoothed(&here), filtered.parts(&here));
         for source in Source::ALL {
             let effect = Effect::Noise(source);
-            let Some(part) = smoothed.parts.get(&effect) else {
+            let Some(part) = parts.get(&effect) else {
                 continue;
             };
             let step = 1e-3f64;
