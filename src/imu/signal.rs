@@ -48,6 +48,15 @@ pub struct MotionNoise {
     pub by_duration: f64,
 }
 
+impl MotionNoise {
+    /// That of turning by hand: 0.05° (1σ) in a quarter turn of 1.5 s, the size that records of MEMS sensors turned by
+    /// hand show (bandwidth, timing and second-order effects of the sensor).
+    pub const BY_HAND: Self = Self {
+        by_motion: 7e-4,
+        by_duration: 0.0,
+    };
+}
+
 impl GaussMarkov {
     /// The equivalent random walk over times much shorter than its correlation time, rad/s/√s or m/s²/√s.
     pub fn walk(&self) -> f64 {

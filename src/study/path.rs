@@ -5,12 +5,12 @@ use crate::calibration::{
     Bound, CalibrationError, ErrorTerm, Options, ParameterVector, Problem, TermLeftOff,
     bound_without_moves, coarse_start, terms_left_off,
 };
-use crate::imu::{PerSensor, TermVector, Triad};
+use crate::imu::{MotionNoise, PerSensor, TermVector, Triad};
 use crate::lot::{Check, Specification};
 use crate::models::{Instrument, ModelError, Place, path_by_hand, turntable};
 use crate::run::{Aiding, Run};
 use crate::simulation::Scenario;
-use crate::survey::{TURNED_BY_HAND, decided};
+use crate::survey::decided;
 use crate::turntable::TableError;
 
 /// A path to evaluate.
@@ -167,7 +167,7 @@ impl PathStudy {
         let mut run = simulated.run;
         if self.by_hand {
             run.recording.table = None;
-            run.instrument.motion_noise = PerSensor::from_fn(|_| TURNED_BY_HAND);
+            run.instrument.motion_noise = PerSensor::from_fn(|_| MotionNoise::BY_HAND);
         }
         Ok((run, simulated.truth, simulated.terms))
     }

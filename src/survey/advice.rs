@@ -23,13 +23,6 @@ use crate::turntable::{
 };
 use crate::units::DEGREE;
 
-/// Noise that turning by hand adds to the integrals of both triads, √s: 0.05° (1σ) in a quarter turn of 1.5 s, the size that
-/// records of MEMS sensors turned by hand show (bandwidth, timing and second-order effects of the sensor).
-pub const TURNED_BY_HAND: MotionNoise = MotionNoise {
-    by_motion: 7e-4,
-    by_duration: 0.0,
-};
-
 /// Duration of a dwell, s.
 const DWELL: f64 = 5.0;
 /// Mean rate of a turn by hand, rad/s.
@@ -215,7 +208,7 @@ fn alone(run: &Run, from: &Vector3<f64>, of: Move) -> Option<Bound> {
     };
     let options = Options::default().aiding(Aiding::Velocity);
     let mut problem = Problem::new(&record, &options);
-    problem.model.motion_noise = PerSensor::from_fn(|_| TURNED_BY_HAND);
+    problem.model.motion_noise = PerSensor::from_fn(|_| MotionNoise::BY_HAND);
     let truth = run.instrument.prior_mean(InstallationForm::General);
     bound(&problem, &truth, &TermVector::zeros()).ok()
 }

@@ -6,7 +6,7 @@ mod attained;
 mod evaluator;
 mod session;
 
-pub use advice::{Attitude, Move, TURNED_BY_HAND, nearest_attitude};
+pub use advice::{Attitude, Move, nearest_attitude};
 pub use attained::{Attained, decided, needed};
 pub use evaluator::{Evaluator, GROWTH, InterimCalibration, Status};
 pub use session::Session;
@@ -178,7 +178,7 @@ pub fn bound_of_record(run: &Run, options: &Options) -> Result<Bound, Calibratio
         let of_moves = &mut model.motion_noise.accel;
         // What a hand leaves of velocity is never stated; a table without a log is taken for one.
         if model.aiding == Aiding::Velocity && *of_moves == MotionNoise::default() {
-            *of_moves = TURNED_BY_HAND;
+            *of_moves = MotionNoise::BY_HAND;
         }
     });
     bound(&problem, &start.at.triads, &TermVector::zeros())

@@ -187,7 +187,9 @@ fn at_rest(
     AT_REST.par_iter().map(part).collect()
 }
 
-/// Parts of the constants that may be absent: `G Σ Gᵀ`, Σ being their covariance and G their effect on the others.
+/// Parts of the constants that may be absent: what all of them add is `A Σ⁻¹ Aᵀ`, Σ being their covariance and A that
+/// with all others; each has its column of `A Σ⁻½`, which are nearest to its own (Zuber and Strimmer 2011, "High-
+/// dimensional regression and variable selection using CAR scores", Statistical Applications in Genetics 10(1)).
 fn of_candidates(
     weighed: &Weighed,
     candidates: &Candidates,
@@ -196,17 +198,20 @@ fn of_candidates(
     let n = weighed.prior.constants.len();
     let first = n - weighed.prior.candidates;
     let all: Vec<usize> = (first..n).collect();
+    if all.is_empty() {
+        return Vec::new();
+    }
     let across = posterior.covariance.select_columns(&all);
     let own = across.select_rows(&all);
     let scale = DMatrix::from_diagonal(&own.diagonal().map(|value| value.sqrt().recip()));
-    let Some(factor) = (&scale * &own * &scale).cholesky() else {
-        return Vec::new();
-    };
-    let effect = &scale * factor.solve(&(&scale * across.transpose()));
+    let mut correlation = (&scale * &own * &scale).symmetric_eigen();
+    correlation
+        .eigenvalues
+        .apply(|value| *value = value.max(f64::EPSILON).sqrt().recip());
+    let columns = across * scale * correlation.recompose();
     let part = |places: &[usize]| {
-        let effect = effect.select_rows(places);
-        let own = own.select_rows(places).select_columns(places);
-        let part = effect.transpose() * own * effect;
+        let columns = columns.select_columns(places);
+        let part = &columns * columns.transpose();
         let source = posterior.constants[first + places[0]].source();
         (source, of_parameters(&posterior.constants, &part))
     };
