@@ -35,7 +35,8 @@ impl Filtered<'_> {
         dispersion: &Dispersion,
     ) -> Result<(Vec<Innovation>, Vec<Epoch>), CalibrationError> {
         let mut known = Known::new(prior.clone());
-        known.learn(&rows_of(sites, prior));
+        let undetermined = CalibrationError::Diverged { time: 0.0 };
+        known.learn(&rows_of(sites, prior).ok_or(undetermined)?);
         let mut filters = part_filters(self.chain.states.moving);
         let rests = (0..problem.stretches().len()).flat_map(|stretch| {
             let rests = script.parts(stretch).filter(|rest| !rest.models.is_empty());
@@ -140,18 +141,16 @@ fn root(covariance: DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::from_diagonal(&scale) * eigen.eigenvectors * DMatrix::from_diagonal(&roots)
 }
 
-/// Rows that say about what the sites of the constants that may be absent do.
-fn rows_of(sites: &Sites, prior: &Prior) -> DMatrix<f64> {
+/// Rows that say what the sites of the constants that may be absent do; `None` if one is not positive definite.
+fn rows_of(sites: &Sites, prior: &Prior) -> Option<DMatrix<f64>> {
     let (n, m) = (prior.sigma.len(), prior.candidates);
     let mut rows = DMatrix::zeros(m, n + 1);
-    for k in 0..m {
-        // A site that only weakens what data say is replaced by the usual size.
-        let usual = prior.sigma[n - m + k];
-        let information = sites.information[(k, k)].max(usual.powi(-2));
-        rows[(k, n - m + k)] = information.sqrt();
-        rows[(k, n)] = prior.mean[n - m + k] * information.sqrt();
+    if m > 0 {
+        let root = sites.information.matrix.clone().cholesky()?.unpack();
+        rows.columns_mut(n - m, m).copy_from(&root.transpose());
+        rows.set_column(n, &root.solve_lower_triangular(&sites.information.vector)?);
     }
-    rows
+    Some(rows)
 }
 
 impl Epoch {

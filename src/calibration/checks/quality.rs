@@ -136,7 +136,7 @@ impl Outcome {
         let half = enough.then(|| chain.observed_in(|dwell| dwell % 2 == 0));
         // Half the dwells may be too few.
         let half = half.and_then(|half| {
-            let of_half = effects.weighed(&half, problem, script).ok()?;
+            let of_half = effects.weighed_anew(&half, problem, script).ok()?;
             let moved = of_half.filtered.moved(&script.at, &of_half.posterior);
             Some(moved)
         });

@@ -16,12 +16,19 @@ pub struct Known {
     root: DMatrix<f64>,
 }
 
-/// Normal factors in place of the prior of the constants that may be absent: `−½ xᵀ information x + xᵀ vector` is their
-/// logarithm up to a constant.
+/// What is known of constants: the logarithm of its density is `−½ xᵀ matrix x + xᵀ vector` up to a constant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Information {
+    pub matrix: DMatrix<f64>,
+    pub vector: DVector<f64>,
+}
+
+/// Normal priors of the constants that may be absent, and what averages over several add to their covariance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sites {
-    pub information: DMatrix<f64>,
-    pub vector: DVector<f64>,
+    pub information: Information,
+    /// Covariance between the cases, from both sides multiplied by the inverse of the covariance.
+    pub between: DMatrix<f64>,
 }
 
 impl Known {
@@ -61,11 +68,11 @@ impl Known {
     }
 
     /// What the rows say of the constants that may be absent, whatever all others are.
-    pub fn of_candidates(&self) -> Sites {
+    pub fn of_candidates(&self) -> Information {
         let (n, m) = (self.open.len(), self.prior.candidates);
         let root = self.root.view((n - m, n - m), (m, m));
-        Sites {
-            information: root.tr_mul(&root),
+        Information {
+            matrix: root.tr_mul(&root),
             vector: root.tr_mul(&self.root.view((n - m, n), (m, 1)).column(0)),
         }
     }
@@ -93,7 +100,7 @@ impl Known {
                 }
             }
         }
-        let information = self.of_candidates().information;
+        let information = self.of_candidates().matrix;
         let scaled = DMatrix::from_fn(places.len(), places.len(), |i, j| {
             let own = information[(places[i], places[j])] * usual(places[i]) * usual(places[j]);
             own + f64::from(u8::from(i == j))
@@ -108,10 +115,8 @@ impl Known {
         let (n, m) = (self.open.len(), self.prior.candidates);
         let k = n - m;
         let own = self.of_candidates();
-        let (information, vector) = (
-            own.information + &sites.information,
-            own.vector + &sites.vector,
-        );
+        let information = own.matrix + &sites.information.matrix;
+        let vector = own.vector + &sites.information.vector;
         // With a diagonal of ones, whatever the units.
         let scale = information.diagonal().map(|value| value.sqrt().recip());
         let scaled = DMatrix::from_fn(m, m, |i, j| information[(i, j)] * scale[i] * scale[j]);
@@ -120,6 +125,8 @@ impl Known {
         let inverse = factor.inverse();
         let of_candidates = DMatrix::from_fn(m, m, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
         let candidates = &of_candidates * &vector;
+        let between = &of_candidates * &sites.between * &of_candidates;
+        let of_candidates = of_candidates + between;
         let root = self.root.view((0, 0), (k, k)).into_owned();
         let mut of_known = DMatrix::identity(k, k);
         let mut by_candidates = -self.root.view((0, k), (k, m)).into_owned();
@@ -194,19 +201,31 @@ impl Sites {
             .sigma
             .rows(n - m, m)
             .map(|sigma| 1e12 * sigma.powi(-2));
-        Self {
+        Self::of(Information {
             vector: information.component_mul(&prior.mean.rows(n - m, m)),
-            information: DMatrix::from_diagonal(&information),
-        }
+            matrix: DMatrix::from_diagonal(&information),
+        })
     }
 
     /// Nothing in addition to the rows.
     pub fn none(prior: &Prior) -> Self {
         let m = prior.candidates;
-        Self {
-            information: DMatrix::zeros(m, m),
+        Self::of(Information {
+            matrix: DMatrix::zeros(m, m),
             vector: DVector::zeros(m),
+        })
+    }
+
+    fn of(information: Information) -> Self {
+        Self {
+            between: DMatrix::zeros(information.vector.len(), information.vector.len()),
+            information,
         }
+    }
+
+    /// Without what is between the cases.
+    pub fn within(self) -> Self {
+        Self::of(self.information)
     }
 }
 

@@ -1,14 +1,14 @@
 //! Average over effects that may be absent and whose size is not known: error terms, temperature orders.
 //!
 //! A group of constants is absent with probability one half, else of its usual size, which is known to a factor three.
-//! The posterior of all constants is the average over these cases. With many groups it is found by expectation
+//! The posterior of all constants is the average over these cases. With many groups it is found as in expectation
 //! propagation (Minka 2001, "Expectation propagation for approximate Bayesian inference", UAI 17): the prior of each
-//! group becomes the normal factor with which the average over its own cases has the right mean and covariance, given
-//! those of all others. For one group this is exact.
+//! group becomes the normal one about zero with which its mean is that of the average over its own cases, given the
+//! priors of all others. The covariance then is that within the cases, to which that between them is added.
 
-use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
-use crate::calibration::constants::Sites;
+use crate::calibration::constants::Information;
 
 /// Sizes over the usual one: every half power of three to the factor 3^(3/2), with weights of a triangle over their
 /// logarithms.
@@ -25,21 +25,18 @@ const SIZES: [(f64, f64); 7] = [
 pub const LARGEST: f64 = SIZES[6].0;
 /// Prior probability that a group is absent.
 const ABSENT: f64 = 0.5;
-/// Most rounds over all groups …
+/// Most rounds over all groups.
 const ROUNDS: usize = 100;
-/// … of which this many go to where each group leads, later ones half the way.
-const WHOLE: usize = 20;
 /// A change of the probability that any group is absent by less than this has settled.
-const SETTLED: f64 = 1e-8;
-
-/// Information below this part of the largest is rounding.
-const ROUNDING: f64 = 1e-9;
+const SETTLED: f64 = 1e-5;
 
 /// The average over all cases of groups of constants, in units of their usual sizes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Average {
-    /// The normal factor in place of the prior of each group, block by block.
-    pub sites: Sites,
+    /// Inverse of the covariance of the normal prior of each group, block by block.
+    pub precision: DMatrix<f64>,
+    /// Covariance between the cases of each group, from both sides multiplied by the inverse of that within them.
+    pub between: DMatrix<f64>,
     /// Probability that each group is absent.
     pub absent: Vec<f64>,
 }
@@ -54,167 +51,145 @@ impl Average {
     /// Every group present with this size over the usual one.
     pub fn begun(groups: &[Vec<usize>], sizes: &[f64]) -> Self {
         let n = groups.iter().map(Vec::len).sum();
-        let mut information = DMatrix::zeros(n, n);
+        let mut precision = DMatrix::zeros(n, n);
         for (places, size) in groups.iter().zip(sizes) {
             for &place in places {
-                information[(place, place)] = size.powi(-2);
+                precision[(place, place)] = size.powi(-2);
             }
         }
         Self {
-            sites: Sites {
-                information,
-                vector: DVector::zeros(n),
-            },
+            precision,
+            between: DMatrix::zeros(n, n),
             absent: vec![ABSENT; groups.len()],
         }
     }
 
     /// The average given what data say of all groups, each with its places among the constants, begun at this one; `None` if
-    /// the two contradict each other beyond rounding.
-    pub fn given(mut self, data: &Sites, groups: &[Vec<usize>]) -> Option<Self> {
-        for round in 0..ROUNDS {
+    /// a group has a covariance that is not positive definite.
+    pub fn given(mut self, data: &Information, groups: &[Vec<usize>]) -> Option<Self> {
+        for _ in 0..ROUNDS {
             let mut now = self.moments(data)?;
             let mut most = 0.0f64;
             for (k, places) in groups.iter().enumerate() {
-                let Some((site, absent)) = self.of_group(places, &now) else {
-                    continue;
-                };
-                let fraction = if round < WHOLE { 1.0 } else { 0.5 };
-                most = most.max((absent - self.absent[k]).abs());
-                self.absent[k] = absent;
-                let change = self.replace(places, &site, fraction);
-                now.update(places, &change)?;
+                let others = self.others(places, &now)?;
+                let cases = Cases::of(&others);
+                most = most.max((cases.absent - self.absent[k]).abs());
+                self.absent[k] = cases.absent;
+                set(&mut self.between, places, &cases.between);
+                let before = of(&self.precision, places);
+                set(&mut self.precision, places, &cases.precision);
+                now.update(places, &(cases.precision - before))?;
             }
             if most < SETTLED {
                 break;
             }
         }
-        self.moments(data).map(|_| self)
+        Some(self)
     }
 
     /// Mean and covariance of all.
-    fn moments(&self, data: &Sites) -> Option<Moments> {
-        let information = &data.information + &self.sites.information;
+    fn moments(&self, data: &Information) -> Option<Moments> {
+        let information = &data.matrix + &self.precision;
         let scale = information.diagonal().map(|value| value.sqrt().recip());
         let n = scale.len();
         let scaled = DMatrix::from_fn(n, n, |i, j| information[(i, j)] * scale[i] * scale[j]);
         let inverse = Cholesky::new(scaled)?.inverse();
         let covariance = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
         Some(Moments {
-            mean: &covariance * (&data.vector + &self.sites.vector),
+            mean: &covariance * &data.vector,
             covariance,
         })
     }
 
-    /// The factor of a group that gives its average over all cases, given all others, and the probability that it is
-    /// absent; `None` if the others do not allow one yet.
-    fn of_group(&self, places: &[usize], now: &Moments) -> Option<(Sites, f64)> {
-        let cavity = self.cavity(places, now)?;
-        let (average, absent) = cases(&cavity)?;
-        let inverse = Cholesky::new(average.covariance)?.inverse();
-        let site = Sites {
-            vector: &inverse * average.mean - cavity.vector,
-            information: inverse - cavity.information,
-        };
-        Some((site, absent))
-    }
-
     /// What all others say of a group.
-    fn cavity(&self, places: &[usize], now: &Moments) -> Option<Sites> {
-        let own = now.covariance.select_rows(places).select_columns(places);
-        let inverse = Cholesky::new(own)?.inverse();
-        let (information, vector) = self.site(places);
-        Some(Sites {
-            vector: &inverse * now.mean.select_rows(places) - vector,
-            information: inverse - information,
+    fn others(&self, places: &[usize], now: &Moments) -> Option<Information> {
+        let inverse = Cholesky::new(of(&now.covariance, places))?.inverse();
+        Some(Information {
+            vector: &inverse * now.mean.select_rows(places),
+            matrix: inverse - of(&self.precision, places),
         })
     }
+}
 
-    fn site(&self, places: &[usize]) -> (DMatrix<f64>, DVector<f64>) {
-        let Sites {
-            information,
-            vector,
-        } = &self.sites;
-        let information = information.select_rows(places).select_columns(places);
-        (information, vector.select_rows(places))
-    }
+fn of(matrix: &DMatrix<f64>, places: &[usize]) -> DMatrix<f64> {
+    matrix.select_rows(places).select_columns(places)
+}
 
-    /// Moves the factor of a group a fraction of the way to another; returns the change.
-    fn replace(&mut self, places: &[usize], site: &Sites, fraction: f64) -> Sites {
-        let (information, vector) = self.site(places);
-        let change = Sites {
-            information: (&site.information - information) * fraction,
-            vector: (&site.vector - vector) * fraction,
-        };
-        for (row, &i) in places.iter().enumerate() {
-            self.sites.vector[i] += change.vector[row];
-            for (column, &j) in places.iter().enumerate() {
-                self.sites.information[(i, j)] += change.information[(row, column)];
-            }
+fn set(matrix: &mut DMatrix<f64>, places: &[usize], block: &DMatrix<f64>) {
+    for (row, &i) in places.iter().enumerate() {
+        for (column, &j) in places.iter().enumerate() {
+            matrix[(i, j)] = block[(row, column)];
         }
-        change
     }
 }
 
 impl Moments {
-    /// With the factor of a group changed (Woodbury's identity).
-    fn update(&mut self, places: &[usize], change: &Sites) -> Option<()> {
+    /// With the prior of a group changed (Woodbury's identity).
+    fn update(&mut self, places: &[usize], change: &DMatrix<f64>) -> Option<()> {
         let across = self.covariance.select_columns(places);
         let own = across.select_rows(places);
         let n = places.len();
-        let inverse = (DMatrix::identity(n, n) + &change.information * own).try_inverse()?;
-        let gain = &across * &inverse;
-        // (P⁻¹ + ΔS)⁻¹ (P⁻¹ m + Δη) = m + P_g (I + ΔS P_gg)⁻¹ (Δη − ΔS m_g)
-        let mean = self.mean.select_rows(places);
-        self.mean += &gain * (&change.vector - &change.information * mean);
-        self.covariance -= gain * &change.information * across.transpose();
+        let inverse = (DMatrix::identity(n, n) + change * own).try_inverse()?;
+        // (P⁻¹ + ΔS)⁻¹ = P − P_g (I + ΔS P_gg)⁻¹ ΔS P_gᵀ
+        let gain = &across * inverse * change;
+        self.mean -= &gain * self.mean.select_rows(places);
+        self.covariance -= gain * across.transpose();
         Some(())
     }
 }
 
-/// Mean and covariance of a group over its cases, given what all others say, and the probability that it is absent.
-fn cases(cavity: &Sites) -> Option<(Moments, f64)> {
-    let n = cavity.vector.len();
-    // Along the directions that the others determine independently.
-    let turned = SymmetricEigen::try_new(cavity.information.clone(), f64::EPSILON, 0)?;
-    let largest = turned.eigenvalues.amax();
-    if turned.eigenvalues.min() < -ROUNDING * largest {
-        return None;
+/// The cases of a group, given what all others say.
+struct Cases {
+    /// Probability that it is absent.
+    absent: f64,
+    /// As in [`Average`].
+    precision: DMatrix<f64>,
+    between: DMatrix<f64>,
+}
+
+impl Cases {
+    fn of(others: &Information) -> Self {
+        let n = others.vector.len();
+        // Along the directions that the others determine independently.
+        let turned = others.matrix.clone().symmetric_eigen();
+        let told = turned.eigenvectors.tr_mul(&others.vector);
+        let known = turned.eigenvalues.map(|value| value.max(0.0));
+        let mut weights = vec![ABSENT.ln()];
+        let mut variances = vec![DVector::zeros(n)];
+        for (size, weight) in SIZES {
+            let variance = known.map(|known| (known + size.powi(-2)).recip());
+            let likelihood: f64 = (0..n)
+                .map(|k| variance[k] * told[k].powi(2) - (1.0 + size.powi(2) * known[k]).ln())
+                .sum();
+            weights.push(((1.0 - ABSENT) * weight).ln() + 0.5 * likelihood);
+            variances.push(variance);
+        }
+        let largest = weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        weights
+            .iter_mut()
+            .for_each(|of| *of = (*of - largest).exp());
+        let sum: f64 = weights.iter().sum();
+        weights.iter_mut().for_each(|of| *of /= sum);
+        let mut within = DVector::from_element(n, f64::EPSILON);
+        for (weight, variance) in weights.iter().zip(&variances) {
+            within.axpy(*weight, variance, 1.0);
+        }
+        // Means are variances times what is told: within the cases, on average, so is the mean of all.
+        let mut between = DMatrix::zeros(n, n);
+        for (weight, variance) in weights.iter().zip(&variances) {
+            let off = (variance - &within)
+                .component_mul(&told)
+                .component_div(&within);
+            between.ger(*weight, &off, &off, 1.0);
+        }
+        let back = &turned.eigenvectors;
+        let precision = DMatrix::from_diagonal(&(within.map(f64::recip) - known));
+        Self {
+            absent: weights[0],
+            precision: back * precision * back.transpose(),
+            between: back * between * back.transpose(),
+        }
     }
-    let told = turned.eigenvectors.tr_mul(&cavity.vector);
-    let known = turned.eigenvalues.map(|value| value.max(0.0));
-    let mut weights = vec![ABSENT.ln()];
-    let mut means = vec![DVector::zeros(n)];
-    let mut variances = vec![DVector::zeros(n)];
-    for (size, weight) in SIZES {
-        let variance = known.map(|known| (known + size.powi(-2)).recip());
-        let mean = variance.component_mul(&told);
-        let likelihood = 0.5
-            * (0..n)
-                .map(|k| mean[k] * told[k] - (1.0 + size.powi(2) * known[k]).ln())
-                .sum::<f64>();
-        weights.push(((1.0 - ABSENT) * weight).ln() + likelihood);
-        means.push(mean);
-        variances.push(variance);
-    }
-    let largest = weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let weights: Vec<f64> = weights
-        .iter()
-        .map(|weight| (weight - largest).exp())
-        .collect();
-    let sum: f64 = weights.iter().sum();
-    let mut mean = DVector::zeros(n);
-    let mut squares = DMatrix::zeros(n, n);
-    for ((weight, of), variance) in weights.iter().zip(&means).zip(&variances) {
-        let weight = weight / sum;
-        mean.axpy(weight, of, 1.0);
-        squares += (of * of.transpose() + DMatrix::from_diagonal(variance)) * weight;
-    }
-    let covariance = squares - &mean * mean.transpose();
-    let back = turned.eigenvectors;
-    let covariance = &back * covariance * back.transpose();
-    let mean = back * mean;
-    Some((Moments { mean, covariance }, weights[0] / sum))
 }
 
 #[cfg(test)]
@@ -222,7 +197,7 @@ mod tests {
     use super::*;
 
     /// What correlated rows say of two terms of these sizes beside two other constants.
-    fn seen(terms: [f64; 2]) -> Sites {
+    fn seen(terms: [f64; 2]) -> Information {
         let rows = DMatrix::from_row_slice(
             6,
             4,
@@ -236,10 +211,9 @@ mod tests {
         let information = rows.tr_mul(&rows);
         let others = information.view((0, 0), (2, 2)).into_owned().try_inverse();
         let across = information.view((2, 0), (2, 2)) * others.unwrap();
-        Sites {
+        Information {
             vector: vector.rows(2, 2) - &across * vector.rows(0, 2),
-            information: information.view((2, 2), (2, 2))
-                - across * information.view((0, 2), (2, 2)),
+            matrix: information.view((2, 2), (2, 2)) - across * information.view((0, 2), (2, 2)),
         }
     }
 
@@ -250,20 +224,21 @@ mod tests {
         absent: Vec<f64>,
     }
 
-    fn by_propagation(data: &Sites, groups: &[Vec<usize>]) -> Whole {
+    fn by_propagation(data: &Information, groups: &[Vec<usize>]) -> Whole {
         let found = Average::begun(groups, &vec![1.0; groups.len()])
             .given(data, groups)
             .unwrap();
         let Moments { mean, covariance } = found.moments(data).unwrap();
+        let between = &covariance * &found.between * &covariance;
         Whole {
             mean,
-            covariance,
+            covariance: covariance + between,
             absent: found.absent,
         }
     }
 
     /// The average over all cases, each case solved alone; one constant a group.
-    fn by_cases(data: &Sites) -> Whole {
+    fn by_cases(data: &Information) -> Whole {
         let cases: Vec<(f64, f64)> = std::iter::once((0.0, ABSENT))
             .chain(SIZES.map(|(size, weight)| (size, (1.0 - ABSENT) * weight)))
             .collect();
@@ -273,7 +248,7 @@ mod tests {
         let mut absent = vec![0.0; n];
         for number in 0..cases.len().pow(n as u32) {
             let case = |k: usize| cases[number / cases.len().pow(k as u32) % cases.len()];
-            let mut information = data.information.clone();
+            let mut information = data.matrix.clone();
             let mut weight = 1.0f64;
             for k in 0..n {
                 let size = case(k).0.max(1e-7);
@@ -302,8 +277,8 @@ mod tests {
     fn one_group_is_averaged_exactly() {
         for size in [0.0, 0.1, 1.0, 3.0] {
             let both = seen([size, 0.0]);
-            let data = Sites {
-                information: both.information.view((0, 0), (1, 1)).into_owned(),
+            let data = Information {
+                matrix: both.matrix.view((0, 0), (1, 1)).into_owned(),
                 vector: both.vector.rows(0, 1).into_owned(),
             };
             let (found, expected) = (by_propagation(&data, &[vec![0]]), by_cases(&data));
@@ -334,8 +309,8 @@ mod tests {
 
     #[test]
     fn what_is_not_seen_at_all_stays_at_its_prior() {
-        let data = Sites {
-            information: DMatrix::zeros(1, 1),
+        let data = Information {
+            matrix: DMatrix::zeros(1, 1),
             vector: DVector::zeros(1),
         };
         let found = by_propagation(&data, &[vec![0]]);

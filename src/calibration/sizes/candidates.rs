@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::averages::{Average, LARGEST};
-use crate::calibration::constants::Sites;
+use super::averages::Average;
+use crate::calibration::constants::{Information, Sites};
 use crate::calibration::{Candidate, Constant, Known, Model, Prior};
 
 /// Size over the usual one with which a term begins.
@@ -56,33 +56,16 @@ impl Candidates {
 
     /// Normal factors in place of their prior, as errors of the linearisation point of this one.
     pub fn sites(&self, prior: &Prior) -> Sites {
-        in_errors(&self.average.sites, prior)
-    }
-
-    /// The same where other sizes are on trial. A factor that takes information away, between absent and present, would
-    /// reward whatever makes the data know less: it counts as a free constant of the largest size.
-    pub fn sites_on_trial(&self, prior: &Prior) -> Sites {
-        let mut sites = self.average.sites.clone();
-        for places in &self.places {
-            let own = sites.information.select_rows(places).select_columns(places);
-            let mut eigen = own.symmetric_eigen();
-            let mut along = eigen.eigenvectors.tr_mul(&sites.vector.select_rows(places));
-            let least = LARGEST.powi(-2);
-            for (value, along) in eigen.eigenvalues.iter_mut().zip(along.iter_mut()) {
-                if *value < least {
-                    (*value, *along) = (least, 0.0);
-                }
-            }
-            let vector = &eigen.eigenvectors * along;
-            let own = eigen.recompose();
-            for (row, &i) in places.iter().enumerate() {
-                sites.vector[i] = vector[row];
-                for (column, &j) in places.iter().enumerate() {
-                    sites.information[(i, j)] = own[(row, column)];
-                }
-            }
+        let (usual, at) = usual_and_values(prior);
+        let inverse = DMatrix::from_diagonal(&usual.map(f64::recip));
+        let matrix = &inverse * &self.average.precision * &inverse;
+        Sites {
+            between: &inverse * &self.average.between * &inverse,
+            information: Information {
+                vector: -(&matrix * at),
+                matrix,
+            },
         }
-        in_errors(&sites, prior)
     }
 
     /// Begins the average anew.
@@ -98,14 +81,11 @@ impl Candidates {
         let (usual, at) = usual_and_values(prior);
         let of_data = known.of_candidates();
         let scale = DMatrix::from_diagonal(&usual);
-        let data = Sites {
-            vector: &scale * (of_data.vector + &of_data.information * at),
-            information: &scale * of_data.information * &scale,
+        let data = Information {
+            vector: &scale * (of_data.vector + &of_data.matrix * at),
+            matrix: &scale * of_data.matrix * &scale,
         };
-        let begun = [self.average.clone(), begun(&self.all, &self.places)];
-        let found = begun
-            .into_iter()
-            .find_map(|of| of.given(&data, &self.places));
+        let found = begun(&self.all, &self.places).given(&data, &self.places);
         let Some(found) = found else {
             return 0.0;
         };
@@ -126,17 +106,6 @@ fn begun(all: &[Candidate], places: &[Vec<usize>]) -> Average {
     };
     let sizes: Vec<f64> = all.iter().map(size).collect();
     Average::begun(places, &sizes)
-}
-
-/// Factors of values over usual sizes as factors of errors of the linearisation point.
-fn in_errors(sites: &Sites, prior: &Prior) -> Sites {
-    let (usual, at) = usual_and_values(prior);
-    let inverse = DMatrix::from_diagonal(&usual.map(f64::recip));
-    let information = &inverse * &sites.information * &inverse;
-    Sites {
-        vector: inverse * &sites.vector - &information * at,
-        information,
-    }
 }
 
 /// Usual size of each constant that may be absent, and its value at the linearisation point.

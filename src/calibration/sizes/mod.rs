@@ -174,7 +174,7 @@ impl Effects {
         if self.events != Sizes::default() {
             start.events = self.events.clone();
         }
-        let here = search.likeliest(start, &self.candidates.sites_on_trial(prior))?;
+        let here = search.likeliest(start, &self.candidates.sites(prior).within())?;
         let change = self.candidates.weigh(&here.known, prior);
         let sigma = here.sigma(&usual);
         for (k, size) in self.between.iter_mut().enumerate() {
@@ -210,10 +210,8 @@ impl Effects {
         let prior = Prior::new(&chain.constants, &problem.model, &script.at);
         let known = filtered.known(&prior);
         let time = chain.links.last().map_or(0.0, |link| link.time);
-        // Where a part of the rows knows less than what the averages take away, candidates are free.
-        let averaged = filtered.posterior_with(&known, &self.candidates.sites(&prior));
-        let posterior = averaged
-            .or_else(|| filtered.posterior_with(&known, &self.candidates.sites_on_trial(&prior)))
+        let posterior = filtered
+            .posterior_with(&known, &self.candidates.sites(&prior))
             .ok_or(CalibrationError::Diverged { time })?;
         Ok(Weighed {
             filtered,
@@ -221,6 +219,23 @@ impl Effects {
             known,
             posterior,
         })
+    }
+
+    /// The same for some of the rows, over which candidates are averaged anew.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    pub fn weighed_anew<'a>(
+        &self,
+        chain: &'a Chain,
+        problem: &Problem,
+        script: &Script,
+    ) -> Result<Weighed<'a>, CalibrationError> {
+        let mut anew = self.clone();
+        let prior = Prior::new(&chain.constants, &problem.model, &script.at);
+        let known = chain.filter(&self.sizes(chain))?.known(&prior);
+        anew.candidates.weigh(&known, &prior);
+        anew.weighed(chain, problem, script)
     }
 
     /// Variances over those with which the links of a chain are made; as stated, nothing slips.
