@@ -142,10 +142,14 @@ impl Model {
         })
     }
 
-    /// Variance of a table's reading per axis by settling, this time after a stop, rad².
-    pub(in crate::calibration) fn settling(&self, since_stop: f64) -> f64 {
-        let fading = (-2.0 * since_stop / self.settling_time).exp();
-        self.settling_sigma.powi(2) * fading * self.weight(BudgetSource::Settling)
+    /// Part of the settling of a table that is left after a time.
+    pub(in crate::calibration) fn settling(&self, duration: f64) -> f64 {
+        (-duration / self.settling_time).exp()
+    }
+
+    /// Variance of the settling of a table at a stop per axis, rad².
+    pub(in crate::calibration) fn settling_variance(&self) -> f64 {
+        self.settling_sigma.powi(2) * self.weight(BudgetSource::Settling)
     }
 
     /// Factor of the variance of a source.

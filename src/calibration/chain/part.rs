@@ -4,6 +4,9 @@
 //! states at the begin (together `g`), only noise remains, which a filter of the moving states whitens in each
 //! observation. The whitened observations are linear in `g`, and so are the states at the end: together they are all
 //! that the part says (Friedland 1969, "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control 14(4)).
+//!
+//! Beside the navigation errors an attitude is observed: by hand, the rotation since the body came to rest; after a move
+//! of a table, the attitude error less the settling of the table, which fades.
 
 mod course;
 
@@ -74,15 +77,18 @@ pub trait PartFilter {
     ) -> Option<Part>;
 }
 
-/// The filters for this number of moving states: for parts that follow a move, and for others, which have other noise.
+/// The filters for this number of moving states: for parts that follow a move, and for others.
 pub fn part_filters(moving: usize) -> [Box<dyn PartFilter>; 2] {
-    [(); 2].map(|()| -> Box<dyn PartFilter> {
-        if moving == NAVIGATION {
-            Box::new(Course::<9, 12>::new(&begins(moving)))
-        } else {
-            Box::new(Course::<12, 15>::new(&begins(moving)))
-        }
-    })
+    let begins = begins(moving).into_iter().enumerate();
+    if moving == NAVIGATION {
+        let settles = (0..3).map(|axis| (ATTITUDE + axis, NAVIGATION + axis));
+        [
+            Box::new(Course::<12, 12>::new(begins.clone().chain(settles))),
+            Box::new(Course::<9, 12>::new(begins)),
+        ]
+    } else {
+        [(); 2].map(|()| -> Box<dyn PartFilter> { Box::new(Course::<12, 15>::new(begins.clone())) })
+    }
 }
 
 /// Which of the two filters a part has.
@@ -107,12 +113,19 @@ impl<const M: usize, const G: usize> PartFilter for Course<M, G> {
         model: &Model,
         seen: &mut dyn FnMut(Whitened),
     ) -> Option<Part> {
-        let models = rest.models.iter().map(|block| step_model(block, model));
+        let settles = M == G;
+        let models = rest.models.iter().map(|block| {
+            let fading = if settles { model.settling(block.duration) } else { 1.0 };
+            step_model::<M, G>(block, model, fading)
+        });
         self.begin(models.collect());
         let turn = (M > NAVIGATION).then_some(NAVIGATION);
         let (mut events, mut mean, mut vector) = (0, [0.0; M], [0.0; G]);
         let (mut squares, mut log_determinant) = (0.0, 0.0);
-        let mut since_stop = 0.0;
+        if settles {
+            self.widen(events, NAVIGATION, model.settling_variance());
+            events += 1;
+        }
         for step in &rest.steps {
             let errors = [ATTITUDE, VELOCITY, POSITION].into_iter();
             let turned = turn.map(|turn| (turn, step.referred[0]));
@@ -122,23 +135,15 @@ impl<const M: usize, const G: usize> PartFilter for Course<M, G> {
             self.step(events, step.model);
             events += 1;
             mean = self.models[step.model].propagated(&mean);
-            since_stop += rest.models[step.model].duration;
             for number in step.seen.clone() {
                 let observed = &rest.seen[number];
                 let first = match observed.kind {
                     Observation::Velocity => VELOCITY,
-                    Observation::Table => ATTITUDE,
-                    Observation::Attitude => turn.unwrap_or(ATTITUDE),
+                    Observation::Table | Observation::Attitude => turn.unwrap_or(ATTITUDE),
                 };
                 let variance =
                     stretch.observation_variance(model, observed.kind, observed.readings);
-                let settles = filter_of(rest) == 0 && observed.kind == Observation::Table;
-                let settling = if settles {
-                    model.settling(since_stop)
-                } else {
-                    0.0
-                };
-                let gain = self.observe(events, first, variance + settling)?;
+                let gain = self.observe(events, first, variance)?;
                 events += 1;
                 let expected = Vector3::new(mean[first], mean[first + 1], mean[first + 2]);
                 let scalars = gain
@@ -179,8 +184,12 @@ fn matrix<const N: usize>(rows: &[[f64; N]]) -> DMatrix<f64> {
     DMatrix::from_row_slice(rows.len(), N, rows.as_flattened())
 }
 
-/// Propagation of the moving states in a step.
-fn step_model<const M: usize>(block: &Block, model: &Model) -> StepModel<M> {
+/// Propagation of the moving states in a step, in which the difference of the two attitudes fades by a factor.
+fn step_model<const M: usize, const G: usize>(
+    block: &Block,
+    model: &Model,
+    fading: f64,
+) -> StepModel<M> {
     let driven_by = driven_at_rest(block);
     let own = |row: usize| {
         row.checked_sub(NAVIGATION)
@@ -193,19 +202,19 @@ fn step_model<const M: usize>(block: &Block, model: &Model) -> StepModel<M> {
     let mut noise = [[0.0; M]; M];
     for row in 0..M {
         for k in 0..M {
-            // The rotation at rest follows the change of the attitude.
+            // The observed attitude follows the change of the attitude.
             let phi = if k >= NAVIGATION {
-                f64::from(k == row)
+                fading * f64::from(k == row)
             } else {
                 let itself = f64::from(row >= NAVIGATION && own(row) == k);
-                block.navigation[(own(row), k)] - itself
+                block.navigation[(own(row), k)] - fading * itself
             };
             transition.push((row, k, phi));
             let alone = f64::from(row == k && row >= NAVIGATION);
             noise[row][k] = of_navigation[(own(row), own(k))] + alone * turning;
         }
         for k in 0..CONSTANTS {
-            driven.push((row, M - 3 + k, driven_by[(own(row), k)]));
+            driven.push((row, G - CONSTANTS + k, driven_by[(own(row), k)]));
         }
     }
     transition.retain(|&(.., phi)| phi != 0.0);

@@ -91,8 +91,9 @@ impl Given {
 
     /// The states at the end of the part.
     pub fn end(&self, part: &Part, moving: usize, to: &mut Transition) {
-        let mut states = &part.of_given * &self.states;
-        let mut constants = &part.of_given * &self.constants;
+        let of_given = part.of_given.rows(0, moving);
+        let mut states = of_given * &self.states;
+        let mut constants = of_given * &self.constants;
         for axis in 0..3 {
             states[(POSITION + axis, POSITION + axis)] += 1.0;
             let mut row = states.row_mut(ATTITUDE + axis);
@@ -102,8 +103,8 @@ impl Given {
         }
         to.states.rows_mut(0, moving).copy_from(&states);
         to.constants.rows_mut(0, moving).copy_from(&constants);
-        to.offset.rows_mut(0, moving).copy_from(&part.offset);
+        to.offset.rows_mut(0, moving).copy_from(&part.offset.rows(0, moving));
         let mut covariance = to.covariance.view_mut((0, 0), (moving, moving));
-        covariance.copy_from(&part.covariance);
+        covariance.copy_from(&part.covariance.view((0, 0), (moving, moving)));
     }
 }

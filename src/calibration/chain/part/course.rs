@@ -39,6 +39,8 @@ enum Event {
     Step(usize),
     /// Three states from a first one on are observed, each with this variance.
     Observed(usize, f64),
+    /// Three states from a first one on are wider by this variance.
+    Widened(usize, f64),
 }
 
 /// Gain of an observation for given `g`.
@@ -74,14 +76,14 @@ impl<const M: usize> StepModel<M> {
 }
 
 impl<const M: usize, const G: usize> Course<M, G> {
-    /// Component `k` of `g` is the moving state `begins[k]` at the begin of a part.
-    pub fn new(begins: &[usize]) -> Self {
+    /// Components of `g`, each with a moving state that begins with it.
+    pub fn new(begins: impl Iterator<Item = (usize, usize)>) -> Self {
         let mut known = Known {
             of_given: [[0.0; G]; M],
             covariance: [[0.0; M]; M],
             information: [[0.0; G]; G],
         };
-        for (component, &state) in begins.iter().enumerate() {
+        for (component, state) in begins {
             known.of_given[state][component] = 1.0;
         }
         Self {
@@ -113,6 +115,16 @@ impl<const M: usize, const G: usize> Course<M, G> {
         }
     }
 
+    /// Adds a variance to three states after this number of events.
+    pub fn widen(&mut self, from: usize, first: usize, variance: f64) {
+        let event = Event::Widened(first, variance);
+        if !self.is_next(from, event) {
+            self.back_to(from);
+            self.last.widen(first, variance);
+            self.add(event, None);
+        }
+    }
+
     /// The gain of an observation of three states after this number of events; `None` if their covariance is not
     /// positive definite.
     pub fn observe(&mut self, from: usize, first: usize, variance: f64) -> Option<&Gain<M, G>> {
@@ -135,6 +147,7 @@ impl<const M: usize, const G: usize> Course<M, G> {
         for event in &self.events[at / KEPT * KEPT..at] {
             match event {
                 (Event::Step(model), _) => known.propagate(&self.models[*model]),
+                (Event::Widened(first, variance), _) => known.widen(*first, *variance),
                 (Event::Observed(..), gain) => {
                     gain.iter().for_each(|gain| known.update(gain));
                 }
@@ -181,6 +194,10 @@ impl<const M: usize, const G: usize> Known<M, G> {
             }
         }
         (self.of_given, self.covariance) = (of_given, covariance);
+    }
+
+    fn widen(&mut self, first: usize, variance: f64) {
+        (first..first + 3).for_each(|state| self.covariance[state][state] += variance);
     }
 
     fn gain(&self, first: usize, variance: f64) -> Option<Gain<M, G>> {
