@@ -107,12 +107,6 @@ fn a_table_that_settles_after_each_stop_costs_no_accuracy() {
             }
         }
         let (outcome, settling) = error(&simulated);
-        let _ = outcome
-            .noise
-            .sources
-            .iter()
-            .map(|of| println!("{of}"))
-            .count();
         let shift = (settling - clean).amax();
         println!("{size}″: shift {shift:.3} σ");
         assert!(shift < 1.0, "{size}″: {shift} σ");
@@ -123,6 +117,10 @@ fn a_table_that_settles_after_each_stop_costs_no_accuracy() {
             .find(|of| of.source == Source::Settling);
         let found = settles.unwrap().used;
         println!("{size}″: {found}″ found");
+        // About each of two axes across and one along a random direction.
+        assert!((0.3..1.2).contains(&(found / size)), "{size}″: {found}″");
+        let is_named = outcome.findings.iter().any(|of| of.code == "W15");
+        assert!(is_named, "{size}″");
     }
 }
 

@@ -115,7 +115,11 @@ impl<const M: usize, const G: usize> PartFilter for Course<M, G> {
     ) -> Option<Part> {
         let settles = M == G;
         let models = rest.models.iter().map(|block| {
-            let fading = if settles { model.settling(block.duration) } else { 1.0 };
+            let fading = if settles {
+                model.settling(block.duration)
+            } else {
+                1.0
+            };
             step_model::<M, G>(block, model, fading)
         });
         self.begin(models.collect());

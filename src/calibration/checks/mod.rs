@@ -13,6 +13,7 @@ pub mod recordings;
 pub mod residuals;
 pub mod rest_scatter;
 pub mod rounding;
+pub mod settling;
 pub mod term;
 pub mod unexplained;
 
@@ -39,6 +40,7 @@ pub fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
         .chain(unexplained::not_converged(outcome))
         .chain(latitude::earth_rate(outcome))
         .chain(outcome.events.iter().map(Event::finding))
+        .chain(settling::settles(problem, outcome))
         .chain(TermEvidence::findings(&outcome.terms))
         .chain(outcome.noise.finding(problem))
         .chain(rest_scatter::scatter_at_rest(problem, &estimate.triads))

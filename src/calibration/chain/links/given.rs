@@ -103,7 +103,9 @@ impl Given {
         }
         to.states.rows_mut(0, moving).copy_from(&states);
         to.constants.rows_mut(0, moving).copy_from(&constants);
-        to.offset.rows_mut(0, moving).copy_from(&part.offset.rows(0, moving));
+        to.offset
+            .rows_mut(0, moving)
+            .copy_from(&part.offset.rows(0, moving));
         let mut covariance = to.covariance.view_mut((0, 0), (moving, moving));
         covariance.copy_from(&part.covariance.view((0, 0), (moving, moving)));
     }
