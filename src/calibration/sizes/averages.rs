@@ -23,6 +23,8 @@ const SIZES: [(f64, f64); 7] = [
 ];
 /// The largest size over the usual one.
 pub const LARGEST: f64 = SIZES[6].0;
+/// Least variance of a prior: what is absent is so to a millionth of its usual size.
+const NOTHING: f64 = 1e-12;
 /// Prior probability that a group is absent.
 const ABSENT: f64 = 0.5;
 /// Most rounds over all groups.
@@ -170,10 +172,14 @@ impl Cases {
             .for_each(|of| *of = (*of - largest).exp());
         let sum: f64 = weights.iter().sum();
         weights.iter_mut().for_each(|of| *of /= sum);
-        let mut within = DVector::from_element(n, f64::EPSILON);
-        for (weight, variance) in weights.iter().zip(&variances) {
+        let mut within = DVector::zeros(n);
+        // 1 − known · variance, without the rounding of a difference.
+        let mut open = DVector::from_element(n, weights[0]);
+        for ((weight, variance), (size, _)) in weights.iter().zip(&variances).skip(1).zip(SIZES) {
             within.axpy(*weight, variance, 1.0);
+            open.axpy(weight * size.powi(-2), variance, 1.0);
         }
+        within.axpy(NOTHING, &open, 1.0);
         // Means are variances times what is told: within the cases, on average, so is the mean of all.
         let mut between = DMatrix::zeros(n, n);
         for (weight, variance) in weights.iter().zip(&variances) {
@@ -183,7 +189,7 @@ impl Cases {
             between.ger(*weight, &off, &off, 1.0);
         }
         let back = &turned.eigenvectors;
-        let precision = DMatrix::from_diagonal(&(within.map(f64::recip) - known));
+        let precision = DMatrix::from_diagonal(&open.component_div(&within));
         Self {
             absent: weights[0],
             precision: back * precision * back.transpose(),
