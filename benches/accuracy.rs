@@ -18,6 +18,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         scenario: Scenario::load("demo")?,
         form: InstallationForm::General,
         unmodelled: Vec::new(),
+        auto_terms: true,
         noise: Default::default(),
         runs: RUNS,
         seed: SEED,

@@ -158,6 +158,7 @@ fn study(runs: u64) -> AccuracyStudy {
         scenario: Scenario::load("demo").expect("embedded"),
         form: InstallationForm::General,
         unmodelled: Vec::new(),
+        auto_terms: true,
         noise: Default::default(),
         runs,
         seed: 1,

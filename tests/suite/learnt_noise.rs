@@ -12,9 +12,10 @@ use turncal_files::write_run;
 
 use crate::shared::{read, shared};
 
+/// Terms that a record hardly shows weigh single dwells.
 fn estimated(run: &Run, noise: NoisePolicy) -> Outcome {
-    let problem = Problem::new(run, &Options::default().noise(noise));
-    estimate(&problem, UNWATCHED).unwrap()
+    let options = Options::default().noise(noise).no_auto_terms();
+    estimate(&Problem::new(run, &options), UNWATCHED).unwrap()
 }
 
 /// Puts every field of one table into another, table by table.
@@ -30,11 +31,6 @@ fn put(into: &mut Table, from: Table) {
 #[test]
 #[ignore = "slow: several calibrations"]
 fn what_was_learnt_and_is_then_stated_gives_the_same_calibration() {
-    // Terms that the record hardly shows weigh single dwells.
-    let estimated = |run: &Run, noise: NoisePolicy| {
-        let options = Options::default().noise(noise).no_auto_terms();
-        estimate(&Problem::new(run, &options), UNWATCHED).unwrap()
-    };
     let directory = tempfile::tempdir().unwrap();
     let scenario = Scenario::load("mems").unwrap();
     let run = scenario.simulate(1, 0).unwrap().run;

@@ -283,6 +283,7 @@ fn a_study_comes_back_from_what_its_parts_say_of_it() {
             scenario,
             form: Default::default(),
             unmodelled: vec![turncal::calibration::ErrorTerm::TableBase],
+            auto_terms: true,
             noise: Default::default(),
             runs: u64::MAX,
             seed: u64::MAX,

@@ -115,6 +115,7 @@ impl Study {
             scenario,
             form: InstallationForm::default(),
             unmodelled,
+            auto_terms: true,
             noise: NoisePolicy::Stated,
             runs,
             seed,

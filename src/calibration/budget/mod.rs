@@ -79,45 +79,9 @@ impl Budget {
     /// [`CalibrationError`] if the problem is not the one of the outcome.
     pub fn new(problem: &Problem, outcome: &Outcome) -> Result<Self, CalibrationError> {
         let problem = &problem.with(|model| model.prior_sigma = outcome.model.prior_sigma);
-        let solved = &outcome.solved;
-        let (chain, effects) = (&solved.chain, &solved.effects);
-        let weighed = effects.weighed(chain, problem, &solved.script)?;
-        let mut by_source = BTreeMap::<BudgetSource, ParameterMatrix>::new();
-        let mut add = |source: BudgetSource, part: ParameterMatrix| {
-            *by_source.entry(source).or_default() += part;
-        };
-        let Weighed {
-            filtered,
-            prior,
-            known,
-            posterior,
-        } = &weighed;
-        // All but the candidates by what is known if these are, and the candidates by what they add.
-        let given = filtered.posterior_with(known, &Sites::certain(prior));
-        let given = given.as_ref().unwrap_or(posterior);
-        let constants = &posterior.constants;
-        for (source, part) in at_rest(problem, outcome, (filtered, given))? {
-            add(source, part);
-        }
-        for (effect, part) in filtered.parts(given) {
-            add(effect.in_budget(), of_parameters(constants, &part));
-        }
-        for (source, part) in prior.parts(given) {
-            add(source, of_parameters(constants, &part));
-        }
-        for (source, part) in of_candidates(&weighed, &effects.candidates) {
-            add(source, part);
-        }
-        let sum: ParameterMatrix = by_source.values().sum();
-        let rest = posterior.parameter_covariance - sum;
-        // What differences leave over belongs to the largest.
-        let trace = |part: &ParameterMatrix| relative(part, &posterior.parameter_covariance);
-        let largest = by_source.iter_mut();
-        let largest = largest.max_by(|a, b| trace(a.1).total_cmp(&trace(b.1)));
-        if let Some((_, part)) = largest {
-            *part += rest;
-        }
-        let bent = curvature(&outcome.estimate.triads, &posterior.parameter_covariance);
+        let by_source = of_chain(problem, outcome)?;
+        let linear = &outcome.solved.posterior.parameter_covariance;
+        let bent = curvature(&outcome.estimate.triads, linear);
         let [rounding, period] = beside(problem, &outcome.estimate);
         let parts = by_source.into_iter().chain([
             (BudgetSource::Curvature, bent),
@@ -163,6 +127,52 @@ impl Budget {
     pub fn coverage_factor(&self, parameter: usize) -> f64 {
         coverage_factor(self.degrees_of_freedom(parameter))
     }
+}
+
+/// Parts of the covariance of the chain by source.
+fn of_chain(
+    problem: &Problem,
+    outcome: &Outcome,
+) -> Result<BTreeMap<BudgetSource, ParameterMatrix>, CalibrationError> {
+    let solved = &outcome.solved;
+    let (chain, effects) = (&solved.chain, &solved.effects);
+    let weighed = effects.weighed(chain, problem, &solved.script)?;
+    let mut by_source = BTreeMap::<BudgetSource, ParameterMatrix>::new();
+    let mut add = |source: BudgetSource, part: ParameterMatrix| {
+        *by_source.entry(source).or_default() += part;
+    };
+    let Weighed {
+        filtered,
+        prior,
+        known,
+        posterior,
+    } = &weighed;
+    // All but the candidates by what is known if these are, and the candidates by what they add.
+    let given = filtered.posterior_with(known, &Sites::certain(prior));
+    let given = given.as_ref().unwrap_or(posterior);
+    let constants = &posterior.constants;
+    for (source, part) in at_rest(problem, outcome, (filtered, given))? {
+        add(source, part);
+    }
+    for (effect, part) in filtered.parts(given) {
+        add(effect.in_budget(), of_parameters(constants, &part));
+    }
+    for (source, part) in prior.parts(given) {
+        add(source, of_parameters(constants, &part));
+    }
+    for (source, part) in of_candidates(&weighed, &effects.candidates) {
+        add(source, part);
+    }
+    let sum: ParameterMatrix = by_source.values().sum();
+    let rest = posterior.parameter_covariance - sum;
+    // What differences leave over belongs to the largest.
+    let trace = |part: &ParameterMatrix| relative(part, &posterior.parameter_covariance);
+    let largest = by_source.iter_mut();
+    let largest = largest.max_by(|a, b| trace(a.1).total_cmp(&trace(b.1)));
+    if let Some((_, part)) = largest {
+        *part += rest;
+    }
+    Ok(by_source)
 }
 
 /// Parts of the sources at rest: their variance times the derivative of the covariance, `−C Λ′ C` with Λ′ that of the

@@ -18,7 +18,7 @@ use super::states::{ATTITUDE, NAVIGATION, POSITION, VELOCITY};
 use crate::calibration::record::Rest;
 use crate::calibration::{BudgetSource, Model, Observation, Stretch};
 use crate::navigation::Block;
-use course::{Course, StepModel};
+use course::{Course, Gain, StepModel};
 
 /// What a part of a dwell says.
 pub struct Part {
@@ -113,6 +113,52 @@ impl<const M: usize, const G: usize> PartFilter for Course<M, G> {
         model: &Model,
         seen: &mut dyn FnMut(Whitened),
     ) -> Option<Part> {
+        let mut events = self.start(rest, model);
+        let mut said = Said::<M, G>::nothing();
+        for step in &rest.steps {
+            said.refer(step.referred);
+            self.step(events, step.model);
+            events += 1;
+            said.mean = self.models[step.model].propagated(&said.mean);
+            for number in step.seen.clone() {
+                let observed = &rest.seen[number];
+                let first = match observed.kind {
+                    Observation::Velocity => VELOCITY,
+                    _ if M > NAVIGATION => NAVIGATION,
+                    Observation::Table | Observation::Attitude => ATTITUDE,
+                };
+                let variance =
+                    stretch.observation_variance(model, observed.kind, observed.readings);
+                let gain = self.observe(events, first, variance)?;
+                events += 1;
+                seen(Whitened {
+                    number,
+                    scalars: said.observe(gain, first, observed.residual)?,
+                    root: &gain.root,
+                    rows: gain.rows.as_flattened(),
+                });
+            }
+        }
+        let known = self.known(events);
+        let rows = factor(known.information, said.vector);
+        let (rows, values): (Vec<_>, Vec<_>) = rows.map(|(_, row, value)| (row, value)).unzip();
+        let values = DVector::from_vec(values);
+        Some(Part {
+            measured: matrix(&rows),
+            squares: said.squares - values.norm_squared(),
+            log_determinant: said.log_determinant,
+            values,
+            count: 3 * rest.seen.len(),
+            of_given: matrix(&known.of_given),
+            offset: DVector::from_column_slice(&said.mean),
+            covariance: matrix(&known.covariance),
+        })
+    }
+}
+
+impl<const M: usize, const G: usize> Course<M, G> {
+    /// Begins with a part; returns the number of events so far.
+    fn start(&mut self, rest: &Rest, model: &Model) -> usize {
         let settles = M == G;
         let models = rest.models.iter().map(|block| {
             let fading = if settles {
@@ -123,64 +169,58 @@ impl<const M: usize, const G: usize> PartFilter for Course<M, G> {
             step_model::<M, G>(block, model, fading)
         });
         self.begin(models.collect());
-        let turn = (M > NAVIGATION).then_some(NAVIGATION);
-        let (mut events, mut mean, mut vector) = (0, [0.0; M], [0.0; G]);
-        let (mut squares, mut log_determinant) = (0.0, 0.0);
         if settles {
-            self.widen(events, NAVIGATION, model.settling_variance());
-            events += 1;
+            self.widen(0, NAVIGATION, model.settling_variance());
         }
-        for step in &rest.steps {
-            let errors = [ATTITUDE, VELOCITY, POSITION].into_iter();
-            let turned = turn.map(|turn| (turn, step.referred[0]));
-            for (first, by) in errors.zip(step.referred).chain(turned) {
-                (0..3).for_each(|axis| mean[first + axis] += by[axis]);
-            }
-            self.step(events, step.model);
-            events += 1;
-            mean = self.models[step.model].propagated(&mean);
-            for number in step.seen.clone() {
-                let observed = &rest.seen[number];
-                let first = match observed.kind {
-                    Observation::Velocity => VELOCITY,
-                    Observation::Table | Observation::Attitude => turn.unwrap_or(ATTITUDE),
-                };
-                let variance =
-                    stretch.observation_variance(model, observed.kind, observed.readings);
-                let gain = self.observe(events, first, variance)?;
-                events += 1;
-                let expected = Vector3::new(mean[first], mean[first + 1], mean[first + 2]);
-                let scalars = gain
-                    .root
-                    .solve_lower_triangular(&(observed.residual - expected))?;
-                squares += scalars.norm_squared();
-                log_determinant += gain.log_determinant;
-                for axis in 0..3 {
-                    add(&mut mean, scalars[axis], &gain.of_errors[axis]);
-                    add(&mut vector, scalars[axis], &gain.rows[axis]);
-                }
-                seen(Whitened {
-                    number,
-                    scalars,
-                    root: &gain.root,
-                    rows: gain.rows.as_flattened(),
-                });
-            }
+        usize::from(settles)
+    }
+}
+
+/// What the observations of a part say so far.
+struct Said<const M: usize, const G: usize> {
+    /// Mean of the moving states, given `g = 0`.
+    mean: [f64; M],
+    /// Information on `g` times `g`.
+    vector: [f64; G],
+    squares: f64,
+    log_determinant: f64,
+}
+
+impl<const M: usize, const G: usize> Said<M, G> {
+    fn nothing() -> Self {
+        Self {
+            mean: [0.0; M],
+            vector: [0.0; G],
+            squares: 0.0,
+            log_determinant: 0.0,
         }
-        let known = self.known(events);
-        let rows = factor(known.information, vector);
-        let (rows, values): (Vec<_>, Vec<_>) = rows.map(|(_, row, value)| (row, value)).unzip();
-        let values = DVector::from_vec(values);
-        Some(Part {
-            measured: matrix(&rows),
-            squares: squares - values.norm_squared(),
-            log_determinant,
-            values,
-            count: 3 * rest.seen.len(),
-            of_given: matrix(&known.of_given),
-            offset: DVector::from_column_slice(&mean),
-            covariance: matrix(&known.covariance),
-        })
+    }
+
+    /// Refers the errors of attitude, velocity and position to others.
+    fn refer(&mut self, by: [Vector3<f64>; 3]) {
+        let errors = [ATTITUDE, VELOCITY, POSITION].into_iter().zip(by);
+        let observed = (M > NAVIGATION).then_some((NAVIGATION, by[0]));
+        for (first, by) in errors.chain(observed) {
+            (0..3).for_each(|axis| self.mean[first + axis] += by[axis]);
+        }
+    }
+
+    /// Adds an observation of the states from a first one on; returns it whitened.
+    fn observe(
+        &mut self,
+        gain: &Gain<M, G>,
+        first: usize,
+        residual: Vector3<f64>,
+    ) -> Option<Vector3<f64>> {
+        let expected = Vector3::from_fn(|axis, _| self.mean[first + axis]);
+        let scalars = gain.root.solve_lower_triangular(&(residual - expected))?;
+        self.squares += scalars.norm_squared();
+        self.log_determinant += gain.log_determinant;
+        for axis in 0..3 {
+            add(&mut self.mean, scalars[axis], &gain.of_errors[axis]);
+            add(&mut self.vector, scalars[axis], &gain.rows[axis]);
+        }
+        Some(scalars)
     }
 }
 

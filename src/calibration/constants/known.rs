@@ -137,25 +137,22 @@ impl Known {
         if !solved {
             return None;
         }
-        let across = &by_candidates * &of_candidates;
-        let covariance = &of_known * of_known.transpose() + &across * by_candidates.transpose();
-        let known = known.column(0) + &by_candidates * &candidates;
+        let mut by = DMatrix::zeros(n, m);
+        by.rows_mut(0, k).copy_from(&by_candidates);
+        by.rows_mut(k, m).fill_with_identity();
+        let mut values = &by * &candidates;
+        let mut first = values.rows_mut(0, k);
+        first += known.column(0);
+        let mut covariance = &by * of_candidates * by.transpose();
+        let mut first = covariance.view_mut((0, 0), (k, k));
+        first += &of_known * of_known.transpose();
         let all = self.prior.sigma.len();
         let mut mean = self.prior.mean.clone();
         let mut full = DMatrix::zeros(all, all);
         for (row, &i) in self.open.iter().enumerate() {
-            mean[i] = if row < k {
-                known[row]
-            } else {
-                candidates[row - k]
-            };
+            mean[i] = values[row];
             for (column, &j) in self.open.iter().enumerate() {
-                full[(i, j)] = match (row < k, column < k) {
-                    (true, true) => covariance[(row, column)],
-                    (true, false) => across[(row, column - k)],
-                    (false, true) => across[(column, row - k)],
-                    (false, false) => of_candidates[(row - k, column - k)],
-                };
+                full[(i, j)] = covariance[(row, column)];
             }
         }
         let squares = self.root.view((k, n), (m + 1, 1)).norm_squared();

@@ -15,6 +15,8 @@ pub struct AccuracyStudy {
     pub form: InstallationForm,
     /// Error terms of the truth that the filter does not model.
     pub unmodelled: Vec<ErrorTerm>,
+    /// Whether the filter averages over error terms that may be there.
+    pub auto_terms: bool,
     /// Noise policy of the filter.
     pub noise: NoisePolicy,
     /// Number of runs.

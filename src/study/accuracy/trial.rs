@@ -79,7 +79,7 @@ impl AccuracyStudy {
             .aiding(aiding)
             .noise(self.noise);
         // Terms that are left unmodelled on purpose must not be switched on automatically.
-        options.auto_terms = self.unmodelled.is_empty();
+        options.auto_terms = self.auto_terms && self.unmodelled.is_empty();
         let mut problem = Problem::new(&record, &options);
         let form = self.bound_form(&truth);
         let attainable = PerSensor::from_fn(|sensor| truth.get(sensor).in_form(form));

@@ -3,8 +3,6 @@
 use crate::arguments::{AIDINGS, FORMS, NOISE, one_of};
 use std::path::Path;
 
-use clap::error::ErrorKind;
-
 use super::carry_out::carry_out;
 use crate::arguments::{
     Delivery, Sharding, With, at_least_two, error_term, needs_table, seed, with_value,
@@ -49,8 +47,7 @@ pub struct Accuracy {
     /// Installation of the simulated instruments: a TOML file or an embedded name [default: from the scenario]
     #[arg(long, value_name = "MODEL")]
     truth_installation: Option<String>,
-    /// Error terms to simulate and to estimate, in addition to those of the scenario; auto: no further terms
-    /// [default: auto]
+    /// Error terms to simulate and to estimate, in addition to those of the scenario [default: auto]
     #[arg(long, value_name = "TERM", value_parser = with_value(), value_delimiter = ',')]
     with: Vec<With>,
     /// Error terms to simulate but not to estimate
@@ -74,11 +71,6 @@ pub struct Accuracy {
 impl Accuracy {
     pub fn run(&self) -> anyhow::Result<()> {
         With::check(&self.with);
-        if self.with.contains(&With::None) {
-            let message = "--with none does not apply to a study, which estimates the terms that it simulates; omit \
-                --with, or name terms with --with\n";
-            clap::Error::raw(ErrorKind::ArgumentConflict, message).exit();
-        }
         let mut scenario = Scenario::load(&self.scenario)?;
         scenario.body_frame = self.aiding.body_frame();
         if let Some(path) = &self.path {
@@ -93,6 +85,7 @@ impl Accuracy {
         }
         let study = AccuracyStudy {
             unmodelled: self.unmodelled.clone(),
+            auto_terms: !self.with.contains(&With::None),
             form: self.installation,
             noise: self.noise,
             runs: self.runs,

@@ -23,6 +23,7 @@ fn small() -> Accuracy {
             scenario,
             form,
             unmodelled: Vec::new(),
+            auto_terms: true,
             noise: Default::default(),
             runs,
             seed,
