@@ -168,10 +168,6 @@ fn wrong_usage_is_status_two_and_says_what_to_do() {
             "--with none and --with time-offset exclude each other; write --with none alone",
         ),
         (&auto, "--with auto and --with none exclude each other"),
-        (
-            &["study", "accuracy", "--with", "none"],
-            "omit --with, or name terms",
-        ),
         (&velocity, "--aiding velocity does not use the table"),
         (&study, "omit one of them"),
         (&["calibrate", here], "this is a directory; give"),
