@@ -255,7 +255,7 @@ fn merged<S: Makes<Trial: DeserializeOwned>>(
             .map_err(|error: turncal::study::ShardError| error.to_string())?;
         let made: Vec<S::Trial> =
             rmp_serde::from_slice(bytes).map_err(|error| error.to_string())?;
-        all.extend(shard.runs(study.runs()).into_iter().zip(made));
+        all.extend(shard.runs(study.runs()).zip(made));
     }
     all.sort_by_key(|(run, _)| *run);
     let trials = all.into_iter().map(|(_, trial)| trial).collect();
