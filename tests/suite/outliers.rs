@@ -117,8 +117,8 @@ fn a_table_that_settles_after_each_stop_costs_no_accuracy() {
             .find(|of| of.source == Source::Settling);
         let found = settles.unwrap().used;
         println!("{size}″: {found}″ found");
-        // About each of two axes across and one along a random direction.
-        assert!((0.3..1.2).contains(&(found / size)), "{size}″: {found}″");
+        // Of a turn about a random direction, each axis has 1/√3 (RMS); found to a factor of two.
+        assert!((0.29..1.15).contains(&(found / size)), "{size}″: {found}″");
         let is_named = outcome.findings.iter().any(|of| of.code == "W15");
         assert!(is_named, "{size}″");
     }

@@ -117,13 +117,7 @@ impl Known {
         let own = self.of_candidates();
         let information = own.matrix + &sites.information.matrix;
         let vector = own.vector + &sites.information.vector;
-        // With a diagonal of ones, whatever the units.
-        let scale = information.diagonal().map(|value| value.sqrt().recip());
-        let scaled = DMatrix::from_fn(m, m, |i, j| information[(i, j)] * scale[i] * scale[j]);
-        let factor = Cholesky::new(scaled)?;
-        let logarithms = factor.l_dirty().diagonal().map(f64::ln).sum() - scale.map(f64::ln).sum();
-        let inverse = factor.inverse();
-        let of_candidates = DMatrix::from_fn(m, m, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
+        let (of_candidates, log_determinant) = inverse(&information)?;
         let candidates = &of_candidates * &vector;
         let between = &of_candidates * &sites.between * &of_candidates;
         let of_candidates = of_candidates + between;
@@ -168,7 +162,7 @@ impl Known {
             mean,
             full,
             squares - vector.dot(&candidates),
-            2.0 * (of_root + logarithms + of_prior),
+            2.0 * (of_root + of_prior) + log_determinant,
         ))
     }
 
@@ -224,6 +218,19 @@ impl Sites {
     pub fn within(self) -> Self {
         Self::of(self.information)
     }
+}
+
+/// Inverse of a positive-definite matrix, whatever the units of its components, and the logarithm of its determinant.
+pub fn inverse(matrix: &DMatrix<f64>) -> Option<(DMatrix<f64>, f64)> {
+    let n = matrix.nrows();
+    // With a diagonal of ones.
+    let scale = matrix.diagonal().map(|value| value.sqrt().recip());
+    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    let root = Cholesky::new(scaled)?;
+    let logarithms = root.l_dirty().diagonal().map(f64::ln).sum() - scale.map(f64::ln).sum();
+    let inverse = root.inverse();
+    let inverse = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
+    Some((inverse, 2.0 * logarithms))
 }
 
 /// The upper-triangular R with `RᵀR = AᵀA`, A consisting of these rows, by Householder reflections.

@@ -9,7 +9,7 @@ mod prior;
 use crate::calibration::Coefficient;
 pub use candidate::Candidate;
 pub use constant::Constant;
-pub use known::{Information, Known, Sites, triangle};
+pub use known::{Information, Known, Sites, inverse, triangle};
 pub use posterior::{Posterior, of_parameters};
 pub use prior::Prior;
 

@@ -8,7 +8,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use crate::calibration::constants::Information;
+use crate::calibration::constants::{Information, inverse};
 
 /// Sizes over the usual one: every half power of three to the factor 3^(3/2), with weights of a triangle over their
 /// logarithms.
@@ -91,12 +91,7 @@ impl Average {
 
     /// Mean and covariance of all.
     fn moments(&self, data: &Information) -> Option<Moments> {
-        let information = &data.matrix + &self.precision;
-        let scale = information.diagonal().map(|value| value.sqrt().recip());
-        let n = scale.len();
-        let scaled = DMatrix::from_fn(n, n, |i, j| information[(i, j)] * scale[i] * scale[j]);
-        let inverse = Cholesky::new(scaled)?.inverse();
-        let covariance = DMatrix::from_fn(n, n, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
+        let (covariance, _) = inverse(&(&data.matrix + &self.precision))?;
         Some(Moments {
             mean: &covariance * &data.vector,
             covariance,
@@ -154,14 +149,14 @@ impl Cases {
         let n = others.vector.len();
         // Along the directions that the others determine independently.
         let turned = others.matrix.clone().symmetric_eigen();
-        let told = turned.eigenvectors.tr_mul(&others.vector);
+        let said = turned.eigenvectors.tr_mul(&others.vector);
         let known = turned.eigenvalues.map(|value| value.max(0.0));
         let mut weights = vec![ABSENT.ln()];
         let mut variances = vec![DVector::zeros(n)];
         for (size, weight) in SIZES {
             let variance = known.map(|known| (known + size.powi(-2)).recip());
             let likelihood: f64 = (0..n)
-                .map(|k| variance[k] * told[k].powi(2) - (1.0 + size.powi(2) * known[k]).ln())
+                .map(|k| variance[k] * said[k].powi(2) - (1.0 + size.powi(2) * known[k]).ln())
                 .sum();
             weights.push(((1.0 - ABSENT) * weight).ln() + 0.5 * likelihood);
             variances.push(variance);
@@ -180,11 +175,11 @@ impl Cases {
             open.axpy(weight * size.powi(-2), variance, 1.0);
         }
         within.axpy(NOTHING, &open, 1.0);
-        // Means are variances times what is told: within the cases, on average, so is the mean of all.
+        // The mean of a case is its variance times what the others say; so the mean of all is that of the mean variance.
         let mut between = DMatrix::zeros(n, n);
         for (weight, variance) in weights.iter().zip(&variances) {
             let off = (variance - &within)
-                .component_mul(&told)
+                .component_mul(&said)
                 .component_div(&within);
             between.ger(*weight, &off, &off, 1.0);
         }

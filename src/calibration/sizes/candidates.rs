@@ -54,7 +54,7 @@ impl Candidates {
             .zip(self.places.iter().map(Vec::as_slice))
     }
 
-    /// Normal factors in place of their prior, as errors of the linearisation point of this one.
+    /// Normal priors that stand for the average, of errors of the linearisation point of this prior.
     pub fn sites(&self, prior: &Prior) -> Sites {
         let (usual, at) = usual_and_values(prior);
         let inverse = DMatrix::from_diagonal(&usual.map(f64::recip));
@@ -73,7 +73,8 @@ impl Candidates {
         self.average = begun(&self.all, &self.places);
     }
 
-    /// Averages over all cases, given what is known of the constants; returns the largest change of a probability.
+    /// Averages over all cases, given what is known of the constants; returns the largest change of a probability, which is
+    /// infinite if there is no average.
     pub fn weigh(&mut self, known: &Known, prior: &Prior) -> f64 {
         if self.all.is_empty() {
             return 0.0;
@@ -87,7 +88,7 @@ impl Candidates {
         };
         let found = begun(&self.all, &self.places).given(&data, &self.places);
         let Some(found) = found else {
-            return 0.0;
+            return f64::INFINITY;
         };
         let pairs = found.absent.iter().zip(&self.average.absent);
         let change = pairs.map(|(now, before)| (now - before).abs());
