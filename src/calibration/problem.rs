@@ -249,6 +249,15 @@ impl<'a> Problem<'a> {
         there.map(|(kind, _)| kind)
     }
 
+    /// The kinds of observation in which remainders of pulses are.
+    pub(in crate::calibration) fn with_pulses(&self) -> Vec<Observation> {
+        let any = |kind: &Observation| {
+            self.runs()
+                .any(|run| *run.recording.imu.pulse.get(kind.sensor()) > 0.0)
+        };
+        Observation::ALL.into_iter().filter(any).collect()
+    }
+
     /// Whether gravity is the same in all recordings.
     pub(in crate::calibration) fn one_gravity(&self) -> bool {
         self.runs().all(|run| run.site == self.run.site)
@@ -281,10 +290,7 @@ impl<'a> Stretch<'a> {
     /// Variance of an observation per axis, rad² or m²/s², including pulses; for a table attitude, that of the mean of
     /// this many readings.
     pub fn observation_variance(&self, model: &Model, kind: Observation, readings: usize) -> f64 {
-        let sensor = match kind {
-            Observation::Velocity => Sensor::Accel,
-            Observation::Table | Observation::Attitude => Sensor::Gyro,
-        };
+        let sensor = kind.sensor();
         let own = match kind {
             Observation::Table => {
                 let reading = model.reading_sigma.powi(2);

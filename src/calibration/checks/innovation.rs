@@ -5,6 +5,7 @@ use serde_json::json;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::calibration::{Finding, FindingKind as Kind};
+use crate::imu::Sensor;
 use crate::statistics::FALSE_ALARM;
 
 /// Kind of observation.
@@ -29,6 +30,14 @@ impl Observation {
             Self::Velocity => "velocity",
             Self::Table => "table attitude",
             Self::Attitude => "attitude at standstill",
+        }
+    }
+
+    /// The triad whose integral is observed.
+    pub fn sensor(self) -> Sensor {
+        match self {
+            Self::Velocity => Sensor::Accel,
+            Self::Table | Self::Attitude => Sensor::Gyro,
         }
     }
 }
@@ -127,8 +136,9 @@ fn over_dwells(innovations: &[&Innovation]) -> Vec<f64> {
     summed.collect()
 }
 
-/// The finding on innovations that do not agree with their covariance, if any.
-pub fn inconsistent(innovations: &[Innovation]) -> Option<Finding> {
+/// The finding on innovations that do not agree with their covariance, if any. `pulses`: the kinds of observation in
+/// which remainders of pulses are.
+pub fn inconsistent(innovations: &[Innovation], pulses: &[Observation]) -> Option<Finding> {
     let of = |kind| innovations.iter().filter(move |i| i.observation == kind);
     let kinds = Observation::ALL.map(|kind| (kind, of(kind).collect::<Vec<_>>()));
     let kinds = kinds.iter().filter(|(_, of_kind)| !of_kind.is_empty());
@@ -140,8 +150,10 @@ pub fn inconsistent(innovations: &[Innovation]) -> Option<Finding> {
             let count = squares.len();
             let nis = squares.iter().sum::<f64>() / count as f64;
             // The distance of the IMU from the table's centre is stated by a bound, which makes the velocity after
-            // a move uncertain: smaller innovations do not contradict the model.
-            let one_sided = (look, *observation) == (AFTER_MOVES, Observation::Velocity);
+            // a move uncertain, and a pulse bounds its remainder, which may hardly vary: smaller innovations do not
+            // contradict the model.
+            let one_sided = (look, *observation) == (AFTER_MOVES, Observation::Velocity)
+                || pulses.contains(observation);
             let (low, high) = if one_sided {
                 (0.0, mean_square_interval(count, 2.0 * chance).1)
             } else {
@@ -240,11 +252,13 @@ mod tests {
             let dwells = (0..20).flat_map(|k| dwell.map(|whitened| of_dwell(k, whitened)));
             dwells.collect()
         };
-        assert_eq!(inconsistent(&of(Observation::Velocity)), None);
-        let found = inconsistent(&of(Observation::Table)).unwrap();
+        assert_eq!(inconsistent(&of(Observation::Velocity), &[]), None);
+        let found = inconsistent(&of(Observation::Table), &[]).unwrap();
         let looks = found.figures["looks"].as_array().unwrap();
         assert_eq!(looks.len(), 1, "{found:?}");
         assert_eq!(looks[0]["look"], AFTER_MOVES);
+        let pulses = [Observation::Table];
+        assert_eq!(inconsistent(&of(Observation::Table), &pulses), None);
     }
 
     #[test]

@@ -49,7 +49,10 @@ pub fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
         .chain(observability::not_observed_by_path(outcome))
         .chain(form)
         .chain(unexplained)
-        .chain(innovation::inconsistent(innovations))
+        .chain(innovation::inconsistent(
+            innovations,
+            &problem.with_pulses(),
+        ))
         .chain(recordings::recordings_differ(&outcome.differences))
         .collect()
 }

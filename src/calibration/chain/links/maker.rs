@@ -274,6 +274,11 @@ impl<'a> Maker<'a> {
         let still = [0.0; 3];
         if let Some(turn) = states.turn() {
             self.pending.reset(turn..turn + 3, &still);
+            // The rotation counts from an attitude that lacks the remainder of its pulses.
+            let remainder = stretch.run.recording.imu.pulse.gyro / 12f64.sqrt();
+            let root = DMatrix::from_diagonal_element(3, 3, remainder);
+            let effect = Effect::Stated(BudgetSource::Pulses);
+            self.pending.drive(effect, self.dwell - 1, turn, &root);
         }
         if rest.new_position {
             if let Some(table) = states.table {
