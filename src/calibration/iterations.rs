@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::attitude::from_tilt_and_heading;
 use crate::calibration::chain::states::ATTITUDE;
-use crate::calibration::chain::{Chain, Filtered};
+use crate::calibration::chain::Filtered;
 use crate::calibration::linearisation::not_invertible;
 use crate::calibration::passes::tell;
 use crate::calibration::sizes::{Effects, Stage, Weighed};
@@ -26,9 +26,10 @@ const MOST_SHORTENED: usize = 10;
 /// A problem whose iterations have ended.
 #[derive(Debug, Clone)]
 pub struct Solved {
-    /// Events at the last linearisation point, and the chain made of them.
+    /// Events at the last linearisation point.
     pub script: Arc<Script>,
-    pub chain: Arc<Chain>,
+    /// Number of scalars that were observed.
+    pub observations: usize,
     pub effects: Effects,
     pub posterior: Posterior,
     /// Parameters and attitudes after the last pass.
@@ -76,7 +77,7 @@ pub fn solve(
         let pass = Pass {
             largest_step: largest(&solved.posterior),
             cost: solved.posterior.cost,
-            observations: solved.chain.observations,
+            observations: solved.observations,
         };
         tell(progress, &pass)?;
         passes.push(pass);
@@ -120,7 +121,7 @@ fn one_pass(
         passes: Vec::new(),
         converged: false,
         script: Arc::new(script),
-        chain: Arc::new(chain),
+        observations: chain.observations,
     })
 }
 

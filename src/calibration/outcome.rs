@@ -106,7 +106,7 @@ impl Outcome {
             return Err(CalibrationError::Singular { sensor });
         }
         let (script, effects) = (solved.script.clone(), &solved.effects);
-        let chain = solved.chain.clone();
+        let chain = effects.chain(problem, &script)?;
         let weighed = effects.weighed(&chain, problem, &script)?;
         let Weighed {
             filtered,

@@ -135,8 +135,9 @@ fn of_chain(
     outcome: &Outcome,
 ) -> Result<BTreeMap<BudgetSource, ParameterMatrix>, CalibrationError> {
     let solved = &outcome.solved;
-    let (chain, effects) = (&solved.chain, &solved.effects);
-    let weighed = effects.weighed(chain, problem, &solved.script)?;
+    let effects = &solved.effects;
+    let chain = effects.chain(problem, &solved.script)?;
+    let weighed = effects.weighed(&chain, problem, &solved.script)?;
     let mut by_source = BTreeMap::<BudgetSource, ParameterMatrix>::new();
     let mut add = |source: BudgetSource, part: ParameterMatrix| {
         *by_source.entry(source).or_default() += part;
@@ -189,8 +190,7 @@ fn at_rest(
     let covariance = &posterior.covariance;
     let part = |&source: &BudgetSource| {
         let varied = problem.with(|model| model.varied = Some((source, 1.0 + STEP)));
-        let chain = effects.chain(&varied, script)?;
-        let there = chain.filter(&filtered.sizes)?.information();
+        let there = effects.information(&varied, script, &filtered.sizes)?;
         let part = covariance * ((&here - there) / STEP) * covariance;
         Ok((source, of_parameters(&posterior.constants, &part)))
     };

@@ -24,6 +24,15 @@ pub struct Passed {
     pub innovations: DVector<f64>,
 }
 
+/// The filter after a link: mean given zero constants, effect of the constants, and covariance of the states.
+pub struct Forward {
+    mean: DVector<f64>,
+    by_constants: DMatrix<f64>,
+    covariance: DMatrix<f64>,
+    /// Logarithm of the determinant of the covariance of all innovations.
+    log_determinant: f64,
+}
+
 /// A chain after the filter has passed it.
 pub struct Filtered<'a> {
     pub chain: &'a Chain,
@@ -38,37 +47,50 @@ impl Chain {
     /// # Errors
     /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
     pub fn filter(&self, sizes: &Sizes) -> Result<Filtered<'_>, CalibrationError> {
-        let (n, c) = (self.states.count, self.constants.len());
-        let mut mean = DVector::zeros(n);
-        let mut by_constants = DMatrix::zeros(n, c);
-        let mut covariance = DMatrix::zeros(n, n);
-        let mut log_determinant = self.log_determinant;
-        let mut passed = Vec::with_capacity(self.links.len());
-        for link in &self.links {
-            let transition = &link.transition;
-            mean = &transition.states * mean + &transition.offset;
-            by_constants = &transition.states * by_constants + &transition.constants;
-            covariance = &transition.states * covariance * transition.states.transpose()
-                + &transition.covariance;
-            for drive in &transition.drives {
-                let factor = sizes.of(drive.effect, drive.event);
-                covariance.gemm(factor, &drive.by, &drive.by.transpose(), 1.0);
-            }
-            let seen = Passed::new(link, mean, by_constants, covariance)
-                .ok_or(CalibrationError::Diverged { time: link.time })?;
-            log_determinant += seen.1;
-            let seen = seen.0;
-            mean = &seen.mean + seen.across.tr_mul(&seen.innovations);
-            by_constants = &seen.by_constants - seen.across.tr_mul(&seen.of_constants);
-            covariance = &seen.covariance - seen.across.tr_mul(&seen.across);
-            passed.push(seen);
-        }
+        let mut forward = Forward::new(self.states.count, self.constants.len());
+        let passed = self.links.iter().map(|link| forward.pass(link, sizes));
+        let passed = passed.collect::<Result<_, _>>()?;
         Ok(Filtered {
             chain: self,
             sizes: sizes.clone(),
             passed,
-            log_determinant,
+            log_determinant: self.log_determinant + forward.log_determinant,
         })
+    }
+}
+
+impl Forward {
+    /// Before the first link.
+    pub fn new(states: usize, constants: usize) -> Self {
+        Self {
+            mean: DVector::zeros(states),
+            by_constants: DMatrix::zeros(states, constants),
+            covariance: DMatrix::zeros(states, states),
+            log_determinant: 0.0,
+        }
+    }
+
+    /// Through a link.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
+    pub fn pass(&mut self, link: &Link, sizes: &Sizes) -> Result<Passed, CalibrationError> {
+        let transition = &link.transition;
+        let mean = &transition.states * &self.mean + &transition.offset;
+        let by_constants = &transition.states * &self.by_constants + &transition.constants;
+        let mut covariance = &transition.states * &self.covariance * transition.states.transpose()
+            + &transition.covariance;
+        for drive in &transition.drives {
+            let factor = sizes.of(drive.effect, drive.event);
+            covariance.gemm(factor, &drive.by, &drive.by.transpose(), 1.0);
+        }
+        let (seen, log_determinant) = Passed::new(link, mean, by_constants, covariance)
+            .ok_or(CalibrationError::Diverged { time: link.time })?;
+        self.log_determinant += log_determinant;
+        self.mean = &seen.mean + seen.across.tr_mul(&seen.innovations);
+        self.by_constants = &seen.by_constants - seen.across.tr_mul(&seen.of_constants);
+        self.covariance = &seen.covariance - seen.across.tr_mul(&seen.across);
+        Ok(seen)
     }
 }
 

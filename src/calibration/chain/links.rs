@@ -6,7 +6,10 @@ mod maker;
 mod rows;
 mod transition;
 
-use super::effects::Dispersion;
+use nalgebra::DMatrix;
+
+use super::effects::{Dispersion, Sizes};
+use super::forward::Forward;
 use super::states::States;
 use crate::calibration::{CalibrationError, Constant, Problem, Script};
 pub use link::Link;
@@ -31,13 +34,12 @@ pub struct Chain {
 
 impl Chain {
     /// The same without the rows of some dwells, given by number.
-    pub fn observed_in(&self, used: impl Fn(usize) -> bool) -> Self {
-        let mut part = self.clone();
+    pub fn observed_in(mut self, used: impl Fn(usize) -> bool) -> Self {
         let (n, c) = (self.states.count, self.constants.len());
-        for link in part.links.iter_mut().filter(|link| !used(link.dwell)) {
+        for link in self.links.iter_mut().filter(|link| !used(link.dwell)) {
             link.rows = Rows::none(n, c);
         }
-        part
+        self
     }
 
     /// The links of a problem, from its events at one linearisation point, with this dispersion of the dwells.
@@ -49,22 +51,57 @@ impl Chain {
         script: &Script,
         dispersion: &Dispersion,
     ) -> Result<Self, CalibrationError> {
+        let mut links = Vec::new();
+        let chain = Self::each(problem, script, dispersion, |link| {
+            links.push(link);
+            Ok(())
+        })?;
+        Ok(Self { links, ..chain })
+    }
+
+    /// What a filter with these sizes learns of the constants, from links that are not kept.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Diverged`] if a part cannot be reduced, or a covariance is not positive definite.
+    pub fn information(
+        problem: &Problem,
+        script: &Script,
+        (dispersion, sizes): (&Dispersion, &Sizes),
+    ) -> Result<DMatrix<f64>, CalibrationError> {
+        let states = States::new(&problem.model, problem.one_gravity());
+        let count = Constant::all(&problem.model, problem.one_gravity()).len();
+        let mut forward = Forward::new(states.count, count);
+        let mut information = DMatrix::zeros(count, count);
+        Self::each(problem, script, dispersion, |link| {
+            let seen = forward.pass(&link, sizes)?.of_constants;
+            information.gemm_tr(1.0, &seen, &seen, 1.0);
+            Ok(())
+        })?;
+        Ok(information)
+    }
+
+    /// A chain whose links are taken one by one.
+    fn each(
+        problem: &Problem,
+        script: &Script,
+        dispersion: &Dispersion,
+        take: impl FnMut(Link) -> Result<(), CalibrationError>,
+    ) -> Result<Self, CalibrationError> {
         let one_gravity = problem.one_gravity();
         let states = States::new(&problem.model, one_gravity);
         let constants = Constant::all(&problem.model, one_gravity);
-        let mut maker = Maker::new((problem, dispersion), &states, &constants);
+        let mut maker = Maker::new((problem, dispersion), &states, &constants, take);
         for number in 0..problem.stretches().len() {
             maker.stretch(script, number)?;
         }
         let Maker {
-            links,
             squares,
             log_determinant,
             observations,
             ..
         } = maker;
         Ok(Self {
-            links,
+            links: Vec::new(),
             observations,
             slip: problem.slip(),
             squares,

@@ -127,15 +127,15 @@ impl Outcome {
     pub fn quality(&self, problem: &Problem) -> Result<Quality, CalibrationError> {
         let Solved {
             script,
-            chain,
             effects,
             estimate,
             ..
         } = &*self.solved;
         let enough = every_other(problem).is_some();
-        let half = enough.then(|| chain.observed_in(|dwell| dwell % 2 == 0));
         // Half the dwells may be too few.
-        let half = half.and_then(|half| {
+        let half = enough.then_some(()).and_then(|()| {
+            let chain = effects.chain(problem, script).ok()?;
+            let half = chain.observed_in(|dwell| dwell % 2 == 0);
             let of_half = effects.weighed_anew(&half, problem, script).ok()?;
             let moved = of_half.filtered.moved(&script.at, &of_half.posterior);
             Some(moved)

@@ -7,7 +7,7 @@ mod descent;
 mod likeliest;
 mod usual;
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use crate::calibration::chain::{Chain, Dispersion, Effect, Filtered, Sizes, Slip};
 use crate::calibration::checks::recordings::RecordingDifference;
@@ -194,6 +194,20 @@ impl Effects {
     pub fn chain(&self, problem: &Problem, script: &Script) -> Result<Chain, CalibrationError> {
         let made = problem.with(|model| self.set(model, |_| 0.0));
         Chain::new(&made, script, &self.dispersion)
+    }
+
+    /// What a filter with these sizes between dwells learns of the constants.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Diverged`] if a part cannot be reduced, or a covariance is not positive definite.
+    pub fn information(
+        &self,
+        problem: &Problem,
+        script: &Script,
+        sizes: &Sizes,
+    ) -> Result<DMatrix<f64>, CalibrationError> {
+        let made = problem.with(|model| self.set(model, |_| 0.0));
+        Chain::information(&made, script, (&self.dispersion, sizes))
     }
 
     /// What a chain says of the constants.

@@ -23,14 +23,14 @@ use crate::navigation::{Block, ErrorMatrix, ProcessNoise};
 const SLIP: f64 = 0.1;
 
 /// Makes links one after the other.
-pub struct Maker<'a> {
+pub struct Maker<'a, F> {
     problem: &'a Problem<'a>,
     filters: [Box<dyn PartFilter>; 2],
     dispersion: &'a Dispersion,
     dynamics: Dynamics<'a>,
     /// What happened since the last rows.
     pending: Transition,
-    pub links: Vec<Link>,
+    take: F,
     pub squares: f64,
     pub log_determinant: f64,
     pub observations: usize,
@@ -38,12 +38,13 @@ pub struct Maker<'a> {
     dwell: usize,
 }
 
-impl<'a> Maker<'a> {
-    /// Before the first stretch.
+impl<'a, F: FnMut(Link) -> Result<(), CalibrationError>> Maker<'a, F> {
+    /// Before the first stretch; `take` gets each link.
     pub fn new(
         (problem, dispersion): (&'a Problem<'a>, &'a Dispersion),
         states: &'a States,
         constants: &'a [Constant],
+        take: F,
     ) -> Self {
         Self {
             problem,
@@ -55,7 +56,7 @@ impl<'a> Maker<'a> {
                 turned: None,
             },
             pending: Transition::identity(states.count, constants.len()),
-            links: Vec::new(),
+            take,
             squares: 0.0,
             log_determinant: 0.0,
             observations: 0,
@@ -226,7 +227,7 @@ impl<'a> Maker<'a> {
             return Err(diverged());
         }
         given.end(&part, self.dynamics.states.moving, &mut self.pending);
-        self.links.push(Link {
+        let link = Link {
             begins,
             recording: stretch.recording,
             dwell: self.dwell - 1,
@@ -235,7 +236,8 @@ impl<'a> Maker<'a> {
             transition: pending,
             rows,
             given,
-        });
+        };
+        (self.take)(link)?;
         let duration = rest
             .steps
             .iter()

@@ -212,8 +212,10 @@ fn stands_out(
     for attitude in &mut attitudes[changed] {
         *attitude = quaternion(&change(&matrix(attitude)));
     }
-    let found = estimated(&Problem::new(&run, &options));
-    let sizes = found.effects.sizes(&found.chain);
+    let problem = Problem::new(&run, &options);
+    let found = estimated(&problem);
+    let chain = found.effects.chain(&problem, &found.script).unwrap();
+    let sizes = found.effects.sizes(&chain);
     let standing_out = sizes.events().filter(|&(_, factor)| factor > 30.0);
     let standing_out: Vec<_> = standing_out.collect();
     let is_it = |of: &((Effect, usize), f64)| of.0 == (named, dwell);
