@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use crate::attitude::from_tilt_and_heading;
-use crate::calibration::chain::states::ATTITUDE;
 use crate::calibration::chain::Filtered;
+use crate::calibration::chain::states::ATTITUDE;
 use crate::calibration::linearisation::not_invertible;
 use crate::calibration::passes::tell;
 use crate::calibration::sizes::{Effects, Stage, Weighed};
@@ -154,11 +154,11 @@ impl Filtered<'_> {
                 _ => {}
             }
         }
-        for (link, states) in self.states(posterior, |link| link.attitude.is_some()) {
+        for (link, mean) in self.means(posterior, |link| link.attitude.is_some()) {
             let Some(computed) = link.attitude else {
                 continue;
             };
-            let error = states.mean.fixed_rows::<3>(ATTITUDE).into_owned();
+            let error = mean.fixed_rows::<3>(ATTITUDE).into_owned();
             let attitude = from_tilt_and_heading(&error) * computed;
             if link.begins {
                 moved.initial_attitudes.push(attitude);
@@ -168,7 +168,7 @@ impl Filtered<'_> {
                 moved.own.push(at.own(moved.own.len()));
                 let recording = moved.own.len() - 1;
                 for &(state, of) in &self.layout().own {
-                    *moved.own[recording].get_mut(of) += states.mean[state];
+                    *moved.own[recording].get_mut(of) += mean[state];
                 }
             }
         }

@@ -146,11 +146,33 @@ impl Filtered<'_> {
         posterior: &Posterior,
         wanted: impl Fn(&Link) -> bool,
     ) -> Vec<(&'a Link, SmoothedStates)> {
+        self.of_states(wanted, |passed, cumulants| {
+            SmoothedStates::new(passed, cumulants, posterior)
+        })
+    }
+
+    /// The means of these states alone.
+    pub fn means<'a>(
+        &'a self,
+        posterior: &Posterior,
+        wanted: impl Fn(&Link) -> bool,
+    ) -> Vec<(&'a Link, DVector<f64>)> {
+        self.of_states(wanted, |passed, cumulants| {
+            let unexplained = &cumulants.mean - &cumulants.by_constants * &posterior.mean;
+            &passed.mean + &passed.by_constants * &posterior.mean + &passed.covariance * unexplained
+        })
+    }
+
+    fn of_states<'a, T>(
+        &'a self,
+        wanted: impl Fn(&Link) -> bool,
+        of: impl Fn(&Passed, &Cumulants) -> T,
+    ) -> Vec<(&'a Link, T)> {
         let mut all = Vec::new();
         self.backward(|number, cumulants| {
             let (link, passed) = (&self.chain.links[number], &self.passed[number]);
             if wanted(link) {
-                all.push((link, SmoothedStates::new(passed, cumulants, posterior)));
+                all.push((link, of(passed, cumulants)));
             }
         });
         all.reverse();

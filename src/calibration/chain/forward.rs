@@ -7,6 +7,9 @@ use super::links::{Chain, Link};
 use crate::calibration::constants::Sites;
 use crate::calibration::{CalibrationError, Known, Posterior, Prior};
 
+/// Number of links whose rows are learnt at once.
+const BLOCK: usize = 100;
+
 /// A link after the filter has passed it.
 #[derive(Debug, Clone)]
 pub struct Passed {
@@ -134,18 +137,20 @@ impl Filtered<'_> {
     /// What all rows say of the constants, with their prior.
     pub fn known(&self, prior: &Prior) -> Known {
         let c = self.chain.constants.len();
-        let count = self.passed.iter().map(|of| of.innovations.len()).sum();
-        let mut rows = DMatrix::zeros(count, c + 1);
-        let mut first = 0;
-        for of in &self.passed {
-            let m = of.innovations.len();
-            rows.view_mut((first, 0), (m, c))
-                .copy_from(&of.of_constants);
-            rows.view_mut((first, c), (m, 1)).copy_from(&of.innovations);
-            first += m;
-        }
         let mut known = Known::new(prior.clone());
-        known.learn(&rows);
+        for block in self.passed.chunks(BLOCK) {
+            let count = block.iter().map(|of| of.innovations.len()).sum();
+            let mut rows = DMatrix::zeros(count, c + 1);
+            let mut first = 0;
+            for of in block {
+                let m = of.innovations.len();
+                rows.view_mut((first, 0), (m, c))
+                    .copy_from(&of.of_constants);
+                rows.view_mut((first, c), (m, 1)).copy_from(&of.innovations);
+                first += m;
+            }
+            known.learn(&rows);
+        }
         known
     }
 
