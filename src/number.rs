@@ -121,6 +121,12 @@ pub fn plus_minus(of: f64, own: f64) -> String {
     format!("{} ± {}", value(of, own), sigma(own))
 }
 
+/// A value with its 1σ in units of the last digit, such as `0.99998(44)`.
+pub fn with_last_digits(of: f64, own: f64) -> String {
+    let last = 10f64.powi(-(decimals(own) as i32));
+    format!("{}({:.0})", value(of, own), own / last)
+}
+
 /// A number or a dash.
 pub fn or_dash(of: Option<f64>, shown: impl FnOnce(f64) -> String) -> String {
     of.map_or_else(|| "–".to_owned(), shown)
@@ -187,6 +193,13 @@ mod tests {
         assert_eq!(sigma(0.0034), "0.0034");
         assert_eq!(three_digits(21502.0), "21\u{202f}500");
         assert_eq!(three_digits(-0.012345), "−0.0123");
+    }
+
+    #[test]
+    fn sigma_follows_in_units_of_the_last_digit() {
+        assert_eq!(with_last_digits(0.999984, 0.00044), "0.99998(44)");
+        assert_eq!(with_last_digits(-152.3, 23.4), "−152(23)");
+        assert_eq!(with_last_digits(35288.0, 155.0), "35288(155)");
     }
 
     #[test]

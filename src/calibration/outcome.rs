@@ -10,6 +10,7 @@ use crate::calibration::checks::event::Event;
 use crate::calibration::checks::form::form_test;
 use crate::calibration::checks::innovation::consistency;
 use crate::calibration::checks::observability::AttitudeCovariance;
+use crate::calibration::checks::quality::{Residuals, residuals};
 use crate::calibration::checks::recordings::RecordingDifference;
 use crate::calibration::checks::rounding::by_rounding;
 use crate::calibration::checks::term::{TermEvidence, is_shown};
@@ -22,7 +23,7 @@ use crate::calibration::{
     AttitudePrior, Auxiliary, CalibrationError, Candidate, Consistency, Constant, Difference,
     Epoch, Estimate, Finding, FormTest, Innovation, Linearisation, Model, NoiseReport,
     OBSERVED_BELOW, Observability, ParameterMatrix, ParameterVector, Pass, Posterior, Problem,
-    Thermal, Verdict, Word,
+    Thermal, Verdict, Word, from_vector,
 };
 use crate::imu::Sensor;
 
@@ -80,6 +81,8 @@ pub struct Outcome {
     pub terms: Vec<TermEvidence>,
     /// Differences between recordings that the data show beyond the stated ones.
     pub differences: Vec<RecordingDifference>,
+    /// Residuals of gravity and turns over the whole recording.
+    pub(in crate::calibration) residuals: Residuals,
     /// Findings that a calibration engineer must know before using the figures.
     pub findings: Vec<Finding>,
     /// The iterations from which all this follows.
@@ -123,6 +126,11 @@ impl Outcome {
         if let Some(last) = history.last_mut() {
             (last.estimate, last.sigma) = (estimate.vector(), estimate.sigma());
         }
+        let at = Linearisation {
+            triads: estimate.triads,
+            ..solved.estimate.clone()
+        };
+        let residuals = residuals(problem, &at, |_| true)?;
         let (attitude_sigma, attitude_covariance) = last_attitude(&weighed, &script.priors);
         let prior_sigma = as_stated.model.prior_sigma;
         let (off, gravity_sigma) = gravity(filtered, posterior);
@@ -144,6 +152,7 @@ impl Outcome {
             passes: solved.passes.clone(),
             converged: solved.converged,
             findings: Vec::new(),
+            residuals,
             estimate,
             prior_sigma,
             attitude_sigma,
@@ -173,6 +182,30 @@ impl Outcome {
         let of_run = information(&self.attitude_sigma) - information(&prior.sigma);
         // Opposite directions of Earth rate differ by twice its level part.
         4.0 * of_run > HEADING_SEEN
+    }
+
+    /// The estimate as it may be used: parameters that the run did not observe keep what was known of them.
+    pub fn usable(&self) -> Estimate {
+        let mut values = self.estimate.vector();
+        let mut covariance = self.estimate.covariance;
+        for index in self.unobserved() {
+            values[index] = self.model.prior_mean[index];
+            covariance.row_mut(index).fill(0.0);
+            covariance.column_mut(index).fill(0.0);
+        }
+        Estimate {
+            triads: from_vector(self.estimate.form(), &values),
+            covariance,
+        }
+    }
+
+    /// 1σ of the usable values; zero for parameters that were not estimated.
+    pub fn usable_sigma(&self) -> ParameterVector {
+        let mut sigma = self.estimate.sigma();
+        for index in self.unobserved() {
+            sigma[index] = self.prior_sigma[index];
+        }
+        sigma
     }
 
     /// Indices of the parameters that the run did not observe.

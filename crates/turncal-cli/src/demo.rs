@@ -12,7 +12,9 @@ use super::simulate::{simulated, write};
 use crate::arguments::{Overwrite, seed};
 use crate::terminal::{Activity, show_brief};
 use turncal::calibration;
-use turncal::calibration::{Assessment, ClosedForm, Estimate, Method, Options, Problem, Solution};
+use turncal::calibration::{
+    Assessment, Calibration, ClosedForm, Estimate, Method, Options, Problem, Solution,
+};
 use turncal::imu::{PerSensor, Triad};
 use turncal::models;
 use turncal::models::Place;
@@ -63,8 +65,9 @@ impl Demo {
         }
         let assessment = solution.assess(&problem)?;
         activity.next("navigating");
+        let of_filter = solution.calibration(&problem, &assessment);
         let mut document = document(
-            (&problem, &solution, &assessment),
+            (&problem, &solution, &assessment, &of_filter),
             (&still, &whole),
             &turning,
         )?;
@@ -78,7 +81,6 @@ impl Demo {
                 .with_context(|| format!("cannot create {}", path.display()))?;
         }
         write(&standing, &closed)?;
-        let of_filter = solution.calibration(&problem, &assessment);
         let of_closed_form = whole.record(&still, &whole.quality(&still)?);
         for (mut record, of, run, path) in [
             (of_filter, &root, &turning.run, filtered),
@@ -102,7 +104,7 @@ impl Demo {
 
 /// Report on the filter calibration, with the closed form from the same table time and from its full time.
 fn document(
-    (problem, solution, assessment): (&Problem, &Solution, &Assessment),
+    (problem, solution, assessment, calibration): (&Problem, &Solution, &Assessment, &Calibration),
     (still, whole): (&Problem, &ClosedForm),
     turning: &Simulated,
 ) -> anyhow::Result<Document> {
@@ -126,6 +128,7 @@ fn document(
         body_frame: problem.model.aiding.body_frame(),
         outcome: solution.outcome(),
         findings: solution.findings(),
+        calibration,
         budget: assessment.budget.as_ref(),
         predicted: None,
         quality: Some(&assessment.quality),

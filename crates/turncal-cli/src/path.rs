@@ -104,7 +104,9 @@ impl Evaluate {
         let document = report.document();
         begun.deliver(&document)?;
         match document.verdict {
-            Some((Word::Undecided, text)) => Err(NotMet(format!("{name}: {text}")).into()),
+            Some((Word::Undecided, text)) => {
+                Err(NotMet::Specification(format!("{name}: {text}")).into())
+            }
             _ => Ok(()),
         }
     }

@@ -43,11 +43,13 @@ pub mod lot;
 pub mod navigation;
 pub mod path;
 mod prelude;
+pub mod record;
 pub mod session;
 pub mod table1;
 mod terms;
 #[cfg(test)]
 mod tests;
+pub mod values;
 
 pub use document::{Document, Facts};
 pub use html::{ReportError, files, write};

@@ -13,6 +13,8 @@ const GAP: usize = 2;
 
 /// Lines of one screen.
 const SCREEN: usize = 40;
+/// Most findings on a screen.
+const SHOWN: usize = 3;
 /// Assumed screen width if unknown.
 const USUAL_WIDTH: usize = 80;
 /// Prefix of a finding: its code.
@@ -39,27 +41,26 @@ fn titled(document: &Document) -> String {
     format!("{}: {first}", document.title)
 }
 
-/// Problems and remedies, as far as space permits; notes are only named, on one line.
+/// The first problems with their remedies, as far as space permits; notes without one.
 fn findings(all: &[Finding], width: usize, room: usize) -> Vec<String> {
     let of_one = |finding: &Finding| {
         let (what, next) = finding.headline();
         let code = format!("  {}  ", finding.code);
-        if finding.level() == Level::Note {
-            return vec![cut(&format!("{code}{what}"), width)];
-        }
+        let next = next.filter(|_| finding.level() != Level::Note);
         let next = next.map(|next| format!("{CODE}→ {next}"));
         let next = next
             .iter()
             .flat_map(|next| wrapped(next, "         ", Some(width)));
         let what = wrapped(&format!("{code}{what}"), CODE, Some(width)).into_iter();
-        what.chain(next).collect()
+        what.chain(next).collect::<Vec<String>>()
     };
     let mut lines = Vec::new();
     for (place, finding) in all.iter().enumerate() {
         let more = of_one(finding);
         let is_last = place + 1 == all.len();
-        if lines.len() + more.len() + usize::from(!is_last) > room {
-            lines.push(format!("{CODE}{} more: --verbose", all.len() - place));
+        if place == SHOWN || lines.len() + more.len() + usize::from(!is_last) > room {
+            let more = all.len() - place;
+            lines.push(format!("{CODE}and {more} more"));
             break;
         }
         lines.extend(more);

@@ -25,6 +25,7 @@ pub struct Synthetic {
     pub run: Run,
     pub outcome: Outcome,
     pub closed: Estimate,
+    pub calibration: Calibration,
     pub truth: PerSensor<Triad>,
     pub dwells: Vec<Range<f64>>,
     pub navigation: Vec<MethodOutlook>,
@@ -39,6 +40,7 @@ impl Synthetic {
             body_frame: self.run.aiding().body_frame(),
             outcome: Some(&self.outcome),
             findings: &self.outcome.findings,
+            calibration: &self.calibration,
             budget: None,
             predicted: None,
             quality: None,
@@ -245,7 +247,9 @@ pub fn synthetic(form: InstallationForm) -> Synthetic {
             outlook: mission.outlook(estimate, Some(&truth)).unwrap(),
         })
         .to_vec();
+    let calibration = outcome.estimate.record(&run, run.aiding().body_frame());
     Synthetic {
+        calibration,
         run,
         outcome,
         closed,

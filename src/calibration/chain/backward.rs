@@ -163,11 +163,11 @@ impl Filtered<'_> {
         })
     }
 
-    fn of_states<'a, T>(
-        &'a self,
+    fn of_states<T>(
+        &self,
         wanted: impl Fn(&Link) -> bool,
         of: impl Fn(&Passed, &Cumulants) -> T,
-    ) -> Vec<(&'a Link, T)> {
+    ) -> Vec<(&Link, T)> {
         let mut all = Vec::new();
         self.backward(|number, cumulants| {
             let (link, passed) = (&self.chain.links[number], &self.passed[number]);

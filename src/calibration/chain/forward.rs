@@ -2,10 +2,11 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use super::effects::Sizes;
+use super::effects::{Dispersion, Sizes};
 use super::links::{Chain, Link};
+use super::states::States;
 use crate::calibration::constants::Sites;
-use crate::calibration::{CalibrationError, Known, Posterior, Prior};
+use crate::calibration::{CalibrationError, Constant, Known, Posterior, Prior, Problem, Script};
 
 /// Number of links whose rows are learnt at once.
 const BLOCK: usize = 100;
@@ -28,7 +29,7 @@ pub struct Passed {
 }
 
 /// The filter after a link: mean given zero constants, effect of the constants, and covariance of the states.
-pub struct Forward {
+struct Forward {
     mean: DVector<f64>,
     by_constants: DMatrix<f64>,
     covariance: DMatrix<f64>,
@@ -60,11 +61,33 @@ impl Chain {
             log_determinant: self.log_determinant + forward.log_determinant,
         })
     }
+
+    /// What a filter with these sizes learns of the constants, from links that are not kept.
+    ///
+    /// # Errors
+    /// [`CalibrationError::Diverged`] if a part cannot be reduced, or a covariance is not positive definite.
+    pub fn information(
+        problem: &Problem,
+        script: &Script,
+        (dispersion, sizes): (&Dispersion, &Sizes),
+    ) -> Result<DMatrix<f64>, CalibrationError> {
+        let one_gravity = problem.one_gravity();
+        let states = States::new(&problem.model, one_gravity);
+        let count = Constant::all(&problem.model, one_gravity).len();
+        let mut forward = Forward::new(states.count, count);
+        let mut information = DMatrix::zeros(count, count);
+        Self::each(problem, script, dispersion, |link| {
+            let seen = forward.pass(&link, sizes)?.of_constants;
+            information.gemm_tr(1.0, &seen, &seen, 1.0);
+            Ok(())
+        })?;
+        Ok(information)
+    }
 }
 
 impl Forward {
     /// Before the first link.
-    pub fn new(states: usize, constants: usize) -> Self {
+    fn new(states: usize, constants: usize) -> Self {
         Self {
             mean: DVector::zeros(states),
             by_constants: DMatrix::zeros(states, constants),
@@ -77,7 +100,7 @@ impl Forward {
     ///
     /// # Errors
     /// [`CalibrationError::Diverged`] if a covariance is not positive definite.
-    pub fn pass(&mut self, link: &Link, sizes: &Sizes) -> Result<Passed, CalibrationError> {
+    fn pass(&mut self, link: &Link, sizes: &Sizes) -> Result<Passed, CalibrationError> {
         let transition = &link.transition;
         let mean = &transition.states * &self.mean + &transition.offset;
         let by_constants = &transition.states * &self.by_constants + &transition.constants;

@@ -6,10 +6,7 @@ mod maker;
 mod rows;
 mod transition;
 
-use nalgebra::DMatrix;
-
-use super::effects::{Dispersion, Sizes};
-use super::forward::Forward;
+use super::effects::Dispersion;
 use super::states::States;
 use crate::calibration::{CalibrationError, Constant, Problem, Script};
 pub use link::Link;
@@ -59,29 +56,8 @@ impl Chain {
         Ok(Self { links, ..chain })
     }
 
-    /// What a filter with these sizes learns of the constants, from links that are not kept.
-    ///
-    /// # Errors
-    /// [`CalibrationError::Diverged`] if a part cannot be reduced, or a covariance is not positive definite.
-    pub fn information(
-        problem: &Problem,
-        script: &Script,
-        (dispersion, sizes): (&Dispersion, &Sizes),
-    ) -> Result<DMatrix<f64>, CalibrationError> {
-        let states = States::new(&problem.model, problem.one_gravity());
-        let count = Constant::all(&problem.model, problem.one_gravity()).len();
-        let mut forward = Forward::new(states.count, count);
-        let mut information = DMatrix::zeros(count, count);
-        Self::each(problem, script, dispersion, |link| {
-            let seen = forward.pass(&link, sizes)?.of_constants;
-            information.gemm_tr(1.0, &seen, &seen, 1.0);
-            Ok(())
-        })?;
-        Ok(information)
-    }
-
     /// A chain whose links are taken one by one.
-    fn each(
+    pub fn each(
         problem: &Problem,
         script: &Script,
         dispersion: &Dispersion,

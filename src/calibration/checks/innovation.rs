@@ -143,7 +143,7 @@ pub fn inconsistent(innovations: &[Innovation], pulses: &[Observation]) -> Optio
     let kinds = Observation::ALL.map(|kind| (kind, of(kind).collect::<Vec<_>>()));
     let kinds = kinds.iter().filter(|(_, of_kind)| !of_kind.is_empty());
     let chance = FALSE_ALARM / (kinds.clone().count() * LOOKS.len()) as f64;
-    let (mut each, mut looks) = (Vec::new(), Vec::new());
+    let (mut each, mut looks, mut largest) = (Vec::new(), Vec::new(), 0f64);
     for (observation, of_kind) in kinds {
         for (look, which, squares) in LOOKS {
             let squares = squares(of_kind);
@@ -160,6 +160,7 @@ pub fn inconsistent(innovations: &[Innovation], pulses: &[Observation]) -> Optio
                 mean_square_interval(count, chance)
             };
             if nis < low || nis > high {
+                largest = largest.max(nis);
                 let name = observation.name();
                 each.push(format!("{name}{which} {nis:.2} ({low:.2} to {high:.2})"));
                 looks.push(json!({
@@ -174,7 +175,11 @@ pub fn inconsistent(innovations: &[Innovation], pulses: &[Observation]) -> Optio
          [imu.noise].",
         each.join("; ")
     );
-    (!looks.is_empty()).then(|| Finding::new(Kind::Inconsistent, text, json!({ "looks": looks })))
+    let any = !looks.is_empty();
+    any.then(|| {
+        let finding = Finding::new(Kind::Inconsistent, text, json!({ "looks": looks }));
+        finding.of_growth(largest.sqrt())
+    })
 }
 
 /// Two-sided probability outside the intervals.

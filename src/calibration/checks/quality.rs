@@ -1,5 +1,6 @@
 //! Quality of a calibration by references that need no truth: gravity and turns.
 
+use std::f64::consts::TAU;
 use std::ops::Range;
 
 use nalgebra::{Matrix3, Vector3};
@@ -16,6 +17,8 @@ use crate::imu::{PerSensor, Sensed, Sensor, TermVector, Triad};
 use crate::navigation::{Navigator, State};
 use crate::recording::LabelledMotion;
 use crate::run::{Dwell, Run};
+use crate::statistics::median;
+use crate::units::MICRO_G;
 
 /// Residuals of gravity and turns after a calibration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -47,13 +50,28 @@ pub struct DwellResidual {
 }
 
 /// Residuals in dwells and over turns.
-struct Residuals {
+#[derive(Debug, Clone, PartialEq)]
+pub struct Residuals {
     dwells: Vec<DwellResidual>,
     /// rad
     turns: Vec<f64>,
 }
 
 impl Residuals {
+    /// Medians of the magnitudes of those of gravity over gravity, and of those of directions over a turn; `None` if there
+    /// are none.
+    pub fn middle(&self) -> [Option<f64>; 2] {
+        let gravity = self
+            .dwells
+            .iter()
+            .map(|of| of.gravity.abs() / (1e6 * MICRO_G));
+        let direction = self.dwells.iter().filter_map(|of| of.direction);
+        [
+            median(&mut gravity.collect::<Vec<_>>()),
+            median(&mut direction.map(|angle| angle / TAU).collect::<Vec<_>>()),
+        ]
+    }
+
     fn measures(&self) -> Measures {
         Measures {
             gravity: self.dwells.iter().map(|of| of.gravity).collect(),
@@ -126,10 +144,7 @@ impl Outcome {
     /// [`CalibrationError`] if the problem is not the one of the outcome.
     pub fn quality(&self, problem: &Problem) -> Result<Quality, CalibrationError> {
         let Solved {
-            script,
-            effects,
-            estimate,
-            ..
+            script, effects, ..
         } = &*self.solved;
         let enough = every_other(problem).is_some();
         // Half the dwells may be too few.
@@ -141,12 +156,7 @@ impl Outcome {
             Some(moved)
         });
         let held_out = half.map(|half| residuals(problem, &half, |k| k % 2 == 1));
-        let estimate = Linearisation {
-            triads: self.estimate.triads,
-            ..estimate.clone()
-        };
-        let all = residuals(problem, &estimate, |_| true)?;
-        Ok(Quality::new(all, held_out.transpose()?))
+        Ok(Quality::new(self.residuals.clone(), held_out.transpose()?))
     }
 }
 
@@ -225,7 +235,7 @@ fn first_attitude(
 }
 
 /// Residuals in the evaluated dwells and in the turns that end in them.
-fn residuals(
+pub fn residuals(
     problem: &Problem,
     at: &Linearisation,
     judged: impl Fn(usize) -> bool,

@@ -58,7 +58,7 @@ impl Residuals {
             "of": of, "chi_square": chi_square, "degrees": degrees, "limit": limit, "growth": growth,
             "worst": [[begin, end]]
         });
-        self.are_large()
-            .then(|| Finding::new(Kind::ResidualsLarge, text, figures))
+        let finding = || Finding::new(Kind::ResidualsLarge, text, figures).of_growth(growth);
+        self.are_large().then(finding)
     }
 }

@@ -5,7 +5,9 @@ use serde_json::json;
 
 use super::finding::triad_name;
 use crate::calibration::record::schedule::step_length;
-use crate::calibration::{Finding, FindingKind as Kind, Problem, mean_square_interval};
+use crate::calibration::{
+    Finding, FindingKind as Kind, NoisePolicy, Problem, mean_square_interval,
+};
 use crate::imu::{AXES, NoiseKeys, PerSensor, Sensor, Triad};
 use crate::number::three_digits;
 use crate::run::{Dwell, Run};
@@ -15,8 +17,8 @@ use crate::statistics::FALSE_ALARM;
 /// half a pulse at most.
 const PULSES: f64 = 2.0;
 
-/// Findings on triads with a scatter at rest that does not agree with their noise. Calibrated inputs are used, because
-/// a wrong prior scale factor is not noise.
+/// Findings on triads with a scatter at rest that does not agree with the noise that the user insists on. Calibrated
+/// inputs are used, because a wrong prior scale factor is not noise.
 ///
 /// A step lasts a tenth of a second, as in the filter: faster errors average out, and of slower ones only random walk,
 /// bias and vibration of the mount remain. The result does not change the calibration, because it does not distinguish
@@ -24,7 +26,9 @@ const PULSES: f64 = 2.0;
 pub fn scatter_at_rest(problem: &Problem, calibrated: &PerSensor<Triad>) -> Vec<Finding> {
     let runs = problem.runs().enumerate();
     let each = runs.flat_map(|(recording, run)| Sensor::ALL.map(|sensor| (recording, run, sensor)));
-    let stated = each.filter(|(_, run, sensor)| *run.instrument.noise_is_stated.get(*sensor));
+    let insists = problem.options.noise == NoisePolicy::Stated;
+    let stated =
+        each.filter(|(_, run, sensor)| insists && *run.instrument.noise_is_stated.get(*sensor));
     let found = stated.filter_map(|(recording, run, sensor)| {
         let stretches = problem.stretches().iter();
         let of_run = stretches.filter(|stretch| stretch.recording == recording);
@@ -93,7 +97,7 @@ fn of_triad<'a>(
     let figures = json!({
         "of": sensor.name(), "figure": figure, "found": found, "stated": stated, "limits": [low, high]
     });
-    beyond.then(|| Finding::new(Kind::ScatterAtRest, text, figures))
+    beyond.then(|| Finding::new(Kind::ScatterAtRest, text, figures).of_growth(ratio))
 }
 
 #[cfg(test)]
@@ -110,7 +114,11 @@ mod tests {
             let mut run = scenario.simulate(1, number).unwrap().run;
             run.instrument.noise.gyro.random_walk *= part;
             run.instrument.noise.accel.random_walk *= part;
-            let problem = Problem::new(&run, &Options::default());
+            let options = Options {
+                noise: NoisePolicy::Stated,
+                ..Options::default()
+            };
+            let problem = Problem::new(&run, &options);
             let prior = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
             scatter_at_rest(&problem, &prior)
         };

@@ -59,7 +59,8 @@ pub fn rounded(
         );
         let of = sensor.name();
         let figures = json!({ "of": of, "step": step, "unit": unit, "growth": growth });
-        (growth >= SAID).then(|| Finding::new(Kind::Rounded, text, figures))
+        let finding = || Finding::new(Kind::Rounded, text, figures).of_growth(growth);
+        (growth >= SAID).then(finding)
     };
     Sensor::ALL.into_iter().filter_map(of).collect()
 }

@@ -2,12 +2,17 @@
 
 use serde_json::json;
 
+use crate::calibration::checks::quality::Residuals;
 use crate::calibration::sizes::LOG_SIGMA;
 use crate::calibration::{Finding, FindingKind as Kind, Innovation, Nis, Outcome};
+use crate::number::three_digits;
 use crate::statistics::chi_square_limit;
 
 /// Probability that a stated figure is wrong by more than the accepted limit.
 const SO_WRONG: f64 = 1e-2;
+
+/// Residuals above this part of gravity, or of a turn, are those of no sensor.
+const ABSURD: f64 = 0.01;
 
 /// Limit of NIS, or of χ² over its degrees of freedom.
 ///
@@ -31,6 +36,26 @@ pub fn not_converged(outcome: &Outcome) -> Option<Finding> {
     );
     let figures = json!({ "passes": passes, "largest_step_sigma": step });
     (!outcome.converged).then(|| Finding::new(Kind::NotConverged, text, figures))
+}
+
+/// The finding, if residuals are absurd for any sensor, whatever explains them: half of the dwells or moves are off by
+/// more than a hundredth of gravity or of a turn.
+pub fn absurd(residuals: &Residuals) -> Option<Finding> {
+    let names = [
+        "|f| − g is {} of gravity",
+        "the direction of gravity after a move is off by {} of a turn",
+    ];
+    let pairs = names.into_iter().zip(residuals.middle());
+    let worst = pairs.filter_map(|(name, middle)| middle.map(|middle| (name, middle)));
+    let (name, middle) = worst.max_by(|one, other| one.1.total_cmp(&other.1))?;
+    let percent = format!("{} %", three_digits(100.0 * middle));
+    let text = format!(
+        "Calibration rejected: in the median dwell {}, more than any sensor is wrong after calibration. Do not use the \
+         values or σ. Check units, axes and rate in run.toml with turncal check.",
+        name.replace("{}", &percent)
+    );
+    let figures = json!({ "median": middle, "limit": ABSURD });
+    (middle > ABSURD).then(|| Finding::new(Kind::Unexplained, text, figures))
 }
 
 /// The finding, if innovations are larger than wrong figures of a data sheet can explain.

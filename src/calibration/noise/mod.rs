@@ -10,5 +10,5 @@ pub mod variances;
 pub use by_hand::{BY_HAND, ByHand, Parts};
 pub use likelihood_ratio::INTERVAL;
 pub use policy::NoisePolicy;
-pub use report::{NoiseReport, NoiseTest, SourceFigures};
+pub use report::{NAMED, NoiseReport, NoiseTest, SourceFigures};
 pub use source::Source;

@@ -147,7 +147,11 @@ fn symbol(unit: &str) -> String {
     })
 }
 
-/// The finding on estimated noise: the distance of the worst stated figure, its limit, and the sources. `None` if no noise was stated.
+/// A stated figure is named if the recording shows more than this times as much.
+pub const NAMED: f64 = 1.5;
+
+/// The finding on estimated noise: the squared distance of the worst stated figure, and its limit. `None` if no noise was
+/// stated.
 fn noise_learnt(
     problem: &Problem,
     (ratio, limit): (f64, f64),
@@ -157,16 +161,32 @@ fn noise_learnt(
     if !(stated.gyro || stated.accel) {
         return None;
     }
-    let used = sources.iter().filter(|figures| figures.counts());
-    let used: Vec<String> = used.map(SourceFigures::to_string).collect();
+    let named = sources.iter().filter_map(|figures| {
+        let stated = figures.stated?;
+        let line = figures.line();
+        let [used, stated_as] = [figures.used, stated].map(three_digits);
+        let (name, unit) = (&figures.name, symbol(&figures.unit));
+        let words = format!("{name} {used} instead of {stated_as} {unit}");
+        (figures.used > NAMED * stated).then_some((words, line))
+    });
+    let (words, lines): (Vec<_>, Vec<_>) = named.unzip();
     let text = format!(
-        "The stated noise does not fit this record (squared distance of the worst figure {ratio:.0}; expected \
-         below {limit:.0}). turncal used the noise it estimated from the record \
-         instead; all σ include it: {}. To keep it, paste noise.run_toml of calibration.json into [imu.noise].",
-        used.join("; ")
+        "Noise is larger than stated: {} (squared distance {ratio:.0}; limit {limit:.0}). turncal used its own estimate, \
+         and σ include it. To state it for the next recording, copy into run.toml: {}.",
+        words.join("; "),
+        lines.join(", ")
     );
-    let figures = json!({ "ratio": ratio, "limit": limit, "sources": sources });
+    let figures = json!({ "ratio": ratio, "limit": limit, "sources": sources, "lines": lines });
     Some(Finding::new(Kind::NoiseLearnt, text, figures))
+}
+
+impl SourceFigures {
+    /// The line of `run.toml` that states it.
+    fn line(&self) -> String {
+        let (_, (name, unit)) = self.source.stated_in();
+        let value = self.used * self.source.unit().1 / unit;
+        format!("{name} = {}", rounded(value))
+    }
 }
 
 /// Tables of `run.toml` that state noise.
@@ -182,13 +202,13 @@ impl NoiseReport {
         let used = self.sources.iter().filter(|figures| figures.used > 0.0);
         let lines = used.flat_map(|figures| {
             let source = figures.source;
-            let (table, (name, unit)) = source.stated_in();
+            let (table, _) = source.stated_in();
             let varies = matches!(source, Source::GyroGaussMarkov | Source::AccelGaussMarkov);
             let time = correlation_time.get(source.triad()).filter(|_| varies);
             let time = time.map(|time| (NoiseKeys::of(source.triad()).correlation_time, time));
-            let value = figures.used * source.unit().1 / unit;
-            let lines = [(name, value)].into_iter().chain(time);
-            lines.map(move |(name, value)| (table, format!("{name} = {}", rounded(value))))
+            let time = time.map(|(name, value)| format!("{name} = {}", rounded(value)));
+            let lines = [figures.line()].into_iter().chain(time);
+            lines.map(move |line| (table, line))
         });
         let lines: Vec<(&str, String)> = lines.collect();
         let of_table = |table: &str| -> Option<String> {

@@ -310,6 +310,12 @@ impl Calibration {
         Verdict::of(&self.findings).word == Word::Failed || self.converged == Some(false)
     }
 
+    /// Names of parameters that were asked for but not determined; they keep the values and σ of before.
+    pub fn undetermined(&self) -> impl Iterator<Item = &String> {
+        let kept = |name: &&String| self.sigma_of(name).is_some_and(|sigma| *sigma > 0.0);
+        self.fixed.iter().filter(kept)
+    }
+
     /// A record of the two triads only, such as a truth.
     pub fn new(gyro: TriadRecord, accel: TriadRecord) -> Self {
         Self {

@@ -29,7 +29,8 @@ const TEST_INPUTS: [[f64; 6]; 3] = [
 impl Outcome {
     /// The record of this calibration of a problem, with the residuals of gravity and turns.
     pub fn record(&self, problem: &Problem, quality: &Quality) -> Calibration {
-        let (run, estimate) = (problem.run(), &self.estimate);
+        let (run, usable) = (problem.run(), self.usable());
+        let estimate = &usable;
         let equation = if self.auxiliary.has_terms() {
             EQUATION_WITH_TERMS
         } else {
@@ -40,6 +41,8 @@ impl Outcome {
             None => FORMAT,
         };
         let thermal = self.thermal.as_ref();
+        let nominal = &run.instrument.nominal;
+        let sigma = TriadRecord::of_both_sigma(estimate.form(), &self.usable_sigma(), nominal);
         let record = Calibration {
             format: format.to_owned(),
             method: Some(Method::Ekf),
@@ -57,6 +60,7 @@ impl Outcome {
             noise: Some(self.noise_record()),
             equation: Some(equation.to_owned()),
             provenance: Some(problem.provenance()),
+            sigma: Some(sigma),
             ..estimate.record(run, problem.model.aiding.body_frame())
         };
         record.with_findings(self.findings.clone())
@@ -94,7 +98,7 @@ impl Calibration {
         outcome: &Outcome,
         budget: &Budget,
     ) {
-        let estimated: Vec<usize> = outcome.estimate.estimated().collect();
+        let estimated: Vec<usize> = outcome.usable().estimated().collect();
         let factor = |index| factor(&run.instrument.nominal, index);
         self.budget = Some(budget.record(&estimated, factor));
     }

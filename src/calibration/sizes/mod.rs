@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::calibration::chain::{Chain, Dispersion, Effect, Filtered, Sizes, Slip};
 use crate::calibration::checks::recordings::RecordingDifference;
-use crate::calibration::noise::INTERVAL;
+use crate::calibration::noise::{INTERVAL, NAMED};
 use crate::calibration::{
     CalibrationError, Constant, Known, Model, NoisePolicy, NoiseReport, NoiseTest, Posterior,
     Prior, Problem, Script, SourceFigures,
@@ -30,9 +30,6 @@ const ROUNDS: usize = 4;
 /// A change of the logarithm of every size, in its σ, or of the probability that something is absent, by less than this
 /// has settled.
 const SETTLED: f64 = 0.1;
-/// A stated figure is named as wrong if it is more than this times too small: σ that grow by half are no longer those
-/// that were expected.
-const NAMED: f64 = 1.5;
 
 /// A size as estimated.
 #[derive(Debug, Clone, Copy)]

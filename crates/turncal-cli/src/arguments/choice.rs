@@ -24,6 +24,23 @@ pub const METHODS: [Choice<Method>; 2] = [
     ),
 ];
 
+/// What may be required of a calibration: all parameters, or those whose names begin so.
+pub const REQUIRED: [Choice<&str>; 9] = [
+    ("all", "Every parameter that is estimated", ""),
+    ("gyro", "All of the gyros", "gyro."),
+    ("accel", "All of the accelerometers", "accel."),
+    ("gyro.scale", "K of the gyros", "gyro.scale."),
+    ("gyro.installation", "E of the gyros", "gyro.installation."),
+    ("gyro.bias", "D of the gyros", "gyro.bias."),
+    ("accel.scale", "K of the accelerometers", "accel.scale."),
+    (
+        "accel.installation",
+        "E of the accelerometers",
+        "accel.installation.",
+    ),
+    ("accel.bias", "D of the accelerometers", "accel.bias."),
+];
+
 /// Forms of the installation matrix.
 pub const FORMS: [Choice<InstallationForm>; 3] = [
     (

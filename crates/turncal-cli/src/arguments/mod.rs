@@ -9,7 +9,7 @@ mod sharding;
 mod values;
 mod with;
 
-pub use choice::{AIDINGS, FORMS, NOISE, export_format, one_of};
+pub use choice::{AIDINGS, FORMS, NOISE, REQUIRED, export_format, one_of};
 pub use delivery::{Delivery, Overwrite, keep};
 pub use error_term::{error_term, needs_table};
 pub use estimation::Estimation;

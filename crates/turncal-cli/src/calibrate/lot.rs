@@ -169,15 +169,21 @@ pub fn deliver(
         );
     }
     match document.verdict {
-        Some((Word::Fail, words)) => Err(NotMet(words).into()),
+        Some((Word::Fail, words)) => Err(NotMet::Specification(words).into()),
         _ => Ok(()),
     }
 }
 
-/// The lot was calibrated, but some units do not meet their specification.
+/// It was calibrated, but what was asked of it is not met.
 #[derive(Debug, thiserror::Error)]
-#[error("the specification is not met: {0}")]
-pub struct NotMet(pub String);
+pub enum NotMet {
+    /// Limits of a specification.
+    #[error("the specification is not met: {0}")]
+    Specification(String),
+    /// Parameters of --require.
+    #[error("{0}")]
+    Required(String),
+}
 
 /// A name for each unit: its run directory, or its file if that is not called run.toml, with as many parent directories
 /// as needed to make names unique.

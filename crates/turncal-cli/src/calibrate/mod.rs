@@ -18,10 +18,12 @@ use turncal_files::{calibration_json, write_calibration};
 use anyhow::{Context, bail};
 use clap::error::ErrorKind;
 
-use crate::arguments::{Estimation, OfLog, Overwrite, run_file, run_or_log, seconds, shard};
+use crate::arguments::{
+    Estimation, OfLog, Overwrite, REQUIRED, one_of, run_file, run_or_log, seconds, shard,
+};
 use crate::terminal::{Activity, print, show, show_brief};
 use turncal::calibration::{
-    AtRest, Method, Problem, Solution, Together, Word, in_body_frame, triads_of,
+    AtRest, Calibration, Method, Problem, Solution, Together, Word, in_body_frame, triads_of,
 };
 use turncal::imu::{BodyFrame, InstallationForm};
 use turncal::models;
@@ -42,8 +44,8 @@ const FOLLOWING: &str = "Following a log";
 
 /// Estimates scale factors, misalignments and biases from a run
 ///
-/// Writes DIR/calibration.json and DIR/report/, and prints a summary. The command fails if the filter does not
-/// converge.
+/// Writes DIR/calibration.json and DIR/report/, and prints a summary. Exit status: 0 if the values may be used, 1 if
+/// they must not (FAILED), 3 if --require or a specification is not met.
 ///
 /// With --temperature, parameters depend on the temperature column; for an instrument at rest in one attitude, only
 /// biases do.
@@ -88,6 +90,9 @@ pub struct Calibrate {
     /// True calibration, not used by the estimator; summary and report show the errors relative to it
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
+    /// Parameters that must be determined; otherwise the exit status is 3
+    #[arg(long, value_name = "PARAMETERS", value_parser = one_of(&REQUIRED), value_delimiter = ',', conflicts_with_all = ["specification", "shard"])]
+    require: Vec<&'static str>,
     /// Limits for the units of a lot (a specification.toml)
     #[arg(long, value_name = "FILE", conflicts_with = "truth")]
     specification: Option<PathBuf>,
@@ -270,6 +275,7 @@ impl Calibrate {
             solution,
             ..
         } = checked;
+        let missing = self.missing(&calibration);
         if let (Some(directory), Some(document)) = (directory, &document) {
             let file = directory.path().join("calibration.json");
             write_calibration(&calibration, &file, false)?;
@@ -294,7 +300,18 @@ impl Calibrate {
         if !solution.is_usable() {
             bail!("{name}: do not use the values, see the findings");
         }
+        if !missing.is_empty() {
+            let words = format!("{name}: not determined: {}", missing.join(", "));
+            return Err(NotMet::Required(words).into());
+        }
         Ok(())
+    }
+
+    /// Required parameters that are not determined.
+    fn missing(&self, calibration: &Calibration) -> Vec<String> {
+        let is_required = |name: &&String| self.require.iter().any(|of| name.starts_with(of));
+        let names = calibration.undetermined().filter(is_required);
+        names.cloned().collect()
     }
 }
 
@@ -323,14 +340,14 @@ fn files(target: Option<&Path>, run: &Path, document: &Document) -> Facts {
             );
         }
     }
-    let explain = document
-        .findings
-        .first()
-        .map(|finding| format!(", or turncal explain {}", finding.code));
-    // The same command would replace the existing files.
-    let force = target.map_or("", |_| " --force");
-    let more = format!("--verbose{force}{}", explain.unwrap_or_default());
-    facts.push("more", more);
+    let explain = document.findings.first();
+    let explain = explain.map(|finding| format!("turncal explain {}", finding.code));
+    let calibration = target.map(|target| shown(target.join("calibration.json")));
+    let all = calibration.map(|file| format!("turncal show {file} --verbose"));
+    let more: Vec<String> = all.into_iter().chain(explain).collect();
+    if !more.is_empty() {
+        facts.push("more", more.join(", "));
+    }
     facts
 }
 

@@ -113,6 +113,13 @@ fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String
     if record.is_failed() {
         notes.push("the verdict of the calibration is FAILED: do not use these values".to_owned());
     }
+    let kept: Vec<&str> = record.undetermined().map(String::as_str).collect();
+    if !kept.is_empty() {
+        let names = kept.join(", ");
+        notes.push(format!(
+            "the calibration did not determine {names}: they keep the values of before"
+        ));
+    }
     if record.unit.is_none() {
         notes.push(
             "the calibration states no units, so turncal assumed those of the run".to_owned(),

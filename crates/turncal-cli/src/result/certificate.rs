@@ -105,7 +105,7 @@ impl Certificate {
         match overall {
             Some(Decision::Fail | Decision::ConditionalFail) => {
                 let limits = "the certificate lists the limits".to_owned();
-                Err(NotMet(limits).into())
+                Err(NotMet::Specification(limits).into())
             }
             _ => Ok(()),
         }

@@ -35,6 +35,7 @@ impl Explain {
         };
         let verdict = match kind.level() {
             Level::Failed => "The verdict is FAILED.",
+            Level::Partial => "The verdict is PARTIAL.",
             Level::Care => "The verdict is USE WITH CARE.",
             Level::Note => "The verdict is not affected.",
         };

@@ -6,3 +6,4 @@ pub mod compare;
 pub mod explain;
 pub mod export;
 pub mod navigate;
+pub mod show;

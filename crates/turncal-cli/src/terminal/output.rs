@@ -32,7 +32,7 @@ pub fn show_brief(document: &Document) -> anyhow::Result<()> {
 fn in_colour(word: Word) -> String {
     let colour = match word {
         Word::Good | Word::Pass => 32,
-        Word::UseWithCare | Word::Undecided => 33,
+        Word::UseWithCare | Word::Partial | Word::Undecided => 33,
         Word::Failed | Word::Fail => 31,
     };
     format!("\u{1b}[1;{colour}m{word}\u{1b}[0m")

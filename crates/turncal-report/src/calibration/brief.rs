@@ -1,6 +1,6 @@
 //! One-screen summary: accuracy and its main source, cross-validation, navigation error.
 
-use super::super::navigation;
+use super::super::{navigation, values};
 use super::report::Report;
 use super::{budget, tables};
 use crate::prelude::*;
@@ -11,12 +11,17 @@ pub fn add(document: &mut Document, report: &Report) {
     let Some(estimate) = report.estimate() else {
         return;
     };
+    let values = values::table(report.calibration);
+    document.brief.push(values.into());
     document.brief.push(accuracy(report, estimate).into());
     let navigated = report.navigation.ok().filter(|of| !of.is_empty());
     let mut facts = Facts::default();
     for (name, value) in [
         ("weakest", weakest(report)),
-        ("excluded from fit", tables::cross_validation(report)),
+        (
+            "excluded from fit",
+            report.quality.and_then(tables::cross_validation),
+        ),
         ("navigation", navigated.map(navigation::line)),
     ] {
         if let Some(value) = value {

@@ -14,15 +14,16 @@ mod tests;
 use std::collections::BTreeSet;
 
 use crate::prelude::*;
-use crate::{navigation, terms};
+use crate::{navigation, terms, values};
 use turncal::calibration::{Finding, Verdict, Word};
 use turncal::imu::{Noise, Sensor};
 
 pub use report::{ClosedForm, Report};
 pub use solved::{Truth, document, dwell_times, note};
+pub use tables::cross_validation;
 
 /// The most severe first; of one level, the first of each kind before more of any.
-fn in_order(findings: &[Finding]) -> Vec<Finding> {
+pub fn in_order(findings: &[Finding]) -> Vec<Finding> {
     let mut seen = BTreeSet::new();
     let keyed = findings.iter().map(|finding| {
         let is_first = seen.insert(&finding.code);
@@ -120,6 +121,7 @@ impl Report<'_> {
         let determined = estimated - hidden;
         let of_it = match word {
             Word::Failed => "do not use values or σ",
+            Word::Partial => &values::determined(self.calibration),
             _ => &format!("{determined} of {estimated} parameters determined"),
         };
         let findings = several(self.findings.len(), "finding");

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use turncal::calibration::result::TermRecord;
 use turncal::calibration::{
-    Budget, Estimate, Finding, Outcome, ParameterVector, Quality, to_vector,
+    Budget, Calibration, Estimate, Finding, Outcome, ParameterVector, Quality, to_vector,
 };
 use turncal::imu::{BodyFrame, PerSensor, Triad};
 use turncal::recording::TableLog;
@@ -32,6 +32,8 @@ pub struct Report<'a> {
     pub budget: Option<&'a Budget>,
     /// The closed-form result, if any.
     pub closed_form: Option<ClosedForm<'a>>,
+    /// The calibration as a file.
+    pub calibration: &'a Calibration,
     /// The true triads, if known.
     pub truth: Option<&'a PerSensor<Triad>>,
     /// True auxiliary parameters by name, if known.

@@ -41,6 +41,7 @@ pub fn document(
         body_frame: calibration.body_frame,
         outcome: solution.outcome(),
         findings: solution.findings(),
+        calibration,
         budget: assessment.budget.as_ref(),
         predicted: consequences.predicted.as_ref(),
         quality: Some(&assessment.quality),

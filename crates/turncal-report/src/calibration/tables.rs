@@ -110,8 +110,8 @@ pub fn consistency(outcome: &Outcome) -> Table {
 }
 
 /// Residuals in dwells excluded from the fit, on one line.
-pub fn cross_validation(report: &Report) -> Option<String> {
-    let held_out = report.quality?.held_out.as_ref()?;
+pub fn cross_validation(quality: &Quality) -> Option<String> {
+    let held_out = quality.held_out.as_ref()?;
     let of = |name: &str, spread: &Spread, units: &[(&'static str, f64); 2]| {
         let (unit, size) = readable(units, spread.rms);
         let [rms, largest] = [spread.rms, spread.largest].map(|x| three_digits(x / size));

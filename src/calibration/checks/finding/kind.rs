@@ -1,10 +1,15 @@
 //! Kinds of findings: their names, their levels and their meanings.
 
+use serde::{Deserialize, Serialize};
+
 /// Severity of a finding, which determines the verdict.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Level {
     /// The values must not be used.
     Failed,
+    /// Part of what was asked was not determined.
+    Partial,
     /// The values may be used if the finding is taken into account.
     Care,
     /// The result already accounts for it.
@@ -59,9 +64,9 @@ kinds! {
         "The residuals are too large for any noise figure, so the values are meaningless. The usual causes are \
          labels or table attitudes from a different recording, a wrong axis order, a wrong unit, or a mount that \
          slipped. The finding names the interval with the largest residuals; look there first."
-    NotObserved = "W04" "not-observed" Care:
+    NotObserved = "W04" "not-observed" Partial:
         "The recording adds little information about these parameters: σ is still more than half of the prior, so \
-         the values come mostly from [imu.prior]. Add positions that put each axis up and down, and a turn of 90° or more about each axis. \
+         turncal keeps their values and σ from [imu.prior]. Add positions that put each axis up and down, and a turn of 90° or more about each axis. \
          `turncal check` predicts the σ of each parameter."
     CombinationsNotObserved = "W05" "combinations-not-observed" Care:
         "Each of these parameters is determined on its own, but a combination of them is not, because their errors \
@@ -71,12 +76,12 @@ kinds! {
         "The gyros do not sense Earth rate well enough to find north. K, E and D do not need the heading, but the \
          gyro biases are less accurate because Earth rate is less certain. If you need the heading, use a table, or \
          gyros with noise below 0.1 °/√h and dwells of one minute."
-    NoiseLearnt = "W07" "noise-learnt" Care:
+    NoiseLearnt = "W07" "noise-learnt" Note:
         "A noise figure in [imu.noise] is more than 1.5 times too small for this recording (false-alarm rate 1 in 1000). \
-         turncal estimated the noise from the record and used it for weights and σ. This is normal for a sensor turned by hand, because motion adds noise that a data sheet does not state. To keep the estimate, paste noise.run_toml of \
-         calibration.json into [imu.noise]; to use the stated noise anyway, add --noise stated."
+         turncal used its own estimate for weights and σ. To state the estimate for the next recording, copy the lines \
+         of the finding into [imu.noise]; to use the stated noise anyway, add --noise stated."
     ScatterAtRest = "W08" "scatter-at-rest" Care:
-        "In dwells, the samples scatter more or less than the stated white noise implies. The estimate uses 0.1 s \
+        "You asked for the stated noise, but in dwells the samples scatter more or less than it implies. The estimate uses 0.1 s \
          averages, so mount vibration adds to it. Record an hour at rest, run `turncal allan` to separate noise from \
          vibration, and state the result in [imu.noise]."
     Inconsistent = "W10" "inconsistent" Care:
@@ -84,7 +89,7 @@ kinds! {
          than predicted. If they are larger only after moves, suspect the table position, a scale factor or a time \
          offset; if in dwells, bias drift, often due to temperature (--temperature); if everywhere, the white noise \
          in [imu.noise]."
-    ErrorTermEstimated = "W12" "error-term-estimated" Care:
+    ErrorTermEstimated = "W12" "error-term-estimated" Note:
         "The recording shows a significant error term, so turncal estimated it together with K, E and D. The values \
          are valid only together with this term: `turncal apply` removes it, while export formats without error \
          terms leave it in and report this. To switch it off, list the terms that you want with --with."

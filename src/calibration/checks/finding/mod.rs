@@ -11,6 +11,9 @@ use serde_json::Value;
 use crate::imu::Sensor;
 use kind::{Kind, Level};
 
+/// Growth of σ from which a user would decide otherwise.
+const MATTERS: f64 = 1.5;
+
 /// A finding of a check: the problem, its meaning for the result and the remedy, with figures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
@@ -19,6 +22,9 @@ pub struct Finding {
     pub code: String,
     /// The name of its kind, such as `not-observed`.
     pub kind: String,
+    /// Its severity, if it differs from that of its kind.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    level: Option<Level>,
     /// Its text.
     pub text: String,
     /// Its figures by name.
@@ -32,6 +38,7 @@ impl Finding {
         Self {
             code: kind.code().to_owned(),
             kind: kind.name().to_owned(),
+            level: None,
             text,
             figures,
         }
@@ -49,9 +56,23 @@ impl Finding {
         Self::new(Kind::StatementDoubted, doubt, figures)
     }
 
+    /// The same as a note if σ grew by less than half: they include it, and hardly matter more than without it.
+    pub fn of_growth(self, growth: f64) -> Self {
+        if growth < MATTERS { self.noted() } else { self }
+    }
+
+    /// The same as a note.
+    pub fn noted(self) -> Self {
+        Self {
+            level: Some(Level::Note),
+            ..self
+        }
+    }
+
     /// Its severity. Unknown kinds, from another version, have the level of care.
     pub fn level(&self) -> Level {
-        Kind::named(&self.kind).map_or(Level::Care, Kind::level)
+        let of_kind = || Kind::named(&self.kind).map_or(Level::Care, Kind::level);
+        self.level.unwrap_or_else(of_kind)
     }
 
     /// Whether it is of this kind.

@@ -13,9 +13,12 @@ pub enum Word {
     /// It converged, its σ agree with its residuals, and all requested parameters are determined.
     #[serde(rename = "good")]
     Good,
-    /// Usable, with the restrictions stated in its reasons.
+    /// Usable, but what its reasons name made σ grow or overruled a statement.
     #[serde(rename = "use with care")]
     UseWithCare,
+    /// Some of the requested parameters are not determined; the others are usable.
+    #[serde(rename = "partial")]
+    Partial,
     /// Its values must not be used.
     #[serde(rename = "failed")]
     Failed,
@@ -35,7 +38,7 @@ impl Word {
     pub fn class(self) -> &'static str {
         match self {
             Self::Good | Self::Pass => "good",
-            Self::UseWithCare | Self::Undecided => "care",
+            Self::UseWithCare | Self::Partial | Self::Undecided => "care",
             Self::Failed | Self::Fail => "failed",
         }
     }
@@ -46,6 +49,7 @@ impl fmt::Display for Word {
         f.write_str(match self {
             Self::Good => "GOOD",
             Self::UseWithCare => "USE WITH CARE",
+            Self::Partial => "PARTIAL",
             Self::Failed => "FAILED",
             Self::Pass => "PASS",
             Self::Undecided => "UNDECIDED",
@@ -70,6 +74,7 @@ impl Verdict {
         let worst = worst.unwrap_or(Level::Note);
         let word = match worst {
             Level::Failed => Word::Failed,
+            Level::Partial => Word::Partial,
             Level::Care => Word::UseWithCare,
             Level::Note => Word::Good,
         };
@@ -99,20 +104,25 @@ mod tests {
         assert_eq!(of(&[Kind::Recording, Kind::TermNotShown]), of(&[]));
         let care = of(&[
             Kind::Recording,
-            Kind::NoiseLearnt,
+            Kind::MoveWrong,
             Kind::Rounded,
-            Kind::NoiseLearnt,
+            Kind::MoveWrong,
         ]);
         assert_eq!(
             (care.word, care.reasons.join(" ").as_str()),
-            (Word::UseWithCare, "W07 W22")
+            (Word::UseWithCare, "W17 W22")
         );
-        let failed = of(&[Kind::NoiseLearnt, Kind::NotConverged]);
+        let partial = of(&[Kind::Rounded, Kind::NotObserved]);
+        assert_eq!(
+            (partial.word, partial.reasons.join(" ").as_str()),
+            (Word::Partial, "W04")
+        );
+        let failed = of(&[Kind::NotObserved, Kind::NotConverged]);
         assert_eq!(
             (failed.word, failed.reasons.join(" ").as_str()),
             (Word::Failed, "W02")
         );
         let json = serde_json::to_string(&care).unwrap();
-        assert_eq!(json, r#"{"word":"use with care","reasons":["W07","W22"]}"#);
+        assert_eq!(json, r#"{"word":"use with care","reasons":["W17","W22"]}"#);
     }
 }

@@ -1,0 +1,111 @@
+//! A calibration file, as it was written.
+
+use super::calibration::{cross_validation, in_order};
+use super::prelude::*;
+use super::values;
+use turncal::calibration::{Calibration, Verdict, Word};
+
+/// Verdict, findings, values and, beyond one screen, every parameter with its sources of uncertainty.
+pub fn document(calibration: &Calibration, name: &str) -> Document {
+    let mut document = Document::new(name);
+    document.verdict = calibration
+        .verdict
+        .as_ref()
+        .map(|of| verdict(calibration, of));
+    document.lead.extend(origin(calibration));
+    document.findings = in_order(&calibration.findings);
+    document.brief.push(values::table(calibration).into());
+    document.brief.push(facts(calibration).into());
+    document.both(parameters(calibration));
+    document.both(noise(calibration));
+    document.both(terms(calibration));
+    document
+}
+
+fn verdict(calibration: &Calibration, verdict: &Verdict) -> (Word, String) {
+    let of_it = match verdict.word {
+        Word::Failed => "do not use values or σ".to_owned(),
+        _ => values::determined(calibration),
+    };
+    let findings = several(calibration.findings.len(), "finding");
+    (verdict.word, format!("{of_it}, {findings}"))
+}
+
+/// Duration, rate and dwells of the recording.
+fn origin(calibration: &Calibration) -> Option<String> {
+    let of = calibration.provenance.as_ref()?;
+    let [duration, rate] = [of.duration_s, of.rate_hz].map(three_digits);
+    Some(format!(
+        "{duration} s at {rate} Hz, {}",
+        several(of.dwells, "dwell")
+    ))
+}
+
+fn facts(calibration: &Calibration) -> Facts {
+    let mut facts = Facts::default();
+    let held_out = calibration.quality.as_ref().and_then(cross_validation);
+    if let Some(words) = held_out {
+        facts.push("excluded from fit", words);
+    }
+    if let Some(of) = &calibration.provenance {
+        let files = of.inputs.iter().map(|input| input.name.as_str());
+        facts.push("from", files.collect::<Vec<_>>().join(", "));
+        facts.push("by", of.program.clone());
+    }
+    for (name, text) in &calibration.meta {
+        facts.push(name, text.clone());
+    }
+    facts
+}
+
+/// Every estimated parameter in the unit of the file, with the largest part of its uncertainty.
+fn parameters(calibration: &Calibration) -> Table {
+    let columns = ["parameter", "value", "1σ", "coverage factor", "mostly from"];
+    let rows = calibration.parameters.iter().enumerate();
+    let rows = rows.filter_map(|(k, name)| {
+        let (value, own) = (calibration.get(name)?, *calibration.sigma_of(name)?);
+        let budget = calibration.budget.as_ref();
+        let factor = budget.and_then(|of| of.coverage_factor.get(k).copied());
+        let parts = budget.into_iter().flat_map(|of| &of.sources);
+        let parts = parts.filter_map(|of| Some((of, *of.u.get(k)?)));
+        let largest = parts.max_by(|a, b| a.1.total_cmp(&b.1));
+        let source = largest.map(|(of, u)| {
+            let share = 100.0 * (u / own).powi(2);
+            format!("{} {share:.0} %", of.source)
+        });
+        Some(cells![
+            name,
+            turncal::number::value(*value, own),
+            sigma(own),
+            or_dash(factor, three_digits),
+            source.unwrap_or_else(|| NONE.to_owned())
+        ])
+    });
+    Table::new("Parameters, in the unit of the file", columns).section(rows)
+}
+
+fn noise(calibration: &Calibration) -> Table {
+    let columns = ["noise", "used", "95 % interval", "stated", "unit"];
+    let sources = calibration.noise.iter().flat_map(|of| &of.report.sources);
+    let rows = sources.filter(|of| of.counts()).map(|of| {
+        let ends = of
+            .interval
+            .map(|[low, high]| format!("{} to {}", three_digits(low), three_digits(high)));
+        cells![
+            of.name.clone(),
+            three_digits(of.used),
+            ends.unwrap_or_else(|| NONE.to_owned()),
+            or_dash(of.stated, three_digits),
+            of.unit.clone()
+        ]
+    });
+    Table::new("Noise", columns).section(rows)
+}
+
+fn terms(calibration: &Calibration) -> Table {
+    let rows = calibration.terms.iter().map(|(name, of)| {
+        let own = of.sigma.unwrap_or(0.0);
+        cells![name, turncal::number::value(of.value, own), sigma(own)]
+    });
+    Table::new("Error terms, in SI", ["term", "value", "1σ"]).section(rows)
+}

@@ -1,0 +1,135 @@
+//! The values of a calibration: K, E and D of each axis with their σ.
+
+use super::prelude::*;
+use turncal::calibration::Calibration;
+use turncal::imu::{AXES, Sensor};
+
+/// The unit of raw numbers, for which a scale factor relative to the nominal one says little.
+const RAW: &str = "count";
+
+/// One row an axis.
+pub fn table(calibration: &Calibration) -> Table {
+    let columns = ["", "K", "E to x, ″", "to y, ″", "to z, ″", "D"];
+    let axes = Sensor::ALL
+        .into_iter()
+        .flat_map(|sensor| AXES.map(|axis| (sensor, axis)));
+    let rows = axes.map(|(sensor, axis)| row(calibration, sensor, axis));
+    let table = Table::new("", columns).section(rows);
+    let scale = Sensor::ALL.map(|sensor| {
+        let input = match sensor {
+            Sensor::Gyro => "rad/s",
+            Sensor::Accel => "m/s²",
+        };
+        match unit(calibration, sensor) {
+            Some(RAW) => format!("counts per second for 1 {input}"),
+            _ => "relative to the nominal scale".to_owned(),
+        }
+    });
+    let scale = match scale {
+        [gyro, accel] if gyro == accel => gyro,
+        [gyro, accel] => format!("{gyro} (gyros), {accel} (accelerometers)"),
+    };
+    table.note(format!(
+        "In parentheses: 1σ in units of the last digit. K: {scale}; D: °/h and µg."
+    ))
+}
+
+fn unit(calibration: &Calibration, sensor: Sensor) -> Option<&str> {
+    let units = calibration.unit.as_ref()?;
+    Some(units.get(sensor))
+}
+
+/// Name, scale factor, misalignments to x, y and z, and bias of an axis.
+fn row(calibration: &Calibration, sensor: Sensor, axis: char) -> Vec<String> {
+    let name = sensor.name();
+    let nominal = nominal(calibration, sensor, axis);
+    let scale = if unit(calibration, sensor) == Some(RAW) {
+        1.0
+    } else {
+        nominal
+    };
+    let of = |kind: &str, axes: String, size: f64| {
+        let parameter = format!("{name}.{kind}.{axes}");
+        cell(calibration, &parameter, size)
+    };
+    let bias = match sensor {
+        Sensor::Gyro => DEG_PER_H,
+        Sensor::Accel => MICRO_G,
+    };
+    let angles = AXES.map(|to| {
+        if to == axis {
+            NONE.to_owned()
+        } else {
+            of("installation", format!("{axis}{to}"), ARCSEC)
+        }
+    });
+    let first = [
+        format!("{name:<5}  {axis}"),
+        of("scale", axis.into(), scale),
+    ];
+    let last = of("bias", axis.into(), nominal * bias);
+    first.into_iter().chain(angles).chain([last]).collect()
+}
+
+/// Nominal scale of an axis, in the file's quantity.
+fn nominal(calibration: &Calibration, sensor: Sensor, axis: char) -> f64 {
+    let place = AXES.iter().position(|&of| of == axis).unwrap_or(0);
+    let nominal = calibration
+        .provenance
+        .as_ref()
+        .map(|of| of.nominal.get(sensor)[place]);
+    // A record without its origin has no other nominal scale.
+    nominal.unwrap_or_else(|| calibration.triad(sensor).scale[place].abs())
+}
+
+/// A parameter over a size; a dash if it is zero by definition or was not determined.
+fn cell(calibration: &Calibration, name: &str, size: f64) -> String {
+    let Some(&value) = calibration.get(name) else {
+        return NONE.to_owned();
+    };
+    let sigma = calibration.sigma_of(name).copied().unwrap_or(0.0);
+    let is_estimated = calibration.parameters.iter().any(|of| of == name);
+    let is_fixed = calibration.method.is_none() || (value != 0.0 && sigma == 0.0);
+    if is_estimated {
+        with_last_digits(value / size, sigma / size.abs())
+    } else if is_fixed {
+        three_digits(value / size)
+    } else {
+        NONE.to_owned()
+    }
+}
+
+/// What of each triad is determined, such as `gyros: D only; accelerometers: 9 of 9`.
+pub fn determined(calibration: &Calibration) -> String {
+    let of_triad = |sensor: Sensor| {
+        let kinds = [("scale", "K"), ("installation", "E"), ("bias", "D")];
+        let counts = kinds.map(|(kind, letter)| {
+            let of_kind = format!("{}.{kind}.", sensor.name());
+            let is_it = |name: &&String| name.starts_with(&of_kind);
+            let known = calibration.parameters.iter().filter(is_it).count();
+            let missing = calibration.undetermined().filter(is_it).count();
+            (letter, known, known + missing)
+        });
+        let asked: usize = counts.iter().map(|of| of.2).sum();
+        let known: usize = counts.iter().map(|of| of.1).sum();
+        let parts: Vec<String> = counts
+            .iter()
+            .filter(|of| of.1 > 0)
+            .map(|(letter, known, asked)| {
+                if known == asked {
+                    (*letter).to_owned()
+                } else {
+                    format!("{letter} ({known} of {asked})")
+                }
+            })
+            .collect();
+        let words = match known {
+            0 => "nothing".to_owned(),
+            _ if known == asked => format!("{known} of {asked}"),
+            _ => format!("{} only", parts.join(", ")),
+        };
+        (asked > 0).then(|| format!("{}: {words}", triad_name(sensor)))
+    };
+    let triads: Vec<String> = Sensor::ALL.into_iter().filter_map(of_triad).collect();
+    triads.join("; ")
+}
