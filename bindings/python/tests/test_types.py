@@ -14,6 +14,8 @@ calibration = run.calibrate(with_="accel-second-order", progress=lambda done, to
 bias: float = calibration["gyro.bias.x"] + calibration.sigma("gyro.bias.x")
 verdict: str | None = calibration.verdict
 report: turncal.Report = turncal.study("accuracy", runs=10)
+gravity: float = float(np.linalg.norm(calibration.correction.accel @ (np.ones(3) - calibration.bias.accel)))
+turncal.run(gyro=np.zeros((9, 3)), accel=np.zeros((9, 3)), time=np.arange(9.0), gyro_unit="rad/s")
 written: bytes = turncal.export(calibration, "kalibr")
 expected = turncal.path.evaluate("three-axis").data["sigma"]
 session = turncal.Session(100.0, "bmi088")
