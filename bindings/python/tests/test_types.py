@@ -2,6 +2,9 @@
 
 import subprocess
 import sys
+from pathlib import Path
+
+import turncal
 
 PROGRAM = '''
 import numpy as np
@@ -35,6 +38,11 @@ def test_a_program_of_a_user_passes_mypy_strict(tmp_path):
     path = tmp_path / "program.py"
     path.write_text(PROGRAM)
     done = mypy(path)
+    assert done.returncode == 0, done.stdout
+
+
+def test_the_package_passes_mypy_strict():
+    done = mypy(Path(turncal.__file__).parent)
     assert done.returncode == 0, done.stdout
 
 
