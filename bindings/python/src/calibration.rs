@@ -7,7 +7,7 @@ use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyIterator;
 use turncal::calibration;
-use turncal::calibration::{Finding, FindingKind, Progress as Passes};
+use turncal::calibration::{Correction, Finding, FindingKind, Progress as Passes};
 use turncal::imu::{Output, Sensor, Term};
 use turncal::lot::{Lot, Specification, Unit};
 use turncal::study::CheckedCalibration;
@@ -19,6 +19,7 @@ use turncal_report::{Document, at_rest, lot as of_lot, write};
 use crate::errors::{in_python, raise, raised};
 use crate::report::{Report, brief, framed};
 use crate::run::{Recorded, Refusal, Request};
+use crate::values;
 use crate::wait::finish;
 
 /// What a report needs beside the calibration.
@@ -128,7 +129,7 @@ impl Calibration {
     }
 
     /// The unit of a parameter and its σ.
-    fn unit(&self, name: &str) -> String {
+    pub fn unit(&self, name: &str) -> String {
         let has = |term: &Term| {
             let mut names = term.parameters().filter_map(Term::parameter_name);
             names.any(|of| of == name)
@@ -232,7 +233,7 @@ impl Calibration {
 }
 
 /// A number of so many significant digits.
-fn digits(value: f64, digits: usize) -> String {
+pub fn digits(value: f64, digits: usize) -> String {
     let rounded = format!("{value:.*e}", digits - 1).parse();
     rounded.unwrap_or(value).to_string()
 }
@@ -295,8 +296,8 @@ impl Calibration {
     ///
     /// Returns
     /// -------
-    /// pandas.DataFrame
-    ///     Columns ``value``, ``sigma`` (zero if not estimated) and ``unit``, a row for each parameter by name.
+    /// pandas.DataFrame, or structured array without pandas
+    ///     Columns ``value``, ``sigma`` (zero if not estimated) and ``unit``, a row for each ``parameter``.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let columns = ("parameter", "value", "sigma", "unit");
@@ -308,8 +309,8 @@ impl Calibration {
     ///
     /// Returns
     /// -------
-    /// pandas.DataFrame
-    ///     Shape (n, n), rows and columns by name.
+    /// pandas.DataFrame, or array without pandas
+    ///     Shape (n, n), rows and columns by name, in the order of the parameters whose σ is not zero.
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (names, rows) = (
@@ -318,6 +319,27 @@ impl Calibration {
         );
         py.import("turncal._frames")?
             .call_method1("covariance", (names, rows))
+    }
+
+    /// Scale factors K: ``scale.gyro`` and ``scale.accel`` are arrays of shape (3,).
+    #[getter]
+    fn scale<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        values::vectors(py, |sensor| self.record.triad(sensor).scale)
+    }
+
+    /// Biases D: ``bias.gyro`` and ``bias.accel`` are arrays of shape (3,).
+    #[getter]
+    fn bias<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        values::vectors(py, |sensor| self.record.triad(sensor).bias)
+    }
+
+    /// Matrices of ``u = correction · (N − bias)``: ``correction.gyro`` and ``correction.accel``, of shape (3, 3).
+    ///
+    /// The matrices are for the reference temperature and do not contain error terms; :meth:`apply` includes both.
+    #[getter]
+    fn correction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let by = Correction::of_record(&self.record).map_err(raise)?;
+        values::matrices(py, &by.matrix)
     }
 
     /// "good", "use with care" or "failed"; None for values that were not estimated.
@@ -350,9 +372,9 @@ impl Calibration {
     ///
     /// Parameters
     /// ----------
-    /// data : DataFrame, array of shape (rows, columns), mapping of arrays, or Run
+    /// data : DataFrame, Dataset of xarray, array of shape (rows, columns), mapping of arrays, or Run, optional
     ///     Samples as logged.
-    /// gyro, accel : (x, y, z) or (x, y, z, unit), optional
+    /// gyro, accel : (x, y, z), (x, y, z, unit) or array of shape (n, 3), optional
     ///     Columns along right, front and up; a minus before a name reverses a column. Default: those of the run that
     ///     was calibrated, by name.
     /// rate : float, optional
@@ -363,10 +385,10 @@ impl Calibration {
     /// DataFrame or array of shape (n, 6)
     ///     Angular rate in rad/s and specific force in m/s² along right, front and up, of the kind of `data`; for a Run
     ///     also start and end of each sample in s.
-    #[pyo3(signature = (data, gyro=None, accel=None, rate=None))]
+    #[pyo3(signature = (data=None, gyro=None, accel=None, rate=None))]
     fn apply<'py>(
         slf: Bound<'py, Self>,
-        data: Bound<'py, PyAny>,
+        data: Option<Bound<'py, PyAny>>,
         gyro: Option<Bound<'py, PyAny>>,
         accel: Option<Bound<'py, PyAny>>,
         rate: Option<Bound<'py, PyAny>>,
@@ -402,6 +424,11 @@ impl Calibration {
     }
 
     fn _repr_html_(&self, py: Python) -> PyResult<String> {
-        Ok(framed(&self.page(py)?))
+        let mut page = self.page(py)?;
+        let verdict = page.verdict.take();
+        let verdict = verdict.map_or_else(String::new, |(word, summary)| {
+            format!("<p><strong>{word}</strong> {}</p>", in_python(&summary))
+        });
+        Ok(verdict + &values::html(self) + &framed(&page))
     }
 }

@@ -12,6 +12,7 @@ mod results;
 mod run;
 mod session;
 mod study;
+mod values;
 mod wait;
 
 use std::ffi::OsString;

@@ -189,7 +189,7 @@ impl Run {
     ///
     /// Returns
     /// -------
-    /// pandas.DataFrame
+    /// pandas.DataFrame, or structured array without pandas
     ///     Columns ``value``, ``certainty`` ("certain", "guess" or "unknown") and ``why``, a row for each ``what``.
     #[getter]
     fn found<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {

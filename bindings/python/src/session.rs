@@ -124,8 +124,8 @@ fn as_dict<'py>(py: Python<'py>, status: &Status) -> PyResult<Bound<'py, PyAny>>
 
 /// Rows of three numbers.
 fn samples(name: &str, of: &Bound<PyAny>) -> PyResult<Vec<Vector3<f64>>> {
-    let frames = of.py().import("turncal._frames")?;
-    let of: PyReadonlyArray2<f64> = frames.call_method1("samples", (name, of))?.extract()?;
+    let columns = of.py().import("turncal._columns")?;
+    let of: PyReadonlyArray2<f64> = columns.call_method1("samples", (name, of))?.extract()?;
     let rows = of.as_array();
     let vector = |row: ArrayView1<f64>| Vector3::new(row[0], row[1], row[2]);
     Ok(rows.rows().into_iter().map(vector).collect())

@@ -11,6 +11,10 @@ BY_HAND = Path(__file__).with_name("data") / "by-hand.toml"
 COMMAND = str(Path(sys.executable).with_name("turncal"))
 
 
+def pytest_addoption(parser):
+    parser.addoption("--store", action="store_true", help="store the outputs of the notebooks")
+
+
 def command(*arguments, **options):
     """Standard output of the command."""
     done = subprocess.run([COMMAND, *map(str, arguments)], capture_output=True, **options)

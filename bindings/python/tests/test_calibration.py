@@ -91,6 +91,8 @@ def test_a_verdict_is_explained(calibration):
     assert {finding.split(" ", 1)[1] for finding in calibration.findings} == words
     page = calibration._repr_html_()
     assert calibration.verdict.upper() in page and "svg" in page and all(name in page for name in calibration)
+    first, z = page.split("<iframe")[0], calibration.bias.gyro[2]
+    assert f"<td>{z:.6f} ± {calibration.sigma('gyro.bias.z'):.6f}</td>" in first and first.count("±") > 21
     assert f"{calibration.verdict}, 21 of 21 parameters determined, " in repr(calibration)
 
 

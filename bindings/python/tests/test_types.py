@@ -2,6 +2,9 @@
 
 import subprocess
 import sys
+from pathlib import Path
+
+import turncal
 
 PROGRAM = '''
 import numpy as np
@@ -14,6 +17,8 @@ calibration = run.calibrate(with_="accel-second-order", progress=lambda done, to
 bias: float = calibration["gyro.bias.x"] + calibration.sigma("gyro.bias.x")
 verdict: str | None = calibration.verdict
 report: turncal.Report = turncal.study("accuracy", runs=10)
+gravity: float = float(np.linalg.norm(calibration.correction.accel @ (np.ones(3) - calibration.bias.accel)))
+turncal.run(gyro=np.zeros((9, 3)), accel=np.zeros((9, 3)), time=np.arange(9.0), gyro_unit="rad/s")
 written: bytes = turncal.export(calibration, "kalibr")
 expected = turncal.path.evaluate("three-axis").data["sigma"]
 session = turncal.Session(100.0, "bmi088")
@@ -33,6 +38,11 @@ def test_a_program_of_a_user_passes_mypy_strict(tmp_path):
     path = tmp_path / "program.py"
     path.write_text(PROGRAM)
     done = mypy(path)
+    assert done.returncode == 0, done.stdout
+
+
+def test_the_package_passes_mypy_strict():
+    done = mypy(Path(turncal.__file__).parent)
     assert done.returncode == 0, done.stdout
 
 

@@ -13,7 +13,7 @@ REFUSED = (ValueError, TypeError, KeyError, OverflowError, OSError)
 NUMBERS = [float("nan"), float("inf"), -1.0, "100", None.__class__, 1e400, [1.0], 1j]
 NAMES = ["", "ekf2", 7, b"ekf", None.__class__, "\0", "ä" * 10_000, ["ekf"]]
 PATHS = ["", "/", "/no/such/file", "\0", 3.5, "x" * 5000, ".", None.__class__]
-COLUMNS = ["gx", (), ("gx",), ("gx", "gy", "gw"), ("gx", "gy", "gz", "furlong"), ("gx", "gy", "gz", 1), 5]
+COLUMNS = [np.zeros((600, 2)), np.zeros(3, complex), "gx", (), ("gx",), ("gx", "gy", "gw"), ("gx", "gy", "gz", "furlong"), ("gx", "gy", "gz", 1), 5]
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Union
 
 from turncal import _turncal
-from turncal._frames import Columns, Data, run
+from turncal._columns import Columns, Data
+from turncal._frames import run
 from turncal._turncal import Calibration, Known, Report, Run
 
 PathLike = Union[str, "os.PathLike[str]"]
@@ -121,7 +122,7 @@ def init(
 
 
 def allan(
-    data: Data | Run,
+    data: Data | Run = None,
     *,
     gyro: Columns | None = None,
     accel: Columns | None = None,
@@ -133,10 +134,10 @@ def allan(
 
     Parameters
     ----------
-    data : DataFrame, array, mapping of arrays, or Run
+    data : DataFrame, Dataset of xarray, array, mapping of arrays, or Run, optional
         Samples at rest.
     gyro, accel, gyro_unit, accel_unit, rate : optional
-        Columns, units and rows per second, as in :func:`run`. One triad is enough.
+        Columns or arrays, units and rows per second, as in :func:`run`. One triad is enough.
 
     Returns
     -------
