@@ -13,6 +13,8 @@ const GAP: usize = 2;
 
 /// Lines of one screen.
 const SCREEN: usize = 40;
+/// Most lines of a problem, and of its remedy.
+const LINES: usize = 2;
 /// Most findings on a screen.
 const SHOWN: usize = 3;
 /// Assumed screen width if unknown.
@@ -48,17 +50,21 @@ fn findings(all: &[Finding], width: usize, room: usize) -> Vec<String> {
         let code = format!("  {}  ", finding.code);
         let next = next.filter(|_| finding.level() != Level::Note);
         let next = next.map(|next| format!("{CODE}→ {next}"));
-        let next = next
+        let next: Vec<String> = next
             .iter()
-            .flat_map(|next| wrapped(next, "         ", Some(width)));
-        let what = wrapped(&format!("{code}{what}"), CODE, Some(width)).into_iter();
-        what.chain(next).collect::<Vec<String>>()
+            .flat_map(|next| wrapped(next, "         ", Some(width)))
+            .collect();
+        let what = wrapped(&format!("{code}{what}"), CODE, Some(width));
+        at_most(LINES, what, width)
+            .chain(at_most(LINES, next, width))
+            .collect::<Vec<String>>()
     };
     let mut lines = Vec::new();
     for (place, finding) in all.iter().enumerate() {
         let more = of_one(finding);
         let is_last = place + 1 == all.len();
-        if place == SHOWN || lines.len() + more.len() + usize::from(!is_last) > room {
+        let fits = lines.len() + more.len() + usize::from(!is_last) <= room;
+        if place == SHOWN || (place > 0 && !fits) {
             let more = all.len() - place;
             lines.push(format!("{CODE}and {more} more"));
             break;
@@ -66,6 +72,16 @@ fn findings(all: &[Finding], width: usize, room: usize) -> Vec<String> {
         lines.extend(more);
     }
     lines
+}
+
+/// The first lines, the last of which shows that some follow.
+fn at_most(count: usize, mut lines: Vec<String>, width: usize) -> impl Iterator<Item = String> {
+    if lines.len() > count {
+        lines.truncate(count);
+        let last = lines.pop().unwrap_or_default();
+        lines.push(cut(&format!("{last} …"), width));
+    }
+    lines.into_iter()
 }
 
 /// A line cut to the available width.

@@ -4,11 +4,19 @@ use nalgebra::Vector3;
 use serde_json::json;
 
 use super::term::is_shown;
-use crate::calibration::{Candidate, Constant, Finding, FindingKind as Kind, Outcome};
-use crate::units::DEG_PER_H;
+use crate::calibration::{
+    Candidate, Constant, Finding, FindingKind as Kind, Group, Level, Outcome, Problem,
+};
+use crate::earth::{Site, normal_gravity};
+use crate::imu::{ParameterKind, Sensor};
+use crate::number::{three_digits, value};
+use crate::units::{DEG_PER_H, DEGREE, PPM};
+
+/// Gravity of a wrong latitude makes accelerometer scale factors useless beyond this many σ.
+const USELESS: f64 = 4.0;
 
 /// The finding, if Earth rate is not that of the stated latitude.
-pub fn earth_rate(outcome: &Outcome) -> Option<Finding> {
+pub fn earth_rate(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
     let candidates = &outcome.solved.effects.candidates;
     let count = candidates.absent().count();
     let mut absent = candidates.absent();
@@ -21,14 +29,53 @@ pub fn earth_rate(outcome: &Outcome) -> Option<Finding> {
     let mut rate = Vector3::zeros();
     for (constant, mean) in constants {
         if let Constant::EarthRate(axis) = constant {
-            rate[*axis] = mean / DEG_PER_H;
+            rate[*axis] = *mean;
         }
     }
-    let text = format!(
-        "The gyros sense an Earth rate that differs from the one at latitude_deg by {:+.4}, {:+.4}, {:+.4} °/h (East, \
-         North, Up). turncal estimated it. Check latitude_deg and the north and level of the table.",
-        rate.x, rate.y, rate.z
+    let site = &problem.run().site;
+    let sensed = site.earth_rate_n() + rate;
+    let fits = sensed.z.atan2(sensed.x.hypot(sensed.y));
+    let [fits_deg, stated] = [fits, site.latitude].map(|of| value(of / DEGREE, 1.0));
+    let mut text = format!(
+        "The gyros sense the Earth rate of latitude {fits_deg}°, but {stated}° is stated. turncal estimated Earth rate"
     );
-    let figures = json!({ "deg_per_h": [rate.x, rate.y, rate.z], "present": 1.0 - absent });
-    Some(Finding::new(Kind::EarthRateWrong, text, figures))
+    let off = by_gravity(site, fits);
+    let sigmas = off / scale_sigma(outcome);
+    if off > 0.0 {
+        text += &format!(
+            ", but gravity of the wrong latitude makes accelerometer scale factors wrong by {} ppm ({} σ)",
+            three_digits(off / PPM),
+            three_digits(sigmas)
+        );
+    }
+    text += ". Check latitude_deg and the north and level of the table.";
+    let figures = json!({
+        "deg_per_h": Vec::from_iter(rate.iter().map(|of| of / DEG_PER_H)), "present": 1.0 - absent,
+        "latitude_deg": fits / DEGREE, "scale_error_ppm": off / PPM
+    });
+    let finding = Finding::new(Kind::EarthRateWrong, text, figures);
+    Some(if sigmas > USELESS {
+        finding.at(Level::Failed)
+    } else {
+        finding
+    })
+}
+
+/// Relative error of gravity if it was taken from the stated latitude and another one is right; zero if gravity is stated.
+fn by_gravity(site: &Site, latitude: f64) -> f64 {
+    let [taken, right] = [site.latitude, latitude].map(|of| normal_gravity(of, site.height));
+    if (taken - site.gravity).abs() < site.gravity_sigma {
+        (right / taken - 1.0).abs()
+    } else {
+        0.0
+    }
+}
+
+/// RMS σ of the accelerometers' scale factors.
+fn scale_sigma(outcome: &Outcome) -> f64 {
+    let sigma = outcome.estimate.sigma();
+    let scale =
+        Group::all().find(|of| of.sensor() == Sensor::Accel && of.kind() == ParameterKind::Scale);
+    let rms = scale.and_then(|of| of.rms(&sigma, &outcome.estimate));
+    rms.map_or(f64::INFINITY, |rms| rms * PPM)
 }

@@ -39,7 +39,7 @@ pub fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
     remarks
         .chain(unexplained::not_converged(outcome))
         .chain(unexplained::absurd(&outcome.residuals))
-        .chain(latitude::earth_rate(outcome))
+        .chain(latitude::earth_rate(problem, outcome))
         .chain(outcome.events.iter().map(Event::finding))
         .chain(settling::settles(problem, outcome))
         .chain(TermEvidence::findings(&outcome.terms))

@@ -17,7 +17,6 @@ pub fn add(document: &mut Document, report: &Report) {
     let navigated = report.navigation.ok().filter(|of| !of.is_empty());
     let mut facts = Facts::default();
     for (name, value) in [
-        ("weakest", weakest(report)),
         (
             "excluded from fit",
             report.quality.and_then(tables::cross_validation),
@@ -67,21 +66,4 @@ fn accuracy(report: &Report, estimate: &Estimate) -> Table {
         (2..table.columns.len()).partition(|column| table.columns[*column] == "closed form error");
     table.optional = [others, first].concat();
     table
-}
-
-/// The parameter with the smallest reduction of its prior σ.
-fn weakest(report: &Report) -> Option<String> {
-    let (estimate, outcome) = (report.estimate()?, report.outcome?);
-    let (sigma_of, prior) = (estimate.sigma(), &outcome.prior_sigma);
-    let left = |i: &usize| sigma_of[*i] / prior[*i];
-    let known = estimate.estimated().filter(|i| left(i).is_finite());
-    let index = known.max_by(|a, b| left(a).total_cmp(&left(b)))?;
-    let group = Group::of(index);
-    let own = sigma(sigma_of[index] / group.unit_value());
-    let axis = axis_name(estimate.form(), index);
-    Some(format!(
-        "{} {axis}, ±{own} {} (1σ)",
-        group.title(),
-        group.unit()
-    ))
 }

@@ -58,13 +58,17 @@ impl Finding {
 
     /// The same as a note if σ grew by less than half: they include it, and hardly matter more than without it.
     pub fn of_growth(self, growth: f64) -> Self {
-        if growth < MATTERS { self.noted() } else { self }
+        if growth < MATTERS {
+            self.at(Level::Note)
+        } else {
+            self
+        }
     }
 
-    /// The same as a note.
-    pub fn noted(self) -> Self {
+    /// The same with another severity than that of its kind.
+    pub fn at(self, level: Level) -> Self {
         Self {
-            level: Some(Level::Note),
+            level: Some(level),
             ..self
         }
     }

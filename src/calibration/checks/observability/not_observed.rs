@@ -4,7 +4,7 @@
 use serde_json::json;
 
 use crate::calibration::{
-    Finding, FindingKind as Kind, OBSERVED_BELOW, Outcome, auxiliary_name, parameter_name,
+    Finding, FindingKind as Kind, Level, OBSERVED_BELOW, Outcome, auxiliary_name, parameter_name,
 };
 use crate::units::DEGREE;
 
@@ -19,7 +19,7 @@ pub fn not_observed_by_path(outcome: &Outcome) -> Vec<Finding> {
         not_observed(path, parameters),
         combinations(together),
         (!outcome.heading_observed()).then(|| heading(outcome.attitude_sigma.z)),
-        not_observed(path, constants.collect()),
+        not_observed(path, constants.collect()).map(|finding| finding.at(Level::Note)),
         outcome.auxiliary.even_terms_inseparable().then(even_terms),
         temperature_not_seen(unseen_temperature(outcome)),
     ];
