@@ -41,6 +41,7 @@ impl Synthetic {
             findings: &self.outcome.findings,
             budget: None,
             predicted: None,
+            specification: None,
             quality: None,
             true_terms: &NO_TERMS,
             closed_form: Some(ClosedForm {

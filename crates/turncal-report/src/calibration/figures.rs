@@ -21,6 +21,7 @@ impl Report<'_> {
         let mut plots = Vec::new();
         if let Some(outcome) = self.against_time() {
             plots.extend(self.innovations(outcome));
+            plots.extend(self.noise());
         }
         if self.outcome.is_none() || self.against_time().is_some() {
             plots.push(path(self));
@@ -162,7 +163,7 @@ fn correlation(estimate: &Estimate) -> Option<Plot> {
     let y = Axis::places(names().rev());
     let mut panel = Panel::new("", Axis::places(names()), y).with_all(series);
     panel.square = true;
-    let plot = Plot::new("correlation.svg", "Correlations", (1, 1000), [panel]).caption(format!(
+    let plot = Plot::new("correlation.svg", "Correlations", (1, 860), [panel]).caption(format!(
         "Correlation of the estimated parameters. Below the diagonal the side of a square grows with the magnitude; \
          blue squares are positive, orange ones negative. Above the diagonal, the coefficient is given in hundredths \
          if its magnitude is at least {WRITTEN}. Strongly correlated parameters were observed by this path as a sum or \
