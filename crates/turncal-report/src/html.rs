@@ -13,6 +13,9 @@ use turncal::calibration::{Finding, FindingKind as Kind};
 /// The style of every page.
 const STYLE: &str = include_str!("style.css");
 
+/// Letters of the longest number with σ and unit.
+const LONGEST: usize = 20;
+
 /// A file of a report that could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {path}: {source}. The directory must exist and be writable", path = path.display())]
@@ -89,10 +92,27 @@ pub fn page(document: &Document) -> String {
     page.into_string()
 }
 
+/// A text without parentheses and sentences about options of the command, which its reader may not have.
+fn without_options(text: &str) -> String {
+    let is_of_command = |part: &str| part.contains("--") || part.contains('`');
+    let parts = text
+        .split_inclusive(')')
+        .map(|part| match part.rfind(" (") {
+            Some(open) if is_of_command(&part[open..]) => &part[..open],
+            _ => part,
+        });
+    let text = parts.collect::<String>();
+    let sentences = text.split_inclusive(". ");
+    let kept = sentences.filter(|sentence| !is_of_command(sentence));
+    kept.collect::<String>().trim_end().to_owned()
+}
+
 /// Problem and remedy, with details collapsed.
 fn of_finding(finding: &Finding) -> Markup {
+    let mut finding = finding.clone();
+    finding.text = without_options(&finding.text);
+    let explanation = Kind::named(&finding.kind).map(|kind| without_options(kind.explanation()));
     let (what, next) = finding.headline();
-    let explanation = Kind::named(&finding.kind).map(Kind::explanation);
     html! {
         details {
             summary {
@@ -160,9 +180,19 @@ fn row_of(row: &[String]) -> Markup {
     html! {
         tr {
             @for (place, cell) in row.iter().enumerate() {
-                @if place == 0 { th scope="row" { (cell) } } @else { td { (cell) } }
+                @if place == 0 { th scope="row" { (cell) } } @else { td { (unbroken(cell)) } }
             }
         }
+    }
+}
+
+/// A number with its σ and unit on one line, any other text as it is.
+fn unbroken(cell: &str) -> String {
+    let is_number = cell.starts_with(|first: char| first.is_ascii_digit() || first == '−');
+    if is_number && cell.chars().count() <= LONGEST {
+        cell.replace(' ', "\u{a0}")
+    } else {
+        cell.to_owned()
     }
 }
 
@@ -179,5 +209,20 @@ fn plot(of: &Plot) -> Markup {
             }
             figcaption { (of.caption) " (" code { (of.file) } ")" }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_speaks_of_no_option() {
+        let text = "The form is too narrow (χ² 40). Look at drift (add --temperature if warm); else widen σ. Rerun \
+                    with --installation general.";
+        assert_eq!(
+            without_options(text),
+            "The form is too narrow (χ² 40). Look at drift; else widen σ."
+        );
     }
 }

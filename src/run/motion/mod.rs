@@ -6,5 +6,5 @@ mod rest;
 mod turn;
 
 pub use label::{LabelCheck, Verdict, checks};
-pub use rest::{Rest, UPRIGHT, Up, rests};
+pub use rest::{Rest, Up, rests};
 pub use turn::{Turn, turns};

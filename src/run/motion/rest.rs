@@ -6,7 +6,7 @@ use crate::run::{Dwell, Run};
 use crate::units::DEGREE;
 
 /// An axis within this angle of the vertical is up or down, rad.
-pub const UPRIGHT: f64 = 10.0 * DEGREE;
+const UPRIGHT: f64 = 10.0 * DEGREE;
 
 /// A dwell, evaluated with nominal scales and prior biases.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,15 +5,17 @@ use std::f64::consts::TAU;
 use super::report::Report;
 use crate::prelude::*;
 use turncal::imu::AXES;
-use turncal::run::motion::{Rest, UPRIGHT, rests};
+use turncal::run::motion::{Rest, rests};
 
+/// A position is missing if every dwell is farther from it, rad.
+const FAR: f64 = 45.0 * DEGREE;
 /// Half the width of a map of a hemisphere, whose radius is 1.
 const ROOM: f64 = 1.22;
 /// Points of a circle.
 const CIRCLE: usize = 121;
 
 impl Report<'_> {
-    /// The upward directions of all dwells along body axes, and those of the six positions that no dwell reached.
+    /// The upward directions of all dwells along body axes, and those of the six positions that no dwell is near.
     pub fn attitudes(&self) -> Option<Plot> {
         let rests = rests(self.run);
         let missing: Vec<(usize, f64)> = (0..AXES.len())
@@ -33,16 +35,17 @@ impl Report<'_> {
         };
         let caption = format!(
             "Dots: upward direction along the body axes in each dwell, in an equal-area map of the two hemispheres. \
-             Rings: positions with an axis up or down that no dwell reached within {:.0}°. {missing}.",
-            UPRIGHT / DEGREE
+             Inner circle: {far:.0}° from the pole. Rings: positions with an axis up or down that are more than {far:.0}° \
+             from every dwell. {missing}.",
+            far = FAR / DEGREE
         );
-        let plot = Plot::new("attitudes.svg", "Attitudes reached", (2, 420), panels);
+        let plot = Plot::new("attitudes.svg", "Attitudes reached", (3, 420), panels);
         (!rests.is_empty()).then(|| plot.caption(caption))
     }
 }
 
 fn is_in(rest: &Rest, (axis, sign): (usize, f64)) -> bool {
-    rest.up.is_upright() && rest.up.axis == axis && rest.up.down == (sign < 0.0)
+    sign * rest.force[axis] > rest.force.norm() * FAR.cos()
 }
 
 /// Such as `x down`.
@@ -67,8 +70,7 @@ fn hemisphere(rests: &[Rest], missing: &[(usize, f64)], side: f64) -> Panel {
         let points = steps(0.0, TAU, CIRCLE).map(move |t| (radius * t.cos(), radius * t.sin()));
         Series::line(points).color(Color::Quiet).width(0.75)
     };
-    // The circle at 45° from the pole.
-    let inner = map([0.5f64.sqrt(), 0.0, side * 0.5f64.sqrt()]).0;
+    let inner = map([FAR.sin(), 0.0, side * FAR.cos()]).0;
     let is_seen = |z: f64| z * side > -1e-9;
     let dwells = rests.iter().map(|rest| rest.force.normalize());
     let dwells = dwells

@@ -21,7 +21,6 @@ impl Report<'_> {
         let mut plots = Vec::new();
         if let Some(outcome) = self.against_time() {
             plots.extend(self.innovations(outcome));
-            plots.extend(self.noise());
         }
         if self.outcome.is_none() || self.against_time().is_some() {
             plots.push(path(self));
@@ -165,8 +164,8 @@ fn correlation(estimate: &Estimate) -> Option<Plot> {
     panel.square = true;
     let plot = Plot::new("correlation.svg", "Correlations", (1, 860), [panel]).caption(format!(
         "Correlation of the estimated parameters. Below the diagonal the side of a square grows with the magnitude; \
-         blue squares are positive, orange ones negative. Above the diagonal, the coefficient is given in hundredths \
-         if its magnitude is at least {WRITTEN}. Strongly correlated parameters were observed by this path as a sum or \
+         blue squares are positive, orange ones negative. Above the diagonal, a wide figure gives the coefficient in \
+         hundredths if its magnitude is at least {WRITTEN}. Strongly correlated parameters were observed by this path as a sum or \
          difference rather than each alone."
     ));
     (!indices.is_empty()).then_some(plot)

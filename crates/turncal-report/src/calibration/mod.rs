@@ -3,8 +3,11 @@
 mod attitudes;
 mod brief;
 mod budget;
+mod error_bars;
 pub mod figures;
 mod noise;
+#[cfg(test)]
+mod pictures;
 mod report;
 mod residuals;
 mod solved;
@@ -12,7 +15,6 @@ mod tables;
 pub mod temperature;
 #[cfg(test)]
 mod tests;
-mod values;
 
 use std::collections::BTreeSet;
 
@@ -47,12 +49,13 @@ impl Report<'_> {
         document.page(item(self));
         if let Some(estimate) = self.estimate() {
             document.both(self.parameters(estimate));
-            document.page(self.values(estimate));
+            document.page(self.error_bars(estimate));
         }
         let quality = self.quality.filter(|of| !of.dwells.is_empty());
         document.pages(quality.map(residuals::figure));
         document.pages(self.against_time().and_then(|outcome| self.sigma(outcome)));
         document.pages(self.against_time().and_then(|_| self.attitudes()));
+        document.pages(self.against_time().and_then(|_| self.noise()));
         document.pages(self.outcome.and_then(temperature::figure));
         document.fold("Residuals, consistency, error terms");
         if let Some(quality) = self.quality {
@@ -112,7 +115,7 @@ impl Report<'_> {
                 recordings => format!("{recordings} recordings of one instrument, {dwells}, {how}"),
             },
         ];
-        lead.splice(0..0, self.origin());
+        lead.extend(self.origin());
         lead.extend(self.outcome.map(|outcome| {
             let converged = if outcome.converged {
                 "converged"

@@ -101,7 +101,11 @@ pub fn shortened(text: &str, room: f64) -> String {
 
 /// Content of an SVG document under construction.
 #[derive(Default)]
-pub struct Canvas(String);
+pub struct Canvas {
+    marks: String,
+    /// Whether marks show their values to a pointer, which only wide screens have.
+    pub is_hovered: bool,
+}
 
 fn px(shown: f64) -> i32 {
     (shown * FINE).round() as i32
@@ -115,7 +119,7 @@ impl Canvas {
     /// All marks, at display size.
     pub fn inside(&self) -> String {
         let shown = format!("scale({})", FINE.recip());
-        html! { g transform=(shown) { (PreEscaped(&self.0)) } }.into_string()
+        html! { g transform=(shown) { (PreEscaped(&self.marks)) } }.into_string()
     }
 
     fn put<E>(&mut self, element: E)
@@ -129,14 +133,17 @@ impl Canvas {
         let _ = area.draw(&element);
         drop(area);
         let inside = document.split_once(">\n").map_or("", |(_, inside)| inside);
-        self.0 += inside.trim_end().trim_end_matches("</svg>");
+        self.marks += inside.trim_end().trim_end_matches("</svg>");
     }
 
     /// Draws a mark with this hover text.
     pub fn titled(&mut self, text: &str, drawn: impl FnOnce(&mut Self)) {
+        if !self.is_hovered {
+            return drawn(self);
+        }
         let mut inside = Self::default();
         drawn(&mut inside);
-        self.0 += &html! { g { title { (text) } (PreEscaped(inside.0)) } }.into_string();
+        self.marks += &html! { g { title { (text) } (PreEscaped(inside.marks)) } }.into_string();
     }
 
     /// Joins points.

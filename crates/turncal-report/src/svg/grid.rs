@@ -5,7 +5,7 @@ use super::canvas::{
     BAND, Canvas, Frame, GRID, HPos, INK, LETTER, QUIET, SHADE, SMALL, VPos, rgb, shortened, width,
 };
 use super::series;
-use super::words::{LINE, Names, UPWARD, keys};
+use super::words::{LINE, Names, UPWARD, keys, title};
 
 /// Space above the axes for the title.
 const TOP: f64 = 26.0;
@@ -43,8 +43,9 @@ pub fn draw(on: &mut Canvas, plot: &Plot, width: u32) -> u32 {
             .map(|(scaled, across)| keys(scaled.0, across.1 - across.0))
             .collect();
         // Axes of a row begin at one height.
-        let lines = keys.iter().map(Vec::len).max().unwrap_or(1).max(1);
-        let above = TOP + LINE * (lines - 1) as f64;
+        let lines = row.iter().zip(&keys);
+        let lines = lines.map(|((panel, _), keys)| title(panel, panel_width).len() + keys.len());
+        let above = TOP + LINE * (lines.max().unwrap_or(2) - 2) as f64;
         let is_square = row.iter().any(|(panel, _)| panel.square);
         let most = if is_square {
             panel_width + TOP
@@ -80,7 +81,8 @@ pub fn draw(on: &mut Canvas, plot: &Plot, width: u32) -> u32 {
         }
         top = bottom;
     }
-    top.max(f64::from(plot.height)).ceil() as u32
+    let empty = plot.panels.is_empty().then_some(plot.height);
+    empty.unwrap_or(top.ceil() as u32)
 }
 
 /// Ends of the horizontal axes of a column, which all have the same margins.
@@ -129,12 +131,15 @@ fn of_panel(on: &mut Canvas, frame: &Frame, names: &Names, keys: &[Vec<&Series>]
     if !panel.x.is_bare {
         on.stroke(&[(left, top), (left, bottom), (right, bottom)], QUIET, 0.75);
     }
-    // A title wider than the axes begins at the edge of the panel.
-    let start = left.min(frame.ends.1 - width(&panel.title, 1.0));
-    let at = (start.max(frame.ends.0), frame.top + 6.0);
-    on.text(&panel.title, at, (HPos::Left, VPos::Top), INK, 1.0);
-    for (line, keys) in keys.iter().enumerate() {
-        key_line(on, right, frame.top + 6.0 + LINE * line as f64, keys);
+    let title = title(panel, frame.ends.1 - frame.ends.0);
+    let line_at = |line: usize| frame.top + 6.0 + LINE * line as f64;
+    for (n, line) in title.iter().enumerate() {
+        // A line wider than the axes begins at the edge of the panel.
+        let start = left.min(frame.ends.1 - width(line, 1.0)).max(frame.ends.0);
+        on.text(line, (start, line_at(n)), (HPos::Left, VPos::Top), INK, 1.0);
+    }
+    for (n, keys) in keys.iter().enumerate() {
+        key_line(on, right, line_at(title.len() - 1 + n), keys);
     }
     for series in &panel.series {
         series::draw(on, frame, series);

@@ -26,6 +26,7 @@ pub fn draw(plot: &Plot) -> String {
 /// The SVG document of a plot of this width: the narrower, the fewer panels stand side by side.
 pub fn draw_at(plot: &Plot, width: u32) -> String {
     let mut on = Canvas::default();
+    on.is_hovered = width == WIDTHS[0];
     let height = grid::draw(&mut on, plot, width);
     let document = html! {
         svg width=(width) height=(height) viewBox={ "0 0 " (width) " " (height) } font-family="sans-serif"

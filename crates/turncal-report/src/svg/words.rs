@@ -66,7 +66,17 @@ impl Names {
     }
 }
 
-/// Lines of named series: one beside the title if there is space, else as many as needed below it.
+/// Lines of the title of a panel of this width.
+pub fn title(panel: &Panel, room: f64) -> Vec<String> {
+    if width(&panel.title, 1.0) <= room {
+        return vec![panel.title.clone()];
+    }
+    let letters = textwrap::Options::new((room / (0.63 * LETTER)) as usize);
+    let lines = textwrap::wrap(&panel.title, letters);
+    lines.into_iter().map(|line| line.into_owned()).collect()
+}
+
+/// Lines of named series: one beside the title if there is space, which is the first, else empty.
 pub fn keys(panel: &Panel, room: f64) -> Vec<Vec<&Series>> {
     let mut lines: Vec<(f64, Vec<&Series>)> = vec![(0.0, Vec::new())];
     for series in &panel.series {

@@ -11,7 +11,7 @@ const SIGMAS: f64 = 2.0;
 
 impl Report<'_> {
     /// Every value with ±2σ, in front of its prior and within its limits.
-    pub fn values(&self, estimate: &Estimate) -> Plot {
+    pub fn error_bars(&self, estimate: &Estimate) -> Plot {
         let prior = self.outcome.map(|outcome| {
             let mean = self.run.instrument.prior_mean(estimate.form());
             (to_vector(&mean), outcome.prior_sigma)
