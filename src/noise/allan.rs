@@ -1,7 +1,7 @@
 //! The overlapping Allan variance.
 
 /// Allan variance of one axis at growing cluster times.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Curve {
     /// Cluster times τ, s.
     pub tau: Vec<f64>,

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::clusters::Clusters;
 use super::triad::TriadNoise;
-use crate::imu::{PerSensor, Sensor};
+use crate::imu::{Noise, PerSensor, Sensor};
 use crate::recording::Segment;
 use crate::run::Run;
 
@@ -156,6 +156,8 @@ pub struct NoiseAnalysis {
     pub pulse: PerSensor<f64>,
     /// Noise of both triads.
     pub triads: PerSensor<TriadNoise>,
+    /// Noise that the run states, if any.
+    pub stated: PerSensor<Option<Noise>>,
     /// The triads that were recorded.
     pub sensors: Vec<Sensor>,
 }
@@ -172,6 +174,11 @@ impl NoiseAnalysis {
         Self {
             period: imu.period,
             pulse: imu.pulse,
+            stated: PerSensor::from_fn(|sensor| {
+                let noise = run.instrument.noise.get(sensor);
+                let is_stated = *run.instrument.noise_is_stated.get(sensor);
+                is_stated.then_some(*noise)
+            }),
             triads,
             stretch,
             sensors: Sensor::ALL

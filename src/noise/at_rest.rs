@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use super::allan::overlapping;
+use super::allan::{Curve, cluster_sizes, overlapping};
 use crate::imu::{PerSensor, Sensor};
 use crate::recording::ImuSamples;
 
@@ -25,24 +25,13 @@ impl RestNoise {
         let mut lengths: Vec<usize> = dwells.iter().map(ExactSizeIterator::len).collect();
         lengths.sort_unstable();
         let size = lengths.get(lengths.len() / 2)? / 4;
-        let used: Vec<&Range<usize>> = dwells.iter().filter(|d| d.len() >= 4 * size).collect();
-        if size == 0 {
-            return None;
-        }
-        let freedoms: Vec<f64> = used.iter().map(|d| freedom(d.len(), size)).collect();
-        let freedom: f64 = freedoms.iter().sum();
-        let density = |sensor: Sensor, axis: usize| {
-            let variances = used.iter().zip(&freedoms).map(|(dwell, weight)| {
-                let of_dwell = imu.of(sensor).within((*dwell).clone()).map(|v| v[axis]);
-                let curve = overlapping(of_dwell, imu.period, &[size]);
-                weight * curve.variance.first().copied().unwrap_or_default()
-            });
-            let variance = variances.sum::<f64>() / freedom;
-            (variance * size as f64 * imu.period).sqrt()
-        };
+        let tau_s = size as f64 * imu.period;
+        let (variances, freedom) = pooled(imu, dwells, size)?;
         Some(Self {
-            tau_s: size as f64 * imu.period,
-            density: PerSensor::from_fn(|sensor| [0, 1, 2].map(|axis| density(sensor, axis))),
+            tau_s,
+            density: PerSensor::from_fn(|sensor| {
+                variances.get(sensor).map(|of| (of * tau_s).sqrt())
+            }),
             freedom,
         })
     }
@@ -51,6 +40,50 @@ impl RestNoise {
     pub fn relative_sigma(&self) -> f64 {
         (2.0 * self.freedom).sqrt().recip()
     }
+}
+
+/// Overlapping Allan variance of each axis at rest, pooled over the dwells, at clusters up to a quarter of the longest.
+pub fn curves_at_rest(imu: &ImuSamples, dwells: &[Range<usize>]) -> PerSensor<[Curve; 3]> {
+    let longest = dwells.iter().map(ExactSizeIterator::len).max();
+    let mut curves: PerSensor<[Curve; 3]> = PerSensor::default();
+    for size in cluster_sizes(longest.unwrap_or(0)) {
+        let Some((variances, _)) = pooled(imu, dwells, size) else {
+            continue;
+        };
+        for sensor in Sensor::ALL {
+            let of_axes = variances.get(sensor);
+            for (curve, variance) in curves.get_mut(sensor).iter_mut().zip(of_axes) {
+                curve.tau.push(size as f64 * imu.period);
+                curve.variance.push(*variance);
+            }
+        }
+    }
+    curves
+}
+
+/// Allan variance of each axis for clusters of this size, averaged over the dwells of four clusters or more by their
+/// degrees of freedom, and the sum of these; `None` if there is no such dwell.
+fn pooled(
+    imu: &ImuSamples,
+    dwells: &[Range<usize>],
+    size: usize,
+) -> Option<(PerSensor<[f64; 3]>, f64)> {
+    let used = dwells.iter().filter(|dwell| dwell.len() >= 4 * size);
+    let used: Vec<(&Range<usize>, f64)> = used.map(|d| (d, freedom(d.len(), size))).collect();
+    let sum: f64 = used.iter().map(|(_, weight)| weight).sum();
+    if size == 0 || used.is_empty() {
+        return None;
+    }
+    let variance = |sensor: Sensor, axis: usize| {
+        let variances = used.iter().map(|(dwell, weight)| {
+            let of_dwell = imu.of(sensor).within((*dwell).clone()).map(|v| v[axis]);
+            let curve = overlapping(of_dwell, imu.period, &[size]);
+            weight * curve.variance.first().copied().unwrap_or_default()
+        });
+        variances.sum::<f64>() / sum
+    };
+    let variances = PerSensor::from_fn(|sensor| [0, 1, 2].map(|axis| variance(sensor, axis)));
+    Some((variances, sum))
 }
 
 /// Equivalent degrees of freedom of the overlapping Allan variance of white noise: Riley, NIST SP 1065, 5.4.1,

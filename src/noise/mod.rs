@@ -21,7 +21,7 @@ mod triad;
 
 pub use allan::Curve;
 pub use analysis::{NoiseAnalysis, Stretch, StretchError};
-pub use at_rest::RestNoise;
+pub use at_rest::{RestNoise, curves_at_rest};
 pub use clusters::Clusters;
 pub use conventions::normalised;
 pub use identify::{Found, Hidden, Identified, of_kind};

@@ -2,6 +2,8 @@
 
 use std::f64::consts::{LN_2, PI};
 
+use crate::imu::Noise;
+
 /// A noise process in a rate. Its Allan variance is proportional to its squared strength.
 ///
 /// Sources: IEEE Std 952-1997, annex C (all terms and the Markov process); El-Sheimy, Hou, Niu,
@@ -25,6 +27,17 @@ pub enum Process {
         /// Correlation time in s.
         correlation_time: f64,
     },
+}
+
+impl Noise {
+    /// Allan variance at a cluster time in s.
+    pub fn allan_variance(&self, tau: f64) -> f64 {
+        let bias = self.gauss_markov.map_or(0.0, |of| {
+            let correlation_time = of.correlation_time;
+            of.sigma.powi(2) * Process::GaussMarkov { correlation_time }.allan_variance(tau)
+        });
+        self.random_walk.powi(2) * Process::RandomWalk.allan_variance(tau) + bias
+    }
 }
 
 impl Process {

@@ -45,9 +45,22 @@ function check() {
 /** The name of a field on the page. */
 const label = (field) => field.labels[0].firstChild.textContent.split(",")[0].trim();
 
-/** A text of the engine in the words of the page: the names of its fields instead of the command's options. */
+/** The fields of run.toml that have a field on the page. */
+const FIELDS = { latitude_deg: "latitude", height_m: "height", gravity_m_s2: "gravity", sample_period_s: "rate" };
+
+/** What only the command and run.toml have: options, commands, sections. */
+const FOREIGN = /`|--[a-z]|\bturncal (allan|apply|calibrate|check|explain|export|init)\b|\[[a-z_.]+\]|\.run_toml/;
+
+/** A text of the engine in the words of the page: the names of its fields instead of options and of run.toml's. */
 function worded(text) {
   const field = (name) => form.elements[name];
   const named = text.replace(/`?--([a-z-]+)`?/g, (option, name) => (field(name) ? `“${label(field(name))}”` : option));
   return named.replace("`salvage = true`", "$& in run.toml");
+}
+
+/** A text about the result in the words of the page, without sentences that do not apply to it. */
+function own(text) {
+  const names = new RegExp(Object.keys(FIELDS).join("|"), "g");
+  const named = worded(text).replace(names, (name) => `“${label(form.elements[FIELDS[name]])}”`);
+  return named.split(/(?<=[.!?]) (?=\p{Lu})/u).filter((sentence) => !FOREIGN.test(sentence)).join(" ");
 }

@@ -1,7 +1,9 @@
 // The result: what was found in the log, verdict, files to download, report.
 
-/** Meaning of names in texts of the engine. */
+/** Meaning of names in messages of the engine. */
 const COMMANDS = "Commands are those of the program turncal; names in [brackets] are sections of run.toml.";
+/** What to do about a finding for which the page has no field. */
+const ELSEWHERE = "→ No field of this page changes it. Drop a run.toml together with the log to state more.";
 
 let links = [];
 
@@ -44,18 +46,18 @@ function showReport([report, calibration, ...exports]) {
   at("result").scrollIntoView({ behavior: "smooth" });
 }
 
-/** Opens the values below the table of their accuracy, and says how to read them and the findings. */
+/** Says how to use the values, and puts the findings into the words of the page. */
 function explain(calibration) {
   const details = at("details");
-  const accuracy = details.querySelector("table").closest("section");
-  // The first part that the report folds.
-  const values = details.querySelector(":scope > details");
-  values.open = true;
   const where = `correction and bias are in ${calibration}`;
   const equation = `u = correction · (N − bias): N is the sensor's output, u the true value; ${where}.`;
-  values.firstChild.after(element("p", equation));
-  accuracy.after(values);
-  details.querySelector(".findings > h2")?.after(quiet(COMMANDS));
+  const headings = [...details.querySelectorAll("h2")];
+  headings.find((heading) => heading.textContent === "Parameters")?.after(element("p", equation));
+  for (const part of details.querySelectorAll(".findings p, .findings .next")) {
+    const text = own(part.textContent);
+    const isNext = part.matches(".next");
+    part.textContent = text || (isNext ? ELSEWHERE : "");
+  }
 }
 
 function download({ name, about, bytes }) {

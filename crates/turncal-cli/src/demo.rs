@@ -131,6 +131,7 @@ fn document(
         calibration,
         budget: assessment.budget.as_ref(),
         predicted: None,
+        specification: None,
         quality: Some(&assessment.quality),
         true_terms: &BTreeMap::new(),
         closed_form: Some(of_calibration::ClosedForm {

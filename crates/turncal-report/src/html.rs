@@ -13,6 +13,9 @@ use turncal::calibration::{Finding, FindingKind as Kind};
 /// The style of every page.
 const STYLE: &str = include_str!("style.css");
 
+/// Letters of the longest number with σ and unit.
+const LONGEST: usize = 20;
+
 /// A file of a report that could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {path}: {source}. The directory must exist and be writable", path = path.display())]
@@ -26,9 +29,10 @@ pub struct ReportError {
 /// The files of a document by name: `index.html`, which contains the figures and needs no other files or network, every
 /// figure as a separate SVG file, and further files of the document.
 pub fn files(document: &Document) -> Vec<(String, String)> {
-    let drawn: Vec<String> = document.plots().map(svg::draw).collect();
-    let page = ("index.html".to_owned(), page(document, &drawn));
-    let figures = document.plots().map(|plot| plot.file.clone()).zip(drawn);
+    let page = ("index.html".to_owned(), page(document));
+    let figures = document
+        .plots()
+        .map(|plot| (plot.file.clone(), svg::draw(plot)));
     let further = document.files.iter().cloned();
     figures.chain(further).chain([page]).collect()
 }
@@ -45,10 +49,8 @@ pub fn write(document: &Document, directory: &Path) -> Result<(), ReportError> {
     Ok(())
 }
 
-/// The page: warnings first, then conclusions, then the other parts in order. `drawn` contains the SVG document of each
-/// plot in order.
-pub fn page(document: &Document, drawn: &[String]) -> String {
-    let mut drawn = drawn.iter();
+/// The page: warnings first, then conclusions, then the other parts in order.
+pub fn page(document: &Document) -> String {
     let parts = document
         .blocks
         .chunk_by(|_, (_, next)| !matches!(next, Block::Fold(_)));
@@ -75,14 +77,14 @@ pub fn page(document: &Document, drawn: &[String]) -> String {
                         @for finding in &document.findings { (of_finding(finding)) }
                     }
                 }
-                @for block in &document.brief { (of_block(block, &mut drawn)) }
+                @for block in &document.brief { (of_block(block)) }
                 @if !document.warnings.items.is_empty() {
                     section.warnings { (list(&document.warnings)) }
                 }
                 @if !document.conclusions.items.is_empty() {
                     section { (list(&document.conclusions)) }
                 }
-                @for part in parts { (of_part(part, &mut drawn)) }
+                @for part in parts { (of_part(part)) }
                 footer { "turncal " (env!("CARGO_PKG_VERSION")) }
             }
         }
@@ -90,10 +92,27 @@ pub fn page(document: &Document, drawn: &[String]) -> String {
     page.into_string()
 }
 
+/// A text without parentheses and sentences about options of the command, which its reader may not have.
+fn without_options(text: &str) -> String {
+    let is_of_command = |part: &str| part.contains("--") || part.contains('`');
+    let parts = text
+        .split_inclusive(')')
+        .map(|part| match part.rfind(" (") {
+            Some(open) if is_of_command(&part[open..]) => &part[..open],
+            _ => part,
+        });
+    let text = parts.collect::<String>();
+    let sentences = text.split_inclusive(". ");
+    let kept = sentences.filter(|sentence| !is_of_command(sentence));
+    kept.collect::<String>().trim_end().to_owned()
+}
+
 /// Problem and remedy, with details collapsed.
 fn of_finding(finding: &Finding) -> Markup {
+    let mut finding = finding.clone();
+    finding.text = without_options(&finding.text);
+    let explanation = Kind::named(&finding.kind).map(|kind| without_options(kind.explanation()));
     let (what, next) = finding.headline();
-    let explanation = Kind::named(&finding.kind).map(Kind::explanation);
     html! {
         details {
             summary {
@@ -107,8 +126,8 @@ fn of_finding(finding: &Finding) -> Markup {
 }
 
 /// Blocks below the heading of a collapsed section; those before the first have none.
-fn of_part<'a>(part: &[(PageOnly, Block)], drawn: &mut impl Iterator<Item = &'a String>) -> Markup {
-    let blocks = html! { @for (_, block) in part { (of_block(block, drawn)) } };
+fn of_part(part: &[(PageOnly, Block)]) -> Markup {
+    let blocks = html! { @for (_, block) in part { (of_block(block)) } };
     match part {
         [(_, Block::Fold(_))] => html! {},
         [(_, Block::Fold(heading)), ..] => html! { details { summary { (heading) } (blocks) } },
@@ -116,14 +135,14 @@ fn of_part<'a>(part: &[(PageOnly, Block)], drawn: &mut impl Iterator<Item = &'a 
     }
 }
 
-fn of_block<'a>(block: &Block, drawn: &mut impl Iterator<Item = &'a String>) -> Markup {
+fn of_block(block: &Block) -> Markup {
     match block {
         Block::Facts(of) => html! {
             section { @if !of.heading.is_empty() { h2 { (of.heading) } } (facts(of)) }
         },
         Block::Table(of) => table(of),
         Block::List(of) => html! { section { (list(of)) } },
-        Block::Plot(of) => drawn.next().map_or_else(|| html! {}, |svg| plot(of, svg)),
+        Block::Plot(of) => plot(of),
         Block::Text(heading, text) => html! {
             section { @if !heading.is_empty() { h2 { (heading) } } p.note { (text) } }
         },
@@ -161,20 +180,49 @@ fn row_of(row: &[String]) -> Markup {
     html! {
         tr {
             @for (place, cell) in row.iter().enumerate() {
-                @if place == 0 { th scope="row" { (cell) } } @else { td { (cell) } }
+                @if place == 0 { th scope="row" { (cell) } } @else { td { (unbroken(cell)) } }
             }
         }
     }
 }
 
-fn plot(of: &Plot, svg: &str) -> Markup {
+/// A number with its σ and unit on one line, any other text as it is.
+fn unbroken(cell: &str) -> String {
+    let is_number = cell.starts_with(|first: char| first.is_ascii_digit() || first == '−');
+    if is_number && cell.chars().count() <= LONGEST {
+        cell.replace(' ', "\u{a0}")
+    } else {
+        cell.to_owned()
+    }
+}
+
+/// The figure in every width, of which the style shows one.
+fn plot(of: &Plot) -> Markup {
     // The namespace is needed in a file of its own only.
-    let svg = svg.replacen(r#" xmlns="http://www.w3.org/2000/svg""#, "", 1);
+    let drawn =
+        |width| svg::draw_at(of, width).replacen(r#" xmlns="http://www.w3.org/2000/svg""#, "", 1);
     html! {
         figure {
             h2 { (of.heading) }
-            div role="img" aria-label=(of.heading) { (PreEscaped(svg)) }
+            @for width in svg::WIDTHS {
+                div class={ "w" (width) } role="img" aria-label=(of.heading) { (PreEscaped(drawn(width))) }
+            }
             figcaption { (of.caption) " (" code { (of.file) } ")" }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_speaks_of_no_option() {
+        let text = "The form is too narrow (χ² 40). Look at drift (add --temperature if warm); else widen σ. Rerun \
+                    with --installation general.";
+        assert_eq!(
+            without_options(text),
+            "The form is too narrow (χ² 40). Look at drift; else widen σ."
+        );
     }
 }

@@ -43,6 +43,7 @@ impl Synthetic {
             calibration: &self.calibration,
             budget: None,
             predicted: None,
+            specification: None,
             quality: None,
             true_terms: &NO_TERMS,
             closed_form: Some(ClosedForm {

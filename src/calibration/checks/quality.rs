@@ -13,7 +13,7 @@ use crate::calibration::start::closed_form::six_position_by;
 use crate::calibration::{
     CalibrationError, ClosedForm, Linearisation, Outcome, Problem, Reference, Stretch,
 };
-use crate::imu::{PerSensor, Sensed, Sensor, TermVector, Triad};
+use crate::imu::{InstallationForm, PerSensor, Sensed, Sensor, TermVector, Triad};
 use crate::navigation::{Navigator, State};
 use crate::recording::LabelledMotion;
 use crate::run::{Dwell, Run};
@@ -35,13 +35,16 @@ pub struct Quality {
     /// Residuals in the excluded dwells, from the calibration without them.
     #[serde(skip)]
     pub held_out_dwells: Vec<DwellResidual>,
+    /// Residuals in each dwell before calibration: nominal scales, no misalignment, no bias.
+    #[serde(skip)]
+    pub nominal_dwells: Vec<DwellResidual>,
 }
 
 /// Residuals in one dwell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DwellResidual {
-    /// Its begin, s.
-    pub time: f64,
+    /// Its number, from 1.
+    pub number: usize,
     /// Magnitude of the mean specific force minus gravity, m/s².
     pub gravity: f64,
     /// Angle between the gravity direction measured by the accelerometers and the one carried over from the previous
@@ -82,12 +85,13 @@ impl Residuals {
 }
 
 impl Quality {
-    fn new(all: Residuals, held_out: Option<Residuals>) -> Self {
+    fn new(all: Residuals, held_out: Option<Residuals>, nominal: Residuals) -> Self {
         Self {
             all: all.measures(),
             held_out: held_out.as_ref().map(Residuals::measures),
             dwells: all.dwells,
             held_out_dwells: held_out.map_or_else(Vec::new, |of| of.dwells),
+            nominal_dwells: nominal.dwells,
         }
     }
 }
@@ -156,7 +160,11 @@ impl Outcome {
             Some(moved)
         });
         let held_out = half.map(|half| residuals(problem, &half, |k| k % 2 == 1));
-        Ok(Quality::new(self.residuals.clone(), held_out.transpose()?))
+        // Only the instrument differs, not the attitudes.
+        let nominal = nominal(self.solved.estimate.initial_attitudes.clone());
+        let before = residuals(problem, &nominal, |_| true)?;
+        let all = self.residuals.clone();
+        Ok(Quality::new(all, held_out.transpose()?, before))
     }
 }
 
@@ -177,6 +185,7 @@ impl ClosedForm {
             let at = Linearisation::new(*triads, TermVector::zeros(), initial);
             residuals(problem, &at, judged)
         };
+        let before = of(&nominal(Vec::new()).triads, &|_| true)?;
         let all = of(&self.estimate.triads, &|_| true)?;
         let dwells: Vec<&Dwell> = problem.dwells().collect();
         let held_out = match self.reference {
@@ -198,8 +207,15 @@ impl ClosedForm {
         Ok(Quality::new(
             all,
             held_out.filter(|of| !of.dwells.is_empty()),
+            before,
         ))
     }
+}
+
+/// An instrument as nominal as its scales, with these first attitudes.
+fn nominal(initial_attitudes: Vec<Matrix3<f64>>) -> Linearisation {
+    let triads = PerSensor::from_fn(|_| Triad::ideal(InstallationForm::General));
+    Linearisation::new(triads, TermVector::zeros(), initial_attitudes)
 }
 
 /// The problem with every other dwell, from the first on; `None` if fewer than two remain, or if a stretch
@@ -265,7 +281,7 @@ pub fn residuals(
             let off = tilt(&(carried * force));
             if judged {
                 dwells.push(DwellResidual {
-                    time: run.recording.imu.time(dwell.samples.start),
+                    number,
                     gravity: force.norm() - run.site.gravity,
                     direction: before.map(|_| off.norm()),
                 });

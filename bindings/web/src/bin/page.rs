@@ -28,7 +28,8 @@ fn main() -> anyhow::Result<()> {
     let (glue, wasm) = engine(&target)?;
     let read =
         |path: PathBuf| fs::read_to_string(&path).with_context(|| path.display().to_string());
-    let style = read(root.join("src/report/style.css"))? + &read(crate_root.join("page/page.css"))?;
+    let style = read(root.join("crates/turncal-report/src/style.css"))?
+        + &read(crate_root.join("page/page.css"))?;
     let scripts = ["form.js", "result.js", "page.js"];
     let program = scripts.map(|name| read(crate_root.join("page").join(name)));
     let program = program

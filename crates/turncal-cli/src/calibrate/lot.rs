@@ -118,7 +118,10 @@ impl Calibrate {
         let mut checked = CheckedCalibration::new(&problem, solution)?;
         record_inputs(&mut checked.calibration, path, &run);
         let of = (&checked, &checked.consequences(&problem, None));
-        let document = calibration::document((&problem, &run.recording.name), of, None);
+        let limits = self.specification.as_deref().map(models::specification);
+        let limits = limits.transpose()?;
+        let named = (&problem, run.recording.name.as_str());
+        let document = calibration::within(named, of, None, limits.as_ref());
         let calibration = checked.calibration;
         // What cannot be written is no calibration.
         turncal_files::calibration_json(&calibration, path)?;

@@ -2,7 +2,7 @@
 
 use super::quantity::{deviation_unit, quantity};
 use crate::prelude::*;
-use turncal::imu::{AXES, Sensor};
+use turncal::imu::{AXES, Noise, Sensor};
 use turncal::noise::{AxisNoise, Found, NoiseAnalysis, Process};
 
 /// A process is drawn where it contributes at least this fraction of the variance.
@@ -19,15 +19,22 @@ pub fn figure(analysis: &NoiseAnalysis, sensor: Sensor) -> Plot {
     let (low, high) = positive_range(all.map(|variance| variance.sqrt() / unit));
     let ends = (0.5 * low, 1.8 * high);
     let panels = triad.axes.iter().zip(AXES);
-    let panels = panels.map(|(axis, letter)| panel(axis, letter, sensor, ends));
+    let stated = analysis.stated.get(sensor).as_ref();
+    let panels = panels.map(|(axis, letter)| panel(axis, letter, (sensor, stated), ends));
     Plot::new(&file, &heading, (3, 440), panels).caption(
         "Overlapping Allan deviation against cluster time, both logarithmic, the same axes for all three. Dots with \
          band: measured values with their 95 % interval; black: sum of the detected processes; dashed: each detected \
-         process, with its coefficient; random walk N is read at 1 s. Ring: lowest deviation.",
+         process, with its coefficient; random walk N is read at 1 s. Orange: the noise stated for the instrument. \
+         Ring: lowest deviation.",
     )
 }
 
-fn panel(axis: &AxisNoise, letter: char, sensor: Sensor, (low, high): Point) -> Panel {
+fn panel(
+    axis: &AxisNoise,
+    letter: char,
+    (sensor, stated): (Sensor, Option<&Noise>),
+    (low, high): Point,
+) -> Panel {
     let (symbol, unit, _) = deviation_unit(sensor);
     let shown = |variance: f64| variance.sqrt() / unit;
     let curve = &axis.curve;
@@ -48,7 +55,7 @@ fn panel(axis: &AxisNoise, letter: char, sensor: Sensor, (low, high): Point) -> 
         });
         let (least, most) = intervals.unzip();
         panel = panel.with(Series::band(least, most));
-        let taus = fine(&curve.tau);
+        let taus = smooth(&curve.tau);
         for found in axis.found() {
             let part = |tau: f64| found.allan_variance(tau) / identified.allan_variance(tau);
             let line = taus.iter().filter(|&&tau| part(tau) > SEEN);
@@ -60,6 +67,12 @@ fn panel(axis: &AxisNoise, letter: char, sensor: Sensor, (low, high): Point) -> 
         let sum = sum.map(|&tau| (tau, shown(identified.allan_variance(tau))));
         panel = panel.with(Series::line(sum).color(Color::Ink).width(1.0));
     }
+    let stated = stated.map(|noise| {
+        let line = smooth(&curve.tau).into_iter();
+        let line = line.map(|tau| (tau, shown(noise.allan_variance(tau))));
+        Series::line(line.filter(|(_, y)| (low..=high).contains(y)))
+    });
+    panel = panel.with_all(stated.map(|line| line.nth(1).label("stated")));
     let dots = curve.tau.iter().zip(&curve.variance);
     let dots = dots.map(|(&tau, &variance)| (tau, shown(variance)));
     panel = panel.with(Series::marks(Mark::Dot, dots.filter(|(_, y)| *y > 0.0)).width(1.25));
@@ -78,7 +91,7 @@ fn coefficient(found: &Found, sensor: Sensor) -> String {
 }
 
 /// Cluster times close enough for a smooth line.
-fn fine(taus: &[f64]) -> Vec<f64> {
+pub fn smooth(taus: &[f64]) -> Vec<f64> {
     let (Some(first), Some(last)) = (taus.first(), taus.last()) else {
         return Vec::new();
     };

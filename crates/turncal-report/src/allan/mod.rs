@@ -9,6 +9,9 @@ mod words;
 use crate::prelude::*;
 use turncal::noise::NoiseAnalysis;
 
+pub use figure::smooth;
+pub use quantity::deviation_unit;
+
 /// The complete report on the noise of a run with this name.
 pub fn document(run: &str, analysis: &NoiseAnalysis) -> Document {
     let NoiseAnalysis {

@@ -162,10 +162,10 @@ fn correlation(estimate: &Estimate) -> Option<Plot> {
     let y = Axis::places(names().rev());
     let mut panel = Panel::new("", Axis::places(names()), y).with_all(series);
     panel.square = true;
-    let plot = Plot::new("correlation.svg", "Correlations", (1, 1000), [panel]).caption(format!(
+    let plot = Plot::new("correlation.svg", "Correlations", (1, 860), [panel]).caption(format!(
         "Correlation of the estimated parameters. Below the diagonal the side of a square grows with the magnitude; \
-         blue squares are positive, orange ones negative. Above the diagonal, the coefficient is given in hundredths \
-         if its magnitude is at least {WRITTEN}. Strongly correlated parameters were observed by this path as a sum or \
+         blue squares are positive, orange ones negative. Above the diagonal, a wide figure gives the coefficient in \
+         hundredths if its magnitude is at least {WRITTEN}. Strongly correlated parameters were observed by this path as a sum or \
          difference rather than each alone."
     ));
     (!indices.is_empty()).then_some(plot)

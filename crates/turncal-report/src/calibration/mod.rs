@@ -1,8 +1,13 @@
 //! Report on a calibration, and comparison of both methods.
 
+mod attitudes;
 mod brief;
 mod budget;
+mod error_bars;
 pub mod figures;
+mod noise;
+#[cfg(test)]
+mod pictures;
 mod report;
 mod residuals;
 mod solved;
@@ -19,7 +24,7 @@ use turncal::calibration::{Finding, Verdict, Word};
 use turncal::imu::{Noise, Sensor};
 
 pub use report::{ClosedForm, Report};
-pub use solved::{Truth, document, dwell_times, note};
+pub use solved::{Truth, document, dwell_times, note, within};
 pub use tables::cross_validation;
 
 /// The most severe first; of one level, the first of each kind before more of any.
@@ -43,14 +48,16 @@ impl Report<'_> {
         document.findings = in_order(self.findings);
         brief::add(&mut document, self);
         document.page(item(self));
-        document.pages(self.against_time().and_then(|outcome| self.sigma(outcome)));
-        let quality = self.quality.filter(|of| !of.dwells.is_empty());
-        document.pages(quality.map(residuals::figure));
-        document.pages(self.outcome.and_then(temperature::figure));
-        document.fold("Every parameter");
         if let Some(estimate) = self.estimate() {
             document.both(self.parameters(estimate));
+            document.page(self.error_bars(estimate));
         }
+        let quality = self.quality.filter(|of| !of.dwells.is_empty());
+        document.pages(quality.map(residuals::figure));
+        document.pages(self.against_time().and_then(|outcome| self.sigma(outcome)));
+        document.pages(self.against_time().and_then(|_| self.attitudes()));
+        document.pages(self.against_time().and_then(|_| self.noise()));
+        document.pages(self.outcome.and_then(temperature::figure));
         document.fold("Residuals, consistency, error terms");
         if let Some(quality) = self.quality {
             document.both(tables::residuals(quality, self.table()));
@@ -78,6 +85,19 @@ impl Report<'_> {
         document
     }
 
+    /// Recording, date and files, as far as the title does not name them.
+    fn origin(&self) -> Option<String> {
+        let recording = &self.run.recording;
+        let name = (recording.name != self.title).then(|| recording.name.clone());
+        let date = recording.meta.get("date");
+        let files = recording.files.iter().filter_map(|path| path.file_name());
+        let files: Vec<_> = files.map(|name| name.to_string_lossy()).collect();
+        let files = (!files.is_empty()).then(|| files.join(", "));
+        let date = date.map(|date| format!("Recorded {date}"));
+        let parts = Vec::from_iter([date, name, files].into_iter().flatten());
+        (!parts.is_empty()).then(|| parts.join(" · "))
+    }
+
     /// Methods and data.
     fn lead(&self) -> Vec<String> {
         let imu = &self.run.recording.imu;
@@ -96,6 +116,7 @@ impl Report<'_> {
                 recordings => format!("{recordings} recordings of one instrument, {dwells}, {how}"),
             },
         ];
+        lead.extend(self.origin());
         lead.extend(self.outcome.map(|outcome| {
             let converged = if outcome.converged {
                 "converged"

@@ -8,6 +8,7 @@ use turncal::calibration::{
     Budget, Calibration, Estimate, Finding, Outcome, ParameterVector, Quality, to_vector,
 };
 use turncal::imu::{BodyFrame, PerSensor, Triad};
+use turncal::lot::Specification;
 use turncal::recording::TableLog;
 use turncal::run::{Aiding, Run};
 use turncal::study::navigation::{MethodOutlook, NavigationStudyError};
@@ -38,6 +39,8 @@ pub struct Report<'a> {
     pub truth: Option<&'a PerSensor<Triad>>,
     /// True auxiliary parameters by name, if known.
     pub true_terms: &'a BTreeMap<String, TermRecord>,
+    /// Limits of the parameters, if any.
+    pub specification: Option<&'a Specification>,
     /// Predicted accuracy, if known.
     pub predicted: Option<&'a Expected>,
     /// Residuals at rest and after turns.

@@ -1,43 +1,55 @@
-//! Residuals in each dwell, as a figure.
+//! Residuals before and after calibration, as a figure.
 
 use super::tables::{ANGLE, FORCE};
 use crate::prelude::*;
 use turncal::calibration::{DwellResidual, Quality};
 
-/// Residuals of the magnitude and direction of gravity against time; dwells excluded from a fit as rings.
+/// Magnitude of the residuals of gravity in each dwell and after each move, by the nominal and the calibrated
+/// instrument; dwells excluded from a fit as rings.
 pub fn figure(quality: &Quality) -> Plot {
-    let panel = |name: &str, units, of: fn(&DwellResidual) -> Option<f64>| {
+    let panel = |name: &str, place: &str, units, of: fn(&DwellResidual) -> Option<f64>| {
         let points = |dwells: &[DwellResidual]| -> Vec<Point> {
-            let residual = |dwell: &DwellResidual| Some((dwell.time, of(dwell)?));
+            let residual = |dwell: &DwellResidual| Some((dwell.number as f64, of(dwell)?.abs()));
             dwells.iter().filter_map(residual).collect()
         };
-        let (fitted, left_out) = (points(&quality.dwells), points(&quality.held_out_dwells));
-        let all = || fitted.iter().chain(&left_out).map(|point| point.1.abs());
-        let largest = all().fold(0.0, f64::max);
+        let before = points(&quality.nominal_dwells);
+        let largest = before.iter().map(|point| point.1).fold(0.0, f64::max);
         let (unit, size) = readable(units, largest);
-        let scaled = |points: Vec<Point>| points.into_iter().map(move |(time, y)| (time, y / size));
-        Panel::new(
-            format!("{name}, {unit}"),
-            Axis::linear("time, s").room(0.03, 0.03),
-            Axis::linear("").including([0.0]).room(0.06, 0.06),
-        )
-        .with(Series::zero())
-        .with(Series::marks(Mark::Dot, scaled(fitted)).key("in the fit"))
-        .with(
-            Series::marks(Mark::Ring, scaled(left_out))
-                .nth(1)
-                .key("left out"),
-        )
+        let scaled = |points: Vec<Point>| points.into_iter().map(move |(x, y)| (x, y / size));
+        let y = Axis::log("").room(0.1, 0.2);
+        let x = Axis::linear(place).room(0.03, 0.03);
+        let fitted = Series::marks(Mark::Dot, scaled(points(&quality.dwells)));
+        let left_out = Series::marks(Mark::Ring, scaled(points(&quality.held_out_dwells)));
+        Panel::new(format!("{name}, {unit}"), x, y)
+            .with(
+                Series::marks(Mark::Cross, scaled(before))
+                    .nth(1)
+                    .key("before"),
+            )
+            .with(fitted.key("after"))
+            .with(left_out.nth(2).key("after, without the dwell"))
     };
     let panels = [
-        panel("|f| − gravity", &FORCE, |dwell| Some(dwell.gravity)),
-        panel("direction of gravity after a move", &ANGLE, |dwell| {
-            dwell.direction
+        panel("||f| − gravity|", "dwell", &FORCE, |dwell| {
+            Some(dwell.gravity)
         }),
+        panel(
+            "direction of gravity",
+            "dwell after the move",
+            &ANGLE,
+            |dwell| dwell.direction,
+        ),
     ];
-    Plot::new("residuals.svg", "Residuals in each dwell", (2, 220), panels).caption(
-        "Left: magnitude of the mean specific force minus gravity. Right: angle between the vertical carried over \
-         from the previous dwell by the gyros and the vertical measured by the accelerometers. Rings: from a fit \
-         without that dwell.",
+    Plot::new(
+        "residuals.svg",
+        "Before and after calibration",
+        (2, 280),
+        panels,
+    )
+    .caption(
+        "|f| − gravity: deviation of the mean specific force of each dwell from gravity. Direction: angle after each \
+         move between the vertical that the gyros carried over from the dwell before and the vertical that the \
+         accelerometers measure. Crosses: the nominal instrument, without calibration. Dots: the calibrated \
+         instrument. Rings: an instrument calibrated without that dwell.",
     )
 }

@@ -8,6 +8,7 @@ use crate::Document;
 use turncal::calibration::result::TermRecord;
 use turncal::calibration::{ClosedForm, Problem, Reference};
 use turncal::imu::{PerSensor, Triad};
+use turncal::lot::Specification;
 use turncal::study::{CheckedCalibration, Consequences};
 
 /// A true calibration, in the general form, with its error terms.
@@ -23,6 +24,16 @@ pub fn document(
     (problem, name): (&Problem, &str),
     (checked, consequences): (&CheckedCalibration, &Consequences),
     truth: Option<&Truth>,
+) -> Document {
+    within((problem, name), (checked, consequences), truth, None)
+}
+
+/// The same with the limits that the calibration is to keep.
+pub fn within(
+    (problem, name): (&Problem, &str),
+    (checked, consequences): (&CheckedCalibration, &Consequences),
+    truth: Option<&Truth>,
+    specification: Option<&Specification>,
 ) -> Document {
     let CheckedCalibration {
         solution,
@@ -43,6 +54,7 @@ pub fn document(
         findings: solution.findings(),
         calibration,
         budget: assessment.budget.as_ref(),
+        specification,
         predicted: consequences.predicted.as_ref(),
         quality: Some(&assessment.quality),
         true_terms: truth.map_or(&no_terms, |truth| &truth.terms),

@@ -35,6 +35,8 @@ pub struct Axis {
     pub room: (f64, f64),
     /// Names at 0, 1, 2 … instead of numbers.
     pub places: Vec<String>,
+    /// Whether it is not drawn, as in a map.
+    pub is_bare: bool,
 }
 
 impl Axis {
@@ -53,6 +55,14 @@ impl Axis {
         Self {
             places: names.into_iter().collect(),
             ..Self::default()
+        }
+    }
+
+    /// An axis with these ends that is not drawn.
+    pub fn bare(low: f64, high: f64) -> Self {
+        Self {
+            is_bare: true,
+            ..Self::default().between(low, high)
         }
     }
 
@@ -97,13 +107,17 @@ impl Axis {
         };
         let (low, high) = self.ends.unwrap_or_else(held);
         let (below, above) = self.room;
-        match self.kind {
+        let mut scale = match self.kind {
             Kind::Linear => {
                 let span = high - low;
                 Scale::linear(low - below * span, high + above * span)
             }
             Kind::Log => Scale::log(low * (1.0 - below), high * (1.0 + above)),
+        };
+        if self.is_bare {
+            scale.ticks.clear();
         }
+        scale
     }
 }
 
@@ -183,6 +197,11 @@ impl Scale {
             high: names.len() as f64 - 0.5 + above,
             ticks: ticks.map(|(k, name)| (k as f64, name.clone())).collect(),
         }
+    }
+
+    /// Length of one place on an axis of names of this length.
+    pub fn step(&self, length: f64) -> f64 {
+        length / (self.high - self.low)
     }
 
     /// Position of a value, from 0 at the low to 1 at the high end; values outside are at the end.

@@ -14,8 +14,8 @@ use crate::plot::{Color, Panel, Pen, Point, Scale};
 
 pub use plotters::style::text_anchor::{HPos, VPos};
 
-/// Width of every figure in pixels.
-pub const WIDTH: u32 = 1200;
+/// Widths at which every figure is drawn, in pixels: a screen, a printed page or tablet, a telephone.
+pub const WIDTHS: [u32; 3] = [1200, 720, 360];
 /// Drawn pixels in one shown pixel.
 pub const FINE: f64 = 8.0;
 /// Drawn pixels of the widest and of the highest figure.
@@ -27,10 +27,18 @@ pub const LETTER: f64 = 14.0;
 /// Font size of ticks, labels and notes.
 pub const SMALL: f64 = 0.95;
 
+/// Background.
+pub const PAPER: RGBColor = RGBColor(255, 255, 255);
 /// Text and axes.
 pub const INK: RGBColor = RGBColor(34, 34, 34);
 /// Colour of unobtrusive elements.
 pub const QUIET: RGBColor = RGBColor(110, 110, 110);
+/// Grid lines.
+pub const GRID: RGBColor = RGBColor(218, 218, 214);
+/// Shading of dwells.
+pub const SHADE: RGBColor = RGBColor(243, 243, 238);
+/// Bands.
+pub const BAND: RGBColor = RGBColor(196, 214, 228);
 const COLORS: [RGBColor; 6] = [
     RGBColor(0, 84, 147),
     RGBColor(200, 80, 0),
@@ -39,6 +47,22 @@ const COLORS: [RGBColor; 6] = [
     RGBColor(150, 60, 110),
     RGBColor(140, 120, 20),
 ];
+/// The same colours on a dark screen, in the order of [`dark_style`].
+const DARK: [&str; 12] = [
+    "#1b1b1a", "#e6e6e3", "#a8a8a4", "#41413e", "#2a2a28", "#2f4a5e", "#6db3f2", "#ff9d5c",
+    "#4fc9a4", "#a9d3f0", "#e08fc0", "#d6c04a",
+];
+
+/// A style sheet that gives every colour its counterpart on a dark screen; paper stays light.
+pub fn dark_style() -> String {
+    let light = [PAPER, INK, QUIET, GRID, SHADE, BAND].into_iter();
+    let rule = |(RGBColor(r, g, b), dark): (RGBColor, &str)| {
+        let light = format!("\"#{r:02X}{g:02X}{b:02X}\"");
+        format!("[fill={light}]{{fill:{dark}}}[stroke={light}]{{stroke:{dark}}}")
+    };
+    let rules: String = light.chain(COLORS).zip(DARK).map(rule).collect();
+    format!("@media screen and (prefers-color-scheme:dark){{{rules}}}")
+}
 
 /// The colour of a pen.
 pub fn rgb(color: Color) -> RGBColor {
@@ -77,7 +101,11 @@ pub fn shortened(text: &str, room: f64) -> String {
 
 /// Content of an SVG document under construction.
 #[derive(Default)]
-pub struct Canvas(String);
+pub struct Canvas {
+    marks: String,
+    /// Whether marks show their values to a pointer, which only wide screens have.
+    pub is_hovered: bool,
+}
 
 fn px(shown: f64) -> i32 {
     (shown * FINE).round() as i32
@@ -91,7 +119,7 @@ impl Canvas {
     /// All marks, at display size.
     pub fn inside(&self) -> String {
         let shown = format!("scale({})", FINE.recip());
-        html! { g transform=(shown) { (PreEscaped(&self.0)) } }.into_string()
+        html! { g transform=(shown) { (PreEscaped(&self.marks)) } }.into_string()
     }
 
     fn put<E>(&mut self, element: E)
@@ -105,14 +133,17 @@ impl Canvas {
         let _ = area.draw(&element);
         drop(area);
         let inside = document.split_once(">\n").map_or("", |(_, inside)| inside);
-        self.0 += inside.trim_end().trim_end_matches("</svg>");
+        self.marks += inside.trim_end().trim_end_matches("</svg>");
     }
 
     /// Draws a mark with this hover text.
     pub fn titled(&mut self, text: &str, drawn: impl FnOnce(&mut Self)) {
+        if !self.is_hovered {
+            return drawn(self);
+        }
         let mut inside = Self::default();
         drawn(&mut inside);
-        self.0 += &html! { g { title { (text) } (PreEscaped(inside.0)) } }.into_string();
+        self.marks += &html! { g { title { (text) } (PreEscaped(inside.marks)) } }.into_string();
     }
 
     /// Joins points.
@@ -163,6 +194,13 @@ impl Canvas {
         let style = font(scale).color(&color).pos(Pos::new(across, height));
         self.put(Text::new(text.to_owned(), place(at), style));
     }
+
+    /// Writes text that reads upwards and ends at the point.
+    pub fn upward(&mut self, text: &str, at: Point, color: RGBColor, scale: f64) {
+        let font = font(scale).transform(FontTransform::Rotate270);
+        let style = font.color(&color).pos(Pos::new(HPos::Right, VPos::Center));
+        self.put(Text::new(text.to_owned(), place(at), style));
+    }
 }
 
 fn font(scale: f64) -> FontDesc<'static> {
@@ -181,8 +219,10 @@ pub struct Frame<'p> {
     pub across: (f64, f64),
     /// Upper and lower end.
     pub down: (f64, f64),
-    /// Right end of the panel.
-    pub end: f64,
+    /// Left and right end of the panel.
+    pub ends: (f64, f64),
+    /// Upper end of the panel.
+    pub top: f64,
 }
 
 impl Frame<'_> {

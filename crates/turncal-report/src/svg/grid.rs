@@ -1,62 +1,100 @@
 //! Panels in rows: scales, margins, frames, ticks, titles, tags and notes.
 
-use plotters::style::RGBColor;
-
-use super::super::plot::{Panel, Plot, Scale};
+use super::super::plot::{Panel, Plot, Scale, Series, Shape};
 use super::canvas::{
-    Canvas, Frame, HPos, INK, LETTER, QUIET, SMALL, VPos, WIDTH, rgb, shortened, width,
+    BAND, Canvas, Frame, GRID, HPos, INK, LETTER, QUIET, SHADE, SMALL, VPos, rgb, shortened, width,
 };
 use super::series;
+use super::words::{LINE, Names, UPWARD, keys, title};
 
-/// Grid lines.
-const GRID: RGBColor = RGBColor(218, 218, 214);
-/// Shading of dwells.
-const SHADE: RGBColor = RGBColor(243, 243, 238);
 /// Space above the axes for the title.
 const TOP: f64 = 26.0;
-/// Distance between lines of text.
-const LINE: f64 = 17.0;
+/// Space below the names of the horizontal axis.
+const BOTTOM: f64 = 12.0;
+/// Minimum width of a panel beside another.
+const NARROWEST: u32 = 340;
 /// Number of lines over which tags are spread.
 const TAG_LINES: usize = 3;
 /// Relative size of the letters of tags.
-const TAG: f64 = 0.85;
+const TAG: f64 = 0.88;
 /// Maximum fraction of the width of a panel for names at the ends of lines.
 const LABELS: f64 = 0.3;
+/// Minimum distance between upward names.
+const CLOSEST: f64 = 11.0;
 
-/// Draws it and returns the height of the figure.
-pub fn draw(on: &mut Canvas, plot: &Plot) -> u32 {
-    let panel_width = f64::from(WIDTH) / plot.columns as f64;
-    for column in 0..plot.columns {
-        let panels = plot.panels.iter().skip(column).step_by(plot.columns);
-        let scaled: Vec<(&Panel, (Scale, Scale))> = panels.map(|p| (p, p.scales())).collect();
-        // All panels of a column have the same margins.
-        let left = scaled.iter().map(|(_, (_, y))| widest(&y.ticks) + 14.0);
-        let right = scaled
-            .iter()
-            .map(|(panel, (x, _))| right(panel, x, panel_width));
-        let [left, right] = [left.fold(14.0, f64::max), right.fold(14.0, f64::max)];
-        let origin = panel_width * column as f64;
-        let across = (origin + left, origin + panel_width - right);
-        for (row, (panel, (x, y))) in scaled.into_iter().enumerate() {
-            let names = names(&x, (across.1 - across.0) / x.ticks.len().max(1) as f64);
-            let lines = names.iter().map(Vec::len).max().unwrap_or(1).max(1);
-            let lines = lines + usize::from(!panel.x.title.is_empty());
-            let top = f64::from(plot.height) * row as f64;
-            let bottom = top + f64::from(plot.height) - 12.0 - LINE * lines as f64;
-            let down = (top + TOP, bottom);
-            let square = (across.0, across.0 + down.1 - down.0);
+/// A panel with its scales.
+type Scaled<'p> = (&'p Panel, (Scale, Scale));
+
+/// Draws it in this width and returns the height of the figure.
+pub fn draw(on: &mut Canvas, plot: &Plot, width: u32) -> u32 {
+    let columns = plot.columns.min((width / NARROWEST).max(1) as usize);
+    let panel_width = f64::from(width) / columns as f64;
+    let scaled: Vec<Scaled> = plot.panels.iter().map(|p| (p, p.scales())).collect();
+    let across: Vec<(f64, f64)> = (0..columns)
+        .map(|column| {
+            let panels = scaled.iter().skip(column).step_by(columns);
+            axes(panels, panel_width * column as f64, panel_width)
+        })
+        .collect();
+    let mut top = 0.0;
+    for row in scaled.chunks(columns) {
+        let placed = row.iter().zip(&across);
+        let keys: Vec<Vec<Vec<&Series>>> = placed
+            .map(|(scaled, across)| keys(scaled.0, across.1 - across.0))
+            .collect();
+        // Axes of a row begin at one height.
+        let lines = row.iter().zip(&keys);
+        let lines = lines.map(|((panel, _), keys)| title(panel, panel_width).len() + keys.len());
+        let above = TOP + LINE * (lines.max().unwrap_or(2) - 2) as f64;
+        let is_square = row.iter().any(|(panel, _)| panel.square);
+        let most = if is_square {
+            panel_width + TOP
+        } else {
+            f64::INFINITY
+        };
+        let bottom = top + above - TOP + f64::from(plot.height).min(most);
+        for (column, ((panel, (x, y)), keys)) in row.iter().zip(&keys).enumerate() {
+            let (across, origin) = (across[column], panel_width * column as f64);
+            let is_places = !panel.x.places.is_empty();
+            let names = Names::new(x, is_places, across.1 - across.0, f64::from(plot.height));
+            let title = LINE * f64::from(u8::from(!panel.x.title.is_empty()));
+            let down = (top + above, bottom - BOTTOM - names.height() - title);
+            let side = (down.1 - down.0).min(across.1 - across.0);
             let frame = Frame {
                 panel,
-                x,
-                y,
-                across: if panel.square { square } else { across },
-                down,
-                end: origin + panel_width,
+                x: x.clone(),
+                y: y.clone(),
+                across: if panel.square {
+                    (across.0, across.0 + side)
+                } else {
+                    across
+                },
+                down: if panel.square {
+                    (down.0, down.0 + side)
+                } else {
+                    down
+                },
+                ends: (origin, origin + panel_width),
+                top,
             };
-            of_panel(on, &frame, &names);
+            of_panel(on, &frame, &names, keys);
         }
+        top = bottom;
     }
-    plot.height * plot.panels.len().div_ceil(plot.columns).max(1) as u32
+    let empty = plot.panels.is_empty().then_some(plot.height);
+    empty.unwrap_or(top.ceil() as u32)
+}
+
+/// Ends of the horizontal axes of a column, which all have the same margins.
+fn axes<'p>(
+    panels: impl Iterator<Item = &'p Scaled<'p>> + Clone,
+    origin: f64,
+    panel_width: f64,
+) -> (f64, f64) {
+    let left = panels.clone().map(|(_, (_, y))| widest(&y.ticks) + 14.0);
+    let right = panels.map(|(panel, (x, _))| right(panel, x, panel_width));
+    let [left, right] = [left.fold(14.0, f64::max), right.fold(14.0, f64::max)];
+    (origin + left, origin + panel_width - right)
 }
 
 fn widest(ticks: &[(f64, String)]) -> f64 {
@@ -79,23 +117,7 @@ fn right(panel: &Panel, x: &Scale, panel_width: f64) -> f64 {
     widest.min(LABELS * panel_width).max(half)
 }
 
-/// Minimum number of letters in a line of a name.
-const LETTERS: usize = 6;
-
-/// Labels of the horizontal ticks; names are broken into as many lines as needed.
-fn names(x: &Scale, room: f64) -> Vec<Vec<String>> {
-    let letters = (room / (0.6 * LETTER * SMALL)) as usize;
-    let lines = |label: &String| {
-        if width(label, SMALL) < room || letters < LETTERS {
-            return vec![label.clone()];
-        }
-        let lines = textwrap::wrap(label, textwrap::Options::new(letters).break_words(false));
-        lines.into_iter().map(|line| line.into_owned()).collect()
-    };
-    x.ticks.iter().map(|(_, label)| lines(label)).collect()
-}
-
-fn of_panel(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
+fn of_panel(on: &mut Canvas, frame: &Frame, names: &Names, keys: &[Vec<&Series>]) {
     let (panel, (left, right), (top, bottom)) = (frame.panel, frame.across, frame.down);
     for range in &panel.shading {
         let (start, end) = (range.start.max(frame.x.low), range.end.min(frame.x.high));
@@ -104,11 +126,21 @@ fn of_panel(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
             on.rectangle(corners, SHADE);
         }
     }
-    ticks(on, frame, names);
-    on.stroke(&[(left, top), (left, bottom), (right, bottom)], QUIET, 0.75);
-    let at = (left, top - TOP + 6.0);
-    on.text(&panel.title, at, (HPos::Left, VPos::Top), INK, 1.0);
-    keys(on, frame, top - TOP + 6.0);
+    vertical_ticks(on, frame);
+    horizontal_ticks(on, frame, names);
+    if !panel.x.is_bare {
+        on.stroke(&[(left, top), (left, bottom), (right, bottom)], QUIET, 0.75);
+    }
+    let title = title(panel, frame.ends.1 - frame.ends.0);
+    let line_at = |line: usize| frame.top + 6.0 + LINE * line as f64;
+    for (n, line) in title.iter().enumerate() {
+        // A line wider than the axes begins at the edge of the panel.
+        let start = left.min(frame.ends.1 - width(line, 1.0)).max(frame.ends.0);
+        on.text(line, (start, line_at(n)), (HPos::Left, VPos::Top), INK, 1.0);
+    }
+    for (n, keys) in keys.iter().enumerate() {
+        key_line(on, right, line_at(title.len() - 1 + n), keys);
+    }
     for series in &panel.series {
         series::draw(on, frame, series);
     }
@@ -120,12 +152,18 @@ fn of_panel(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
     labels(on, frame)
 }
 
-fn ticks(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
-    let ((left, right), (top, bottom)) = (frame.across, frame.down);
+fn vertical_ticks(on: &mut Canvas, frame: &Frame) {
+    let (left, right) = frame.across;
+    let is_places = !frame.panel.y.places.is_empty();
+    let (scale, closest) = if is_places {
+        (UPWARD, CLOSEST)
+    } else {
+        (SMALL, LETTER)
+    };
     let mut taken: Vec<f64> = Vec::new();
     for (value, label) in &frame.y.ticks {
         let y = frame.at_y(*value);
-        if taken.iter().any(|other| (other - y).abs() < LETTER) {
+        if taken.iter().any(|other| (other - y).abs() < closest) {
             continue;
         }
         taken.push(y);
@@ -136,24 +174,30 @@ fn ticks(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
             (left - 6.0, y),
             (HPos::Right, VPos::Center),
             INK,
-            SMALL,
+            scale,
         );
     }
+}
+
+fn horizontal_ticks(on: &mut Canvas, frame: &Frame, names: &Names) {
+    let ((left, right), (top, bottom)) = (frame.across, frame.down);
+    let is_place = !frame.panel.x.places.is_empty();
     let mut taken: Vec<(f64, f64)> = Vec::new();
-    for ((value, _), lines) in frame.x.ticks.iter().zip(names) {
+    for (nth, (value, _)) in frame.x.ticks.iter().enumerate() {
         let x = frame.at_x(*value);
-        let half = 0.5
-            * lines
-                .iter()
-                .map(|line| width(line, SMALL))
-                .fold(0.0, f64::max);
-        let is_place = !frame.panel.x.places.is_empty();
+        let (half, gap) = match names {
+            Names::Upward(_) => (0.5 * CLOSEST, 0.0),
+            Names::Across(names) => {
+                let widths = names[nth].iter().map(|line| width(line, SMALL));
+                let gap = if is_place { 0.0 } else { 6.0 };
+                (0.5 * widths.fold(0.0, f64::max), gap)
+            }
+        };
         let shown = if is_place {
             x.clamp(left + half, (right - half).max(left + half))
         } else {
             x
         };
-        let gap = if is_place { 0.0 } else { 6.0 };
         let near = |&(other, of): &(f64, f64)| (other - shown).abs() < half + of + gap;
         on.stroke(&[(x, top), (x, bottom)], GRID, 0.75);
         on.stroke(&[(x, bottom), (x, bottom + 3.0)], QUIET, 0.75);
@@ -161,29 +205,36 @@ fn ticks(on: &mut Canvas, frame: &Frame, names: &[Vec<String>]) {
             continue;
         }
         taken.push((shown, half));
-        for (n, line) in lines.iter().enumerate() {
-            let at = (shown, bottom + 6.0 + LINE * n as f64);
-            on.text(line, at, (HPos::Center, VPos::Top), INK, SMALL);
+        match names {
+            Names::Upward(names) => on.upward(&names[nth], (x, bottom + 6.0), INK, UPWARD),
+            Names::Across(names) => {
+                for (n, line) in names[nth].iter().enumerate() {
+                    let at = (shown, bottom + 6.0 + LINE * n as f64);
+                    on.text(line, at, (HPos::Center, VPos::Top), INK, SMALL);
+                }
+            }
         }
     }
-    let lines = names.iter().map(Vec::len).max().unwrap_or(1).max(1) as f64;
-    let at = (0.5 * (left + right), bottom + 6.0 + LINE * lines);
     let title = &frame.panel.x.title;
-    if title.is_empty() {
-        return;
+    if !title.is_empty() {
+        let at = (0.5 * (left + right), bottom + 6.0 + names.height());
+        on.text(title, at, (HPos::Center, VPos::Top), INK, SMALL)
     }
-    on.text(title, at, (HPos::Center, VPos::Top), INK, SMALL)
 }
 
-/// Names with a colour sample, from the right end of the title line.
-fn keys(on: &mut Canvas, frame: &Frame, y: f64) {
-    let mut x = frame.across.1;
-    for series in frame.panel.series.iter().rev() {
-        let Some(key) = &series.key else { continue };
+/// Names with a colour sample, from the right end of a line.
+fn key_line(on: &mut Canvas, right: f64, y: f64, keys: &[&Series]) {
+    let mut x = right;
+    for series in keys.iter().rev() {
+        let key = series.key.as_deref().unwrap_or_default();
         x -= width(key, SMALL);
         on.text(key, (x, y), (HPos::Left, VPos::Top), INK, SMALL);
         let sample = [(x - 16.0, y + 3.0), (x - 5.0, y + 14.0)];
-        on.rectangle(sample, rgb(series.pen.color));
+        let color = match series.shape {
+            Shape::Band(..) => BAND,
+            _ => rgb(series.pen.color),
+        };
+        on.rectangle(sample, color);
         x -= 28.0;
     }
 }
@@ -221,7 +272,7 @@ fn labels(on: &mut Canvas, frame: &Frame) {
     for (((x, y), text, color), shown_at) in labels.into_iter().zip(spread(&heights, frame.down)) {
         on.stroke(&[(x, y), (right, y)], color, 0.4);
         on.stroke(&[(right + 1.0, y), (right + 9.0, shown_at)], color, 0.75);
-        let text = shortened(text, frame.end - right - 12.0);
+        let text = shortened(text, frame.ends.1 - right - 12.0);
         let at = (right + 11.0, shown_at);
         on.text(&text, at, (HPos::Left, VPos::Center), color, SMALL);
     }

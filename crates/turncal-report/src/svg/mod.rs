@@ -1,28 +1,38 @@
-//! Draws any plot as an SVG document: margins from the widths of labels, non-overlapping names at the ends of lines,
-//! and spaced ticks. Hovering over a mark shows its values.
+//! Draws any plot as an SVG document of some width, in the colours of paper or of a dark screen: margins from the widths
+//! of labels, non-overlapping names at the ends of lines, and spaced ticks. Hovering over a mark shows its values.
 
 mod canvas;
 mod grid;
 mod series;
 #[cfg(test)]
 mod tests;
+mod words;
 
-use canvas::{Canvas, WIDTH};
+use canvas::{Canvas, dark_style};
 use maud::{PreEscaped, html};
 
 use super::plot::Plot;
 
+pub use canvas::WIDTHS;
+
 #[cfg(test)]
 pub use tests::{assert_sound, drawn};
 
-/// The SVG document of a plot.
+/// The SVG document of a plot for a wide screen.
 pub fn draw(plot: &Plot) -> String {
+    draw_at(plot, WIDTHS[0])
+}
+
+/// The SVG document of a plot of this width: the narrower, the fewer panels stand side by side.
+pub fn draw_at(plot: &Plot, width: u32) -> String {
     let mut on = Canvas::default();
-    let height = grid::draw(&mut on, plot);
+    on.is_hovered = width == WIDTHS[0];
+    let height = grid::draw(&mut on, plot, width);
     let document = html! {
-        svg width=(WIDTH) height=(height) viewBox={ "0 0 " (WIDTH) " " (height) } font-family="sans-serif"
+        svg width=(width) height=(height) viewBox={ "0 0 " (width) " " (height) } font-family="sans-serif"
             xmlns="http://www.w3.org/2000/svg" {
-            rect width="100%" height="100%" fill="#ffffff" {}
+            style { (PreEscaped(dark_style())) }
+            rect width="100%" height="100%" fill="#FFFFFF" {}
             (PreEscaped(on.inside()))
         }
     };

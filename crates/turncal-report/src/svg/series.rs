@@ -3,11 +3,9 @@
 use plotters::style::RGBColor;
 
 use super::super::plot::{Anchor, Axis, Mark, Pen, Point, Series, Shape, Upright};
-use super::canvas::{Canvas, Frame, HPos, SMALL, VPos, rgb};
+use super::canvas::{BAND, Canvas, Frame, HPos, SMALL, VPos, rgb, width};
 use turncal::number::three_digits;
 
-/// Bands.
-const BAND: RGBColor = RGBColor(196, 214, 228);
 /// Half the width of a cap, in pixels.
 const CAP: f64 = 4.0;
 /// Maximum number of marks with hover texts.
@@ -39,7 +37,10 @@ pub fn draw(on: &mut Canvas, frame: &Frame, series: &Series) {
                 Anchor::Below => ((x, y + 5.0), (HPos::Center, VPos::Top)),
                 Anchor::Middle => ((x, y), (HPos::Center, VPos::Center)),
             };
-            on.text(text, at, lie, color, SMALL)
+            // Words in a cell of a matrix that is too small for them would cover those beside it.
+            if *anchor != Anchor::Middle || frame.x.step(right - left) > width(text, SMALL) {
+                on.text(text, at, lie, color, SMALL)
+            }
         }
     }
 }
@@ -51,7 +52,7 @@ fn marks(
     mark: Mark,
     points: &[(Point, (f64, f64))],
 ) {
-    let is_hovered = points.len() <= HOVERED;
+    let is_hovered = points.len() <= HOVERED && !frame.panel.x.is_bare;
     for &(at, ends) in points {
         if visible(frame, &[at]).is_empty() {
             continue;

@@ -23,8 +23,9 @@ fn texts(svg: &str) -> Vec<(String, [f64; 4])> {
         let text = rest.split_once("</text>").unwrap().0.trim().to_owned();
         let [x, y, size] = ["x", "y", "font-size"].map(|name| number(tag, name) / canvas::FINE);
         let width = width(&text.replace("&lt;", "<"), size / LETTER);
+        // Upward names end at their point.
         if attribute(tag, "transform").is_some() {
-            return (text, [x - size, x + size, y - width, y]);
+            return (text, [x - 0.5 * size, x + 0.5 * size, y, y + width]);
         }
         let start = match attribute(tag, "text-anchor") {
             Some("middle") => x - 0.5 * width,
@@ -48,8 +49,7 @@ fn texts(svg: &str) -> Vec<(String, [f64; 4])> {
 pub fn assert_sound(figures: &[String]) {
     for svg in figures {
         let head = &svg[..svg.find('>').unwrap()];
-        assert_eq!(number(head, "width"), 1200.0);
-        let height = number(head, "height");
+        let [wide, height] = ["width", "height"].map(|name| number(head, name));
         assert!(svg.ends_with("</svg>\n"));
         for bad in [
             "NaN",
@@ -63,7 +63,7 @@ pub fn assert_sound(figures: &[String]) {
             assert!(!svg.contains(bad), "{bad}");
         }
         for (text, [left, right, top, bottom]) in texts(svg) {
-            let inside = left >= 0.0 && right <= 1200.0 && top >= 0.0 && bottom <= height;
+            let inside = left >= 0.0 && right <= wide && top >= 0.0 && bottom <= height;
             assert!(
                 inside,
                 "`{text}` from {left} to {right}, {top} to {bottom} of {height}"
@@ -74,9 +74,12 @@ pub fn assert_sound(figures: &[String]) {
 
 /// Figures that were drawn and meet the requirements.
 pub fn drawn<'a>(plots: impl Iterator<Item = &'a Plot>) -> Vec<String> {
-    let figures: Vec<String> = plots.map(draw).collect();
-    assert_sound(&figures);
-    figures
+    let plots: Vec<&Plot> = plots.collect();
+    for width in WIDTHS {
+        let figures: Vec<String> = plots.iter().map(|plot| draw_at(plot, width)).collect();
+        assert_sound(&figures);
+    }
+    plots.into_iter().map(draw).collect()
 }
 
 fn of(panels: impl IntoIterator<Item = Panel>) -> String {
