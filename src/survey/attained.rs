@@ -20,10 +20,9 @@ pub struct Attained {
 }
 
 impl Attained {
-    /// Whether a specification is given and every limit can be decided.
+    /// Whether a specification is given and every limit seems to be decided.
     pub fn is_met(&self) -> bool {
-        let decided = |check: &Check| check.verdict == Verdict::Pass;
-        !self.checks.is_empty() && self.checks.iter().all(decided)
+        are_decided(&self.checks)
     }
 
     /// Time until every limit can be decided, s, if the rest of the record adds information as the rows so far; `None`
@@ -43,6 +42,12 @@ impl Attained {
         });
         times.reduce(|a, b| Some(a?.max(b?)))?
     }
+}
+
+/// Whether there are limits, and all can be decided.
+pub fn are_decided(checks: &[Check]) -> bool {
+    let is_decided = |check: &Check| check.verdict == Verdict::Pass;
+    !checks.is_empty() && checks.iter().all(is_decided)
 }
 
 /// A unit at its nominal values against every limit of an estimated parameter: it passes if the σ of an estimate are

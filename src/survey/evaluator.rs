@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::advice::{Advisor, Move};
-use super::attained::{Attained, decided};
+use super::attained::{Attained, are_decided, decided};
 use super::{Survey, bound_of_record, by_group, unobserved};
 use crate::calibration::{
     Bound, CalibrationError, Estimate, Finding, Method, Options, ParameterVector, Problem,
@@ -44,6 +44,8 @@ pub struct InterimCalibration {
     pub verdict: Verdict,
     /// Its findings.
     pub findings: Vec<Finding>,
+    /// Whether a specification is given and its σ decide every limit.
+    pub is_met: bool,
     /// σ relative to those of the bound.
     inflation: ParameterVector,
 }
@@ -74,19 +76,30 @@ impl Evaluator {
         self.specification.as_ref()
     }
 
-    /// State of the recording so far. σ are those of the last calibration, changed by the expected effect of the rows
-    /// since. The rows are calibrated after every growth by half, and when every limit seems to be decided.
+    /// State of the recording so far, which is calibrated first if that is due.
     pub fn status(&mut self, run: &Run, progress: Progress) -> Status {
+        let status = self.outlook(run);
+        let Some(due) = self.due(run, &status) else {
+            return status;
+        };
+        self.take(due.calibrate(progress));
+        self.outlook(run)
+    }
+
+    /// State of the recording so far, without a calibration: σ are those of the last one, changed by the expected
+    /// effect of the rows since.
+    pub fn outlook(&mut self, run: &Run) -> Status {
         let imu = &run.recording.imu;
         let survey = Survey::of_motion(run);
         let last = survey.rests.last();
         let standing = last.filter(|rest| rest.dwell.samples.end == imu.len());
         let still = standing.map_or(0.0, |rest| rest.dwell.duration(imu));
         let up = last.map_or(Vector3::z(), |rest| rest.force.normalize());
-        let expected = bound_of_record(run, &self.options)
-            .map(|bound| self.attained(run, &survey, bound, progress));
+        let expected = bound_of_record(run, &self.options);
+        let expected = expected.map(|bound| self.of_bound(run, &survey, bound));
+        let calibrated = self.calibrated.clone();
         let next = match &expected {
-            Ok(attained) if attained.is_met() => None,
+            _ if calibrated.as_ref().is_some_and(|of| of.is_met) => None,
             Ok(attained) => self
                 .advisor
                 .next(run, &up, attained, self.specification.as_ref()),
@@ -97,27 +110,30 @@ impl Evaluator {
             survey,
             still,
             expected,
-            calibrated: self.calibrated.clone(),
+            calibrated,
             next,
         }
     }
 
-    fn attained(
-        &mut self,
-        run: &Run,
-        survey: &Survey,
-        bound: Bound,
-        progress: Progress,
-    ) -> Attained {
-        let attained = self.of_bound(run, survey, bound);
-        let duration = run.recording.imu.duration();
-        let seems_met = duration > self.attempted && attained.is_met();
-        if duration < GROWTH * self.attempted && !seems_met {
-            return attained;
+    /// The calibration that is due in this state: after every growth by half, and when every limit seems to be decided.
+    pub fn due(&mut self, run: &Run, status: &Status) -> Option<Due> {
+        let attained = status.expected.as_ref().ok()?;
+        let seems_met = status.duration > self.attempted && attained.is_met();
+        if status.duration < GROWTH * self.attempted && !seems_met {
+            return None;
         }
-        self.attempted = duration;
-        self.calibrated = InterimCalibration::of(run, &self.options, &attained.bound, progress);
-        self.of_bound(run, survey, attained.bound)
+        self.attempted = status.duration;
+        Some(Due {
+            run: run.clone(),
+            options: self.options.clone(),
+            specification: self.specification.clone(),
+            bound: attained.bound.estimate.clone(),
+        })
+    }
+
+    /// Takes the result of the calibration that was due.
+    pub fn take(&mut self, calibrated: Option<InterimCalibration>) {
+        self.calibrated = calibrated;
     }
 
     fn of_bound(&self, run: &Run, survey: &Survey, bound: Bound) -> Attained {
@@ -159,17 +175,32 @@ impl Evaluator {
     }
 }
 
-impl InterimCalibration {
-    /// `None` if the rows cannot be calibrated, or progress is stopped.
-    fn of(run: &Run, options: &Options, bound: &Bound, progress: Progress) -> Option<Self> {
-        let problem = Problem::new(run, options);
+/// Rows to calibrate, possibly in another thread.
+#[derive(Debug)]
+pub struct Due {
+    run: Run,
+    options: Options,
+    specification: Option<Specification>,
+    bound: Estimate,
+}
+
+impl Due {
+    /// Calibrates the rows; `None` if that fails, or progress is stopped.
+    pub fn calibrate(&self, progress: Progress) -> Option<InterimCalibration> {
+        let problem = Problem::new(&self.run, &self.options);
         let solution = problem.solve(Method::Ekf, progress).ok()?;
         let findings = solution.findings().to_vec();
-        let [found, expected] = [solution.estimate(), &bound.estimate].map(Estimate::sigma);
-        Some(Self {
-            duration: run.recording.imu.duration(),
-            verdict: Verdict::of(&findings),
+        let verdict = Verdict::of(&findings);
+        let [found, expected] = [solution.estimate(), &self.bound].map(Estimate::sigma);
+        let is_met = verdict.word != Word::Failed
+            && self.specification.as_ref().is_some_and(|specification| {
+                are_decided(&decided(specification, solution.estimate()))
+            });
+        Some(InterimCalibration {
+            duration: self.run.recording.imu.duration(),
+            verdict,
             findings,
+            is_met,
             inflation: found.zip_map(&expected, |found, expected| {
                 if expected > 0.0 {
                     found / expected
@@ -182,8 +213,8 @@ impl InterimCalibration {
 }
 
 impl Status {
-    /// Whether a specification is given and every limit can be decided.
+    /// Whether a specification is given and the last calibration decides every limit.
     pub fn is_met(&self) -> bool {
-        self.expected.as_ref().is_ok_and(Attained::is_met)
+        self.calibrated.as_ref().is_some_and(|of| of.is_met)
     }
 }

@@ -8,7 +8,7 @@ mod session;
 
 pub use advice::{Attitude, Move, nearest_attitude};
 pub use attained::{Attained, decided, needed};
-pub use evaluator::{Evaluator, GROWTH, InterimCalibration, Status};
+pub use evaluator::{Due, Evaluator, GROWTH, InterimCalibration, Status};
 pub use session::Session;
 
 use crate::calibration::{

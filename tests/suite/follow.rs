@@ -1,16 +1,19 @@
 //! `turncal calibrate --follow`: rows are evaluated as they arrive, kept, and finally calibrated.
 
 use std::fs::{self, OpenOptions};
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
+use std::sync::{Arc, Mutex};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use turncal::imu::Output as Quantity;
 use turncal::models::path_by_hand;
 use turncal::simulation::Scenario;
 use turncal_files::write_run;
+
+use crate::shared::shared;
 
 const PATH: &str =
     "z_up, turn x 180, x_up, x_down, turn z 90, y_up, y_down, turn y 180, turn x 90, turn z 180";
@@ -214,4 +217,330 @@ fn what_keeps_rows_from_being_read_is_told_while_they_come() {
     let told = text(&output);
     assert!(told.contains("not yet: "), "{told}");
     assert_eq!(fs::read(directory.path().join("kept.csv")).unwrap(), noise);
+}
+
+/// What following gives if this is its whole input, and whether it succeeded.
+fn followed(directory: &Path, arguments: &[&str], input: &[u8]) -> (String, bool) {
+    let mut child = spawned(directory, &[&["--follow", "-"], arguments].concat());
+    // A command that refuses does not read on.
+    let _ = child.stdin.take().unwrap().write_all(input);
+    let output = child.wait_with_output().unwrap();
+    (text(&output), output.status.success())
+}
+
+#[test]
+fn lines_that_are_no_rows_are_left_out_counted_and_named_and_guidance_goes_on() {
+    let banner = "MPU-6050 ready\noffsets loaded\n";
+    for (case, added, counted) in [
+        (
+            "follow-one-letter",
+            "",
+            "left out: 1 (line 502: found `-0.0223p` in field 3, expected a number)",
+        ),
+        (
+            "follow-header-again",
+            banner,
+            "left out: 3 (line 502: found `t` in field 1, expected a number; line 503: found 1 as",
+        ),
+        (
+            "follow-header-again",
+            "8.0,0.1,0.2\n",
+            "left out: 2 (line 502: found `t` in field 1, expected a number; line 503: found 3 as",
+        ),
+    ] {
+        let Some(from) = shared(&format!("attack/{case}")) else {
+            return;
+        };
+        let directory = tempfile::tempdir().unwrap();
+        let rows = fs::read_to_string(from.join("rows.csv")).unwrap();
+        let bad = rows.lines().nth(501).unwrap().to_owned() + "\n";
+        let begin = rows.rfind(&bad).unwrap();
+        let (before, after) = (&rows[..begin], &rows[begin + bad.len()..]);
+        let sent = [before, &bad, added, after].concat();
+        let keep = ["--gyro-unit", "rad/s", "--keep", "kept.csv", "--json"];
+        let (told, is_done) = followed(directory.path(), &keep, sent.as_bytes());
+        assert!(is_done && told.contains(counted), "{told}");
+        assert!(told.contains("next: "), "{told}");
+        let kept = fs::read_to_string(directory.path().join("kept.csv")).unwrap();
+        assert_eq!(kept, before.to_owned() + after);
+    }
+}
+
+#[test]
+fn a_kept_file_is_continued_on_a_new_line_by_rows_like_its_own() {
+    let Some(from) = shared("attack/keep-continued-half-row") else {
+        return;
+    };
+    let directory = tempfile::tempdir().unwrap();
+    let [old, new] = ["k.csv", "more.csv"].map(|name| fs::read_to_string(from.join(name)).unwrap());
+    let log = directory.path().join("k.csv");
+    let whole = &old[..=old.rfind('\n').unwrap()];
+    let names = whole.lines().next().unwrap();
+    for sent in [new.clone(), format!("{names}\n{new}")] {
+        fs::write(&log, &old).unwrap();
+        let (told, is_done) = followed(
+            directory.path(),
+            &["--keep", "k.csv", "--json"],
+            sent.as_bytes(),
+        );
+        assert!(is_done && told.contains("removed the last line"), "{told}");
+        assert_eq!(fs::read_to_string(&log).unwrap(), whole.to_owned() + &new);
+    }
+    let renamed = names.replacen("gx,gy", "gy,gx", 1);
+    for (sent, says) in [
+        (renamed + "\n" + &new, "found the columns t,gy,gx"),
+        (old.clone(), "rows that this file contains already"),
+        (
+            new.replace(',', ",0,"),
+            "found 13 as the number of fields, expected 7",
+        ),
+    ] {
+        fs::write(&log, &old).unwrap();
+        let (told, is_done) = followed(directory.path(), &["--keep", "k.csv"], sent.as_bytes());
+        assert!(!is_done && told.contains(says), "{told}");
+        assert_eq!(fs::read_to_string(&log).unwrap(), old);
+    }
+}
+
+#[test]
+fn rows_are_added_to_no_other_file() {
+    let cases =
+        ["keep-foreign-file", "follow-header-again"].map(|of| shared(&format!("attack/{of}")));
+    let [Some(foreign), Some(rows)] = cases else {
+        return;
+    };
+    let directory = tempfile::tempdir().unwrap();
+    let rows = fs::read(rows.join("rows.csv")).unwrap();
+    let thesis = fs::read(foreign.join("thesis.tex")).unwrap();
+    let packed = [&[0x1f, 0x8b, 8, 0][..], &rows[..3000]].concat();
+    let binary: Vec<u8> = (0..5000_u32).map(|k| (k * k % 251) as u8).collect();
+    for content in [thesis, packed, binary, b"t,gx,gy\n".to_vec()] {
+        let file = directory.path().join("thesis.tex");
+        fs::write(&file, &content).unwrap();
+        let (told, is_done) = followed(directory.path(), &["--keep", "thesis.tex"], &rows);
+        let refused = told.contains("thesis.tex: found no rows of numbers");
+        assert!(!is_done && refused, "{told}");
+        assert_eq!(fs::read(&file).unwrap(), content);
+    }
+}
+
+#[test]
+fn the_log_of_a_run_is_not_extended_by_its_own_rows() {
+    let directory = tempfile::tempdir().unwrap();
+    rows(directory.path());
+    let run = directory.path().join("whole");
+    let log = fs::read(run.join("imu.csv.gz")).unwrap();
+    let mut child = Command::new(assert_cmd::cargo::cargo_bin("turncal"))
+        .current_dir(&run)
+        .args(["calibrate", "--follow", "-", "--run", "run.toml"])
+        .stdin(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let _ = child.stdin.take().unwrap().write_all(&log);
+    let output = child.wait_with_output().unwrap();
+    let told = text(&output);
+    assert!(
+        !output.status.success() && told.contains("names imu.csv.gz"),
+        "{told}"
+    );
+    assert_eq!(fs::read(run.join("imu.csv.gz")).unwrap(), log);
+}
+
+#[test]
+fn a_specification_is_decided_by_the_calibration_of_all_rows() {
+    let directory = tempfile::tempdir().unwrap();
+    let rows = rows(directory.path());
+    let limits = ["--specification", "mems-by-hand", "--json"];
+    let (told, is_done) = followed(directory.path(), &limits, rows.as_bytes());
+    assert!(is_done, "{told}");
+    let last = told
+        .lines()
+        .rfind(|line| line.starts_with("specification: "));
+    assert!(last.is_some_and(|line| line.contains(" met, ")), "{told}");
+}
+
+#[test]
+fn the_sketch_has_the_functions_that_an_arduino_calls() {
+    let page = include_str!("../../docs/live.md");
+    for function in ["    void setup() {", "    void loop() {"] {
+        assert!(page.contains(function), "{function}");
+    }
+}
+
+/// A serial device: a terminal whose other end is written to.
+#[cfg(target_os = "linux")]
+struct Device(Child);
+
+#[cfg(target_os = "linux")]
+impl Device {
+    /// Makes it available by this name.
+    fn new(name: &Path) -> Self {
+        let _ = fs::remove_file(name);
+        let made = format!(
+            "stty raw -echo; ln -s $(tty) {}; exec sleep 600",
+            name.display()
+        );
+        let child = Command::new("script")
+            .args(["-q", "-c", &made, "/dev/null"])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .spawn();
+        while !name.exists() {
+            thread::sleep(Duration::from_millis(20));
+        }
+        Self(child.unwrap())
+    }
+
+    fn says(&mut self, text: &str) {
+        let mut input = self.0.stdin.as_ref().unwrap();
+        input.write_all(text.as_bytes()).unwrap();
+    }
+
+    /// Lets the last bytes arrive, then takes the device away.
+    fn go(mut self) {
+        thread::sleep(Duration::from_millis(500));
+        self.0.kill().unwrap();
+        self.0.wait().unwrap();
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_device_with_noise_that_resets_gives_the_values_of_its_rows() {
+    let directory = tempfile::tempdir().unwrap();
+    let rows = rows(directory.path());
+    let lines: Vec<&str> = rows.split_inclusive('\n').collect();
+    let (header, third) = (lines[0], lines.len() / 3);
+    let name = directory.path().join("device");
+    let banner = "\u{fffd}\u{1}boot\nIMU ready, 100 Hz\n";
+    let mut device = Device::new(&name);
+    let child = spawned(
+        directory.path(),
+        &["--follow", "device", "--keep", "kept.csv", "-o", "result"],
+    );
+    thread::sleep(Duration::from_millis(500));
+    let noise = ["0.1,0.2\n", "12.3,0.0p,0,0,0,0,9.8\n", &lines[50][9..]];
+    device.says(&[&lines[7][5..], lines[8], banner, header].concat());
+    device.says(&lines[1..third].concat());
+    device.says(&noise.concat());
+    device.says(&(lines[third..2 * third].concat() + &lines[2 * third][..20]));
+    let kept = || fs::read_to_string(directory.path().join("kept.csv")).unwrap();
+    while kept().lines().count() < 2 * third {
+        thread::sleep(Duration::from_millis(100));
+    }
+    device.go();
+    let mut device = Device::new(&name);
+    thread::sleep(Duration::from_secs(2));
+    device.says(&[&lines[2 * third][20..], banner, header].concat());
+    device.says(&lines[2 * third + 1..].concat());
+    while kept().lines().count() < lines.len() - 1 {
+        thread::sleep(Duration::from_millis(100));
+    }
+    let ended = Command::new("kill")
+        .args(["-TERM", &child.id().to_string()])
+        .status();
+    assert!(ended.unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    device.go();
+    let told = text(&output);
+    assert!(
+        output.status.success() && told.contains("incomplete lines left out: 12 ("),
+        "{told}"
+    );
+    let good = [&lines[..2 * third], &lines[2 * third + 1..]].concat();
+    assert!(kept() == good.concat());
+    let result = directory.path().join("result");
+    let run = fs::read_to_string(result.join("run.toml")).unwrap();
+    let named = run
+        .lines()
+        .find_map(|line| line.strip_prefix("file = "))
+        .unwrap();
+    assert!(Path::new(named.trim_matches('"')).is_file(), "{named}");
+    let [live, offline] = [
+        fs::read(result.join("calibration.json")).unwrap(),
+        offline(directory.path(), "kept.csv"),
+    ];
+    let [live, offline] =
+        [live, offline].map(|of| serde_json::from_slice::<serde_json::Value>(&of).unwrap());
+    for part in ["gyro", "accel", "covariance", "verdict"] {
+        assert_eq!(live[part], offline[part], "{part}");
+    }
+}
+
+/// Duration of the record on the last screen, s.
+#[cfg(target_os = "linux")]
+fn shown(screens: &str) -> Option<f64> {
+    screens.lines().rev().find_map(|line| {
+        let (duration, rest) = line.split_once(" s, ")?;
+        let is_state = rest.split(' ').nth(1)?.starts_with("dwell");
+        duration.parse().ok().filter(|_| is_state)
+    })
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+#[ignore = "time of the machine"]
+fn the_status_lags_at_most_two_seconds_on_one_core_also_while_rows_are_calibrated() {
+    const RATE: f64 = 100.0;
+    let directory = tempfile::tempdir().unwrap();
+    let rows = rows(directory.path());
+    let lines: Vec<&str> = rows.split_inclusive('\n').collect();
+    // The second calibration is due after growth by half, 10 s after the rows begin to come in real time.
+    let first = lines.len() * 6 / 10;
+    let (second, whole) = (first * 3 / 2 - 1000, first * 3 / 2 + 1000);
+    let program = assert_cmd::cargo::cargo_bin("turncal");
+    let follow = format!(
+        "exec taskset -c 0 {} calibrate --follow - --latitude 34 < rows",
+        program.display()
+    );
+    let made = Command::new("mkfifo")
+        .arg(directory.path().join("rows"))
+        .status();
+    assert!(made.unwrap().success());
+    let mut child = Command::new("script")
+        .current_dir(directory.path())
+        .args(["-q", "-c", &follow, "/dev/null"])
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut output = child.stdout.take().unwrap();
+    let screens = Arc::new(Mutex::new(String::new()));
+    let read = screens.clone();
+    thread::spawn(move || {
+        let mut buffer = [0; 4096];
+        while let Ok(count @ 1..) = output.read(&mut buffer) {
+            let mut screens = read.lock().unwrap();
+            screens.push_str(&String::from_utf8_lossy(&buffer[..count]));
+        }
+    });
+    let mut pipe = fs::File::create(directory.path().join("rows")).unwrap();
+    let behind = |sent: usize| sent as f64 / RATE - shown(&screens.lock().unwrap()).unwrap_or(0.0);
+    for (begin, end) in [(0, first), (first, second)] {
+        pipe.write_all(lines[begin..end].concat().as_bytes())
+            .unwrap();
+        let begun = Instant::now();
+        while behind(end) > 1.0 && begun.elapsed().as_secs() < 30 {
+            thread::sleep(Duration::from_millis(50));
+        }
+    }
+    let (begun, mut sent, mut lags) = (Instant::now(), second, Vec::new());
+    while sent < whole {
+        let until = (second + (begun.elapsed().as_secs_f64() * RATE) as usize).min(whole);
+        pipe.write_all(lines[sent..until].concat().as_bytes())
+            .unwrap();
+        sent = until;
+        thread::sleep(Duration::from_millis(20));
+        lags.push(behind(sent));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    lags.sort_by(f64::total_cmp);
+    let (median, most) = (lags[lags.len() / 2], lags[lags.len() - 1]);
+    println!(
+        "{} s of record: lag {median:.2} s, at most {most:.2} s",
+        whole as f64 / RATE
+    );
+    assert!(most <= 2.0, "{median} {most}");
 }

@@ -2,6 +2,7 @@
 
 mod clock_text;
 mod heading;
+mod kind;
 mod lines;
 mod row;
 
@@ -15,6 +16,7 @@ use flate2::read::MultiGzDecoder;
 use super::data_file::DataFile;
 use super::rows::Rows;
 use heading::{Heading, Looks};
+pub use kind::{RowKind, is_remark};
 use lines::{LONGEST, Lines, Stop};
 use row::{LONGEST_FIELD, MOST_COLUMNS, Malformed, Row};
 use turncal_input::{FileError, Place};

@@ -65,7 +65,7 @@ pub fn screen(run: &Run, status: &Status, specification: Option<&Specification>)
     }
     lines.push(match status.next {
         Some(next) => format!("next: {}, then keep still for 5 s", words(next)),
-        None => "σ are small enough to decide every limit of the specification".to_owned(),
+        None => "σ of the calibration decide every limit of the specification".to_owned(),
     });
     lines
 }
@@ -131,7 +131,7 @@ fn groups(attained: &Attained, specification: Option<&Specification>) -> Vec<Str
         let state = match (asked, open) {
             (None, _) => "",
             (Some(_), true) => "not yet",
-            (Some(_), false) => "reached",
+            (Some(_), false) => "predicted",
         };
         let row = format!(
             "{:<24}{:>14}{:>14}  {state}",

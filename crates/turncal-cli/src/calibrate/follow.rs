@@ -2,6 +2,8 @@
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use std::thread;
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use anyhow::bail;
@@ -12,14 +14,15 @@ use crate::arguments::OfLog;
 use crate::terminal::{end_gently, is_ended};
 use turncal::calibration::Options;
 use turncal::lot::Specification;
-use turncal::survey::{Evaluator, GROWTH};
+use turncal::survey::{Evaluator, GROWTH, InterimCalibration};
 use turncal_files::Opened;
+use turncal_report::terminal::printable;
 
 /// Interval between redraws of the screen.
 const REDRAW: Duration = Duration::from_millis(250);
-/// Evaluations use at most one part in this many of a processor's time, and start at least a second apart.
-const SHARE: u32 = 40;
-const APART: Duration = Duration::from_secs(1);
+/// Evaluations take at most half of the time, and start at least half a second apart.
+const SHARE: u32 = 2;
+const APART: Duration = Duration::from_millis(500);
 
 /// Rows to follow.
 pub struct Follow<'a> {
@@ -49,6 +52,7 @@ impl Follow<'_> {
             read: self.run.unwrap_or(&rows.log).to_owned(),
             opened: None,
             evaluator: Evaluator::new(self.options.clone(), self.specification.clone()),
+            calibrating: None,
         };
         let mut due = Instant::now();
         let mut known = 0;
@@ -59,14 +63,14 @@ impl Follow<'_> {
             if !rows.wait(REDRAW)? {
                 break "no more rows";
             }
-            screen.count(rows.received.lines)?;
+            screen.count(rows.received.lines, rows.left_out())?;
             if rows.received.bytes > known && Instant::now() >= due {
-                let (begun, spent) = (Instant::now(), processor_time());
+                let begun = Instant::now();
                 known = rows.received.bytes;
                 if followed.evaluate(known, &mut screen)? {
-                    break "the specification can be decided";
+                    break "the calibration decides every limit";
                 }
-                due = begun + APART.max(processor_time().saturating_sub(spent) * SHARE);
+                due = begun + APART.max(begun.elapsed() * SHARE);
             }
         };
         rows.end()?;
@@ -77,8 +81,8 @@ impl Follow<'_> {
             "stopped following: {end}; the rows are in {}",
             rows.log.display()
         );
-        if rows.incomplete() > 0 {
-            tell!("incomplete lines left out: {}", rows.incomplete());
+        if let Some(text) = rows.left_out() {
+            tell!("{}", printable(&text));
         }
         Ok(followed.read)
     }
@@ -88,6 +92,16 @@ impl Follow<'_> {
         if self.source.is_file() {
             self.check_named(named_by_run.as_deref())?;
             return Ok(Incoming::growing(self.source, self.patience));
+        }
+        if let Some((run, log)) = self.run.zip(named_by_run.as_ref())
+            && log.metadata().is_ok_and(|of| of.len() > 0)
+        {
+            bail!(
+                "{}: found that [imu] names {}, which exists, expected a new file to keep the rows in. Name a new file \
+                 there, or follow that file",
+                run.display(),
+                log.display()
+            );
         }
         let log = self.keep.map(Path::to_owned).or(named_by_run);
         Incoming::kept(self.source, log.unwrap_or_else(default_log))
@@ -120,6 +134,8 @@ struct Followed<'a> {
     /// What was read, and the size of the log when its fields were found.
     opened: Option<(Opened, u64)>,
     evaluator: Evaluator,
+    /// The calibration of earlier rows, which would delay the status.
+    calibrating: Option<JoinHandle<Option<InterimCalibration>>>,
 }
 
 impl Followed<'_> {
@@ -132,13 +148,17 @@ impl Followed<'_> {
         let Some((Opened { run, .. }, _)) = &self.opened else {
             return Ok(false);
         };
-        let status = self.evaluator.status(run, &|_| {
-            if is_ended() {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
-        });
+        if let Some(done) = self.calibrating.take_if(|of| of.is_finished()) {
+            self.evaluator.take(done.join().ok().flatten());
+        }
+        let status = self.evaluator.outlook(run);
+        if self.calibrating.is_none()
+            && let Some(due) = self.evaluator.due(run, &status)
+        {
+            let calibrate = move || due.calibrate(&|_| until_end());
+            let thread = thread::Builder::new().name("calibration".into());
+            self.calibrating = Some(thread.spawn(calibrate)?);
+        }
         screen.show(run, &status, self.evaluator.specification())?;
         Ok(status.is_met())
     }
@@ -156,19 +176,12 @@ impl Followed<'_> {
     }
 }
 
-/// Processor time of the command.
-#[cfg(any(target_os = "linux", target_vendor = "apple"))]
-fn processor_time() -> Duration {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
-    Duration::try_from(time).unwrap_or_default()
-}
-
-/// Elapsed time, where the system does not report processor time.
-#[cfg(not(any(target_os = "linux", target_vendor = "apple")))]
-fn processor_time() -> Duration {
-    SystemTime::now()
-        .duration_since(UNIX_EPOCH)
-        .unwrap_or_default()
+fn until_end() -> ControlFlow<()> {
+    if is_ended() {
+        ControlFlow::Break(())
+    } else {
+        ControlFlow::Continue(())
+    }
 }
 
 fn default_log() -> PathBuf {

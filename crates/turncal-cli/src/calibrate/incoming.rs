@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 
+use super::continued::Continued;
 use super::lines::Lines;
 
 /// Interval between attempts to reopen a device that disappeared.
@@ -27,7 +28,9 @@ enum Kind {
     /// Lines that are read are written to the log.
     Kept {
         file: File,
-        lines: Lines,
+        /// Length of the file without its incomplete last line, until that line is removed.
+        cut: Option<u64>,
+        lines: Box<Lines>,
         /// Bytes; `None` if the device is gone.
         chunks: Receiver<Option<Vec<u8>>>,
     },
@@ -44,24 +47,25 @@ impl Incoming {
         }
     }
 
-    /// Rows of standard input (`-`) or a device, which are appended to a file.
+    /// Rows of standard input (`-`) or a device, which are appended to a file of rows of the same kind.
     pub fn kept(source: &Path, log: PathBuf) -> anyhow::Result<Self> {
         if source != Path::new("-") {
             let there = source.metadata();
             there.with_context(|| source.display().to_string())?;
         }
+        let continued = Continued::of(&log).with_context(|| log.display().to_string())?;
         let file = OpenOptions::new().create(true).append(true).open(&log);
         let file = file.with_context(|| log.display().to_string())?;
-        let bytes = file
-            .metadata()
-            .with_context(|| log.display().to_string())?
-            .len();
+        let bytes = continued.as_ref().map_or(0, |of| of.length);
+        let length = file.metadata().map_or(0, |of| of.len());
+        let cut = (length > bytes).then_some(bytes);
         Ok(Self {
             log,
             received: Received { bytes, lines: 0 },
             kind: Kind::Kept {
                 file,
-                lines: Lines::new(is_serial(source)),
+                cut,
+                lines: Box::new(Lines::new(is_serial(source), continued)),
                 chunks: read_in_background(source.to_owned())?,
             },
         })
@@ -91,7 +95,7 @@ impl Incoming {
                         break true;
                     };
                     match chunks.recv_timeout(left) {
-                        Ok(Some(bytes)) => complete.extend(lines.push(&bytes)),
+                        Ok(Some(bytes)) => complete.extend(lines.push(&bytes)?),
                         Ok(None) => lines.interrupt(),
                         Err(RecvTimeoutError::Timeout) => break true,
                         Err(RecvTimeoutError::Disconnected) => break false,
@@ -108,14 +112,21 @@ impl Incoming {
         match &mut self.kind {
             Kind::Growing { .. } => Ok(()),
             Kind::Kept { lines, .. } => {
-                let rest = lines.end();
+                let rest = lines.end()?;
                 self.keep(&rest)
             }
         }
     }
 
     fn keep(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
-        if let Kind::Kept { file, .. } = &mut self.kind {
+        if let Kind::Kept { file, cut, .. } = &mut self.kind
+            && !bytes.is_empty()
+        {
+            if let Some(length) = cut.take() {
+                let log = self.log.display();
+                file.set_len(length).with_context(|| log.to_string())?;
+                tell!("{log}: removed the last line, which is incomplete");
+            }
             let written = file.write_all(bytes);
             written.with_context(|| self.log.display().to_string())?;
             self.received.write_all(bytes)?;
@@ -123,11 +134,11 @@ impl Incoming {
         Ok(())
     }
 
-    /// Number of incomplete lines left out.
-    pub fn incomplete(&self) -> usize {
+    /// Number of lines that were not kept, and the first reasons; `None` if there are none.
+    pub fn left_out(&self) -> Option<String> {
         match &self.kind {
-            Kind::Growing { .. } => 0,
-            Kind::Kept { lines, .. } => lines.incomplete,
+            Kind::Growing { .. } => None,
+            Kind::Kept { lines, .. } => lines.left_out.text(),
         }
     }
 }

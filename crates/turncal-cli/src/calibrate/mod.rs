@@ -1,5 +1,6 @@
 //! `turncal calibrate`
 
+mod continued;
 mod follow;
 mod incoming;
 mod lines;
@@ -26,6 +27,7 @@ use turncal::calibration::{
     AtRest, Calibration, Method, Problem, Solution, Together, Word, in_body_frame, triads_of,
 };
 use turncal::imu::{BodyFrame, InstallationForm};
+use turncal::lot::{Lot, Unit};
 use turncal::models;
 use turncal::recording::Recording;
 use turncal::run::Run;
@@ -103,10 +105,11 @@ pub struct Calibrate {
     /// specification can be decided, no more rows arrive, or Ctrl-C is pressed
     #[arg(long, conflicts_with_all = ["shard", "temperature", "truth"], help_heading = FOLLOWING)]
     follow: bool,
-    /// File to keep the rows of - or a device in; rows are appended to an existing file [default: follow-TIME.csv]
+    /// File to keep the rows of - or a device in; an existing file must contain such rows, and is continued [default:
+    /// follow-TIME.csv]
     #[arg(long, value_name = "FILE", requires = "follow", help_heading = FOLLOWING)]
     keep: Option<PathBuf>,
-    /// The run.toml that describes the rows; those of - or a device are kept in the file named there
+    /// The run.toml that describes the rows; those of - or a device are kept in the file named there, which must be new
     #[arg(long, value_name = "RUN.toml", requires = "follow", conflicts_with = "keep", value_parser = run_file, help_heading = FOLLOWING)]
     run: Option<PathBuf>,
     /// Time without growth after which a followed file is complete, s
@@ -303,6 +306,27 @@ impl Calibrate {
         if !missing.is_empty() {
             let words = format!("{name}: not determined: {}", missing.join(", "));
             return Err(NotMet::Required(words).into());
+        }
+        self.decide(name, calibration)
+    }
+
+    /// Checks the calibration of a followed log against the specification.
+    fn decide(&self, name: &str, calibration: Calibration) -> anyhow::Result<()> {
+        let Some(specification) = self.specification.as_ref().filter(|_| self.follow) else {
+            return Ok(());
+        };
+        let unit = Unit::of_record(name, calibration, None);
+        let lot = Lot::new(
+            vec![unit],
+            None,
+            Some(models::specification(specification)?),
+        );
+        match report::lot::document(&lot).verdict {
+            Some((Word::Fail, words)) => return Err(NotMet::Specification(words).into()),
+            Some((word, words)) => {
+                tell!("specification: {word}, {words}");
+            }
+            None => {}
         }
         Ok(())
     }

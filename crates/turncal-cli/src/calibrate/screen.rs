@@ -22,6 +22,8 @@ pub struct Screen {
     trouble: String,
     /// Notes already reported, without their figures.
     noted: BTreeSet<String>,
+    /// Lines left out.
+    left_out: Option<String>,
     /// Content of the screen below the number of lines received.
     content: Vec<String>,
     received: usize,
@@ -36,6 +38,7 @@ impl Screen {
             told: 0,
             trouble: String::new(),
             noted: BTreeSet::new(),
+            left_out: None,
             content: Vec::new(),
             received: 0,
         }
@@ -100,11 +103,11 @@ impl Screen {
     }
 
     /// Shows at once that lines arrive, before they are evaluated.
-    pub fn count(&mut self, received: usize) -> anyhow::Result<()> {
-        if received == self.received {
+    pub fn count(&mut self, received: usize, left_out: Option<String>) -> anyhow::Result<()> {
+        if received == self.received && left_out == self.left_out {
             return Ok(());
         }
-        self.received = received;
+        (self.received, self.left_out) = (received, left_out);
         if self.is_terminal && !self.silent {
             self.redraw()
         } else {
@@ -126,7 +129,8 @@ impl Screen {
         text += "\u{1b}[J";
         self.drawn = 0;
         let received = format!("{} lines received", count(self.received));
-        for line in std::iter::once(&received).chain(&self.content) {
+        let counts = std::iter::once(&received).chain(&self.left_out);
+        for line in counts.chain(&self.content) {
             for part in wrapped(&printable(line), "  ", Some(width)) {
                 text += &part;
                 text.push('\n');

@@ -478,7 +478,7 @@ pub enum Delimiter {
 
 impl Delimiter {
     /// The separator in a first row.
-    fn of_row(row: &str) -> Self {
+    pub fn of_row(row: &str) -> Self {
         let blanks = Self::Blanks.fields(row).unwrap_or_default();
         if blanks.len() > 1 && blanks.iter().all(|field| is_number(field)) {
             return if row.contains('\t') && !row.contains(' ') {

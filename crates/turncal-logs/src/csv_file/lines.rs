@@ -25,16 +25,21 @@ pub struct Line {
 impl Line {
     /// The text of a comment, if it is one.
     pub fn comment(&self) -> Option<&[u8]> {
-        let text = self.text.trim_ascii_start();
-        let marks = [&b"#"[..], b"%", b"//"];
-        marks.iter().find_map(|mark| text.strip_prefix(*mark))
+        comment(&self.text)
     }
+}
 
-    /// Whether it contains more than delimiters.
-    fn has_content(&self) -> bool {
-        let empty = |byte: &u8| byte.is_ascii_whitespace() || matches!(byte, b',' | b';');
-        !self.text.iter().all(empty)
-    }
+/// The text of a comment, if the line is one.
+pub fn comment(line: &[u8]) -> Option<&[u8]> {
+    let text = line.trim_ascii_start();
+    let marks = [&b"#"[..], b"%", b"//"];
+    marks.iter().find_map(|mark| text.strip_prefix(*mark))
+}
+
+/// Whether a line contains more than delimiters.
+pub fn has_content(line: &[u8]) -> bool {
+    let empty = |byte: &u8| byte.is_ascii_whitespace() || matches!(byte, b',' | b';');
+    !line.iter().all(empty)
 }
 
 /// Reason why reading stopped.
@@ -188,7 +193,7 @@ impl Lines {
             if self.number == 1 && line.text.starts_with(b"\xef\xbb\xbf") {
                 line.text.drain(..3);
             }
-            if line.has_content() {
+            if has_content(&line.text) {
                 return Ok(true);
             }
         }
