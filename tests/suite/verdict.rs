@@ -55,30 +55,22 @@ fn real_records_fit_on_one_screen() {
     ] {
         if let Some(directory) = shared(name) {
             let run = directory.join("run.toml");
-            let word = if name.starts_with("real") {
-                "USE WITH CARE"
-            } else {
-                ""
-            };
-            one_screen(&run.to_string_lossy(), word);
+            one_screen(&run.to_string_lossy(), "GOOD");
         }
     }
 }
 
 #[test]
-fn a_sound_record_is_good_and_one_with_wrong_noise_is_used_with_care() {
+fn noise_that_is_stated_wrongly_is_named_with_the_line_that_states_it() {
     let place = tempfile::tempdir().unwrap();
     let run = simulated("demo", place.path());
     one_screen(&run, "GOOD   24 of 24 parameters determined");
-    let verdict = |run: &str, noise: &str| {
+    let result = |run: &str, noise: &str| -> Value {
         let (_, json, message) = turncal(&["calibrate", run, "--json", "--noise", noise]);
-        let result: Value = serde_json::from_str(&json).unwrap_or_else(|_| panic!("{message}"));
-        result["verdict"].clone()
+        serde_json::from_str(&json).unwrap_or_else(|_| panic!("{message}"))
     };
-    assert_eq!(
-        verdict(&run, "auto"),
-        serde_json::json!({ "word": "good", "reasons": [] })
-    );
+    let good = serde_json::json!({ "word": "good", "reasons": [] });
+    assert_eq!(result(&run, "auto")["verdict"], good);
     let text = std::fs::read_to_string(&run).unwrap();
     let quiet = text.replace(
         "velocity_random_walk_ug_per_sqrt_hz = 5.0",
@@ -86,15 +78,58 @@ fn a_sound_record_is_good_and_one_with_wrong_noise_is_used_with_care() {
     );
     assert_ne!(text, quiet);
     std::fs::write(&run, quiet).unwrap();
-    let care = verdict(&run, "auto");
-    assert_eq!(care["word"], "use with care");
+    let of_estimate = result(&run, "auto");
+    assert_eq!(of_estimate["verdict"], good);
+    let findings = of_estimate["findings"].as_array().unwrap();
+    let named = findings.iter().find(|finding| finding["code"] == "W07");
+    let line = named.unwrap()["figures"]["lines"][0].as_str().unwrap();
+    let stated = line.strip_prefix("velocity_random_walk_ug_per_sqrt_hz = ");
+    let stated: f64 = stated.unwrap().parse().unwrap();
+    assert!((stated / 5.0 - 1.0).abs() < 0.3, "{line}");
+    assert_eq!(result(&run, "stated")["verdict"]["word"], "use with care");
+}
+
+#[test]
+fn what_a_recording_does_not_show_keeps_its_value_and_the_rest_is_usable() {
+    let place = tempfile::tempdir().unwrap();
+    let run = simulated("mems", place.path());
+    let log = place.path().join("mems").join("imu.csv.gz");
+    let mut rows = String::new();
+    let file = std::fs::File::open(&log).unwrap();
+    std::io::Read::read_to_string(&mut flate2::read::GzDecoder::new(file), &mut rows).unwrap();
+    // The first dwell alone.
+    let first: Vec<&str> = rows.lines().take(3000).collect();
+    let still = place.path().join("mems").join("still.csv");
+    std::fs::write(&still, first.join("\n") + "\n").unwrap();
+    let text = std::fs::read_to_string(&run).unwrap();
+    std::fs::write(&run, text.replace("imu.csv.gz", "still.csv")).unwrap();
+    let output = place.path().join("result");
+    let output = output.to_string_lossy();
+    let to = ["--aiding", "velocity", "-o", &output, "--force"];
+    let calibrate = |more: &[&str]| turncal(&[&["calibrate", &run][..], &to, more].concat());
+    let (status, screen, message) = calibrate(&[]);
+    assert_eq!(status, 0, "{message}");
     assert!(
-        care["reasons"]
-            .as_array()
+        screen
+            .lines()
+            .nth(1)
             .unwrap()
-            .contains(&Value::from("W07")),
-        "{care}"
+            .starts_with("PARTIAL   gyros: D only"),
+        "{screen}"
     );
+    let file = format!("{output}/calibration.json");
+    let result: Value = serde_json::from_str(&std::fs::read_to_string(&file).unwrap()).unwrap();
+    // The prior of the scenario is a scale factor of one.
+    assert_eq!(result["gyro"]["scale"], serde_json::json!([1.0, 1.0, 1.0]));
+    assert!(result["sigma"]["gyro"]["scale"][0].as_f64() > Some(0.0));
+    let (status, shown, _) = turncal(&["show", &file]);
+    assert!(
+        status == 0 && shown.contains("PARTIAL   gyros: D only"),
+        "{shown}"
+    );
+    assert_eq!(calibrate(&["--require", "gyro.bias"]).0, 0);
+    let (status, _, message) = calibrate(&["--require", "gyro"]);
+    assert!(status == 3 && message.contains("gyro.scale.x"), "{message}");
 }
 
 #[test]

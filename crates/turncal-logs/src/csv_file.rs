@@ -55,6 +55,9 @@ impl CsvFile {
     pub fn open(file: &DataFile, tag: Option<&str>) -> Result<Self, FileError> {
         let stopped = |stop: Stop| stopped(file, &stop);
         let mut lines = Lines::open(source(file)?).map_err(stopped)?;
+        if let Some(error) = not_rows(file, &lines) {
+            return Err(error);
+        }
         let looks = Looks::of(lines.ahead());
         let tags = tag.map(|tag| {
             let tags = looks
@@ -102,6 +105,23 @@ impl CsvFile {
     fn error_here(&self, found: impl Display, expected: impl Display, advice: &str) -> FileError {
         FileError::new(&self.file, self.place(None), found, expected, advice)
     }
+}
+
+/// The error for a text that is of another kind by its first line.
+fn not_rows(file: &DataFile, lines: &Lines) -> Option<FileError> {
+    let first = lines.ahead().next()?.text.trim_ascii_start();
+    let (found, advice) = match first.first()? {
+        b'{' => (
+            "JSON",
+            "Give a log. A calibration is shown by turncal show FILE.",
+        ),
+        0 => (
+            "NUL bytes at its beginning",
+            "The log was not written, or its memory was erased: copy it again.",
+        ),
+        _ => return None,
+    };
+    Some(FileError::of(file, found, "rows of numbers", advice))
 }
 
 impl Rows for CsvFile {

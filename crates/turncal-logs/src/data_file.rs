@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::table::Table;
-use turncal_input::FileError;
+use turncal_input::{FileError, suggestion};
 
 /// A readable file, with the path by which `run.toml` and messages name it.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,10 +83,27 @@ impl DataFile {
 
     /// Error for a file that the system does not open.
     pub fn refused(&self, error: &io::Error) -> FileError {
-        let advice =
+        let otherwise =
             "Names in run.toml are relative to run.toml; correct the name or add the file.";
-        FileError::io(self, "open the file", error, advice)
+        let beside = if error.kind() == io::ErrorKind::NotFound {
+            beside(self)
+        } else {
+            Vec::new()
+        };
+        let name = self.file_name().map(|name| name.to_string_lossy());
+        let names = beside.iter().map(String::as_str);
+        let advice = suggestion(&name.unwrap_or_default(), names, otherwise);
+        FileError::io(self, "open the file", error, &advice)
     }
+}
+
+/// Names of the files in the directory of a path.
+fn beside(path: &Path) -> Vec<String> {
+    let directory = path.parent().filter(|of| !of.as_os_str().is_empty());
+    let entries = fs::read_dir(directory.unwrap_or(Path::new(".")));
+    let entries = entries.into_iter().flatten().flatten();
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    names.collect()
 }
 
 impl From<PathBuf> for DataFile {

@@ -79,6 +79,7 @@ impl Quantities {
             let rows = TriadRows {
                 motion,
                 period: clock.period.unwrap_or(f64::NAN),
+                is_stated: clock.is_stated,
                 named: first.and_then(named),
                 whole: *whole.get(sensor),
             };
@@ -199,6 +200,16 @@ impl Quantities {
                     ..Unit::open(&why)
                 };
             }
+            // No unit fits at a rate that nothing but a statement shows, and one does at another.
+            Some(angle) if is_bare && rows.is_stated && row.is_finite() => {
+                if let Some((word, period)) = usual_period(all, angle) {
+                    let [stated, usual] = [rows.period, period].map(|of| rounded(of.recip(), 4));
+                    return Unit::open(&format!(
+                        "no unit fits the change of gravity direction at {stated} Hz; {word} would at about {usual} Hz. \
+                         Check the rate"
+                    ));
+                }
+            }
             None if is_bare && self.output != Output::Pulse => {
                 return Unit::open(if rows.motion.is_turned {
                     "too few usable turns of gravity to estimate it"
@@ -237,6 +248,7 @@ impl Quantities {
         let rows = TriadRows {
             motion,
             period,
+            is_stated: false,
             named: None,
             whole: false,
         };

@@ -48,16 +48,17 @@ impl Report<'_> {
         document.findings = in_order(self.findings);
         brief::add(&mut document, self);
         document.page(item(self));
-        if let Some(estimate) = self.estimate() {
-            document.both(self.parameters(estimate));
-            document.page(self.error_bars(estimate));
-        }
+        document.pages(self.estimate().map(|estimate| self.error_bars(estimate)));
         let quality = self.quality.filter(|of| !of.dwells.is_empty());
         document.pages(quality.map(residuals::figure));
         document.pages(self.against_time().and_then(|outcome| self.sigma(outcome)));
         document.pages(self.against_time().and_then(|_| self.attitudes()));
         document.pages(self.against_time().and_then(|_| self.noise()));
         document.pages(self.outcome.and_then(temperature::figure));
+        document.fold("Every parameter");
+        if let Some(estimate) = self.estimate() {
+            document.both(self.parameters(estimate));
+        }
         document.fold("Residuals, consistency, error terms");
         if let Some(quality) = self.quality {
             document.both(tables::residuals(quality, self.table()));

@@ -18,6 +18,8 @@ pub struct TriadRows<'a> {
     pub motion: &'a Motion,
     /// Period in s; NaN if unknown.
     pub period: f64,
+    /// Whether the period is stated, not derived from times.
+    pub is_stated: bool,
     /// Unit named in the file.
     pub named: Option<Unit>,
     /// Whether they are whole numbers.
