@@ -9,6 +9,8 @@ use turncal::run::motion::{Rest, rests};
 
 /// A position is missing if every dwell is farther from it, rad.
 const FAR: f64 = 45.0 * DEGREE;
+/// Dwells less than this below the rim of a hemisphere are shown in both maps: sine of 5°.
+const RIM: f64 = 0.087;
 /// Half the width of a map of a hemisphere, whose radius is 1.
 const ROOM: f64 = 1.22;
 /// Points of a circle.
@@ -71,7 +73,7 @@ fn hemisphere(rests: &[Rest], missing: &[(usize, f64)], side: f64) -> Panel {
         Series::line(points).color(Color::Quiet).width(0.75)
     };
     let inner = map([FAR.sin(), 0.0, side * FAR.cos()]).0;
-    let is_seen = |z: f64| z * side > -1e-9;
+    let is_seen = |z: f64| z * side > -RIM;
     let dwells = rests.iter().map(|rest| rest.force.normalize());
     let dwells = dwells
         .filter(|up| is_seen(up.z))
@@ -80,7 +82,7 @@ fn hemisphere(rests: &[Rest], missing: &[(usize, f64)], side: f64) -> Panel {
     let poles = poles.filter(|&(axis, sign)| axis < 2 || sign == side);
     let names = poles.map(|(axis, sign)| {
         let (x, y) = map(unit(axis, sign));
-        let at = (1.12 * x, 1.12 * y);
+        let at = (1.14 * x, 1.14 * y);
         let anchor = if axis == 2 {
             Anchor::Below
         } else {
