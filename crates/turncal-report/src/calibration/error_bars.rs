@@ -73,11 +73,8 @@ impl Report<'_> {
                 .iter()
                 .flat_map(|(_, value, bar)| [value - bar, value + bar]);
             let ends = ends.chain(limits.iter().flat_map(|(_, ends)| *ends));
-            let (low, high) = ends.fold((0.0, 0.0), |(low, high): Point, end| {
-                (low.min(end), high.max(end))
-            });
-            let room = 0.08 * (high - low);
-            y = y.between(low - room, high + room);
+            let scale = y.scale(ends);
+            y = y.between(scale.low, scale.high).room(0.0, 0.0);
         }
         let panel = Panel::new(group.titled(), Axis::places(names), y)
             .with_all(bands)
