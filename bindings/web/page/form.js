@@ -61,6 +61,8 @@ function worded(text) {
 /** A text about the result in the words of the page, without sentences that do not apply to it. */
 function own(text) {
   const names = new RegExp(Object.keys(FIELDS).join("|"), "g");
-  const named = worded(text).replace(names, (name) => `“${label(form.elements[FIELDS[name]])}”`);
-  return named.split(/(?<=[.!?]) (?=\p{Lu})/u).filter((sentence) => !FOREIGN.test(sentence)).join(" ");
+  const field = (name) => `“${label(form.elements[FIELDS[name]])}”`;
+  const named = worded(text).replace(names, field).replace(/(?<=”[^.]*) in \[(site|imu)\]/g, "");
+  const parts = named.split(/(?<=[.!?]) (?=\p{Lu})|(?<=;) /u).filter((part) => !FOREIGN.test(part));
+  return parts.join(" ").replace(/;$/, ".");
 }

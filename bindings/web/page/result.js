@@ -3,7 +3,7 @@
 /** Meaning of names in messages of the engine. */
 const COMMANDS = "Commands are those of the program turncal; names in [brackets] are sections of run.toml.";
 /** What to do about a finding for which the page has no field. */
-const ELSEWHERE = "→ No field of this page changes it. Drop a run.toml together with the log to state more.";
+const ELSEWHERE = "→ State “Sensor” to use its data sheet, or drop a run.toml together with the log to state more.";
 
 let links = [];
 

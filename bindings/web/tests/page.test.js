@@ -117,7 +117,7 @@ test("values are open, and findings name the fields of the page, no options and 
   const values = page.locator("#details > section", { hasText: "Parameters" });
   assert.match(await values.innerText(), /u = correction · \(N − bias\)[^]*gyro\.scale\.x/);
   const findings = await page.locator(".findings").evaluate((of) => of.textContent);
-  assert.match(findings, /“Latitude”, “Height”/);
+  assert.match(findings, /“Latitude” and “Height”/);
   assert.doesNotMatch(findings, /--[a-z]|\[[a-z.]+\]|`/);
 });
 

@@ -53,7 +53,7 @@ pub fn bound(accuracy: &Accuracy) -> Table {
     Table::new("EKF against the Cramér–Rao bound", columns(AGAINST_BOUND))
         .sections(sections(accuracy, cells))
         .note("RMS over all runs and the parameters of a group; σ: stated by the filter.")
-        .note("Position: horizontal, after 40 h from perfect alignment; flight: on the trajectory `flight`.")
+        .note("Position: horizontal, after 40 h from perfect alignment; flight: on the trajectory flight.")
         .note("Bound: Bayesian Cramér–Rao bound from a pass linearised at the truth. Interval: bootstrap over runs.")
 }
 

@@ -63,7 +63,7 @@ pub fn warnings(analysis: &NoiseAnalysis) -> Vec<String> {
             if axis.knocks > 0 {
                 warnings.push(format!(
                     "{name} {letter}: {} jump(s) of more than 8σ between samples (knocks or faulty samples) raise \
-                     the deviations. Choose a quieter segment with --segment.",
+                     the deviations. Choose a quieter segment.",
                     count(axis.knocks)
                 ));
             }

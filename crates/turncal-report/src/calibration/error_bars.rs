@@ -22,7 +22,7 @@ impl Report<'_> {
              well determined; scale factors as deviation from nominal. Bands: prior mean ±1σ."
             .to_owned();
         if self.specification.is_some() {
-            caption += " Dashed: limits of the specification.";
+            caption += " Dashed: limits of the specification; a prior may extend beyond the axes.";
         }
         let heading = "Values with their uncertainty";
         Plot::new("values.svg", heading, (3, 270), panels).caption(caption)
@@ -53,21 +53,33 @@ impl Report<'_> {
         let limits = limits.filter_map(|limit| {
             let n = indices.iter().position(|&i| i == limit.parameter)?;
             let ends = [limit.nominal - limit.within, limit.nominal + limit.within];
-            Some(ends.map(|end| {
-                let line = Series::line(across(n, group.shown(end)));
-                line.color(Color::Ink).width(1.25).dashed()
-            }))
+            Some((n, ends.map(|end| group.shown(end))))
+        });
+        let limits: Vec<(usize, [f64; 2])> = limits.collect();
+        let lines = limits.iter().flat_map(|&(n, ends)| {
+            let line = move |end: f64| Series::line(across(n, end)).color(Color::Ink).dashed();
+            ends.map(line)
         });
         let bars = places().map(|(n, &i)| {
             let (value, bar) = (group.shown(values[i]), SIGMAS * sigma[i] / unit);
             (n as f64, value, bar)
         });
+        let bars: Vec<(f64, f64, f64)> = bars.collect();
         let names = indices.iter().map(|&i| axis_name(estimate.form(), i));
-        let y = Axis::linear("").including([0.0]).room(0.08, 0.08);
+        let mut y = Axis::linear("").including([0.0]).room(0.08, 0.08);
+        if !limits.is_empty() {
+            // Beside limits, a wide prior would hide what they decide.
+            let ends = bars
+                .iter()
+                .flat_map(|(_, value, bar)| [value - bar, value + bar]);
+            let ends = ends.chain(limits.iter().flat_map(|(_, ends)| *ends));
+            let scale = y.scale(ends);
+            y = y.between(scale.low, scale.high).room(0.0, 0.0);
+        }
         let panel = Panel::new(group.titled(), Axis::places(names), y)
             .with_all(bands)
             .with(Series::zero())
-            .with_all(limits.flatten())
+            .with_all(lines)
             .with(Series::measured(Mark::Dot, bars).width(2.0).key("±2σ"));
         (!indices.is_empty()).then_some(panel)
     }

@@ -89,7 +89,7 @@ impl Report<'_> {
     /// Recording, date and files, as far as the title does not name them.
     fn origin(&self) -> Option<String> {
         let recording = &self.run.recording;
-        let name = (recording.name != self.title).then(|| recording.name.clone());
+        let name = (recording.name != self.title).then(|| format!("Recording {}", recording.name));
         let date = recording.meta.get("date");
         let files = recording.files.iter().filter_map(|path| path.file_name());
         let files: Vec<_> = files.map(|name| name.to_string_lossy()).collect();

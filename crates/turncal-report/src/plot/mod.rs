@@ -6,6 +6,7 @@ mod series;
 use std::ops::Range;
 
 pub use axis::{Axis, Kind, Scale, positive_range};
+pub(crate) use series::thinned;
 pub use series::{Anchor, Color, Mark, Pen, Point, Series, Shape, Upright};
 
 /// A figure with its file, heading and caption.

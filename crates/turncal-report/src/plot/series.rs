@@ -130,7 +130,7 @@ impl Series {
 
     /// Points joined in order; dense data are reduced to the lowest and highest.
     pub fn line(points: impl IntoIterator<Item = Point>) -> Self {
-        Self::new(Shape::Line(thinned(points)))
+        Self::new(Shape::Line(thinned(points, MOST)))
     }
 
     /// The area between two lines.
@@ -220,12 +220,12 @@ impl Series {
 /// Maximum number of points of a line; no panel is wider in pixels.
 const MOST: usize = 1200;
 
-/// About [`MOST`] points of a line: the lowest and highest of each interval, every gap, and the end, to which the name
+/// About this many points of a line: the lowest and highest of each interval, every gap, and the end, to which the name
 /// of the line refers.
-fn thinned(points: impl IntoIterator<Item = Point>) -> Vec<Point> {
+pub fn thinned(points: impl IntoIterator<Item = Point>, most: usize) -> Vec<Point> {
     let points = points.into_iter();
     let (least, greatest) = points.size_hint();
-    let together = (2 * greatest.unwrap_or(least)).div_ceil(MOST);
+    let together = (2 * greatest.unwrap_or(least)).div_ceil(most);
     let (mut line, mut stretch) = (Vec::new(), Vec::new());
     for point in points {
         let is_gap = !(point.0.is_finite() && point.1.is_finite());
@@ -275,7 +275,7 @@ mod tests {
             };
             (k as f64, if k == 1_000_000 { f64::NAN } else { height })
         };
-        let line = thinned((0..3_000_000).map(point));
+        let line = thinned((0..3_000_000).map(point), MOST);
         assert!(
             line.len() < MOST + 10 && line.len() > MOST / 2,
             "{}",
@@ -297,6 +297,6 @@ mod tests {
         let line: Vec<Point> = (0..1000)
             .map(|k| (f64::from(k), f64::from(k % 7)))
             .collect();
-        assert_eq!(thinned(line.iter().copied()), line);
+        assert_eq!(thinned(line.iter().copied(), MOST), line);
     }
 }

@@ -133,7 +133,10 @@ impl Canvas {
         let _ = area.draw(&element);
         drop(area);
         let inside = document.split_once(">\n").map_or("", |(_, inside)| inside);
-        self.marks += inside.trim_end().trim_end_matches("</svg>");
+        let inside = inside.trim_end().trim_end_matches("</svg>");
+        // Plotters states for each mark what the document states for all.
+        let inside = inside.replace(" opacity=\"1\"", "");
+        self.marks += &inside.replace(" font-family=\"sans-serif\"", "");
     }
 
     /// Draws a mark with this hover text.

@@ -54,26 +54,21 @@ pub fn draw(on: &mut Canvas, plot: &Plot, width: u32) -> u32 {
         };
         let bottom = top + above - TOP + f64::from(plot.height).min(most);
         for (column, ((panel, (x, y)), keys)) in row.iter().zip(&keys).enumerate() {
-            let (across, origin) = (across[column], panel_width * column as f64);
+            let (mut across, origin) = (across[column], panel_width * column as f64);
             let is_places = !panel.x.places.is_empty();
             let names = Names::new(x, is_places, across.1 - across.0, f64::from(plot.height));
             let title = LINE * f64::from(u8::from(!panel.x.title.is_empty()));
-            let down = (top + above, bottom - BOTTOM - names.height() - title);
-            let side = (down.1 - down.0).min(across.1 - across.0);
+            let mut down = (top + above, bottom - BOTTOM - names.height() - title);
+            if panel.square {
+                let side = (down.1 - down.0).min(across.1 - across.0);
+                (across.1, down.1) = (across.0 + side, down.0 + side);
+            }
             let frame = Frame {
                 panel,
                 x: x.clone(),
                 y: y.clone(),
-                across: if panel.square {
-                    (across.0, across.0 + side)
-                } else {
-                    across
-                },
-                down: if panel.square {
-                    (down.0, down.0 + side)
-                } else {
-                    down
-                },
+                across,
+                down,
                 ends: (origin, origin + panel_width),
                 top,
             };

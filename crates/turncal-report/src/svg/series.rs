@@ -2,7 +2,7 @@
 
 use plotters::style::RGBColor;
 
-use super::super::plot::{Anchor, Axis, Mark, Pen, Point, Series, Shape, Upright};
+use super::super::plot::{Anchor, Axis, Mark, Pen, Point, Series, Shape, Upright, thinned};
 use super::canvas::{BAND, Canvas, Frame, HPos, SMALL, VPos, rgb, width};
 use turncal::number::three_digits;
 
@@ -15,7 +15,16 @@ pub fn draw(on: &mut Canvas, frame: &Frame, series: &Series) {
     let (pen, color) = (series.pen, rgb(series.pen.color));
     let (left, right) = frame.across;
     match &series.shape {
-        Shape::Line(points) => line(on, frame, points, pen),
+        Shape::Line(points) => {
+            // Two points in a pixel look like all.
+            let most = 2.0 * (right - left).max(1.0);
+            line(
+                on,
+                frame,
+                &thinned(points.iter().copied(), most as usize),
+                pen,
+            )
+        }
         Shape::Band(lower, upper) => {
             let [lower, upper] = [lower, upper].map(|edge| visible(frame, edge));
             let outline = upper.into_iter().chain(lower.into_iter().rev());
