@@ -30,7 +30,9 @@ mod solution;
 
 // Most files of this module import their common types from here.
 pub use bound::{Bound, TermLeftOff, bound, bound_without_moves, terms_left_off};
-pub use budget::{Budget, BudgetPart, BudgetPartRecord, BudgetRecord, BudgetSource};
+pub use budget::{
+    Budget, BudgetPart, BudgetPartRecord, BudgetRecord, BudgetSource, coverage_factor,
+};
 pub use chain::Slip;
 pub use checks::event::{Event, EventKind};
 pub use checks::finding::Finding;

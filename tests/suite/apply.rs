@@ -12,7 +12,7 @@ use turncal::imu::{Output, PerSensor, Sensor, Term, TermVector};
 use turncal::simulation::{Scenario, true_increments};
 use turncal::turntable::{Imperfection, Motion};
 use turncal::units::{DEGREE, STANDARD_GRAVITY};
-use turncal_files::export::{HEADER, sample_rows};
+use turncal_files::export::{HEADER, Samples};
 
 use crate::calibration_file::written;
 
@@ -392,7 +392,13 @@ fn rows_written_in_parts_are_the_samples_to_the_last_bit_even_as_the_temperature
     // More than one part, and parts that begin within a second of temperature.
     assert!(samples.len() > 4097, "{}", samples.len());
     let mut text = Vec::new();
-    sample_rows(&mut text, &correction, run, false).unwrap();
+    let all = Samples {
+        run,
+        correction: &correction,
+        fill: false,
+        verdict: None,
+    };
+    all.rows(&mut text).unwrap();
     let text = String::from_utf8(text).unwrap();
     let rows: Vec<&str> = text.lines().skip(1).collect();
     assert_eq!(rows.len(), samples.len());

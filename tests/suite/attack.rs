@@ -352,3 +352,83 @@ fn a_file_that_is_not_read_says_what_it_is_and_what_to_do() {
         assert!(message.contains(says), "{name}: {message}");
     }
 }
+
+#[test]
+fn a_calibration_that_contradicts_itself_gets_no_certificate() {
+    for (name, says) in [
+        ("correction-x2", "correction.gyro and gyro.scale"),
+        ("cov-1e-4", "sigma of gyro.scale.x"),
+        ("cov-zeros", "sigma of gyro.scale.x"),
+        ("k-0.1", "budget.coverage_factor of gyro.scale.x = 0.1"),
+        ("nis-1e6", "consistency.nis = 1000000"),
+        ("unit-parsec", "unit.gyro = \"parsec\""),
+        (
+            "verdict-failed",
+            "verdict.word = FAILED, expected GOOD, from findings",
+        ),
+    ] {
+        let certificate = format!("certificate {name}.json --laboratory lab.toml -o c");
+        refused("certificate-inconsistent", &certificate, says);
+    }
+}
+
+/// The word is in every file that has a place for it, and on standard error.
+#[test]
+fn a_failed_calibration_goes_out_only_when_asked_for_and_with_its_word() {
+    let Some((from, data)) = shared("attack/export-failed").zip(shared("three-axis-counts")) else {
+        return;
+    };
+    let copy = tempfile::tempdir().unwrap();
+    let here = copy.path();
+    copied(&from, here);
+    copied(&data, here);
+    let read = |name: &str| {
+        let bytes = std::fs::read(here.join(name)).unwrap();
+        String::from_utf8_lossy(&bytes).replace('\0', "")
+    };
+    let mut commands: Vec<(String, &str, &str)> = vec![
+        (
+            "apply calibration.json run.toml -o a.csv".to_owned(),
+            "a.csv",
+            ",verdict_failed\n",
+        ),
+        (
+            "compare calibration.json --truth truth.json -o c".to_owned(),
+            "c/index.html",
+            "FAILED W08",
+        ),
+        (
+            "navigate calibration.json --truth truth.json --latitude-deg 45 --hours 1 -o n"
+                .to_owned(),
+            "n/navigation.csv",
+            ",verdict_failed\n",
+        ),
+    ];
+    let formats = turncal_files::export::FORMATS
+        .iter()
+        .map(|format| format.name);
+    commands.extend(formats.map(|name| {
+        let word = if name == "realsense" { "" } else { "FAILED" };
+        (
+            format!("export calibration.json --format {name} -o e"),
+            "e",
+            word,
+        )
+    }));
+    for (command, file, says) in commands {
+        let (status, _, message) = turncal(here, &command);
+        assert!(
+            status == 1 && message.contains("FAILED (W03: "),
+            "{command}: {message}"
+        );
+        assert!(!here.join(file).exists(), "{command}");
+        let (status, _, message) = turncal(here, &format!("{command} --force"));
+        assert!(
+            status == 0 && message.contains("FAILED"),
+            "{command}: {message}"
+        );
+        assert!(read(file).contains(says), "{command}: no {says}");
+        let _ = std::fs::remove_file(here.join("e"));
+    }
+    assert!(read("c/lot.csv").contains(",failed\n"));
+}

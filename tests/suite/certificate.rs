@@ -95,9 +95,24 @@ fn a_draft_that_nobody_completed_is_no_statement() {
     let refused = certificate.arg("--laboratory").arg(&lab).output().unwrap();
     let message = String::from_utf8_lossy(&refused.stderr);
     assert!(
-        refused.status.code() == Some(1) && message.contains("Complete this value"),
+        refused.status.code() == Some(1) && message.contains("found 20 open fields"),
         "{message}"
     );
+    // In the order of the draft, without those that the run states.
+    let text = std::fs::read_to_string(&lab).unwrap();
+    let places = [
+        ("laboratory.name", "[laboratory]"),
+        ("customer.country", "[customer]"),
+        ("certificate.begin", "# begin"),
+        ("certificate.issued", "# issued"),
+        ("method.procedure", "[method]"),
+        ("conditions.temperature_degc", "# temperature_degc"),
+        ("traceability.statement", "[traceability]"),
+        ("authorised.function", "[authorised]"),
+    ];
+    let found =
+        places.map(|(field, mark)| (message.find(field).unwrap(), text.find(mark).unwrap()));
+    assert!(found.is_sorted(), "{message}");
 }
 
 #[test]

@@ -111,19 +111,24 @@ fn what_cannot_be_compared_is_refused() {
     let root = tempfile::tempdir().unwrap();
     let a = written(root.path(), "a.json", &record());
     let mut other = record();
-    other.unit = Some(PerSensor::from_fn(|_| "rad".to_owned()));
+    other.unit = Some(PerSensor {
+        gyro: "rad".to_owned(),
+        accel: "count".to_owned(),
+    });
     let b = written(root.path(), "b.json", &other);
     let mut unfinished = record();
     unfinished.converged = Some(false);
     let c = written(root.path(), "c.json", &unfinished);
     for (second, says) in [
         (&b, ["b: ", "`count`", "`rad`"]),
-        (&c, ["c: ", "not", "converged"]),
+        (&c, ["c.json: ", "FAILED", "did not converge"]),
     ] {
         let message = stderr(&compare(&[&a, second]).failure().code(1));
         let missing = says.iter().find(|part| !message.contains(**part));
         assert_eq!(missing, None, "{message}");
     }
+    let forced = compare(&[&a, &c, Path::new("--force")]).success();
+    assert!(stderr(&forced).contains("FAILED"));
     compare(&[&a]).failure().code(2);
     compare(&[&a, &root.path().join("none.json")])
         .failure()

@@ -148,7 +148,10 @@ fn a_lot_is_its_units_and_one_that_cannot_be_calibrated_is_a_row() {
     assert_eq!(said["units"][2]["meta"]["serial"], "A-3");
     assert_eq!(said["units"][0]["verdict"], "pass");
     let table = fs::read_to_string(here.join("result/lot.csv")).unwrap();
-    assert!(table.contains("\nu3,A-3,,,,,,,not calibrated\n"), "{table}");
+    assert!(
+        table.contains("\nu3,A-3,,,,,,,not calibrated,\n"),
+        "{table}"
+    );
     assert!(
         table
             .lines()

@@ -121,7 +121,7 @@ pub fn navigate(
     };
     let has_terms = |of: &Calibration| !of.record.terms.is_empty();
     let terms = has_terms(calibration) || has_terms(truth);
-    let converged = calibration.record.converged != Some(false);
+    let verdict = calibration.record.word();
     let report = finish(py, move || {
         let navigated = MethodOutlook {
             method: "error",
@@ -130,7 +130,7 @@ pub fn navigate(
         let navigation = Navigation {
             calibration: names[0],
             truth: names[1],
-            converged,
+            verdict,
             terms,
             body_frame,
             only: None,

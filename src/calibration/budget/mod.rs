@@ -55,6 +55,13 @@ pub struct BudgetPart {
     pub degrees_of_freedom: f64,
 }
 
+impl BudgetPart {
+    /// Its part of the variance of a parameter; a difference may be below zero by rounding.
+    fn variance(&self, parameter: usize) -> f64 {
+        self.covariance[(parameter, parameter)].max(0.0)
+    }
+}
+
 /// Relative change of the variance of a source at rest, for a difference: it is accurate to this, and the rounding of
 /// covariances that fall by ten orders of magnitude stays below that.
 const STEP: f64 = 3e-4;
@@ -113,7 +120,7 @@ impl Budget {
     /// Degrees of freedom of the combined standard uncertainty of a parameter (Welch and Satterthwaite, JCGM 100,
     /// G.4.1); infinite if infinite for all parts.
     pub fn degrees_of_freedom(&self, parameter: usize) -> f64 {
-        let of = |part: &BudgetPart| part.covariance[(parameter, parameter)];
+        let of = |part: &BudgetPart| part.variance(parameter);
         let combined: f64 = self.parts.iter().map(of).sum();
         let each = self.parts.iter();
         let sum: f64 = each
@@ -255,8 +262,8 @@ impl BudgetSource {
     }
 }
 
-/// Coverage factor for 95.45 % and this many degrees of freedom.
-fn coverage_factor(degrees_of_freedom: f64) -> f64 {
+/// Coverage factor for 95.45 % and this many degrees of freedom, which may be infinite.
+pub fn coverage_factor(degrees_of_freedom: f64) -> f64 {
     if degrees_of_freedom.is_finite() {
         student_limit(degrees_of_freedom, 0.5 * (1.0 - COVERAGE))
     } else {

@@ -28,12 +28,18 @@ pub struct BudgetPartRecord {
 }
 
 impl Budget {
-    /// Converts to a record of these parameters, each with its factor to the unit of the file.
+    /// Converts to a record of these parameters with these variances, each with its factor to the unit of the file.
     pub(in crate::calibration) fn record(
         &self,
         estimated: &[usize],
+        variance: impl Fn(usize) -> f64,
         factor: impl Fn(usize) -> f64,
     ) -> BudgetRecord {
+        // Differences below zero are left out, and without convergence the parts are those of another linearisation.
+        let share = |i: usize| {
+            let sum: f64 = self.parts.iter().map(|part| part.variance(i)).sum();
+            if sum > 0.0 { variance(i) / sum } else { 0.0 }
+        };
         let finite = |freedom: f64| Some(freedom).filter(|freedom| freedom.is_finite());
         BudgetRecord {
             sources: self
@@ -43,7 +49,7 @@ impl Budget {
                     source: part.source.name(),
                     u: estimated
                         .iter()
-                        .map(|&i| part.covariance[(i, i)].max(0.0).sqrt() * factor(i).abs())
+                        .map(|&i| (part.variance(i) * share(i)).sqrt() * factor(i).abs())
                         .collect(),
                     degrees_of_freedom: finite(part.degrees_of_freedom),
                 })

@@ -94,6 +94,8 @@ impl Calibration {
         Ok(Self {
             correction: self.correction.and(correction_of(&triads, &ONE)),
             test_vectors: Vec::new(),
+            // The budget is that of the reference temperature.
+            budget: None,
             format: FORMAT.to_owned(),
             temperature: None,
             covariance: if self.covariance.is_empty() {

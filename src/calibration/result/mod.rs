@@ -290,6 +290,15 @@ pub struct TestVector {
     pub calibrated: [f64; 6],
 }
 
+impl Word {
+    /// Name of a column that contains 1 in every row, such as `verdict_good`, because readers of a table of numbers
+    /// tolerate neither comments nor text.
+    pub fn column(self) -> String {
+        let word = self.to_string().to_lowercase();
+        format!("verdict_{}", word.replace(' ', "_"))
+    }
+}
+
 /// `calibration["gyro.bias.x"]`: a parameter by name, in the file's quantity, as [`Calibration::get`].
 ///
 /// # Panics Like a map, if there is no parameter with that name; `get` does not panic.
@@ -307,7 +316,16 @@ impl Index<&str> for Calibration {
 impl Calibration {
     /// Whether its values must not be used.
     pub fn is_failed(&self) -> bool {
-        Verdict::of(&self.findings).word == Word::Failed || self.converged == Some(false)
+        let stated = self.verdict.as_ref().map(|verdict| verdict.word);
+        let words = [stated, Some(Verdict::of(&self.findings).word)];
+        words.contains(&Some(Word::Failed)) || self.converged == Some(false)
+    }
+
+    /// Its verdict; `None` for values that were not estimated, such as a truth.
+    pub fn word(&self) -> Option<Word> {
+        let stated = self.verdict.as_ref().map(|verdict| verdict.word);
+        let failed = self.is_failed().then_some(Word::Failed);
+        failed.or(stated)
     }
 
     /// Names of parameters that were asked for but not determined; they keep the values and σ of before.

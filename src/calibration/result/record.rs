@@ -53,7 +53,7 @@ impl Outcome {
             gravity: Some(GravityRecord::new(self.gravity)),
             passes: Some(self.passes.len()),
             converged: Some(self.converged),
-            consistency: Some(self.consistency_record()),
+            consistency: self.consistency_record(),
             quality: Some(quality.clone()),
             blocks: self.terms.iter().map(BlockRecord::from).collect(),
             observability: self.observability.directions.clone(),
@@ -66,19 +66,20 @@ impl Outcome {
         record.with_findings(self.findings.clone())
     }
 
-    fn consistency_record(&self) -> ConsistencyRecord {
+    /// `None` without innovations, because their mean square is then not a number.
+    fn consistency_record(&self) -> Option<ConsistencyRecord> {
         let of = |nis: Nis| NisRecord {
             nis: nis.mean,
             nis_interval: nis.interval.into(),
         };
         let some = |nis: Nis| (nis.count > 0).then(|| of(nis));
         let consistency = &self.consistency;
-        ConsistencyRecord {
-            all: of(consistency.all),
+        Some(ConsistencyRecord {
+            all: some(consistency.all)?,
             velocity: some(consistency.velocity),
             table: some(consistency.table),
             attitude: some(consistency.attitude),
-        }
+        })
     }
 
     fn noise_record(&self) -> NoiseRecord {
@@ -100,7 +101,8 @@ impl Calibration {
     ) {
         let estimated: Vec<usize> = outcome.usable().estimated().collect();
         let factor = |index| factor(&run.instrument.nominal, index);
-        self.budget = Some(budget.record(&estimated, factor));
+        let variance = |index| outcome.estimate.covariance[(index, index)];
+        self.budget = Some(budget.record(&estimated, variance, factor));
     }
 
     fn with_findings(self, findings: Vec<Finding>) -> Self {

@@ -5,7 +5,7 @@ use std::fs;
 use approx::assert_relative_eq;
 use nalgebra::Vector3;
 use turncal::calibration::result::{
-    Calibration, ConsistencyRecord, EQUATION, Method, NisRecord, TestVector, TriadRecord,
+    Calibration, ConsistencyRecord, EQUATION, Method, NisRecord, TestVector, TriadRecord, rows,
 };
 use turncal::imu::{BodyFrame, InstallationForm, Nominal, Output, PerSensor};
 use turncal::run::Aiding;
@@ -135,7 +135,9 @@ fn a_calibration_comes_back_as_it_went() {
         accel: sigma,
     });
     record.parameters = vec!["gyro.installation.yz".to_owned(), "accel.bias.x".to_owned()];
-    record.covariance = vec![vec![1.0 / 3.0, 1e-300], vec![1e-300, 2.0]];
+    let variance = |name: &str| record.sigma_of(name).unwrap().powi(2);
+    let [angle, bias] = [0, 1].map(|n| variance(&record.parameters[n]));
+    record.covariance = vec![vec![angle, 1e-300], vec![1e-300, bias]];
     record.passes = Some(3);
     record.converged = Some(true);
     let nis = NisRecord {
@@ -151,12 +153,13 @@ fn a_calibration_comes_back_as_it_went() {
     record.warnings = vec!["heading is not observed".to_owned()];
     record.fixed = vec!["accel.installation.xy".to_owned()];
     record.equation = Some(EQUATION.to_owned());
-    record.correction = Some(PerSensor {
-        gyro: sigma.installation,
-        accel: sigma.installation,
-    });
+    let triads = [&record.gyro, &record.accel];
+    let [gyro, accel] = triads.map(|of| rows(&of.sensitivity().try_inverse().unwrap()));
+    record.correction = Some(PerSensor { gyro, accel });
+    let input = Vector3::repeat(0.1);
+    let raw = triads.map(|of| (of.sensitivity() * input + Vector3::from(of.bias)).data.0[0]);
     record.test_vectors = vec![TestVector {
-        raw: [1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
+        raw: raw.concat().try_into().unwrap(),
         calibrated: [0.1; 6],
     }];
     record.meta.insert("serial".to_owned(), "7".to_owned());

@@ -1,11 +1,7 @@
 //! Value ranges of arguments.
 
-use std::path::Path;
 use std::time::Duration;
 
-use anyhow::Context;
-
-use turncal::calibration::result::Calibration;
 use turncal::earth::{GRAVITIES, HEIGHTS};
 use turncal::study::navigation::INTERVAL;
 use turncal::study::{Shard, ShardError};
@@ -71,17 +67,5 @@ pub fn at_least_two(text: &str) -> Result<u64, String> {
     match text.parse() {
         Ok(count @ 2..=MOST) => Ok(count),
         _ => Err(format!("expected a whole number from 2 to {MOST}")),
-    }
-}
-
-/// A calibration at a temperature in °C, or unchanged without one.
-pub fn at_temperature(path: &Path, temperature: Option<f64>) -> anyhow::Result<Calibration> {
-    let record = turncal_files::read_calibration(path)?;
-    match temperature {
-        Some(temperature) => {
-            let there = record.at_temperature(temperature);
-            there.with_context(|| path.display().to_string())
-        }
-        None => Ok(record),
     }
 }

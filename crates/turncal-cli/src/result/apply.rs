@@ -6,14 +6,14 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use clap::error::ErrorKind;
 
-use crate::arguments::{OfLog, keep, run_or_log};
+use crate::arguments::{OfLog, keep, run_or_log, usable};
 use crate::terminal::{Activity, stream};
 use turncal::calibration::result::Calibration;
 use turncal::calibration::{Correction, TEMPERATURE_TOLERANCE, ThermalRecord};
 use turncal::imu::{Sensor, Term};
 use turncal::run::Run;
 use turncal::units::PPM;
-use turncal_files::export::{sample_rows, write_samples};
+use turncal_files::export::Samples;
 use turncal_report::terminal::printable;
 
 /// A scale factor that differs by more than this many prior σ probably belongs to another instrument.
@@ -24,7 +24,8 @@ const SUSPECT_SIGMAS: f64 = 10.0;
 /// Writes one row per sample: start and end in s, angular rate in rad/s and specific force in m/s², both averaged over
 /// the sample, along right, front and up in the body frame of the calibration. Error terms of the calibration are also
 /// corrected, as is temperature dependence if the run has a temperature; the correction of the time offset neglects
-/// Earth rate. The output can itself be the log of a run.toml: output = "rate", time_stamp = "end".
+/// Earth rate. The last column names the verdict of the calibration, such as verdict_good, and contains 1. The output can
+/// itself be the log of a run.toml: output = "rate", time_stamp = "end".
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal apply result/calibration.json run.toml -o calibrated.csv.gz
@@ -45,7 +46,7 @@ pub struct Apply {
     /// bridge
     #[arg(long)]
     fill: bool,
-    /// Replace the output file if it exists
+    /// Replace the output file if it exists, and apply a calibration even if its verdict is FAILED
     #[arg(long)]
     force: bool,
 }
@@ -61,7 +62,7 @@ impl Apply {
                 clap::Error::raw(ErrorKind::ValueValidation, message).exit();
             }
         }
-        let record = turncal_files::read_calibration(&self.calibration)?;
+        let record = usable(&self.calibration, None, self.force)?;
         let activity = Activity::new(format!("reading {}", self.run.display()));
         let run = self.of_log.open(&self.run)?.run;
         let correction = Correction::for_run(&record, &run)
@@ -76,15 +77,21 @@ impl Apply {
             );
         }
         activity.next("writing");
+        let samples = Samples {
+            run: &run,
+            correction: &correction,
+            fill: self.fill,
+            verdict: record.word(),
+        };
         match &self.output {
             Some(output) => {
                 keep(
                     output,
                     run.recording.files.iter().chain([&self.calibration]),
                 )?;
-                write_samples(output, &correction, &run, self.fill, self.force)?;
+                samples.write(output, self.force)?;
             }
-            None => stream(|rows| sample_rows(rows, &correction, &run, self.fill))?,
+            None => stream(|rows| samples.rows(rows))?,
         }
         drop(activity);
         tell!(
@@ -110,9 +117,6 @@ impl Apply {
 
 fn notes(record: &Calibration, correction: &Correction, run: &Run) -> Vec<String> {
     let mut notes = Vec::new();
-    if record.is_failed() {
-        notes.push("the verdict of the calibration is FAILED: do not use these values".to_owned());
-    }
     let kept: Vec<&str> = record.undetermined().map(String::as_str).collect();
     if !kept.is_empty() {
         let names = kept.join(", ");

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::bail;
 use clap::error::ErrorKind;
 
-use crate::arguments::{Delivery, at_temperature};
+use crate::arguments::{Delivery, usable};
 use crate::terminal::short_names;
 use turncal::lot::{Lot, Unit};
 use turncal_report as report;
@@ -14,7 +14,8 @@ use turncal_report as report;
 ///
 /// All calibrations are first converted to the general installation form and one body frame. Differences are from the
 /// truth or, for two calibrations without a truth, from the first. For three or more, the mean, scatter and χ² of the
-/// scatter relative to the stated σ are also shown, and outliers are named.
+/// scatter relative to the stated σ are also shown, and outliers are named. A calibration whose verdict is FAILED is
+/// refused without --force.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  turncal compare monday.json friday.json --truth truth.json")]
 pub struct Compare {
@@ -41,7 +42,12 @@ impl Compare {
         let paths: Vec<&Path> = paths.map(PathBuf::as_path).collect();
         let named = short_names(&paths).into_iter().zip(&paths);
         let units = named.map(|(name, path)| {
-            let calibration = at_temperature(path, self.temperature_degc)?;
+            let force = self.delivery.force();
+            let mut calibration = usable(path, self.temperature_degc, force)?;
+            // A comparison leaves out units that did not converge, but this one was asked for.
+            calibration.converged = calibration
+                .converged
+                .filter(|converged| *converged || !force);
             anyhow::Ok(Unit::of_record(name, calibration, None))
         });
         let mut units = units.collect::<anyhow::Result<Vec<Unit>>>()?;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 
-use crate::arguments::{at_temperature, keep, run_file};
+use crate::arguments::{keep, run_file, usable};
 use crate::terminal::print;
 use turncal_files::export;
 use turncal_files::write_whole;
@@ -14,7 +14,8 @@ use turncal_files::write_whole;
 ///
 /// Formats with inputs in rad/s and m/s² state the divisor of the raw output: the nominal scale of its unit or, for
 /// counts, that of --run, otherwise the calibrated scale factors rounded to three digits. Parts of the calibration that
-/// a format cannot represent are named in the file and on standard error.
+/// a format cannot represent are named in the file and on standard error. So is the verdict of the calibration; realsense
+/// has no place for text, so its file contains neither.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   turncal export result/calibration.json --format c -o imu.h
@@ -38,14 +39,14 @@ pub struct Export {
     /// File to write [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Replace the output file if it exists
+    /// Replace the output file if it exists, and export a calibration even if its verdict is FAILED
     #[arg(long)]
     force: bool,
 }
 
 impl Export {
     pub fn run(&self) -> anyhow::Result<()> {
-        let record = at_temperature(&self.calibration, self.temperature_degc)?;
+        let record = usable(&self.calibration, self.temperature_degc, self.force)?;
         let run = self
             .run
             .as_deref()
@@ -61,6 +62,9 @@ impl Export {
                 write_whole(output, text, self.force)?;
             }
             None => print(text)?,
+        }
+        if let Some(word) = record.word() {
+            tell!("verdict of the calibration: {word}");
         }
         for note in exported.notes {
             tell!("not included: {note}");

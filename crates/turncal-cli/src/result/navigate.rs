@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use clap::ValueEnum;
 
-use crate::arguments::{Delivery, at_temperature, hours, latitude, number};
+use crate::arguments::{Delivery, hours, latitude, number, usable};
 use crate::terminal::{Activity, short_names};
 use turncal::calibration::{Calibration, Named};
 use turncal::imu::Sensor;
@@ -21,7 +21,8 @@ const LARGEST_PITCH: f64 = 89.0;
 ///
 /// Navigates with the instrument of --truth, corrected by the calibration, from perfect alignment and with the height
 /// fixed to the true height, at rest or along a trajectory. Shows the errors of attitude, velocity and position, and
-/// their σ predicted from the covariance of the calibration.
+/// their σ predicted from the covariance of the calibration. A calibration whose verdict is FAILED is refused without
+/// --force.
 #[derive(Debug, clap::Args)]
 #[command(mut_arg("output", |output| output.help("Directory for navigation.csv, figures and a page")))]
 #[command(after_help = "Examples:
@@ -104,10 +105,8 @@ impl Navigate {
     pub fn run(&self) -> anyhow::Result<()> {
         let paths = [self.calibration.as_path(), self.truth.as_path()];
         let names = short_names(&paths);
-        let [calibration, truth] = [
-            at_temperature(&self.calibration, self.temperature_degc)?,
-            at_temperature(&self.truth, self.temperature_degc)?,
-        ];
+        let read = |path| usable(path, self.temperature_degc, self.delivery.force());
+        let [calibration, truth] = [read(&self.calibration)?, read(&self.truth)?];
         let [of_calibration, of_truth] = [(&names[0], &calibration), (&names[1], &truth)]
             .map(|(name, record)| Named { name, record });
         let (mut pair, body_frame) = Pair::of_records(of_calibration, of_truth)?;
@@ -138,7 +137,7 @@ impl Navigate {
         let navigation = Navigation {
             calibration: &names[0],
             truth: &names[1],
-            converged: calibration.converged != Some(false),
+            verdict: calibration.word(),
             terms: !calibration.terms.is_empty() || !truth.terms.is_empty(),
             body_frame,
             only,

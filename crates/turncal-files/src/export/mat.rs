@@ -28,6 +28,8 @@ pub fn write(values: &Values) -> Exported {
         ("axes", text("right, front, up")),
         ("about", text(&about(values).join("; "))),
     ];
+    let word = values.record.word().map(|word| word.to_string());
+    fields.extend(word.map(|word| ("verdict", text(&word))));
     for sensor in Sensor::ALL {
         let mut of_triad = triad(values.record.triad(sensor));
         let matrix = values.correction.matrix.get(sensor);

@@ -17,7 +17,7 @@ mod text;
 mod values;
 
 pub use remarks::Exported;
-pub use samples::{HEADER, sample_rows, write_samples};
+pub use samples::{HEADER, Samples};
 
 use turncal::calibration::CorrectionError;
 use turncal::calibration::result::Calibration;

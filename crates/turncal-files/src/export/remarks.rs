@@ -160,8 +160,11 @@ pub fn about(values: &Values) -> Vec<String> {
     ];
     let meta = record.meta.iter();
     lines.extend(meta.map(|(name, value)| format!("{name}: {value}")));
+    if let Some(word) = record.word() {
+        lines.push(format!("verdict of the calibration: {word}"));
+    }
     if record.is_failed() {
-        lines.push("WARNING: verdict FAILED: do not use these values".to_owned());
+        lines.push("WARNING: do not use these values".to_owned());
     }
     lines.extend(record.warnings.iter().map(|w| format!("warning: {w}")));
     let axes = match &record.columns {

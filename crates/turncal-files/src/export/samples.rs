@@ -7,7 +7,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use crate::{write_rows, write_whole_with};
-use turncal::calibration::Correction;
+use turncal::calibration::{Correction, Word};
 use turncal::recording::nanoseconds;
 use turncal::run::Run;
 use turncal_input::FileError;
@@ -23,80 +23,83 @@ const ROWS: usize = 4096;
 /// Tasks before their text is written.
 const TASKS: usize = 64;
 
-/// Writes one row per log row, with [`HEADER`] first; for a temperature-dependent calibration, `in_range` states
-/// whether it is valid at the temperature of the row. A row contains means over its sample, so the output is a log with
-/// `output = "rate"` in `rad/s` and `m/s^2`.
-///
-/// Numbers are the shortest that read as the same value. With `fill`, missing samples are also written, interpolated,
-/// with 1 in a last column `filled`.
-pub fn sample_rows(
-    file: &mut dyn Write,
-    correction: &Correction,
-    run: &Run,
-    fill: bool,
-) -> io::Result<()> {
-    let optional = |is_there: bool, column| if is_there { column } else { "" };
-    let in_range = optional(correction.changes(), ",in_range");
-    let filled = optional(fill, ",filled");
-    writeln!(file, "{HEADER}{in_range}{filled}")?;
-    let (samples, lost) = (run.recording.imu.len(), run.recording.imu.lost());
-    let parts = (0..samples).step_by(ROWS);
-    let parts: Vec<_> = parts
-        .map(|first| first..samples.min(first + ROWS))
-        .collect();
-    for parts in parts.chunks(TASKS) {
-        let text = |part: &Range<usize>| rows(correction, run, part.clone(), &lost, fill);
-        for text in parts.par_iter().map(text).collect::<Vec<_>>() {
-            file.write_all(&text)?;
-        }
-    }
-    Ok(())
+/// The samples of a run to write.
+#[derive(Debug, Clone, Copy)]
+pub struct Samples<'a> {
+    /// Their run.
+    pub run: &'a Run,
+    /// Its correction.
+    pub correction: &'a Correction,
+    /// Whether missing samples are also written, interpolated, with 1 in a column `filled`.
+    pub fill: bool,
+    /// Verdict of the calibration, which names a last column.
+    pub verdict: Option<Word>,
 }
 
-/// The rows of some samples.
-fn rows(
-    correction: &Correction,
-    run: &Run,
-    samples: Range<usize>,
-    lost: &[Range<usize>],
-    fill: bool,
-) -> Vec<u8> {
-    let mut text = Vec::with_capacity(samples.len() * ROW_LENGTH);
-    let mut number = zmij::Buffer::new();
-    let lost = &lost[lost.partition_point(|lost| lost.end <= samples.start)..];
-    let mut lost = lost.iter().peekable();
-    for (k, sample) in samples.clone().zip(correction.samples(run, samples)) {
-        while lost.next_if(|lost| lost.end <= k).is_some() {}
-        let is_lost = lost.peek().is_some_and(|lost| lost.contains(&k));
-        if is_lost && !fill {
-            continue;
+impl Samples<'_> {
+    /// Writes one row per log row, with [`HEADER`] first; for a temperature-dependent calibration, `in_range` states
+    /// whether it is valid at the temperature of the row. A row contains means over its sample, so the output is a log
+    /// with `output = "rate"` in `rad/s` and `m/s^2`. Numbers are the shortest that read as the same value.
+    pub fn rows(&self, file: &mut dyn Write) -> io::Result<()> {
+        let optional = |is_there: bool, column| if is_there { column } else { "" };
+        let in_range = optional(self.correction.changes(), ",in_range");
+        let filled = optional(self.fill, ",filled");
+        let verdict = self.verdict.map(|word| format!(",{}", word.column()));
+        let verdict = verdict.unwrap_or_default();
+        writeln!(file, "{HEADER}{in_range}{filled}{verdict}")?;
+        let imu = &self.run.recording.imu;
+        let (samples, lost) = (imu.len(), imu.lost());
+        let parts = (0..samples).step_by(ROWS);
+        let parts: Vec<_> = parts
+            .map(|first| first..samples.min(first + ROWS))
+            .collect();
+        for parts in parts.chunks(TASKS) {
+            let text = |part: &Range<usize>| self.part(part.clone(), &lost);
+            for text in parts.par_iter().map(text).collect::<Vec<_>>() {
+                file.write_all(&text)?;
+            }
         }
-        let times = [nanoseconds(sample.start), nanoseconds(sample.end)];
-        for &value in times.iter().chain(&sample.rate).chain(&sample.force) {
-            text.extend_from_slice(number.format(value).as_bytes());
-            text.push(b',');
-        }
-        text.pop();
-        if correction.changes() {
-            text.extend([b',', b'0' + u8::from(sample.in_range)]);
-        }
-        if fill {
-            text.extend([b',', b'0' + u8::from(is_lost)]);
-        }
-        text.push(b'\n');
+        Ok(())
     }
-    text
-}
 
-/// The same into a complete file, compressed if its name ends in `.gz`; an existing file is replaced only with `force`.
-pub fn write_samples(
-    path: &Path,
-    correction: &Correction,
-    run: &Run,
-    fill: bool,
-    force: bool,
-) -> Result<(), FileError> {
-    write_whole_with(path, force, |file| {
-        write_rows(path, file, |rows| sample_rows(rows, correction, run, fill))
-    })
+    /// The same into a complete file, compressed if its name ends in `.gz`; an existing file is replaced only with
+    /// `force`.
+    pub fn write(&self, path: &Path, force: bool) -> Result<(), FileError> {
+        write_whole_with(path, force, |file| {
+            write_rows(path, file, |rows| self.rows(rows))
+        })
+    }
+
+    /// The rows of some samples.
+    fn part(&self, samples: Range<usize>, lost: &[Range<usize>]) -> Vec<u8> {
+        let (correction, fill) = (self.correction, self.fill);
+        let mut text = Vec::with_capacity(samples.len() * ROW_LENGTH);
+        let mut number = zmij::Buffer::new();
+        let lost = &lost[lost.partition_point(|lost| lost.end <= samples.start)..];
+        let mut lost = lost.iter().peekable();
+        for (k, sample) in samples.clone().zip(correction.samples(self.run, samples)) {
+            while lost.next_if(|lost| lost.end <= k).is_some() {}
+            let is_lost = lost.peek().is_some_and(|lost| lost.contains(&k));
+            if is_lost && !fill {
+                continue;
+            }
+            let times = [nanoseconds(sample.start), nanoseconds(sample.end)];
+            for &value in times.iter().chain(&sample.rate).chain(&sample.force) {
+                text.extend_from_slice(number.format(value).as_bytes());
+                text.push(b',');
+            }
+            text.pop();
+            if correction.changes() {
+                text.extend([b',', b'0' + u8::from(sample.in_range)]);
+            }
+            if fill {
+                text.extend([b',', b'0' + u8::from(is_lost)]);
+            }
+            if self.verdict.is_some() {
+                text.extend(b",1");
+            }
+            text.push(b'\n');
+        }
+        text
+    }
 }

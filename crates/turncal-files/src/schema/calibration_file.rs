@@ -1,6 +1,6 @@
-//! `calibration.json` and `truth.json`: validated on reading, written completely.
+//! `calibration.json` and `truth.json`: validated on reading, and on writing by the same checks.
 //!
-//! An estimated calibration is written with any values, because its findings describe its quality.
+//! A failed calibration is written with values of any size, because its findings say that they must not be used.
 
 use std::collections::HashSet;
 use std::ops::RangeInclusive;
@@ -28,10 +28,6 @@ const TABLE: f64 = 180.0 * DEGREE;
 /// Rounding tolerance of correlations written by other programs.
 const ROUNDING: f64 = 1e-6;
 
-/// An error: content found and content expected.
-type Wrong = (String, String);
-type Checked = Result<(), Wrong>;
-
 /// Refuses a violated condition.
 macro_rules! expect {
     ($holds:expr, $expected:expr, $($found:tt)+) => {
@@ -42,11 +38,18 @@ macro_rules! expect {
     };
 }
 
+mod agreement;
+
+use agreement::{Checked, Wrong, check_agreement};
+
 /// Reads and checks a record.
 pub fn read_calibration(path: &Path) -> Result<Calibration, FileError> {
     let advice = "Give the path of a calibration.json or truth.json.";
-    let bytes = small_file::bytes(path, "the calibration", advice)?;
-    let record: Calibration = serde_json::from_slice(&bytes).map_err(|error| {
+    record_of(&small_file::bytes(path, "the calibration", advice)?, path)
+}
+
+fn record_of(bytes: &[u8], path: &Path) -> Result<Calibration, FileError> {
+    let record: Calibration = serde_json::from_slice(bytes).map_err(|error| {
         let (line, column) = (error.line() as u64, error.column() as u64);
         let at = format!(" at line {line} column {column}");
         let what = excerpt(&error.to_string().replace(&at, ""));
@@ -58,23 +61,33 @@ pub fn read_calibration(path: &Path) -> Result<Calibration, FileError> {
             ),
         }
     })?;
-    let checked = check(&record).and_then(|()| check_sizes(&record));
-    let checked = checked.and_then(|()| check_correlations(&record));
-    checked.map_err(|wrong| refused(path, &wrong))?;
+    checked(&record).map_err(|wrong| refused(path, &wrong))?;
     Ok(record)
 }
 
-/// The record as file bytes; `path` is used in error messages.
+/// The record as file bytes that [`read_calibration`] accepts; `path` is used in error messages.
 pub fn calibration_json(record: &Calibration, path: &Path) -> Result<Vec<u8>, FileError> {
     let expected = "values that JSON can represent".to_owned();
     let written = || small_file::pretty(record).map_err(|error| (error.to_string(), expected));
     let bytes = check(record).and_then(|()| written());
-    bytes.map_err(|wrong| refused(path, &wrong))
+    let bytes = bytes.map_err(|wrong| refused(path, &wrong))?;
+    record_of(&bytes, path)?;
+    Ok(bytes)
 }
 
 /// Writes the complete record or nothing; an existing file is replaced only with `force`.
 pub fn write_calibration(record: &Calibration, path: &Path, force: bool) -> Result<(), FileError> {
     write_whole(path, &calibration_json(record, path)?, force)
+}
+
+/// All checks of a file.
+fn checked(record: &Calibration) -> Checked {
+    check(record)?;
+    if !record.is_failed() {
+        check_sizes(record)?;
+    }
+    check_correlations(record)?;
+    check_agreement(record)
 }
 
 fn check(record: &Calibration) -> Checked {

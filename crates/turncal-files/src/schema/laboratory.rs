@@ -1,12 +1,12 @@
 //! `lab.toml`: laboratory data for a calibration certificate.
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 
-use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use turncal::laboratory::{Condition, Laboratory};
-use turncal_input::{Document, FileError, list, small_file};
+use turncal_input::{Document, FileError, small_file};
 
 /// The version of the format.
 const FORMAT: &str = "turncal-laboratory/1";
@@ -14,13 +14,13 @@ const FORMAT: &str = "turncal-laboratory/1";
 /// A lab.toml to be completed.
 pub const LABORATORY_DRAFT: &str = include_str!("laboratory.toml");
 
-/// Tables and fields required in every certificate by ISO/IEC 17025.
+/// Tables and fields required in every certificate by ISO/IEC 17025, in the order of the draft.
 const REQUIRED: [(&str, &[&str]); 8] = [
     ("laboratory", &["name", "street", "city", "country"]),
     ("customer", &["name", "street", "city", "country"]),
     (
         "certificate",
-        &["number", "issued", "begin", "end", "place"],
+        &["number", "begin", "end", "issued", "place"],
     ),
     ("item", &["name", "model", "serial", "state"]),
     ("method", &["procedure"]),
@@ -29,10 +29,24 @@ const REQUIRED: [(&str, &[&str]); 8] = [
     ("authorised", &["name", "function"]),
 ];
 
+/// Air temperatures of calibrations, °C; kelvins are above them.
+const TEMPERATURES: RangeInclusive<f64> = -100.0..=200.0;
+/// Relative humidities, percent.
+const HUMIDITIES: RangeInclusive<f64> = 0.0..=100.0;
+
+/// Country codes of ISO 3166-1, alpha-2.
+const COUNTRIES: &str = "AD AE AF AG AI AL AM AO AQ AR AS AT AU AW AX AZ BA BB BD BE BF BG BH BI BJ BL BM BN BO BQ BR \
+    BS BT BV BW BY BZ CA CC CD CF CG CH CI CK CL CM CN CO CR CU CV CW CX CY CZ DE DJ DK DM DO DZ EC EE EG EH ER ES ET \
+    FI FJ FK FM FO FR GA GB GD GE GF GG GH GI GL GM GN GP GQ GR GS GT GU GW GY HK HM HN HR HT HU ID IE IL IM IN IO IQ \
+    IR IS IT JE JM JO JP KE KG KH KI KM KN KP KR KW KY KZ LA LB LC LI LK LR LS LT LU LV LY MA MC MD ME MF MG MH MK ML \
+    MM MN MO MP MQ MR MS MT MU MV MW MX MY MZ NA NC NE NF NG NI NL NO NP NR NU NZ OM PA PE PF PG PH PK PL PM PN PR PS \
+    PT PW PY QA RE RO RS RU RW SA SB SC SD SE SG SH SI SJ SK SL SM SN SO SR SS ST SV SX SY SZ TC TD TF TG TH TJ TK TL \
+    TM TN TO TR TT TV TW TZ UA UG UM US UY UZ VA VC VE VG VI VN VU WF WS YE YT ZA ZM ZW";
+
 /// Reads and checks a lab.toml. `meta` contains metadata of the run, which complete `[item]`.
 ///
 /// # Errors
-/// [`FileError`] that names every required field that is missing, or the first invalid one.
+/// [`FileError`] that names every field that is empty or missing, or the first invalid one.
 pub fn read_laboratory(
     path: &Path,
     meta: impl Fn(&str) -> Option<String>,
@@ -42,14 +56,16 @@ pub fn read_laboratory(
     let of_item = [("model", meta("instrument")), ("serial", meta("serial"))];
     let mut table = document.of_format(FORMAT)?;
     let values = table.get_mut().iter_mut();
-    for (name, value) in values.filter(|(name, _)| name.get_ref() != "conditions") {
+    for (_, value) in values.filter(|(name, _)| name.get_ref() != "conditions") {
         document.as_written(value);
-        say_something(document, name.get_ref(), value)?;
     }
+    let mut open = Vec::new();
+    take_empty(table.get_mut(), "", &mut open);
     let file: Result<Laboratory, FileError> = document.fill(table.clone());
-    // All that is missing is named at once, unless another error comes first.
+    // All that is open is named at once, unless another error comes first.
     if !matches!(&file, Err(error) if !error.message.starts_with("found no ")) {
-        check_complete(path, table.get_ref(), &of_item)?;
+        open.extend(missing(table.get_ref(), &of_item, &open));
+        check_complete(document, open)?;
     }
     let mut file = file?;
     let fields = [&mut file.item.model, &mut file.item.serial];
@@ -62,44 +78,47 @@ pub fn read_laboratory(
     Ok(file)
 }
 
-/// Checks conditions, dates and countries.
-fn check_values(document: Document, file: &Laboratory) -> Result<(), FileError> {
-    let conditions = &file.conditions;
-    for (name, of) in [
-        ("temperature_degc", Some(conditions.temperature_degc)),
-        ("humidity_percent", conditions.humidity_percent),
-    ] {
-        let is_sound = |of: &Condition| {
-            of.value.is_finite() && of.uncertainty.is_finite() && of.uncertainty >= 0.0
+/// Removes empty texts and adds their paths; normalises the white space of the others for page and XML.
+fn take_empty(fields: &mut DeTable, path: &str, open: &mut Vec<String>) {
+    let mut empty = Vec::new();
+    for (name, value) in fields.iter_mut() {
+        let name = name.get_ref().to_string();
+        let path = format!("{path}{name}");
+        let is_empty = match value.get_mut() {
+            DeValue::Table(fields) => {
+                take_empty(fields, &format!("{path}."), open);
+                false
+            }
+            value => has_empty(value),
         };
-        if !of.as_ref().is_none_or(is_sound) {
-            let expected = "a finite value and an uncertainty of at least zero";
-            let path = format!("conditions.{name}");
-            return Err(document.wrong(&path, expected, "Correct this value."));
+        if is_empty {
+            open.push(path);
+            empty.push(name);
         }
     }
-    let days = &file.certificate;
-    if days.end < days.begin || days.issued < days.end {
-        let expected = "begin, end and issued in chronological order";
-        return Err(document.wrong("certificate.end", expected, "Correct these dates."));
-    }
-    for (of, contact) in [("laboratory", &file.contact), ("customer", &file.customer)] {
-        let country = &contact.country;
-        if country.len() != 2 || !country.bytes().all(|b| b.is_ascii_uppercase()) {
-            let expected = "two capital letters of ISO 3166-1, such as \"DE\"";
-            let path = format!("{of}.country");
-            return Err(document.wrong(&path, expected, "Correct this value."));
-        }
-    }
-    Ok(())
+    empty
+        .iter()
+        .for_each(|name| drop(fields.remove(name.as_str())));
 }
 
-/// Names every required field that is missing.
-fn check_complete(
-    path: &Path,
-    table: &DeTable,
-    of_item: &[(&str, Option<String>)],
-) -> Result<(), FileError> {
+/// Whether a text, or one in a list, is empty; white space is normalised on the way.
+fn has_empty(value: &mut DeValue) -> bool {
+    match value {
+        DeValue::String(text) => {
+            let words: Vec<&str> = text.split_whitespace().collect();
+            *text = words.join(" ").into();
+            text.is_empty()
+        }
+        DeValue::Array(all) => {
+            let empty = all.iter_mut().map(|value| has_empty(value.get_mut()));
+            empty.fold(false, |any, this| any | this)
+        }
+        _ => false,
+    }
+}
+
+/// Required fields that are missing, by path, except those that the run or `open` contains.
+fn missing(table: &DeTable, of_item: &[(&str, Option<String>)], open: &[String]) -> Vec<String> {
     let is_there = |of: &str, name: &str| {
         let mut of_run = of_item.iter().filter(|(_, of_run)| of_run.is_some());
         let fields = table.get(of).and_then(|fields| fields.get_ref().as_table());
@@ -110,43 +129,67 @@ fn check_complete(
         let names = names.iter().filter(|name| !is_there(of, name));
         names.map(move |name| format!("{of}.{name}"))
     });
-    let missing: Vec<String> = missing.collect();
-    let fields = match missing.len() {
-        0 => return Ok(()),
-        1 => "1 required field".to_owned(),
-        count => format!("{count} required fields"),
-    };
-    let missing = list(missing.iter().map(String::as_str));
-    let found = format_args!("{fields} missing");
-    let expected = format_args!("the fields required by ISO/IEC 17025, 7.8.2 and 7.8.4: {missing}");
-    let advice = "Add them; `turncal certificate --draft` shows an example.";
-    Err(FileError::of(path, found, expected, advice))
+    missing.filter(|path| !open.contains(path)).collect()
 }
 
-/// Refuses empty texts and normalises white space for page and XML.
-fn say_something(
-    document: Document,
-    path: &str,
-    value: &mut Spanned<DeValue>,
-) -> Result<(), FileError> {
-    match value.get_mut() {
-        DeValue::Table(fields) => {
-            let mut fields = fields.iter_mut();
-            fields.try_for_each(|(name, value)| {
-                say_something(document, &format!("{path}.{}", name.get_ref()), value)
-            })
+/// Names every open field, in the order of the tables in the file, and within a table in that of the draft.
+fn check_complete(document: Document, mut open: Vec<String>) -> Result<(), FileError> {
+    let place = |path: &String| {
+        let (table, name) = path.split_once('.').unwrap_or(("", path));
+        let heading = document.text.find(&format!("[{table}]"));
+        let fields = REQUIRED.iter().find(|(of, _)| *of == table);
+        let field = fields.and_then(|(_, names)| names.iter().position(|of| *of == name));
+        (heading.unwrap_or(usize::MAX), field.unwrap_or(usize::MAX))
+    };
+    open.sort_by_key(place);
+    let fields = match open.len() {
+        0 => return Ok(()),
+        1 => "1 open field".to_owned(),
+        count => format!("{count} open fields"),
+    };
+    let all = open.join(", ");
+    let expected = "text or a value in each (ISO/IEC 17025, 7.8.2 and 7.8.4)";
+    let advice = format_args!("Complete {all}.");
+    Err(FileError::of(document.file, fields, expected, advice))
+}
+
+/// Checks conditions, dates and countries.
+fn check_values(document: Document, file: &Laboratory) -> Result<(), FileError> {
+    let conditions = &file.conditions;
+    for (name, of, possible) in [
+        (
+            "temperature_degc",
+            Some(conditions.temperature_degc),
+            TEMPERATURES,
+        ),
+        ("humidity_percent", conditions.humidity_percent, HUMIDITIES),
+    ] {
+        let (low, high) = (possible.start(), possible.end());
+        let is_sound = |of: Condition| {
+            let size = 0.0..=high - low;
+            possible.contains(&of.value) && size.contains(&of.uncertainty)
+        };
+        if !of.is_none_or(is_sound) {
+            let expected =
+                format_args!("a value from {low} to {high} and an uncertainty of at least zero");
+            let path = format!("conditions.{name}");
+            return Err(document.wrong(&path, expected, "Correct this value."));
         }
-        DeValue::String(text) => {
-            let words: Vec<&str> = text.split_whitespace().collect();
-            if words.is_empty() {
-                let expected = "non-empty text";
-                return Err(document.wrong(path, expected, "Complete this value."));
-            }
-            *text = words.join(" ").into();
-            Ok(())
-        }
-        _ => Ok(()),
     }
+    let days = &file.certificate;
+    let received = days.received.unwrap_or(days.begin);
+    if days.begin < received || days.end < days.begin || days.issued < days.end {
+        let expected = "received, begin, end and issued in chronological order";
+        return Err(document.wrong("certificate.end", expected, "Correct these dates."));
+    }
+    for (of, contact) in [("laboratory", &file.contact), ("customer", &file.customer)] {
+        if !COUNTRIES.split(' ').any(|code| code == contact.country) {
+            let expected = "two capital letters of ISO 3166-1, such as \"DE\"";
+            let path = format!("{of}.country");
+            return Err(document.wrong(&path, expected, "Correct this value."));
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -179,10 +222,7 @@ mod tests {
         let without = LAB.replace("number = ", "# number = ");
         let message = read(&without).unwrap_err().to_string();
         assert!(message.contains("certificate.number") && !message.contains("customer"));
-        assert!(
-            message.contains("found 1 required field missing"),
-            "{message}"
-        );
+        assert!(message.contains("found 1 open field"), "{message}");
     }
 
     #[test]
@@ -199,6 +239,15 @@ mod tests {
             ("name = \"Example", "nam = \"Example", "unknown field"),
             ("\"T-17\", ", "", "serial number"),
             ("uncertainty = 0.5", "uncertainty = -0.5", "at least zero"),
+            ("value = 22.4", "value = -300.0", "from -100 to 200"),
+            ("value = 22.4", "value = 295.55", "from -100 to 200"),
+            ("value = 45.0", "value = 120.0", "from 0 to 100"),
+            ("country = \"DE\"", "country = \"ZZ\"", "ISO 3166-1"),
+            (
+                "received = 2026-02-27",
+                "received = 2026-03-03",
+                "in chronological order",
+            ),
         ] {
             let text = LAB.replacen(from, to, 1);
             assert_ne!(text, LAB, "{from}");

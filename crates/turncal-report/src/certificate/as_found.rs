@@ -1,7 +1,7 @@
 //! As-found state of the instrument: its deviation from the earlier calibration.
 
-use super::results::{Quantity, nominal};
-use turncal::calibration::result::frame::{free_parameters, in_common_form};
+use super::results::{Measured, Quantity, coverage, nominal};
+use turncal::calibration::result::frame::{Canonical, free_parameters, in_common_form};
 use turncal::calibration::result::{Calibration, Provenance};
 use turncal::calibration::{ComparisonError, Group, Named, parameter_name};
 use turncal::imu::{BodyFrame, InstallationForm, ParameterKind};
@@ -20,16 +20,24 @@ pub struct AsFound {
 /// Change of a parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Change {
-    /// Its name in the general form.
-    pub name: String,
-    /// Its quantity.
-    pub quantity: Quantity,
-    /// Earlier value, in SI; scale factors over their nominal value minus one.
-    pub found: f64,
+    /// Earlier value, with the uncertainty of the earlier calibration: zero if that states none.
+    pub found: Measured,
     /// Value now.
-    pub left: f64,
-    /// 1σ of the difference, as if both came from independent data; `None` if the earlier calibration states no σ.
-    pub sigma: Option<f64>,
+    pub left: Measured,
+}
+
+impl Change {
+    /// The value now minus the earlier one.
+    pub fn difference(&self) -> f64 {
+        self.left.value - self.found.value
+    }
+
+    /// Expanded uncertainty of the difference, as if both came from independent data; `None` if the earlier calibration
+    /// states none.
+    pub fn expanded(&self) -> Option<f64> {
+        let (found, left) = (self.found.expanded, self.left.expanded);
+        (found > 0.0).then(|| found.hypot(left))
+    }
 }
 
 pub fn as_found(
@@ -50,22 +58,30 @@ pub fn as_found(
         },
         &nominal,
     )?;
-    let covariance = found.covariance.zip(left.covariance).map(|(a, b)| a + b);
-    let (values_found, values_left) = (found.vector(), left.vector());
-    let changes = free_parameters(left.body_frame).into_iter().map(|i| {
+    let measured = |of: &Canonical, record: &Calibration, i: usize| {
         let group = Group::of(i);
         let base = match group.kind() {
             ParameterKind::Scale => 1.0,
             _ => 0.0,
         };
-        Change {
-            name: parameter_name(InstallationForm::General, i).unwrap_or_default(),
+        let name = parameter_name(InstallationForm::General, i).unwrap_or_default();
+        let (coverage_factor, degrees_of_freedom) = coverage(record, &name);
+        let sigma = of.sigma().map_or(0.0, |sigma| sigma[i]);
+        Measured {
+            name,
             quantity: Quantity::Parameters(group),
-            found: values_found[i] - base,
-            left: values_left[i] - base,
-            sigma: covariance.map(|p| p[(i, i)].max(0.0).sqrt()),
+            value: of.vector()[i] - base,
+            expanded: coverage_factor * sigma,
+            coverage_factor,
+            degrees_of_freedom,
         }
-    });
+    };
+    let changes = free_parameters(left.body_frame)
+        .into_iter()
+        .map(|i| Change {
+            found: measured(&found, earlier, i),
+            left: measured(&left, now, i),
+        });
     Ok(AsFound {
         earlier: name.to_owned(),
         body_frame: left.body_frame,

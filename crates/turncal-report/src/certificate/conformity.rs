@@ -2,16 +2,13 @@
 //!
 //! Source: JCGM 106:2012, 8.3 (guard bands), 9.3 (specific consumer's risk); ILAC-G8:09/2019, 4.2.
 
-use super::results::nominal;
+use super::results::{coverage, nominal};
 use turncal::calibration::result::frame::Canonical;
 use turncal::calibration::result::{Calibration, Provenance};
 use turncal::calibration::{ComparisonError, parameter_name};
 use turncal::imu::InstallationForm;
 use turncal::laboratory::DecisionRule;
 use turncal::lot::{Limit, Specification, probability_outside};
-
-/// Guard band divided by σ: the expanded uncertainty with k = 2.
-const GUARD: f64 = 2.0;
 
 /// Decision on a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -59,6 +56,8 @@ pub struct Decided {
     pub off: f64,
     /// 1σ of this distance.
     pub sigma: f64,
+    /// Coverage factor of the parameter, as in the table of results.
+    pub coverage_factor: f64,
     /// The decision.
     pub decision: Decision,
     /// Probability that the decision is wrong (false acceptance or false rejection).
@@ -83,11 +82,17 @@ impl Conformity {
     }
 }
 
-/// Decision on a parameter at this distance from the centre of a limit.
-pub fn decide(off: f64, sigma: f64, within: f64, rule: DecisionRule) -> (Decision, f64) {
+/// Decision on a parameter at this distance from the centre of a limit, and the probability that it is wrong. A guard
+/// band is the expanded uncertainty, k σ.
+pub fn decide(
+    off: f64,
+    (sigma, k): (f64, f64),
+    within: f64,
+    rule: DecisionRule,
+) -> (Decision, f64) {
     let outside = probability_outside(off, sigma, within);
     let guard = match rule {
-        DecisionRule::GuardBand => GUARD * sigma,
+        DecisionRule::GuardBand => k * sigma,
         DecisionRule::SimpleAcceptance => 0.0,
     };
     let decision = match off.abs() {
@@ -123,12 +128,15 @@ pub fn conformity(
             values[limit.parameter] - limit.nominal,
             sigma[limit.parameter],
         );
-        let (decision, risk) = decide(off, sigma, limit.within, rule);
+        let name = name(limit.parameter);
+        let (k, _) = coverage(calibration, &name);
+        let (decision, risk) = decide(off, (sigma, k), limit.within, rule);
         Decided {
-            name: name(limit.parameter),
+            name,
             limit,
             off,
             sigma,
+            coverage_factor: k,
             decision,
             risk,
         }

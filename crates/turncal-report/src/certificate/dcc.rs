@@ -6,7 +6,7 @@
 use maud::{Markup, html};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::{Certificate, Decided, Measured, in_words, temperature_words};
+use super::{AsFound, Certificate, Decided, Measured, in_words, temperature_words};
 use turncal::laboratory::{Condition, Contact};
 use turncal::number::to_twelve_digits;
 
@@ -174,6 +174,18 @@ fn administrative(certificate: &Certificate) -> Markup {
                 dcc:name { dcc:content { "metrological traceability" } }
                 dcc:declaration { dcc:content { (laboratory.traceability.statement) } }
             }
+            @if let Some(word) = certificate.calibration.word() {
+                dcc:statement {
+                    dcc:name { dcc:content { "verdict of the evaluation" } }
+                    dcc:declaration { dcc:content { (word) } }
+                }
+            }
+            @for text in certificate.remarks() {
+                dcc:statement {
+                    dcc:name { dcc:content { "remark" } }
+                    dcc:declaration { dcc:content { (text) } }
+                }
+            }
             @if let Some(conformity) = &certificate.conformity {
                 @for limit in &conformity.limits { (statement(limit, conformity.rule.words())) }
             }
@@ -247,10 +259,13 @@ fn measured(certificate: &Certificate) -> Markup {
                 dcc:name { dcc:content { "Parameters" } }
                 dcc:description { dcc:content { (description(certificate)) } }
                 dcc:data {
-                    @for of in certificate.results.iter().chain(&certificate.terms) { (quantity(of)) }
+                    @for of in certificate.results.iter().chain(&certificate.terms) {
+                        (quantity(of, Some(&of.name), Some("basic_measuredValue")))
+                    }
                     (together(&certificate.results, &certificate.covariance))
                 }
             }
+            @if let Some(as_found) = &certificate.as_found { (found(as_found)) }
         }
     }
 }
@@ -276,17 +291,35 @@ fn description(certificate: &Certificate) -> String {
     text
 }
 
-/// One parameter as expected by certificate readers. Its name in calibration.json is a valid xs:ID.
-fn quantity(of: &Measured) -> Markup {
-    let expanded = Expanded {
+/// Parameters as found, with their own uncertainties; those as left are the results in the same body frame.
+fn found(as_found: &AsFound) -> Markup {
+    let about = format!(
+        "Valid when the item was received, from {}; general installation form, body frame: {}.",
+        as_found.earlier,
+        as_found.body_frame.words()
+    );
+    html! {
+        dcc:result {
+            dcc:name { dcc:content { "Parameters as found" } }
+            dcc:description { dcc:content { (about) } }
+            dcc:data {
+                @for change in &as_found.changes { (quantity(&change.found, None, None)) }
+            }
+        }
+    }
+}
+
+/// One parameter as expected by certificate readers. Its name in calibration.json is a valid xs:ID, for one result.
+fn quantity(of: &Measured, id: Option<&str>, kind: Option<&str>) -> Markup {
+    let expanded = (of.expanded > 0.0).then_some(Expanded {
         uncertainty: of.expanded,
         coverage_factor: of.coverage_factor,
         distribution: of.degrees_of_freedom.map_or("normal", |_| "t"),
-    };
+    });
     html! {
-        dcc:quantity id=(of.name) refType="basic_measuredValue" {
+        dcc:quantity id=[id] refType=[kind] {
             dcc:name { dcc:content { (in_words(&of.name)) } }
-            (real(of.value, of.quantity.si_unit(), Some(expanded)))
+            (real(of.value, of.quantity.si_unit(), expanded))
         }
     }
 }

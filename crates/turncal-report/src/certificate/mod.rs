@@ -5,6 +5,7 @@ mod as_found;
 mod conformity;
 pub mod dcc;
 pub mod document;
+mod remarks;
 mod results;
 
 use turncal::calibration::result::{Calibration, Provenance};
@@ -24,6 +25,15 @@ pub enum CertificateError {
     NotUsable {
         /// The reason.
         reason: &'static str,
+    },
+    /// The earlier calibration must not be used.
+    #[error(
+        "the verdict of the earlier calibration, {name}, is FAILED, so it does not show the state as found. Give the last \
+         calibration that is valid, or none."
+    )]
+    Earlier {
+        /// Its name.
+        name: String,
     },
     /// A required field is missing from the file.
     #[error("the calibration has no `{field}` because it is from another version. Calibrate again")]
@@ -105,6 +115,10 @@ impl Certificate {
             }
             None => None,
         };
+        if let Some((name, _)) = earlier.filter(|(_, earlier)| earlier.is_failed()) {
+            let name = name.to_owned();
+            return Err(CertificateError::Earlier { name });
+        }
         let as_found = earlier
             .map(|(name, earlier)| as_found::as_found(name, earlier, &calibration, &provenance))
             .transpose()?;
@@ -119,6 +133,19 @@ impl Certificate {
             as_found,
             calibration,
         })
+    }
+
+    /// Remarks for the customer: what the certificate applies to, those of the laboratory, and the findings of the
+    /// evaluation.
+    pub fn remarks(&self) -> Vec<String> {
+        let general = [
+            "The results relate only to the item named above, in the state and under the conditions stated.",
+            "This certificate may not be reproduced except in full without approval of the laboratory.",
+        ];
+        let general = general.into_iter().map(str::to_owned);
+        let of_laboratory = self.laboratory.remarks.clone();
+        let findings = remarks::sentences(&self.calibration.findings);
+        general.chain(of_laboratory).chain(findings).collect()
     }
 }
 

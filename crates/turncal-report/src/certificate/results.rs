@@ -5,8 +5,25 @@ use turncal::calibration::result::{Calibration, Provenance};
 use turncal::calibration::{PARAMETERS, ThermalRecord, parameter_name, sensor_and_parameter};
 use turncal::imu::{Nominal, ParameterKind, PerSensor, Sensor, TERM_PARAMETERS, Term};
 
-/// Default coverage factor for 95.45 %.
+/// Coverage factor for 95.45 % if the degrees of freedom were not evaluated.
 const COVERAGE_FACTOR: f64 = 2.0;
+
+/// Coverage factor and degrees of freedom of a parameter, the same in every table: from the budget of the calibration,
+/// otherwise for a normal distribution.
+pub fn coverage(calibration: &Calibration, name: &str) -> (f64, Option<f64>) {
+    let place = calibration.parameters.iter().position(|of| of == name);
+    let of_budget = calibration
+        .budget
+        .as_ref()
+        .zip(place)
+        .and_then(|(budget, n)| {
+            Some((
+                *budget.coverage_factor.get(n)?,
+                *budget.degrees_of_freedom.get(n)?,
+            ))
+        });
+    of_budget.unwrap_or((COVERAGE_FACTOR, None))
+}
 
 /// A quantity of a certificate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -96,13 +113,11 @@ pub fn results(
             (0..size).map(element).collect()
         })
         .collect();
-    let budget = calibration.budget.as_ref();
     let results = indices.iter().zip(&calibration.parameters).enumerate();
     let results = results.map(|(n, (&i, name))| {
         let group = Group::of(i);
         let value = *calibration.get(name)? / factor(i);
-        let own = budget.and_then(|budget| budget.coverage_factor.get(n));
-        let coverage_factor = own.copied().unwrap_or(COVERAGE_FACTOR);
+        let (coverage_factor, degrees_of_freedom) = coverage(calibration, name);
         Some(Measured {
             name: name.clone(),
             quantity: Quantity::Parameters(group),
@@ -112,7 +127,7 @@ pub fn results(
             },
             expanded: coverage_factor * covariance[n][n].max(0.0).sqrt(),
             coverage_factor,
-            degrees_of_freedom: budget.and_then(|b| *b.degrees_of_freedom.get(n)?),
+            degrees_of_freedom,
         })
     });
     Some((results.collect::<Option<_>>()?, covariance))
@@ -123,13 +138,14 @@ pub fn terms(calibration: &Calibration) -> Vec<Measured> {
     let measured = |k: usize| {
         let name = Term::parameter_name(k)?;
         let record = calibration.terms.get(&name)?;
+        let (coverage_factor, degrees_of_freedom) = coverage(calibration, &name);
         Some(Measured {
             name,
             quantity: Quantity::Term(Term::of(k)?),
             value: record.value,
-            expanded: COVERAGE_FACTOR * record.sigma?,
-            coverage_factor: COVERAGE_FACTOR,
-            degrees_of_freedom: None,
+            expanded: coverage_factor * record.sigma?,
+            coverage_factor,
+            degrees_of_freedom,
         })
     };
     (0..TERM_PARAMETERS).filter_map(measured).collect()

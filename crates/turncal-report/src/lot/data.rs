@@ -2,6 +2,7 @@
 
 use super::shown::{in_unit, shown, unit_key, verdict};
 use crate::prelude::*;
+use turncal::calibration::Calibration;
 use turncal::imu::InstallationForm;
 use turncal::lot::{Check, ChiSquare, FALSE_ALARM, Lot, Quantity, Row, Statistics, Verdict};
 
@@ -51,6 +52,7 @@ fn unit(lot: &Lot, place: usize, row: &Row) -> Value {
         "name": row.unit.name,
         "meta": row.unit.meta,
         "failure": row.canonical.as_ref().err(),
+        "calibration_verdict": calibration.and_then(Calibration::word),
         "converged": calibration.map(|c| c.converged),
         "nis": calibration.and_then(|c| Some(c.consistency.as_ref()?.all.nis)),
         "warnings": calibration.map(|c| &c.warnings),
@@ -112,8 +114,8 @@ fn chi2(of: Option<ChiSquare>) -> Value {
 }
 
 #[rustfmt::skip]
-const HEADER: [&str; 9] = [
-    "unit", "serial", "date", "quantity", "unit_of_value", "value", "sigma", "apart", "verdict",
+const HEADER: [&str; 10] = [
+    "unit", "serial", "date", "quantity", "unit_of_value", "value", "sigma", "apart", "verdict", "calibration_verdict",
 ];
 
 fn text(of: &Value) -> &str {
@@ -132,7 +134,7 @@ pub fn csv(data: &Value) -> String {
         let meta = |key: &str| text(&unit["meta"][key]);
         let first = [text(&unit["name"]), meta("serial"), meta("date")];
         if !unit["failure"].is_null() {
-            write(&[&first[..], &["", "", "", "", "", "not calibrated"]].concat());
+            write(&[&first[..], &["", "", "", "", "", "not calibrated", ""]].concat());
         }
         for (name, of) in unit["values"].as_object().into_iter().flatten() {
             let [value, sigma] =
@@ -147,6 +149,7 @@ pub fn csv(data: &Value) -> String {
                 &sigma,
                 &apart.to_string(),
                 &text(&of["verdict"]).replace('-', " "),
+                text(&unit["calibration_verdict"]),
             ];
             write(&[&first[..], &rest].concat());
         }

@@ -57,7 +57,7 @@ pub fn units(lot: &Lot) -> Table {
         push("n", |of| count(of.count));
     }
     columns.push("NIS", |(_, row)| nis(row));
-    columns.push("findings", |(_, row)| codes(row));
+    columns.push("calibration", |(_, row)| word_and_codes(row));
     if lot.rows.len() > 2 {
         columns.push("outlier in", move |(place, _)| outlier_in(lot, place));
     }
@@ -83,19 +83,19 @@ fn nis(row: &Row) -> String {
     or_dash(consistency.map(|of| of.all.nis), |nis| value(nis, 0.1))
 }
 
-/// The findings of a calibration that can be used.
-fn codes(row: &Row) -> String {
+/// The verdict and the findings of a calibration that can be used.
+fn word_and_codes(row: &Row) -> String {
     let (Ok(_), Ok(of)) = (&row.canonical, &row.unit.calibrated) else {
         return "not calibrated".to_owned();
     };
-    let mut codes: Vec<&str> = { of.calibration.findings.iter() }
-        .map(|of| of.code.as_str())
-        .collect();
-    codes.dedup();
-    if codes.is_empty() {
+    let word = of.calibration.word().map(|word| word.to_string());
+    let codes = of.calibration.findings.iter().map(|of| of.code.clone());
+    let mut all: Vec<String> = word.into_iter().chain(codes).collect();
+    all.dedup();
+    if all.is_empty() {
         return NONE.to_owned();
     }
-    codes.join(" ")
+    all.join(" ")
 }
 
 fn outlier_in(lot: &Lot, place: usize) -> String {

@@ -7,6 +7,7 @@ mod tests;
 
 use crate::prelude::*;
 use turncal::attitude::to_pitch_roll_heading;
+use turncal::calibration::Word;
 use turncal::imu::{BodyFrame, Sensor};
 use turncal::study::navigation::{INTERVAL, MethodOutlook, Mission, Motion, Outlook, Quantity};
 
@@ -23,8 +24,8 @@ pub struct Navigation<'a> {
     pub calibration: &'a str,
     /// Name of the truth.
     pub truth: &'a str,
-    /// False if the calibration states that its method did not converge.
-    pub converged: bool,
+    /// Verdict of the calibration; `None` if it was not estimated.
+    pub verdict: Option<Word>,
     /// Whether one of the two has error terms in addition to K, E and D, which navigation does not use.
     pub terms: bool,
     /// Definition of the body axes.
@@ -89,15 +90,18 @@ impl Navigation<'_> {
             ("body frame", self.body_frame.words().to_owned()),
             ("start", start.to_owned()),
         ];
-        Facts::new("The navigation", rows)
+        let verdict = self
+            .verdict
+            .map(|word| ("verdict of the calibration", word.to_string()));
+        Facts::new("The navigation", rows.into_iter().chain(verdict))
     }
 
     fn warnings(&self) -> Vec<String> {
         let name = self.calibration;
         let mut warnings = Vec::new();
-        if !self.converged {
+        if self.verdict == Some(Word::Failed) {
             warnings.push(format!(
-                "{name} did not converge, so its σ are meaningless."
+                "The verdict of {name} is FAILED: do not use its values or σ."
             ));
         }
         if self.navigated.outlook.iter().any(|m| m.sigma.is_none()) {
@@ -162,13 +166,16 @@ impl Navigation<'_> {
         if moments.iter().all(|moment| moment.sigma.is_some()) {
             heading.extend(keys.map(|key| format!("sigma_{key}")));
         }
+        heading.extend(self.verdict.map(Word::column));
         let row = |moment: &Outlook| {
             let errors = Quantity::ALL.map(|of| of.error(moment));
             let sigmas = Quantity::ALL.map(|of| of.sigma(moment));
             let numbers = errors.into_iter().chain(sigmas).flatten();
             let numbers = numbers.map(|number| format!("{number:e}"));
             let time = (moment.time / HOUR).to_string();
-            std::iter::once(time).chain(numbers).collect::<Vec<_>>()
+            let verdict = self.verdict.map(|_| "1".to_owned());
+            let cells = std::iter::once(time).chain(numbers).chain(verdict);
+            cells.collect::<Vec<_>>()
         };
         let rows = std::iter::once(heading).chain(moments.iter().map(row));
         rows.map(|row| row.join(",") + "\n").collect()
@@ -187,6 +194,7 @@ impl Navigation<'_> {
         };
         json!({
             "calibration": self.calibration,
+            "calibration_verdict": self.verdict,
             "truth": self.truth,
             "body_frame": self.body_frame,
             "errors": self.only.map_or("both", |sensor| sensor.name()),

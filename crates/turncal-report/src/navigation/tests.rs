@@ -45,7 +45,7 @@ fn document(moments: &[Outlook]) -> Document {
     let navigation = Navigation {
         calibration: "monday",
         truth: "truth",
-        converged: true,
+        verdict: Some(Word::Good),
         terms: false,
         body_frame: BodyFrame::Table,
         only: None,

@@ -5,7 +5,8 @@ mod results;
 use results::{results, two_digits};
 
 use crate::certificate::{
-    AsFound, Certificate, Conformity, Decision, Quantity, dcc, in_words, temperature_words,
+    AsFound, Certificate, Conformity, Decision, Measured, Quantity, dcc, in_words,
+    temperature_words,
 };
 use crate::document::Block;
 use crate::pdf;
@@ -148,6 +149,9 @@ fn method(certificate: &Certificate) -> Facts {
     );
     let how = evaluation(calibration.aiding);
     facts.push("evaluation", format!("{}: {how}", provenance.program));
+    if let Some(word) = calibration.word() {
+        facts.push("verdict", word.to_string());
+    }
     let latitude = provenance.latitude_deg;
     facts.push(
         "data",
@@ -237,7 +241,7 @@ fn verdict(conformity: &Conformity) -> String {
     };
     let risk = all().map(|of| of.risk).fold(0.0, f64::max);
     let mut text = format!(
-        "{first} Decision rule: {}. Largest probability of a wrong decision below: {}.",
+        "{first} Decision rule: {}. Highest risk of a wrong decision in the table below: {}.",
         conformity.rule.words(),
         probability(risk)
     );
@@ -268,11 +272,11 @@ fn limits(conformity: &Conformity) -> Table {
             ParameterKind::Installation | ParameterKind::Bias => 0.0,
         };
         let off = of.off + of.limit.nominal - base;
-        let (found, expanded) = two_digits(off / size, 2.0 * of.sigma / size);
+        let expanded = of.coverage_factor * of.sigma;
+        let (found, expanded) = two_digits(off / size, expanded / size);
         cells![
             in_words(&of.name),
-            value(found, expanded),
-            sigma(expanded),
+            plus_minus(found, expanded),
             format!(
                 "{} ± {}",
                 stated((of.limit.nominal - base) / size),
@@ -283,36 +287,44 @@ fn limits(conformity: &Conformity) -> Table {
             probability(of.risk),
         ]
     });
-    Table::new("Conformity with the specification", columns("parameter | value | U (k = 2) | limits | unit | \
-        decision | risk"))
+    Table::new("Conformity with the specification", columns("parameter | value ± U | limits | unit | decision | risk"))
         .section(rows)
         .note(
-            "In the general installation form. Risk: probability, given this calibration, that the decision is wrong \
+            "In the general installation form; U with the k of the results. Risk: probability, given this calibration, that the decision is wrong \
              (false acceptance or false rejection; JCGM 106, 9.3).",
         )
 }
 
 fn found(as_found: &AsFound) -> Table {
     let rows = as_found.changes.iter().map(|change| {
-        let (unit, size) = change.quantity.unit();
-        let expanded = change.sigma.map(|sigma| 2.0 * sigma / size);
-        let digits = expanded.unwrap_or(0.01);
-        let by = change.left - change.found;
-        let in_u = expanded.filter(|u| *u > 0.0).map(|u| by / size / u);
-        let shown = |of: f64| value(two_digits(of / size, digits).0, digits);
+        let (unit, size) = change.left.quantity.unit();
+        let expanded = change.expanded().map(|u| u / size);
+        let by = change.difference() / size;
+        let in_u = expanded.filter(|u| *u > 0.0).map(|u| by / u);
+        let shown = |of: f64, u: f64| {
+            let digits = if u > 0.0 { u } else { 0.01 };
+            let (of, expanded) = two_digits(of, digits);
+            if u > 0.0 {
+                plus_minus(of, expanded)
+            } else {
+                value(of, digits)
+            }
+        };
+        let measured = |of: &Measured| shown(of.value / size, of.expanded / size);
         cells![
-            in_words(&change.name),
-            shown(change.found),
-            shown(change.left),
-            shown(by),
-            or_dash(expanded, |u| sigma(two_digits(0.0, u).1)),
+            in_words(&change.left.name),
+            measured(&change.found),
+            measured(&change.left),
+            shown(by, expanded.unwrap_or(0.0)),
             unit,
             or_dash(in_u, |x| value(x, 0.1)),
         ]
     });
-    Table::new("As found and as left", columns("parameter | as found | as left | change | U (k = 2) | unit | change/U")).section(rows).note(format!(
-        "As found: parameters from {}, valid when the item was received; as left: parameters from this calibration. \
-         A change beyond its U shows that the item has drifted. Body frame of both: {}.",
+    let columns = columns("parameter | as found ± U | as left ± U | change ± U | unit | change/U");
+    Table::new("As found and as left", columns).section(rows).note(format!(
+        "As found: parameters from {}, valid when the item was received; as left: parameters from this calibration, in \
+         the general installation form. U of a change: root of the sum of the squares of both U. A change beyond its U \
+         shows that the item has drifted. Body frame of both: {}.",
         as_found.earlier,
         as_found.body_frame.words()
     ))
@@ -343,13 +355,5 @@ fn traceability(certificate: &Certificate) -> Facts {
 }
 
 fn remarks(certificate: &Certificate) -> List {
-    let mut items = vec![
-        "The results relate only to the item named above, in the state and under the conditions stated.".to_owned(),
-        "This certificate may not be reproduced except in full without approval of the laboratory.".to_owned(),
-    ];
-    items.extend(certificate.laboratory.remarks.clone());
-    // What to do about them is the laboratory's matter, not the customer's.
-    let findings = certificate.calibration.findings.iter();
-    items.extend(findings.map(|of| format!("From the evaluation: {}.", of.headline().0)));
-    List::new("Remarks", items)
+    List::new("Remarks", certificate.remarks())
 }

@@ -5,7 +5,7 @@ mod record;
 use crate::certificate::document::files;
 use record::{record, with_covariance};
 use turncal::calibration::result::{EQUATION_WITH_TERMS, InputFile, TermRecord};
-use turncal::calibration::{BudgetRecord, ThermalRecord};
+use turncal::calibration::{BudgetRecord, Finding, FindingKind, ThermalRecord, Verdict};
 use turncal::imu::{InstallationForm, PerSensor, ThermalRange};
 use turncal::laboratory::DecisionRule;
 use turncal::lot::Limit;
@@ -224,8 +224,8 @@ fn releases_begin_with_a_letter_as_ptbs_rules_want() {
 fn what_was_found_differs_by_what_has_changed() {
     let certificate = certificate();
     let changes = &certificate.as_found.as_ref().unwrap().changes;
-    let by = |n: usize| changes[n].left - changes[n].found;
-    let now = 1.0 + changes[0].left;
+    let by = |n: usize| changes[n].difference();
+    let now = 1.0 + changes[0].left.value;
     assert!((by(0) / now - 100.0 * PPM).abs() < 1e-3 * PPM, "{}", by(0));
     assert!((1..changes.len()).all(|n| by(n).abs() < 1e-12));
 }
@@ -241,17 +241,21 @@ fn a_guard_band_decides_by_the_uncertainty_and_the_risk_is_that_of_the_other_sid
         (-11.0, Decision::ConditionalFail, Decision::Fail),
         (12.1, Decision::Fail, Decision::Fail),
     ] {
-        assert_eq!(decide(off, sigma, 10.0, GuardBand).0, guarded, "{off}");
         assert_eq!(
-            decide(off, sigma, 10.0, SimpleAcceptance).0,
+            decide(off, (sigma, 2.0), 10.0, GuardBand).0,
+            guarded,
+            "{off}"
+        );
+        assert_eq!(
+            decide(off, (sigma, 2.0), 10.0, SimpleAcceptance).0,
             simple,
             "{off}"
         );
     }
     // Normal distribution beyond 1σ and 2σ: 0.158655, 0.022750.
-    assert!((decide(9.0, sigma, 10.0, GuardBand).1 - 0.158_655).abs() < 1e-6);
-    assert!((decide(8.0, sigma, 10.0, GuardBand).1 - 0.022_750).abs() < 1e-6);
-    assert!((decide(11.0, sigma, 10.0, SimpleAcceptance).1 - 0.158_655).abs() < 1e-6);
+    assert!((decide(9.0, (sigma, 2.0), 10.0, GuardBand).1 - 0.158_655).abs() < 1e-6);
+    assert!((decide(8.0, (sigma, 2.0), 10.0, GuardBand).1 - 0.022_750).abs() < 1e-6);
+    assert!((decide(11.0, (sigma, 2.0), 10.0, SimpleAcceptance).1 - 0.158_655).abs() < 1e-6);
 }
 
 #[test]
@@ -285,4 +289,73 @@ fn a_character_without_a_glyph_is_named_with_its_text() {
     let greek = "Δοκιμή Łódź Журнал ½ µ ″ ≤ ∞ −";
     certificate.laboratory.customer.name = greek.to_owned();
     files(&certificate, Vec::new()).unwrap();
+}
+
+/// k of 2.5 from 7.1 degrees of freedom: U, guard band and change all have it.
+#[test]
+fn a_parameter_has_one_u_and_one_k_in_every_table_and_the_guard_band_is_that_u() {
+    let mut calibration = calibration();
+    let size = calibration.parameters.len();
+    let sigma = calibration.covariance[0][0].sqrt();
+    calibration.budget = Some(BudgetRecord {
+        sources: Vec::new(),
+        degrees_of_freedom: vec![Some(7.1); size],
+        coverage_factor: vec![2.5; size],
+    });
+    let nominal = calibration.provenance.as_ref().unwrap().nominal.gyro[0];
+    let value = calibration.gyro.scale[0] / nominal - 1.0;
+    // 2.2 σ inside the upper limit: more than 2 σ, less than U.
+    let mut limits = specification(value.abs() + 2.2 * sigma / nominal);
+    limits.limits.truncate(1);
+    let earlier = calibration.clone();
+    let certificate = Certificate::new(
+        calibration,
+        digest_of_bytes(b"file"),
+        laboratory(),
+        Some(&limits),
+        Some(("earlier.json", &earlier)),
+    )
+    .unwrap();
+    let decided = &certificate.conformity.as_ref().unwrap().limits[0];
+    assert_eq!(decided.decision, Decision::ConditionalPass);
+    let change = &certificate.as_found.as_ref().unwrap().changes[0];
+    let expanded = certificate.results[0].expanded;
+    assert!((expanded - 2.5 * sigma / nominal).abs() < 1e-9 * expanded);
+    for (name, of, k) in [
+        (
+            "limit",
+            decided.coverage_factor * decided.sigma,
+            decided.coverage_factor,
+        ),
+        ("as left", change.left.expanded, change.left.coverage_factor),
+    ] {
+        assert!(
+            (of / expanded - 1.0).abs() < 1e-9 && k == 2.5,
+            "{name}: {of} {expanded}"
+        );
+    }
+    assert!((change.expanded().unwrap() / expanded - 2f64.sqrt()).abs() < 1e-9);
+}
+
+#[test]
+fn the_xml_has_the_values_as_found_the_verdict_and_the_remarks_in_sentences() {
+    let mut certificate = certificate();
+    let text = "You stated no white noise. Add --noise or run `turncal allan`.".to_owned();
+    let finding = Finding::new(FindingKind::NoiseLearnt, text, serde_json::Value::Null);
+    certificate.calibration.verdict = Some(Verdict::of(std::slice::from_ref(&finding)));
+    certificate.calibration.findings.push(finding);
+    let xml = dcc::write(&certificate);
+    let document = format!("{:?}", crate::certificate::document::document(&certificate));
+    assert_eq!(xml.matches("<dcc:result>").count(), 2);
+    let found = xml.split("Parameters as found").nth(1).unwrap();
+    assert_eq!(found.matches("<si:valueExpandedMU>").count(), 24);
+    for text in [&xml, &document] {
+        for says in [
+            "USE WITH CARE",
+            "The noise of the instrument was estimated from the record",
+        ] {
+            assert!(text.contains(says), "no {says} in {text}");
+        }
+        assert!(!text.contains(" --") && !text.contains('`'), "{text}");
+    }
 }

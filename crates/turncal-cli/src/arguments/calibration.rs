@@ -1,0 +1,42 @@
+//! A calibration whose values a command uses.
+
+use std::path::Path;
+
+use anyhow::{Context, bail};
+
+use turncal::calibration::result::Calibration;
+use turncal::calibration::{Finding, Level};
+use turncal_report::terminal::printable;
+
+/// Reads a calibration, at a temperature in °C if one is given. Refuses one whose verdict is FAILED, or with `force` says
+/// so on standard error.
+pub fn usable(path: &Path, temperature: Option<f64>, force: bool) -> anyhow::Result<Calibration> {
+    let record = turncal_files::read_calibration(path)?;
+    if record.is_failed() {
+        let name = printable(&path.display().to_string());
+        let cause = printable(&cause(&record));
+        if !force {
+            bail!(
+                "{name}: the verdict is FAILED ({cause}), so its values must not be used. Calibrate again; --force \
+                 uses the values anyway"
+            );
+        }
+        tell!("warning: {name}: the verdict is FAILED ({cause}); do not use these values");
+    }
+    match temperature {
+        Some(temperature) => {
+            let there = record.at_temperature(temperature);
+            there.with_context(|| path.display().to_string())
+        }
+        None => Ok(record),
+    }
+}
+
+/// The first finding that makes a calibration fail.
+fn cause(record: &Calibration) -> String {
+    let mut findings = record.findings.iter();
+    match findings.find(|finding| finding.level() == Level::Failed) {
+        Some(finding @ Finding { code, .. }) => format!("{code}: {}", finding.headline().0),
+        None => "it did not converge".to_owned(),
+    }
+}
