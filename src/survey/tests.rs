@@ -352,6 +352,39 @@ mod by_hand {
     }
 
     #[test]
+    fn limits_are_decided_by_a_calibration_and_not_by_a_prediction() {
+        let mut person = Person::new(4);
+        Move::all().take(4).for_each(|next| person.does(next));
+        let early = person.run();
+        let rest = Move::all().skip(26).chain(Move::all().take(12));
+        rest.for_each(|next| person.does(next));
+        let run = person.run();
+        // Limits that the early rows do not decide and all rows are predicted to decide.
+        let cases = [1.0, 1.5, 2.0, 3.0, 4.0].into_iter().map(|wider| {
+            let mut limits = specification();
+            let all = limits.limits.iter_mut();
+            all.for_each(|limit| limit.within *= wider);
+            let mut evaluator = Evaluator::new(Options::default(), Some(limits));
+            let status = evaluator.outlook(&early);
+            let due = evaluator.due(&early, &status).unwrap();
+            evaluator.take(due.calibrate(UNWATCHED));
+            let is_early = evaluator.outlook(&early).is_met();
+            let status = evaluator.outlook(&run);
+            (evaluator, is_early, status)
+        });
+        let is_predicted = |status: &Status| status.expected.as_ref().unwrap().is_met();
+        let mut cases = cases.filter(|(_, is_early, status)| !is_early && is_predicted(status));
+        let (mut evaluator, _, status) = cases.next().unwrap();
+        assert!(!status.is_met() && status.next.is_some());
+        let due = evaluator.due(&run, &status).unwrap();
+        evaluator.take(None);
+        assert!(!evaluator.outlook(&run).is_met());
+        evaluator.take(due.calibrate(UNWATCHED));
+        let status = evaluator.outlook(&run);
+        assert!(status.is_met() && status.next.is_none());
+    }
+
+    #[test]
     #[ignore = "statistical"]
     fn who_does_what_is_said_needs_hardly_more_dwells_than_the_best_of_fifty_orders() {
         let mut ratios = Vec::new();

@@ -426,17 +426,19 @@ fn a_device_with_noise_that_resets_gives_the_values_of_its_rows() {
     device.says(&noise.concat());
     device.says(&(lines[third..2 * third].concat() + &lines[2 * third][..20]));
     let kept = || fs::read_to_string(directory.path().join("kept.csv")).unwrap();
-    while kept().lines().count() < 2 * third {
-        thread::sleep(Duration::from_millis(100));
-    }
+    let wait_for = |lines: usize| {
+        let begun = Instant::now();
+        while kept().lines().count() < lines && begun.elapsed().as_secs() < 60 {
+            thread::sleep(Duration::from_millis(100));
+        }
+    };
+    wait_for(2 * third);
     device.go();
     let mut device = Device::new(&name);
     thread::sleep(Duration::from_secs(2));
     device.says(&[&lines[2 * third][20..], banner, header].concat());
     device.says(&lines[2 * third + 1..].concat());
-    while kept().lines().count() < lines.len() - 1 {
-        thread::sleep(Duration::from_millis(100));
-    }
+    wait_for(lines.len() - 1);
     let ended = Command::new("kill")
         .args(["-TERM", &child.id().to_string()])
         .status();

@@ -20,8 +20,8 @@ use turncal_report::terminal::printable;
 
 /// Interval between redraws of the screen.
 const REDRAW: Duration = Duration::from_millis(250);
-/// Evaluations take at most half of the time, and start at least half a second apart.
-const SHARE: u32 = 2;
+/// Evaluations take at most two thirds of the time, and start at least half a second apart.
+const PAUSE: f64 = 1.5;
 const APART: Duration = Duration::from_millis(500);
 
 /// Rows to follow.
@@ -70,7 +70,7 @@ impl Follow<'_> {
                 if followed.evaluate(known, &mut screen)? {
                     break "the calibration decides every limit";
                 }
-                due = begun + APART.max(begun.elapsed() * SHARE);
+                due = begun + APART.max(begun.elapsed().mul_f64(PAUSE));
             }
         };
         rows.end()?;
