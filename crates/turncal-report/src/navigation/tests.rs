@@ -90,8 +90,8 @@ fn a_row_of_the_csv_has_as_many_numbers_as_the_heading_has_names() {
         .1
         .lines()
         .map(|line| line.split(',').count());
-    assert_eq!(lines.next(), Some(19));
-    assert!(lines.clone().count() == 121 && lines.all(|count| count == 19));
+    assert_eq!(lines.next(), Some(20));
+    assert!(lines.clone().count() == 121 && lines.all(|count| count == 20));
 }
 
 #[test]
