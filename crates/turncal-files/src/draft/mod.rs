@@ -189,11 +189,37 @@ impl Draft {
         }
         let period = self.clock.period.unwrap_or(f64::NAN);
         let of_units = || self.quantities.contradiction(&self.stated, &motion, period);
-        self.contradiction = self.contradiction.take().or_else(of_units);
+        let exchanged = || self.are_exchanged(rows, sheet).then(|| self.exchanged());
+        let contradiction = self.contradiction.clone().or_else(of_units);
+        self.contradiction = contradiction.or_else(exchanged);
         self.quantities.state(&self.stated);
         self.random_walk = self.noise_at_rest(rows, &motion).unwrap_or_default();
         self.offset = rows.offset;
         self.motion = Some(motion);
+    }
+
+    /// Whether the columns of gyros hold gravity, and those of accelerometers its turns, and not as they are named.
+    fn are_exchanged(&self, rows: &RawSamples, sheet: &Sheet) -> bool {
+        let shown = |of: &Quantities| of.units.get(Sensor::Accel).is_shown;
+        let both = |of: &Quantities| Sensor::ALL.iter().all(|&sensor| of.units.get(sensor).is_shown);
+        !shown(&self.quantities) && {
+            let motion = rows.exchanged();
+            let (columns, clock) = (&self.columns, &self.clock);
+            both(&Quantities::find(sheet, columns, clock, rows.whole, &motion))
+        }
+    }
+
+    fn exchanged(&self) -> [String; 3] {
+        let names = PerSensor::from_fn(|sensor| {
+            let names = self.columns.triads.get(sensor).into_iter().flatten();
+            let names = names.map(|column| self.columns.names[*column].as_str());
+            names.collect::<Vec<_>>().join(" ")
+        });
+        [
+            format!("gravity in {} and turns in {}", names.gyro, names.accel),
+            "rates and accelerations, as these columns are named".to_owned(),
+            "Exchange the two triads in the header of the log, or in columns of run.toml.".to_owned(),
+        ]
     }
 
     /// White noise of both triads in the longest dwell, as from `turncal allan`.

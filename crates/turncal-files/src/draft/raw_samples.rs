@@ -47,6 +47,16 @@ impl RawSamples {
         Motion::find(&self.triads, &self.breaks, self.period)
     }
 
+    /// The motion if gyros were accelerometers, and accelerometers gyros.
+    pub fn exchanged(&self) -> Motion {
+        let PerSensor { gyro, accel } = &self.triads;
+        let triads = PerSensor {
+            gyro: accel.clone(),
+            accel: gyro.clone(),
+        };
+        Motion::find(&triads, &self.breaks, self.period)
+    }
+
     /// The axis with mostly negative specific force in the first rows.
     pub fn points_down(&self) -> Option<usize> {
         let accel = &self.triads.accel;
