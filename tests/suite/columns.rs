@@ -135,20 +135,19 @@ fn a_statement_that_rows_contradict_is_refused_and_a_right_one_is_not() {
 }
 
 #[test]
-fn a_rate_at_which_no_unit_fits_is_doubted() {
+fn a_rate_at_which_no_unit_fits_is_refused_with_the_rate_at_which_one_does() {
     let columns = columns();
-    let doubts = |rate: f64| {
+    let at = |rate: f64| {
         let stated = Stated {
             rate_hz: Some(rate),
             ..Stated::default()
         };
-        let opened = opened(table(NAMES, &columns), &stated).unwrap();
-        opened.run.recording.doubts.join("\n")
+        opened(table(NAMES, &columns), &stated)
     };
-    assert_eq!(doubts(100.0), "");
-    let text = doubts(50.0);
+    assert_eq!(at(100.0).unwrap().run.recording.doubts, [""; 0]);
+    let text = at(50.0).unwrap_err().to_string();
     assert!(
-        text.contains("is not clear") && text.contains("--rate"),
+        text.contains("at 50 Hz") && text.contains("Check the rate"),
         "{text}"
     );
 }

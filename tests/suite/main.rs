@@ -33,6 +33,7 @@ mod logs;
 mod lot;
 mod lot_slow;
 mod mat_7_3;
+mod mistaken;
 mod modules;
 mod mounting;
 mod navigate;

@@ -201,11 +201,17 @@ impl Draft {
     /// Whether the columns of gyros hold gravity, and those of accelerometers its turns, and not as they are named.
     fn are_exchanged(&self, rows: &RawSamples, sheet: &Sheet) -> bool {
         let shown = |of: &Quantities| of.units.get(Sensor::Accel).is_shown;
-        let both = |of: &Quantities| Sensor::ALL.iter().all(|&sensor| of.units.get(sensor).is_shown);
+        let both = |of: &Quantities| {
+            Sensor::ALL
+                .iter()
+                .all(|&sensor| of.units.get(sensor).is_shown)
+        };
         !shown(&self.quantities) && {
             let motion = rows.exchanged();
             let (columns, clock) = (&self.columns, &self.clock);
-            both(&Quantities::find(sheet, columns, clock, rows.whole, &motion))
+            both(&Quantities::find(
+                sheet, columns, clock, rows.whole, &motion,
+            ))
         }
     }
 
@@ -218,7 +224,8 @@ impl Draft {
         [
             format!("gravity in {} and turns in {}", names.gyro, names.accel),
             "rates and accelerations, as these columns are named".to_owned(),
-            "Exchange the two triads in the header of the log, or in columns of run.toml.".to_owned(),
+            "Exchange the two triads in the header of the log, or in columns of run.toml."
+                .to_owned(),
         ]
     }
 
