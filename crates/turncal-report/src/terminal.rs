@@ -4,7 +4,7 @@ use textwrap::core::display_width;
 use textwrap::{Options, WordSplitter};
 
 use super::document::{Block, Document, Facts, List, Table};
-use turncal::calibration::{Finding, Level};
+use turncal::calibration::Finding;
 
 /// Minimum width, in characters, of the lines of a broken column heading.
 const HEADING: usize = 9;
@@ -43,12 +43,11 @@ fn titled(document: &Document) -> String {
     format!("{}: {first}", document.title)
 }
 
-/// The first problems with their remedies, as far as space permits; notes without one.
+/// The first problems with their remedies, as far as space permits.
 fn findings(all: &[Finding], width: usize, room: usize) -> Vec<String> {
     let of_one = |finding: &Finding| {
         let (what, next) = finding.headline();
         let code = format!("  {}  ", finding.code);
-        let next = next.filter(|_| finding.level() != Level::Note);
         let next = next.map(|next| format!("{CODE}→ {next}"));
         let next: Vec<String> = next
             .iter()
