@@ -7,6 +7,7 @@ use std::path::Path;
 use super::super::svg;
 use super::super::tests::{Synthetic, synthetic};
 use super::{Report, Truth, document};
+use crate::group::short_name;
 use turncal::calibration::{Method, Options, Problem, UNWATCHED};
 use turncal::imu::InstallationForm;
 use turncal::lot::{Limit, Specification};
@@ -72,4 +73,20 @@ fn a_position_that_every_dwell_is_far_from_is_missing() {
     imu.accel.to_mut().truncate(first);
     made_up.run.recording.table = None;
     assert!(caption(&made_up).contains("positions: x up"));
+}
+
+#[test]
+fn the_correlation_matrix_names_every_row_and_column_in_every_width() {
+    for form in InstallationForm::ALL {
+        let made_up = synthetic(form);
+        let plots = made_up.report().figures();
+        let plot = plots.iter().find(|plot| plot.file == "correlation.svg");
+        for width in svg::WIDTHS {
+            let drawn = svg::draw_at(plot.unwrap(), width);
+            for i in made_up.outcome.estimate.estimated() {
+                let name = format!("\n{}\n", short_name(form, i));
+                assert_eq!(drawn.matches(&name).count(), 2, "{name} at {width}");
+            }
+        }
+    }
 }

@@ -20,7 +20,7 @@ const TAG: f64 = 0.88;
 /// Maximum fraction of the width of a panel for names at the ends of lines.
 const LABELS: f64 = 0.3;
 /// Minimum distance between upward names.
-const CLOSEST: f64 = 11.0;
+const CLOSEST: f64 = 10.0;
 
 /// A panel with its scales.
 type Scaled<'p> = (&'p Panel, (Scale, Scale));
@@ -56,7 +56,12 @@ pub fn draw(on: &mut Canvas, plot: &Plot, width: u32) -> u32 {
         for (column, ((panel, (x, y)), keys)) in row.iter().zip(&keys).enumerate() {
             let (mut across, origin) = (across[column], panel_width * column as f64);
             let is_places = !panel.x.places.is_empty();
-            let names = Names::new(x, is_places, across.1 - across.0, f64::from(plot.height));
+            let mut length = across.1 - across.0;
+            if panel.square {
+                // The names below it take some of its height.
+                length = length.min(0.9 * (bottom - top - above));
+            }
+            let names = Names::new(x, is_places, length, f64::from(plot.height));
             let title = LINE * f64::from(u8::from(!panel.x.title.is_empty()));
             let mut down = (top + above, bottom - BOTTOM - names.height() - title);
             if panel.square {
