@@ -10,7 +10,6 @@ use crate::calibration::checks::event::Event;
 use crate::calibration::checks::form::form_test;
 use crate::calibration::checks::innovation::consistency;
 use crate::calibration::checks::observability::AttitudeCovariance;
-use crate::calibration::checks::quality::{Residuals, residuals};
 use crate::calibration::checks::recordings::RecordingDifference;
 use crate::calibration::checks::rounding::by_rounding;
 use crate::calibration::checks::term::{TermEvidence, is_shown};
@@ -81,8 +80,6 @@ pub struct Outcome {
     pub terms: Vec<TermEvidence>,
     /// Differences between recordings that the data show beyond the stated ones.
     pub differences: Vec<RecordingDifference>,
-    /// Residuals of gravity and turns over the whole recording.
-    pub(in crate::calibration) residuals: Residuals,
     /// Findings that a calibration engineer must know before using the figures.
     pub findings: Vec<Finding>,
     /// The iterations from which all this follows.
@@ -126,11 +123,6 @@ impl Outcome {
         if let Some(last) = history.last_mut() {
             (last.estimate, last.sigma) = (estimate.vector(), estimate.sigma());
         }
-        let at = Linearisation {
-            triads: estimate.triads,
-            ..solved.estimate.clone()
-        };
-        let residuals = residuals(problem, &at, |_| true)?;
         let (attitude_sigma, attitude_covariance) = last_attitude(&weighed, &script.priors);
         let prior_sigma = as_stated.model.prior_sigma;
         let (off, gravity_sigma) = gravity(filtered, posterior);
@@ -152,7 +144,6 @@ impl Outcome {
             passes: solved.passes.clone(),
             converged: solved.converged,
             findings: Vec::new(),
-            residuals,
             estimate,
             prior_sigma,
             attitude_sigma,

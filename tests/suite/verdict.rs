@@ -55,7 +55,10 @@ fn real_records_fit_on_one_screen() {
     ] {
         if let Some(directory) = shared(name) {
             let run = directory.join("run.toml");
-            one_screen(&run.to_string_lossy(), "GOOD");
+            // Gravity is stated 1 Gal too small there.
+            let is_doubted = name == "real-mems-lot-0";
+            let word = if is_doubted { "USE WITH CARE" } else { "GOOD" };
+            one_screen(&run.to_string_lossy(), word);
         }
     }
 }

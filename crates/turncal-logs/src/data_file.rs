@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::table::Table;
-use turncal_input::{FileError, suggestion};
+use turncal_input::{FileError, nearest};
 
 /// A readable file, with the path by which `run.toml` and messages name it.
 #[derive(Debug, Clone, PartialEq)]
@@ -83,8 +83,6 @@ impl DataFile {
 
     /// Error for a file that the system does not open.
     pub fn refused(&self, error: &io::Error) -> FileError {
-        let otherwise =
-            "Names in run.toml are relative to run.toml; correct the name or add the file.";
         let beside = if error.kind() == io::ErrorKind::NotFound {
             beside(self)
         } else {
@@ -92,7 +90,11 @@ impl DataFile {
         };
         let name = self.file_name().map(|name| name.to_string_lossy());
         let names = beside.iter().map(String::as_str);
-        let advice = suggestion(&name.unwrap_or_default(), names, otherwise);
+        let nearest = nearest(&name.unwrap_or_default(), names);
+        let asked = nearest.map_or_else(String::new, |name| format!("Did you mean `{name}`? "));
+        let advice = format!(
+            "{asked}Names in run.toml are relative to run.toml; correct the name or add the file."
+        );
         FileError::io(self, "open the file", error, &advice)
     }
 }

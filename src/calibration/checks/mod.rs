@@ -38,7 +38,7 @@ pub fn findings(problem: &Problem, outcome: &Outcome) -> Vec<Finding> {
     let remarks = problem.remarks().into_iter();
     remarks
         .chain(unexplained::not_converged(outcome))
-        .chain(unexplained::absurd(&outcome.residuals))
+        .chain(unexplained::absurd(problem, outcome))
         .chain(latitude::earth_rate(problem, outcome))
         .chain(outcome.events.iter().map(Event::finding))
         .chain(settling::settles(problem, outcome))

@@ -140,6 +140,21 @@ impl FromIterator<f64> for Spread {
 }
 
 impl Outcome {
+    /// Residuals of gravity and turns over the whole recording.
+    ///
+    /// # Errors
+    /// [`CalibrationError`] if the problem is not the one of the outcome.
+    pub(in crate::calibration) fn residuals(
+        &self,
+        problem: &Problem,
+    ) -> Result<Residuals, CalibrationError> {
+        let at = Linearisation {
+            triads: self.estimate.triads,
+            ..self.solved.estimate.clone()
+        };
+        residuals(problem, &at, |_| true)
+    }
+
     /// The quality of this calibration of a problem.
     ///
     /// Cross-validation solves the chain without the rows of every other dwell, at the linearisation point of the last pass.
@@ -163,7 +178,7 @@ impl Outcome {
         // Only the instrument differs, not the attitudes.
         let nominal = nominal(self.solved.estimate.initial_attitudes.clone());
         let before = residuals(problem, &nominal, |_| true)?;
-        let all = self.residuals.clone();
+        let all = self.residuals(problem)?;
         Ok(Quality::new(all, held_out.transpose()?, before))
     }
 }
@@ -251,7 +266,7 @@ fn first_attitude(
 }
 
 /// Residuals in the evaluated dwells and in the turns that end in them.
-pub fn residuals(
+fn residuals(
     problem: &Problem,
     at: &Linearisation,
     judged: impl Fn(usize) -> bool,

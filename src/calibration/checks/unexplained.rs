@@ -2,9 +2,8 @@
 
 use serde_json::json;
 
-use crate::calibration::checks::quality::Residuals;
 use crate::calibration::sizes::LOG_SIGMA;
-use crate::calibration::{Finding, FindingKind as Kind, Innovation, Nis, Outcome};
+use crate::calibration::{Finding, FindingKind as Kind, Innovation, Nis, Outcome, Problem};
 use crate::number::three_digits;
 use crate::statistics::chi_square_limit;
 
@@ -40,7 +39,8 @@ pub fn not_converged(outcome: &Outcome) -> Option<Finding> {
 
 /// The finding, if residuals are absurd for any sensor, whatever explains them: half of the dwells or moves are off by
 /// more than a hundredth of gravity or of a turn.
-pub fn absurd(residuals: &Residuals) -> Option<Finding> {
+pub fn absurd(problem: &Problem, outcome: &Outcome) -> Option<Finding> {
+    let residuals = outcome.residuals(problem).ok()?;
     let names = [
         "|f| − g is {} of gravity",
         "the direction of gravity after a move is off by {} of a turn",

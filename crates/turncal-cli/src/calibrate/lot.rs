@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::bail;
 
+use super::not_met::NotMet;
 use super::{Calibrate, write_report};
 use crate::arguments::OfLog;
 use crate::terminal::{Runs, piece_by_piece, show};
@@ -175,17 +176,6 @@ pub fn deliver(
         Some((Word::Fail, words)) => Err(NotMet::Specification(words).into()),
         _ => Ok(()),
     }
-}
-
-/// It was calibrated, but what was asked of it is not met.
-#[derive(Debug, thiserror::Error)]
-pub enum NotMet {
-    /// Limits of a specification.
-    #[error("the specification is not met: {0}")]
-    Specification(String),
-    /// Parameters of --require.
-    #[error("{0}")]
-    Required(String),
 }
 
 /// A name for each unit: its run directory, or its file if that is not called run.toml, with as many parent directories

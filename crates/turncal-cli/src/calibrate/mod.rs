@@ -6,10 +6,11 @@ mod incoming;
 mod lines;
 mod lot;
 mod merge;
+mod not_met;
 mod screen;
 
-pub use lot::NotMet;
 pub use merge::Merge;
+pub use not_met::NotMet;
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};

@@ -342,8 +342,14 @@ fn the_xml_has_the_values_as_found_the_verdict_and_the_remarks_in_sentences() {
     let mut certificate = certificate();
     let text = "You stated no white noise. Add --noise or run `turncal allan`.".to_owned();
     let finding = Finding::new(FindingKind::NoiseLearnt, text, serde_json::Value::Null);
-    certificate.calibration.verdict = Some(Verdict::of(std::slice::from_ref(&finding)));
-    certificate.calibration.findings.push(finding);
+    let event = Finding::new(
+        FindingKind::MoveWrong,
+        String::new(),
+        serde_json::Value::Null,
+    );
+    let findings = [finding, event];
+    certificate.calibration.verdict = Some(Verdict::of(&findings));
+    certificate.calibration.findings.extend(findings);
     let xml = dcc::write(&certificate);
     let document = format!("{:?}", crate::certificate::document::document(&certificate));
     assert_eq!(xml.matches("<dcc:result>").count(), 2);
