@@ -43,7 +43,7 @@ pub fn not_converged(outcome: &Outcome) -> Option<Finding> {
 pub fn absurd(residuals: &Residuals) -> Option<Finding> {
     let names = [
         "|f| − g is {} of gravity",
-        "the direction of gravity after a move is off by {} of a turn",
+        "the direction of gravity after a move is wrong by {} of a turn",
     ];
     let pairs = names.into_iter().zip(residuals.middle());
     let worst = pairs.filter_map(|(name, middle)| middle.map(|middle| (name, middle)));
