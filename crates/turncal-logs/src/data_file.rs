@@ -84,7 +84,7 @@ impl DataFile {
     /// Error for a file that the system does not open.
     pub fn refused(&self, error: &io::Error) -> FileError {
         let otherwise =
-            "Names in run.toml are relative to run.toml; correct the name or add the file.";
+            "Correct the name or add the file; names in run.toml are relative to run.toml.";
         let beside = if error.kind() == io::ErrorKind::NotFound {
             beside(self)
         } else {
